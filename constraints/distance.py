@@ -1,0 +1,94 @@
+"""Distance between two points, constant or a function of time.
+
+    d     = x_a - x_b
+    Phi   = (d.d - L^2) / (2 L0)            (1)  [m], ground frame; L0 = L(0) is a constant
+    Phi_x = [ d^T, -d^T ] / L0              (2)
+    Phi_t = -L Ld / L0                      (3)
+    gamma = (dd.dd - Ld^2 - L Ldd) / L0     (4)  dd = d/dt d
+
+Singular where x_a = x_b: a distance of zero is a Spherical joint.
+"""
+
+import numpy as np
+
+from ..bodies import rotation_matrix
+from ..errors import InvalidConstraint
+from ..markers import Point
+from ..motion import Motion
+from ..primitive import Primitive
+
+
+class Distance(Primitive):
+    """Keep a distance between a point of one body and a point of another: a massless rod with two ball ends.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene.
+    point_a, point_b : array_like (3,), m
+        The points in the bodies' own frames.
+    length : float, or three functions of time (L, Ld, Ldd), m; optional
+        The distance kept, > 0; None takes the distance of the bodies as they stand now.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If the length is not positive and finite (at t = 0, for a function), or a point or body is wrong.
+    """
+
+    rows = 1
+    markers = (Point("a"), Point("b"))
+
+    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), length=None, name=""):
+        super().__init__(a, b, (point_a, point_b), name)
+        if length is None:
+            ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
+            length = np.linalg.norm(ends[0] - ends[1])
+        self.length = Motion.wrap(length, f"{self.name}: length")
+        initial = self.length.value(0.0)[0] if self.rheonomic else self.length
+        if not initial > 0.0:
+            raise InvalidConstraint(
+                f"{self.name}: the length is {initial:g} m and must be positive; "
+                "to hold two points together use Spherical."
+            )
+        self.scale = initial
+
+    @property
+    def rheonomic(self):
+        """Whether length is a function of time."""
+        return isinstance(self.length, Motion)
+
+    def parameters(self):
+        """(L, Ld, Ldd, L0)."""
+        return (*([self.length] if self.rheonomic else [self.length, 0.0, 0.0]), self.scale)
+
+    @staticmethod
+    def phi(x, par, t, out):
+        """Eq. (1)."""
+        d0, d1, d2 = x[0] - x[3], x[1] - x[4], x[2] - x[5]
+        out[0] = (d0 * d0 + d1 * d1 + d2 * d2 - par[0] * par[0]) / (2.0 * par[3])
+
+    @staticmethod
+    def jacobian(x, par, t, out):
+        """Eq. (2)."""
+        scale = 1.0 / par[3]
+        for i in range(3):
+            d = (x[i] - x[3 + i]) * scale
+            out[0, i] = d
+            out[0, 3 + i] = -d
+
+    @staticmethod
+    def phi_t(x, par, t, out):
+        """Eq. (3)."""
+        out[0] = -par[0] * par[1] / par[3]
+
+    @staticmethod
+    def gamma(x, xd, par, t, out):
+        """Eq. (4)."""
+        d0, d1, d2 = xd[0] - xd[3], xd[1] - xd[4], xd[2] - xd[5]
+        out[0] = (d0 * d0 + d1 * d1 + d2 * d2 - par[1] * par[1] - par[0] * par[2]) / par[3]
+
+
+def _ground_point(body, s):
+    return body.position + (rotation_matrix(body.orientation) @ s if body.dimension != 3 else 0.0)

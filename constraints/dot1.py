@@ -1,0 +1,78 @@
+"""Dot-1: the cosine of the angle between a direction of each body, constant or a function of time.
+
+    Phi   = a.b - c                (1)  [-]
+    Phi_x = [ b^T, a^T ]           (2)
+    Phi_t = -cd                    (3)
+    gamma = 2 ad.bd - cdd          (4)
+
+Singular where a and b are parallel (c = 1 or -1): two Dot1 rows with directions across make axes parallel.
+"""
+
+from ..errors import InvalidConstraint
+from ..markers import Vector
+from ..motion import Motion
+from ..primitive import Primitive
+
+
+class Dot1(Primitive):
+    """Keep the cosine of the angle between two body-fixed directions; by default keep them perpendicular.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene.
+    axis_a, axis_b : array_like (3,)
+        The directions in the bodies' own frames; scaled to unit length.
+    value : float, or three functions of time (c, cd, cdd); default 0
+        The cosine, between -1 and 1 (exclusive: there the row is singular).
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If an axis is missing or zero, or the value is no cosine.
+    """
+
+    rows = 1
+    markers = (Vector("a"), Vector("b"))
+
+    def __init__(self, a, b, *, axis_a=None, axis_b=None, value=0.0, name=""):
+        super().__init__(a, b, (axis_a, axis_b), name)
+        self.value = Motion.wrap(value, f"{self.name}: value")
+        initial = self.value.value(0.0)[0] if self.rheonomic else self.value
+        if not -1.0 < initial < 1.0:
+            raise InvalidConstraint(
+                f"{self.name}: value is the cosine of an angle and must lie between -1 and 1, got {initial:g}; "
+                "to make two axes parallel, keep each of two directions across one of them perpendicular to the other."
+            )
+
+    @property
+    def rheonomic(self):
+        """Whether value is a function of time."""
+        return isinstance(self.value, Motion)
+
+    def parameters(self):
+        """(c, cd, cdd)."""
+        return (self.value,) if self.rheonomic else (self.value, 0.0, 0.0)
+
+    @staticmethod
+    def phi(x, par, t, out):
+        """Eq. (1)."""
+        out[0] = x[0] * x[3] + x[1] * x[4] + x[2] * x[5] - par[0]
+
+    @staticmethod
+    def jacobian(x, par, t, out):
+        """Eq. (2)."""
+        for i in range(3):
+            out[0, i] = x[3 + i]
+            out[0, 3 + i] = x[i]
+
+    @staticmethod
+    def phi_t(x, par, t, out):
+        """Eq. (3)."""
+        out[0] = -par[1]
+
+    @staticmethod
+    def gamma(x, xd, par, t, out):
+        """Eq. (4)."""
+        out[0] = 2.0 * (xd[0] * xd[3] + xd[1] * xd[4] + xd[2] * xd[5]) - par[2]

@@ -1,0 +1,75 @@
+"""Dot-2: the component, along a direction of a, of the vector from a point of a to a point of b.
+
+    d     = x_b - x_a
+    Phi   = a.d - c                     (1)  [m]; c constant or a function of time
+    Phi_x = [ d^T, -a^T, a^T ]          (2)  for (a, x_a, x_b)
+    Phi_t = -cd                         (3)
+    gamma = 2 ad.dd - cdd               (4)
+
+Never singular by itself.
+"""
+
+from ..markers import Point, Vector
+from ..motion import Motion
+from ..primitive import Primitive
+
+
+class Dot2(Primitive):
+    """Keep the offset of a point of b from a point of a, measured along an axis of a.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene.
+    axis_a : array_like (3,)
+        The direction in a's frame; scaled to unit length.
+    point_a, point_b : array_like (3,), m
+        The points in the bodies' own frames.
+    value : float, or three functions of time (c, cd, cdd), m; default 0
+        The offset kept.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If the axis is missing or zero, or a point, value or body is wrong.
+    """
+
+    rows = 1
+    markers = (Vector("a"), Point("a"), Point("b"))
+
+    def __init__(self, a, b, *, axis_a=None, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), value=0.0, name=""):
+        super().__init__(a, b, (axis_a, point_a, point_b), name)
+        self.value = Motion.wrap(value, f"{self.name}: value")
+
+    @property
+    def rheonomic(self):
+        """Whether value is a function of time."""
+        return isinstance(self.value, Motion)
+
+    def parameters(self):
+        """(c, cd, cdd)."""
+        return (self.value,) if self.rheonomic else (self.value, 0.0, 0.0)
+
+    @staticmethod
+    def phi(x, par, t, out):
+        """Eq. (1)."""
+        out[0] = x[0] * (x[6] - x[3]) + x[1] * (x[7] - x[4]) + x[2] * (x[8] - x[5]) - par[0]
+
+    @staticmethod
+    def jacobian(x, par, t, out):
+        """Eq. (2)."""
+        for i in range(3):
+            out[0, i] = x[6 + i] - x[3 + i]
+            out[0, 3 + i] = -x[i]
+            out[0, 6 + i] = x[i]
+
+    @staticmethod
+    def phi_t(x, par, t, out):
+        """Eq. (3)."""
+        out[0] = -par[1]
+
+    @staticmethod
+    def gamma(x, xd, par, t, out):
+        """Eq. (4)."""
+        out[0] = 2.0 * (xd[0] * (xd[6] - xd[3]) + xd[1] * (xd[7] - xd[4]) + xd[2] * (xd[8] - xd[5])) - par[2]

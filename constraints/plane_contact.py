@@ -1,0 +1,62 @@
+"""Point on plane: a point of a stays in a plane of b, on either side (two-sided).
+
+    d     = x_a - x_b,  n = normal of b in the ground frame
+    Phi   = n.d                       (1)  [m]
+    Phi_x = [ n^T, -n^T, d^T ]        (2)  for (x_a, x_b, n)
+    gamma = 2 nd.dd                   (3)
+
+Never singular by itself.
+"""
+
+from ..markers import Point, Vector
+from ..primitive import Primitive
+
+
+class PlaneContact(Primitive):
+    """Keep a point of one body in a plane fixed to another, without friction and without lifting off.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        a carries the point, b the plane.
+    point_a : array_like (3,), m
+        The point, in a's frame.
+    point_b : array_like (3,), m
+        A point of the plane, in b's frame.
+    normal_b : array_like (3,)
+        Normal of the plane, in b's frame; scaled to unit length.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If the normal is missing or zero, or a point or body is wrong.
+
+    Notes
+    -----
+    The force on a is -lam n: the plane pushes where lam < 0.
+    """
+
+    rows = 1
+    markers = (Point("a"), Point("b"), Vector("b", "normal_b"))
+
+    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), normal_b=None, name=""):
+        super().__init__(a, b, (point_a, point_b, normal_b), name)
+
+    @staticmethod
+    def phi(x, par, t, out):
+        """Eq. (1)."""
+        out[0] = x[6] * (x[0] - x[3]) + x[7] * (x[1] - x[4]) + x[8] * (x[2] - x[5])
+
+    @staticmethod
+    def jacobian(x, par, t, out):
+        """Eq. (2)."""
+        for i in range(3):
+            out[0, i] = x[6 + i]
+            out[0, 3 + i] = -x[6 + i]
+            out[0, 6 + i] = x[i] - x[3 + i]
+
+    @staticmethod
+    def gamma(x, xd, par, t, out):
+        """Eq. (3)."""
+        out[0] = 2.0 * (xd[6] * (xd[0] - xd[3]) + xd[7] * (xd[1] - xd[4]) + xd[8] * (xd[2] - xd[5]))

@@ -1,0 +1,58 @@
+"""Spherical joint: a point of each body coincide.
+
+    Phi   = x_a - x_b         (1)  [m], 3 rows, ground frame
+    Phi_x = [ I, -I ]         (2)
+    gamma = 0                 (3)  what remains is the markers' own acceleration
+
+Never singular by itself.
+"""
+
+from ..markers import Point
+from ..primitive import Primitive
+
+
+class Spherical(Primitive):
+    """Keep a point of one body on a point of another; three rows, three rotations stay free.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene.
+    point_a, point_b : array_like (3,), m
+        The points in the bodies' own frames.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If a point is not three finite numbers, or the bodies are the same or of different scenes.
+
+    Notes
+    -----
+    The force on b is the multiplier itself, in the ground frame: -Phi_r^T lam = lam.
+    """
+
+    rows = 3
+    markers = (Point("a"), Point("b"))
+
+    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), name=""):
+        super().__init__(a, b, (point_a, point_b), name)
+
+    @staticmethod
+    def phi(x, par, t, out):
+        """Eq. (1)."""
+        for i in range(3):
+            out[i] = x[i] - x[3 + i]
+
+    @staticmethod
+    def jacobian(x, par, t, out):
+        """Eq. (2)."""
+        for i in range(3):
+            out[i, i] = 1.0
+            out[i, 3 + i] = -1.0
+
+    @staticmethod
+    def gamma(x, xd, par, t, out):
+        """Eq. (3)."""
+        for i in range(3):
+            out[i] = 0.0

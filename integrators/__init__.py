@@ -1,0 +1,13 @@
+"""Integrators, one file each; a new file in this folder is found by itself."""
+
+from .._discovery import export_all
+
+__all__ = export_all(__name__, __path__, globals(), "Integrator")
+__all__.append("registered")
+
+
+def registered():
+    """Return every integrator class known, built in or plugged in."""
+    from ..integrator import registered as known
+
+    return tuple(known().values())

@@ -1,0 +1,57 @@
+"""tsdyn: constrained rigid-body dynamics on the constraint manifold, by Haug's tangent-space ODE."""
+
+from pathlib import Path as _Path
+
+_here = _Path(__file__).parent
+if not (_here / "constraints").is_dir():  # a checkout: they stand beside this folder
+    __path__.append(str(_here.parent))
+
+from . import constraints, integrators, testing  # noqa: E402
+from .bodies import Body, PointMass  # noqa: E402
+from .errors import (  # noqa: E402
+    InconsistentState,
+    InvalidArgument,
+    InvalidBody,
+    InvalidConstraint,
+    MissingDependency,
+    RedundantConstraints,
+    SingularConfiguration,
+    Status,
+    StepFailure,
+    TsdynError,
+)
+from .markers import Parameters, Point, Vector  # noqa: E402
+from .motion import Motion  # noqa: E402
+from .primitive import Primitive  # noqa: E402
+from .scene import Scene  # noqa: E402
+from .simulate import simulate  # noqa: E402
+from .solution import Solution, State  # noqa: E402
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Body",
+    "InconsistentState",
+    "InvalidArgument",
+    "InvalidBody",
+    "InvalidConstraint",
+    "MissingDependency",
+    "Motion",
+    "Parameters",
+    "Point",
+    "PointMass",
+    "Primitive",
+    "RedundantConstraints",
+    "Scene",
+    "SingularConfiguration",
+    "Solution",
+    "State",
+    "Status",
+    "StepFailure",
+    "TsdynError",
+    "Vector",
+    "constraints",
+    "integrators",
+    "simulate",
+    "testing",
+]

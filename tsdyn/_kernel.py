@@ -1,0 +1,241 @@
+"""How kernels are compiled and called: the only file that uses Numba's decorators and code generation.
+
+Kernels are compiled without Numba's runtime, so a kernel that would allocate or count references does not compile.
+What is chosen at run time (a primitive, a method, a formulation) is called by address, all arguments being 64-bit
+integers, floats and addresses of arrays; no new scene or plug-in ever recompiles a caller.
+
+With TSDYN_DEBUG=1 in the environment nothing is compiled: every kernel is the plain Python function that it was
+written as, addresses are indices into a table, and a debugger or a print works anywhere.
+"""
+
+import os
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.ccallback import CFunc
+from numba.core.errors import RequireLiteralValue
+from numba.extending import intrinsic
+from numba.np.arrayobj import populate_array
+
+from ._cache import cache_of
+
+DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
+_OPTIONS = {"error_model": "numpy", "_nrt": False}
+_table = []  # debug mode: what an address stands for
+
+
+def kernel(function):
+    """Compile a function that other kernels call; it is compiled into each of them."""
+    return function if DEBUG else numba.njit(**_OPTIONS)(function)
+
+
+def entry(function):
+    """Compile a function that Python calls with arrays; cached, and run without the GIL."""
+    if DEBUG:
+        return function
+    dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
+    dispatcher._cache = cache_of(function)
+    return dispatcher
+
+
+class Callback:
+    """A cached kernel that others call by `address`; compiled or loaded when the address is first asked for.
+
+    The signature has a letter an argument: i an integer, d a float, p the address of an array. It returns an integer.
+    """
+
+    _letters = {"i": types.int64, "d": types.float64, "p": types.int64}
+
+    def __init__(self, function, signature, result="i", allocates=False):
+        self.py_func = getattr(function, "py_func", function)
+        self.options = {**_OPTIONS, "_nrt": allocates}
+        self.signature = signature
+        self.result = result
+        self._address = None
+
+    @property
+    def address(self):
+        """The address to hand to a kernel."""
+        if self._address is None:
+            self._address = self._register() if DEBUG else self._compile()
+        return self._address
+
+    def _register(self):
+        _table.append(self.py_func)
+        return len(_table) - 1
+
+    def _compile(self):
+        arguments = tuple(self._letters[c] for c in self.signature)
+        self._cfunc = CFunc(self.py_func, (arguments, self._letters[self.result]), locals={}, options=self.options)
+        self._cfunc._cache = cache_of(self.py_func)
+        self._cfunc.compile()
+        return self._cfunc.address
+
+
+def callback(signature, result="i"):
+    """Decorate a function to make it a `Callback`."""
+    return lambda function: Callback(function, signature, result)
+
+
+def specialised(template, name, owner, **constants):
+    """Copy a function under another name, with some of its globals replaced by constants or kernels.
+
+    The copy claims to stand where `owner` does, so that it is cached, and its cache entry replaced, with the owner.
+    """
+    code = template.__code__.replace(co_filename=owner.__code__.co_filename, co_name=name, co_qualname=name)
+    copy = type(template)(code, {**template.__globals__, **constants}, name)
+    copy.__qualname__, copy.__module__ = name, owner.__module__
+    return copy
+
+
+_i64, _f64 = ir.IntType(64), ir.DoubleType()
+_vector = types.Array(types.float64, 1, "C")
+_matrix = types.Array(types.float64, 2, "C")
+_integers = types.Array(types.int64, 1, "C")
+
+
+def _array(context, builder, kind, pointer, shape):
+    """An array over memory that somebody else owns."""
+    array = context.make_array(kind)(context, builder)
+    size = context.get_constant(types.intp, 8)
+    strides = [size]
+    for length in reversed(shape[1:]):
+        strides.insert(0, builder.mul(strides[0], length))
+    data = builder.bitcast(pointer, array.data.type)
+    populate_array(array, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None, parent=None)
+    return array._getvalue()
+
+
+def _literal(value):
+    if not isinstance(value, types.IntegerLiteral):
+        raise RequireLiteralValue("the size of a stack array is a constant")
+    return value.literal_value
+
+
+@intrinsic(prefer_literal=True)
+def stack(typing, n):
+    """A vector of n floats on the stack, n a constant; its content is undefined."""
+    length = _literal(n)
+
+    def generate(context, builder, signature, arguments):
+        pointer = cgutils.alloca_once(builder, ir.ArrayType(_f64, length))
+        return _array(context, builder, _vector, pointer, [context.get_constant(types.intp, length)])
+
+    return _vector(n), generate
+
+
+@intrinsic(prefer_literal=True)
+def stack2(typing, n, m):
+    """An n x m matrix on the stack, both constants; its content is undefined."""
+    shape = _literal(n), _literal(m)
+
+    def generate(context, builder, signature, arguments):
+        pointer = cgutils.alloca_once(builder, ir.ArrayType(_f64, shape[0] * shape[1]))
+        return _array(context, builder, _matrix, pointer, [context.get_constant(types.intp, s) for s in shape])
+
+    return _matrix(n, m), generate
+
+
+def _viewer(kind):
+    @intrinsic
+    def view(typing, address, *shape):
+        def generate(context, builder, signature, arguments):
+            pointer = builder.inttoptr(arguments[0], _f64.as_pointer())
+            parts = cgutils.unpack_tuple(builder, arguments[1]) if len(arguments) == 2 else list(arguments[1:])
+            return _array(context, builder, kind, pointer, list(parts))
+
+        return kind(types.int64, types.StarArgTuple([types.intp] * len(shape))), generate
+
+    return view
+
+
+vector = _viewer(_vector)
+matrix = _viewer(_matrix)
+integers = _viewer(_integers)
+
+
+@intrinsic
+def address_of(typing, value):
+    """The address of a copy of a named tuple of arrays, valid until the calling kernel returns."""
+
+    def generate(context, builder, signature, arguments):
+        model = context.data_model_manager[signature.args[0]]
+        pointer = cgutils.alloca_once_value(builder, model.as_data(builder, arguments[0]))
+        return builder.ptrtoint(pointer, _i64)
+
+    return types.int64(value), generate
+
+
+def loader(example):
+    """Make the kernel that reads a named tuple of example's type back from its address."""
+    if DEBUG:
+        return lambda value: value
+    kind = numba.typeof(example)
+
+    @intrinsic
+    def load(typing, address):
+        def generate(context, builder, signature, arguments):
+            model = context.data_model_manager[kind]
+            pointer = builder.inttoptr(arguments[0], model.get_data_type().as_pointer())
+            return model.load_from_data_pointer(builder, pointer)
+
+        return kind(types.int64), generate
+
+    return load
+
+
+def caller(signature, result="i"):
+    """Make the kernel that calls a `Callback` of this signature: call(address, *arguments), arrays passed as they are."""
+    if DEBUG:
+        return lambda address, *arguments: _table[address](*arguments)
+    native = {"i": _i64, "d": _f64, "p": _i64}
+
+    @intrinsic
+    def call(typing, address, *arguments):
+        wanted = [
+            given if isinstance(given, types.Array) else Callback._letters[letter]
+            for letter, given in zip(signature, arguments, strict=True)
+        ]
+
+        def generate(context, builder, sig, values):
+            given = cgutils.unpack_tuple(builder, values[1])
+            words = []
+            for kind, value in zip(wanted, given, strict=True):
+                if isinstance(kind, types.Array):
+                    data = context.make_array(kind)(context, builder, value=value).data
+                    value = builder.ptrtoint(data, _i64)
+                words.append(value)
+            target = ir.FunctionType(native[result], [native[c] for c in signature]).as_pointer()
+            return builder.call(builder.inttoptr(values[0], target), words)
+
+        return Callback._letters[result](types.int64, types.StarArgTuple(wanted)), generate
+
+    return call
+
+
+if DEBUG:
+
+    def stack(n):
+        """A vector of n floats."""
+        return np.zeros(n)
+
+    def stack2(n, m):
+        """An n x m matrix."""
+        return np.zeros((n, m))
+
+    def vector(array, n):
+        """The array itself: in debug mode nothing is passed by address."""
+        return array[:n] if array.ndim == 1 else array.reshape(-1)[:n]
+
+    def matrix(array, n, m):
+        """The array as an n x m matrix."""
+        return array.reshape(-1)[: n * m].reshape(n, m)
+
+    integers = vector
+
+    def address_of(value):
+        """The value itself."""
+        return value

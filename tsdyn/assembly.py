@@ -1,0 +1,66 @@
+"""Phi, Phi_q, Phi_t and gamma of a whole system: one call by address for each kind of constraint it has."""
+
+from ._kernel import entry, kernel
+from .motion import call_motion
+from .primitive import call_kind
+from .system import COUNT, FIRST_INT, FIRST_REAL, GAMMA, JACOBIAN, PHI, PHI_T, REALS
+
+
+@kernel
+def set_time(s, t):
+    """Write value, rate and acceleration of every motion at t into its places."""
+    for i in range(s.motions.shape[0]):
+        place = s.motions[i, 3]
+        for j in range(3):
+            s.reals[place + j] = call_motion(s.motions[i, j], t)
+
+
+@kernel
+def _run(s, column, q, qd, t, out):
+    for i in range(s.kinds.shape[0]):
+        if s.kinds[i, column] != 0:
+            table, reals = s.table[s.kinds[i, FIRST_INT] :], s.reals[s.kinds[i, FIRST_REAL] :]
+            call_kind(s.kinds[i, column], s.kinds[i, COUNT], s.kinds[i, REALS], table, reals, q, qd, t, out)
+
+
+@kernel
+def constraints(s, q, t, Phi):
+    """Phi (m,), Eq. 1; time has been set."""
+    _run(s, PHI, q, q, t, Phi)
+
+
+@kernel
+def constraint_jacobian(s, q, t, Phi_q):
+    """Phi_q (m, n); entries off the segments are left alone: zero them once."""
+    _run(s, JACOBIAN, q, q, t, Phi_q)
+
+
+@kernel
+def time_derivative(s, q, t, Phi_t):
+    """Phi_t (m,); rows that don't depend on time are left alone: zero them once."""
+    _run(s, PHI_T, q, q, t, Phi_t)
+
+
+@kernel
+def acceleration_bias(s, q, qd, t, gamma):
+    """gamma (m,), Eq. 3: Phi_q qdd + gamma = 0."""
+    _run(s, GAMMA, q, qd, t, gamma)
+
+
+@kernel
+def is_rheonomic(s):
+    """Whether any row depends on time."""
+    for i in range(s.kinds.shape[0]):
+        if s.kinds[i, PHI_T] != 0:
+            return True
+    return False
+
+
+@entry
+def evaluate_constraints(s, q, qd, t, Phi, Phi_q, Phi_t, gamma):
+    """Fill Phi (m,), Phi_q (m, n), Phi_t (m,) and gamma (m,); the last three are zero on entry."""
+    set_time(s, t)
+    constraints(s, q, t, Phi)
+    constraint_jacobian(s, q, t, Phi_q)
+    time_derivative(s, q, t, Phi_t)
+    acceleration_bias(s, q, qd, t, gamma)

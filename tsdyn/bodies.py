@@ -1,0 +1,186 @@
+"""Rigid bodies, point masses and the ground: what the user sets, checked when it is set."""
+
+import numpy as np
+
+from .errors import InvalidBody
+from .markers import vector3
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+class Ground:
+    """The inertial frame, as a body that constraints attach to."""
+
+    dimension = 0
+    name = "ground"
+
+    def __init__(self, scene):
+        self.scene = scene
+
+    position = property(lambda self: np.zeros(3))
+    orientation = property(lambda self: IDENTITY.copy())
+
+    def __repr__(self):
+        return "<ground>"
+
+
+class _Attribute:
+    """A checked attribute of a body; setting it tells the scene that its packed numbers are out of date."""
+
+    def __init__(self, check, what):
+        self.check, self.__doc__ = check, what
+
+    def __set_name__(self, owner, name):
+        self.name = name
+
+    def __get__(self, body, owner=None):
+        return self if body is None else body.values[self.name].copy()
+
+    def __set__(self, body, value):
+        body.values[self.name] = self.check(value, body)
+        body.scene.touch()
+
+
+def _mass(value, body):
+    try:
+        mass = np.float64(value)
+    except (TypeError, ValueError):
+        mass = np.float64("nan")
+    if not (np.isfinite(mass) and mass > 0.0):
+        raise InvalidBody(f"{body.name}: mass must be a positive finite number of kg, got {value!r}.")
+    return mass
+
+
+def _inertia(value, body):
+    try:
+        given = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        given = np.empty(0)
+    if given.shape == (3,):
+        given = np.diag(given)
+    if given.shape != (3, 3) or not np.isfinite(given).all():
+        raise InvalidBody(
+            f"{body.name}: inertia must be 3 principal values or a symmetric 3 x 3 matrix of finite kg m^2, got {value!r}."
+        )
+    scale = np.abs(given).max()
+    if np.abs(given - given.T).max() > 1e-12 * scale:
+        raise InvalidBody(f"{body.name}: the inertia matrix is not symmetric; J - J^T is up to {np.abs(given - given.T).max():.3g}.")
+    given = (given + given.T) / 2.0
+    principal = np.linalg.eigvalsh(given)
+    if principal[0] < -1e-12 * scale or scale == 0.0:
+        raise InvalidBody(
+            f"{body.name}: the principal moments of inertia {principal} kg m^2 must not be negative, nor all zero; "
+            "a body without extent is scene.add_point_mass(...)."
+        )
+    if principal[2] > (principal[0] + principal[1]) * (1.0 + 1e-9):
+        raise InvalidBody(
+            f"{body.name}: no body has the principal moments {principal} kg m^2: the largest exceeds the sum of the "
+            "others (triangle inequality). Are products of inertia or units mixed up?"
+        )
+    return given
+
+
+def _orientation(value, body):
+    if hasattr(value, "as_quat"):  # scipy.spatial.transform.Rotation has the scalar last
+        value = np.roll(np.asarray(value.as_quat(), dtype=float), 1, axis=-1)
+    try:
+        p = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        p = np.empty(0)
+    if p.shape != (4,) or not np.isfinite(p).all():
+        raise InvalidBody(
+            f"{body.name}: orientation must be four finite Euler parameters (e0, e1, e2, e3), scalar first, or one "
+            f"scipy Rotation, got {value!r}."
+        )
+    length = np.sqrt(p @ p)
+    if abs(length - 1.0) > 1e-6:
+        raise InvalidBody(
+            f"{body.name}: the Euler parameters {p} have length {length:.9g} instead of 1; divide them by it"
+            + (", or give a rotation: they are zero." if length == 0.0 else ".")
+        )
+    return p / length
+
+
+def _vector(what, unit):
+    return lambda value, body: vector3(value, f"{body.name}: {what} ({unit})", InvalidBody)
+
+
+class PointMass:
+    """A particle: three coordinates, no orientation. Made by `Scene.add_point_mass`."""
+
+    dimension = 3
+    mass = _Attribute(_mass, "Mass, kg.")
+    position = _Attribute(_vector("position", "m"), "Position at the start, ground frame, m, shape (3,).")
+    velocity = _Attribute(_vector("velocity", "m/s"), "Velocity at the start, ground frame, m/s, shape (3,).")
+
+    def __init__(self, scene, index, name, **values):
+        self.scene, self.index, self.name, self.values = scene, index, name, {}
+        for attribute, value in values.items():
+            setattr(self, attribute, value)
+
+    @property
+    def orientation(self):
+        """A point mass has none."""
+        raise InvalidBody(f"{self.name}: a point mass has no orientation; use scene.add_body for a rigid body.")
+
+    @property
+    def q(self):
+        """Coordinates at the start, shape (3,) or (7,)."""
+        return self.values["position"]
+
+    @property
+    def qd(self):
+        """Velocities at the start."""
+        return self.values["velocity"]
+
+    def place(self, q, qd):
+        """Take over coordinates and velocities as the values at the start."""
+        self.position, self.velocity = q, qd
+
+    def __repr__(self):
+        return f"<{type(self).__name__} {self.name!r}>"
+
+
+class Body(PointMass):
+    """A rigid body: centroid r and Euler parameters p, seven coordinates. Made by `Scene.add_body`."""
+
+    dimension = 7
+    inertia = _Attribute(_inertia, "Inertia about the centroid, body frame, kg m^2, shape (3, 3).")
+    orientation = _Attribute(_orientation, "Euler parameters at the start, body to ground, scalar first, shape (4,).")
+    angular_velocity = _Attribute(
+        _vector("angular velocity", "rad/s"), "Angular velocity at the start, body frame, rad/s, shape (3,)."
+    )
+
+    @property
+    def q(self):
+        """Coordinates (r, p) at the start, shape (7,)."""
+        return np.concatenate((self.values["position"], self.values["orientation"]))
+
+    @property
+    def qd(self):
+        """Velocities (rd, pd), pd = G(p)^T omega' / 2, shape (7,)."""
+        p, w = self.values["orientation"], self.values["angular_velocity"]
+        return np.concatenate((self.values["velocity"], 0.5 * (transform_g(p).T @ w)))
+
+    def place(self, q, qd):
+        """Take over coordinates and velocities as the values at the start."""
+        self.position, self.velocity, self.orientation = q[:3], qd[:3], q[3:]
+        self.angular_velocity = 2.0 * (transform_g(q[3:]) @ qd[3:])
+
+
+def transform_g(p):
+    """G(p) = [-e, -e~ + e0 I], shape (3, 4), or (..., 3, 4) for p of shape (..., 4)."""
+    e0, e1, e2, e3 = np.moveaxis(np.asarray(p), -1, 0)
+    rows = [[-e1, e0, e3, -e2], [-e2, -e3, e0, e1], [-e3, e2, -e1, e0]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def rotation_matrix(p):
+    """A(p), homogeneous, shape (3, 3), or (..., 3, 3) for p of shape (..., 4)."""
+    e0, e1, e2, e3 = np.moveaxis(np.asarray(p), -1, 0)
+    rows = [
+        [e0 * e0 + e1 * e1 - e2 * e2 - e3 * e3, 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)],
+        [2 * (e1 * e2 + e0 * e3), e0 * e0 - e1 * e1 + e2 * e2 - e3 * e3, 2 * (e2 * e3 - e0 * e1)],
+        [2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), e0 * e0 - e1 * e1 - e2 * e2 + e3 * e3],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

@@ -1,0 +1,91 @@
+"""What can go wrong: exceptions for what is refused before a run, a status for how a run ended."""
+
+from enum import IntEnum
+
+
+class TsdynError(Exception):
+    """Any error that tsdyn raises on purpose; the message says what is wrong, where, and how to mend it."""
+
+
+class InvalidArgument(TsdynError, ValueError):
+    """An argument that is neither a body nor a constraint has a wrong value, type or shape."""
+
+
+class InvalidBody(TsdynError, ValueError):
+    """A body's mass, inertia, pose or velocity is impossible, or the body belongs to another scene."""
+
+
+class InvalidConstraint(TsdynError, ValueError):
+    """A constraint's geometry, bodies or kernels are impossible."""
+
+
+class InconsistentState(TsdynError, ValueError):
+    """Positions or velocities break a constraint; the message names it and its residual."""
+
+
+class RedundantConstraints(TsdynError, ValueError):
+    """Rows of Phi_q depend on each other; the message names them."""
+
+
+class SingularConfiguration(TsdynError, ArithmeticError):
+    """The equations of motion have no unique solution here: Phi_q loses rank, or D^T M D is singular."""
+
+
+class MissingDependency(TsdynError, ImportError):
+    """An optional package is needed for this and is not installed."""
+
+
+class StepFailure(TsdynError, ArithmeticError):
+    """A run ended early; raised by `Solution.raise_if_failed`, with the solution so far as `.solution`."""
+
+    def __init__(self, message, solution=None):
+        super().__init__(message)
+        self.solution = solution
+
+
+class Status(IntEnum):
+    """How a run ended, or the stop of one slice of it; `sentence` says it, `remedy` what to do."""
+
+    SUCCESS = 0
+    NEWTON_FAILED = 1
+    NOT_FINITE = 2
+    SINGULAR = 3
+    MASS_SINGULAR = 4
+    MAX_STEPS = 5
+    INTERRUPTED = 6
+    SLICE_DONE = 7
+
+    @property
+    def sentence(self):
+        """What happened, without the place."""
+        return _SENTENCES[self][0]
+
+    @property
+    def remedy(self):
+        """What to try."""
+        return _SENTENCES[self][1]
+
+
+_SENTENCES = {
+    Status.SUCCESS: ("The run reached the end of the interval.", ""),
+    Status.NEWTON_FAILED: (
+        "Newton's method for the position constraints (Eq. 29) did not converge, not even on a fresh chart.",
+        "Take a smaller step.",
+    ),
+    Status.NOT_FINITE: (
+        "A number stopped being finite.",
+        "Look for a motion, a force or a plug-in that returns inf or nan here, or take a smaller step.",
+    ),
+    Status.SINGULAR: (
+        "The constraint Jacobian Phi_q has lost rank: this is a singular configuration.",
+        "Start elsewhere, or remove the constraint that has become dependent.",
+    ),
+    Status.MASS_SINGULAR: (
+        "The reduced mass matrix D^T M D is not positive definite: a direction that the constraints leave free "
+        "carries no inertia.",
+        "Give the body inertia about its free axis, or add the constraint that holds it.",
+    ),
+    Status.MAX_STEPS: ("The run reached max_steps.", "Raise max_steps, or take a larger step."),
+    Status.INTERRUPTED: ("The run was interrupted.", "Go on with simulate(scene, (t, t_end), state=solution.state)."),
+    Status.SLICE_DONE: ("A slice of the run is done.", ""),
+}

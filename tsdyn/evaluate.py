@@ -1,0 +1,126 @@
+"""What the solver sees at one state, in plain NumPy, exactly as the paper writes it: `scene.evaluate(q, qd, t)`."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .assembly import evaluate_constraints
+from .bodies import transform_g
+from .errors import InvalidArgument, SingularConfiguration
+
+
+class Evaluation(NamedTuple):
+    """Everything in the equations of motion at one state; n coordinates, m rows."""
+
+    Phi: np.ndarray  # (m,) constraints, Eq. 1
+    Phi_q: np.ndarray  # (m, n) their Jacobian
+    Phi_t: np.ndarray  # (m,) their explicit time derivative
+    gamma: np.ndarray  # (m,) Phi_q qdd + gamma = 0, Eq. 3
+    M: np.ndarray  # (n, n) mass matrix
+    Q_A: np.ndarray  # (n,) applied forces
+    S: np.ndarray  # (n,) velocity terms, on the right-hand side
+    multipliers: np.ndarray  # (m,) M qdd + Phi_q^T lam = Q_A + S
+    qdd: np.ndarray  # (n,) accelerations
+
+
+def evaluate(scene, q=None, qd=None, t=0.0):
+    """Evaluate constraints, masses, forces, multipliers and accelerations at one state.
+
+    Parameters
+    ----------
+    q, qd : array_like (n,), optional
+        Positions and velocities; default the start values of the bodies. They need not satisfy the constraints.
+    t : float, s
+
+    Returns
+    -------
+    Evaluation
+        Named tuple of dense arrays: Phi, Phi_q, Phi_t, gamma, M, Q_A, S, multipliers, qdd.
+
+    Raises
+    ------
+    InvalidArgument
+        If q or qd is not n finite numbers, or t is not finite.
+    SingularConfiguration
+        If multipliers and accelerations are not unique there.
+
+    Notes
+    -----
+    Haug 2018, Eqs. 1-4. Multipliers and accelerations solve [M, Phi_q^T; Phi_q, 0] (qdd, lam) = (Q_A + S, -gamma).
+    """
+    system = scene.system
+    start = scene.start
+    q = state_vector(start[0] if q is None else q, start[0].size, "q")
+    qd = state_vector(start[1] if qd is None else qd, start[0].size, "qd")
+    if not np.isfinite(t):
+        raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
+    Phi, Phi_q, Phi_t, gamma = constraint_arrays(system, q, qd, t)
+    M, Q_A, S = mass_matrix(system, q), applied_forces(system, q), velocity_forces(system, q, qd)
+    m, n = Phi_q.shape
+    kkt = np.block([[M, Phi_q.T], [Phi_q, np.zeros((m, m))]])
+    try:
+        solution = equilibrated_solve(kkt, np.concatenate((Q_A + S, -gamma)))
+    except np.linalg.LinAlgError as error:
+        raise SingularConfiguration(
+            "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the "
+            "constraints leave free carries no inertia."
+        ) from error
+    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A, S, solution[n:], solution[:n])
+
+
+def state_vector(value, n, what):
+    """Return n finite floats as an array."""
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (n,) or not np.isfinite(array).all():
+        raise InvalidArgument(f"{what} must be {n} finite numbers, one for each coordinate, got shape {array.shape}.")
+    return array
+
+
+def equilibrated_solve(A, b):
+    """Solve a symmetric system scaled to unit rows; LinAlgError where it is singular to working precision."""
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(A).max(axis=1), 1e-300))
+    scaled = A * scale[:, None] * scale
+    if A.size and np.linalg.cond(scaled) > 1e14:
+        raise np.linalg.LinAlgError
+    return np.linalg.solve(scaled, b * scale) * scale
+
+
+def constraint_arrays(system, q, qd, t):
+    """Phi, Phi_q, Phi_t and gamma as the kernels give them."""
+    system = system._replace(reals=system.reals.copy())  # the motions' places are written to
+    m, n = system.segments.shape[0], q.size
+    Phi, Phi_q, Phi_t, gamma = np.zeros(m), np.zeros((m, n)), np.zeros(m), np.zeros(m)
+    evaluate_constraints(system, q, qd, float(t), Phi, Phi_q, Phi_t, gamma)
+    return Phi, Phi_q, Phi_t, gamma
+
+
+def mass_matrix(system, q):
+    """M: m I on r and 4 G^T J' G on p."""
+    M = np.zeros((q.size, q.size))
+    for (at, length), mass, J in zip(system.bodies, system.mass, system.inertia, strict=True):
+        M[at : at + 3, at : at + 3] = mass * np.eye(3)
+        if length == 7:
+            G = transform_g(q[at + 3 : at + 7])
+            M[at + 3 : at + 7, at + 3 : at + 7] = 4.0 * G.T @ J.reshape(3, 3) @ G
+    return M
+
+
+def applied_forces(system, q):
+    """Q_A: gravity."""
+    Q = np.zeros(q.size)
+    for (at, _), mass in zip(system.bodies, system.mass, strict=True):
+        Q[at : at + 3] = mass * system.gravity
+    return Q
+
+
+def velocity_forces(system, q, qd):
+    """S: 8 Gd^T J' Gd p on p."""
+    S = np.zeros(q.size)
+    for (at, length), J in zip(system.bodies, system.inertia, strict=True):
+        if length == 7:
+            Gd = transform_g(qd[at + 3 : at + 7])
+            S[at + 3 : at + 7] = 8.0 * Gd.T @ J.reshape(3, 3) @ Gd @ q[at + 3 : at + 7]
+    return S

@@ -1,0 +1,219 @@
+"""Consistent initial conditions: checked, projected when they nearly hold, or found by `scene.assemble`."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import qr
+
+from .errors import InconsistentState, RedundantConstraints, SingularConfiguration
+from .evaluate import constraint_arrays, mass_matrix
+
+RANK_TOL = 1e-10  # of a row of Phi_q, scaled to unit length, after the rows it depends on are taken out
+
+ROUNDING = 2e-16
+
+
+@dataclass(frozen=True)
+class AssemblyReport:
+    """What `scene.assemble` did.
+
+    Attributes
+    ----------
+    moved : float
+        Largest change of a coordinate: m for positions, 1 for Euler parameters.
+    residual : float
+        Largest |Phi| left.
+    velocity_changed : float
+        Largest change of a velocity coordinate.
+    velocity_residual : float
+        Largest |Phi_q qd + Phi_t| left.
+    iterations : int
+    """
+
+    moved: float
+    residual: float
+    velocity_changed: float
+    velocity_residual: float
+    iterations: int
+
+
+def check_rank(scene, Phi_q):
+    """Refuse dependent rows of Phi_q, by name."""
+    m = Phi_q.shape[0]
+    if m == 0:
+        return
+    lengths = np.linalg.norm(Phi_q, axis=1)
+    names = scene.row_names()
+    if (lengths == 0.0).any():
+        row = names[int(np.argmin(lengths))]
+        raise SingularConfiguration(
+            f"the row of {row} in Phi_q is zero in this configuration: the constraint is singular here. "
+            "Start from another configuration, or use a constraint that is regular here."
+        )
+    scaled = Phi_q / lengths[:, None]
+    _, R, order = qr(scaled.T, mode="economic", pivoting=True)
+    size = np.abs(np.diag(R))
+    rank = int((size > RANK_TOL * size[0]).sum())
+    if rank == m:
+        return
+    kept, dropped = order[:rank], order[rank:]
+    stories = []
+    for row in sorted(dropped):
+        weights, *_ = np.linalg.lstsq(scaled[kept].T, scaled[row], rcond=None)
+        partners = sorted(kept[np.abs(weights) > 1e-6])
+        stories.append(f"  {names[row]} depends on " + (", ".join(names[i] for i in partners[:8]) or "nothing else"))
+    raise RedundantConstraints(
+        f"{m - rank} of the {m} constraint rows are redundant, Phi_q has rank {rank}:\n"
+        + "\n".join(stories)
+        + "\nRemove the rows that say nothing new, or use a joint with fewer rows."
+    )
+
+
+def consistent(scene, system, q, qd, t, tol):
+    """Check positions and velocities against the constraints, then remove what rounding is left. Returns (q, qd)."""
+    Phi, Phi_q, Phi_t, _ = constraint_arrays(system, q, qd, t)
+    _demand(scene, Phi, tol * (1.0 + np.abs(q).max()), "position", "Phi")
+    check_rank(scene, Phi_q)
+    _demand(scene, Phi_q @ qd + Phi_t, tol * (1.0 + np.abs(qd).max()), "velocity", "Phi_q qd + Phi_t")
+    if not Phi.size:
+        return q, qd
+    for _ in range(3):  # what is exact to rounding is left alone: a projection would only add noise
+        if np.abs(Phi).max() <= ROUNDING * (1.0 + np.abs(q).max()):
+            break
+        q = q - _least(Phi_q, Phi)
+        Phi, Phi_q, Phi_t, _ = constraint_arrays(system, q, qd, t)
+    for _ in range(2):
+        residual = Phi_q @ qd + Phi_t
+        if np.abs(residual).max() <= ROUNDING * (1.0 + np.abs(qd).max()):
+            break
+        qd = qd - _least(Phi_q, residual)
+    return q, qd
+
+
+def _demand(scene, residual, tol, level, formula):
+    bad = np.flatnonzero(~(np.abs(residual) <= tol))
+    if bad.size == 0:
+        return
+    names = scene.row_names()
+    worst = sorted(bad, key=lambda i: -abs(residual[i]))
+    lines = [f"  {names[i]}: {formula} = {residual[i]:.6g}" for i in worst[:8]]
+    if bad.size > 8:
+        lines.append(f"  ... and {bad.size - 8} more rows")
+    raise InconsistentState(
+        f"the initial {level} breaks {bad.size} constraint row{'s' if bad.size > 1 else ''} (allowed: {tol:.2g}):\n"
+        + "\n".join(lines)
+        + f"\nCorrect the bodies' {'poses' if level == 'position' else 'velocities'}, or call scene.assemble() to move "
+        "them to the nearest consistent ones."
+    )
+
+
+def _least(Phi_q, residual):
+    """The smallest change dq with Phi_q dq = residual."""
+    return np.linalg.lstsq(Phi_q, residual, rcond=None)[0]
+
+
+def assemble(scene, tol=1e-12, fixed=(), t=0.0):
+    """Move the bodies to the nearest consistent positions, then to the nearest consistent velocities.
+
+    Parameters
+    ----------
+    tol : float
+        Largest |Phi| accepted at the end, relative to 1 + max |q|.
+    fixed : sequence of Body
+        Bodies whose pose (not velocity) must stay as it is.
+    t : float, s
+        The time at which constraints that depend on time are met.
+
+    Returns
+    -------
+    AssemblyReport
+        `.moved`, `.residual` and more; the bodies hold the new values.
+
+    Raises
+    ------
+    InconsistentState
+        If the constraints can't be met; names the rows that are left over. The bodies are as before.
+    SingularConfiguration, RedundantConstraints
+        If rows of Phi_q vanish or depend on each other at the configuration found.
+
+    Notes
+    -----
+    Gauss-Newton steps, smallest in the kinetic-energy metric, with rotations of at most half a radian a step and
+    halved until |Phi| falls; the velocity correction is the smallest in kinetic energy.
+    """
+    system = scene.system
+    q_start, qd_start = scene.start
+    q, qd = q_start.copy(), qd_start.copy()
+    held = np.zeros(q.size, bool)
+    for body in fixed:
+        at = int(system.bodies[body.index, 0])
+        held[at : at + body.dimension] = True
+    free = ~held
+    Phi, Phi_q, Phi_t, _ = constraint_arrays(system, q, qd, t)
+    moved_rows = np.abs(Phi_q[:, free]).max(axis=1, initial=0.0) > 0.0
+    iterations = 0
+    size = np.linalg.norm(Phi)
+    for iterations in range(1, 101):
+        if not Phi.size or np.abs(Phi).max() <= 1e-15 * (1.0 + np.abs(q).max()):
+            break
+        step = np.zeros(q.size)
+        step[free] = _smallest(_metric(system, q)[np.ix_(free, free)], Phi_q[np.ix_(moved_rows, free)], -Phi[moved_rows])
+        rigid = [slice(at + 3, at + 7) for at, length in system.bodies if length == 7]
+        turn = max((2.0 * np.linalg.norm(step[p]) for p in rigid), default=0.0)
+        factor = min(1.0, 0.5 / turn) if turn > 0.0 else 1.0
+        improved = False
+        for _ in range(12):
+            trial = q + factor * step
+            for p in rigid:
+                trial[p] /= np.linalg.norm(trial[p])
+            trial_arrays = constraint_arrays(system, trial, qd, t)
+            if np.linalg.norm(trial_arrays[0]) < size:
+                improved = True
+                break
+            factor /= 2.0
+        if not improved:
+            break
+        q, (Phi, Phi_q, Phi_t, _) = trial, trial_arrays
+        size = np.linalg.norm(Phi)
+    _demand_assembled(scene, Phi, tol * (1.0 + np.abs(q).max()), iterations)
+    check_rank(scene, Phi_q)
+    M = _metric(system, q)
+    for _ in range(2):
+        qd = qd + _smallest(M, Phi_q, -(Phi_q @ qd + Phi_t))
+    scene.place(q, qd)
+    return AssemblyReport(
+        moved=float(np.abs(q - q_start).max()),
+        residual=float(np.abs(Phi).max(initial=0.0)),
+        velocity_changed=float(np.abs(qd - qd_start).max()),
+        velocity_residual=float(np.abs(Phi_q @ qd + Phi_t).max(initial=0.0)),
+        iterations=iterations,
+    )
+
+
+def _metric(system, q):
+    """M with the direction of p, and axes without inertia, made regular."""
+    M = mass_matrix(system, q)
+    for (at, length), J in zip(system.bodies, system.inertia, strict=True):
+        if length == 7:
+            c = 4.0 * (J[0] + J[4] + J[8]) / 3.0
+            p = q[at + 3 : at + 7]
+            M[at + 3 : at + 7, at + 3 : at + 7] += c * np.outer(p, p) + 1e-3 * c * np.eye(4)
+    return M
+
+
+def _smallest(M, Phi_q, residual):
+    """The change smallest in the metric M with Phi_q dq = residual, in the least-squares sense."""
+    L = np.linalg.cholesky(M)
+    scaled = np.linalg.solve(L, Phi_q.T).T
+    return np.linalg.solve(L.T, np.linalg.lstsq(scaled, residual, rcond=1e-12)[0])
+
+
+def _demand_assembled(scene, Phi, tol, iterations):
+    bad = np.flatnonzero(~(np.abs(Phi) <= tol))
+    if bad.size:
+        names = scene.row_names()
+        rows = ", ".join(f"{names[i]} ({Phi[i]:.3g})" for i in sorted(bad, key=lambda i: -abs(Phi[i]))[:8])
+        raise InconsistentState(
+            f"no configuration that meets all constraints was found in {iterations} iterations; left over: {rows}. "
+            "Bring the bodies nearer to an assembled pose, or drop a constraint that contradicts the others."
+        )

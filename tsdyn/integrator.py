@@ -1,0 +1,73 @@
+"""What an integrator is: a small object that holds its settings and names the kernel that makes a step."""
+
+from types import MappingProxyType
+
+import numpy as np
+
+from .errors import InvalidArgument
+from .stepping import nystrom_step, runge_kutta_step
+
+_registry = {}
+
+
+class Integrator:
+    """Base class of all methods; one file each.
+
+    A method gives, for a second-order system vdd = f(t, v, vd) and for a first-order one (the Maggi/Kane form), a step
+    kernel (see tsdyn.stepping) and the numbers that the kernel reads.
+
+    Attributes
+    ----------
+    order : int
+        Order of the error of v and vd at fixed time.
+    step : float, s
+        The fixed step.
+    """
+
+    order = 0
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        if cls.order:
+            _registry[cls.__name__.lower()] = cls
+
+    def __init__(self, step):
+        self.step = positive(step, f"{type(self).__name__}: step (s)")
+
+    def kernel(self, first_order):
+        """Return (step kernel, its numbers (float64), floats of memory it needs for systems of sizes nx, ny)."""
+        raise NotImplementedError
+
+    def __repr__(self):
+        return f"{type(self).__name__}(step={self.step:g})"
+
+
+class ExplicitNystrom(Integrator):
+    """A method that is a `NystromTableau`, with the Runge-Kutta tableau of its first-order equivalent."""
+
+    tableau = None
+    first_order = None
+
+    def kernel(self, first_order):
+        """The tableau, packed, and the kernel that steps by it."""
+        tableau = self.first_order if first_order else self.tableau
+        stages = len(tableau.c)
+        if first_order:
+            return runge_kutta_step, tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny)
+        return nystrom_step, tableau.packed(), lambda nx, ny: (stages + 2) * nx
+
+
+def registered():
+    """Return every integrator class known, by its name in lower case."""
+    return MappingProxyType(_registry)
+
+
+def positive(value, what):
+    """Return a positive finite float, or raise InvalidArgument."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not (np.isfinite(number) and number > 0.0):
+        raise InvalidArgument(f"{what} must be a positive finite number, got {value!r}.")
+    return number

@@ -1,0 +1,56 @@
+"""The Maggi/Kane equations, the baseline that drifts: a first-order system in (w, q) (Haug 2018, Eqs. 17-18).
+
+    D^T M D wd = D^T (M U B gamma + Q_A + S),   qd = D w - U B Phi_t
+
+q is integrated as it stands and nothing puts it back on Phi(q) = 0. D, B, V and U are those of the tangent-space form.
+"""
+
+from ._kernel import callback, vector
+from .assembly import set_time
+from .chart import inspect, new_chart, tangent_map
+from .newton import OK
+from .null_space import project, reduced_acceleration, reduced_mass, velocities
+from .stepping import ACCELERATE, PLACE
+from .workspace import PLACEMENTS, load
+
+
+@callback(PLACE)
+def place(context, t, q):
+    """Take the positions q as they are: Phi_q, B, D and the factor of D^T M D. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    set_time(s, t)
+    w.counters[PLACEMENTS] += 1
+    w.q[:] = vector(q, w.q.size)
+    status = tangent_map(s, w, t)
+    return reduced_mass(s, w) if status == OK else status
+
+
+@callback(ACCELERATE)
+def accelerate(context, t, velocity, wd, qd):
+    """Take the kinematic velocities w at the place last taken: qd and wd. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    velocities(s, w, t, vector(velocity, w.v.size))
+    status = reduced_acceleration(s, w, t, vector(wd, w.v.size))
+    vector(qd, w.q.size)[:] = w.qd
+    return status
+
+
+@callback("p")
+def check(context):
+    """Reason to choose a new V, or zero."""
+    return inspect(load(context).work, False)
+
+
+@callback("pdpppp")
+def start_chart(context, t, q, velocity, wd, qd):
+    """Choose U and V anew at the present q; w = V^T qd, wd = V^T qdd. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    set_time(s, t)
+    status = new_chart(s, w, t)
+    vector(q, w.q.size)[:] = w.q
+    vector(qd, w.q.size)[:] = w.qd
+    project(w, vector(velocity, w.v.size), vector(wd, w.v.size))
+    return status

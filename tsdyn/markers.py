@@ -1,0 +1,161 @@
+"""Markers: the points, vectors and Euler parameters of a body on which constraints are written.
+
+    Point       x = r + A(p) s    xd = rd + (A s)_p pd    at qdd = 0: xdd = 2 A(pd) s
+    Vector      x = A(p) s        xd = (A s)_p pd                     xdd = 2 A(pd) s
+    Parameters  x = p             xd = pd                             xdd = 0
+
+x is in the ground frame, s in the body frame. On the ground x = s, and nothing moves; a point mass has r only.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._kernel import kernel, stack
+from .errors import InvalidBody, InvalidConstraint
+from .rotation import rotate, rotate_gradient, rotate_rate
+
+POINT, VECTOR, PARAMETERS = 0, 1, 2  # codes in kernels
+
+
+@dataclass(frozen=True)
+class Marker:
+    """What one slot of a primitive is attached to: body "a" or "b", and the argument that places it there."""
+
+    body: str
+    argument: str = ""
+    code = POINT
+    size = 3
+    prefix = "point_"
+
+    def __post_init__(self):
+        if self.body not in ("a", "b"):
+            raise InvalidConstraint(f"a marker belongs to body 'a' or 'b', not to {self.body!r}.")
+        if not self.argument:
+            object.__setattr__(self, "argument", self.prefix + self.body)
+
+    def coordinates(self, body, value, where):
+        """Check the body-frame coordinates that a user gave, return them as an array (3,)."""
+        return vector3(value, f"{where}: {self.argument}", InvalidConstraint)
+
+
+class Point(Marker):
+    """A point of a body, by its coordinates in the body frame, m."""
+
+    def coordinates(self, body, value, where):
+        """Check the coordinates; a point mass has no other point than itself."""
+        value = super().coordinates(body, value, where)
+        if body.dimension == 3 and value.any():
+            raise InvalidConstraint(f"{where}: {self.argument} must be (0, 0, 0) on the point mass {body.name!r}.")
+        return value
+
+
+class Vector(Marker):
+    """A direction of a body, by its components in the body frame; scaled to unit length."""
+
+    code = VECTOR
+    prefix = "axis_"
+
+    def coordinates(self, body, value, where):
+        """Check and normalise the direction."""
+        value = super().coordinates(body, value, where)
+        _needs_rotation(body, f"{where}: {self.argument}")
+        length = np.linalg.norm(value)
+        if not length > 0.0:
+            raise InvalidConstraint(f"{where}: {self.argument} has length zero; give a direction, such as (0, 0, 1).")
+        return value / length
+
+
+class Parameters(Marker):
+    """The Euler parameters of a rigid body themselves."""
+
+    code = PARAMETERS
+    size = 4
+    prefix = "parameters_"
+
+    def coordinates(self, body, value, where):
+        """Nothing to place: the marker is p."""
+        _needs_rotation(body, where)
+        if body.dimension == 0:
+            raise InvalidConstraint(f"{where}: the ground has no Euler parameters.")
+        return np.zeros(3)
+
+
+def _needs_rotation(body, where):
+    if body.dimension == 3:
+        raise InvalidBody(f"{where}: the point mass {body.name!r} has no orientation; use add_body.")
+
+
+def vector3(value, what, error):
+    """Return three finite floats as an array (3,), or raise `error`."""
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise error(f"{what} must be three finite numbers, got {value!r}.")
+    return array
+
+
+@kernel
+def position(code, dimension, at, q, s, x):
+    """x of one marker; its body's coordinates begin at q[at]."""
+    if dimension == 7:
+        if code == PARAMETERS:
+            for i in range(4):
+                x[i] = q[at + 3 + i]
+            return
+        rotate(q[at + 3 : at + 7], s, x)
+        if code == POINT:
+            for i in range(3):
+                x[i] += q[at + i]
+    elif dimension == 3:
+        for i in range(3):
+            x[i] = q[at + i]
+    else:
+        for i in range(3):
+            x[i] = s[i]
+
+
+@kernel
+def motion(code, dimension, at, q, qd, s, x, xd, xdd):
+    """x, xd, and xdd at qdd = 0, of one marker."""
+    position(code, dimension, at, q, s, x)
+    for i in range(3):
+        xd[i] = 0.0
+        xdd[i] = 0.0
+    if dimension == 7:
+        if code == PARAMETERS:
+            for i in range(4):
+                xd[i] = qd[at + 3 + i]
+            xdd[3] = 0.0
+            return
+        rotate_rate(q[at + 3 : at + 7], qd[at + 3 : at + 7], s, xd)
+        rotate(qd[at + 3 : at + 7], s, xdd)
+        for i in range(3):
+            xdd[i] *= 2.0
+    if dimension != 0 and code == POINT:
+        for i in range(3):
+            xd[i] += qd[at + i]
+
+
+@kernel
+def chain_rule(code, dimension, at, q, s, f, first, out):
+    """out (+)= f x_q, one row over the coordinates of the marker's body; f (3,) or (4,), out (7,) or (3,)."""
+    if dimension == 0:
+        return
+    if first:
+        for i in range(dimension):
+            out[i] = 0.0
+    if code == PARAMETERS:
+        for i in range(4):
+            out[3 + i] += f[i]
+        return
+    if code == POINT:
+        for i in range(3):
+            out[i] += f[i]
+    if dimension == 7:
+        g = stack(4)
+        rotate_gradient(q[at + 3 : at + 7], s, f[0], f[1], f[2], g)
+        for i in range(4):
+            out[3 + i] += g[i]

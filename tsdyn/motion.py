@@ -1,0 +1,71 @@
+"""A prescribed function of time with its two derivatives, compiled, cached and reached by address."""
+
+import math
+
+from numba.core.errors import NumbaError
+
+from ._kernel import Callback, caller
+from .errors import InvalidConstraint
+
+SIGNATURE = "d"
+call_motion = caller(SIGNATURE, "d")
+
+
+class Motion:
+    """f(t), fd(t), fdd(t): a length, an angle's cosine or another quantity that the user prescribes.
+
+    Parameters
+    ----------
+    f, fd, fdd : callable
+        Plain functions of one float, the time in s, that Numba can compile; fd and fdd are the exact first and second
+        derivatives of f. The compiled code is cached on disk by all the code and constants it depends on.
+    what : str
+        What error messages call it.
+    """
+
+    def __init__(self, f, fd, fdd, what="motion"):
+        self.functions = (f, fd, fdd)
+        for function in self.functions:
+            if not callable(function):
+                raise InvalidConstraint(f"{what}: a motion is three functions of time (f, fd, fdd), got {function!r}.")
+        self._callbacks = tuple(Callback(f, SIGNATURE, "d", allocates=True) for f in self.functions)
+        self.what = what
+        self.value(0.0)
+
+    @classmethod
+    def wrap(cls, value, what):
+        """Return a Motion for a triple of functions or a Motion, a finite float for a number."""
+        if isinstance(value, Motion):
+            return value
+        if isinstance(value, (tuple, list)) and len(value) == 3 and all(callable(f) for f in value):
+            return cls(*value, what=what)
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            number = math.nan
+        if not math.isfinite(number):
+            raise InvalidConstraint(
+                f"{what} must be a finite number or three functions of time (f, fd, fdd), got {value!r}."
+            )
+        return number
+
+    def value(self, t):
+        """Return (f, fd, fdd) at t, by the plain Python functions."""
+        try:
+            result = tuple(float(f(t)) for f in self.functions)
+        except Exception as error:
+            raise InvalidConstraint(f"{self.what}: the motion can't be evaluated at t = {t:g}: {error!r}") from error
+        if not all(map(math.isfinite, result)):
+            raise InvalidConstraint(f"{self.what}: the motion is not finite at t = {t:g}: (f, fd, fdd) = {result}.")
+        return result
+
+    @property
+    def addresses(self):
+        """The addresses of the three compiled functions."""
+        try:
+            return tuple(callback.address for callback in self._callbacks)
+        except NumbaError as error:
+            raise InvalidConstraint(
+                f"{self.what}: Numba can't compile the motion; use plain arithmetic, NumPy functions and constants "
+                f"in it.\n{error}"
+            ) from error

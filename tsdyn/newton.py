@@ -1,0 +1,149 @@
+"""The two Newton iterations of Haug 2018, section 5: u by Eq. 29 and B by Eq. 28, both warm-started."""
+
+import math
+
+from ._kernel import kernel
+from .assembly import constraint_jacobian, constraints
+from .errors import Status
+from .linalg import invert
+from .workspace import B_ITERATIONS, B_TOL, FACTORIZATIONS, FLOOR, NEWTON, U_TOL
+
+OK = int(Status.SUCCESS)
+NEWTON_FAILED = int(Status.NEWTON_FAILED)
+NOT_FINITE = int(Status.NOT_FINITE)
+SINGULAR = int(Status.SINGULAR)
+SWEEPS = 30
+
+
+@kernel
+def solve_positions(s, w, t, v):
+    """Find u and q = q0 + V v - U u with Phi(q, t) = 0, Eqs. 19, 20 and 29. Status.
+
+    The start is u + T dv, T = du/dv being left over from the place before. Sweeps go on until |Phi| <= u_tol; the
+    correction that belongs to the last Phi costs no further evaluation and is made as well.
+    """
+    n, m, k = w.q.size, w.u.size, v.size
+    for i in range(m):
+        d = 0.0
+        for j in range(k):
+            d += w.T[i, j] * (v[j] - w.v[j])
+        w.u[i] += d
+    for i in range(n):
+        x = 0.0
+        for j in range(k):
+            x += w.V[i, j] * v[j]
+        w.base[i] = w.q0[i] + x
+    for j in range(k):
+        w.v[j] = v[j]
+    tol = max(w.control[U_TOL], w.control[FLOOR])
+    before = math.inf
+    for _ in range(SWEEPS):
+        _step_off(w, n, m)
+        constraints(s, w.q, t, w.Phi)
+        w.counters[NEWTON] += 1
+        worst = 0.0
+        for i in range(m):
+            size = abs(w.Phi[i])
+            if not size < math.inf:
+                return NOT_FINITE
+            worst = max(worst, size)
+        if worst > 0.25 * before:  # B is out of date
+            if not factorise_b(s, w, t):
+                return SINGULAR
+        for i in range(m):
+            d = 0.0
+            for j in range(m):
+                d += w.B[i, j] * w.Phi[j]
+            w.u[i] += d
+        if worst <= tol:
+            _step_off(w, n, m)
+            return OK
+        before = worst
+    return NEWTON_FAILED
+
+
+@kernel
+def _step_off(w, n, m):
+    """q = base - U u."""
+    for i in range(n):
+        x = w.base[i]
+        for j in range(m):
+            x -= w.U[i, j] * w.u[j]
+        w.q[i] = x
+
+
+@kernel
+def factorise_b(s, w, t):
+    """B = (Phi_q U)^-1 at the present q, from nothing; False where it is singular."""
+    constraint_jacobian(s, w.q, t, w.Phi_q)
+    normal_matrix(s, w)
+    m = w.u.size
+    for i in range(m):
+        for j in range(m):
+            w.R[i, j] = w.N[i, j]
+    w.counters[FACTORIZATIONS] += 1
+    return invert(w.R, w.B, m)
+
+
+@kernel
+def normal_matrix(s, w):
+    """N = Phi_q U, over the nonzero columns of Phi_q."""
+    m = w.u.size
+    for i in range(m):
+        for j in range(m):
+            w.N[i, j] = 0.0
+        for part in range(0, 4, 2):
+            begin = s.segments[i, part]
+            for c in range(begin, begin + s.segments[i, part + 1]):
+                f = w.Phi_q[i, c]
+                for j in range(m):
+                    w.N[i, j] += f * w.U[c, j]
+
+
+@kernel
+def update_b(s, w, t):
+    """Bring B to (Phi_q U)^-1 by Eq. 28, B <- 2 B - B (Phi_q U) B, N = Phi_q U being known. Status.
+
+    With R = N B - I the iteration is B <- B - B R and squares R: it ends when the R to come is below B_tol.
+    A start with |R| near one or above is replaced by a factorisation.
+    """
+    m = w.u.size
+    tol = w.control[B_TOL]
+    before = math.inf
+    for _ in range(SWEEPS):
+        worst = 0.0
+        for i in range(m):
+            total = 0.0
+            for j in range(m):
+                x = 0.0
+                for c in range(m):
+                    x += w.N[i, c] * w.B[c, j]
+                w.R[i, j] = x
+            w.R[i, i] -= 1.0
+            for j in range(m):
+                total += abs(w.R[i, j])
+            if not total < math.inf:
+                return NOT_FINITE
+            worst = max(worst, total)
+        if worst > 0.5 and before == math.inf:
+            before = 1e300  # a factorisation is tried once
+            for i in range(m):
+                for j in range(m):
+                    w.R[i, j] = w.N[i, j]
+            w.counters[FACTORIZATIONS] += 1
+            if not invert(w.R, w.B, m):
+                return SINGULAR
+            continue
+        w.counters[B_ITERATIONS] += 1
+        for i in range(m):  # row i of B R; R is needed whole, B only row by row
+            for j in range(m):
+                x = 0.0
+                for c in range(m):
+                    x += w.B[i, c] * w.R[c, j]
+                w.h[j] = x
+            for j in range(m):
+                w.B[i, j] -= w.h[j]
+        if worst * worst <= tol or worst > 0.5 * before:  # squared next time; or rounding is all that is left
+            return OK if worst < 0.5 else SINGULAR
+        before = worst
+    return SINGULAR

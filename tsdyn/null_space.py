@@ -1,0 +1,208 @@
+"""The tangent-space ODE in the paper's own form, with U, V, B and D (Haug 2018, Eqs. 19-29).
+
+    q   = q0 + V v - U u                                             Eq. 19
+    qd  = D vd - U B Phi_t                                           Eq. 23
+    D^T M D vdd = D^T (M U B gamma + Q_A + S)                        Eq. 26
+    qdd = D vdd - U B gamma                                          Eq. 24
+
+M_r = m I and M_p = 4 G^T J' G give D^T M D = sum m D_r^T D_r + E^T J' E with E = 2 G D_p, the body's angular velocity
+per vd; S_p = 8 Gd^T J' Gd p.
+"""
+
+import math
+
+from ._kernel import callback, kernel, vector
+from .assembly import acceleration_bias, is_rheonomic, set_time, time_derivative
+from .chart import inspect, new_chart, tangent_map
+from .errors import Status
+from .linalg import cholesky, cholesky_solve
+from .newton import NOT_FINITE, OK, solve_positions
+from .stepping import ACCELERATE, PLACE
+from .workspace import EVALUATIONS, FACTORIZATIONS, PLACEMENTS, load
+
+MASS_SINGULAR = int(Status.MASS_SINGULAR)
+
+
+@kernel
+def reduced_mass(s, w):
+    """E and the Cholesky factor of D^T M D at the present q. Status."""
+    k = w.v.size
+    for i in range(k):
+        for j in range(i + 1):
+            w.A[i, j] = 0.0
+    for b in range(s.mass.size):
+        at, mass = s.bodies[b, 0], s.mass[b]
+        for c in range(at, at + 3):
+            for i in range(k):
+                f = mass * w.D[c, i]
+                if f != 0.0:
+                    for j in range(i + 1):
+                        w.A[i, j] += f * w.D[c, j]
+        if s.bodies[b, 1] == 7:
+            e0, e1, e2, e3 = 2.0 * w.q[at + 3], 2.0 * w.q[at + 4], 2.0 * w.q[at + 5], 2.0 * w.q[at + 6]
+            x, y, z = w.E[3 * b], w.E[3 * b + 1], w.E[3 * b + 2]
+            d0, d1, d2, d3 = w.D[at + 3], w.D[at + 4], w.D[at + 5], w.D[at + 6]
+            for j in range(k):
+                x[j] = -e1 * d0[j] + e0 * d1[j] + e3 * d2[j] - e2 * d3[j]
+                y[j] = -e2 * d0[j] - e3 * d1[j] + e0 * d2[j] + e1 * d3[j]
+                z[j] = -e3 * d0[j] + e2 * d1[j] - e1 * d2[j] + e0 * d3[j]
+            J = s.inertia[b]
+            for i in range(k):
+                f = J[0] * x[i] + J[1] * y[i] + J[2] * z[i]
+                g = J[3] * x[i] + J[4] * y[i] + J[5] * z[i]
+                h = J[6] * x[i] + J[7] * y[i] + J[8] * z[i]
+                for j in range(i + 1):
+                    w.A[i, j] += f * x[j] + g * y[j] + h * z[j]
+    w.counters[FACTORIZATIONS] += 1
+    return OK if cholesky(w.A, k) else MASS_SINGULAR
+
+
+@kernel
+def velocities(s, w, t, vd):
+    """qd = D vd - U B Phi_t, Eq. 23."""
+    n, m, k = w.q.size, w.u.size, vd.size
+    for i in range(n):
+        x = 0.0
+        for j in range(k):
+            x += w.D[i, j] * vd[j]
+        w.qd[i] = x
+    if is_rheonomic(s):
+        time_derivative(s, w.q, t, w.Phi_t)
+        _subtract_normal(w, w.Phi_t, w.qd, n, m)
+
+
+@kernel
+def _subtract_normal(w, f, out, n, m):
+    """out -= U B f; leaves B f in z."""
+    for i in range(m):
+        x = 0.0
+        for j in range(m):
+            x += w.B[i, j] * f[j]
+        w.z[i] = x
+    for i in range(n):
+        x = 0.0
+        for j in range(m):
+            x += w.U[i, j] * w.z[j]
+        out[i] -= x
+
+
+@kernel
+def reduced_acceleration(s, w, t, vdd):
+    """vdd of Eq. 26 at the present q and qd. Status."""
+    n, m, k = w.q.size, w.u.size, vdd.size
+    acceleration_bias(s, w.q, w.qd, t, w.gamma)
+    for i in range(n):
+        w.h[i] = 0.0
+    _subtract_normal(w, w.gamma, w.h, n, m)  # h = -U B gamma, what qdd is at vdd = 0
+    for j in range(k):
+        vdd[j] = 0.0
+    for b in range(s.mass.size):
+        at, mass = s.bodies[b, 0], s.mass[b]
+        for c in range(3):
+            f = mass * (s.gravity[c] - w.h[at + c])
+            for j in range(k):
+                vdd[j] += f * w.D[at + c, j]
+        if s.bodies[b, 1] == 7:
+            e0, e1, e2, e3 = w.q[at + 3], w.q[at + 4], w.q[at + 5], w.q[at + 6]
+            d0, d1, d2, d3 = w.qd[at + 3], w.qd[at + 4], w.qd[at + 5], w.qd[at + 6]
+            a0, a1, a2, a3 = -2.0 * w.h[at + 3], -2.0 * w.h[at + 4], -2.0 * w.h[at + 5], -2.0 * w.h[at + 6]
+            J = s.inertia[b]
+            x = -e1 * a0 + e0 * a1 + e3 * a2 - e2 * a3  # 2 G (U B gamma)_p
+            y = -e2 * a0 - e3 * a1 + e0 * a2 + e1 * a3
+            z = -e3 * a0 + e2 * a1 - e1 * a2 + e0 * a3
+            f0 = J[0] * x + J[1] * y + J[2] * z
+            f1 = J[3] * x + J[4] * y + J[5] * z
+            f2 = J[6] * x + J[7] * y + J[8] * z
+            x = -d1 * e0 + d0 * e1 + d3 * e2 - d2 * e3  # Gd p
+            y = -d2 * e0 - d3 * e1 + d0 * e2 + d1 * e3
+            z = -d3 * e0 + d2 * e1 - d1 * e2 + d0 * e3
+            g0 = 8.0 * (J[0] * x + J[1] * y + J[2] * z)
+            g1 = 8.0 * (J[3] * x + J[4] * y + J[5] * z)
+            g2 = 8.0 * (J[6] * x + J[7] * y + J[8] * z)
+            s0 = -d1 * g0 - d2 * g1 - d3 * g2  # S_p = 8 Gd^T J' Gd p
+            s1 = d0 * g0 - d3 * g1 + d2 * g2
+            s2 = d3 * g0 + d0 * g1 - d1 * g2
+            s3 = -d2 * g0 + d1 * g1 + d0 * g2
+            for j in range(k):
+                vdd[j] += (
+                    f0 * w.E[3 * b, j]
+                    + f1 * w.E[3 * b + 1, j]
+                    + f2 * w.E[3 * b + 2, j]
+                    + s0 * w.D[at + 3, j]
+                    + s1 * w.D[at + 4, j]
+                    + s2 * w.D[at + 5, j]
+                    + s3 * w.D[at + 6, j]
+                )
+    cholesky_solve(w.A, vdd, k)
+    total = 0.0
+    for j in range(k):
+        total += abs(vdd[j])
+    w.counters[EVALUATIONS] += 1
+    return OK if total < math.inf else NOT_FINITE
+
+
+@callback(PLACE)
+def place(context, t, v):
+    """Take the position coordinates v: q, Phi_q, B, D and the factor of D^T M D. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    set_time(s, t)
+    w.counters[PLACEMENTS] += 1
+    status = solve_positions(s, w, t, vector(v, w.v.size))
+    if status == OK:
+        status = tangent_map(s, w, t)
+    return reduced_mass(s, w) if status == OK else status
+
+
+@callback(ACCELERATE)
+def accelerate(context, t, vd, vdd, unused):
+    """Take the velocity coordinates vd at the place last taken: qd and vdd. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    velocities(s, w, t, vector(vd, w.v.size))
+    return reduced_acceleration(s, w, t, vector(vdd, w.v.size))
+
+
+@callback("pp")
+def complete(context, vdd):
+    """Accelerations qdd = D vdd - U B gamma, Eq. 24, after `accelerate`."""
+    w = load(context).work
+    vdd = vector(vdd, w.v.size)
+    for i in range(w.q.size):
+        x = w.h[i]
+        for j in range(vdd.size):
+            x += w.D[i, j] * vdd[j]
+        w.qdd[i] = x
+    return OK
+
+
+@callback("p")
+def check(context):
+    """Reason to leave the chart, or zero."""
+    return inspect(load(context).work, True)
+
+
+@callback("pdpppp")
+def start_chart(context, t, v, vd, vdd, unused):
+    """Make a chart at the present q; v = 0, vd = V^T qd, vdd = V^T qdd, Eq. 27. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    set_time(s, t)
+    status = new_chart(s, w, t)
+    k = w.v.size
+    v = vector(v, k)
+    for j in range(k):
+        v[j] = 0.0
+    project(w, vector(vd, k), vector(vdd, k))
+    return status
+
+
+@kernel
+def project(w, vd, vdd):
+    """vd = V^T qd and vdd = V^T qdd."""
+    for j in range(vd.size):
+        x, y = 0.0, 0.0
+        for i in range(w.q.size):
+            x += w.V[i, j] * w.qd[i]
+            y += w.V[i, j] * w.qdd[i]
+        vd[j], vdd[j] = x, y

@@ -1,0 +1,30 @@
+"""Progress of a run: a bar in terminal or notebook, or a user's function."""
+
+import sys
+
+from .errors import InvalidArgument, MissingDependency
+
+
+def reporter(progress):
+    """Return a function that is given the fraction done, and None at the end."""
+    if progress is None or progress is False:
+        return lambda fraction: None
+    if callable(progress):
+        return lambda fraction: None if fraction is None else progress(min(max(float(fraction), 0.0), 1.0))
+    if progress is not True:
+        raise InvalidArgument(f"progress must be True, False, None or a function of the fraction done, got {progress!r}.")
+    try:
+        from tqdm.auto import tqdm
+    except ImportError as error:
+        raise MissingDependency(
+            "progress=True needs tqdm: pip install 'tsdyn[progress]'; or pass a function of the fraction done."
+        ) from error
+    bar = tqdm(total=100, unit="%", file=sys.stderr, bar_format="{desc}{percentage:3.0f}%|{bar}| {elapsed}<{remaining}")
+
+    def show(fraction):
+        if fraction is None:
+            bar.close()
+        else:
+            bar.update(100.0 * min(fraction, 1.0) - bar.n)
+
+    return show

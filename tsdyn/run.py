@@ -1,0 +1,277 @@
+"""The driver: steps, outputs, charts. One kernel for every scene, method and formulation; it calls them by address."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ._kernel import address_of, caller, entry, kernel
+from .chart import AT_START, BY_FAILURE, BY_INTERVAL
+from .errors import Status
+from .stepping import call_accelerate, call_place, call_step
+from .workspace import CHARTS, CONDITION, CONTRACTION
+
+SLICE_DONE = int(Status.SLICE_DONE)
+# addresses
+A_PLACE, A_ACCELERATE, A_COMPLETE, A_CHECK, A_CHART, A_STEP = range(6)
+# clock
+T, T_ORIGIN, T_END, H = range(4)
+# numbers
+FIRST_ORDER, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL, HISTORY, CHART_ROWS, REJECTED, NUMBERS = range(11)
+
+call_complete = caller("pp")
+call_check = caller("p")
+call_chart = caller("pdpppp")
+
+
+class Run(NamedTuple):
+    """State and output of one run. x, y are v, vd (tangent-space ODE) or q, w (Maggi/Kane)."""
+
+    x: np.ndarray  # (nx,)
+    y: np.ndarray  # (ny,)
+    yd: np.ndarray  # (ny,)
+    xd: np.ndarray  # (nx,)
+    dx: np.ndarray  # (nx,)  increments of a step
+    dy: np.ndarray  # (ny,)
+    x_low: np.ndarray  # (nx,)  what the additions have lost so far (Kahan)
+    y_low: np.ndarray  # (ny,)
+    x_old: np.ndarray  # (nx,)  at the start of the step, for dense output
+    y_old: np.ndarray  # (ny,)
+    yd_old: np.ndarray  # (ny,)
+    now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point
+    before: np.ndarray  # (3, n)  at the one before
+    warm: np.ndarray  # copy of u, B, T and v while dense output moves them
+    xs: np.ndarray  # (nx,)  dense output
+    ys: np.ndarray  # (ny,)
+    yds: np.ndarray  # (ny,)
+    tableau: np.ndarray  # the method's numbers
+    memory: np.ndarray  # the method's scratch
+    t_eval: np.ndarray  # output times, or empty: every step
+    clock: np.ndarray  # T ... H
+    numbers: np.ndarray  # int64, FIRST_ORDER ... REJECTED
+    out: np.ndarray  # (rows, 1 + 3 n)  t, q, qd, qdd
+    history: np.ndarray  # (rows, 3)  t, h, accepted
+    charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left
+
+
+@kernel
+def _add(x, low, dx):
+    """x += dx with compensated summation (Kahan); low holds what has been lost."""
+    for i in range(x.size):
+        y = dx[i] - low[i]
+        s = x[i] + y
+        low[i] = (s - x[i]) - y
+        x[i] = s
+
+
+@kernel
+def _copy(a, b):
+    for i in range(a.size):
+        b[i] = a[i]
+
+
+@kernel
+def _begin_chart(context, w, r, at, reason):
+    """A new chart at the present q, qd, qdd; closes the record of the old one. Status."""
+    i = r.numbers[CHART_ROWS]
+    if reason != AT_START:
+        r.charts[i, 2], r.charts[i, 3], r.charts[i, 4] = w.control[CONDITION], w.control[CONTRACTION], r.numbers[IN_CHART]
+        i += 1
+        r.numbers[CHART_ROWS] = i
+    r.charts[i, 0], r.charts[i, 1] = r.clock[T], reason
+    r.numbers[IN_CHART] = 0
+    for j in range(r.x.size):
+        r.x_low[j] = 0.0
+    for j in range(r.y.size):
+        r.y_low[j] = 0.0
+    return call_chart(at[A_CHART], context, r.clock[T], r.x, r.y, r.yd, r.xd)
+
+
+@kernel
+def _evaluate(context, at, t, x, y, yd, xd):
+    """q, qd, qdd, yd (and xd) at (t, x, y). Status."""
+    status = call_place(at[A_PLACE], context, t, x)
+    if status == 0:
+        status = call_accelerate(at[A_ACCELERATE], context, t, y, yd, xd)
+    if status == 0:
+        status = call_complete(at[A_COMPLETE], context, yd)
+    return status
+
+
+@kernel
+def _record(r, t, q, qd, qdd):
+    n, i = q.size, r.numbers[ROWS]
+    row = r.out[i]
+    row[0] = t
+    for j in range(n):
+        row[1 + j], row[1 + n + j], row[1 + 2 * n + j] = q[j], qd[j], qdd[j]
+    r.numbers[ROWS] = i + 1
+
+
+@kernel
+def _hermite(s, h, a, ad, add, b, bd, bdd, out, outd):
+    """Quintic Hermite interpolation at s in (0, 1) of a step h, and its derivative."""
+    s2 = s * s
+    s3 = s2 * s
+    f = s3 * (10.0 + s * (6.0 * s - 15.0))
+    fd = 30.0 * s2 * (1.0 + s * (s - 2.0)) / h
+    g0, g0d = s + s3 * (s * (8.0 - 3.0 * s) - 6.0), 1.0 + s2 * (s * (32.0 - 15.0 * s) - 18.0)
+    g1, g1d = s3 * (s * (7.0 - 3.0 * s) - 4.0), s2 * (s * (28.0 - 15.0 * s) - 12.0)
+    k0, k0d = 0.5 * (s2 - s3 * (3.0 + s * (s - 3.0))), s + 0.5 * s2 * (s * (12.0 - 5.0 * s) - 9.0)
+    k1, k1d = 0.5 * s3 * (1.0 + s * (s - 2.0)), 0.5 * s2 * (3.0 + s * (5.0 * s - 8.0))
+    for i in range(a.size):
+        step = b[i] - a[i]
+        out[i] = a[i] + f * step + h * (g0 * ad[i] + g1 * bd[i]) + h * h * (k0 * add[i] + k1 * bdd[i])
+        outd[i] = fd * step + g0d * ad[i] + g1d * bd[i] + h * (k0d * add[i] + k1d * bdd[i])
+
+
+@kernel
+def _cubic(s, h, a, ad, b, bd, out):
+    """Cubic Hermite interpolation."""
+    f = s * s * (3.0 - 2.0 * s)
+    g0, g1 = s * (s - 1.0) * (s - 1.0), s * s * (s - 1.0)
+    for i in range(a.size):
+        out[i] = a[i] + f * (b[i] - a[i]) + h * (g0 * ad[i] + g1 * bd[i])
+
+
+@kernel
+def _warm(w, r, store):
+    """Keep, or bring back, what the Newton solvers start from, so that outputs never change the steps."""
+    i = 0
+    for part in (w.u, w.v):
+        for j in range(part.size):
+            if store:
+                r.warm[i] = part[j]
+            else:
+                part[j] = r.warm[i]
+            i += 1
+    for part in (w.B, w.T):
+        for a in range(part.shape[0]):
+            for b in range(part.shape[1]):
+                if store:
+                    r.warm[i] = part[a, b]
+                else:
+                    part[a, b] = r.warm[i]
+                i += 1
+
+
+@kernel
+def _outputs(context, w, r, at, t0, h, t1):
+    """Record what t_eval asks for in (t0, t1], or the step's end where it asks for nothing. Status."""
+    if r.t_eval.size == 0:
+        _record(r, t1, w.q, w.qd, w.qdd)
+        return 0
+    stored = False
+    while r.numbers[NEXT_EVAL] < r.t_eval.size and r.t_eval[r.numbers[NEXT_EVAL]] <= t1:
+        t = r.t_eval[r.numbers[NEXT_EVAL]]
+        r.numbers[NEXT_EVAL] += 1
+        if t == t1:
+            _record(r, t1, r.now[0], r.now[1], r.now[2])
+            continue
+        if not stored:
+            stored = True
+            _warm(w, r, True)
+        s = (t - t0) / h
+        if r.numbers[FIRST_ORDER] == 1:
+            a, b = r.before, r.now
+            _hermite(s, h, a[0], a[1], a[2], b[0], b[1], b[2], r.xs, r.dx)
+            _cubic(s, h, r.y_old, r.yd_old, r.y, r.yd, r.ys)
+        else:
+            _hermite(s, h, r.x_old, r.y_old, r.yd_old, r.x, r.y, r.yd, r.xs, r.ys)
+        status = _evaluate(context, at, t, r.xs, r.ys, r.yds, r.xd)
+        if status != 0:
+            return status
+        _record(r, t, w.q, w.qd, w.qdd)
+    if stored:
+        _warm(w, r, False)
+    return 0
+
+
+@kernel
+def _store_now(w, r):
+    _copy(w.q, r.now[0])
+    _copy(w.qd, r.now[1])
+    _copy(w.qdd, r.now[2])
+
+
+@entry
+def begin(c, r, at):
+    """The first chart, the accelerations there, and the first output. Status."""
+    context = address_of(c)
+    w = c.work
+    status = _begin_chart(context, w, r, at, AT_START)
+    if status == 0:
+        status = _evaluate(context, at, r.clock[T], r.x, r.y, r.yd, r.xd)
+    if status == 0:
+        _store_now(w, r)
+        call_check(at[A_CHECK], context)
+        wanted = r.t_eval.size == 0
+        if not wanted and r.t_eval[0] == r.clock[T]:
+            wanted = True
+            r.numbers[NEXT_EVAL] = 1
+        if wanted:
+            _record(r, r.clock[T], w.q, w.qd, w.qdd)
+    return status
+
+
+@entry
+def advance(c, r, at, most):
+    """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or why it stopped."""
+    context = address_of(c)
+    w = c.work
+    nx, ny = r.x.size, r.y.size
+    for _ in range(most):
+        i = r.numbers[STEPS]
+        if i >= r.numbers[STEPS_WANTED]:
+            return 0
+        t0 = r.clock[T]
+        last = i + 1 == r.numbers[STEPS_WANTED]
+        t1 = r.clock[T_END] if last else r.clock[T_ORIGIN] + (i + 1) * r.clock[H]
+        h = t1 - t0
+        row = r.history[r.numbers[HISTORY]]
+        row[0], row[1], row[2] = t0, h, 0.0
+        r.numbers[HISTORY] += 1
+        _copy(r.x, r.x_old)
+        _copy(r.y, r.y_old)
+        _copy(r.yd, r.yd_old)
+        status = call_step(
+            at[A_STEP], context, at[A_PLACE], at[A_ACCELERATE], t0, h, nx, ny,
+            r.x, r.y, r.yd, r.xd, r.tableau, r.memory, r.dx, r.dy,
+        )  # fmt: skip
+        if status == 0:
+            _add(r.x, r.x_low, r.dx)
+            _add(r.y, r.y_low, r.dy)
+            status = _evaluate(context, at, t1, r.x, r.y, r.yd, r.xd)
+        if status != 0:  # back to the start of the step, on a new chart if this one has been used
+            _copy(r.now[0], w.q)
+            _copy(r.now[1], w.qd)
+            _copy(r.now[2], w.qdd)
+            r.numbers[REJECTED] += 1
+            if r.numbers[IN_CHART] == 0:
+                return status
+            retry = _begin_chart(context, w, r, at, BY_FAILURE)
+            if retry != 0:
+                return retry
+            continue
+        row[2] = 1.0
+        for j in range(3):
+            _copy(r.now[j], r.before[j])
+        _store_now(w, r)
+        r.clock[T] = t1
+        r.numbers[STEPS] = i + 1
+        r.numbers[IN_CHART] += 1
+        reason = call_check(at[A_CHECK], context)
+        if r.numbers[INTERVAL] > 0:
+            reason = BY_INTERVAL if r.numbers[IN_CHART] >= r.numbers[INTERVAL] else 0
+        status = _outputs(context, w, r, at, t0, h, t1)
+        if status != 0:
+            return status
+        if reason != 0 and not last:
+            _copy(r.now[0], w.q)
+            _copy(r.now[1], w.qd)
+            _copy(r.now[2], w.qdd)
+            status = _begin_chart(context, w, r, at, reason)
+            if status != 0:
+                return status
+        if r.numbers[CHART_ROWS] + 2 >= r.charts.shape[0] or r.numbers[HISTORY] >= r.history.shape[0]:
+            break
+    return 0 if r.numbers[STEPS] >= r.numbers[STEPS_WANTED] else SLICE_DONE

@@ -1,0 +1,192 @@
+"""The scene: what a user assembles from bodies and constraints, checked piece by piece."""
+
+import numpy as np
+
+from .bodies import IDENTITY, Body, Ground, PointMass
+from .constraints.euler_normalization import EulerNormalization
+from .errors import InvalidArgument, InvalidBody, InvalidConstraint
+from .evaluate import evaluate
+from .initial import assemble
+from .markers import vector3
+from .primitive import Primitive
+from .system import pack
+
+
+class Scene:
+    """Bodies, constraints and gravity.
+
+    Parameters
+    ----------
+    gravity : array_like (3,), m/s^2; default (0, 0, -9.81)
+        Acceleration of free fall, ground frame.
+
+    Attributes
+    ----------
+    ground : Ground
+        The inertial frame, to attach constraints to.
+    bodies, constraints : tuple
+        In the order added; the normalisations of the rigid bodies come last, in body order.
+
+    Notes
+    -----
+    A scene can be run as often as you like; `simulate` never changes it. Set a body's mass, inertia, position,
+    orientation or velocities and run again: nothing is rebuilt but the numbers that changed.
+    """
+
+    def __init__(self, gravity=(0.0, 0.0, -9.81)):
+        self.ground = Ground(self)
+        self._bodies, self._added, self._normalisations = [], [], {}
+        self.gravity = gravity
+
+    @property
+    def gravity(self):
+        """Acceleration of free fall, ground frame, m/s^2, shape (3,)."""
+        return self._gravity.copy()
+
+    @gravity.setter
+    def gravity(self, value):
+        self._gravity = vector3(value, "gravity (m/s^2)", InvalidArgument)
+        self.touch()
+
+    @property
+    def bodies(self):
+        """The bodies, in the order added."""
+        return tuple(self._bodies)
+
+    @property
+    def constraints(self):
+        """The constraints, in the order of their rows."""
+        return (*self._added, *self._normalisations.values())
+
+    def add_body(
+        self,
+        mass,
+        inertia,
+        position=(0.0, 0.0, 0.0),
+        orientation=IDENTITY,
+        velocity=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, 0.0),
+        name="",
+    ):
+        """Add a rigid body and return its handle.
+
+        Parameters
+        ----------
+        mass : float, kg
+            Positive.
+        inertia : array_like (3,) or (3, 3), kg m^2
+            About the centroid, body frame; not negative, and no principal value above the sum of the other two.
+        position, velocity : array_like (3,), m and m/s
+            Of the centroid, ground frame.
+        orientation : array_like (4,) or scipy.spatial.transform.Rotation
+            Euler parameters (e0, e1, e2, e3), scalar first, body to ground; of unit length to 1e-6, then scaled.
+        angular_velocity : array_like (3,), rad/s
+            Body frame.
+        name : str, optional
+            What messages call it; default "body1", "body2", ...
+
+        Returns
+        -------
+        Body
+
+        Raises
+        ------
+        InvalidBody
+            If a value is impossible, not finite or of a wrong shape, or the name is taken.
+        """
+        values = {
+            "mass": mass,
+            "inertia": inertia,
+            "position": position,
+            "orientation": orientation,
+            "velocity": velocity,
+            "angular_velocity": angular_velocity,
+        }
+        body = self._admit(Body, name, values)
+        self._normalisations[body] = EulerNormalization(body, name=f"EulerNormalization({body.name})")
+        return body
+
+    def add_point_mass(self, mass, position=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), name=""):
+        """Add a particle of three coordinates and return its handle; arguments as for `add_body`."""
+        return self._admit(PointMass, name, {"mass": mass, "position": position, "velocity": velocity})
+
+    def _admit(self, kind, name, values):
+        name = str(name) or f"body{len(self._bodies) + 1}"
+        if any(body.name == name for body in self._bodies) or name == "ground":
+            raise InvalidBody(f"the scene has a body named {name!r} already; choose another name.")
+        body = kind(self, len(self._bodies), name, **values)
+        self._bodies.append(body)
+        self.touch()
+        return body
+
+    def add(self, item):
+        """Add a constraint and return it; a second EulerNormalization of a body gives back the one it has.
+
+        Raises
+        ------
+        InvalidConstraint
+            If it is no constraint, belongs to another scene, or has been added before.
+        """
+        if not isinstance(item, Primitive):
+            raise InvalidConstraint(f"{item!r} is not a constraint; pass an instance, such as ts.constraints.Spherical(...).")
+        if item.scene is not self:
+            raise InvalidConstraint(f"{item.name}: its bodies belong to another scene; use bodies of this one.")
+        if type(item) is EulerNormalization:
+            return self._normalisations[item.a]
+        if any(item is other for other in self._added):
+            raise InvalidConstraint(f"{item.name}: it has been added to this scene before; add each constraint once.")
+        self._added.append(item)
+        self.touch()
+        return item
+
+    def touch(self):
+        """Forget the packed numbers: something has changed."""
+        self._system = self._start = None
+
+    @property
+    def system(self):
+        """The packed `System`; made again after a change only."""
+        if not self._bodies:
+            raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
+        if self._system is None:
+            self._system = pack(self)
+        return self._system
+
+    @property
+    def start(self):
+        """(q, qd) that the bodies say, shapes (n,), (n,)."""
+        if self._start is None:
+            self._start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
+        return tuple(array.copy() for array in self._start)
+
+    def body(self, name):
+        """Return the body of this name."""
+        for body in self._bodies:
+            if body.name == name:
+                return body
+        raise InvalidBody(f"no body is named {name!r}; there are {', '.join(b.name for b in self._bodies) or 'none'}.")
+
+    def row_names(self):
+        """Name the rows of Phi, in order: a constraint's name, with the row's number where it has several."""
+        names = []
+        for constraint in self.constraints:
+            if constraint.rows == 1:
+                names.append(constraint.name)
+            else:
+                names += [f"{constraint.name}[{i}]" for i in range(constraint.rows)]
+        return names
+
+    def place(self, q, qd):
+        """Write coordinates q (n,) and velocities qd (n,) into the bodies as their values at the start."""
+        at = 0
+        for body in self._bodies:
+            span = slice(at, at := at + body.dimension)
+            body.place(q[span], qd[span])
+
+    evaluate = evaluate
+    assemble = assemble
+
+    def __repr__(self):
+        rows = sum(constraint.rows for constraint in self.constraints)
+        n = sum(body.dimension for body in self._bodies)
+        return f"<Scene of {len(self._bodies)} bodies: {n} coordinates, {rows} constraint rows>"

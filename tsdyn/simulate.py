@@ -1,0 +1,283 @@
+"""`simulate`: check everything, lay out the memory, run the driver in slices, hand back a Solution."""
+
+import math
+import time
+
+import numpy as np
+
+from . import integrators as _integrators  # noqa: F401  (fills the registry)
+from .errors import InvalidArgument, Status
+from .evaluate import state_vector
+from .formulation import formulation as find_formulation
+from .initial import consistent
+from .integrator import Integrator, positive, registered
+from .progress import reporter
+from .run import (
+    CHART_ROWS,
+    FIRST_ORDER,
+    H,
+    HISTORY,
+    INTERVAL,
+    NUMBERS,
+    ROWS,
+    STEPS,
+    STEPS_WANTED,
+    T_END,
+    T_ORIGIN,
+    Run,
+    T,
+    advance,
+    begin,
+)
+from .scene import Scene
+from .solution import Solution
+from .workspace import Context, allocate
+
+SLICE_SECONDS = 0.2  # how often a run comes back to Python: progress, interrupts
+FIRST_SLICE, LARGEST_SLICE, CHART_ROOM = 1024, 1 << 17, 4096
+
+
+def simulate(
+    scene,
+    t_span,
+    *,
+    integrator=None,
+    formulation="tangent",
+    constraint_tol=1e-12,
+    initial_tol=1e-9,
+    redundancy="refuse",
+    t_eval=None,
+    max_steps=None,
+    progress=None,
+    chart_interval=None,
+    state=None,
+):
+    """Integrate a scene over an interval of time; the scene is not changed.
+
+    Parameters
+    ----------
+    scene : Scene
+    t_span : (float, float), s
+        Start and end, the end later.
+    integrator : Integrator or str, optional
+        A method, or its name with its defaults; default Nystrom4(step=1e-3).
+    formulation : {"tangent", "null-space", "maggi-kane"}
+        "tangent": the tangent-space ODE, at present in the form of Eq. 26, which "null-space" names explicitly;
+        "maggi-kane": Eqs. 17-18, which drift off the constraints, for comparison.
+    constraint_tol : float
+        u_tol and B_tol of Eqs. 28-29: bound on |Phi| (m) and on |Phi_q U B - I|.
+    initial_tol : float
+        Residuals of the start, relative to 1 + max |q| or 1 + max |qd|, up to which it is accepted and projected.
+    redundancy : {"refuse"}
+        What to do about dependent constraints.
+    t_eval : array_like, s, optional
+        Increasing output times within t_span, from dense output on the manifold, which never changes the steps;
+        None gives every accepted step and both ends.
+    max_steps : int, optional
+        End the run after so many steps.
+    progress : bool or callable, optional
+        True shows a bar (needs tqdm); a callable is given the fraction done, 0 to 1.
+    chart_interval : int, optional
+        Make a new chart every so many steps, whatever the criteria say; for experiments.
+    state : State, optional
+        Positions and velocities to start from instead of those of the bodies, such as `solution.state`.
+
+    Returns
+    -------
+    Solution
+        Also of a run that ended early: see `.success`, `.status`, `.message`.
+
+    Raises
+    ------
+    TsdynError
+        One of its kinds, before anything runs: InvalidArgument, InvalidBody, InconsistentState, RedundantConstraints,
+        SingularConfiguration.
+    """
+    if not isinstance(scene, Scene):
+        raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
+    t0, t1 = _interval(t_span)
+    method = _method(integrator)
+    form = find_formulation(formulation)
+    constraint_tol = positive(constraint_tol, "constraint_tol")
+    initial_tol = positive(initial_tol, "initial_tol")
+    if redundancy != "refuse":
+        raise InvalidArgument(f"redundancy must be 'refuse', got {redundancy!r}; other policies don't exist yet.")
+    times = _output_times(t_eval, t0, t1)
+    steps, max_steps = _step_count(t0, t1, method.step), _count(max_steps, "max_steps")
+    interval = _count(chart_interval, "chart_interval") or 0
+    report = reporter(progress)
+
+    started = time.perf_counter()
+    system = scene.system
+    q, qd = scene.start
+    if state is not None:
+        q, qd = state_vector(state.q, q.size, "state.q"), state_vector(state.qd, q.size, "state.qd")
+    q, qd = consistent(scene, system, q, qd, t0, initial_tol)
+    m, n = system.segments.shape[0], q.size
+    system = system._replace(reals=system.reals.copy())
+    work = allocate(n, m, len(scene.bodies), constraint_tol)
+    work.q[:], work.qd[:] = q, qd
+    step_kernel, tableau, memory = method.kernel(form.first_order)
+    nx = n if form.first_order else n - m
+    run = _lay_out(work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order)
+    run.clock[[T, T_ORIGIN, T_END, H]] = t0, t0, t1, method.step
+    run.numbers[STEPS_WANTED] = steps
+    run.numbers[INTERVAL] = interval
+    addresses = np.array([*form.addresses(), step_kernel.address], np.int64)
+    prepared = time.perf_counter()
+    status, chunks = _drive(Context(system, work), run, addresses, max_steps, report, (t0, t1))
+    ended = time.perf_counter()
+    return Solution(
+        scene,
+        system,
+        method=repr(method),
+        formulation=form.name,
+        status=status,
+        span=(t0, t1),
+        run=run,
+        work=work,
+        chunks=chunks,
+        seconds={"prepare": prepared - started, "run": ended - prepared},
+    )
+
+
+def _drive(context, run, addresses, max_steps, report, span):
+    """Run slice by slice; returns the status and the lists of rows of outputs, history and charts."""
+    chunks = {"out": [], "history": [], "charts": []}
+    most, total = FIRST_SLICE, int(run.numbers[STEPS_WANTED])
+    limit = total if max_steps is None else min(max_steps, total)
+    per_step = run.t_eval.size == 0
+    width = 1 + 3 * context.work.q.size
+
+    def fresh(run, rows):
+        """New arrays for the next slice; what the last one filled goes to the chunks."""
+        _collect(run, chunks, per_step)
+        run.numbers[HISTORY] = 0
+        changes = {"history": np.empty((rows, 3))}
+        if per_step:
+            run.numbers[ROWS] = 0
+            changes["out"] = np.empty((rows + 1, width))
+        if run.numbers[CHART_ROWS] + CHART_ROOM > run.charts.shape[0]:
+            changes["charts"] = np.resize(run.charts, (2 * run.charts.shape[0], 5))
+        return run._replace(**changes)
+
+    status = Status.INTERRUPTED
+    try:
+        run = fresh(run, min(most, limit))
+        status = Status(begin(context, run, addresses))
+        while status == Status.SUCCESS:
+            done = int(run.numbers[STEPS])
+            if done >= limit:
+                status = Status.SUCCESS if done >= total else Status.MAX_STEPS
+                break
+            started = time.perf_counter()
+            rows = min(most, limit - done)
+            status = Status(advance(context, run, addresses, rows))
+            seconds = time.perf_counter() - started
+            if status == Status.SLICE_DONE:
+                status = Status.SUCCESS
+            if seconds < SLICE_SECONDS / 2:
+                most = min(2 * most, LARGEST_SLICE)
+            elif seconds > 2 * SLICE_SECONDS:
+                most = max(most // 2, 1)
+            report((run.clock[T] - span[0]) / (span[1] - span[0]))
+            run = fresh(run, min(most, max(limit - int(run.numbers[STEPS]), 1)))
+    except KeyboardInterrupt:
+        status = Status.INTERRUPTED
+    _collect(run, chunks, per_step)
+    chunks["charts"] = run.charts
+    if not per_step:
+        chunks["out"] = [run.out[: run.numbers[ROWS]]]
+    report(None)
+    return status, chunks
+
+
+def _collect(run, chunks, per_step):
+    if per_step:
+        chunks["out"].append(run.out[: run.numbers[ROWS]])
+        run.numbers[ROWS] = 0
+    chunks["history"].append(run.history[: run.numbers[HISTORY]])
+    run.numbers[HISTORY] = 0
+
+
+def _lay_out(work, nx, ny, tableau, memory, times, first_order):
+    n = work.q.size
+    zeros = np.zeros
+    numbers = zeros(NUMBERS, np.int64)
+    numbers[FIRST_ORDER] = first_order
+    return Run(
+        **{name: zeros(nx) for name in ("x", "xd", "dx", "x_low", "x_old", "xs")},
+        **{name: zeros(ny) for name in ("y", "yd", "dy", "y_low", "y_old", "yd_old", "ys", "yds")},
+        now=zeros((3, n)),
+        before=zeros((3, n)),
+        warm=zeros(work.u.size + work.v.size + work.B.size + work.T.size),
+        tableau=tableau,
+        memory=zeros(memory),
+        t_eval=times,
+        clock=zeros(H + 1),
+        numbers=numbers,
+        out=np.empty((times.size, 1 + 3 * n)),
+        history=np.empty((0, 3)),
+        charts=zeros((2 * CHART_ROOM, 5)),
+    )
+
+
+def _interval(t_span):
+    try:
+        t0, t1 = (float(t) for t in t_span)
+    except (TypeError, ValueError):
+        t0 = t1 = math.nan
+    if not (math.isfinite(t0) and math.isfinite(t1)):
+        raise InvalidArgument(f"t_span must be two finite times in s, (start, end), got {t_span!r}.")
+    if not t1 > t0:
+        raise InvalidArgument(f"t_span must end after it starts, got ({t0:g}, {t1:g}); swap them, or choose a later end.")
+    return t0, t1
+
+
+def _method(integrator):
+    known = registered()
+    if integrator is None:
+        integrator = "nystrom4"
+    if isinstance(integrator, str):
+        name = integrator.lower().replace("-", "").replace("_", "")
+        if name not in known:
+            raise InvalidArgument(f"unknown integrator {integrator!r}; there are {', '.join(map(repr, known))}.")
+        return known[name]()
+    if isinstance(integrator, type) and issubclass(integrator, Integrator):
+        return integrator()
+    if not isinstance(integrator, Integrator):
+        raise InvalidArgument(
+            f"integrator must be a name or an instance such as ts.integrators.Nystrom4(step=1e-3), got {integrator!r}."
+        )
+    return integrator
+
+
+def _output_times(t_eval, t0, t1):
+    if t_eval is None:
+        return np.empty(0)
+    try:
+        times = np.array(t_eval, dtype=float)
+    except (TypeError, ValueError):
+        times = np.array(math.nan)
+    if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
+        raise InvalidArgument("t_eval must be a non-empty vector of finite times in s.")
+    if (np.diff(times) <= 0.0).any():
+        raise InvalidArgument("t_eval must increase from each time to the next.")
+    if times[0] < t0 or times[-1] > t1:
+        raise InvalidArgument(f"t_eval must lie within t_span, ({t0:g}, {t1:g}); it runs from {times[0]:g} to {times[-1]:g}.")
+    return times
+
+
+def _step_count(t0, t1, step):
+    count = (t1 - t0) / step
+    if not count < 2**53 or t0 + step == t0:
+        raise InvalidArgument(f"the step of {step:g} s is too small for the interval ({t0:g}, {t1:g}).")
+    return max(1, math.ceil(count * (1.0 - 1e-12)))
+
+
+def _count(value, what):
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise InvalidArgument(f"{what} must be a positive whole number, got {value!r}.")
+    return int(value)

@@ -1,0 +1,231 @@
+"""What a run hands back: the trajectory, how it went, and everything that follows from it."""
+
+from functools import cached_property
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+
+from . import diagnostics, reactions
+from .bodies import rotation_matrix
+from .chart import BY_INTERVAL, REASONS
+from .errors import InvalidBody, InvalidConstraint, Status, StepFailure
+from .run import CHART_ROWS, IN_CHART, NUMBERS, REJECTED, STEPS, T
+from .workspace import (
+    B_ITERATIONS,
+    CHARTS,
+    CONDITION,
+    CONTRACTION,
+    EVALUATIONS,
+    FACTORIZATIONS,
+    NEWTON,
+    PLACEMENTS,
+)
+
+
+class State(NamedTuple):
+    """Time, positions, velocities, accelerations and multipliers at one instant."""
+
+    t: float
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    multipliers: np.ndarray
+
+
+class Steps(NamedTuple):
+    """Every step tried: where it began, s, its length, s, and whether it was accepted."""
+
+    t: np.ndarray
+    h: np.ndarray
+    accepted: np.ndarray
+
+
+class Charts(NamedTuple):
+    """Every chart: its instant, s, why it was made, and on leaving it its condition, contraction and steps."""
+
+    t: np.ndarray
+    reason: tuple
+    condition: np.ndarray
+    contraction: np.ndarray
+    steps: np.ndarray
+
+
+class Solution:
+    """The result of `simulate`; k outputs, n coordinates, m constraint rows.
+
+    Attributes
+    ----------
+    t : ndarray (k,), s
+    q, qd, qdd : ndarray (k, n)
+        7 coordinates a rigid body (r, then p) and 3 a point mass, in the order added.
+    multipliers : ndarray (k, m)
+        M qdd + Phi_q^T lam = Q_A + S; rows in the order added, then the normalisations in body order.
+    success : bool
+    status : Status
+    message : str
+        What happened, where, and what to try.
+    stats : SimpleNamespace
+        steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds.
+    """
+
+    def __init__(self, scene, system, *, method, formulation, status, span, run, work, chunks, seconds):
+        self.scene, self.system, self.method, self.formulation = scene, system, method, formulation
+        self.status, self.span = status, span
+        rows = chunks["out"][0] if len(chunks["out"]) == 1 else np.concatenate(chunks["out"])
+        n = work.q.size
+        self.t = rows[:, 0].copy()
+        self.q, self.qd, self.qdd = (np.ascontiguousarray(rows[:, 1 + i * n : 1 + (i + 1) * n]) for i in range(3))
+        self._history = np.concatenate(chunks["history"])
+        self._reached = float(run.clock[T])
+        self._last = [a.copy() for a in run.now]
+        self._charts = chunks["charts"][: run.numbers[CHART_ROWS] + 1].copy()
+        self._charts[-1, 2:] = work.control[CONDITION], work.control[CONTRACTION], run.numbers[IN_CHART]
+        c = work.counters
+        self.stats = SimpleNamespace(
+            steps=int(run.numbers[STEPS]),
+            rejected=int(run.numbers[REJECTED]),
+            evaluations=int(c[EVALUATIONS]),
+            placements=int(c[PLACEMENTS]),
+            newton_iterations=int(c[NEWTON]),
+            b_iterations=int(c[B_ITERATIONS]),
+            charts=int(c[CHARTS]),
+            factorizations=int(c[FACTORIZATIONS]),
+            seconds=seconds,
+        )
+
+    @property
+    def success(self):
+        """Whether the run reached the end of the interval."""
+        return self.status == Status.SUCCESS
+
+    @property
+    def message(self):
+        """How the run ended, in words."""
+        if self.success:
+            return self.status.sentence
+        where = f"It stopped at t = {self._reached:.9g} s of {self.span[1]:g} s, after {self.stats.steps} steps."
+        return " ".join(part for part in (self.status.sentence, where, self._suspect(), self.status.remedy) if part)
+
+    def _suspect(self):
+        """Name what looks singular or large at the last point."""
+        if self.status != Status.SINGULAR or not self._last:
+            return ""
+        from .evaluate import constraint_arrays
+        from .initial import weakest_row
+
+        _, Phi_q, _, _ = constraint_arrays(self.system, self._last[0], self._last[1], self._reached)
+        return f"The rows nearest to dependence there are those of {weakest_row(self.scene, Phi_q)}."
+
+    def raise_if_failed(self):
+        """Raise StepFailure, with this solution as `.solution`, if the run ended early; return self otherwise."""
+        if not self.success:
+            raise StepFailure(self.message, self)
+        return self
+
+    @property
+    def state(self):
+        """The last point reached, to go on from: simulate(scene, (state.t, t_end), state=state)."""
+        q, qd, qdd = (a.copy() for a in self._last)
+        lam = reactions.multipliers(self.system, np.array([self._reached]), q[None], qd[None], qdd[None])[0]
+        return State(self._reached, q, qd, qdd, lam)
+
+    @property
+    def steps(self):
+        """History of the steps, a `Steps`."""
+        return Steps(self._history[:, 0], self._history[:, 1], self._history[:, 2] == 1.0)
+
+    @property
+    def charts(self):
+        """History of the charts, a `Charts`."""
+        rows = self._charts
+        return Charts(rows[:, 0], tuple(REASONS[int(i)] for i in rows[:, 1]), rows[:, 2], rows[:, 3], rows[:, 4].astype(int))
+
+    @cached_property
+    def multipliers(self):
+        """Multipliers (k, m), computed when first asked for."""
+        return reactions.multipliers(self.system, self.t, self.q, self.qd, self.qdd)
+
+    @cached_property
+    def constraint_error(self):
+        """Maximum norms of Eqs. 1-3 at every output, recomputed by code that is not the solver's."""
+        return diagnostics.constraint_error(self.scene, self.t, self.q, self.qd, self.qdd)
+
+    def reaction(self, constraint):
+        """Force (N) and torque (N m) that a constraint exerts, each (k, 3), ground frame.
+
+        On body a, or on b where a is the ground; the torque is about the constraint's first point on that body.
+        """
+        if constraint not in self.scene.constraints:
+            raise InvalidConstraint(f"{constraint!r} is not a constraint of this solution's scene.")
+        return reactions.reaction(self, constraint)
+
+    def _span(self, body, part):
+        if getattr(body, "scene", None) is not self.scene or body.dimension == 0:
+            raise InvalidBody(f"{body!r} is not a body of this solution's scene.")
+        at = int(self.system.bodies[body.index, 0])
+        if part == "r":
+            return slice(at, at + 3)
+        body.orientation  # noqa: B018  a point mass says that it has none
+        return slice(at + 3, at + 7)
+
+    def position(self, body):
+        """Position of the centroid (k, 3), m, ground frame."""
+        return self.q[:, self._span(body, "r")]
+
+    def velocity(self, body):
+        """Velocity of the centroid (k, 3), m/s, ground frame."""
+        return self.qd[:, self._span(body, "r")]
+
+    def acceleration(self, body):
+        """Acceleration of the centroid (k, 3), m/s^2, ground frame."""
+        return self.qdd[:, self._span(body, "r")]
+
+    def orientation(self, body):
+        """Euler parameters (k, 4), body to ground, scalar first."""
+        return self.q[:, self._span(body, "p")]
+
+    def rotation(self, body):
+        """Rotation matrices A(p) (k, 3, 3), body to ground."""
+        return rotation_matrix(self.orientation(body))
+
+    def angular_velocity(self, body):
+        """Angular velocity (k, 3), rad/s, body frame."""
+        return diagnostics.angular_velocity(self.orientation(body), self.qd[:, self._span(body, "p")])
+
+    def angular_acceleration(self, body):
+        """Angular acceleration (k, 3), rad/s^2, body frame."""
+        return diagnostics.angular_velocity(self.orientation(body), self.qdd[:, self._span(body, "p")])
+
+    @cached_property
+    def kinetic_energy(self):
+        """Kinetic energy (k,), J."""
+        return diagnostics.kinetic_energy(self.system, self.q, self.qd)
+
+    @cached_property
+    def potential_energy(self):
+        """Potential energy of gravity (k,), J, zero at the ground's origin."""
+        return diagnostics.potential_energy(self.system, self.q)
+
+    @property
+    def energy(self):
+        """Kinetic and potential energy together (k,), J."""
+        return self.kinetic_energy + self.potential_energy
+
+    @cached_property
+    def linear_momentum(self):
+        """Linear momentum (k, 3), kg m/s, ground frame."""
+        return diagnostics.linear_momentum(self.system, self.q, self.qd)
+
+    @cached_property
+    def angular_momentum(self):
+        """Angular momentum about the ground's origin (k, 3), kg m^2/s, ground frame."""
+        return diagnostics.angular_momentum(self.system, self.q, self.qd)
+
+    def __repr__(self):
+        s = self.stats
+        return (
+            f"<Solution: {self.status.name.lower()}, {self.t.size} outputs to t = {self._reached:g} s by {self.method}, "
+            f"{self.formulation}: {s.steps} steps, {s.evaluations} evaluations, {s.charts} charts, "
+            f"{s.seconds['run']:.3g} s>"
+        )

@@ -1,0 +1,108 @@
+"""The step kernels of tableau methods.
+
+The equations are given by two kernels of the formulation, called by address:
+
+    place(context, t, x)                take positions (all that depends on t and x alone)
+    accelerate(context, t, y, yd, xd)   take velocities there, return yd and, for a first-order system, xd
+
+A step kernel returns the increments dx, dy, so that the driver can add them with compensation. Signature of a step
+kernel: context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy; yd and xd are those of the
+step's start.
+"""
+
+from ._kernel import callback, caller, vector
+from .primitive import ANY
+
+PLACE, ACCELERATE, STEP = "pdp", "pdppp", "piiddiipppppppp"
+call_place = caller(PLACE)
+call_accelerate = caller(ACCELERATE)
+call_step = caller(STEP)
+
+
+@callback(STEP)
+def nystrom_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+    """One step of an explicit Nystrom method, xd = y; memory (stages + 2) n."""
+    n = nx
+    x, y, yd, dx, dy = vector(x, n), vector(y, n), vector(yd, n), vector(dx, n), vector(dy, n)
+    tableau, memory = vector(tableau, ANY), vector(memory, ANY)
+    stages = int(tableau[0])
+    xs, ys = memory[:n], memory[n : 2 * n]
+    width = 2 + 2 * stages
+    for i in range(stages):
+        k = memory[(2 + i) * n :]
+        row = tableau[1 + i * width :]
+        if i == 0:
+            for c in range(n):
+                k[c] = yd[c]
+            continue
+        moved = row[0] == 0.0
+        f = h * row[1]
+        for c in range(n):
+            p, v = 0.0, 0.0
+            for j in range(i):
+                kj = memory[(2 + j) * n + c]
+                p += row[2 + j] * kj
+                v += row[2 + stages + j] * kj
+            if moved:
+                xs[c] = x[c] + (f * y[c] + h * h * p)
+            ys[c] = y[c] + h * v
+        if moved:
+            status = call_place(place, context, t + f, xs)
+            if status != 0:
+                return status
+        status = call_accelerate(accelerate, context, t + f, ys, k, xd)
+        if status != 0:
+            return status
+    weights = tableau[1 + stages * width :]
+    for c in range(n):
+        p, v = 0.0, 0.0
+        for j in range(stages):
+            kj = memory[(2 + j) * n + c]
+            p += weights[j] * kj
+            v += weights[stages + j] * kj
+        dx[c] = h * y[c] + h * h * p
+        dy[c] = h * v
+    return 0
+
+
+@callback(STEP)
+def runge_kutta_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+    """One step of an explicit Runge-Kutta method on the first-order system (x, y); memory (stages + 1)(nx + ny)."""
+    x, y, yd, xd = vector(x, nx), vector(y, ny), vector(yd, ny), vector(xd, nx)
+    dx, dy, tableau, memory = vector(dx, nx), vector(dy, ny), vector(tableau, ANY), vector(memory, ANY)
+    stages = int(tableau[0])
+    n = nx + ny
+    xs, ys = memory[:nx], memory[nx:n]
+    width = 2 + stages
+    for i in range(stages):
+        kx, ky = memory[(1 + i) * n :], memory[(1 + i) * n + nx :]
+        if i == 0:
+            for c in range(nx):
+                kx[c] = xd[c]
+            for c in range(ny):
+                ky[c] = yd[c]
+            continue
+        row = tableau[1 + i * width :]
+        for c in range(n):
+            s = 0.0
+            for j in range(i):
+                s += row[2 + j] * memory[(1 + j) * n + c]
+            if c < nx:
+                xs[c] = x[c] + h * s
+            else:
+                ys[c - nx] = y[c - nx] + h * s
+        status = call_place(place, context, t + h * row[1], xs)
+        if status == 0:
+            status = call_accelerate(accelerate, context, t + h * row[1], ys, ky, kx)
+        if status != 0:
+            return status
+    weights = tableau[1 + stages * width :]
+    for c in range(n):
+        s = 0.0
+        for j in range(stages):
+            s += weights[j] * memory[(1 + j) * n + c]
+        if c < nx:
+            dx[c] = h * s
+        else:
+            dy[c - nx] = h * s
+    return 0

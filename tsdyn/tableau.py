@@ -1,0 +1,121 @@
+"""Tableaus of explicit Runge-Kutta and Nystrom methods: data that checks itself."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import InvalidArgument
+
+
+def _rows(values, stages, what):
+    """A strictly lower triangular matrix from its rows below the diagonal."""
+    matrix = np.zeros((stages, stages))
+    for i, row in enumerate(values):
+        if len(row) != i:
+            raise InvalidArgument(f"{what}: row {i} of an explicit tableau has {i} entries, got {len(row)}.")
+        matrix[i, :i] = row
+    return matrix
+
+
+def _demand(what, **conditions):
+    for name, value in conditions.items():
+        if np.abs(value).max() > 1e-14:
+            raise InvalidArgument(f"{what}: the condition {name} fails by {np.abs(value).max():.3g}.")
+
+
+@dataclass(frozen=True)
+class RungeKuttaTableau:
+    """An explicit Runge-Kutta method: stage times c, coefficients a (rows below the diagonal), weights b."""
+
+    a: tuple
+    b: tuple
+    c: tuple
+    order: int
+
+    def __post_init__(self):
+        a, b, c = self.arrays
+        ones = np.ones(len(c))
+        _demand("RungeKuttaTableau", **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
+        if self.order >= 3:
+            _demand("RungeKuttaTableau", **{"b a c = 1/6": b @ a @ c - 1 / 6})
+        if self.order >= 4:
+            _demand(
+                "RungeKuttaTableau",
+                **{"b c a c = 1/8": (b * c) @ a @ c - 1 / 8},
+                **{"b a c^2 = 1/12": b @ a @ c**2 - 1 / 12, "b a a c = 1/24": b @ a @ a @ c - 1 / 24},
+            )
+
+    @property
+    def arrays(self):
+        """a (s, s), b (s,), c (s,)."""
+        return _rows(self.a, len(self.c), "RungeKuttaTableau"), np.array(self.b), np.array(self.c)
+
+    def packed(self):
+        """The numbers as the step kernel reads them: s, then a stage's same-place flag, c, row of a; then b."""
+        a, b, c = self.arrays
+        stages = [[0.0, c[i], *a[i]] for i in range(len(c))]
+        return np.concatenate([[len(c)], np.ravel(stages), b])
+
+
+@dataclass(frozen=True)
+class NystromTableau:
+    """An explicit Nystrom method for vdd = f(t, v, vd), with the velocity among f's arguments.
+
+    Stage i:  v_i  = v + c_i h vd + h^2 sum_j abar_ij k_j,   vd_i = vd + h sum_j a_ij k_j
+    Step:     v   += h vd + h^2 sum_i bbar_i k_i,            vd  += h sum_i b_i k_i
+
+    Conditions up to order 4 are those of Hairer, Norsett, Wanner, Solving ODEs I, 2nd ed., II.14.
+    """
+
+    a: tuple
+    abar: tuple
+    b: tuple
+    bbar: tuple
+    c: tuple
+    order: int
+
+    def __post_init__(self):
+        a, abar, b, bbar, c = self.arrays
+        ones = np.ones(len(c))
+        what = "NystromTableau"
+        if not a.any():
+            raise InvalidArgument(
+                f"{what}: this method ignores the velocity at its stages, but the reduced equations always depend on "
+                "it (gamma, S): it would be of order one. Use a tableau with coefficients a."
+            )
+        _demand(what, **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
+        _demand(what, **{"bbar 1 = 1/2": bbar @ ones - 1 / 2})
+        if self.order >= 3:
+            _demand(
+                what,
+                **{"sum abar = c^2 / 2": (b @ (abar @ ones)) - 1 / 6, "b a c = 1/6": b @ a @ c - 1 / 6},
+                **{"bbar c = 1/6": bbar @ c - 1 / 6},
+            )
+        if self.order >= 4:
+            _demand(
+                what,
+                **{"b c a c = 1/8": (b * c) @ a @ c - 1 / 8, "b a c^2 = 1/12": b @ a @ c**2 - 1 / 12},
+                **{"b a a c = 1/24": b @ a @ a @ c - 1 / 24, "b abar c = 1/24": b @ abar @ c - 1 / 24},
+                **{"bbar c^2 = 1/12": bbar @ c**2 - 1 / 12, "bbar a c = 1/24": bbar @ a @ c - 1 / 24},
+                **{"b c abar 1 = 1/8": (b * c) @ abar @ ones - 1 / 8, "b a abar 1 = 1/24": b @ a @ abar @ ones - 1 / 24},
+            )
+
+    @property
+    def arrays(self):
+        """a (s, s), abar (s, s), b (s,), bbar (s,), c (s,)."""
+        s = len(self.c)
+        a, abar = _rows(self.a, s, "NystromTableau a"), _rows(self.abar, s, "NystromTableau abar")
+        return a, abar, np.array(self.b), np.array(self.bbar), np.array(self.c)
+
+    def packed(self):
+        """The numbers as the step kernel reads them: s; a stage's same-place flag, c, rows of abar and a; bbar; b."""
+        a, abar, b, bbar, c = self.arrays
+        stages = []
+        for i in range(len(c)):
+            same = i > 0 and c[i] == c[i - 1] and (abar[i] == abar[i - 1]).all()
+            stages += [float(same), c[i], *abar[i], *a[i]]
+        return np.concatenate([[len(c)], stages, bbar, b])
+
+
+def _quadrature(b, c, order):
+    return {f"b c^{j} = 1/{j + 1}": b @ c**j - 1 / (j + 1) for j in range(order)}

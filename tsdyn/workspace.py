@@ -1,0 +1,85 @@
+"""The scratch memory of one run: every array laid out once, before the first step."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ._kernel import loader
+from .system import System
+
+
+class Work(NamedTuple):
+    """n coordinates, m constraints, k = n - m degrees of freedom, b bodies; "computed by" names the kernel."""
+
+    q: np.ndarray  # (n,)    positions; computed by newton.solve_positions
+    qd: np.ndarray  # (n,)   velocities; computed by null_space.accelerate
+    qdd: np.ndarray  # (n,)  accelerations; computed by null_space.complete
+    Phi: np.ndarray  # (m,)  constraints at q; newton.solve_positions
+    Phi_t: np.ndarray  # (m,)  their time derivative; null_space.accelerate
+    gamma: np.ndarray  # (m,)  acceleration bias; null_space.accelerate
+    z: np.ndarray  # (m,)    B gamma; null_space.accelerate
+    Phi_q: np.ndarray  # (m, n)  Jacobian at q; chart.tangent_map
+    q0: np.ndarray  # (n,)   where the chart touches; chart.new_chart
+    U: np.ndarray  # (n, m)  Phi_q(q0)^T, Eq. 5; chart.new_chart
+    V: np.ndarray  # (n, k)  orthonormal basis of ker Phi_q(q0); chart.new_chart
+    B0: np.ndarray  # (m, m)  (Phi_q(q0) U)^-1; chart.new_chart
+    scale: np.ndarray  # (m,)  norms of the rows of Phi_q(q0); chart.new_chart
+    B: np.ndarray  # (m, m)  (Phi_q U)^-1, Eqs. 7, 28, warm-started; newton.update_b
+    u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; newton.solve_positions
+    T: np.ndarray  # (m, k)  B Phi_q V = du/dv; chart.tangent_map
+    v: np.ndarray  # (k,)    tangent coordinates of the latest u; newton.solve_positions
+    base: np.ndarray  # (n,)   q0 + V v; newton.solve_positions
+    N: np.ndarray  # (m, m)  Phi_q U; chart.tangent_map
+    R: np.ndarray  # (m, m)  residual of Eq. 28, and scratch of factorisations; newton.update_b
+    D: np.ndarray  # (n, k)  (I - U B Phi_q) V, Eq. 9; chart.tangent_map
+    E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.mass
+    A: np.ndarray  # (k, k)  D^T M D, then its Cholesky factor; null_space.mass
+    h: np.ndarray  # (n,)    U z, and scratch of charts; null_space.accelerate
+    householder: np.ndarray  # (n, m)  scratch of the orthonormal basis; linalg.null_space
+    control: np.ndarray  # (CONTROLS,)  tolerances and criteria, below
+    counters: np.ndarray  # int64 (COUNTERS,)  what was done how often, below
+
+
+U_TOL, B_TOL, FLOOR, CONDITION, CONDITION_B0, CONDITION_A0, CONTRACTION, CONTROLS = range(8)
+EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS, SKIPPED, COUNTERS = range(8)
+
+
+class Context(NamedTuple):
+    """What a formulation's kernels get, by one address."""
+
+    system: System
+    work: Work
+
+
+def allocate(n, m, bodies, constraint_tol):
+    """Lay out the scratch memory of a run in one block of floats."""
+    k = n - m
+    shapes = {
+        **dict.fromkeys(("q", "qd", "qdd", "q0", "base", "h"), (n,)),
+        **dict.fromkeys(("Phi", "Phi_t", "gamma", "z", "scale", "u"), (m,)),
+        **dict.fromkeys(("B0", "B", "N", "R"), (m, m)),
+        **dict.fromkeys(("U", "householder"), (n, m)),
+        **dict.fromkeys(("V", "D"), (n, k)),
+        "Phi_q": (m, n),
+        "T": (m, k),
+        "v": (k,),
+        "E": (3 * bodies, k),
+        "A": (k, k),
+        "control": (CONTROLS,),
+    }
+    sizes = [int(np.prod(shape)) for shape in shapes.values()]
+    block = np.zeros(sum(sizes))
+    parts = np.split(block, np.cumsum(sizes)[:-1])
+    arrays = {name: part.reshape(shape) for (name, shape), part in zip(shapes.items(), parts, strict=True)}
+    arrays["control"][[U_TOL, B_TOL]] = constraint_tol
+    return Work(**arrays, counters=np.zeros(COUNTERS, np.int64))
+
+
+def _example():
+    one, two = np.zeros(1), np.zeros((1, 1))
+    ones, twos = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
+    system = System(twos, one, two, one, twos, ones, one, twos, twos)
+    return Context(system, allocate(2, 1, 1, 1.0))
+
+
+load = loader(_example())

@@ -25,11 +25,12 @@ from ._cache import cache_of
 DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
 _table = []  # debug mode: what an address stands for
+_letters = {"i": types.int64, "d": types.float64, "p": types.int64}
 
 
 def kernel(function):
     """Compile a function that other kernels call; it is compiled into each of them."""
-    return function if DEBUG else numba.njit(**_OPTIONS)(function)
+    return function if DEBUG else numba.njit(forceinline=True, **_OPTIONS)(function)
 
 
 def entry(function):
@@ -46,8 +47,6 @@ class Callback:
 
     The signature has a letter an argument: i an integer, d a float, p the address of an array. It returns an integer.
     """
-
-    _letters = {"i": types.int64, "d": types.float64, "p": types.int64}
 
     def __init__(self, function, signature, result="i", allocates=False):
         self.py_func = getattr(function, "py_func", function)
@@ -68,8 +67,8 @@ class Callback:
         return len(_table) - 1
 
     def _compile(self):
-        arguments = tuple(self._letters[c] for c in self.signature)
-        self._cfunc = CFunc(self.py_func, (arguments, self._letters[self.result]), locals={}, options=self.options)
+        arguments = tuple(_letters[c] for c in self.signature)
+        self._cfunc = CFunc(self.py_func, (arguments, _letters[self.result]), locals={}, options=self.options)
         self._cfunc._cache = cache_of(self.py_func)
         self._cfunc.compile()
         return self._cfunc.address
@@ -188,7 +187,7 @@ def loader(example):
 
 
 def caller(signature, result="i"):
-    """Make the kernel that calls a `Callback` of this signature: call(address, *arguments), arrays passed as they are."""
+    """Make the kernel that calls a `Callback` of this signature: call(address, *arguments), arrays as they are."""
     if DEBUG:
         return lambda address, *arguments: _table[address](*arguments)
     native = {"i": _i64, "d": _f64, "p": _i64}
@@ -196,7 +195,7 @@ def caller(signature, result="i"):
     @intrinsic
     def call(typing, address, *arguments):
         wanted = [
-            given if isinstance(given, types.Array) else Callback._letters[letter]
+            given if isinstance(given, types.Array) else _letters[letter]
             for letter, given in zip(signature, arguments, strict=True)
         ]
 
@@ -211,7 +210,7 @@ def caller(signature, result="i"):
             target = ir.FunctionType(native[result], [native[c] for c in signature]).as_pointer()
             return builder.call(builder.inttoptr(values[0], target), words)
 
-        return Callback._letters[result](types.int64, types.StarArgTuple(wanted)), generate
+        return _letters[result](types.int64, types.StarArgTuple(wanted)), generate
 
     return call
 

@@ -50,10 +50,7 @@ def acceleration_bias(s, q, qd, t, gamma):
 @kernel
 def is_rheonomic(s):
     """Whether any row depends on time."""
-    for i in range(s.kinds.shape[0]):
-        if s.kinds[i, PHI_T] != 0:
-            return True
-    return False
+    return s.rheonomic[0] != 0
 
 
 @entry

@@ -60,11 +60,14 @@ def _inertia(value, body):
         given = np.diag(given)
     if given.shape != (3, 3) or not np.isfinite(given).all():
         raise InvalidBody(
-            f"{body.name}: inertia must be 3 principal values or a symmetric 3 x 3 matrix of finite kg m^2, got {value!r}."
+            f"{body.name}: inertia must be 3 principal values or a symmetric 3 x 3 matrix, finite, kg m^2, "
+            f"got {value!r}."
         )
     scale = np.abs(given).max()
     if np.abs(given - given.T).max() > 1e-12 * scale:
-        raise InvalidBody(f"{body.name}: the inertia matrix is not symmetric; J - J^T is up to {np.abs(given - given.T).max():.3g}.")
+        raise InvalidBody(
+            f"{body.name}: the inertia matrix is not symmetric; J - J^T is up to {np.abs(given - given.T).max():.3g}."
+        )
     given = (given + given.T) / 2.0
     principal = np.linalg.eigvalsh(given)
     if principal[0] < -1e-12 * scale or scale == 0.0:

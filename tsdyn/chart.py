@@ -29,7 +29,8 @@ REASONS = (
     "start",
 )
 
-CONTRACTION_LIMIT = 0.2
+CONTRACTION_LIMIT = 0.25
+CONTRACTION_LOST = 0.9  # nearer to one B need not exist on the way, and another branch may have been found
 CONDITION_LIMIT = 10.0
 OFFSET_LIMIT = 0.5
 RANK_LIMIT = 1e-11  # smallest singular value of Phi_q, rows scaled to length one, below which it has lost rank

@@ -53,7 +53,8 @@ class Status(IntEnum):
     MASS_SINGULAR = 4
     MAX_STEPS = 5
     INTERRUPTED = 6
-    SLICE_DONE = 7
+    CHART_LOST = 7
+    SLICE_DONE = 8
 
     @property
     def sentence(self):
@@ -84,6 +85,10 @@ _SENTENCES = {
         "The reduced mass matrix D^T M D is not positive definite: a direction that the constraints leave free "
         "carries no inertia.",
         "Give the body inertia about its free axis, or add the constraint that holds it.",
+    ),
+    Status.CHART_LOST: (
+        "The motion left its chart within a single step, so which branch of the constraints it is on is not certain.",
+        "Take a smaller step.",
     ),
     Status.MAX_STEPS: ("The run reached max_steps.", "Raise max_steps, or take a larger step."),
     Status.INTERRUPTED: ("The run was interrupted.", "Go on with simulate(scene, (t, t_end), state=solution.state)."),

@@ -11,6 +11,7 @@ from .evaluate import constraint_arrays, mass_matrix
 RANK_TOL = 1e-10  # of a row of Phi_q, scaled to unit length, after the rows it depends on are taken out
 
 ROUNDING = 2e-16
+MOST_ITERATIONS = 100
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,12 @@ def check_rank(scene, Phi_q):
         + "\n".join(stories)
         + "\nRemove the rows that say nothing new, or use a joint with fewer rows."
     )
+
+
+def weakest_row(scene, Phi_q):
+    """Name the row of Phi_q that is nearest to depending on the others."""
+    scaled = Phi_q / np.maximum(np.linalg.norm(Phi_q, axis=1), 1e-300)[:, None]
+    return scene.row_names()[qr(scaled.T, mode="economic", pivoting=True)[2][-1]]
 
 
 def consistent(scene, system, q, qd, t, tol):
@@ -151,13 +158,15 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0):
     free = ~held
     Phi, Phi_q, Phi_t, _ = constraint_arrays(system, q, qd, t)
     moved_rows = np.abs(Phi_q[:, free]).max(axis=1, initial=0.0) > 0.0
-    iterations = 0
-    size = np.linalg.norm(Phi)
-    for iterations in range(1, 101):
+    iterations, size = 0, np.linalg.norm(Phi)
+    while iterations < MOST_ITERATIONS:
+        iterations += 1
         if not Phi.size or np.abs(Phi).max() <= 1e-15 * (1.0 + np.abs(q).max()):
             break
         step = np.zeros(q.size)
-        step[free] = _smallest(_metric(system, q)[np.ix_(free, free)], Phi_q[np.ix_(moved_rows, free)], -Phi[moved_rows])
+        step[free] = _smallest(
+            _metric(system, q)[np.ix_(free, free)], Phi_q[np.ix_(moved_rows, free)], -Phi[moved_rows]
+        )
         rigid = [slice(at + 3, at + 7) for at, length in system.bodies if length == 7]
         turn = max((2.0 * np.linalg.norm(step[p]) for p in rigid), default=0.0)
         factor = min(1.0, 0.5 / turn) if turn > 0.0 else 1.0

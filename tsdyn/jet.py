@@ -37,9 +37,7 @@ class Jet:
 
     def __mul__(self, other):
         o = Jet.of(other)
-        return Jet(
-            self.x * o.x, self.xd * o.x + self.x * o.xd, self.xdd * o.x + 2.0 * self.xd * o.xd + self.x * o.xdd
-        )
+        return Jet(self.x * o.x, self.xd * o.x + self.x * o.xd, self.xdd * o.x + 2.0 * self.xd * o.xd + self.x * o.xdd)
 
     def _chain(self, f, fd, fdd):
         return Jet(f, fd * self.xd, fdd * self.xd * self.xd + fd * self.xdd)

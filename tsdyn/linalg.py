@@ -6,17 +6,26 @@ from ._kernel import kernel
 
 
 @kernel
+def copy(a, b):
+    """b = a."""
+    for i in range(a.size):
+        b[i] = a[i]
+
+
+@kernel
 def cholesky(A, n):
-    """Factor the lower triangle of A (n, n) in place, A = L L^T; False where A is not positive definite."""
+    """Factor the lower triangle of A (n, n) in place, A = L L^T; False where A is not positive definite.
+
+    The diagonal holds the reciprocals of L's.
+    """
     for j in range(n):
         s = A[j, j]
         for k in range(j):
             s -= A[j, k] * A[j, k]
         if not s > 0.0:
             return False
-        pivot = math.sqrt(s)
+        pivot = 1.0 / math.sqrt(s)
         A[j, j] = pivot
-        pivot = 1.0 / pivot
         for i in range(j + 1, n):
             s = A[i, j]
             for k in range(j):
@@ -32,9 +41,9 @@ def cholesky_solve(L, b, n):
         s = b[i]
         for k in range(i):
             s -= L[i, k] * b[k]
-        b[i] = s / L[i, i]
+        b[i] = s * L[i, i]
     for i in range(n - 1, -1, -1):
-        s = b[i] / L[i, i]
+        s = b[i] * L[i, i]
         b[i] = s
         for k in range(i):
             b[k] -= L[i, k] * s

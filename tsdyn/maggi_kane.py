@@ -8,6 +8,7 @@ q is integrated as it stands and nothing puts it back on Phi(q) = 0. D, B, V and
 from ._kernel import callback, vector
 from .assembly import set_time
 from .chart import inspect, new_chart, tangent_map
+from .linalg import copy
 from .newton import OK
 from .null_space import project, reduced_acceleration, reduced_mass, velocities
 from .stepping import ACCELERATE, PLACE
@@ -21,7 +22,7 @@ def place(context, t, q):
     s, w = c.system, c.work
     set_time(s, t)
     w.counters[PLACEMENTS] += 1
-    w.q[:] = vector(q, w.q.size)
+    copy(vector(q, w.q.size), w.q)
     status = tangent_map(s, w, t)
     return reduced_mass(s, w) if status == OK else status
 
@@ -33,7 +34,7 @@ def accelerate(context, t, velocity, wd, qd):
     s, w = c.system, c.work
     velocities(s, w, t, vector(velocity, w.v.size))
     status = reduced_acceleration(s, w, t, vector(wd, w.v.size))
-    vector(qd, w.q.size)[:] = w.qd
+    copy(w.qd, vector(qd, w.q.size))
     return status
 
 
@@ -50,7 +51,7 @@ def start_chart(context, t, q, velocity, wd, qd):
     s, w = c.system, c.work
     set_time(s, t)
     status = new_chart(s, w, t)
-    vector(q, w.q.size)[:] = w.q
-    vector(qd, w.q.size)[:] = w.qd
+    copy(w.q, vector(q, w.q.size))
+    copy(w.qd, vector(qd, w.q.size))
     project(w, vector(velocity, w.v.size), vector(wd, w.v.size))
     return status

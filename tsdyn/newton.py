@@ -47,9 +47,8 @@ def solve_positions(s, w, t, v):
             if not size < math.inf:
                 return NOT_FINITE
             worst = max(worst, size)
-        if worst > 0.25 * before:  # B is out of date
-            if not factorise_b(s, w, t):
-                return SINGULAR
+        if worst > 0.25 * before and not factorise_b(s, w, t):  # B was out of date
+            return SINGULAR
         for i in range(m):
             d = 0.0
             for j in range(m):

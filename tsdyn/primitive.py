@@ -78,7 +78,9 @@ class Primitive:
         bodies = [body for body in (a, b) if body is not None]
         for body in bodies:
             if not hasattr(body, "dimension"):
-                raise InvalidConstraint(f"{kind}: {body!r} is not a body; pass what add_body returned, or scene.ground.")
+                raise InvalidConstraint(
+                    f"{kind}: {body!r} is not a body; pass what add_body returned, or scene.ground."
+                )
         self.name = str(name) or f"{kind}({', '.join(body.name for body in bodies)})"
         if all(body.dimension == 0 for body in bodies):
             raise InvalidConstraint(f"{self.name}: one of the bodies must not be the ground.")

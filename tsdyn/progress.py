@@ -12,7 +12,9 @@ def reporter(progress):
     if callable(progress):
         return lambda fraction: None if fraction is None else progress(min(max(float(fraction), 0.0), 1.0))
     if progress is not True:
-        raise InvalidArgument(f"progress must be True, False, None or a function of the fraction done, got {progress!r}.")
+        raise InvalidArgument(
+            f"progress must be True, False, None or a function of the fraction done, got {progress!r}."
+        )
     try:
         from tqdm.auto import tqdm
     except ImportError as error:

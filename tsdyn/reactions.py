@@ -10,7 +10,7 @@ from .linalg import cholesky, cholesky_solve
 
 @entry
 def solve_multipliers(s, t, q, f, Phi_q, A, b, out):
-    """out (k, m) with Phi_q^T lam = f in the least-squares sense; f (k, n) is Q_A + S - M qdd. True if Phi_q is regular.
+    """out (k, m) with Phi_q^T lam = f, by least squares; f (k, n) is Q_A + S - M qdd. True if Phi_q is regular.
 
     Normal equations with one step of refinement, (Phi_q Phi_q^T) lam = Phi_q f; f lies in the range of Phi_q^T.
     """

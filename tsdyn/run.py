@@ -5,18 +5,21 @@ from typing import NamedTuple
 import numpy as np
 
 from ._kernel import address_of, caller, entry, kernel
-from .chart import AT_START, BY_FAILURE, BY_INTERVAL
+from .chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .errors import Status
+from .linalg import copy
 from .stepping import call_accelerate, call_place, call_step
-from .workspace import CHARTS, CONDITION, CONTRACTION
+from .workspace import CONDITION, CONTRACTION
 
-SLICE_DONE = int(Status.SLICE_DONE)
+SLICE_DONE, CHART_LOST = int(Status.SLICE_DONE), int(Status.CHART_LOST)
 # addresses
 A_PLACE, A_ACCELERATE, A_COMPLETE, A_CHECK, A_CHART, A_STEP = range(6)
 # clock
 T, T_ORIGIN, T_END, H = range(4)
 # numbers
-FIRST_ORDER, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL, HISTORY, CHART_ROWS, REJECTED, NUMBERS = range(11)
+FIRST_ORDER, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL, HISTORY, CHART_ROWS, REJECTED, NUMBERS = range(
+    11
+)
 
 call_complete = caller("pp")
 call_check = caller("p")
@@ -64,17 +67,15 @@ def _add(x, low, dx):
 
 
 @kernel
-def _copy(a, b):
-    for i in range(a.size):
-        b[i] = a[i]
-
-
-@kernel
 def _begin_chart(context, w, r, at, reason):
     """A new chart at the present q, qd, qdd; closes the record of the old one. Status."""
     i = r.numbers[CHART_ROWS]
     if reason != AT_START:
-        r.charts[i, 2], r.charts[i, 3], r.charts[i, 4] = w.control[CONDITION], w.control[CONTRACTION], r.numbers[IN_CHART]
+        r.charts[i, 2], r.charts[i, 3], r.charts[i, 4] = (
+            w.control[CONDITION],
+            w.control[CONTRACTION],
+            r.numbers[IN_CHART],
+        )
         i += 1
         r.numbers[CHART_ROWS] = i
     r.charts[i, 0], r.charts[i, 1] = r.clock[T], reason
@@ -188,9 +189,9 @@ def _outputs(context, w, r, at, t0, h, t1):
 
 @kernel
 def _store_now(w, r):
-    _copy(w.q, r.now[0])
-    _copy(w.qd, r.now[1])
-    _copy(w.qdd, r.now[2])
+    copy(w.q, r.now[0])
+    copy(w.qd, r.now[1])
+    copy(w.qdd, r.now[2])
 
 
 @entry
@@ -230,9 +231,9 @@ def advance(c, r, at, most):
         row = r.history[r.numbers[HISTORY]]
         row[0], row[1], row[2] = t0, h, 0.0
         r.numbers[HISTORY] += 1
-        _copy(r.x, r.x_old)
-        _copy(r.y, r.y_old)
-        _copy(r.yd, r.yd_old)
+        copy(r.x, r.x_old)
+        copy(r.y, r.y_old)
+        copy(r.yd, r.yd_old)
         status = call_step(
             at[A_STEP], context, at[A_PLACE], at[A_ACCELERATE], t0, h, nx, ny,
             r.x, r.y, r.yd, r.xd, r.tableau, r.memory, r.dx, r.dy,
@@ -241,10 +242,15 @@ def advance(c, r, at, most):
             _add(r.x, r.x_low, r.dx)
             _add(r.y, r.y_low, r.dy)
             status = _evaluate(context, at, t1, r.x, r.y, r.yd, r.xd)
+        reason = 0
+        if status == 0:
+            reason = call_check(at[A_CHECK], context)
+            if not w.control[CONTRACTION] < CONTRACTION_LOST:
+                status = CHART_LOST
         if status != 0:  # back to the start of the step, on a new chart if this one has been used
-            _copy(r.now[0], w.q)
-            _copy(r.now[1], w.qd)
-            _copy(r.now[2], w.qdd)
+            copy(r.now[0], w.q)
+            copy(r.now[1], w.qd)
+            copy(r.now[2], w.qdd)
             r.numbers[REJECTED] += 1
             if r.numbers[IN_CHART] == 0:
                 return status
@@ -254,21 +260,20 @@ def advance(c, r, at, most):
             continue
         row[2] = 1.0
         for j in range(3):
-            _copy(r.now[j], r.before[j])
+            copy(r.now[j], r.before[j])
         _store_now(w, r)
         r.clock[T] = t1
         r.numbers[STEPS] = i + 1
         r.numbers[IN_CHART] += 1
-        reason = call_check(at[A_CHECK], context)
-        if r.numbers[INTERVAL] > 0:
-            reason = BY_INTERVAL if r.numbers[IN_CHART] >= r.numbers[INTERVAL] else 0
+        if reason == 0 and r.numbers[INTERVAL] > 0 and r.numbers[IN_CHART] >= r.numbers[INTERVAL]:
+            reason = BY_INTERVAL
         status = _outputs(context, w, r, at, t0, h, t1)
         if status != 0:
             return status
         if reason != 0 and not last:
-            _copy(r.now[0], w.q)
-            _copy(r.now[1], w.qd)
-            _copy(r.now[2], w.qdd)
+            copy(r.now[0], w.q)
+            copy(r.now[1], w.qd)
+            copy(r.now[2], w.qdd)
             status = _begin_chart(context, w, r, at, reason)
             if status != 0:
                 return status

@@ -128,7 +128,9 @@ class Scene:
             If it is no constraint, belongs to another scene, or has been added before.
         """
         if not isinstance(item, Primitive):
-            raise InvalidConstraint(f"{item!r} is not a constraint; pass an instance, such as ts.constraints.Spherical(...).")
+            raise InvalidConstraint(
+                f"{item!r} is not a constraint; pass an instance, such as ts.constraints.Spherical(...)."
+            )
         if item.scene is not self:
             raise InvalidConstraint(f"{item.name}: its bodies belong to another scene; use bodies of this one.")
         if type(item) is EulerNormalization:

@@ -15,7 +15,6 @@ from .progress import reporter
 from .run import (
     CHART_ROWS,
     FIRST_ORDER,
-    H,
     HISTORY,
     INTERVAL,
     NUMBERS,
@@ -24,6 +23,7 @@ from .run import (
     STEPS_WANTED,
     T_END,
     T_ORIGIN,
+    H,
     Run,
     T,
     advance,
@@ -230,7 +230,9 @@ def _interval(t_span):
     if not (math.isfinite(t0) and math.isfinite(t1)):
         raise InvalidArgument(f"t_span must be two finite times in s, (start, end), got {t_span!r}.")
     if not t1 > t0:
-        raise InvalidArgument(f"t_span must end after it starts, got ({t0:g}, {t1:g}); swap them, or choose a later end.")
+        raise InvalidArgument(
+            f"t_span must end after it starts, got ({t0:g}, {t1:g}); swap them, or choose a later end."
+        )
     return t0, t1
 
 
@@ -264,7 +266,9 @@ def _output_times(t_eval, t0, t1):
     if (np.diff(times) <= 0.0).any():
         raise InvalidArgument("t_eval must increase from each time to the next.")
     if times[0] < t0 or times[-1] > t1:
-        raise InvalidArgument(f"t_eval must lie within t_span, ({t0:g}, {t1:g}); it runs from {times[0]:g} to {times[-1]:g}.")
+        raise InvalidArgument(
+            f"t_eval must lie within t_span, ({t0:g}, {t1:g}); it runs from {times[0]:g} to {times[-1]:g}."
+        )
     return times
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from . import diagnostics, reactions
 from .bodies import rotation_matrix
-from .chart import BY_INTERVAL, REASONS
+from .chart import REASONS
 from .errors import InvalidBody, InvalidConstraint, Status, StepFailure
-from .run import CHART_ROWS, IN_CHART, NUMBERS, REJECTED, STEPS, T
+from .run import CHART_ROWS, IN_CHART, REJECTED, STEPS, T
 from .workspace import (
     B_ITERATIONS,
     CHARTS,
@@ -139,7 +139,9 @@ class Solution:
     def charts(self):
         """History of the charts, a `Charts`."""
         rows = self._charts
-        return Charts(rows[:, 0], tuple(REASONS[int(i)] for i in rows[:, 1]), rows[:, 2], rows[:, 3], rows[:, 4].astype(int))
+        return Charts(
+            rows[:, 0], tuple(REASONS[int(i)] for i in rows[:, 1]), rows[:, 2], rows[:, 3], rows[:, 4].astype(int)
+        )
 
     @cached_property
     def multipliers(self):
@@ -225,7 +227,7 @@ class Solution:
     def __repr__(self):
         s = self.stats
         return (
-            f"<Solution: {self.status.name.lower()}, {self.t.size} outputs to t = {self._reached:g} s by {self.method}, "
-            f"{self.formulation}: {s.steps} steps, {s.evaluations} evaluations, {s.charts} charts, "
+            f"<Solution: {self.status.name.lower()}, {self.t.size} outputs to t = {self._reached:g} s by "
+            f"{self.method}, {self.formulation}: {s.steps} steps, {s.evaluations} evaluations, {s.charts} charts, "
             f"{s.seconds['run']:.3g} s>"
         )

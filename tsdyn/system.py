@@ -22,6 +22,7 @@ class System(NamedTuple):
     table: np.ndarray  # int64: for each instance the places in q and Phi_q, primitive.INTS numbers
     reals: np.ndarray  # float64: for each instance marker coordinates, then parameters
     motions: np.ndarray  # int64 (motions, 4): addresses of f, fd, fdd; place of the first in reals
+    rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
     segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
 
 
@@ -66,6 +67,7 @@ def pack(scene):
         table=np.array(table, np.int64),
         reals=np.array(reals),
         motions=np.array(motions, np.int64).reshape(-1, 4),
+        rheonomic=np.array([any(kind[PHI_T] for kind in kinds)], np.int64),
         segments=np.array(segments, np.int64).reshape(-1, 4),
     )
 

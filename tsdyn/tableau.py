@@ -97,7 +97,10 @@ class NystromTableau:
                 **{"b c a c = 1/8": (b * c) @ a @ c - 1 / 8, "b a c^2 = 1/12": b @ a @ c**2 - 1 / 12},
                 **{"b a a c = 1/24": b @ a @ a @ c - 1 / 24, "b abar c = 1/24": b @ abar @ c - 1 / 24},
                 **{"bbar c^2 = 1/12": bbar @ c**2 - 1 / 12, "bbar a c = 1/24": bbar @ a @ c - 1 / 24},
-                **{"b c abar 1 = 1/8": (b * c) @ abar @ ones - 1 / 8, "b a abar 1 = 1/24": b @ a @ abar @ ones - 1 / 24},
+                **{
+                    "b c abar 1 = 1/8": (b * c) @ abar @ ones - 1 / 8,
+                    "b a abar 1 = 1/24": b @ a @ abar @ ones - 1 / 24,
+                },
             )
 
     @property

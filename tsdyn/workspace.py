@@ -78,7 +78,7 @@ def allocate(n, m, bodies, constraint_tol):
 def _example():
     one, two = np.zeros(1), np.zeros((1, 1))
     ones, twos = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    system = System(twos, one, two, one, twos, ones, one, twos, twos)
+    system = System(twos, one, two, one, twos, ones, one, twos, ones, twos)
     return Context(system, allocate(2, 1, 1, 1.0))
 
 

@@ -214,7 +214,7 @@ def _acquire(path, patience=300.0):
     except ImportError:
         return None
     try:
-        handle = open(path, "w")
+        handle = open(path, "w")  # noqa: SIM115  (held until the kernel is saved)
     except OSError:
         return None
     limit = time.monotonic() + patience

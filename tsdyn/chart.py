@@ -2,9 +2,10 @@
 
 A chart is left at the end of a step, on signs that have no dimension and that no scene's scale enters:
 
-    contraction    |I - B0 Phi_q U|     how far the normal space has turned since q0; 0 at q0; rows and columns are
-                                        weighted so that scaling a constraint changes nothing
-    condition      of B and of D^T M D, each divided by what it was at q0
+    contraction    |I - R^-T (Phi_q U) R^-1|,  U = Q R: how far the normal space has turned since q0; 0 at q0, and
+                   the same however the constraints are scaled or combined
+    condition      of D^T M D, divided by what it was at q0; that of B, as far as it has grown since q0, is at most
+                   (1 + c) / (1 - c) for a contraction c, and needs no sign of its own
     offset         |U u| / |V v|        how steeply the manifold leaves the tangent plane
 """
 
@@ -14,14 +15,13 @@ from ._kernel import kernel
 from .assembly import constraint_jacobian
 from .linalg import invert, null_space
 from .newton import OK, SINGULAR, normal_matrix, update_b
-from .workspace import CHARTS, CONDITION, CONDITION_A0, CONDITION_B0, CONTRACTION, FACTORIZATIONS, FLOOR
+from .workspace import CHARTS, CONDITION, CONDITION_M0, CONTRACTION, FACTORIZATIONS, FLOOR
 
 # reasons to leave a chart, as stored; REASONS names them
-STAY, BY_CONTRACTION, BY_CONDITION_B, BY_CONDITION_M, BY_OFFSET, BY_INTERVAL, BY_FAILURE, AT_START = range(8)
+STAY, BY_CONTRACTION, BY_CONDITION, BY_OFFSET, BY_INTERVAL, BY_FAILURE, AT_START = range(7)
 REASONS = (
     "",
     "contraction",
-    "condition of B",
     "condition of D^T M D",
     "size of u",
     "chart_interval",
@@ -29,7 +29,7 @@ REASONS = (
     "start",
 )
 
-CONTRACTION_LIMIT = 0.25
+CONTRACTION_LIMIT = 0.15
 CONTRACTION_LOST = 0.9  # nearer to one B need not exist on the way, and another branch may have been found
 CONDITION_LIMIT = 10.0
 OFFSET_LIMIT = 0.5
@@ -60,7 +60,7 @@ def new_chart(s, w, t):
             w.T[i, j] = 0.0
     for j in range(k):
         w.v[j] = 0.0
-    low, high = null_space(w.householder, n, m, w.V, w.R, w.z)
+    low, high = null_space(w.householder, n, m, w.V, w.R, w.z)  # leaves R over the reflectors
     if m > 0 and not low > RANK_LIMIT * high:
         return SINGULAR
     normal_matrix(s, w)
@@ -70,11 +70,8 @@ def new_chart(s, w, t):
     w.counters[FACTORIZATIONS] += 1
     if not invert(w.R, w.B, m) or update_b(s, w, t) != OK:
         return SINGULAR
-    for i in range(m):
-        for j in range(m):
-            w.B0[i, j] = w.B[i, j]
     w.counters[CHARTS] += 1
-    w.control[CONDITION_B0] = 0.0  # measured at the next placement
+    w.control[CONDITION_M0] = 0.0  # measured at the next placement
     w.control[FLOOR] = 4e-16 * (1.0 + largest)
     w.control[CONTRACTION] = 0.0
     w.control[CONDITION] = 1.0
@@ -118,39 +115,52 @@ def tangent_map(s, w, t):
 
 
 @kernel
+def _turn(w, m):
+    """|I - R^-T N R^-1|, the maximum row sum; N = Phi_q U, and U = Q R."""
+    X = w.R
+    for i in range(m):
+        for j in range(m):
+            X[i, j] = w.N[i, j] / w.scale[i] / w.scale[j]
+    for i in range(m):  # R^-T from the left, row by row
+        for c in range(i):
+            f = w.householder[c, i]
+            for j in range(m):
+                X[i, j] -= f * X[c, j]
+        f = 1.0 / w.householder[i, i]
+        for j in range(m):
+            X[i, j] *= f
+    off = 0.0
+    for i in range(m):  # R^-1 from the right
+        total = 0.0
+        for j in range(m):
+            x = X[i, j]
+            for c in range(j):
+                x -= X[i, c] * w.householder[c, j]
+            X[i, j] = x / w.householder[j, j]
+        for j in range(m):
+            total += abs(X[i, j] - 1.0 if i == j else X[i, j])
+        off = max(off, total)
+    return off
+
+
+@kernel
 def inspect(w, has_u):
     """Reason to leave the chart at the present placement, or STAY; records contraction and condition."""
     n, m, k = w.q.size, w.u.size, w.v.size
-    contraction, size_b, size_n = 0.0, 0.0, 0.0
-    for i in range(m):
-        row_c, row_b, row_n = 0.0, 0.0, 0.0
-        for j in range(m):
-            x = 0.0
-            for c in range(m):
-                x += w.B0[i, c] * w.N[c, j]
-            if i == j:
-                x -= 1.0
-            ratio = w.scale[i] / w.scale[j]
-            row_c += abs(x) * ratio
-            row_b += abs(w.B[i, j]) * w.scale[i] * w.scale[j]
-            row_n += abs(w.N[i, j]) / (w.scale[i] * w.scale[j])
-        contraction, size_b, size_n = max(contraction, row_c), max(size_b, row_b), max(size_n, row_n)
+    contraction = _turn(w, m)
     low, high = math.inf, 0.0
-    for j in range(k):  # A holds the Cholesky factor of D^T M D
+    for j in range(k):  # the diagonal of the Cholesky factor of D^T M D
         low, high = min(low, w.A[j, j]), max(high, w.A[j, j])
-    condition_b = size_b * size_n
-    condition_a = (high / low) ** 2 if k > 0 else 1.0
-    if w.control[CONDITION_B0] == 0.0:
-        w.control[CONDITION_B0], w.control[CONDITION_A0] = condition_b, condition_a
-    growth_b, growth_a = condition_b / w.control[CONDITION_B0], condition_a / w.control[CONDITION_A0]
+    condition = (high / low) ** 2 if k > 0 else 1.0
+    if w.control[CONDITION_M0] == 0.0:
+        w.control[CONDITION_M0] = condition
+    condition /= w.control[CONDITION_M0]
     w.control[CONTRACTION] = contraction
-    w.control[CONDITION] = max(growth_b, growth_a)
+    w.control[CONDITION] = max((1.0 + contraction) / max(1.0 - contraction, 1e-300), condition)
     if not contraction < CONTRACTION_LIMIT:
         return BY_CONTRACTION
-    if not growth_b < CONDITION_LIMIT and m > 0:
-        return BY_CONDITION_B
-    if not growth_a < CONDITION_LIMIT:
-        return BY_CONDITION_M
+    if not condition < CONDITION_LIMIT:
+        return BY_CONDITION
     if has_u:
         across, along = 0.0, 0.0
         for i in range(n):

@@ -22,7 +22,6 @@ class Work(NamedTuple):
     q0: np.ndarray  # (n,)   where the chart touches; chart.new_chart
     U: np.ndarray  # (n, m)  Phi_q(q0)^T, Eq. 5; chart.new_chart
     V: np.ndarray  # (n, k)  orthonormal basis of ker Phi_q(q0); chart.new_chart
-    B0: np.ndarray  # (m, m)  (Phi_q(q0) U)^-1; chart.new_chart
     scale: np.ndarray  # (m,)  norms of the rows of Phi_q(q0); chart.new_chart
     B: np.ndarray  # (m, m)  (Phi_q U)^-1, Eqs. 7, 28, warm-started; newton.update_b
     u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; newton.solve_positions
@@ -35,12 +34,12 @@ class Work(NamedTuple):
     E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.mass
     A: np.ndarray  # (k, k)  D^T M D, then its Cholesky factor; null_space.mass
     h: np.ndarray  # (n,)    U z, and scratch of charts; null_space.accelerate
-    householder: np.ndarray  # (n, m)  scratch of the orthonormal basis; linalg.null_space
+    householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; linalg.null_space
     control: np.ndarray  # (CONTROLS,)  tolerances and criteria, below
     counters: np.ndarray  # int64 (COUNTERS,)  what was done how often, below
 
 
-U_TOL, B_TOL, FLOOR, CONDITION, CONDITION_B0, CONDITION_A0, CONTRACTION, CONTROLS = range(8)
+U_TOL, B_TOL, FLOOR, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(7)
 EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS, SKIPPED, COUNTERS = range(8)
 
 
@@ -57,7 +56,7 @@ def allocate(n, m, bodies, constraint_tol):
     shapes = {
         **dict.fromkeys(("q", "qd", "qdd", "q0", "base", "h"), (n,)),
         **dict.fromkeys(("Phi", "Phi_t", "gamma", "z", "scale", "u"), (m,)),
-        **dict.fromkeys(("B0", "B", "N", "R"), (m, m)),
+        **dict.fromkeys(("B", "N", "R"), (m, m)),
         **dict.fromkeys(("U", "householder"), (n, m)),
         **dict.fromkeys(("V", "D"), (n, k)),
         "Phi_q": (m, n),

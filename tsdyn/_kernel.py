@@ -42,6 +42,25 @@ def entry(function):
     return dispatcher
 
 
+def twin(function):
+    """Return the plain Python function of a kernel, calling the plain functions of the kernels that it calls."""
+    function = getattr(function, "py_func", function)
+    inner = {
+        name: twin(value)
+        for name in function.__code__.co_names
+        if hasattr(value := function.__globals__.get(name), "py_func")
+    }
+    if not inner:
+        return function
+    return type(function)(
+        function.__code__,
+        {**function.__globals__, **inner},
+        function.__name__,
+        function.__defaults__,
+        function.__closure__,
+    )
+
+
 class Callback:
     """A cached kernel that others call by `address`; compiled or loaded when the address is first asked for.
 

@@ -6,7 +6,8 @@ A chart is left at the end of a step, on signs that have no dimension and that n
                    the same however the constraints are scaled or combined
     condition      of D^T M D, divided by what it was at q0; that of B, as far as it has grown since q0, is at most
                    (1 + c) / (1 - c) for a contraction c, and needs no sign of its own
-    offset         |U u| / |V v|        how steeply the manifold leaves the tangent plane
+    offset         |U u| / |V v|        how steeply the manifold leaves the tangent plane; not where constraints move
+                                        with time, which carries q along U without turning anything
 """
 
 import math
@@ -144,7 +145,7 @@ def _turn(w, m):
 
 
 @kernel
-def inspect(w, has_u):
+def inspect(w, by_offset):
     """Reason to leave the chart at the present placement, or STAY; records contraction and condition."""
     n, m, k = w.q.size, w.u.size, w.v.size
     contraction = _turn(w, m)
@@ -161,7 +162,7 @@ def inspect(w, has_u):
         return BY_CONTRACTION
     if not condition < CONDITION_LIMIT:
         return BY_CONDITION
-    if has_u:
+    if by_offset:
         across, along = 0.0, 0.0
         for i in range(n):
             d = w.base[i] - w.q0[i]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ._kernel import twin
 from .bodies import rotation_matrix, transform_g
 from .jet import Jet
 from .markers import PARAMETERS, POINT
@@ -22,15 +23,17 @@ class ConstraintError(NamedTuple):
     acceleration: np.ndarray
 
 
-def constraint_rows(scene, t, q, qd, qdd):
-    """Phi and its first two time derivatives along a trajectory: three arrays (k, m)."""
+def constraint_rows(scene, t, q, qd, qdd, time_rate=1.0):
+    """Phi and its first two time derivatives along a trajectory: three arrays (k, m).
+
+    With time_rate=0 time stands still: the derivatives are those along (qd, qdd) alone.
+    """
     columns = []
     for constraint in scene.constraints:
         x = [part for marker in _markers(scene, constraint, q, qd, qdd) for part in marker]
-        par = [entry for value in constraint.parameters() for entry in _parameter(value, t)]
+        par = [entry for value in constraint.parameters() for entry in _parameter(value, t, time_rate)]
         out = [None] * constraint.rows
-        phi = type(constraint).phi
-        getattr(phi, "py_func", phi)(x, par, Jet(t, 1.0), out)
+        twin(type(constraint).phi)(x, par, Jet(t, time_rate), out)
         columns += out
     if not columns:
         return (np.zeros((t.size, 0)),) * 3
@@ -43,11 +46,11 @@ def constraint_error(scene, t, q, qd, qdd):
     return ConstraintError(*(np.abs(level).max(axis=1, initial=0.0) for level in constraint_rows(scene, t, q, qd, qdd)))
 
 
-def _parameter(value, t):
+def _parameter(value, t, rate):
     if not isinstance(value, Motion):
         return [value]
     f, fd, fdd = (np.array([function(time) for time in t], dtype=float) for function in value.functions)
-    return [Jet(f, fd, fdd), Jet(fd, fdd), Jet(fdd)]
+    return [Jet(f, rate * fd, rate * rate * fdd), Jet(fd, rate * fdd), Jet(fdd)]
 
 
 def _markers(scene, constraint, q, qd, qdd):

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 from numba.core.errors import NumbaError
 
 from ._kernel import Callback, caller
@@ -58,6 +59,27 @@ class Motion:
         if not all(map(math.isfinite, result)):
             raise InvalidConstraint(f"{self.what}: the motion is not finite at t = {t:g}: (f, fd, fdd) = {result}.")
         return result
+
+    def check(self, t0, t1):
+        """Refuse derivatives that are not those of f, by difference quotients at a few times of the interval.
+
+        Several quotients are tried at each time, and most times must fail: a kink or a short wave is no error.
+        """
+        f, fd, fdd = self.functions
+        times = t0 + (t1 - t0) * np.array([0.11, 0.29, 0.53, 0.71, 0.89])
+        for function, derivative, names in ((f, fd, ("f", "fd")), (fd, fdd, ("fd", "fdd"))):
+            given = np.array([derivative(t) for t in times])
+            values = np.array([function(t) for t in times])
+            off = np.full(times.size, np.inf)
+            for h in min(1.0, t1 - t0) * np.array([1e-2, 1e-3, 1e-4, 1e-5]):
+                near = [[function(t + k * h) for t in times] for k in (-2, -1, 1, 2)]
+                quotient = (np.array([1.0, -8.0, 8.0, -1.0]) @ near) / (12.0 * h)
+                off = np.minimum(off, np.abs(quotient - given) - 1e-9 * np.abs(values) / h)
+            if (off > 1e-3 * (np.abs(given).max() + np.abs(values).max())).sum() > times.size // 2:
+                raise InvalidConstraint(
+                    f"{self.what}: {names[1]} is not the derivative of {names[0]}: at t = {times[0]:g} it gives "
+                    f"{given[0]:g}, and a difference quotient of {names[0]} does not. Correct the derivatives."
+                )
 
     @property
     def addresses(self):

@@ -179,7 +179,8 @@ def complete(context, vdd):
 @callback("p")
 def check(context):
     """Reason to leave the chart, or zero."""
-    return inspect(load(context).work, True)
+    c = load(context)
+    return inspect(c.work, not is_rheonomic(c.system))
 
 
 @callback("pdpppp")

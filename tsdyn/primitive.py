@@ -17,7 +17,7 @@ from types import MappingProxyType
 
 from ._kernel import Callback, caller, integers, kernel, specialised, stack, stack2, vector
 from .errors import InvalidConstraint
-from .markers import Marker, chain_rule, motion, position
+from .markers import PARAMETERS, Marker, chain_rule, motion, position
 
 # what the table of a kind holds for each instance
 AT, DIMENSION, BLOCK, ROW, STRIDE, INTS = 0, 2, 4, 6, 7, 8
@@ -117,8 +117,8 @@ class Primitive:
     @classmethod
     def example(cls, rng, a, b):
         """Return a random valid instance between two bodies, for tests."""
-        places = {m.argument: rng.normal(size=3) for m in cls.markers if m.argument != "parameters_a"}
-        return cls(a, b, **places)
+        places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code != PARAMETERS}
+        return cls(a, b, **places) if any(m.body == "b" for m in cls.markers) else cls(a, **places)
 
     def __repr__(self):
         return f"<{type(self).__name__} {self.name!r}>"

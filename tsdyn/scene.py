@@ -8,6 +8,7 @@ from .errors import InvalidArgument, InvalidBody, InvalidConstraint
 from .evaluate import evaluate
 from .initial import assemble
 from .markers import vector3
+from .motion import Motion
 from .primitive import Primitive
 from .system import pack
 
@@ -153,6 +154,10 @@ class Scene:
         if self._system is None:
             self._system = pack(self)
         return self._system
+
+    def motions(self):
+        """The functions of time that the constraints are given."""
+        return [v for c in self._added if c.rheonomic for v in c.parameters() if isinstance(v, Motion)]
 
     @property
     def start(self):

@@ -109,6 +109,8 @@ def simulate(
 
     started = time.perf_counter()
     system = scene.system
+    for motion in scene.motions():
+        motion.check(t0, t1)
     q, qd = scene.start
     if state is not None:
         q, qd = state_vector(state.q, q.size, "state.q"), state_vector(state.qd, q.size, "state.qd")

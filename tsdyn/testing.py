@@ -1,1 +1,197 @@
 """What authors of plug-ins, and the project's own tests, check their work with."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from ._kernel import twin
+from .diagnostics import constraint_rows
+from .errors import InvalidArgument, TsdynError
+from .evaluate import constraint_arrays
+from .motion import Motion
+from .primitive import Primitive
+from .scene import Scene
+
+STEP = 1e-40  # of complex steps: no cancellation, so as small as can be
+TOLERANCE = 1e-11  # relative to the size of what is compared
+_AXES = "xyz"
+
+
+class CheckFailed(TsdynError, AssertionError):
+    """A check of a plug-in failed; the message says which entry, what it gave and what it should have given."""
+
+
+def check_primitive(kind, *, seed=0, states=3):
+    """Check a primitive's kernels against complex steps of its phi; return None, or raise naming the wrong entry.
+
+    Parameters
+    ----------
+    kind : Primitive subclass, or callable (a, b) -> Primitive
+        A class is tried with its own `example(rng, a, b)`. Primitives that have markers on a only get b too and may
+        ignore it.
+    seed : int
+        Of the random states.
+    states : int
+        Number of random, fast-turning states for each arrangement: body to body, body to ground, ground to body.
+
+    Raises
+    ------
+    CheckFailed
+        If an entry of jacobian, phi_t or gamma, or of the assembled Phi_q, Phi_t or gamma, is not the derivative that
+        it should be, or the compiled kernel differs from the Python one.
+
+    Notes
+    -----
+    jacobian is compared with Phi_x by complex steps in x, phi_t with Phi_t by complex steps in t (motions with
+    difference quotients of the complex-step kind too), gamma with the complex step of Phi_x xd + Phi_t along (xd, 1):
+    (Phi_x xd)_x xd + 2 Phi_xt xd + Phi_tt (Haug 2018, Eq. 3). Then the compiled, assembled arrays are compared with
+    phi carried along the motion as a truncated Taylor series, which uses neither jacobian nor gamma.
+    """
+    rng = np.random.default_rng(seed)
+    for arrangement in ("body to body", "body to ground", "ground to body"):
+        for _ in range(states):
+            scene, constraint = _instance(kind, arrangement, rng)
+            if constraint is None:
+                continue
+            name = f"{type(constraint).__name__} ({arrangement})"
+            _check_kernels(constraint, name, rng)
+            _check_assembled(scene, constraint, name, rng)
+
+
+def _instance(kind, arrangement, rng):
+    """A scene with one instance; None where the arrangement means nothing to the primitive."""
+    scene = Scene()
+    bodies = [
+        scene.add_body(1.0, (1.0, 1.1, 1.2), position=rng.normal(size=3), orientation=_unit(rng), name=name)
+        for name in ("one", "two")
+    ]
+    a = scene.ground if arrangement == "ground to body" else bodies[0]
+    b = scene.ground if arrangement == "body to ground" else bodies[1]
+    if isinstance(kind, type) and issubclass(kind, Primitive):
+        if arrangement != "body to body" and not any(m.body == "b" for m in kind.markers):
+            return scene, None
+        constraint = kind.example(rng, a, b)
+    elif callable(kind):
+        try:
+            constraint = kind(a, b)
+        except TsdynError:
+            if arrangement == "body to body":
+                raise
+            return scene, None
+        if arrangement != "body to body" and constraint.b is None:
+            return scene, None
+    else:
+        raise InvalidArgument(f"check_primitive needs a Primitive class or a callable (a, b), got {kind!r}.")
+    return scene, scene.add(constraint)
+
+
+def _unit(rng):
+    p = rng.normal(size=4)
+    return p / np.linalg.norm(p)
+
+
+def _check_kernels(constraint, name, rng):
+    kind = type(constraint)
+    f = SimpleNamespace(**{k: _python(getattr(kind, k), constraint, k) for k in kind.kernels})
+    size = sum(m.size for m in kind.markers)
+    x, xd, t = rng.normal(size=size), 10.0 * rng.normal(size=size), rng.uniform(0.1, 2.0)
+    # entries are named by the argument that places their marker
+    labels = [
+        f"{m.argument}, component {_AXES[i] if m.size == 3 else f'e{i}'}" for m in kind.markers for i in range(m.size)
+    ]
+
+    Phi_x = np.zeros((kind.rows, size))
+    f.jacobian(x, t, Phi_x)
+    for j in range(size):
+        step = np.zeros(size, complex)
+        step[j] = 1j * STEP
+        expected = _vector(f.phi, kind.rows, x + step, t).imag / STEP
+        for i in range(kind.rows):
+            _compare(name, f"jacobian[{i}, {j}] (d phi[{i}] / d {labels[j]})", Phi_x[i, j], expected[i], Phi_x)
+
+    expected = _vector(f.phi, kind.rows, x, t + 1j * STEP).imag / STEP
+    if hasattr(f, "phi_t"):
+        Phi_t = _vector(f.phi_t, kind.rows, x, t)
+        for i in range(kind.rows):
+            _compare(name, f"phi_t[{i}]", Phi_t[i], expected[i], expected)
+    elif expected.any():
+        raise CheckFailed(
+            f"{name}: phi depends on the time, d phi / dt = {expected}, but there is no phi_t; write one."
+        )
+
+    def rate(s):
+        jacobian = np.zeros((kind.rows, size), complex)
+        f.jacobian(x + s * xd, t + s, jacobian)
+        total = jacobian @ xd
+        return total + _vector(f.phi_t, kind.rows, x + s * xd, t + s) if hasattr(f, "phi_t") else total
+
+    expected = rate(1j * STEP).imag / STEP
+    gamma = np.zeros(kind.rows)
+    f.gamma(x, t, gamma, xd)
+    scale = np.abs(np.abs(Phi_x) @ xd**2)
+    for i in range(kind.rows):
+        _compare(name, f"gamma[{i}]", gamma[i], expected[i], scale)
+
+
+def _python(function, constraint, name):
+    """The kernel as a Python function of (x, t, out), or (x, t, out, xd), with par filled in."""
+    plain = twin(function)
+
+    def call(x, t, out, *xd):
+        par = [part for value in constraint.parameters() for part in _parts(value, t)]
+        try:
+            plain(x, *xd, par, t, out)
+        except TypeError as error:
+            raise CheckFailed(
+                f"{type(constraint).__name__}: {name} can't be run on complex numbers ({error}); use arithmetic and "
+                "NumPy functions (np.sin, not math.sin), and no comparison, abs or norm of x."
+            ) from error
+
+    return call
+
+
+def _parts(value, t):
+    return [f(t) for f in value.functions] if isinstance(value, Motion) else [value]
+
+
+def _vector(function, rows, x, t):
+    out = np.zeros(rows, complex)
+    function(x, t, out)
+    return out
+
+
+def _check_assembled(scene, constraint, name, rng):
+    q, qd = scene.start
+    t = rng.uniform(0.1, 2.0)
+    for body in scene.bodies:
+        body.angular_velocity, body.velocity = 10.0 * rng.normal(size=3), rng.normal(size=3)
+    _, qd = scene.start
+    rows = slice(0, constraint.rows)
+    Phi, Phi_q, Phi_t, gamma = (array[rows] for array in constraint_arrays(scene.system, q, qd, t))
+    zero = np.zeros_like(q)
+
+    def along(direction, rate):
+        levels = constraint_rows(scene, np.array([t]), q[None], direction[None], zero[None], time_rate=rate)
+        return [level[0, rows] for level in levels]
+
+    value, _, second = along(qd, 1.0)
+    for i in range(constraint.rows):
+        _compare(name, f"compiled Phi[{i}]", Phi[i], value[i], np.append(q, 1.0))
+        _compare(name, f"compiled Phi_t[{i}]", Phi_t[i], along(zero, 1.0)[1][i], Phi_t)
+        _compare(name, f"compiled gamma[{i}]", gamma[i], second[i], np.abs(Phi_q) @ qd**2)
+    names = [f"{c} of {body.name}" for body in scene.bodies for c in ("r1", "r2", "r3", "e0", "e1", "e2", "e3")]
+    for j, coordinate in enumerate(names):
+        direction = zero.copy()
+        direction[j] = 1.0
+        expected = along(direction, 0.0)[1]
+        for i in range(constraint.rows):
+            _compare(name, f"compiled Phi_q[{i}, {j}] ({coordinate})", Phi_q[i, j], expected[i], Phi_q)
+
+
+def _compare(name, entry, got, expected, scale):
+    size = max(1.0, np.abs(expected), np.abs(scale).max(initial=0.0))
+    if not abs(got - expected) <= TOLERANCE * size:
+        raise CheckFailed(f"{name}: {entry} is {got:.15g} and should be {np.real(expected):.15g}.")
+
+
+__all__ = ["CheckFailed", "check_primitive"]

@@ -7,6 +7,7 @@ if not (_here / "constraints").is_dir():  # a checkout: they stand beside this f
     __path__.append(str(_here.parent))
 
 from . import constraints, integrators, testing  # noqa: E402
+from ._kernel import kernel  # noqa: E402
 from .bodies import Body, PointMass  # noqa: E402
 from .errors import (  # noqa: E402
     InconsistentState,
@@ -52,6 +53,7 @@ __all__ = [
     "Vector",
     "constraints",
     "integrators",
+    "kernel",
     "simulate",
     "testing",
 ]

@@ -24,7 +24,7 @@ from ._cache import cache_of
 
 DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
-_table = []  # debug mode: what an address stands for
+_table = [None]  # debug mode: what an address stands for; zero is no address
 _letters = {"i": types.int64, "d": types.float64, "p": types.int64}
 
 

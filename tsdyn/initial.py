@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import qr
 
 from .errors import InconsistentState, RedundantConstraints, SingularConfiguration
 from .evaluate import constraint_arrays, mass_matrix
 
-RANK_TOL = 1e-10  # of a row of Phi_q, scaled to unit length, after the rows it depends on are taken out
+RANK_TOL = 1e-10  # of the singular values of Phi_q, its rows scaled to unit length
 
 ROUNDING = 2e-16
 MOST_ITERATIONS = 100
@@ -52,11 +51,11 @@ def check_rank(scene, Phi_q):
             "Start from another configuration, or use a constraint that is regular here."
         )
     scaled = Phi_q / lengths[:, None]
-    _, R, order = qr(scaled.T, mode="economic", pivoting=True)
-    size = np.abs(np.diag(R))
+    size = np.linalg.svd(scaled, compute_uv=False)
     rank = int((size > RANK_TOL * size[0]).sum())
     if rank == m:
         return
+    order = _pivots(scaled)
     kept, dropped = order[:rank], order[rank:]
     stories = []
     for row in sorted(dropped):
@@ -73,7 +72,14 @@ def check_rank(scene, Phi_q):
 def weakest_row(scene, Phi_q):
     """Name the row of Phi_q that is nearest to depending on the others."""
     scaled = Phi_q / np.maximum(np.linalg.norm(Phi_q, axis=1), 1e-300)[:, None]
-    return scene.row_names()[qr(scaled.T, mode="economic", pivoting=True)[2][-1]]
+    return scene.row_names()[_pivots(scaled)[-1]]
+
+
+def _pivots(rows):
+    """The rows in an order in which each is the farthest from those before it."""
+    from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
+
+    return qr(rows.T, mode="economic", pivoting=True)[2]
 
 
 def consistent(scene, system, q, qd, t, tol):

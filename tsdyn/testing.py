@@ -1,5 +1,6 @@
 """What authors of plug-ins, and the project's own tests, check their work with."""
 
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
@@ -140,8 +141,10 @@ def _python(function, constraint, name):
     def call(x, t, out, *xd):
         par = [part for value in constraint.parameters() for part in _parts(value, t)]
         try:
-            plain(x, *xd, par, t, out)
-        except TypeError as error:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", np.exceptions.ComplexWarning)
+                plain(x, *xd, par, t, out)
+        except (TypeError, np.exceptions.ComplexWarning) as error:
             raise CheckFailed(
                 f"{type(constraint).__name__}: {name} can't be run on complex numbers ({error}); use arithmetic and "
                 "NumPy functions (np.sin, not math.sin), and no comparison, abs or norm of x."

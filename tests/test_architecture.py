@@ -1,0 +1,107 @@
+"""The shape of the house: imports run one way, kernels are compiled in one place, files stay short."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = {"tsdyn": ROOT / "tsdyn", "constraints": ROOT / "constraints", "integrators": ROOT / "integrators"}
+FILES = {
+    (f"{name}.{file.stem}" if name != "tsdyn" else file.stem): file
+    for name, folder in FOLDERS.items()
+    for file in sorted(folder.glob("*.py"))
+}
+# lowest first; a module imports from lines above its own, or from its own line
+LAYERS = """
+_cache errors _discovery jet
+_kernel
+rotation linalg motion stepping_signature
+markers bodies tableau
+primitive
+system stepping progress
+assembly integrator constraints.*
+workspace integrators.* constraints.__init__ integrators.__init__
+newton evaluate diagnostics reactions
+chart initial
+null_space maggi_kane scene
+formulation run
+solution
+simulate testing
+tables plots
+cli __init__
+__main__
+"""
+
+
+def layer_of(module):
+    for level, line in enumerate(LAYERS.split("\n")):
+        names = line.split()
+        if module in names or (module.count(".") and f"{module.split('.')[0]}.*" in names and "__init__" not in module):
+            return level
+    return pytest.fail(f"{module} has no layer: give it one in test_architecture.py")
+
+
+def imports(module, file, everywhere=False):
+    """The package's modules that a module imports: at its top, or anywhere in it."""
+    tree = ast.parse(file.read_text())
+    nodes = ast.walk(tree) if everywhere else tree.body
+    for node in nodes:
+        if isinstance(node, ast.ImportFrom) and node.level:
+            inside = "." in module and node.level == 1
+            base = module.split(".")[0] + "." if inside else ""
+            target = node.module or ""
+            names = [f"{base}{target}"] if target else [f"{base}{alias.name}" for alias in node.names]
+            for name in names:
+                yield f"{name}.__init__" if name in ("constraints", "integrators") else name
+
+
+@pytest.mark.parametrize("module", FILES, ids=str)
+def test_imports_run_one_way(module):
+    for target in imports(module, FILES[module]):
+        assert layer_of(target) <= layer_of(module), f"{module} imports {target}, which is above it"
+        assert target != module
+
+
+@pytest.mark.parametrize("module", [m for m in FILES if "." in m], ids=str)
+def test_plug_in_folders_import_relatively(module):
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if isinstance(node, ast.ImportFrom) and not node.level:
+            assert not node.module.startswith("tsdyn")
+        if isinstance(node, ast.Import):
+            assert not any(alias.name.startswith("tsdyn") for alias in node.names)
+
+
+@pytest.mark.parametrize("module", FILES, ids=str)
+def test_numba_is_used_in_one_place(module):
+    if module in ("_cache", "_kernel"):
+        return
+    names = {
+        alias.name
+        for node in ast.walk(ast.parse(FILES[module].read_text()))
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for alias in node.names
+        if (getattr(node, "module", None) or alias.name).startswith(("numba", "llvmlite"))
+    }
+    assert names <= {"NumbaError"}
+
+
+@pytest.mark.parametrize("module", FILES, ids=str)
+def test_files_stay_short(module):
+    assert len(FILES[module].read_text().splitlines()) <= 400
+
+
+@pytest.mark.parametrize("folder", ["constraints", "integrators"])
+def test_folders_are_no_packages_of_their_own(folder):
+    code = f"import {folder}"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode != 0
+    assert "relative import" in result.stderr
+
+
+def test_no_optional_dependency_is_imported():
+    code = "import sys, tsdyn; print([m for m in ('matplotlib', 'tqdm', 'scipy.linalg') if m in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"

@@ -1,0 +1,235 @@
+"""The kernel cache: a second process compiles nothing, and no edit is ever answered by a stale kernel."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+import tsdyn
+
+ROOT = Path(__file__).parents[1]
+
+REPORT = """
+import json, tsdyn
+from tsdyn import _cache
+def report(**numbers):
+    print(json.dumps({**numbers, **_cache.statistics, "folder": str(_cache.folder())}))
+"""
+SMALL = (
+    REPORT
+    + """
+import tsdyn as ts
+scene = ts.Scene()
+mass = scene.add_point_mass(1.0, position=(1.0, 2.0, 2.0))
+scene.add(ts.constraints.Distance(mass, scene.ground, length=3.0))
+report(Phi=float(scene.evaluate().Phi[0]))
+"""
+)
+KERNELS = 4  # of SMALL: three loops of Distance and the one that Python calls
+
+
+def command(code, environment, cwd):
+    full = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "TSDYN_QUIET")}
+    full.update(environment)
+    return subprocess.Popen(
+        [sys.executable, "-c", code], env=full, cwd=cwd, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+def finish(process):
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 0, err
+    return {"misses": 0, "hits": 0, **json.loads(out.splitlines()[-1])}, err
+
+
+def run(code, environment, cwd=ROOT):
+    return finish(command(code, environment, cwd))
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A copy of the sources, to edit."""
+    for folder in ("tsdyn", "constraints", "integrators"):
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path
+
+
+def edit(file, old, new):
+    text = file.read_text()
+    assert text.count(old) == 1
+    file.write_text(text.replace(old, new))
+
+
+def test_second_process_compiles_nothing(tmp_path):
+    code = (
+        REPORT
+        + """
+from examples import top
+from examples.bead_on_surface import build
+for form in ("tangent", "maggi-kane"):
+    tsdyn.simulate(top.build(), (0.0, 0.01), formulation=form, t_eval=[0.0, 0.0055])
+tsdyn.simulate(build(), (0.0, 0.01)).multipliers
+report()
+"""
+    )
+    first, _ = run(code, {})
+    files = sorted(Path(first["folder"]).iterdir())
+    second, errors = run(code, {})
+    assert second["misses"] == 0
+    assert second["hits"] > 15
+    assert sorted(Path(second["folder"]).iterdir()) == files
+    assert "compiling" not in errors
+
+
+def test_first_compilation_is_announced_once(tmp_path):
+    result, errors = run(SMALL, {"NUMBA_CACHE_DIR": str(tmp_path)})
+    assert result["misses"] == KERNELS
+    assert errors.count("compiling kernels") == 1
+
+
+def test_edited_callee_in_another_file_is_seen(package):
+    environment = {"NUMBA_CACHE_DIR": str(package / "cache")}
+    before, _ = run(SMALL, environment, package)
+    assert before["Phi"] == 0.0
+    edit(
+        package / "tsdyn" / "markers.py",
+        "            x[i] = q[at + i]\n    else",
+        "            x[i] = 2.0 * q[at + i]\n    else",
+    )
+    after, _ = run(SMALL, environment, package)
+    assert after["Phi"] == (36.0 - 9.0) / 6.0
+    again, _ = run(SMALL, environment, package)
+    assert (again["Phi"], again["misses"]) == (after["Phi"], 0)
+
+
+def test_no_writable_home_falls_back_to_the_temporary_folder(package):
+    blocked = package / "file"
+    blocked.touch()
+    scratch = package / "scratch"
+    scratch.mkdir()
+    environment = {"HOME": str(blocked), "XDG_CACHE_HOME": "", "TMPDIR": str(scratch)}
+    for folder in ("tsdyn", "constraints", "integrators"):
+        (package / folder).chmod(0o555)
+    first, _ = run(SMALL, environment, package)
+    second, _ = run(SMALL, environment, package)
+    assert first["folder"].startswith(str(scratch))
+    assert (first["misses"], second["misses"]) == (KERNELS, 0)
+
+
+def test_processes_starting_together_compile_once(tmp_path):
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path)}
+    results = [finish(process)[0] for process in [command(SMALL, environment, ROOT) for _ in range(3)]]
+    assert {result["Phi"] for result in results} == {0.0}
+    assert sum(result["misses"] for result in results) == KERNELS
+
+
+PLUG_IN = (
+    REPORT
+    + """
+import numpy as np
+import plug
+import tsdyn as ts
+scene = ts.Scene()
+mass = scene.add_point_mass(1.0, position=(0.0, 0.0, 3.0))
+scene.add(plug.Height(mass))
+free = scene.add_point_mass(1.0, position=(2.0, 0.0, 0.0))
+motion = (lambda t: 0.1 * np.sin(t) + 2.0, lambda t: 0.1 * np.cos(t), lambda t: -0.1 * np.sin(t))
+rod = scene.add(ts.constraints.Distance(free, scene.ground, length=motion))
+found = scene.evaluate(t=1.0)
+report(Phi=float(found.Phi[0]), Phi_t=float(found.Phi_t[1]), gamma=float(found.gamma[1]))
+"""
+)
+PLUG = """
+import tsdyn as ts
+from helper import LEVEL, square
+
+class Height(ts.Primitive):
+    rows = 1
+    markers = (ts.Point("a"),)
+    def __init__(self, a):
+        super().__init__(a, None, ((0, 0, 0),))
+    @staticmethod
+    def phi(x, par, t, out):
+        out[0] = square(x[2]) - LEVEL
+    @staticmethod
+    def jacobian(x, par, t, out):
+        out[0, 2] = 2.0 * x[2]
+    @staticmethod
+    def gamma(x, xd, par, t, out):
+        out[0] = 2.0 * square(xd[2])
+"""
+HELPER = """
+import tsdyn as ts
+LEVEL = 9.0
+
+@ts.kernel
+def square(x):
+    return x * x
+"""
+
+
+@pytest.fixture
+def plug_in(tmp_path):
+    """A primitive in one file of a user's, its helper and a constant in another."""
+    (tmp_path / "plug.py").write_text(PLUG)
+    (tmp_path / "helper.py").write_text(HELPER)
+    return tmp_path
+
+
+def plug_run(folder):
+    return run(PLUG_IN, {"PYTHONPATH": os.pathsep.join([str(ROOT), str(folder)])}, folder)[0]
+
+
+def test_plug_in_is_cached_and_its_edits_are_seen(plug_in):
+    run(SMALL, {})  # so that the core and Distance are in the cache
+    first = plug_run(plug_in)
+    assert first["misses"] == 3 + 1 + 3  # its loops, Distance's phi_t, the three motions: nothing of the core
+    assert first["Phi"] == 0.0
+    second = plug_run(plug_in)
+    assert second["misses"] == 0
+    edit(plug_in / "helper.py", "LEVEL = 9.0", "LEVEL = 5.0")
+    assert plug_run(plug_in)["Phi"] == 4.0
+    edit(plug_in / "helper.py", "return x * x", "return x * x + 1.0")
+    assert plug_run(plug_in)["Phi"] == 5.0
+
+
+def test_functions_on_one_line_are_told_apart(plug_in):
+    # f and fdd differ in a constant only: same file, line, name and byte code
+    import math
+
+    for _ in range(2):
+        found = plug_run(plug_in)
+        length = 0.1 * math.sin(1.0) + 2.0
+        assert found["Phi_t"] == pytest.approx(-length * 0.1 * math.cos(1.0) / 2.0, rel=1e-14)
+        expected = (-((0.1 * math.cos(1.0)) ** 2) + length * 0.1 * math.sin(1.0)) / 2.0
+        assert found["gamma"] == pytest.approx(expected, rel=1e-14)
+
+
+def test_numba_settings_are_left_alone():
+    from numba.core.caching import CacheImpl, _CacheLocator
+
+    assert tsdyn.__version__
+    assert all(locator.__module__ == _CacheLocator.__module__ for locator in CacheImpl._locator_classes)
+    assert os.environ.get("NUMBA_CACHE_LOCATOR_CLASSES", "") == numba.config.CACHE_LOCATOR_CLASSES
+
+
+def test_debug_mode_runs_plain_python():
+    code = (
+        REPORT
+        + """
+from examples import top
+from tsdyn import _kernel
+end = tsdyn.simulate(top.build(), (0.0, 0.01), t_eval=[0.0055, 0.01])
+report(q=end.q.tolist(), debug=_kernel.DEBUG)
+"""
+    )
+    compiled, _ = run(code, {})
+    plain, _ = run(code, {"TSDYN_DEBUG": "1"})
+    assert (compiled["debug"], plain["debug"]) == (False, True)
+    assert plain["misses"] == plain["hits"] == 0
+    assert [pytest.approx(row, abs=1e-15) for row in compiled["q"]] == plain["q"]

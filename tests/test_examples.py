@@ -1,0 +1,34 @@
+"""Every example passes its own check; the README's example runs."""
+
+import pytest
+
+import tsdyn as ts
+from examples import bead_on_surface, driven_pivot, pendulum_chain, top, two_body_pendulum
+
+RUNS = {
+    "top": (top, top.build, 10.0, 1e-3),
+    "two_body_pendulum": (two_body_pendulum, two_body_pendulum.build, 10.0, 1e-3),
+    "spatial": (two_body_pendulum, lambda: two_body_pendulum.build(((0.3, 0, 0), (1, 5, 2))), 10.0, 1e-3),
+    "chain": (pendulum_chain, pendulum_chain.build, 1.0, 5e-4),
+    "bead_on_surface": (bead_on_surface, bead_on_surface.build, 5.0, 1e-3),
+    "driven_pivot": (driven_pivot, driven_pivot.build, 3.0, 2e-4),
+}
+
+
+@pytest.mark.parametrize(("module", "build", "end", "step"), RUNS.values(), ids=RUNS.keys())
+def test_example(module, build, end, step):
+    solution = ts.simulate(build(), (0.0, end), integrator=ts.integrators.Nystrom4(step=step))
+    module.check(solution)
+
+
+@pytest.mark.parametrize("module", [top, two_body_pendulum, pendulum_chain, bead_on_surface, driven_pivot])
+def test_main_reports(module, capsys, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["example"])
+    module.main()
+    assert "Solution" in capsys.readouterr().out
+
+
+def test_check_can_fail():
+    solution = ts.simulate(top.build(), (0.0, 1.0), formulation="maggi-kane", integrator=ts.integrators.Nystrom4(0.01))
+    with pytest.raises(AssertionError):
+        top.check(solution)

@@ -1,0 +1,129 @@
+"""Every primitive against complex steps of its phi; the checker against primitives with one entry broken."""
+
+import math
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from examples.bead_on_surface import OnEllipsoid
+from examples.driven_pivot import DrivenPivot
+
+C = ts.constraints
+BUILT_IN = [kind for kind in C.registered() if kind.__module__.startswith("tsdyn.")]
+WAVE = (
+    lambda t: 0.5 + 0.3 * np.sin(2.0 * t),
+    lambda t: 0.6 * np.cos(2.0 * t),
+    lambda t: -1.2 * np.sin(2.0 * t),
+)
+RHEONOMIC = {
+    "Distance": lambda a, b: C.Distance(a, b, point_a=(1, 2, 3), point_b=(0.3, 0.2, 1), length=WAVE),
+    "Dot1": lambda a, b: C.Dot1(a, b, axis_a=(1, 2, 3), axis_b=(0.3, 0.2, 1), value=WAVE),
+    "Dot2": lambda a, b: C.Dot2(a, b, axis_a=(1, 2, 3), point_a=(0, 1, 0), point_b=(0.3, 0.2, 1), value=WAVE),
+}
+
+
+def test_every_primitive_is_registered():
+    names = {"Distance", "Dot1", "Dot2", "EulerNormalization", "PlaneContact", "Spherical"}
+    assert {kind.__name__ for kind in BUILT_IN} >= names
+
+
+@pytest.mark.parametrize("kind", [*BUILT_IN, OnEllipsoid, DrivenPivot], ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("seed", range(3))
+def test_kernels_are_the_derivatives_of_phi(kind, seed):
+    ts.testing.check_primitive(kind, seed=seed)
+
+
+@pytest.mark.parametrize("make", RHEONOMIC.values(), ids=RHEONOMIC.keys())
+def test_kernels_with_a_motion(make):
+    ts.testing.check_primitive(make)
+
+
+def broken(kind, name, entry):
+    """The primitive with one entry of one kernel off by a thousandth."""
+    good = getattr(kind, name)
+
+    def spoil(*arguments):
+        good(*arguments)
+        arguments[-1][entry] += 1e-3
+
+    def three(x, par, t, out):
+        spoil(x, par, t, out)
+
+    def four(x, xd, par, t, out):
+        spoil(x, xd, par, t, out)
+
+    return type("Broken", (kind,), {name: staticmethod(four if name == "gamma" else three)})
+
+
+def entries(kind):
+    size = sum(marker.size for marker in kind.markers)
+    for row in range(kind.rows):
+        yield kind, "gamma", row
+        if "phi_t" in kind.kernels:
+            yield kind, "phi_t", row
+        for column in range(size):
+            yield kind, "jacobian", (row, column)
+
+
+@pytest.mark.parametrize("kind", [*BUILT_IN, DrivenPivot], ids=lambda kind: kind.__name__)
+def test_checker_names_every_broken_entry(kind):
+    for _, name, entry in entries(kind):
+        where = ", ".join(map(str, np.atleast_1d(entry)))
+        with pytest.raises(ts.testing.CheckFailed, match=rf"Broken.*{name}\[{where}\]"):
+            ts.testing.check_primitive(broken(kind, name, entry))
+
+
+def test_checker_sees_what_is_missing_or_not_analytic():
+    class Forgot(DrivenPivot):
+        phi_t = None
+
+    class RealOnly(C.Distance):
+        @staticmethod
+        def phi(x, par, t, out):
+            out[0] = math.sin(x[0])
+
+    with pytest.raises(ts.testing.CheckFailed, match="no phi_t"):
+        ts.testing.check_primitive(Forgot)
+    with pytest.raises(ts.testing.CheckFailed, match="no comparison"):
+        ts.testing.check_primitive(RealOnly)
+
+
+def test_checker_accepts_instances_made_by_a_function_only():
+    with pytest.raises(ts.InvalidArgument):
+        ts.testing.check_primitive(3)
+
+
+@pytest.mark.parametrize("kind", BUILT_IN, ids=lambda kind: kind.__name__)
+def test_moving_the_whole_scene_changes_nothing(kind):
+    """Phi between two bodies depends on their relative pose alone."""
+    if kind is C.EulerNormalization:
+        pytest.skip("a row of one body")
+    rng = np.random.default_rng(5)
+    scene = ts.Scene()
+    bodies = [scene.add_body(1.0, (1, 1, 1), position=rng.normal(size=3), orientation=unit(rng)) for _ in range(2)]
+    constraint = scene.add(kind.example(rng, *bodies))
+    before = scene.evaluate().Phi[: constraint.rows]
+    turn, shift = unit(rng), rng.normal(size=3)
+    for body in bodies:
+        body.position = matrix(turn) @ body.position + shift
+        body.orientation = product(turn, body.orientation)
+    after = scene.evaluate().Phi[: constraint.rows]
+    if kind is C.Spherical:
+        before = matrix(turn) @ before
+    np.testing.assert_allclose(after, before, atol=1e-13)
+
+
+def unit(rng):
+    p = rng.normal(size=4)
+    return p / np.linalg.norm(p)
+
+
+def product(p, q):
+    return np.concatenate(([p[0] * q[0] - p[1:] @ q[1:]], p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])))
+
+
+def matrix(p):
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_quat(np.roll(p, -1)).as_matrix()

@@ -52,10 +52,10 @@ def new_chart(s, w, t):
             x += w.Phi_q[i, c] * w.Phi_q[i, c]
         if not x > 0.0:
             return SINGULAR
-        w.scale[i] = math.sqrt(x)
+        w.scale[i] = 1.0 / math.sqrt(x)
         for c in range(n):
             w.U[c, i] = w.Phi_q[i, c]
-            w.householder[c, i] = w.Phi_q[i, c] / w.scale[i]
+            w.householder[c, i] = w.Phi_q[i, c] * w.scale[i]
         w.u[i] = 0.0
         for j in range(k):
             w.T[i, j] = 0.0
@@ -121,7 +121,7 @@ def _turn(w, m):
     X = w.R
     for i in range(m):
         for j in range(m):
-            X[i, j] = w.N[i, j] / w.scale[i] / w.scale[j]
+            X[i, j] = w.N[i, j] * (w.scale[i] * w.scale[j])
     for i in range(m):  # R^-T from the left, row by row
         for c in range(i):
             f = w.householder[c, i]

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .bodies import transform_g
 from .errors import InconsistentState, RedundantConstraints, SingularConfiguration
 from .evaluate import constraint_arrays, mass_matrix
 
@@ -69,6 +70,28 @@ def check_rank(scene, Phi_q):
     )
 
 
+def check_inertia(scene, system, q, Phi_q):
+    """Refuse a direction that the constraints leave free and that carries no inertia, by body and axis."""
+    thin = [np.linalg.eigvalsh(J.reshape(3, 3))[0] <= 1e-12 * np.abs(J).max() for J in system.inertia]
+    if not any(flag and length == 7 for flag, (_, length) in zip(thin, system.bodies, strict=True)):
+        return
+    free = np.linalg.svd(Phi_q)[2][Phi_q.shape[0] :].T
+    size, ways = np.linalg.eigh(free.T @ mass_matrix(system, q) @ free)
+    if size.size == 0 or size[0] > 1e-12 * size[-1]:
+        return
+    change = free @ ways[:, 0]
+    turns = [
+        2.0 * transform_g(q[at + 3 : at + 7]) @ change[at + 3 : at + 7] if length == 7 else np.zeros(3)
+        for at, length in system.bodies
+    ]
+    worst = int(np.argmax([np.linalg.norm(turn) for turn in turns]))
+    axis = np.round(turns[worst] / np.linalg.norm(turns[worst]), 3) + 0.0
+    raise SingularConfiguration(
+        f"{scene.bodies[worst].name}: turning about the axis {axis} of its frame is free and carries no inertia, so "
+        "the accelerations are not determined. Give it inertia about that axis, or add the constraint that holds it."
+    )
+
+
 def weakest_row(scene, Phi_q):
     """Name the row of Phi_q that is nearest to depending on the others."""
     scaled = Phi_q / np.maximum(np.linalg.norm(Phi_q, axis=1), 1e-300)[:, None]
@@ -87,6 +110,7 @@ def consistent(scene, system, q, qd, t, tol):
     Phi, Phi_q, Phi_t, _ = constraint_arrays(system, q, qd, t)
     _demand(scene, Phi, tol * (1.0 + np.abs(q).max()), "position", "Phi")
     check_rank(scene, Phi_q)
+    check_inertia(scene, system, q, Phi_q)
     _demand(scene, Phi_q @ qd + Phi_t, tol * (1.0 + np.abs(qd).max()), "velocity", "Phi_q qd + Phi_t")
     if not Phi.size:
         return q, qd

@@ -89,14 +89,15 @@ def normal_matrix(s, w):
     """N = Phi_q U, over the nonzero columns of Phi_q."""
     m = w.u.size
     for i in range(m):
+        begin, middle = s.segments[i, 0], s.segments[i, 2]
+        end, last = begin + s.segments[i, 1], middle + s.segments[i, 3]
         for j in range(m):
-            w.N[i, j] = 0.0
-        for part in range(0, 4, 2):
-            begin = s.segments[i, part]
-            for c in range(begin, begin + s.segments[i, part + 1]):
-                f = w.Phi_q[i, c]
-                for j in range(m):
-                    w.N[i, j] += f * w.U[c, j]
+            x = 0.0
+            for c in range(begin, end):
+                x += w.Phi_q[i, c] * w.U[c, j]
+            for c in range(middle, last):
+                x += w.Phi_q[i, c] * w.U[c, j]
+            w.N[i, j] = x
 
 
 @kernel

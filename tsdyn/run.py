@@ -41,7 +41,7 @@ class Run(NamedTuple):
     y_old: np.ndarray  # (ny,)
     yd_old: np.ndarray  # (ny,)
     now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point
-    before: np.ndarray  # (3, n)  at the one before
+    before: np.ndarray  # (3, n)  at the one before; kept for a first-order system
     warm: np.ndarray  # copy of u, B, T and v while dense output moves them
     xs: np.ndarray  # (nx,)  dense output
     ys: np.ndarray  # (ny,)
@@ -259,8 +259,9 @@ def advance(c, r, at, most):
                 return retry
             continue
         row[2] = 1.0
-        for j in range(3):
-            copy(r.now[j], r.before[j])
+        if r.numbers[FIRST_ORDER] == 1:
+            for j in range(3):
+                copy(r.now[j], r.before[j])
         _store_now(w, r)
         r.clock[T] = t1
         r.numbers[STEPS] = i + 1

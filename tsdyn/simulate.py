@@ -6,7 +6,7 @@ import time
 import numpy as np
 
 from . import integrators as _integrators  # noqa: F401  (fills the registry)
-from .errors import InvalidArgument, Status
+from .errors import InvalidArgument, SingularConfiguration, Status
 from .evaluate import state_vector
 from .formulation import formulation as find_formulation
 from .initial import consistent
@@ -167,6 +167,8 @@ def _drive(context, run, addresses, max_steps, report, span):
     try:
         run = fresh(run, min(most, limit))
         status = Status(begin(context, run, addresses))
+        if status != Status.SUCCESS:
+            raise SingularConfiguration(f"no step could be made from the start. {status.sentence} {status.remedy}")
         while status == Status.SUCCESS:
             done = int(run.numbers[STEPS])
             if done >= limit:

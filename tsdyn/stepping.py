@@ -10,13 +10,22 @@ kernel: context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory,
 step's start.
 """
 
-from ._kernel import callback, caller, vector
+from ._kernel import callback, caller, kernel, vector
+from .linalg import copy
 from .primitive import ANY
 
 PLACE, ACCELERATE, STEP = "pdp", "pdppp", "piiddiipppppppp"
 call_place = caller(PLACE)
 call_accelerate = caller(ACCELERATE)
 call_step = caller(STEP)
+
+
+@kernel
+def _add(out, f, k):
+    """out += f k, where f is not zero."""
+    if f != 0.0:
+        for c in range(out.size):
+            out[c] += f * k[c]
 
 
 @callback(STEP)
@@ -28,40 +37,33 @@ def nystrom_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau
     stages = int(tableau[0])
     xs, ys = memory[:n], memory[n : 2 * n]
     width = 2 + 2 * stages
-    for i in range(stages):
-        k = memory[(2 + i) * n :]
+    copy(yd, memory[2 * n : 3 * n])
+    for i in range(1, stages):
         row = tableau[1 + i * width :]
-        if i == 0:
+        ti = t + h * row[1]
+        copy(y, ys)
+        for j in range(i):
+            _add(ys, h * row[2 + stages + j], memory[(2 + j) * n :])
+        if row[0] == 0.0:  # not where the stage before was
             for c in range(n):
-                k[c] = yd[c]
-            continue
-        moved = row[0] == 0.0
-        f = h * row[1]
-        for c in range(n):
-            p, v = 0.0, 0.0
+                xs[c] = h * row[1] * y[c]
             for j in range(i):
-                kj = memory[(2 + j) * n + c]
-                p += row[2 + j] * kj
-                v += row[2 + stages + j] * kj
-            if moved:
-                xs[c] = x[c] + (f * y[c] + h * h * p)
-            ys[c] = y[c] + h * v
-        if moved:
-            status = call_place(place, context, t + f, xs)
+                _add(xs, h * h * row[2 + j], memory[(2 + j) * n :])
+            for c in range(n):
+                xs[c] += x[c]
+            status = call_place(place, context, ti, xs)
             if status != 0:
                 return status
-        status = call_accelerate(accelerate, context, t + f, ys, k, xd)
+        status = call_accelerate(accelerate, context, ti, ys, memory[(2 + i) * n :], xd)
         if status != 0:
             return status
     weights = tableau[1 + stages * width :]
     for c in range(n):
-        p, v = 0.0, 0.0
-        for j in range(stages):
-            kj = memory[(2 + j) * n + c]
-            p += weights[j] * kj
-            v += weights[stages + j] * kj
-        dx[c] = h * y[c] + h * h * p
-        dy[c] = h * v
+        dx[c] = h * y[c]
+        dy[c] = 0.0
+    for j in range(stages):
+        _add(dx, h * h * weights[j], memory[(2 + j) * n :])
+        _add(dy, h * weights[stages + j], memory[(2 + j) * n :])
     return 0
 
 

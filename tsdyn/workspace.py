@@ -22,7 +22,7 @@ class Work(NamedTuple):
     q0: np.ndarray  # (n,)   where the chart touches; chart.new_chart
     U: np.ndarray  # (n, m)  Phi_q(q0)^T, Eq. 5; chart.new_chart
     V: np.ndarray  # (n, k)  orthonormal basis of ker Phi_q(q0); chart.new_chart
-    scale: np.ndarray  # (m,)  norms of the rows of Phi_q(q0); chart.new_chart
+    scale: np.ndarray  # (m,)  reciprocal norms of the rows of Phi_q(q0); chart.new_chart
     B: np.ndarray  # (m, m)  (Phi_q U)^-1, Eqs. 7, 28, warm-started; newton.update_b
     u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; newton.solve_positions
     T: np.ndarray  # (m, k)  B Phi_q V = du/dv; chart.tangent_map

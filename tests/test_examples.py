@@ -1,10 +1,14 @@
 """Every example passes its own check; the README's example runs."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 import tsdyn as ts
 from examples import bead_on_surface, driven_pivot, pendulum_chain, top, two_body_pendulum
 
+ROOT = Path(__file__).parents[1]
 RUNS = {
     "top": (top, top.build, 10.0, 1e-3),
     "two_body_pendulum": (two_body_pendulum, two_body_pendulum.build, 10.0, 1e-3),
@@ -26,6 +30,18 @@ def test_main_reports(module, capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", ["example"])
     module.main()
     assert "Solution" in capsys.readouterr().out
+
+
+def test_readme_example(capsys):
+    code, shown = re.search(
+        r"```python\n(.*?)```\n+```\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL
+    ).groups()
+    exec(code, {})
+    printed = capsys.readouterr().out
+    words = [line.split("  ")[0] for line in printed.splitlines()]
+    assert words == [line.split("  ")[0] for line in shown.splitlines()]
+    tilt, said = (float(re.search(r"[\d.]+", text).group()) for text in (printed, shown))
+    assert tilt == pytest.approx(said, rel=1e-9)
 
 
 def test_check_can_fail():

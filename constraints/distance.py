@@ -39,6 +39,7 @@ class Distance(Primitive):
 
     rows = 1
     markers = (Point("a"), Point("b"))
+    prescribed = "length"
 
     def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), length=None, name=""):
         super().__init__(a, b, (point_a, point_b), name)
@@ -46,7 +47,7 @@ class Distance(Primitive):
             ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
             length = np.linalg.norm(ends[0] - ends[1])
         self.length = Motion.wrap(length, f"{self.name}: length")
-        initial = self.length.value(0.0)[0] if self.rheonomic else self.length
+        initial = Motion.at_start(self.length)
         if not initial > 0.0:
             raise InvalidConstraint(
                 f"{self.name}: the length is {initial:g} m and must be positive; "
@@ -54,14 +55,9 @@ class Distance(Primitive):
             )
         self.scale = initial
 
-    @property
-    def rheonomic(self):
-        """Whether length is a function of time."""
-        return isinstance(self.length, Motion)
-
     def parameters(self):
         """(L, Ld, Ldd, L0)."""
-        return (*([self.length] if self.rheonomic else [self.length, 0.0, 0.0]), self.scale)
+        return (*Motion.places(self.length), self.scale)
 
     @staticmethod
     def phi(x, par, t, out):

@@ -35,25 +35,21 @@ class Dot1(Primitive):
 
     rows = 1
     markers = (Vector("a"), Vector("b"))
+    prescribed = "value"
 
     def __init__(self, a, b, *, axis_a=None, axis_b=None, value=0.0, name=""):
         super().__init__(a, b, (axis_a, axis_b), name)
         self.value = Motion.wrap(value, f"{self.name}: value")
-        initial = self.value.value(0.0)[0] if self.rheonomic else self.value
+        initial = Motion.at_start(self.value)
         if not -1.0 < initial < 1.0:
             raise InvalidConstraint(
                 f"{self.name}: value is the cosine of an angle and must lie between -1 and 1, got {initial:g}; "
                 "to make two axes parallel, keep each of two directions across one of them perpendicular to the other."
             )
 
-    @property
-    def rheonomic(self):
-        """Whether value is a function of time."""
-        return isinstance(self.value, Motion)
-
     def parameters(self):
         """(c, cd, cdd)."""
-        return (self.value,) if self.rheonomic else (self.value, 0.0, 0.0)
+        return Motion.places(self.value)
 
     @staticmethod
     def phi(x, par, t, out):

@@ -37,19 +37,15 @@ class Dot2(Primitive):
 
     rows = 1
     markers = (Vector("a"), Point("a"), Point("b"))
+    prescribed = "value"
 
     def __init__(self, a, b, *, axis_a=None, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), value=0.0, name=""):
         super().__init__(a, b, (axis_a, point_a, point_b), name)
         self.value = Motion.wrap(value, f"{self.name}: value")
 
-    @property
-    def rheonomic(self):
-        """Whether value is a function of time."""
-        return isinstance(self.value, Motion)
-
     def parameters(self):
         """(c, cd, cdd)."""
-        return (self.value,) if self.rheonomic else (self.value, 0.0, 0.0)
+        return Motion.places(self.value)
 
     @staticmethod
     def phi(x, par, t, out):

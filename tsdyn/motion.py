@@ -50,6 +50,16 @@ class Motion:
             )
         return number
 
+    @staticmethod
+    def places(value):
+        """What a prescribed value contributes to `parameters()`: three places for value, rate and acceleration."""
+        return (value,) if isinstance(value, Motion) else (value, 0.0, 0.0)
+
+    @staticmethod
+    def at_start(value):
+        """The value itself, or that of a Motion at t = 0."""
+        return value.value(0.0)[0] if isinstance(value, Motion) else value
+
     def value(self, t):
         """Return (f, fd, fdd) at t, by the plain Python functions."""
         try:

@@ -18,6 +18,7 @@ from types import MappingProxyType
 from ._kernel import Callback, caller, integers, kernel, specialised, stack, stack2, vector
 from .errors import InvalidConstraint
 from .markers import PARAMETERS, Marker, chain_rule, motion, position
+from .motion import Motion
 
 # what the table of a kind holds for each instance
 AT, DIMENSION, BLOCK, ROW, STRIDE, INTS = 0, 2, 4, 6, 7, 8
@@ -42,6 +43,8 @@ class Primitive:
         Number of scalar constraints.
     markers : tuple of Point, Vector, Parameters
         What x is made of, each on body "a" or "b".
+    prescribed : str, optional
+        The attribute that is a number or a Motion, where nothing else makes it depend on time.
     a, b : Body or ground
         The bodies; b is None for a primitive that has markers on a only.
     name : str
@@ -50,6 +53,7 @@ class Primitive:
 
     rows = 0
     markers = ()
+    prescribed = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
 
     def __init_subclass__(cls, **keywords):
@@ -107,8 +111,9 @@ class Primitive:
 
     @property
     def rheonomic(self):
-        """Whether it depends on time; override where only some instances do."""
-        return "phi_t" in self.kernels
+        """Whether it depends on time."""
+        moves = not self.prescribed or isinstance(getattr(self, self.prescribed), Motion)
+        return moves and "phi_t" in self.kernels
 
     def parameters(self):
         """The floats and motions that the kernels get as `par`."""
@@ -143,11 +148,12 @@ def _compile(cls, functions):
         "SIZE": sum(sizes),
     }
     inner = {f"kernel_{name}": _inlined(function) for name, function in functions.items()}
-    loops = {"phi": _phi, "jacobian": _jacobian, "gamma": _gamma, "phi_t": _phi_t}
+    loops = {"phi": _values, "phi_t": _values, "jacobian": _jacobian, "gamma": _gamma}
     result = {}
     for name, function in functions.items():
         owner = getattr(function, "py_func", function)
-        copy = specialised(loops[name], f"{cls.__qualname__}.{name}_loop", owner, **constants, **inner)
+        names = {**constants, **inner, "kernel_value": inner[f"kernel_{name}"]}
+        copy = specialised(loops[name], f"{cls.__qualname__}.{name}_loop", owner, **names)
         result[name] = Callback(copy, SIGNATURE)
     return result
 
@@ -159,10 +165,10 @@ def _inlined(function):
 # The loops over all instances of a kind. The names in capitals and kernel_* are filled in by `_compile`.
 ROWS = MARKERS = SIZE = 1
 CODES = OWNERS = STARTS = FIRST = (0,)
-kernel_phi = kernel_jacobian = kernel_gamma = kernel_phi_t = None
+kernel_value = kernel_jacobian = kernel_gamma = None
 
 
-def _phi(count, stride, table, reals, q, qd, t, out):
+def _values(count, stride, table, reals, q, qd, t, out):
     table, reals, q, out = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(out, ANY)
     x, f = stack(SIZE), stack(ROWS)
     for i in range(count):
@@ -170,21 +176,7 @@ def _phi(count, stride, table, reals, q, qd, t, out):
         for j in range(MARKERS):
             k = OWNERS[j]
             position(CODES[j], own[DIMENSION + k], own[AT + k], q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
-        kernel_phi(x, real[3 * MARKERS :], t, f)
-        for r in range(ROWS):
-            out[own[ROW] + r] = f[r]
-    return 0
-
-
-def _phi_t(count, stride, table, reals, q, qd, t, out):
-    table, reals, q, out = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(out, ANY)
-    x, f = stack(SIZE), stack(ROWS)
-    for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        for j in range(MARKERS):
-            k = OWNERS[j]
-            position(CODES[j], own[DIMENSION + k], own[AT + k], q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
-        kernel_phi_t(x, real[3 * MARKERS :], t, f)
+        kernel_value(x, real[3 * MARKERS :], t, f)
         for r in range(ROWS):
             out[own[ROW] + r] = f[r]
     return 0

@@ -54,8 +54,9 @@ def solve_positions(s, w, t, v):
             for j in range(m):
                 d += w.B[i, j] * w.Phi[j]
             w.u[i] += d
+            w.z[i] = d
         if worst <= tol:
-            _step_off(w, n, m)
+            subtract_normal(w, w.q)  # q itself, not all of the sum again: a digit less is lost
             return OK
         before = worst
     return NEWTON_FAILED
@@ -69,6 +70,16 @@ def _step_off(w, n, m):
         for j in range(m):
             x -= w.U[i, j] * w.u[j]
         w.q[i] = x
+
+
+@kernel
+def subtract_normal(w, out):
+    """out -= U z."""
+    for i in range(out.size):
+        x = 0.0
+        for j in range(w.z.size):
+            x += w.U[i, j] * w.z[j]
+        out[i] -= x
 
 
 @kernel

@@ -16,7 +16,7 @@ from .assembly import acceleration_bias, is_rheonomic, set_time, time_derivative
 from .chart import inspect, new_chart, tangent_map
 from .errors import Status
 from .linalg import cholesky, cholesky_solve
-from .newton import NOT_FINITE, OK, solve_positions
+from .newton import NOT_FINITE, OK, solve_positions, subtract_normal
 from .stepping import ACCELERATE, PLACE
 from .workspace import EVALUATIONS, FACTORIZATIONS, PLACEMENTS, load
 
@@ -60,7 +60,7 @@ def reduced_mass(s, w):
 @kernel
 def velocities(s, w, t, vd):
     """qd = D vd - U B Phi_t, Eq. 23."""
-    n, m, k = w.q.size, w.u.size, vd.size
+    n, k = w.q.size, vd.size
     for i in range(n):
         x = 0.0
         for j in range(k):
@@ -68,32 +68,29 @@ def velocities(s, w, t, vd):
         w.qd[i] = x
     if is_rheonomic(s):
         time_derivative(s, w.q, t, w.Phi_t)
-        _subtract_normal(w, w.Phi_t, w.qd, n, m)
+        _correct(w, w.Phi_t, w.qd)
 
 
 @kernel
-def _subtract_normal(w, f, out, n, m):
-    """out -= U B f; leaves B f in z."""
+def _correct(w, f, out):
+    """out -= U B f, by z = B f."""
+    m = f.size
     for i in range(m):
         x = 0.0
         for j in range(m):
             x += w.B[i, j] * f[j]
         w.z[i] = x
-    for i in range(n):
-        x = 0.0
-        for j in range(m):
-            x += w.U[i, j] * w.z[j]
-        out[i] -= x
+    subtract_normal(w, out)
 
 
 @kernel
 def reduced_acceleration(s, w, t, vdd):
     """vdd of Eq. 26 at the present q and qd. Status."""
-    n, m, k = w.q.size, w.u.size, vdd.size
+    n, k = w.q.size, vdd.size
     acceleration_bias(s, w.q, w.qd, t, w.gamma)
     for i in range(n):
         w.h[i] = 0.0
-    _subtract_normal(w, w.gamma, w.h, n, m)  # h = -U B gamma, what qdd is at vdd = 0
+    _correct(w, w.gamma, w.h)  # h = -U B gamma, what qdd is at vdd = 0
     for j in range(k):
         vdd[j] = 0.0
     for b in range(s.mass.size):
@@ -165,14 +162,23 @@ def accelerate(context, t, vd, vdd, unused):
 
 @callback("pp")
 def complete(context, vdd):
-    """Accelerations qdd = D vdd - U B gamma, Eq. 24, after `accelerate`."""
-    w = load(context).work
+    """Accelerations qdd = D vdd - U B gamma, Eq. 24, after `accelerate`, refined once by Phi_q qdd + gamma."""
+    c = load(context)
+    s, w = c.system, c.work
     vdd = vector(vdd, w.v.size)
     for i in range(w.q.size):
         x = w.h[i]
         for j in range(vdd.size):
             x += w.D[i, j] * vdd[j]
         w.qdd[i] = x
+    for i in range(w.gamma.size):
+        x = w.gamma[i]
+        for part in range(0, 4, 2):
+            begin = s.segments[i, part]
+            for j in range(begin, begin + s.segments[i, part + 1]):
+                x += w.Phi_q[i, j] * w.qdd[j]
+        w.Phi[i] = x
+    _correct(w, w.Phi, w.qdd)
     return OK
 
 

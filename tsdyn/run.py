@@ -17,9 +17,8 @@ A_PLACE, A_ACCELERATE, A_COMPLETE, A_CHECK, A_CHART, A_STEP = range(6)
 # clock
 T, T_ORIGIN, T_END, H = range(4)
 # numbers
-FIRST_ORDER, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL, HISTORY, CHART_ROWS, REJECTED, NUMBERS = range(
-    11
-)
+FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
+HISTORY, CHART_ROWS, REJECTED, NUMBERS = range(8, 12)
 
 call_complete = caller("pp")
 call_check = caller("p")
@@ -194,11 +193,9 @@ def _store_now(w, r):
     copy(w.qdd, r.now[2])
 
 
-@entry
-def begin(c, r, at):
+@kernel
+def _begin(context, w, r, at):
     """The first chart, the accelerations there, and the first output. Status."""
-    context = address_of(c)
-    w = c.work
     status = _begin_chart(context, w, r, at, AT_START)
     if status == 0:
         status = _evaluate(context, at, r.clock[T], r.x, r.y, r.yd, r.xd)
@@ -216,10 +213,18 @@ def begin(c, r, at):
 
 @entry
 def advance(c, r, at, most):
-    """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or why it stopped."""
+    """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or why it stopped.
+
+    The first call that may make a step begins the run.
+    """
     context = address_of(c)
     w = c.work
     nx, ny = r.x.size, r.y.size
+    if r.numbers[BEGUN] == 0 and most > 0:
+        status = _begin(context, w, r, at)
+        if status != 0:
+            return status
+        r.numbers[BEGUN] = 1
     for _ in range(most):
         i = r.numbers[STEPS]
         if i >= r.numbers[STEPS_WANTED]:

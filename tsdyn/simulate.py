@@ -13,6 +13,7 @@ from .initial import consistent
 from .integrator import Integrator, positive, registered
 from .progress import reporter
 from .run import (
+    BEGUN,
     CHART_ROWS,
     FIRST_ORDER,
     HISTORY,
@@ -27,7 +28,6 @@ from .run import (
     Run,
     T,
     advance,
-    begin,
 )
 from .scene import Scene
 from .solution import Solution
@@ -126,8 +126,10 @@ def simulate(
     run.numbers[STEPS_WANTED] = steps
     run.numbers[INTERVAL] = interval
     addresses = np.array([*form.addresses(), step_kernel.address], np.int64)
+    context = Context(system, work)
+    advance(context, run, addresses, 0)  # loads the driver, before the clock starts
     prepared = time.perf_counter()
-    status, chunks = _drive(Context(system, work), run, addresses, max_steps, report, (t0, t1))
+    status, chunks = _drive(context, run, addresses, max_steps, report, (t0, t1))
     ended = time.perf_counter()
     return Solution(
         scene,
@@ -166,9 +168,7 @@ def _drive(context, run, addresses, max_steps, report, span):
     status = Status.INTERRUPTED
     try:
         run = fresh(run, min(most, limit))
-        status = Status(begin(context, run, addresses))
-        if status != Status.SUCCESS:
-            raise SingularConfiguration(f"no step could be made from the start. {status.sentence} {status.remedy}")
+        status = Status.SUCCESS
         while status == Status.SUCCESS:
             done = int(run.numbers[STEPS])
             if done >= limit:
@@ -178,6 +178,8 @@ def _drive(context, run, addresses, max_steps, report, span):
             rows = min(most, limit - done)
             status = Status(advance(context, run, addresses, rows))
             seconds = time.perf_counter() - started
+            if not run.numbers[BEGUN]:
+                raise SingularConfiguration(f"no step could be made from the start. {status.sentence} {status.remedy}")
             if status == Status.SLICE_DONE:
                 status = Status.SUCCESS
             if seconds < SLICE_SECONDS / 2:

@@ -1,5 +1,6 @@
 """What a run hands back: the trajectory, how it went, and everything that follows from it."""
 
+import html
 from functools import cached_property
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -224,10 +225,30 @@ class Solution:
         """Angular momentum about the ground's origin (k, 3), kg m^2/s, ground frame."""
         return diagnostics.angular_momentum(self.system, self.q, self.qd)
 
+    def _facts(self):
+        s = self.stats
+        sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement" if s.newton_iterations else ""
+        return {
+            "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {self.t.size} outputs",
+            "method": f"{self.method}, formulation {self.formulation}",
+            "steps": f"{s.steps}, {s.rejected} rejected, {s.charts} charts",
+            "work": f"{s.evaluations} evaluations, {s.placements} placements{sweeps}",
+            "time": f"{s.seconds['run']:.3g} s, {s.seconds['prepare']:.2g} s to prepare",
+        }
+
+    def __str__(self):
+        lines = [f"  {name:8}{fact}" for name, fact in self._facts().items()]
+        return "\n".join(["Solution", *lines, *([] if self.success else ["  " + self.message])])
+
+    def _repr_html_(self):
+        """The same in a notebook."""
+        facts = self._facts() | ({} if self.success else {"message": self.message})
+        rows = "".join(f"<tr><th>{name}</th><td>{html.escape(fact)}</td></tr>" for name, fact in facts.items())
+        return f"<table><caption>Solution</caption>{rows}</table>"
+
     def __repr__(self):
         s = self.stats
         return (
-            f"<Solution: {self.status.name.lower()}, {self.t.size} outputs to t = {self._reached:g} s by "
-            f"{self.method}, {self.formulation}: {s.steps} steps, {s.evaluations} evaluations, {s.charts} charts, "
-            f"{s.seconds['run']:.3g} s>"
+            f"<Solution: {self.status.name.lower()} at t = {self._reached:g} s by {self.method}, {self.formulation}: "
+            f"{s.steps} steps, {s.evaluations} evaluations, {s.charts} charts, {s.seconds['run']:.3g} s>"
         )

@@ -17,7 +17,7 @@ class Work(NamedTuple):
     Phi: np.ndarray  # (m,)  constraints at q; newton.solve_positions
     Phi_t: np.ndarray  # (m,)  their time derivative; null_space.accelerate
     gamma: np.ndarray  # (m,)  acceleration bias; null_space.accelerate
-    z: np.ndarray  # (m,)    B gamma; null_space.accelerate
+    z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; newton.solve_positions, null_space
     Phi_q: np.ndarray  # (m, n)  Jacobian at q; chart.tangent_map
     q0: np.ndarray  # (n,)   where the chart touches; chart.new_chart
     U: np.ndarray  # (n, m)  Phi_q(q0)^T, Eq. 5; chart.new_chart

@@ -1,0 +1,184 @@
+"""Figures (matplotlib, an optional dependency, is imported when one is drawn).
+
+`constraint_error` draws one solution into axes of the caller's; `tables_figure` draws what `tables.reproduce` measured,
+without pyplot and so without touching the caller's backend or figures.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from .errors import InvalidArgument, MissingDependency
+from .tables import DURATION, LEVELS
+
+ZERO = 1e-17  # what an error of exactly zero is drawn as: below any other
+POINTS = 400  # stretches of time, the largest error of each of which is drawn
+UNITS = ("m", "m/s", "m/s²")
+# from the palette of Okabe and Ito, told apart whatever the colour vision
+BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
+GREY = "#6b6b6b"
+
+
+def constraint_error(solution, ax=None):
+    """Draw the constraint errors of a solution over time: position, velocity and acceleration, log scale.
+
+    Of a long run the largest error in each of 400 stretches of time is drawn; zeros are drawn at 1e-17.
+
+    Parameters
+    ----------
+    solution : Solution
+    ax : matplotlib Axes, optional
+        Where to draw; default new axes of pyplot's.
+
+    Returns
+    -------
+    matplotlib Axes
+
+    Raises
+    ------
+    MissingDependency
+        If matplotlib is not installed.
+    """
+    _matplotlib()
+    if ax is None:
+        from matplotlib import pyplot
+
+        _, ax = pyplot.subplots(layout="constrained")
+    for level, unit, error, colour in zip(
+        LEVELS, UNITS, solution.constraint_error, (BLUE, VERMILION, GREEN), strict=True
+    ):
+        _draw(ax, solution.t, error, colour, label=f"{level}\nup to {error.max():.1e} {unit}")
+    ax.set_yscale("log")
+    ax.set_xlabel("time (s)")
+    ax.set_ylabel("constraint error, maximum norm")
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, fontsize="small", columnspacing=1.2)
+    return ax
+
+
+def tables_figure(tables):
+    """Draw constraint errors over time at the tightest tolerance: scenes side by side, a panel for each level.
+
+    Parameters
+    ----------
+    tables : sequence of tables.Table
+
+    Returns
+    -------
+    matplotlib Figure
+        Its `savefig` writes it; `save` does so with its errors explained.
+
+    Raises
+    ------
+    MissingDependency
+        If matplotlib is not installed.
+    """
+    _matplotlib()
+    from matplotlib import style
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with style.context("default"):  # looks the same whatever style the caller has set
+        figure = Figure(figsize=(9.0, 6.8), dpi=200, layout="constrained")
+        FigureCanvasAgg(figure)
+        figure.suptitle(
+            "Constraint error: Maggi/Kane drifts, the tangent-space ODE stays at rounding",
+            x=0.01,
+            ha="left",
+            weight="bold",
+            fontsize=13,
+        )
+        panels = figure.subplots(
+            len(LEVELS), len(tables), sharex=True, sharey="row", squeeze=False, height_ratios=(1.9, 1.0, 1.0)
+        )
+        for table, column in zip(tables, panels.T, strict=True):
+            _title(column[0], table)
+            for ax, level in zip(column, LEVELS, strict=True):
+                _panel(ax, table, level)
+            column[-1].set(xlim=(0.0, DURATION), xlabel="time (s)")
+        for row, level, unit in zip(panels, LEVELS, UNITS, strict=True):
+            low, high = row[0].get_ylim()
+            row[0].set(ylim=(low / 2.0, 20.0 * high), ylabel=f"{level} ({unit})")  # room for the words over the curves
+    return figure
+
+
+def save(figure, path):
+    """Write a figure to a file, in the format that its suffix names, PNG if it has none; return the file's path.
+
+    Raises
+    ------
+    InvalidArgument
+        If the folder doesn't exist or can't be written to, or the format is unknown.
+    """
+    from matplotlib import style
+
+    path = Path(path)
+    if not path.suffix:
+        path = path.with_suffix(".png")
+    try:
+        with style.context("default"):
+            figure.savefig(path)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidArgument(f"the figure can't be written to {path}: {reason}") from error
+    return path
+
+
+def _title(ax, table):
+    tangent, maggi_kane = table.rows[-1], table.baseline[-1]
+    ax.set_title(table.experiment.title.partition(" (")[0], loc="left", weight="bold", fontsize=11, pad=34)
+    ax.annotate(
+        f"Nystrom4, step {1e3 * table.experiment.step:g} ms, Tol {tangent.tolerance:.0e}\n"
+        f"run time {tangent.seconds:.2f} s; Maggi/Kane {maggi_kane.seconds:.2f} s",
+        (0.0, 1.0),
+        (0.0, 7.0),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        color=GREY,
+        fontsize=9,
+    )
+
+
+def _panel(ax, table, level):
+    at = LEVELS.index(level)
+    tangent, maggi_kane = table.rows[-1], table.baseline[-1]
+    ours, theirs, published = tangent.measured[at], maggi_kane.measured[at], tangent.published[at]
+    ax.set_yscale("log")
+    ax.minorticks_off()
+    ax.tick_params(labelsize=9)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.axhline(published, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1)
+    _note(ax, DURATION, published, "paper", GREY, offset=(4.0, 0.0), ha="left", va="center")
+    _draw(ax, maggi_kane.t, maggi_kane.error[at], VERMILION)
+    _draw(ax, tangent.t, tangent.error[at], BLUE)
+    above = published if ours < published < 10.0 * ours else ours  # the words keep off the dashed line
+    if level == "position":
+        _note(ax, DURATION, theirs, f"Maggi/Kane drifts to {theirs:.0e}", VERMILION)
+        _note(ax, DURATION, above, f"tangent-space ODE stays below {_ceiling(ours)}", BLUE)
+    else:
+        _note(ax, DURATION, above, f"both stay below {_ceiling(max(ours, theirs))}", "black")
+
+
+def _note(ax, x, y, text, colour, offset=(0.0, 4.0), ha="right", va="bottom"):
+    ax.annotate(text, (x, y), offset, textcoords="offset points", ha=ha, va=va, color=colour, fontsize=10)
+
+
+def _ceiling(value):
+    """The next number of one digit above a value."""
+    value = max(value, ZERO)
+    power = 10.0 ** math.floor(math.log10(value))
+    return f"{(math.floor(value / power) + 1) * power:.0e}"
+
+
+def _draw(ax, t, error, colour, label=None):
+    """One curve, thinned to the largest error of each stretch of time, zeros lifted to where a log axis has them."""
+    size = max(1, -(-t.size // POINTS))
+    at = [start + int(error[start : start + size].argmax()) for start in range(0, t.size, size)]
+    ax.plot(t[at], np.maximum(error[at], ZERO), color=colour, linewidth=1.3, label=label)
+
+
+def _matplotlib():
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
+        raise MissingDependency("the figure needs matplotlib: pip install 'tsdyn[plot]'") from error

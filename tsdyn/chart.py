@@ -16,7 +16,7 @@ from ._kernel import kernel
 from .assembly import constraint_jacobian
 from .linalg import invert, null_space
 from .newton import OK, SINGULAR, normal_matrix, update_b
-from .workspace import CHARTS, CONDITION, CONDITION_M0, CONTRACTION, FACTORIZATIONS, FLOOR
+from .workspace import CHARTS, CONDITION, CONDITION_M0, CONTRACTION, FACTORIZATIONS, FLOOR, SIZE
 
 # reasons to leave a chart, as stored; REASONS names them
 STAY, BY_CONTRACTION, BY_CONDITION, BY_OFFSET, BY_INTERVAL, BY_FAILURE, AT_START = range(7)
@@ -34,6 +34,7 @@ CONTRACTION_LIMIT = 0.15
 CONTRACTION_LOST = 0.9  # nearer to one B need not exist on the way, and another branch may have been found
 CONDITION_LIMIT = 10.0
 OFFSET_LIMIT = 0.5
+ROUNDING = 1e-15  # relative to the numbers that enter Phi: below this a residual says nothing
 RANK_LIMIT = 1e-11  # smallest singular value of Phi_q, rows scaled to length one, below which it has lost rank
 
 
@@ -73,7 +74,7 @@ def new_chart(s, w, t):
         return SINGULAR
     w.counters[CHARTS] += 1
     w.control[CONDITION_M0] = 0.0  # measured at the next placement
-    w.control[FLOOR] = 4e-16 * (1.0 + largest)
+    w.control[FLOOR] = ROUNDING * (w.control[SIZE] + largest)
     w.control[CONTRACTION] = 0.0
     w.control[CONDITION] = 1.0
     return OK

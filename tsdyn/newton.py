@@ -36,7 +36,7 @@ def solve_positions(s, w, t, v):
     for j in range(k):
         w.v[j] = v[j]
     tol = max(w.control[U_TOL], w.control[FLOOR])
-    before = math.inf
+    before, stuck = math.inf, False
     for _ in range(SWEEPS):
         _step_off(w, n, m)
         constraints(s, w.q, t, w.Phi)
@@ -47,8 +47,12 @@ def solve_positions(s, w, t, v):
             if not size < math.inf:
                 return NOT_FINITE
             worst = max(worst, size)
-        if worst > 0.25 * before and not factorise_b(s, w, t):  # B was out of date
-            return SINGULAR
+        if worst > 0.25 * before:
+            if stuck and worst <= 100.0 * w.control[FLOOR]:
+                tol = worst  # a fresh B did not help: this is rounding
+            elif not factorise_b(s, w, t):  # B was out of date
+                return SINGULAR
+            stuck = True
         for i in range(m):
             d = 0.0
             for j in range(m):
@@ -115,11 +119,12 @@ def normal_matrix(s, w):
 def update_b(s, w, t):
     """Bring B to (Phi_q U)^-1 by Eq. 28, B <- 2 B - B (Phi_q U) B, N = Phi_q U being known. Status.
 
-    With R = N B - I the iteration is B <- B - B R and squares R: it ends when the R to come is below B_tol.
+    With R = N B - I the iteration is B <- B - B R and squares R: it ends when the R to come is below B_tol^(3/2), half
+    as many digits again as asked for, so that what the last square happens to be does not show in the velocities.
     A start with |R| near one or above is replaced by a factorisation.
     """
     m = w.u.size
-    tol = w.control[B_TOL]
+    tol = w.control[B_TOL] * math.sqrt(w.control[B_TOL])
     before = math.inf
     for _ in range(SWEEPS):
         worst = 0.0

@@ -177,7 +177,7 @@ def _outputs(context, w, r, at, t0, h, t1):
             _cubic(s, h, r.y_old, r.yd_old, r.y, r.yd, r.ys)
         else:
             _hermite(s, h, r.x_old, r.y_old, r.yd_old, r.x, r.y, r.yd, r.xs, r.ys)
-        status = _evaluate(context, at, t, r.xs, r.ys, r.yds, r.xd)
+        status = _evaluate(context, at, t, r.xs, r.ys, r.yds, r.dx)  # xd is the next step's
         if status != 0:
             return status
         _record(r, t, w.q, w.qd, w.qdd)

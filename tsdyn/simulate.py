@@ -117,7 +117,7 @@ def simulate(
     q, qd = consistent(scene, system, q, qd, t0, initial_tol)
     m, n = system.segments.shape[0], q.size
     system = system._replace(reals=system.reals.copy())
-    work = allocate(n, m, len(scene.bodies), constraint_tol)
+    work = allocate(n, m, len(scene.bodies), constraint_tol, 1.0 + np.abs(system.reals).max(initial=0.0))
     work.q[:], work.qd[:] = q, qd
     step_kernel, tableau, memory = method.kernel(form.first_order)
     nx = n if form.first_order else n - m

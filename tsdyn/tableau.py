@@ -88,7 +88,7 @@ class NystromTableau:
         if self.order >= 3:
             _demand(
                 what,
-                **{"sum abar = c^2 / 2": (b @ (abar @ ones)) - 1 / 6, "b a c = 1/6": b @ a @ c - 1 / 6},
+                **{"b abar 1 = 1/6": b @ abar @ ones - 1 / 6, "b a c = 1/6": b @ a @ c - 1 / 6},
                 **{"bbar c = 1/6": bbar @ c - 1 / 6},
             )
         if self.order >= 4:
@@ -97,6 +97,7 @@ class NystromTableau:
                 **{"b c a c = 1/8": (b * c) @ a @ c - 1 / 8, "b a c^2 = 1/12": b @ a @ c**2 - 1 / 12},
                 **{"b a a c = 1/24": b @ a @ a @ c - 1 / 24, "b abar c = 1/24": b @ abar @ c - 1 / 24},
                 **{"bbar c^2 = 1/12": bbar @ c**2 - 1 / 12, "bbar a c = 1/24": bbar @ a @ c - 1 / 24},
+                **{"bbar abar 1 = 1/24": bbar @ abar @ ones - 1 / 24},
                 **{
                     "b c abar 1 = 1/8": (b * c) @ abar @ ones - 1 / 8,
                     "b a abar 1 = 1/24": b @ a @ abar @ ones - 1 / 24,

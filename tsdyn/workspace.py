@@ -39,7 +39,7 @@ class Work(NamedTuple):
     counters: np.ndarray  # int64 (COUNTERS,)  what was done how often, below
 
 
-U_TOL, B_TOL, FLOOR, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(7)
+U_TOL, B_TOL, SIZE, FLOOR, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(8)
 EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS, SKIPPED, COUNTERS = range(8)
 
 
@@ -50,8 +50,8 @@ class Context(NamedTuple):
     work: Work
 
 
-def allocate(n, m, bodies, constraint_tol):
-    """Lay out the scratch memory of a run in one block of floats."""
+def allocate(n, m, bodies, constraint_tol, size=1.0):
+    """Lay out the scratch memory of a run in one block of floats; size is that of the numbers in the constraints."""
     k = n - m
     shapes = {
         **dict.fromkeys(("q", "qd", "qdd", "q0", "base", "h"), (n,)),
@@ -70,7 +70,7 @@ def allocate(n, m, bodies, constraint_tol):
     block = np.zeros(sum(sizes))
     parts = np.split(block, np.cumsum(sizes)[:-1])
     arrays = {name: part.reshape(shape) for (name, shape), part in zip(shapes.items(), parts, strict=True)}
-    arrays["control"][[U_TOL, B_TOL]] = constraint_tol
+    arrays["control"][[U_TOL, B_TOL, SIZE]] = constraint_tol, constraint_tol, size
     return Work(**arrays, counters=np.zeros(COUNTERS, np.int64))
 
 

@@ -16,9 +16,9 @@ FILES = {
 }
 # lowest first; a module imports from lines above its own, or from its own line
 LAYERS = """
-_cache errors _discovery jet
+_cache errors _discovery jet checks
 _kernel
-rotation linalg motion stepping_signature
+rotation linalg motion
 markers bodies tableau
 primitive
 system stepping progress

@@ -180,7 +180,7 @@ class KernelCache(FunctionCache):
             self._tell()
         else:
             statistics["hits"] += 1
-            self._release()
+            self.release()
         statistics["seconds"] += time.perf_counter() - started
         return found
 
@@ -189,9 +189,10 @@ class KernelCache(FunctionCache):
         try:
             super().save_overload(sig, data)
         finally:
-            self._release()
+            self.release()
 
-    def _release(self):
+    def release(self):
+        """Give the lock back, if it is held."""
         if self._lock is not None:
             self._lock.close()
             self._lock = None

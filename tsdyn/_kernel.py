@@ -28,9 +28,10 @@ _table = [None]  # debug mode: what an address stands for; zero is no address
 _letters = {"i": types.int64, "d": types.float64, "p": types.int64}
 
 
-def kernel(function):
+def kernel(function, allocates=False):
     """Compile a function that other kernels call; it is compiled into each of them."""
-    return function if DEBUG else numba.njit(forceinline=True, **_OPTIONS)(function)
+    options = {**_OPTIONS, "_nrt": allocates}
+    return function if DEBUG else numba.njit(forceinline=not allocates, **options)(function)
 
 
 def entry(function):
@@ -88,8 +89,12 @@ class Callback:
     def _compile(self):
         arguments = tuple(_letters[c] for c in self.signature)
         self._cfunc = CFunc(self.py_func, (arguments, _letters[self.result]), locals={}, options=self.options)
-        self._cfunc._cache = cache_of(self.py_func)
-        self._cfunc.compile()
+        self._cfunc._cache = cache = cache_of(self.py_func)
+        try:
+            self._cfunc.compile()
+        finally:
+            if hasattr(cache, "release"):
+                cache.release()
         return self._cfunc.address
 
 

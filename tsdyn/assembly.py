@@ -1,5 +1,7 @@
 """Phi, Phi_q, Phi_t and gamma of a whole system: one call by address for each kind of constraint it has."""
 
+import math
+
 from ._kernel import entry, kernel
 from .motion import call_motion
 from .primitive import call_kind
@@ -8,11 +10,14 @@ from .system import COUNT, FIRST_INT, FIRST_REAL, GAMMA, JACOBIAN, PHI, PHI_T, R
 
 @kernel
 def set_time(s, t):
-    """Write value, rate and acceleration of every motion at t into its places."""
+    """Write value, rate and acceleration of every motion at t into its places; False where one is not finite."""
+    total = 0.0
     for i in range(s.motions.shape[0]):
         place = s.motions[i, 3]
         for j in range(3):
             s.reals[place + j] = call_motion(s.motions[i, j], t)
+            total += abs(s.reals[place + j])
+    return total < math.inf
 
 
 @kernel

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from .checks import floats, positive, vector3
 from .errors import InvalidBody
-from .markers import vector3
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -25,7 +25,7 @@ class Ground:
 
 
 class _Attribute:
-    """A checked attribute of a body; setting it tells the scene that its packed numbers are out of date."""
+    """A checked, read-only attribute of a body; setting it tells the scene that its packed numbers are out of date."""
 
     def __init__(self, check, what):
         self.check, self.__doc__ = check, what
@@ -34,28 +34,21 @@ class _Attribute:
         self.name = name
 
     def __get__(self, body, owner=None):
-        return self if body is None else body.values[self.name].copy()
+        return self if body is None else body.values[self.name]
 
     def __set__(self, body, value):
-        body.values[self.name] = self.check(value, body)
+        value = self.check(value, body)
+        value.setflags(write=False)  # a change of one component would not reach the packed numbers
+        body.values[self.name] = value
         body.scene.touch()
 
 
 def _mass(value, body):
-    try:
-        mass = np.float64(value)
-    except (TypeError, ValueError):
-        mass = np.float64("nan")
-    if not (np.isfinite(mass) and mass > 0.0):
-        raise InvalidBody(f"{body.name}: mass must be a positive finite number of kg, got {value!r}.")
-    return mass
+    return np.float64(positive(value, f"{body.name}: mass (kg)", InvalidBody))
 
 
 def _inertia(value, body):
-    try:
-        given = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        given = np.empty(0)
+    given = floats(value)
     if given.shape == (3,):
         given = np.diag(given)
     if given.shape != (3, 3) or not np.isfinite(given).all():
@@ -84,12 +77,10 @@ def _inertia(value, body):
 
 
 def _orientation(value, body):
-    if hasattr(value, "as_quat"):  # scipy.spatial.transform.Rotation has the scalar last
-        value = np.roll(np.asarray(value.as_quat(), dtype=float), 1, axis=-1)
-    try:
-        p = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        p = np.empty(0)
+    if hasattr(value, "as_quat") and not isinstance(value, type):  # a SciPy Rotation has the scalar last
+        p = np.roll(value.as_quat(), 1, axis=-1)
+    else:
+        p = floats(value)
     if p.shape != (4,) or not np.isfinite(p).all():
         raise InvalidBody(
             f"{body.name}: orientation must be four finite Euler parameters (e0, e1, e2, e3), scalar first, or one "
@@ -98,7 +89,7 @@ def _orientation(value, body):
     length = np.sqrt(p @ p)
     if abs(length - 1.0) > 1e-6:
         raise InvalidBody(
-            f"{body.name}: the Euler parameters {p} have length {length:.9g} instead of 1; divide them by it"
+            f"{body.name}: orientation {p} has length {length:.9g} and Euler parameters have 1; divide by it"
             + (", or give a rotation: they are zero." if length == 0.0 else ".")
         )
     return p / length

@@ -23,15 +23,15 @@ class ConstraintError(NamedTuple):
     acceleration: np.ndarray
 
 
-def constraint_rows(scene, t, q, qd, qdd, time_rate=1.0):
-    """Phi and its first two time derivatives along a trajectory: three arrays (k, m).
+def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0):
+    """Phi and its first two time derivatives along a trajectory of a packed scene: three arrays (k, m).
 
     With time_rate=0 time stands still: the derivatives are those along (qd, qdd) alone.
     """
     columns = []
-    for constraint in scene.constraints:
-        x = [part for marker in _markers(scene, constraint, q, qd, qdd) for part in marker]
-        par = [entry for value in constraint.parameters() for entry in _parameter(value, t, time_rate)]
+    for constraint, values in zip(packed.constraints, packed.parameters, strict=True):
+        x = [part for marker in _markers(packed.bodies, constraint, q, qd, qdd) for part in marker]
+        par = [entry for value in values for entry in _parameter(value, t, time_rate)]
         out = [None] * constraint.rows
         twin(type(constraint).phi)(x, par, Jet(t, time_rate), out)
         columns += out
@@ -41,9 +41,11 @@ def constraint_rows(scene, t, q, qd, qdd, time_rate=1.0):
     return tuple(np.stack([np.broadcast_to(row, t.shape) for row in level], axis=1) for level in levels)
 
 
-def constraint_error(scene, t, q, qd, qdd):
+def constraint_error(packed, t, q, qd, qdd):
     """Maximum norms of `constraint_rows` over the rows."""
-    return ConstraintError(*(np.abs(level).max(axis=1, initial=0.0) for level in constraint_rows(scene, t, q, qd, qdd)))
+    return ConstraintError(
+        *(np.abs(level).max(axis=1, initial=0.0) for level in constraint_rows(packed, t, q, qd, qdd))
+    )
 
 
 def _parameter(value, t, rate):
@@ -53,9 +55,9 @@ def _parameter(value, t, rate):
     return [Jet(f, rate * fd, rate * rate * fdd), Jet(fd, rate * fdd), Jet(fdd)]
 
 
-def _markers(scene, constraint, q, qd, qdd):
+def _markers(bodies, constraint, q, qd, qdd):
     """The coordinates of each marker as Jets over the outputs."""
-    starts = dict(zip(scene.bodies, np.cumsum([0, *(b.dimension for b in scene.bodies)]), strict=False))
+    starts = dict(zip(bodies, np.cumsum([0, *(b.dimension for b in bodies)]), strict=False))
     for marker, s in zip(constraint.markers, constraint.coordinates, strict=True):
         body = constraint.body_of(marker)
         if body.dimension == 0:

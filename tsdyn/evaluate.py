@@ -6,6 +6,7 @@ import numpy as np
 
 from .assembly import evaluate_constraints
 from .bodies import transform_g
+from .checks import finite_vector, number
 from .errors import InvalidArgument, SingularConfiguration
 
 
@@ -50,9 +51,9 @@ def evaluate(scene, q=None, qd=None, t=0.0):
     """
     system = scene.system
     start = scene.start
-    q = state_vector(start[0] if q is None else q, start[0].size, "q")
-    qd = state_vector(start[1] if qd is None else qd, start[0].size, "qd")
-    if not np.isfinite(t):
+    q = finite_vector(start[0] if q is None else q, start[0].size, "q")
+    qd = finite_vector(start[1] if qd is None else qd, start[0].size, "qd")
+    if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     Phi, Phi_q, Phi_t, gamma = constraint_arrays(system, q, qd, t)
     M, Q_A, S = mass_matrix(system, q), applied_forces(system, q), velocity_forces(system, q, qd)
@@ -66,17 +67,6 @@ def evaluate(scene, q=None, qd=None, t=0.0):
             "constraints leave free carries no inertia."
         ) from error
     return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A, S, solution[n:], solution[:n])
-
-
-def state_vector(value, n, what):
-    """Return n finite floats as an array."""
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape != (n,) or not np.isfinite(array).all():
-        raise InvalidArgument(f"{what} must be {n} finite numbers, one for each coordinate, got shape {array.shape}.")
-    return array
 
 
 def equilibrated_solve(A, b):

@@ -34,6 +34,6 @@ FORMULATIONS = {
 
 def formulation(name):
     """Return the formulation of this name."""
-    if name not in FORMULATIONS:
+    if not isinstance(name, str) or name not in FORMULATIONS:
         raise InvalidArgument(f"unknown formulation {name!r}; there are {', '.join(map(repr, FORMULATIONS))}.")
     return FORMULATIONS[name]

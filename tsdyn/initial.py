@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .bodies import transform_g
-from .errors import InconsistentState, RedundantConstraints, SingularConfiguration
+from .checks import number, positive
+from .errors import InconsistentState, InvalidArgument, InvalidBody, RedundantConstraints, SingularConfiguration
 from .evaluate import constraint_arrays, mass_matrix
 
 RANK_TOL = 1e-10  # of the singular values of Phi_q, its rows scaled to unit length
@@ -93,9 +94,12 @@ def check_inertia(scene, system, q, Phi_q):
 
 
 def weakest_row(scene, Phi_q):
-    """Name the row of Phi_q that is nearest to depending on the others."""
+    """Name the row of Phi_q nearest to depending on the others; and the share of its smallest singular value."""
+    if not (Phi_q.size and np.isfinite(Phi_q).all()):
+        return "", 1.0
     scaled = Phi_q / np.maximum(np.linalg.norm(Phi_q, axis=1), 1e-300)[:, None]
-    return scene.row_names()[_pivots(scaled)[-1]]
+    size = np.linalg.svd(scaled, compute_uv=False)
+    return scene.row_names()[_pivots(scaled)[-1]], size[-1] / size[0]
 
 
 def _pivots(rows):
@@ -108,6 +112,7 @@ def _pivots(rows):
 def consistent(scene, system, q, qd, t, tol):
     """Check positions and velocities against the constraints, then remove what rounding is left. Returns (q, qd)."""
     Phi, Phi_q, Phi_t, _ = constraint_arrays(system, q, qd, t)
+    _demand_finite(scene, Phi, Phi_q, Phi_t)
     _demand(scene, Phi, tol * (1.0 + np.abs(q).max()), "position", "Phi")
     check_rank(scene, Phi_q)
     check_inertia(scene, system, q, Phi_q)
@@ -125,6 +130,16 @@ def consistent(scene, system, q, qd, t, tol):
             break
         qd = qd - _least(Phi_q, residual)
     return q, qd
+
+
+def _demand_finite(scene, *arrays):
+    for array in arrays:
+        bad = np.flatnonzero(~np.isfinite(array if array.ndim == 1 else array.sum(axis=1)))
+        if bad.size:
+            raise InconsistentState(
+                f"{scene.row_names()[bad[0]]}: its constraint or a derivative of it is not finite at the start. Look "
+                "at its parameters, its motion, or its kernels."
+            )
 
 
 def _demand(scene, residual, tol, level, formula):
@@ -178,15 +193,23 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0):
     Gauss-Newton steps, smallest in the kinetic-energy metric, with rotations of at most half a radian a step and
     halved until |Phi| falls; the velocity correction is the smallest in kinetic energy.
     """
+    tol = positive(tol, "tol")
+    if not np.isfinite(number(t)):
+        raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     system = scene.system
     q_start, qd_start = scene.start
     q, qd = q_start.copy(), qd_start.copy()
     held = np.zeros(q.size, bool)
+    if isinstance(fixed, str) or not hasattr(fixed, "__iter__"):
+        raise InvalidBody(f"fixed must be a sequence of bodies, such as (body,), got {fixed!r}.")
     for body in fixed:
+        if body not in scene.bodies:
+            raise InvalidBody(f"fixed: {body!r} is not a body of this scene.")
         at = int(system.bodies[body.index, 0])
         held[at : at + body.dimension] = True
     free = ~held
     Phi, Phi_q, Phi_t, _ = constraint_arrays(system, q, qd, t)
+    _demand_finite(scene, Phi, Phi_q, Phi_t)
     moved_rows = np.abs(Phi_q[:, free]).max(axis=1, initial=0.0) > 0.0
     iterations, size = 0, np.linalg.norm(Phi)
     while iterations < MOST_ITERATIONS:

@@ -2,9 +2,7 @@
 
 from types import MappingProxyType
 
-import numpy as np
-
-from .errors import InvalidArgument
+from .checks import positive
 from .stepping import nystrom_step, runge_kutta_step
 
 _registry = {}
@@ -60,14 +58,3 @@ class ExplicitNystrom(Integrator):
 def registered():
     """Return every integrator class known, by its name in lower case."""
     return MappingProxyType(_registry)
-
-
-def positive(value, what):
-    """Return a positive finite float, or raise InvalidArgument."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = np.nan
-    if not (np.isfinite(number) and number > 0.0):
-        raise InvalidArgument(f"{what} must be a positive finite number, got {value!r}.")
-    return number

@@ -13,16 +13,16 @@ def copy(a, b):
 
 
 @kernel
-def cholesky(A, n):
-    """Factor the lower triangle of A (n, n) in place, A = L L^T; False where A is not positive definite.
+def cholesky(A, n, limit):
+    """Factor the lower triangle of A (n, n) in place, A = L L^T; the diagonal holds the reciprocals of L's.
 
-    The diagonal holds the reciprocals of L's.
+    False where A is not positive definite: where elimination leaves less than `limit` of a diagonal entry.
     """
     for j in range(n):
         s = A[j, j]
         for k in range(j):
             s -= A[j, k] * A[j, k]
-        if not s > 0.0:
+        if not s > limit * A[j, j]:
             return False
         pivot = 1.0 / math.sqrt(s)
         A[j, j] = pivot

@@ -9,7 +9,7 @@ from ._kernel import callback, vector
 from .assembly import set_time
 from .chart import inspect, new_chart, tangent_map
 from .linalg import copy
-from .newton import OK
+from .newton import NOT_FINITE, OK
 from .null_space import project, reduced_acceleration, reduced_mass, velocities
 from .stepping import ACCELERATE, PLACE
 from .workspace import PLACEMENTS, load
@@ -20,8 +20,9 @@ def place(context, t, q):
     """Take the positions q as they are: Phi_q, B, D and the factor of D^T M D. Status."""
     c = load(context)
     s, w = c.system, c.work
-    set_time(s, t)
     w.counters[PLACEMENTS] += 1
+    if not set_time(s, t):
+        return NOT_FINITE
     copy(vector(q, w.q.size), w.q)
     status = tangent_map(s, w, t)
     return reduced_mass(s, w) if status == OK else status

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._kernel import kernel, stack
+from .checks import vector3
 from .errors import InvalidBody, InvalidConstraint
 from .rotation import rotate, rotate_gradient, rotate_rate
 
@@ -84,17 +85,6 @@ class Parameters(Marker):
 def _needs_rotation(body, where):
     if body.dimension == 3:
         raise InvalidBody(f"{where}: the point mass {body.name!r} has no orientation; use add_body.")
-
-
-def vector3(value, what, error):
-    """Return three finite floats as an array (3,), or raise `error`."""
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise error(f"{what} must be three finite numbers, got {value!r}.")
-    return array
 
 
 @kernel

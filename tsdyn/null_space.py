@@ -20,6 +20,7 @@ from .newton import NOT_FINITE, OK, solve_positions, subtract_normal
 from .stepping import ACCELERATE, PLACE
 from .workspace import EVALUATIONS, FACTORIZATIONS, PLACEMENTS, load
 
+PIVOT_LIMIT = 1e-14  # of D^T M D: less than this is rounding
 MASS_SINGULAR = int(Status.MASS_SINGULAR)
 
 
@@ -54,7 +55,7 @@ def reduced_mass(s, w):
                 for j in range(i + 1):
                     w.A[i, j] += f * x[j] + g * y[j] + h * z[j]
     w.counters[FACTORIZATIONS] += 1
-    return OK if cholesky(w.A, k) else MASS_SINGULAR
+    return OK if cholesky(w.A, k, PIVOT_LIMIT) else MASS_SINGULAR
 
 
 @kernel
@@ -143,8 +144,9 @@ def place(context, t, v):
     """Take the position coordinates v: q, Phi_q, B, D and the factor of D^T M D. Status."""
     c = load(context)
     s, w = c.system, c.work
-    set_time(s, t)
     w.counters[PLACEMENTS] += 1
+    if not set_time(s, t):
+        return NOT_FINITE
     status = solve_positions(s, w, t, vector(v, w.v.size))
     if status == OK:
         status = tangent_map(s, w, t)

@@ -16,6 +16,7 @@ and on truncated Taylor series: that is how they are checked.
 from types import MappingProxyType
 
 from ._kernel import Callback, caller, integers, kernel, specialised, stack, stack2, vector
+from .bodies import Ground, PointMass
 from .errors import InvalidConstraint
 from .markers import PARAMETERS, Marker, chain_rule, motion, position
 from .motion import Motion
@@ -58,10 +59,11 @@ class Primitive:
 
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)
-        if not cls.rows:
-            return
         where = f"primitive {cls.__name__}"
-        if not cls.markers or not all(isinstance(m, Marker) for m in cls.markers):
+        if isinstance(cls.rows, bool) or not isinstance(cls.rows, int) or cls.rows < 1:
+            raise InvalidConstraint(f"{where}: rows must be the number of its scalar constraints, 1 or more.")
+        markers = cls.markers if isinstance(cls.markers, (tuple, list)) else ()
+        if not markers or not all(isinstance(m, Marker) for m in markers):
             raise InvalidConstraint(f"{where}: markers must be a tuple of Point, Vector or Parameters.")
         functions = {}
         for name, arguments in {**_KERNELS, **_OPTIONAL}.items():
@@ -79,11 +81,16 @@ class Primitive:
         """Attach the primitive to its bodies; coordinates has an entry for each marker, in the body frame."""
         self.a, self.b = a, b
         kind = type(self).__name__
-        bodies = [body for body in (a, b) if body is not None]
+        if not self.rows:
+            raise InvalidConstraint(
+                "Primitive is the base of constraints and has no rows; use one of them, or a subclass."
+            )
+        needed = {marker.body for marker in self.markers} | {"a"}
+        bodies = [body for body, letter in ((a, "a"), (b, "b")) if body is not None or letter in needed]
         for body in bodies:
-            if not hasattr(body, "dimension"):
+            if not isinstance(body, (PointMass, Ground)):
                 raise InvalidConstraint(
-                    f"{kind}: {body!r} is not a body; pass what add_body returned, or scene.ground."
+                    f"{name or kind}: {body!r} is not a body; pass one that add_body returned, or the ground."
                 )
         self.name = str(name) or f"{kind}({', '.join(body.name for body in bodies)})"
         if all(body.dimension == 0 for body in bodies):
@@ -99,6 +106,12 @@ class Primitive:
             marker.coordinates(self.body_of(marker), value, self.name)
             for marker, value in zip(self.markers, given, strict=True)
         )
+
+    def __setattr__(self, name, value):
+        """Set an attribute; the scene packs its numbers again."""
+        super().__setattr__(name, value)
+        if hasattr(self, "coordinates"):
+            self.scene.touch()
 
     @property
     def scene(self):

@@ -25,7 +25,7 @@ def solve_multipliers(s, t, q, f, Phi_q, A, b, out):
                 for c in range(n):
                     x += Phi_q[i, c] * Phi_q[j, c]
                 A[i, j] = x
-        if not cholesky(A, m):
+        if not cholesky(A, m, 0.0):
             return False
         for _ in range(2):
             for i in range(m):
@@ -72,10 +72,10 @@ def reaction(solution, constraint):
 
     -Phi_r^T lam at the centroid and the body torque -G Phi_p^T lam / 2, moved to the point.
     """
-    scene, system = solution.scene, solution.system
+    system = solution.system
     body = constraint.a if constraint.a.dimension else constraint.b
     row = 0
-    for other in scene.constraints:
+    for other in solution.packed.constraints:
         if other is constraint:
             break
         row += other.rows

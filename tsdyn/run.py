@@ -1,5 +1,6 @@
 """The driver: steps, outputs, charts. One kernel for every scene, method and formulation; it calls them by address."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from .linalg import copy
 from .stepping import call_accelerate, call_place, call_step
 from .workspace import CONDITION, CONTRACTION
 
-SLICE_DONE, CHART_LOST = int(Status.SLICE_DONE), int(Status.CHART_LOST)
+SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
 # addresses
 A_PLACE, A_ACCELERATE, A_COMPLETE, A_CHECK, A_CHART, A_STEP = range(6)
 # clock
@@ -87,13 +88,19 @@ def _begin_chart(context, w, r, at, reason):
 
 
 @kernel
-def _evaluate(context, at, t, x, y, yd, xd):
+def _evaluate(context, w, at, t, x, y, yd, xd):
     """q, qd, qdd, yd (and xd) at (t, x, y). Status."""
     status = call_place(at[A_PLACE], context, t, x)
     if status == 0:
         status = call_accelerate(at[A_ACCELERATE], context, t, y, yd, xd)
     if status == 0:
         status = call_complete(at[A_COMPLETE], context, yd)
+    if status == 0:
+        total = 0.0
+        for i in range(w.q.size):
+            total += abs(w.q[i]) + abs(w.qd[i]) + abs(w.qdd[i])
+        if not total < math.inf:
+            return NOT_FINITE
     return status
 
 
@@ -177,7 +184,7 @@ def _outputs(context, w, r, at, t0, h, t1):
             _cubic(s, h, r.y_old, r.yd_old, r.y, r.yd, r.ys)
         else:
             _hermite(s, h, r.x_old, r.y_old, r.yd_old, r.x, r.y, r.yd, r.xs, r.ys)
-        status = _evaluate(context, at, t, r.xs, r.ys, r.yds, r.dx)  # xd is the next step's
+        status = _evaluate(context, w, at, t, r.xs, r.ys, r.yds, r.dx)  # xd is the next step's
         if status != 0:
             return status
         _record(r, t, w.q, w.qd, w.qdd)
@@ -198,7 +205,7 @@ def _begin(context, w, r, at):
     """The first chart, the accelerations there, and the first output. Status."""
     status = _begin_chart(context, w, r, at, AT_START)
     if status == 0:
-        status = _evaluate(context, at, r.clock[T], r.x, r.y, r.yd, r.xd)
+        status = _evaluate(context, w, at, r.clock[T], r.x, r.y, r.yd, r.xd)
     if status == 0:
         _store_now(w, r)
         call_check(at[A_CHECK], context)
@@ -246,7 +253,7 @@ def advance(c, r, at, most):
         if status == 0:
             _add(r.x, r.x_low, r.dx)
             _add(r.y, r.y_low, r.dy)
-            status = _evaluate(context, at, t1, r.x, r.y, r.yd, r.xd)
+            status = _evaluate(context, w, at, t1, r.x, r.y, r.yd, r.xd)
         reason = 0
         if status == 0:
             reason = call_check(at[A_CHECK], context)

@@ -1,13 +1,15 @@
 """The scene: what a user assembles from bodies and constraints, checked piece by piece."""
 
+from itertools import count
+
 import numpy as np
 
 from .bodies import IDENTITY, Body, Ground, PointMass
+from .checks import vector3
 from .constraints.euler_normalization import EulerNormalization
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint
 from .evaluate import evaluate
 from .initial import assemble
-from .markers import vector3
 from .motion import Motion
 from .primitive import Primitive
 from .system import pack
@@ -42,11 +44,12 @@ class Scene:
     @property
     def gravity(self):
         """Acceleration of free fall, ground frame, m/s^2, shape (3,)."""
-        return self._gravity.copy()
+        return self._gravity
 
     @gravity.setter
     def gravity(self, value):
         self._gravity = vector3(value, "gravity (m/s^2)", InvalidArgument)
+        self._gravity.setflags(write=False)
         self.touch()
 
     @property
@@ -112,8 +115,10 @@ class Scene:
         return self._admit(PointMass, name, {"mass": mass, "position": position, "velocity": velocity})
 
     def _admit(self, kind, name, values):
-        name = str(name) or f"body{len(self._bodies) + 1}"
-        if any(body.name == name for body in self._bodies) or name == "ground":
+        taken = {"ground", *(body.name for body in self._bodies)}
+        free = (f"body{i}" for i in count(len(self._bodies) + 1))
+        name = str(name) or next(name for name in free if name not in taken)
+        if name in taken:
             raise InvalidBody(f"the scene has a body named {name!r} already; choose another name.")
         body = kind(self, len(self._bodies), name, **values)
         self._bodies.append(body)
@@ -132,6 +137,8 @@ class Scene:
             raise InvalidConstraint(
                 f"{item!r} is not a constraint; pass an instance, such as ts.constraints.Spherical(...)."
             )
+        if not hasattr(item, "coordinates"):
+            raise InvalidConstraint(f"{type(item).__name__}: its __init__ must call super().__init__(...).")
         if item.scene is not self:
             raise InvalidConstraint(f"{item.name}: its bodies belong to another scene; use bodies of this one.")
         if type(item) is EulerNormalization:
@@ -144,20 +151,25 @@ class Scene:
 
     def touch(self):
         """Forget the packed numbers: something has changed."""
-        self._system = self._start = None
+        self._packed = self._start = None
+
+    @property
+    def packed(self):
+        """Bodies, constraints and their numbers as they are now, a `Packed`; made again after a change only."""
+        if not self._bodies:
+            raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
+        if self._packed is None:
+            self._packed = pack(self)
+        return self._packed
 
     @property
     def system(self):
-        """The packed `System`; made again after a change only."""
-        if not self._bodies:
-            raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
-        if self._system is None:
-            self._system = pack(self)
-        return self._system
+        """What the kernels see, a `System`."""
+        return self.packed.system
 
     def motions(self):
         """The functions of time that the constraints are given."""
-        return [v for c in self._added if c.rheonomic for v in c.parameters() if isinstance(v, Motion)]
+        return [value for values in self.packed.parameters for value in values if isinstance(value, Motion)]
 
     @property
     def start(self):

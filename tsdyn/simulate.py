@@ -6,11 +6,11 @@ import time
 import numpy as np
 
 from . import integrators as _integrators  # noqa: F401  (fills the registry)
+from .checks import finite_vector, floats, positive, whole
 from .errors import InvalidArgument, SingularConfiguration, Status
-from .evaluate import state_vector
 from .formulation import formulation as find_formulation
 from .initial import consistent
-from .integrator import Integrator, positive, registered
+from .integrator import Integrator, registered
 from .progress import reporter
 from .run import (
     BEGUN,
@@ -103,17 +103,20 @@ def simulate(
     if redundancy != "refuse":
         raise InvalidArgument(f"redundancy must be 'refuse', got {redundancy!r}; other policies don't exist yet.")
     times = _output_times(t_eval, t0, t1)
-    steps, max_steps = _step_count(t0, t1, method.step), _count(max_steps, "max_steps")
-    interval = _count(chart_interval, "chart_interval") or 0
+    steps, max_steps = _stepwhole(t0, t1, method.step), whole(max_steps, "max_steps")
+    interval = whole(chart_interval, "chart_interval") or 0
     report = reporter(progress)
 
     started = time.perf_counter()
-    system = scene.system
+    packed = scene.packed
+    system = packed.system
     for motion in scene.motions():
         motion.check(t0, t1)
     q, qd = scene.start
     if state is not None:
-        q, qd = state_vector(state.q, q.size, "state.q"), state_vector(state.qd, q.size, "state.qd")
+        if not (hasattr(state, "q") and hasattr(state, "qd")):
+            raise InvalidArgument(f"state must have q and qd, such as solution.state, got {state!r}.")
+        q, qd = finite_vector(state.q, q.size, "state.q"), finite_vector(state.qd, q.size, "state.qd")
     q, qd = consistent(scene, system, q, qd, t0, initial_tol)
     m, n = system.segments.shape[0], q.size
     system = system._replace(reals=system.reals.copy())
@@ -129,11 +132,12 @@ def simulate(
     context = Context(system, work)
     advance(context, run, addresses, 0)  # loads the driver, before the clock starts
     prepared = time.perf_counter()
-    status, chunks = _drive(context, run, addresses, max_steps, report, (t0, t1))
+    status, reason, chunks = _drive(context, run, addresses, max_steps, report, (t0, t1))
     ended = time.perf_counter()
     return Solution(
         scene,
-        system,
+        packed,
+        reason=reason,
         method=repr(method),
         formulation=form.name,
         status=status,
@@ -146,7 +150,7 @@ def simulate(
 
 
 def _drive(context, run, addresses, max_steps, report, span):
-    """Run slice by slice; returns the status and the lists of rows of outputs, history and charts."""
+    """Run slice by slice; returns the status, why it was interrupted, and rows of outputs, history and charts."""
     chunks = {"out": [], "history": [], "charts": []}
     most, total = FIRST_SLICE, int(run.numbers[STEPS_WANTED])
     limit = total if max_steps is None else min(max_steps, total)
@@ -165,7 +169,7 @@ def _drive(context, run, addresses, max_steps, report, span):
             changes["charts"] = np.resize(run.charts, (2 * run.charts.shape[0], 5))
         return run._replace(**changes)
 
-    status = Status.INTERRUPTED
+    status, reason = Status.INTERRUPTED, ""
     try:
         run = fresh(run, min(most, limit))
         status = Status.SUCCESS
@@ -186,7 +190,11 @@ def _drive(context, run, addresses, max_steps, report, span):
                 most = min(2 * most, LARGEST_SLICE)
             elif seconds > 2 * SLICE_SECONDS:
                 most = max(most // 2, 1)
-            report((run.clock[T] - span[0]) / (span[1] - span[0]))
+            try:
+                report((run.clock[T] - span[0]) / (span[1] - span[0]))
+            except Exception as error:  # what has been computed is worth more than a progress bar
+                status, reason = Status.INTERRUPTED, f"progress raised {type(error).__name__}: {error}."
+                break
             run = fresh(run, min(most, max(limit - int(run.numbers[STEPS]), 1)))
     except KeyboardInterrupt:
         status = Status.INTERRUPTED
@@ -195,7 +203,7 @@ def _drive(context, run, addresses, max_steps, report, span):
     if not per_step:
         chunks["out"] = [run.out[: run.numbers[ROWS]]]
     report(None)
-    return status, chunks
+    return status, reason, chunks
 
 
 def _collect(run, chunks, per_step):
@@ -229,12 +237,10 @@ def _lay_out(work, nx, ny, tableau, memory, times, first_order):
 
 
 def _interval(t_span):
-    try:
-        t0, t1 = (float(t) for t in t_span)
-    except (TypeError, ValueError):
-        t0 = t1 = math.nan
-    if not (math.isfinite(t0) and math.isfinite(t1)):
+    span = floats(t_span)
+    if span.shape != (2,) or not np.isfinite(span).all():
         raise InvalidArgument(f"t_span must be two finite times in s, (start, end), got {t_span!r}.")
+    t0, t1 = map(float, span)
     if not t1 > t0:
         raise InvalidArgument(
             f"t_span must end after it starts, got ({t0:g}, {t1:g}); swap them, or choose a later end."
@@ -251,7 +257,7 @@ def _method(integrator):
         if name not in known:
             raise InvalidArgument(f"unknown integrator {integrator!r}; there are {', '.join(map(repr, known))}.")
         return known[name]()
-    if isinstance(integrator, type) and issubclass(integrator, Integrator):
+    if isinstance(integrator, type) and integrator in known.values():
         return integrator()
     if not isinstance(integrator, Integrator):
         raise InvalidArgument(
@@ -263,10 +269,7 @@ def _method(integrator):
 def _output_times(t_eval, t0, t1):
     if t_eval is None:
         return np.empty(0)
-    try:
-        times = np.array(t_eval, dtype=float)
-    except (TypeError, ValueError):
-        times = np.array(math.nan)
+    times = floats(t_eval)
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
         raise InvalidArgument("t_eval must be a non-empty vector of finite times in s.")
     if (np.diff(times) <= 0.0).any():
@@ -278,16 +281,8 @@ def _output_times(t_eval, t0, t1):
     return times
 
 
-def _step_count(t0, t1, step):
+def _stepwhole(t0, t1, step):
     count = (t1 - t0) / step
     if not count < 2**53 or t0 + step == t0:
         raise InvalidArgument(f"the step of {step:g} s is too small for the interval ({t0:g}, {t1:g}).")
     return max(1, math.ceil(count * (1.0 - 1e-12)))
-
-
-def _count(value, what):
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise InvalidArgument(f"{what} must be a positive whole number, got {value!r}.")
-    return int(value)

@@ -11,6 +11,8 @@ from . import diagnostics, reactions
 from .bodies import rotation_matrix
 from .chart import REASONS
 from .errors import InvalidBody, InvalidConstraint, Status, StepFailure
+from .evaluate import constraint_arrays
+from .initial import weakest_row
 from .run import CHART_ROWS, IN_CHART, REJECTED, STEPS, T
 from .workspace import (
     B_ITERATIONS,
@@ -22,6 +24,8 @@ from .workspace import (
     NEWTON,
     PLACEMENTS,
 )
+
+NEARLY_SINGULAR = 0.05
 
 
 class State(NamedTuple):
@@ -70,8 +74,9 @@ class Solution:
         steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds.
     """
 
-    def __init__(self, scene, system, *, method, formulation, status, span, run, work, chunks, seconds):
-        self.scene, self.system, self.method, self.formulation = scene, system, method, formulation
+    def __init__(self, scene, packed, *, reason, method, formulation, status, span, run, work, chunks, seconds):
+        self.scene, self.packed, self.method, self.formulation = scene, packed, method, formulation
+        self.system, self._reason = packed.system, reason
         self.status, self.span = status, span
         rows = chunks["out"][0] if len(chunks["out"]) == 1 else np.concatenate(chunks["out"])
         n = work.q.size
@@ -105,18 +110,23 @@ class Solution:
         """How the run ended, in words."""
         if self.success:
             return self.status.sentence
-        where = f"It stopped at t = {self._reached:.9g} s of {self.span[1]:g} s, after {self.stats.steps} steps."
-        return " ".join(part for part in (self.status.sentence, where, self._suspect(), self.status.remedy) if part)
+        steps = f"{self.stats.steps} step{'' if self.stats.steps == 1 else 's'}"
+        where = f"It stopped at t = {self._reached:.9g} s of {self.span[1]:g} s, after {steps}."
+        parts = (self.status.sentence, self._reason, where, self._suspect(), self.status.remedy)
+        return " ".join(part for part in parts if part)
 
     def _suspect(self):
-        """Name what looks singular or large at the last point."""
-        if self.status != Status.SINGULAR or not self._last:
+        """Name what is nearly singular at the last point."""
+        if self.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST):
             return ""
-        from .evaluate import constraint_arrays
-        from .initial import weakest_row
-
         _, Phi_q, _, _ = constraint_arrays(self.system, self._last[0], self._last[1], self._reached)
-        return f"The rows nearest to dependence there are those of {weakest_row(self.scene, Phi_q)}."
+        rows, share = weakest_row(self.scene, Phi_q)
+        if not share < NEARLY_SINGULAR:
+            return ""
+        return (
+            f"Phi_q is near to losing rank there (its smallest singular value is {share:.1e} of the largest, rows "
+            f"scaled): a singular configuration, in which {rows} depends on other rows."
+        )
 
     def raise_if_failed(self):
         """Raise StepFailure, with this solution as `.solution`, if the run ended early; return self otherwise."""
@@ -152,19 +162,19 @@ class Solution:
     @cached_property
     def constraint_error(self):
         """Maximum norms of Eqs. 1-3 at every output, recomputed by code that is not the solver's."""
-        return diagnostics.constraint_error(self.scene, self.t, self.q, self.qd, self.qdd)
+        return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd)
 
     def reaction(self, constraint):
         """Force (N) and torque (N m) that a constraint exerts, each (k, 3), ground frame.
 
         On body a, or on b where a is the ground; the torque is about the constraint's first point on that body.
         """
-        if constraint not in self.scene.constraints:
+        if constraint not in self.packed.constraints:
             raise InvalidConstraint(f"{constraint!r} is not a constraint of this solution's scene.")
         return reactions.reaction(self, constraint)
 
     def _span(self, body, part):
-        if getattr(body, "scene", None) is not self.scene or body.dimension == 0:
+        if body not in self.packed.bodies:
             raise InvalidBody(f"{body!r} is not a body of this solution's scene.")
         at = int(self.system.bodies[body.index, 0])
         if part == "r":

@@ -3,7 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
+from numba.core.errors import NumbaError
 
+from .checks import number
+from .errors import InvalidConstraint
 from .motion import Motion
 from .primitive import AT, BLOCK, DIMENSION, INTS, ROW, STRIDE
 
@@ -26,13 +29,29 @@ class System(NamedTuple):
     segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
 
 
+class Packed(NamedTuple):
+    """A scene as it was when it was packed; a solution keeps it, whatever happens to the scene later."""
+
+    system: System
+    bodies: tuple
+    constraints: tuple
+    parameters: tuple  # of each constraint: floats and Motions
+
+
 def pack(scene):
-    """Pack a scene into a System; loads (at the very first use compiles) the kernels of the kinds it uses."""
+    """Pack a scene; loads (at the very first use compiles) the kernels of the kinds it uses.
+
+    Raises
+    ------
+    InvalidConstraint
+        If a plug-in's parameters are no finite numbers or Motions, or Numba can't compile its kernels.
+    """
     starts = np.cumsum([0, *(body.dimension for body in scene.bodies)])
     n = int(starts[-1])
     where = {id(body): (int(at), body.dimension) for at, body in zip(starts, scene.bodies, strict=False)}
     groups, row = {}, 0
     segments = []
+    parameters = {constraint: _parameters(constraint) for constraint in scene.constraints}
     for constraint in scene.constraints:
         groups.setdefault(type(constraint), []).append((constraint, row))
         row += constraint.rows
@@ -42,23 +61,30 @@ def pack(scene):
     kinds, table, reals, motions = [], [], [], []
     for kind, members in groups.items():
         first = len(table), len(reals)
+        strides = set()
         for constraint, at_row in members:
+            begin = len(reals)
             table += _places(constraint, at_row, n, where)
             reals += np.concatenate(constraint.coordinates).tolist()
-            for value in constraint.parameters():
+            for value in parameters[constraint]:
                 if isinstance(value, Motion):
                     motions.append((*value.addresses, len(reals)))
                     reals += value.value(0.0)
                 else:
                     reals.append(float(value))
-        stride = (len(reals) - first[1]) // len(members)
-        addresses = [kind.kernels[name].address for name in ("phi", "jacobian", "gamma")]
+            stride = len(reals) - begin
+            if strides - {stride}:
+                raise InvalidConstraint(
+                    f"{constraint.name}: parameters() must return as many values as for every other {kind.__name__}."
+                )
+            strides.add(stride)
+        addresses = [_address(kind, name) for name in ("phi", "jacobian", "gamma")]
         moving = any(constraint.rheonomic for constraint, _ in members)
-        addresses.append(kind.kernels["phi_t"].address if moving else 0)
+        addresses.append(_address(kind, "phi_t") if moving else 0)
         kinds.append([*addresses, len(members), stride, *first])
 
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
-    return System(
+    system = System(
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
         mass=np.array([body.values["mass"] for body in scene.bodies]),
         inertia=np.array(inertias).reshape(-1, 9),
@@ -70,6 +96,28 @@ def pack(scene):
         rheonomic=np.array([any(kind[PHI_T] for kind in kinds)], np.int64),
         segments=np.array(segments, np.int64).reshape(-1, 4),
     )
+    return Packed(system, scene.bodies, scene.constraints, tuple(parameters.values()))
+
+
+def _parameters(constraint):
+    """A constraint's parameters, checked."""
+    given = constraint.parameters()
+    if isinstance(given, (tuple, list)) and all(isinstance(p, Motion) or np.isfinite(number(p)) for p in given):
+        return tuple(given)
+    raise InvalidConstraint(
+        f"{constraint.name}: parameters() must return a tuple of finite numbers and Motions, it gave {given!r}."
+    )
+
+
+def _address(kind, name):
+    """The address of a kind's kernel."""
+    try:
+        return kind.kernels[name].address
+    except NumbaError as error:
+        raise InvalidConstraint(
+            f"{kind.__name__}: Numba can't compile {name}; use plain arithmetic, NumPy functions of scalars and "
+            f"constants in it, and allocate nothing.\n{error}"
+        ) from error
 
 
 def _places(constraint, row, n, where):

@@ -174,7 +174,7 @@ def _check_assembled(scene, constraint, name, rng):
     zero = np.zeros_like(q)
 
     def along(direction, rate):
-        levels = constraint_rows(scene, np.array([t]), q[None], direction[None], zero[None], time_rate=rate)
+        levels = constraint_rows(scene.packed, np.array([t]), q[None], direction[None], zero[None], time_rate=rate)
         return [level[0, rows] for level in levels]
 
     value, _, second = along(qd, 1.0)

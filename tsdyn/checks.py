@@ -1,0 +1,55 @@
+"""Numbers that users give: taken only where they are numbers, so that nothing is rounded, parsed or cut silently."""
+
+import math
+
+import numpy as np
+
+from .errors import InvalidArgument
+
+
+def floats(value):
+    """Return real numbers as an array of floats; an empty one for text, booleans, complex or ragged input."""
+    try:
+        array = np.asarray(value)
+        return array.astype(float) if array.dtype.kind in "iuf" else np.empty((0,))
+    except (TypeError, ValueError, OverflowError):
+        return np.empty((0,))
+
+
+def number(value):
+    """Return one real number as a float, NaN for anything else."""
+    array = floats(value)
+    return float(array) if array.shape == () else math.nan
+
+
+def positive(value, what, error=InvalidArgument):
+    """Return a positive finite float, or raise `error`."""
+    result = number(value)
+    if not (math.isfinite(result) and result > 0.0):
+        raise error(f"{what} must be a positive finite number, got {value!r}.")
+    return result
+
+
+def vector3(value, what, error):
+    """Return three finite floats as an array (3,), or raise `error`."""
+    array = floats(value)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise error(f"{what} must be three finite numbers, got {value!r}.")
+    return array
+
+
+def finite_vector(value, n, what):
+    """Return n finite floats as an array (n,), or raise InvalidArgument."""
+    array = floats(value)
+    if array.shape != (n,) or not np.isfinite(array).all():
+        raise InvalidArgument(f"{what} must be {n} finite numbers, one for each coordinate, got {value!r}.")
+    return array
+
+
+def whole(value, what):
+    """Return a positive whole number, None for None, or raise InvalidArgument."""
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value < 2**63:
+        raise InvalidArgument(f"{what} must be a positive whole number, got {value!r}.")
+    return int(value)

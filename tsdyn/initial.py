@@ -197,8 +197,8 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0):
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     system = scene.system
-    q_start, qd_start = scene.start
-    q, qd = q_start.copy(), qd_start.copy()
+    q_start, qd = scene.start
+    q = q_start.copy()
     held = np.zeros(q.size, bool)
     if isinstance(fixed, str) or not hasattr(fixed, "__iter__"):
         raise InvalidBody(f"fixed must be a sequence of bodies, such as (body,), got {fixed!r}.")
@@ -239,14 +239,19 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0):
         size = np.linalg.norm(Phi)
     _demand_assembled(scene, Phi, tol * (1.0 + np.abs(q).max()), iterations)
     check_rank(scene, Phi_q)
-    M = _metric(system, q)
+    for body, (at, length) in zip(scene.bodies, system.bodies, strict=True):
+        if length == 7:  # the angular velocity is the user's, in the body's frame, however the body has been turned
+            qd[at + 3 : at + 7] = 0.5 * transform_g(q[at + 3 : at + 7]).T @ body.angular_velocity
+    M, wanted = _metric(system, q), qd.copy()
     for _ in range(2):
-        qd = qd + _smallest(M, Phi_q, -(Phi_q @ qd + Phi_t))
+        residual = Phi_q @ qd + Phi_t
+        if np.abs(residual).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max()):
+            qd = qd + _smallest(M, Phi_q, -residual)
     scene.place(q, qd)
     return AssemblyReport(
         moved=float(np.abs(q - q_start).max()),
         residual=float(np.abs(Phi).max(initial=0.0)),
-        velocity_changed=float(np.abs(qd - qd_start).max()),
+        velocity_changed=float(np.abs(qd - wanted).max()),
         velocity_residual=float(np.abs(Phi_q @ qd + Phi_t).max(initial=0.0)),
         iterations=iterations,
     )
@@ -257,9 +262,11 @@ def _metric(system, q):
     M = mass_matrix(system, q)
     for (at, length), J in zip(system.bodies, system.inertia, strict=True):
         if length == 7:
-            c = 4.0 * (J[0] + J[4] + J[8]) / 3.0
-            p = q[at + 3 : at + 7]
-            M[at + 3 : at + 7, at + 3 : at + 7] += c * np.outer(p, p) + 1e-3 * c * np.eye(4)
+            size = (J[0] + J[4] + J[8]) / 3.0
+            p, part = q[at + 3 : at + 7], slice(at + 3, at + 7)
+            M[part, part] += 4.0 * size * np.outer(p, p)
+            if np.linalg.eigvalsh(J.reshape(3, 3))[0] < 1e-6 * size:
+                M[part, part] += 1e-6 * size * np.eye(4)
     return M
 
 

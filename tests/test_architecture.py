@@ -25,7 +25,9 @@ system stepping progress
 assembly integrator constraints.*
 workspace integrators.* constraints.__init__ integrators.__init__
 newton evaluate diagnostics reactions
-chart initial
+chart rank
+initial
+assemble
 null_space maggi_kane scene
 formulation run
 solution

@@ -8,6 +8,7 @@ With TSDYN_DEBUG=1 in the environment nothing is compiled: every kernel is the p
 written as, addresses are indices into a table, and a debugger or a print works anywhere.
 """
 
+import dis
 import os
 
 import numba
@@ -21,6 +22,7 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
 from ._cache import cache_of
+from .errors import InvalidConstraint
 
 DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
@@ -29,9 +31,19 @@ _letters = {"i": types.int64, "d": types.float64, "p": types.int64}
 
 
 def kernel(function, allocates=False):
-    """Compile a function that other kernels call; it is compiled into each of them."""
-    options = {**_OPTIONS, "_nrt": allocates}
-    return function if DEBUG else numba.njit(forceinline=not allocates, **options)(function)
+    """Compile a function that other kernels call; it is compiled into each of them.
+
+    With allocates=True it may allocate and raise, indices are checked, and it is not inlined: for functions of time.
+    """
+    if allocates:
+        options = {**_OPTIONS, "_nrt": True, "boundscheck": True}
+    elif any(step.opname == "RAISE_VARARGS" for step in dis.get_instructions(function)):
+        raise InvalidConstraint(
+            f"{function.__qualname__}: a kernel can't raise or assert; write nan where there is no value."
+        )
+    else:
+        options = {**_OPTIONS, "forceinline": True}
+    return function if DEBUG else numba.njit(**options)(function)
 
 
 def entry(function):

@@ -35,7 +35,7 @@ CONTRACTION_LOST = 0.9  # nearer to one B need not exist on the way, and another
 CONDITION_LIMIT = 10.0
 OFFSET_LIMIT = 0.5
 ROUNDING = 1e-15  # relative to the numbers that enter Phi: below this a residual says nothing
-RANK_LIMIT = 1e-11  # smallest singular value of Phi_q, rows scaled to length one, below which it has lost rank
+RANK_LIMIT = 1e-8  # smallest singular value of Phi_q, rows scaled to length one, below which it has lost rank
 
 
 @kernel

@@ -67,7 +67,8 @@ class Motion:
     def value(self, t):
         """Return (f, fd, fdd) at t, by the plain Python functions."""
         try:
-            result = tuple(float(f(t)) for f in self.functions)
+            with np.errstate(all="ignore"):
+                result = tuple(float(f(t)) for f in self.functions)
         except Exception as error:
             raise InvalidConstraint(f"{self.what}: the motion can't be evaluated at t = {t:g}: {error!r}") from error
         if not all(map(math.isfinite, result)):
@@ -98,7 +99,8 @@ class Motion:
 
     def _at(self, i, times):
         try:
-            return np.array([self.functions[i](t) for t in times], dtype=float)
+            with np.errstate(all="ignore"):
+                return np.array([self.functions[i](t) for t in times], dtype=float)
         except Exception as error:
             raise InvalidConstraint(
                 f"{self.what}: the motion can't be evaluated near t = {times[0]:g} ... {times[-1]:g}: {error!r}"

@@ -160,7 +160,10 @@ def _compile(cls, functions):
         "FIRST": tuple(int(owner not in owners[:i]) for i, owner in enumerate(owners)),
         "SIZE": sum(sizes),
     }
-    inner = {f"kernel_{name}": _inlined(function) for name, function in functions.items()}
+    try:
+        inner = {f"kernel_{name}": _inlined(function) for name, function in functions.items()}
+    except InvalidConstraint as error:
+        raise InvalidConstraint(f"primitive {cls.__name__}: {error}") from error
     loops = {"phi": _values, "phi_t": _values, "jacobian": _jacobian, "gamma": _gamma}
     result = {}
     for name, function in functions.items():

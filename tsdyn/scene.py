@@ -1,15 +1,16 @@
 """The scene: what a user assembles from bodies and constraints, checked piece by piece."""
 
+from collections import Counter
 from itertools import count
 
 import numpy as np
 
+from .assemble import assemble
 from .bodies import IDENTITY, Body, Ground, PointMass
 from .checks import vector3
 from .constraints.euler_normalization import EulerNormalization
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint
 from .evaluate import evaluate
-from .initial import assemble
 from .motion import Motion
 from .primitive import Primitive
 from .system import pack
@@ -187,12 +188,12 @@ class Scene:
 
     def row_names(self):
         """Name the rows of Phi, in order: a constraint's name, with the row's number where it has several."""
-        names = []
+        names, seen = [], Counter()
         for constraint in self.constraints:
-            if constraint.rows == 1:
-                names.append(constraint.name)
-            else:
-                names += [f"{constraint.name}[{i}]" for i in range(constraint.rows)]
+            seen[constraint.name] += 1
+            again = seen[constraint.name]
+            name = constraint.name if again == 1 else f"{constraint.name} #{again}"
+            names += [name] if constraint.rows == 1 else [f"{name}[{i}]" for i in range(constraint.rows)]
         return names
 
     def place(self, q, qd):

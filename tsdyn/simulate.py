@@ -103,7 +103,7 @@ def simulate(
     if redundancy != "refuse":
         raise InvalidArgument(f"redundancy must be 'refuse', got {redundancy!r}; other policies don't exist yet.")
     times = _output_times(t_eval, t0, t1)
-    steps, max_steps = _stepwhole(t0, t1, method.step), whole(max_steps, "max_steps")
+    steps, max_steps = _step_count(t0, t1, method.step), whole(max_steps, "max_steps")
     interval = whole(chart_interval, "chart_interval") or 0
     report = reporter(progress)
 
@@ -197,12 +197,13 @@ def _drive(context, run, addresses, max_steps, report, span):
                 break
             run = fresh(run, min(most, max(limit - int(run.numbers[STEPS]), 1)))
     except KeyboardInterrupt:
-        status = Status.INTERRUPTED
+        status = Status.INTERRUPTED if run.numbers[STEPS] < total else Status.SUCCESS
+    finally:
+        report(None)
     _collect(run, chunks, per_step)
     chunks["charts"] = run.charts
     if not per_step:
         chunks["out"] = [run.out[: run.numbers[ROWS]]]
-    report(None)
     return status, reason, chunks
 
 
@@ -281,7 +282,7 @@ def _output_times(t_eval, t0, t1):
     return times
 
 
-def _stepwhole(t0, t1, step):
+def _step_count(t0, t1, step):
     count = (t1 - t0) / step
     if not count < 2**53 or t0 + step == t0:
         raise InvalidArgument(f"the step of {step:g} s is too small for the interval ({t0:g}, {t1:g}).")

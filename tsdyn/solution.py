@@ -12,7 +12,7 @@ from .bodies import rotation_matrix
 from .chart import REASONS
 from .errors import InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
-from .initial import weakest_row
+from .rank import weakest_row
 from .run import CHART_ROWS, IN_CHART, REJECTED, STEPS, T
 from .workspace import (
     B_ITERATIONS,
@@ -112,7 +112,9 @@ class Solution:
             return self.status.sentence
         steps = f"{self.stats.steps} step{'' if self.stats.steps == 1 else 's'}"
         where = f"It stopped at t = {self._reached:.9g} s of {self.span[1]:g} s, after {steps}."
-        parts = (self.status.sentence, self._reason, where, self._suspect(), self.status.remedy)
+        suspect = self._suspect()
+        remedy = Status.SINGULAR.remedy if suspect else self.status.remedy
+        parts = (self.status.sentence, self._reason, where, suspect, remedy)
         return " ".join(part for part in parts if part)
 
     def _suspect(self):

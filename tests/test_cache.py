@@ -172,12 +172,20 @@ class Height(ts.Primitive):
         out[0] = 2.0 * square(xd[2])
 """
 HELPER = """
+import deeper
 import tsdyn as ts
 LEVEL = 9.0
 
 @ts.kernel
-def square(x):
-    return x * x
+def square(x, power=2.0):
+    return deeper.raised(x, power)
+"""
+DEEPER = """
+import tsdyn as ts
+
+@ts.kernel
+def raised(x, power):
+    return x**power
 """
 
 
@@ -186,6 +194,7 @@ def plug_in(tmp_path):
     """A primitive in one file of a user's, its helper and a constant in another."""
     (tmp_path / "plug.py").write_text(PLUG)
     (tmp_path / "helper.py").write_text(HELPER)
+    (tmp_path / "deeper.py").write_text(DEEPER)
     return tmp_path
 
 
@@ -202,8 +211,10 @@ def test_plug_in_is_cached_and_its_edits_are_seen(plug_in, warm):
     assert second["misses"] == 0
     edit(plug_in / "helper.py", "LEVEL = 9.0", "LEVEL = 5.0")
     assert plug_run(plug_in, warm)["Phi"] == 4.0
-    edit(plug_in / "helper.py", "return x * x", "return x * x + 1.0")
+    edit(plug_in / "deeper.py", "return x**power", "return x**power + 1.0")  # reached as module.function
     assert plug_run(plug_in, warm)["Phi"] == 5.0
+    edit(plug_in / "helper.py", "power=2.0", "power=3.0")
+    assert plug_run(plug_in, warm)["Phi"] == 23.0
 
 
 def test_functions_on_one_line_are_told_apart(plug_in, warm):
@@ -216,6 +227,23 @@ def test_functions_on_one_line_are_told_apart(plug_in, warm):
         assert found["Phi_t"] == pytest.approx(-length * 0.1 * math.cos(1.0) / 2.0, rel=1e-14)
         expected = (-((0.1 * math.cos(1.0)) ** 2) + length * 0.1 * math.sin(1.0)) / 2.0
         assert found["gamma"] == pytest.approx(expected, rel=1e-14)
+
+
+def test_threads_that_start_together(warm):
+    """In a process that has loaded nothing yet."""
+    code = (
+        REPORT
+        + """
+from concurrent.futures import ThreadPoolExecutor
+from examples import top
+with ThreadPoolExecutor(4) as pool:
+    ends = list(pool.map(lambda _: tsdyn.simulate(top.build(), (0.0, 0.1)).q[-1].tolist(), range(8)))
+report(same=all(end == ends[0] for end in ends))
+"""
+    )
+    run(code, warm)
+    result, _ = run(code, warm)
+    assert (result["same"], result["misses"]) == (True, 0)
 
 
 def test_numba_settings_are_left_alone():

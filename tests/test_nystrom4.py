@@ -179,7 +179,7 @@ def spoilt(tableau):
     """The tableau with one coefficient after the other off by a millionth."""
     for field in dataclasses.fields(tableau):
         value = getattr(tableau, field.name)
-        if field.name == "order":
+        if not isinstance(value, tuple) or not value:
             continue
         for i, entry in enumerate(value):
             if isinstance(entry, tuple):

@@ -36,9 +36,11 @@ def package_folders():
 def fingerprint():
     """Hash every source file of the package, the Numba version and the Python version."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
-    for folder in package_folders():
-        for file in sorted(folder.glob("*.py")):
-            digest.update(f"{folder.name}/{file.name}\0".encode() + file.read_bytes() + b"\0")
+    files = [file for folder in package_folders() for file in sorted(folder.glob("*.py"))]
+    if not files:
+        return ""  # an install without sources: nothing says which kernels are its own
+    for file in files:
+        digest.update(f"{file.parent.name}/{file.name}\0".encode() + file.read_bytes() + b"\0")
     return digest.hexdigest()
 
 
@@ -58,14 +60,18 @@ def _candidates():
 @cache
 def folder():
     """Return the writable cache folder of these sources, or None where there is none."""
-    for base in _candidates():
+    for base in _candidates() if fingerprint() else ():
         try:
             path = base / fingerprint()[:24]
             new = not path.is_dir()
+            base.mkdir(parents=True, exist_ok=True, mode=0o700)
+            if hasattr(os, "getuid") and base.stat().st_uid != os.getuid():
+                continue
             path.mkdir(parents=True, exist_ok=True, mode=0o700)
             if hasattr(os, "getuid") and path.stat().st_uid != os.getuid():
                 continue  # somebody else's folder: its pickles are not to be trusted
             tempfile.TemporaryFile(dir=path).close()
+            os.utime(path)
             if new:
                 _prune(base, path)
             return path
@@ -83,20 +89,25 @@ def _prune(base, keep):
     """Drop the kernels of other versions that nothing has used for a month."""
     for old in base.iterdir():
         with contextlib.suppress(OSError):
-            newest = max((f.stat().st_atime for f in old.iterdir()), default=old.stat().st_mtime)
-            if old.is_dir() and old != keep and time.time() - newest > _KEEP_DAYS * 86400:
+            if old.is_dir() and old != keep and time.time() - old.stat().st_mtime > _KEEP_DAYS * 86400:
                 for file in old.iterdir():
                     file.unlink()
                 old.rmdir()
 
 
+def _foreign(module):
+    """Whether a module's version, or the package's own fingerprint, says all about it."""
+    return module.__name__.split(".")[0] in ("numpy", "numba", "math", "cmath", "scipy", "tsdyn")
+
+
 def deep_hash(function):
     """Hash a function with all the code, constants and modules that its compiled form depends on."""
     digest, seen = hashlib.sha256(), set()
-    own = tuple(str(f) + os.sep for f in package_folders())
 
     def add_code(code, namespace):
         digest.update(code.co_code)
+        named = [namespace.get(name) for name in code.co_names]
+        modules = [m for m in named if isinstance(m, types.ModuleType) and not _foreign(m)]
         for constant in code.co_consts:
             if isinstance(constant, types.CodeType):
                 add_code(constant, namespace)
@@ -106,6 +117,9 @@ def deep_hash(function):
             digest.update(name.encode())
             if name in namespace:
                 add(namespace[name])
+            for module in modules:  # a function reached as module.function
+                if isinstance(value := getattr(module, name, None), types.FunctionType) or hasattr(value, "py_func"):
+                    add(value)
 
     def add(value):
         value = getattr(value, "py_func", getattr(value, "_defn", value))  # of a kernel, of an intrinsic
@@ -114,12 +128,14 @@ def deep_hash(function):
                 return
             seen.add(value)
             add_code(value.__code__, value.__globals__)
+            for default in (*(value.__defaults__ or ()), *(value.__kwdefaults__ or {}).items()):
+                add(default)
             for cell in value.__closure__ or ():
                 add(cell.cell_contents)
         elif isinstance(value, types.ModuleType):
             file = getattr(value, "__file__", None) or ""
             digest.update(f"{value.__name__} {getattr(value, '__version__', '')}".encode())
-            if file.endswith(".py") and not file.startswith((*own, sys.prefix, sys.base_prefix)):
+            if file.endswith(".py") and not _foreign(value):
                 digest.update(Path(file).read_bytes())
         else:
             try:
@@ -154,7 +170,11 @@ class _Impl(CompileResultCacheImpl):
     _locator_classes = (_Locator,)
 
     def __init__(self, function):
-        override, numba.config.CACHE_LOCATOR_CLASSES = getattr(numba.config, "CACHE_LOCATOR_CLASSES", ""), ""
+        override = getattr(numba.config, "CACHE_LOCATOR_CLASSES", "")
+        if not override:
+            super().__init__(function)
+            return
+        numba.config.CACHE_LOCATOR_CLASSES = ""
         try:
             super().__init__(function)
         finally:
@@ -173,6 +193,7 @@ class KernelCache(FunctionCache):
         started = time.perf_counter()
         found = super().load_overload(sig, target_context)
         if found is None:
+            self.release()  # of a compilation that was interrupted
             self._lock = _acquire(Path(self.cache_path) / f"{self._impl.filename_base}.lock")
             found = super().load_overload(sig, target_context)
         if found is None:

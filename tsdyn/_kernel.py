@@ -10,6 +10,7 @@ written as, addresses are indices into a table, and a debugger or a print works 
 
 import dis
 import os
+import threading
 
 import numba
 import numpy as np
@@ -26,6 +27,7 @@ from .errors import InvalidConstraint
 
 DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
+_lock = threading.RLock()
 _table = [None]  # debug mode: what an address stands for; zero is no address
 _letters = {"i": types.int64, "d": types.float64, "p": types.int64}
 
@@ -91,7 +93,9 @@ class Callback:
     def address(self):
         """The address to hand to a kernel."""
         if self._address is None:
-            self._address = self._register() if DEBUG else self._compile()
+            with _lock:  # threads that ask together compile, or load, once
+                if self._address is None:
+                    self._address = self._register() if DEBUG else self._compile()
         return self._address
 
     def _register(self):
@@ -100,14 +104,15 @@ class Callback:
 
     def _compile(self):
         arguments = tuple(_letters[c] for c in self.signature)
-        self._cfunc = CFunc(self.py_func, (arguments, _letters[self.result]), locals={}, options=self.options)
-        self._cfunc._cache = cache = cache_of(self.py_func)
+        cfunc = CFunc(self.py_func, (arguments, _letters[self.result]), locals={}, options=self.options)
+        cfunc._cache = cache = cache_of(self.py_func)
         try:
-            self._cfunc.compile()
+            cfunc.compile()
         finally:
             if hasattr(cache, "release"):
                 cache.release()
-        return self._cfunc.address
+        self._cfunc = cfunc  # keeps the code alive
+        return cfunc.address
 
 
 def callback(signature, result="i"):

@@ -1,11 +1,12 @@
 """Charts of the constraint manifold: made at q0 (Eqs. 5-9, 27), used, and left when they are about to fail.
 
-A chart is left at the end of a step, on signs that have no dimension and that no scene's scale enters:
+A chart is left at the end of a step, on signs that have no dimension. Lengths and Euler parameters are measured
+together, as in the paper, so a scene is best described in a unit in which its levers are neither tiny nor thousands:
 
     contraction    |I - R^-T (Phi_q U) R^-1|,  U = Q R: how far the normal space has turned since q0; 0 at q0, and
                    the same however the constraints are scaled or combined
-    condition      of D^T M D, divided by what it was at q0; that of B, as far as it has grown since q0, is at most
-                   (1 + c) / (1 - c) for a contraction c, and needs no sign of its own
+    condition      of D^T M D, divided by what it was after the chart's first step; that of B, as far as it has grown
+                   since q0, is at most (1 + c) / (1 - c) for a contraction c, and needs no sign of its own
     offset         |U u| / |V v|        how steeply the manifold leaves the tangent plane; not where constraints move
                                         with time, which carries q along U without turning anything
 """
@@ -16,7 +17,7 @@ from ._kernel import kernel
 from .assembly import constraint_jacobian
 from .linalg import invert, null_space
 from .newton import OK, SINGULAR, normal_matrix, update_b
-from .workspace import CHARTS, CONDITION, CONDITION_M0, CONTRACTION, FACTORIZATIONS, FLOOR, SIZE
+from .workspace import CHARTS, CONDITION, CONDITION_M0, CONTRACTION, FACTORIZATIONS, FLOOR, RATE, SIZE
 
 # reasons to leave a chart, as stored; REASONS names them
 STAY, BY_CONTRACTION, BY_CONDITION, BY_OFFSET, BY_INTERVAL, BY_FAILURE, AT_START = range(7)
@@ -70,12 +71,13 @@ def new_chart(s, w, t):
         for j in range(m):
             w.R[i, j] = w.N[i, j]
     w.counters[FACTORIZATIONS] += 1
-    if not invert(w.R, w.B, m) or update_b(s, w, t) != OK:
+    if not invert(w.R, w.B, m) or update_b(w) != OK:
         return SINGULAR
     w.counters[CHARTS] += 1
     w.control[CONDITION_M0] = 0.0  # measured at the next placement
     w.control[FLOOR] = ROUNDING * (w.control[SIZE] + largest)
     w.control[CONTRACTION] = 0.0
+    w.control[RATE] = 0.1
     w.control[CONDITION] = 1.0
     return OK
 
@@ -86,7 +88,7 @@ def tangent_map(s, w, t):
     n, m, k = w.q.size, w.u.size, w.v.size
     constraint_jacobian(s, w.q, t, w.Phi_q)
     normal_matrix(s, w)
-    status = update_b(s, w, t)
+    status = update_b(w)
     if status != OK:
         return status
     for i in range(m):  # D is scratch for Phi_q V

@@ -29,15 +29,15 @@ def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0):
     With time_rate=0 time stands still: the derivatives are those along (qd, qdd) alone.
     """
     columns = []
-    for constraint, values in zip(packed.constraints, packed.parameters, strict=True):
-        x = [part for marker in _markers(packed.bodies, constraint, q, qd, qdd) for part in marker]
+    for constraint, values, places in zip(packed.constraints, packed.parameters, packed.coordinates, strict=True):
+        x = [part for marker in _markers(packed.bodies, constraint, places, q, qd, qdd) for part in marker]
         par = [entry for value in values for entry in _parameter(value, t, time_rate)]
         out = [None] * constraint.rows
         twin(type(constraint).phi)(x, par, Jet(t, time_rate), out)
         columns += out
     if not columns:
         return (np.zeros((t.size, 0)),) * 3
-    levels = ([Jet.of(row).__getattribute__(name) for row in columns] for name in ("x", "xd", "xdd"))
+    levels = ([getattr(Jet.of(row), name) for row in columns] for name in ("x", "xd", "xdd"))
     return tuple(np.stack([np.broadcast_to(row, t.shape) for row in level], axis=1) for level in levels)
 
 
@@ -55,10 +55,10 @@ def _parameter(value, t, rate):
     return [Jet(f, rate * fd, rate * rate * fdd), Jet(fd, rate * fdd), Jet(fdd)]
 
 
-def _markers(bodies, constraint, q, qd, qdd):
+def _markers(bodies, constraint, coordinates, q, qd, qdd):
     """The coordinates of each marker as Jets over the outputs."""
     starts = dict(zip(bodies, np.cumsum([0, *(b.dimension for b in bodies)]), strict=False))
-    for marker, s in zip(constraint.markers, constraint.coordinates, strict=True):
+    for marker, s in zip(constraint.markers, coordinates, strict=True):
         body = constraint.body_of(marker)
         if body.dimension == 0:
             yield [Jet(value) for value in s]

@@ -54,7 +54,8 @@ class Status(IntEnum):
     MAX_STEPS = 5
     INTERRUPTED = 6
     CHART_LOST = 7
-    SLICE_DONE = 8
+    STEP_COLLAPSED = 8
+    SLICE_DONE = 9
 
     @property
     def sentence(self):
@@ -89,6 +90,10 @@ _SENTENCES = {
     Status.CHART_LOST: (
         "The motion left its chart within a single step, so which branch of the constraints it is on is not certain.",
         "Take a smaller step.",
+    ),
+    Status.STEP_COLLAPSED: (
+        "The step that the tolerances ask for is down to rounding of the time.",
+        "Look for a singular configuration, a jump in a motion or stiff parts near this time; or loosen rtol and atol.",
     ),
     Status.MAX_STEPS: ("The run reached max_steps.", "Raise max_steps, or take a larger step."),
     Status.INTERRUPTED: ("The run was interrupted.", "Go on with simulate(scene, (t, t_end), state=solution.state)."),

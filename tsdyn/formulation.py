@@ -21,6 +21,10 @@ class Formulation:
         k = self.kernels
         return [f.address for f in (k.place, k.accelerate, complete, k.check, k.start_chart)]
 
+    def norm(self):
+        """Address of the error norm, for adaptive methods."""
+        return self.kernels.error_norm.address
+
 
 FORMULATIONS = {
     f.name: f

@@ -3,7 +3,7 @@
 from types import MappingProxyType
 
 from .checks import positive
-from .stepping import nystrom_step, runge_kutta_step
+from .stepping import nystrom_step, runge_kutta_step, second_order_step
 
 _registry = {}
 
@@ -27,7 +27,10 @@ class Integrator:
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)
         if cls.order:
-            _registry[cls.__name__.lower()] = cls
+            _registry[cls.__name__.lower().replace("_", "")] = cls
+
+    embedded_order = 0  # of the error estimate; zero for a method that has none
+    rtol = atol = max_step = first_step = None
 
     def __init__(self, step):
         self.step = positive(step, f"{type(self).__name__}: step (s)")
@@ -53,6 +56,33 @@ class ExplicitNystrom(Integrator):
         if first_order:
             return runge_kutta_step, tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny)
         return nystrom_step, tableau.packed(), lambda nx, ny: (stages + 2) * nx
+
+
+class ExplicitRungeKutta(Integrator):
+    """A method that is a `RungeKuttaTableau` with an error estimate, applied to (v, vd); adaptive, or fixed in step."""
+
+    tableau = None
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        cls.embedded_order = cls.tableau.embedded_order
+
+    def __init__(self, rtol=1e-6, atol=1e-8, step=None, max_step=None, first_step=None):
+        what = type(self).__name__
+        self.rtol, self.atol = positive(rtol, f"{what}: rtol"), positive(atol, f"{what}: atol")
+        self.step = None if step is None else positive(step, f"{what}: step (s)")
+        self.max_step = None if max_step is None else positive(max_step, f"{what}: max_step (s)")
+        self.first_step = None if first_step is None else positive(first_step, f"{what}: first_step (s)")
+
+    def kernel(self, first_order):
+        """The tableau, packed, and the kernel that steps by it."""
+        stages = len(self.tableau.c)
+        step = runge_kutta_step if first_order else second_order_step
+        return step, self.tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny)
+
+    def __repr__(self):
+        settings = f"rtol={self.rtol:g}, atol={self.atol:g}" if self.step is None else f"step={self.step:g}"
+        return f"{type(self).__name__}({settings})"
 
 
 def registered():

@@ -5,13 +5,15 @@
 q is integrated as it stands and nothing puts it back on Phi(q) = 0. D, B, V and U are those of the tangent-space form.
 """
 
+import math
+
 from ._kernel import callback, vector
 from .assembly import set_time
 from .chart import inspect, new_chart, tangent_map
 from .linalg import copy
 from .newton import NOT_FINITE, OK
-from .null_space import project, reduced_acceleration, reduced_mass, velocities
-from .stepping import ACCELERATE, PLACE
+from .null_space import project, reduced_acceleration, reduced_mass, velocities, weighted_square
+from .stepping import ACCELERATE, NORM, PLACE
 from .workspace import PLACEMENTS, load
 
 
@@ -43,6 +45,19 @@ def accelerate(context, t, velocity, wd, qd):
 def check(context):
     """Reason to choose a new V, or zero."""
     return inspect(load(context).work, False)
+
+
+@callback(NORM, "d")
+def error_norm(context, eq, ew, old, rtol, atol):
+    """Root mean square of the errors eq of q and V ew of qd, over atol + rtol times the larger end of the step."""
+    w = load(context).work
+    n, k = w.q.size, w.v.size
+    eq, old = vector(eq, n), vector(old, 3 * n)
+    total = weighted_square(w, w.qd, n, vector(ew, k), old, rtol, atol)
+    for i in range(n):
+        x = eq[i] / (atol + rtol * max(abs(w.q[i]), abs(old[i])))
+        total += x * x
+    return math.sqrt(total / (2 * n))
 
 
 @callback("pdpppp")

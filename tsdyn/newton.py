@@ -6,7 +6,7 @@ from ._kernel import kernel
 from .assembly import constraint_jacobian, constraints
 from .errors import Status
 from .linalg import invert
-from .workspace import B_ITERATIONS, B_TOL, FACTORIZATIONS, FLOOR, NEWTON, U_TOL
+from .workspace import B_ITERATIONS, B_TOL, FACTORIZATIONS, FLOOR, NEWTON, RATE, U_TOL
 
 OK = int(Status.SUCCESS)
 NEWTON_FAILED = int(Status.NEWTON_FAILED)
@@ -19,8 +19,8 @@ SWEEPS = 30
 def solve_positions(s, w, t, v):
     """Find u and q = q0 + V v - U u with Phi(q, t) = 0, Eqs. 19, 20 and 29. Status.
 
-    The start is u + T dv, T = du/dv being left over from the place before. Sweeps go on until |Phi| <= u_tol; the
-    correction that belongs to the last Phi costs no further evaluation and is made as well.
+    The start is u + T dv, T = du/dv being left over from the place before. Sweeps go on until |Phi| <= u_tol and what
+    the last correction, which costs no further evaluation, is expected to leave is below u_tol^(3/2) or rounding.
     """
     n, m, k = w.q.size, w.u.size, v.size
     for i in range(m):
@@ -35,7 +35,9 @@ def solve_positions(s, w, t, v):
         w.base[i] = w.q0[i] + x
     for j in range(k):
         w.v[j] = v[j]
-    tol = max(w.control[U_TOL], w.control[FLOOR])
+    floor = w.control[FLOOR]
+    tol = max(w.control[U_TOL], floor)
+    left = max(tol * math.sqrt(tol), floor)
     before, stuck = math.inf, False
     for _ in range(SWEEPS):
         _step_off(w, n, m)
@@ -47,9 +49,9 @@ def solve_positions(s, w, t, v):
             if not size < math.inf:
                 return NOT_FINITE
             worst = max(worst, size)
-        if worst > 0.25 * before:
-            if stuck and worst <= 100.0 * w.control[FLOOR]:
-                tol = worst  # a fresh B did not help: this is rounding
+        if worst > tol and worst > 0.25 * before:
+            if stuck and worst <= 100.0 * floor:
+                tol, floor = worst, worst  # a fresh B did not help: this is rounding
             elif not factorise_b(s, w, t):  # B was out of date
                 return SINGULAR
             stuck = True
@@ -59,7 +61,9 @@ def solve_positions(s, w, t, v):
                 d += w.B[i, j] * w.Phi[j]
             w.u[i] += d
             w.z[i] = d
-        if worst <= tol:
+        if before < math.inf:
+            w.control[RATE] = worst / before
+        if worst <= floor or (worst <= tol and worst * w.control[RATE] <= left):
             subtract_normal(w, w.q)  # q itself, not all of the sum again: a digit less is lost
             return OK
         before = worst
@@ -116,7 +120,7 @@ def normal_matrix(s, w):
 
 
 @kernel
-def update_b(s, w, t):
+def update_b(w):
     """Bring B to (Phi_q U)^-1 by Eq. 28, B <- 2 B - B (Phi_q U) B, N = Phi_q U being known. Status.
 
     With R = N B - I the iteration is B <- B - B R and squares R: it ends when the R to come is below B_tol^(3/2), half

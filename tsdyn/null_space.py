@@ -17,7 +17,7 @@ from .chart import inspect, new_chart, tangent_map
 from .errors import Status
 from .linalg import cholesky, cholesky_solve
 from .newton import NOT_FINITE, OK, solve_positions, subtract_normal
-from .stepping import ACCELERATE, PLACE
+from .stepping import ACCELERATE, NORM, PLACE
 from .workspace import EVALUATIONS, FACTORIZATIONS, PLACEMENTS, load
 
 PIVOT_LIMIT = 1e-14  # of D^T M D: less than this is rounding
@@ -189,6 +189,30 @@ def check(context):
     """Reason to leave the chart, or zero."""
     c = load(context)
     return inspect(c.work, not is_rheonomic(c.system))
+
+
+@kernel
+def weighted_square(w, values, at, e, old, rtol, atol):
+    """((V e)_i / (atol + rtol |value|))^2 summed over the coordinates; old begins at old[at]."""
+    total = 0.0
+    for i in range(values.size):
+        x = 0.0
+        for j in range(e.size):
+            x += w.V[i, j] * e[j]
+        x /= atol + rtol * max(abs(values[i]), abs(old[at + i]))
+        total += x * x
+    return total
+
+
+@callback(NORM, "d")
+def error_norm(context, ev, evd, old, rtol, atol):
+    """Root mean square of the errors V ev of q and V evd of qd, over atol + rtol times the larger end of the step."""
+    w = load(context).work
+    n, k = w.q.size, w.v.size
+    old = vector(old, 3 * n)
+    total = weighted_square(w, w.q, 0, vector(ev, k), old, rtol, atol)
+    total += weighted_square(w, w.qd, n, vector(evd, k), old, rtol, atol)
+    return math.sqrt(total / (2 * n))
 
 
 @callback("pdpppp")

@@ -21,12 +21,16 @@ def reporter(progress):
         raise MissingDependency(
             "progress=True needs tqdm: pip install 'tsdyn[progress]'; or pass a function of the fraction done."
         ) from error
-    bar = tqdm(total=100, unit="%", file=sys.stderr, bar_format="{desc}{percentage:3.0f}%|{bar}| {elapsed}<{remaining}")
+    form = "{desc}{percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
+    bars = []  # made at the first report: a refused run shows none
 
     def show(fraction):
         if fraction is None:
-            bar.close()
-        else:
-            bar.update(100.0 * min(fraction, 1.0) - bar.n)
+            for bar in bars:
+                bar.close()
+            return
+        if not bars:
+            bars.append(tqdm(total=100, unit="%", file=sys.stderr, bar_format=form))
+        bars[0].update(100.0 * min(fraction, 1.0) - bars[0].n)
 
     return show

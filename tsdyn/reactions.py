@@ -1,5 +1,7 @@
 """Multipliers and the forces of constraints, from positions, velocities and accelerations."""
 
+import math
+
 import numpy as np
 
 from ._kernel import entry
@@ -10,7 +12,7 @@ from .linalg import cholesky, cholesky_solve
 
 @entry
 def solve_multipliers(s, t, q, f, Phi_q, A, b, out):
-    """out (k, m) with Phi_q^T lam = f, by least squares; f (k, n) is Q_A + S - M qdd. True if Phi_q is regular.
+    """out (k, m) with Phi_q^T lam = f, by least squares; f (k, n) is Q_A + S - M qdd. NaN where Phi_q is singular.
 
     Normal equations with one step of refinement, (Phi_q Phi_q^T) lam = Phi_q f; f lies in the range of Phi_q^T.
     """
@@ -25,8 +27,10 @@ def solve_multipliers(s, t, q, f, Phi_q, A, b, out):
                 for c in range(n):
                     x += Phi_q[i, c] * Phi_q[j, c]
                 A[i, j] = x
-        if not cholesky(A, m, 0.0):
-            return False
+        if not cholesky(A, m, 1e-15):
+            for i in range(m):
+                out[row, i] = math.nan
+            continue
         for _ in range(2):
             for i in range(m):
                 b[i] = 0.0
@@ -39,7 +43,6 @@ def solve_multipliers(s, t, q, f, Phi_q, A, b, out):
             cholesky_solve(A, b, m)
             for i in range(m):
                 out[row, i] += b[i]
-    return True
 
 
 def multipliers(system, t, q, qd, qdd):
@@ -48,9 +51,7 @@ def multipliers(system, t, q, qd, qdd):
     out = np.zeros((t.size, m))
     system = system._replace(reals=system.reals.copy())
     f = unbalanced(system, q, qd, qdd)
-    ok = solve_multipliers(system, t, q, f, np.zeros((m, q.shape[1])), np.zeros((m, m)), np.zeros(m), out)
-    if not ok:
-        out[:] = np.nan
+    solve_multipliers(system, t, q, f, np.zeros((m, q.shape[1])), np.zeros((m, m)), np.zeros(m), out)
     return out
 
 

@@ -9,17 +9,19 @@ from ._kernel import address_of, caller, entry, kernel
 from .chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .errors import Status
 from .linalg import copy
-from .stepping import call_accelerate, call_place, call_step
+from .stepping import call_accelerate, call_error, call_norm, call_place, call_step
 from .workspace import CONDITION, CONTRACTION
 
+SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
+STEP_COLLAPSED = int(Status.STEP_COLLAPSED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
 # addresses
-A_PLACE, A_ACCELERATE, A_COMPLETE, A_CHECK, A_CHART, A_STEP = range(6)
+A_PLACE, A_ACCELERATE, A_COMPLETE, A_CHECK, A_CHART, A_STEP, A_ERROR, A_NORM = range(8)
 # clock
-T, T_ORIGIN, T_END, H = range(4)
+T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, CLOCKS = range(10)
 # numbers
 FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
-HISTORY, CHART_ROWS, REJECTED, NUMBERS = range(8, 12)
+HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, NUMBERS = range(8, 14)
 
 call_complete = caller("pp")
 call_check = caller("p")
@@ -37,9 +39,12 @@ class Run(NamedTuple):
     dy: np.ndarray  # (ny,)
     x_low: np.ndarray  # (nx,)  what the additions have lost so far (Kahan)
     y_low: np.ndarray  # (ny,)
-    x_old: np.ndarray  # (nx,)  at the start of the step, for dense output
+    x_old: np.ndarray  # (nx,)  at the start of the step, for dense output and to go back to
     y_old: np.ndarray  # (ny,)
     yd_old: np.ndarray  # (ny,)
+    xd_old: np.ndarray  # (nx,)
+    x_low_old: np.ndarray  # (nx,)
+    y_low_old: np.ndarray  # (ny,)
     now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point
     before: np.ndarray  # (3, n)  at the one before; kept for a first-order system
     warm: np.ndarray  # copy of u, B, T and v while dense output moves them
@@ -218,6 +223,68 @@ def _begin(context, w, r, at):
     return status
 
 
+@kernel
+def _first_step(context, w, r, at):
+    """A first step from the sizes of y, y' and y'' (Hairer, Norsett, Wanner, Solving ODEs I, II.4)."""
+    first = r.xd if r.numbers[FIRST_ORDER] == 1 else r.y
+    rtol, atol = r.clock[RTOL], r.clock[ATOL]
+    n = w.q.size
+    d0 = 0.0
+    for i in range(n):
+        a, b = w.q[i] / (atol + rtol * abs(w.q[i])), w.qd[i] / (atol + rtol * abs(w.qd[i]))
+        d0 += a * a + b * b
+    d0 = math.sqrt(d0 / (2 * n))
+    d1 = call_norm(at[A_NORM], context, first, r.yd, r.now, rtol, atol)
+    span = r.clock[T_END] - r.clock[T]
+    h = min(0.01 * d0 / d1 if d1 > 1e-5 and d0 > 1e-5 else 1e-6, 0.1 * span)
+    for i in range(r.x.size):
+        r.xs[i] = r.x[i] + h * first[i]
+    for i in range(r.y.size):
+        r.ys[i] = r.y[i] + h * r.yd[i]
+    if _evaluate(context, w, at, r.clock[T] + h, r.xs, r.ys, r.yds, r.dx) != 0:
+        return h
+    second = r.dx if r.numbers[FIRST_ORDER] == 1 else r.ys
+    for i in range(r.x.size):
+        r.dx[i] = second[i] - first[i]
+    for i in range(r.y.size):
+        r.dy[i] = r.yds[i] - r.yd[i]
+    d2 = call_norm(at[A_NORM], context, r.dx, r.dy, r.now, rtol, atol) / h
+    size = max(d1, d2)
+    return min(100.0 * h, (0.01 / size) ** r.clock[EXPONENT] if size > 1e-15 else 100.0 * h, span)
+
+
+@kernel
+def _go_back(r):
+    """Everything as at the start of the step."""
+    copy(r.x_old, r.x)
+    copy(r.y_old, r.y)
+    copy(r.yd_old, r.yd)
+    copy(r.xd_old, r.xd)
+    copy(r.x_low_old, r.x_low)
+    copy(r.y_low_old, r.y_low)
+
+
+@kernel
+def _accept(context, w, r, at, h):
+    """Judge the step h just made and choose the next (Gustafsson's PI control). Whether it is accepted."""
+    end = r.xd if r.numbers[FIRST_ORDER] == 1 else r.y
+    call_error(at[A_ERROR], h, r.x.size, r.y.size, end, r.yd, r.tableau, r.memory, r.dx, r.dy)
+    error = call_norm(at[A_NORM], context, r.dx, r.dy, r.now, r.clock[RTOL], r.clock[ATOL])
+    power = r.clock[EXPONENT]
+    if not error <= 1.0:
+        factor = SAFETY * error**-power if error < math.inf else SHRINK
+        r.clock[H] = h * max(factor, SHRINK)
+        r.numbers[REJECTED_LAST] = 1
+        return False
+    error = max(error, 1e-10)
+    factor = SAFETY * error ** (-0.7 * power) * r.clock[ERROR_BEFORE] ** (0.4 * power)
+    factor = min(max(factor, SHRINK), 1.0 if r.numbers[REJECTED_LAST] == 1 else GROW)
+    r.clock[ERROR_BEFORE] = max(error, 1e-4)
+    r.clock[H] = min(h * factor, r.clock[MAX_STEP])
+    r.numbers[REJECTED_LAST] = 0
+    return True
+
+
 @entry
 def advance(c, r, at, most):
     """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or why it stopped.
@@ -227,18 +294,28 @@ def advance(c, r, at, most):
     context = address_of(c)
     w = c.work
     nx, ny = r.x.size, r.y.size
+    adaptive = r.numbers[ADAPTIVE] == 1
     if r.numbers[BEGUN] == 0 and most > 0:
         status = _begin(context, w, r, at)
         if status != 0:
             return status
         r.numbers[BEGUN] = 1
+        if adaptive and r.clock[H] == 0.0:
+            r.clock[H] = min(_first_step(context, w, r, at), r.clock[MAX_STEP])
     for _ in range(most):
-        i = r.numbers[STEPS]
-        if i >= r.numbers[STEPS_WANTED]:
+        i, t0 = r.numbers[STEPS], r.clock[T]
+        if t0 >= r.clock[T_END]:
             return 0
-        t0 = r.clock[T]
-        last = i + 1 == r.numbers[STEPS_WANTED]
-        t1 = r.clock[T_END] if last else r.clock[T_ORIGIN] + (i + 1) * r.clock[H]
+        if adaptive:
+            t1 = t0 + r.clock[H]
+            if not t1 > t0 + 4e-16 * abs(t0):
+                return STEP_COLLAPSED
+            last = t1 + 1e-3 * r.clock[H] >= r.clock[T_END]
+        else:
+            t1 = r.clock[T_ORIGIN] + (i + 1) * r.clock[H]
+            last = i + 1 == r.numbers[STEPS_WANTED]
+        if last:
+            t1 = r.clock[T_END]
         h = t1 - t0
         row = r.history[r.numbers[HISTORY]]
         row[0], row[1], row[2] = t0, h, 0.0
@@ -246,6 +323,10 @@ def advance(c, r, at, most):
         copy(r.x, r.x_old)
         copy(r.y, r.y_old)
         copy(r.yd, r.yd_old)
+        if adaptive:
+            copy(r.xd, r.xd_old)
+            copy(r.x_low, r.x_low_old)
+            copy(r.y_low, r.y_low_old)
         status = call_step(
             at[A_STEP], context, at[A_PLACE], at[A_ACCELERATE], t0, h, nx, ny,
             r.x, r.y, r.yd, r.xd, r.tableau, r.memory, r.dx, r.dy,
@@ -265,10 +346,16 @@ def advance(c, r, at, most):
             copy(r.now[2], w.qdd)
             r.numbers[REJECTED] += 1
             if r.numbers[IN_CHART] == 0:
-                return status
+                if not adaptive or status == NOT_FINITE:
+                    return status
+                r.clock[H] = 0.25 * h
             retry = _begin_chart(context, w, r, at, BY_FAILURE)
             if retry != 0:
                 return retry
+            continue
+        if adaptive and not _accept(context, w, r, at, h):
+            r.numbers[REJECTED] += 1
+            _go_back(r)
             continue
         row[2] = 1.0
         if r.numbers[FIRST_ORDER] == 1:
@@ -292,4 +379,4 @@ def advance(c, r, at, most):
                 return status
         if r.numbers[CHART_ROWS] + 2 >= r.charts.shape[0] or r.numbers[HISTORY] >= r.history.shape[0]:
             break
-    return 0 if r.numbers[STEPS] >= r.numbers[STEPS_WANTED] else SLICE_DONE
+    return 0 if r.clock[T] >= r.clock[T_END] else SLICE_DONE

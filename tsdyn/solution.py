@@ -99,30 +99,30 @@ class Solution:
             factorizations=int(c[FACTORIZATIONS]),
             seconds=seconds,
         )
+        self.message = self._message(scene)  # now: the scene may change
 
     @property
     def success(self):
         """Whether the run reached the end of the interval."""
         return self.status == Status.SUCCESS
 
-    @property
-    def message(self):
+    def _message(self, scene):
         """How the run ended, in words."""
         if self.success:
             return self.status.sentence
         steps = f"{self.stats.steps} step{'' if self.stats.steps == 1 else 's'}"
         where = f"It stopped at t = {self._reached:.9g} s of {self.span[1]:g} s, after {steps}."
-        suspect = self._suspect()
+        suspect = self._suspect(scene)
         remedy = Status.SINGULAR.remedy if suspect else self.status.remedy
         parts = (self.status.sentence, self._reason, where, suspect, remedy)
         return " ".join(part for part in parts if part)
 
-    def _suspect(self):
+    def _suspect(self, scene):
         """Name what is nearly singular at the last point."""
-        if self.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST):
+        if self.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
             return ""
         _, Phi_q, _, _ = constraint_arrays(self.system, self._last[0], self._last[1], self._reached)
-        rows, share = weakest_row(self.scene, Phi_q)
+        rows, share = weakest_row(scene, Phi_q)
         if not share < NEARLY_SINGULAR:
             return ""
         return (

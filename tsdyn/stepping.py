@@ -15,6 +15,9 @@ from .linalg import copy
 from .primitive import ANY
 
 PLACE, ACCELERATE, STEP = "pdp", "pdppp", "piiddiipppppppp"
+ERROR, NORM = "diipppppp", "ppppdd"
+call_norm = caller(NORM, "d")
+call_error = caller(ERROR)
 call_place = caller(PLACE)
 call_accelerate = caller(ACCELERATE)
 call_step = caller(STEP)
@@ -64,6 +67,61 @@ def nystrom_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau
     for j in range(stages):
         _add(dx, h * h * weights[j], memory[(2 + j) * n :])
         _add(dy, h * weights[stages + j], memory[(2 + j) * n :])
+    return 0
+
+
+@callback(STEP)
+def second_order_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+    """One step of an explicit Runge-Kutta method on (x, y) with xd = y; memory as for `runge_kutta_step`."""
+    n = nx
+    x, y, yd, dx, dy = vector(x, n), vector(y, n), vector(yd, n), vector(dx, n), vector(dy, n)
+    tableau, memory = vector(tableau, ANY), vector(memory, ANY)
+    stages = int(tableau[0])
+    xs = memory[:n]
+    width = 2 + stages
+    copy(y, memory[2 * n : 3 * n])
+    copy(yd, memory[3 * n : 4 * n])
+    for i in range(1, stages):
+        row = tableau[1 + i * width :]
+        ys, k = memory[(1 + i) * 2 * n :][:n], memory[(1 + i) * 2 * n + n :]
+        for c in range(n):
+            xs[c] = 0.0
+        copy(y, ys)
+        for j in range(i):
+            _add(xs, h * row[2 + j], memory[(1 + j) * 2 * n :])
+            _add(ys, h * row[2 + j], memory[(1 + j) * 2 * n + n :])
+        for c in range(n):
+            xs[c] += x[c]
+        status = call_place(place, context, t + h * row[1], xs)
+        if status == 0:
+            status = call_accelerate(accelerate, context, t + h * row[1], ys, k, xd)
+        if status != 0:
+            return status
+    weights = tableau[1 + stages * width :]
+    for c in range(n):
+        dx[c] = 0.0
+        dy[c] = 0.0
+    for j in range(stages):
+        _add(dx, h * weights[j], memory[(1 + j) * 2 * n :])
+        _add(dy, h * weights[j], memory[(1 + j) * 2 * n + n :])
+    return 0
+
+
+@callback(ERROR)
+def embedded_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
+    """Errors ex, ey of the step that `memory` holds, y and yd being the derivatives at its end."""
+    n = nx + ny
+    y, yd, ex, ey = vector(y, nx), vector(yd, ny), vector(ex, nx), vector(ey, ny)
+    tableau, memory = vector(tableau, ANY), vector(memory, ANY)
+    stages = int(tableau[0])
+    weights = tableau[1 + stages * (2 + stages) + stages :]
+    for c in range(nx):
+        ex[c] = h * weights[stages] * y[c]
+    for c in range(ny):
+        ey[c] = h * weights[stages] * yd[c]
+    for j in range(stages):
+        _add(ex, h * weights[j], memory[(1 + j) * n :])
+        _add(ey, h * weights[j], memory[(1 + j) * n + nx :])
     return 0
 
 

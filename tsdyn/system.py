@@ -36,6 +36,8 @@ class Packed(NamedTuple):
     bodies: tuple
     constraints: tuple
     parameters: tuple  # of each constraint: floats and Motions
+    coordinates: tuple  # of each constraint: where its markers are, (3,) each
+    size: float  # largest number among the coordinates
 
 
 def pack(scene):
@@ -96,7 +98,9 @@ def pack(scene):
         rheonomic=np.array([any(kind[PHI_T] for kind in kinds)], np.int64),
         segments=np.array(segments, np.int64).reshape(-1, 4),
     )
-    return Packed(system, scene.bodies, scene.constraints, tuple(parameters.values()))
+    coordinates = tuple(constraint.coordinates for constraint in scene.constraints)
+    size = max((np.abs(s).max() for each in coordinates for s in each), default=0.0)
+    return Packed(system, scene.bodies, scene.constraints, tuple(parameters.values()), coordinates, float(size))
 
 
 def _parameters(constraint):

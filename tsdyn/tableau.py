@@ -31,9 +31,14 @@ class RungeKuttaTableau:
     b: tuple
     c: tuple
     order: int
+    error: tuple = ()  # weights of the error estimate: one a stage, and one of the derivative at the step's end
+    embedded_order: int = 0
 
     def __post_init__(self):
         a, b, c = self.arrays
+        if self.error:
+            estimate = np.array(self.error[:-1])
+            _demand("RungeKuttaTableau", **{"sum of the error weights = 0": estimate.sum() + self.error[-1]})
         ones = np.ones(len(c))
         _demand("RungeKuttaTableau", **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
         if self.order >= 3:
@@ -54,7 +59,7 @@ class RungeKuttaTableau:
         """The numbers as the step kernel reads them: s, then a stage's same-place flag, c, row of a; then b."""
         a, b, c = self.arrays
         stages = [[0.0, c[i], *a[i]] for i in range(len(c))]
-        return np.concatenate([[len(c)], np.ravel(stages), b])
+        return np.concatenate([[len(c)], np.ravel(stages), b, self.error])
 
 
 @dataclass(frozen=True)
@@ -116,7 +121,7 @@ class NystromTableau:
         a, abar, b, bbar, c = self.arrays
         stages = []
         for i in range(len(c)):
-            same = i > 0 and c[i] == c[i - 1] and (abar[i] == abar[i - 1]).all()
+            same = i > 1 and c[i] == c[i - 1] and (abar[i] == abar[i - 1]).all()
             stages += [float(same), c[i], *abar[i], *a[i]]
         return np.concatenate([[len(c)], stages, bbar, b])
 

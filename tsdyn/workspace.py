@@ -12,13 +12,13 @@ class Work(NamedTuple):
     """n coordinates, m constraints, k = n - m degrees of freedom, b bodies; "computed by" names the kernel."""
 
     q: np.ndarray  # (n,)    positions; computed by newton.solve_positions
-    qd: np.ndarray  # (n,)   velocities; computed by null_space.accelerate
+    qd: np.ndarray  # (n,)   velocities; computed by null_space.velocities
     qdd: np.ndarray  # (n,)  accelerations; computed by null_space.complete
-    Phi: np.ndarray  # (m,)  constraints at q; newton.solve_positions
-    Phi_t: np.ndarray  # (m,)  their time derivative; null_space.accelerate
-    gamma: np.ndarray  # (m,)  acceleration bias; null_space.accelerate
+    Phi: np.ndarray  # (m,)  constraints at q; newton.solve_positions, and scratch of null_space.complete
+    Phi_t: np.ndarray  # (m,)  their time derivative; null_space.velocities
+    gamma: np.ndarray  # (m,)  acceleration bias; null_space.reduced_acceleration
     z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; newton.solve_positions, null_space
-    Phi_q: np.ndarray  # (m, n)  Jacobian at q; chart.tangent_map
+    Phi_q: np.ndarray  # (m, n)  Jacobian at q; chart.tangent_map, new_chart
     q0: np.ndarray  # (n,)   where the chart touches; chart.new_chart
     U: np.ndarray  # (n, m)  Phi_q(q0)^T, Eq. 5; chart.new_chart
     V: np.ndarray  # (n, k)  orthonormal basis of ker Phi_q(q0); chart.new_chart
@@ -31,16 +31,16 @@ class Work(NamedTuple):
     N: np.ndarray  # (m, m)  Phi_q U; chart.tangent_map
     R: np.ndarray  # (m, m)  residual of Eq. 28, and scratch of factorisations; newton.update_b
     D: np.ndarray  # (n, k)  (I - U B Phi_q) V, Eq. 9; chart.tangent_map
-    E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.mass
-    A: np.ndarray  # (k, k)  D^T M D, then its Cholesky factor; null_space.mass
-    h: np.ndarray  # (n,)    U z, and scratch of charts; null_space.accelerate
+    E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.reduced_mass
+    A: np.ndarray  # (k, k)  D^T M D, then its Cholesky factor; null_space.reduced_mass
+    h: np.ndarray  # (n,)    -U B gamma, and scratch of newton.update_b; null_space.reduced_acceleration
     householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; linalg.null_space
     control: np.ndarray  # (CONTROLS,)  tolerances and criteria, below
     counters: np.ndarray  # int64 (COUNTERS,)  what was done how often, below
 
 
-U_TOL, B_TOL, SIZE, FLOOR, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(8)
-EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS, SKIPPED, COUNTERS = range(8)
+U_TOL, B_TOL, SIZE, FLOOR, RATE, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(9)
+EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS, COUNTERS = range(7)
 
 
 class Context(NamedTuple):

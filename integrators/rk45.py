@@ -1,0 +1,45 @@
+"""RK45: the embedded pair 5(4) of Dormand and Prince, adaptive.
+
+J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, J. Comput. Appl. Math. 6, 19-26 (1980); applied
+to (v, vd). The seventh stage is the evaluation at the step's end, which the driver makes anyway.
+"""
+
+from ..integrator import ExplicitRungeKutta
+from ..tableau import RungeKuttaTableau
+
+
+class RK45(ExplicitRungeKutta):
+    """Explicit Runge-Kutta method of order 5 with an error estimate of order 4.
+
+    Parameters
+    ----------
+    rtol, atol : float; default 1e-6, 1e-8
+        Each step's error is kept to a thirtieth of atol + rtol |value|, in the root mean square over coordinates and
+        velocities, so that what adds up over a run is near to what was asked for.
+    step : float, s, optional
+        A fixed step instead.
+    max_step, first_step : float, s, optional
+        Bound on the step; the first step to try.
+
+    Raises
+    ------
+    InvalidArgument
+        If a tolerance or a step is not positive and finite.
+    """
+
+    order = 5
+    tableau = RungeKuttaTableau(
+        a=(
+            (),
+            (1 / 5,),
+            (3 / 40, 9 / 40),
+            (44 / 45, -56 / 15, 32 / 9),
+            (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
+            (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
+        ),
+        b=(35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+        c=(0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1),
+        order=5,
+        error=(-71 / 57600, 0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40),
+        embedded_order=4,
+    )

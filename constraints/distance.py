@@ -46,18 +46,21 @@ class Distance(Primitive):
         if length is None:
             ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
             length = np.linalg.norm(ends[0] - ends[1])
-        self.length = Motion.wrap(length, f"{self.name}: length")
+        self.length = length
+        self.check()
+
+    def check(self):
+        """A positive length."""
         initial = Motion.at_start(self.length)
         if not initial > 0.0:
             raise InvalidConstraint(
                 f"{self.name}: the length is {initial:g} m and must be positive; "
                 "to hold two points together use Spherical."
             )
-        self.scale = initial
 
     def parameters(self):
         """(L, Ld, Ldd, L0)."""
-        return (*Motion.places(self.length), self.scale)
+        return (*Motion.places(self.length), Motion.at_start(self.length))
 
     @staticmethod
     def phi(x, par, t, out):

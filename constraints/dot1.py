@@ -39,7 +39,11 @@ class Dot1(Primitive):
 
     def __init__(self, a, b, *, axis_a=None, axis_b=None, value=0.0, name=""):
         super().__init__(a, b, (axis_a, axis_b), name)
-        self.value = Motion.wrap(value, f"{self.name}: value")
+        self.value = value
+        self.check()
+
+    def check(self):
+        """A cosine."""
         initial = Motion.at_start(self.value)
         if not -1.0 < initial < 1.0:
             raise InvalidConstraint(

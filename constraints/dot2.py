@@ -41,7 +41,7 @@ class Dot2(Primitive):
 
     def __init__(self, a, b, *, axis_a=None, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), value=0.0, name=""):
         super().__init__(a, b, (axis_a, point_a, point_b), name)
-        self.value = Motion.wrap(value, f"{self.name}: value")
+        self.value = value
 
     def parameters(self):
         """(c, cd, cdd)."""

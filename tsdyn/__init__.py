@@ -20,6 +20,7 @@ from .errors import (  # noqa: E402
     Status,
     StepFailure,
     TsdynError,
+    UnknownAttribute,
 )
 from .markers import Parameters, Point, Vector  # noqa: E402
 from .motion import Motion  # noqa: E402
@@ -50,10 +51,20 @@ __all__ = [
     "Status",
     "StepFailure",
     "TsdynError",
+    "UnknownAttribute",
     "Vector",
     "constraints",
     "integrators",
     "kernel",
+    "plots",
     "simulate",
     "testing",
 ]
+
+
+def __getattr__(name):
+    if name == "plots":  # when asked for: it is of no use without matplotlib
+        from importlib import import_module
+
+        return import_module(".plots", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .checks import floats, positive, vector3
+from .checks import demand_known, floats, positive, vector3
 from .errors import InvalidBody
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -111,6 +111,11 @@ class PointMass:
         self.scene, self.index, self.name, self.values = scene, index, name, {}
         for attribute, value in values.items():
             setattr(self, attribute, value)
+
+    def __setattr__(self, name, value):
+        """Set an attribute that there is; a misspelt one is refused."""
+        demand_known(self, name, ("scene", "index", "name", "values"))
+        super().__setattr__(name, value)
 
     @property
     def orientation(self):

@@ -1,10 +1,11 @@
 """Numbers that users give: taken only where they are numbers, so that nothing is rounded, parsed or cut silently."""
 
+import difflib
 import math
 
 import numpy as np
 
-from .errors import InvalidArgument
+from .errors import InvalidArgument, UnknownAttribute
 
 
 def floats(value):
@@ -53,3 +54,13 @@ def whole(value, what):
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value < 2**63:
         raise InvalidArgument(f"{what} must be a positive whole number, got {value!r}.")
     return int(value)
+
+
+def demand_known(owner, attribute, known):
+    """Refuse to set a public attribute that the owner does not have."""
+    if attribute.startswith("_") or attribute in known or hasattr(type(owner), attribute):
+        return
+    public = [name for name in {*known, *dir(type(owner))} if not name.startswith("_")]
+    near = difflib.get_close_matches(attribute, public, 3)
+    hint = f"; did you mean {' or '.join(near)}?" if near else "."
+    raise UnknownAttribute(f"{owner!r} has no attribute {attribute!r} to set{hint}")

@@ -31,6 +31,10 @@ class SingularConfiguration(TsdynError, ArithmeticError):
     """The equations of motion have no unique solution here: Phi_q loses rank, or D^T M D is singular."""
 
 
+class UnknownAttribute(TsdynError, AttributeError):
+    """An attribute that a body, constraint or scene does not have was set: a slip of the pen would change nothing."""
+
+
 class MissingDependency(TsdynError, ImportError):
     """An optional package is needed for this and is not installed."""
 
@@ -56,6 +60,12 @@ class Status(IntEnum):
     CHART_LOST = 7
     STEP_COLLAPSED = 8
     SLICE_DONE = 9
+
+    def __str__(self):
+        return self.name.lower()
+
+    def __format__(self, spec):
+        return format(str(self), spec)
 
     @property
     def sentence(self):

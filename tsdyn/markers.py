@@ -37,7 +37,9 @@ class Marker:
 
     def coordinates(self, body, value, where):
         """Check the body-frame coordinates that a user gave, return them as an array (3,)."""
-        return vector3(value, f"{where}: {self.argument}", InvalidConstraint)
+        place = vector3(value, f"{where}: {self.argument}", InvalidConstraint)
+        place.setflags(write=False)
+        return place
 
 
 class Point(Marker):
@@ -64,7 +66,9 @@ class Vector(Marker):
         length = np.linalg.norm(value)
         if not length > 0.0:
             raise InvalidConstraint(f"{where}: {self.argument} has length zero; give a direction, such as (0, 0, 1).")
-        return value / length
+        value = value / length
+        value.setflags(write=False)
+        return value
 
 
 class Parameters(Marker):

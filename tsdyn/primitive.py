@@ -17,6 +17,7 @@ from types import MappingProxyType
 
 from ._kernel import Callback, caller, integers, kernel, specialised, stack, stack2, vector
 from .bodies import Ground, PointMass
+from .checks import demand_known
 from .errors import InvalidConstraint
 from .markers import PARAMETERS, Marker, chain_rule, motion, position
 from .motion import Motion
@@ -55,6 +56,7 @@ class Primitive:
     rows = 0
     markers = ()
     prescribed = ""
+    added = False  # to its scene
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
 
     def __init_subclass__(cls, **keywords):
@@ -108,10 +110,40 @@ class Primitive:
         )
 
     def __setattr__(self, name, value):
-        """Set an attribute; the scene packs its numbers again."""
+        """Set an attribute, checked; the scene packs its numbers again.
+
+        A marker's argument (`point_a`, ...) may be set as well as a prescribed value. Once the constraint is in its
+        scene, a name that it does not have is refused.
+        """
+        if name == self.prescribed:
+            value = Motion.wrap(value, f"{self.name}: {name}")
+        slots = [marker.argument for marker in self.markers]
+        if name in slots and "coordinates" in self.__dict__:
+            i = slots.index(name)
+            place = self.markers[i].coordinates(self.body_of(self.markers[i]), value, self.name)
+            name, value = "coordinates", (*self.coordinates[:i], place, *self.coordinates[i + 1 :])
+        if not self.added:
+            super().__setattr__(name, value)
+            return
+        demand_known(self, name, self.__dict__)
+        before = self.__dict__[name]
         super().__setattr__(name, value)
-        if hasattr(self, "coordinates"):
-            self.scene.touch()
+        try:
+            self.check()
+        except InvalidConstraint:
+            super().__setattr__(name, before)
+            raise
+        self.scene.touch()
+
+    def __getattr__(self, name):
+        """The body-frame coordinates of a marker, by its argument."""
+        for marker, place in zip(self.markers, self.__dict__.get("coordinates", ()), strict=False):
+            if marker.argument == name:
+                return place
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    def check(self):
+        """Raise InvalidConstraint where an attribute has an impossible value; asked again when one is set."""
 
     @property
     def scene(self):

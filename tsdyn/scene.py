@@ -7,7 +7,7 @@ import numpy as np
 
 from .assemble import assemble
 from .bodies import IDENTITY, Body, Ground, PointMass
-from .checks import vector3
+from .checks import demand_known, vector3
 from .constraints.euler_normalization import EulerNormalization
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint
 from .evaluate import evaluate
@@ -41,6 +41,11 @@ class Scene:
         self.ground = Ground(self)
         self._bodies, self._added, self._normalisations = [], [], {}
         self.gravity = gravity
+
+    def __setattr__(self, name, value):
+        """Set an attribute that there is; a misspelt one is refused."""
+        demand_known(self, name, ("ground",))
+        super().__setattr__(name, value)
 
     @property
     def gravity(self):
@@ -146,6 +151,7 @@ class Scene:
             return self._normalisations[item.a]
         if any(item is other for other in self._added):
             raise InvalidConstraint(f"{item.name}: it has been added to this scene before; add each constraint once.")
+        item.added = True
         self._added.append(item)
         self.touch()
         return item

@@ -102,7 +102,8 @@ def simulate(
     Returns
     -------
     Solution
-        Also of a run that ended early: see `.success`, `.status`, `.message`.
+        Also of a run that ended early, by Ctrl-C too: see `.success`, `.status`, `.message`; in a loop over runs call
+        `.raise_if_failed()`.
 
     Raises
     ------

@@ -90,7 +90,7 @@ def pack(scene):
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
         mass=np.array([body.values["mass"] for body in scene.bodies]),
         inertia=np.array(inertias).reshape(-1, 9),
-        gravity=scene.gravity,
+        gravity=np.array(scene.gravity),  # writable, as all arrays here: what is read-only is another type to a kernel
         kinds=np.array(kinds, np.int64).reshape(-1, COLUMNS),
         table=np.array(table, np.int64),
         reals=np.array(reals),
@@ -107,6 +107,8 @@ def _parameters(constraint):
     """A constraint's parameters, checked."""
     given = constraint.parameters()
     if isinstance(given, (tuple, list)) and all(isinstance(p, Motion) or np.isfinite(number(p)) for p in given):
+        if "phi_t" not in constraint.kernels and any(isinstance(p, Motion) for p in given):
+            raise InvalidConstraint(f"{constraint.name}: a Motion is among its parameters, so it needs a kernel phi_t.")
         return tuple(given)
     raise InvalidConstraint(
         f"{constraint.name}: parameters() must return a tuple of finite numbers and Motions, it gave {given!r}."

@@ -107,6 +107,13 @@ def _check_kernels(constraint, name, rng):
         step = np.zeros(size, complex)
         step[j] = 1j * STEP
         expected = _vector(f.phi, kind.rows, x + step, t).imag / STEP
+        h = 1e-5 * step.imag / STEP
+        quotient = (_vector(f.phi, kind.rows, x + h, t) - _vector(f.phi, kind.rows, x - h, t)).real / 2e-5
+        if not np.allclose(quotient, expected, rtol=1e-4, atol=1e-4 * (1.0 + np.abs(Phi_x).max())):
+            raise CheckFailed(
+                f"{name}: phi is not analytic, so its complex steps say nothing: it compares, or takes abs or norm of, "
+                "x. Write np.sqrt(x[0] ** 2 + ...) for a norm."
+            )
         for i in range(kind.rows):
             _compare(name, f"jacobian[{i}, {j}] (d phi[{i}] / d {labels[j]})", Phi_x[i, j], expected[i], Phi_x)
 

@@ -8,6 +8,7 @@ from ._kernel import entry
 from .assembly import constraint_jacobian, set_time
 from .bodies import rotation_matrix, transform_g
 from .linalg import cholesky, cholesky_solve
+from .markers import POINT
 
 
 @entry
@@ -82,28 +83,37 @@ def reaction(solution, constraint):
         row += other.rows
     at, length = system.bodies[body.index]
     k, m = solution.multipliers.shape
-    force, torque = np.empty((k, 3)), np.zeros((k, 3))
-    Phi_q, motions = np.zeros((m, solution.q.shape[1])), system._replace(reals=system.reals.copy())
-    letter = "a" if body is constraint.a else "b"
-    points = [
-        s for mark, s in zip(constraint.markers, constraint.coordinates, strict=True)
-        if mark.body == letter and mark.code == 0
-    ]  # fmt: skip
-    for i in range(k):
-        evaluate_jacobian(motions, solution.t[i], solution.q[i], Phi_q)
-        load = -Phi_q[row : row + constraint.rows].T @ solution.multipliers[i, row : row + constraint.rows]
-        force[i] = load[at : at + 3]
-        if length == 7:
-            p = solution.q[i, at + 3 : at + 7]
-            A = rotation_matrix(p)
-            torque[i] = A @ (0.5 * transform_g(p) @ load[at + 3 : at + 7])
-            if points:
-                torque[i] -= np.cross(A @ points[0], force[i])
+    load = np.empty((k, solution.q.shape[1]))
+    motions = system._replace(reals=system.reals.copy())
+    rows = slice(row, row + constraint.rows)
+    lam = np.zeros_like(solution.multipliers)
+    lam[:, rows] = solution.multipliers[:, rows]
+    constraint_loads(motions, solution.t, solution.q, lam, np.zeros((m, solution.q.shape[1])), load)
+    force, torque = load[:, at : at + 3].copy(), np.zeros((k, 3))
+    if length == 7:
+        p = solution.q[:, at + 3 : at + 7]
+        A = rotation_matrix(p)
+        torque = np.einsum("kij,kjl,kl->ki", A, 0.5 * transform_g(p), load[:, at + 3 : at + 7])
+        letter = "a" if body is constraint.a else "b"
+        points = [
+            s for mark, s in zip(constraint.markers, constraint.coordinates, strict=True)
+            if mark.body == letter and mark.code == POINT
+        ]  # fmt: skip
+        if points:
+            torque -= np.cross(A @ points[0], force)
     return force, torque
 
 
 @entry
-def evaluate_jacobian(s, t, q, Phi_q):
-    """Phi_q (m, n) at one state."""
-    set_time(s, t)
-    constraint_jacobian(s, q, t, Phi_q)
+def constraint_loads(s, t, q, lam, Phi_q, out):
+    """out (k, n) = -Phi_q^T lam at every output; lam (k, m), Phi_q scratch, zero on entry."""
+    m, n = Phi_q.shape
+    for row in range(t.size):
+        set_time(s, t[row])
+        constraint_jacobian(s, q[row], t[row], Phi_q)
+        for c in range(n):
+            out[row, c] = 0.0
+        for i in range(m):
+            if lam[row, i] != 0.0:
+                for c in range(n):
+                    out[row, c] -= Phi_q[i, c] * lam[row, i]

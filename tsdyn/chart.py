@@ -15,9 +15,9 @@ import math
 
 from ._kernel import kernel
 from .assembly import constraint_jacobian
-from .linalg import invert, null_space
-from .newton import OK, SINGULAR, normal_matrix, update_b
-from .workspace import CHARTS, CONDITION, CONDITION_M0, CONTRACTION, FACTORIZATIONS, FLOOR, RATE, SIZE
+from .linalg import null_space
+from .newton import OK, SINGULAR, invert_normal_matrix, normal_matrix, update_b
+from .workspace import CHARTS, CONDITION, CONDITION_M0, CONTRACTION, FLOOR, RATE, SIZE
 
 # reasons to leave a chart, as stored; REASONS names them
 STAY, BY_CONTRACTION, BY_CONDITION, BY_OFFSET, BY_INTERVAL, BY_FAILURE, AT_START = range(7)
@@ -67,11 +67,7 @@ def new_chart(s, w, t):
     if m > 0 and not low > RANK_LIMIT * high:
         return SINGULAR
     normal_matrix(s, w)
-    for i in range(m):
-        for j in range(m):
-            w.R[i, j] = w.N[i, j]
-    w.counters[FACTORIZATIONS] += 1
-    if not invert(w.R, w.B, m) or update_b(w) != OK:
+    if not invert_normal_matrix(w) or update_b(w) != OK:
         return SINGULAR
     w.counters[CHARTS] += 1
     w.control[CONDITION_M0] = 0.0  # measured at the next placement

@@ -19,18 +19,17 @@ class Integrator:
     order : int
         Order of the error of v and vd at fixed time.
     step : float, s
-        The fixed step.
+        The fixed step; None for an adaptive run.
     """
 
     order = 0
+    embedded_order = 0  # of the error estimate; zero for a method that has none
+    rtol = atol = max_step = first_step = None
 
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)
         if cls.order:
             _registry[cls.__name__.lower().replace("_", "")] = cls
-
-    embedded_order = 0  # of the error estimate; zero for a method that has none
-    rtol = atol = max_step = first_step = None
 
     def __init__(self, step):
         self.step = positive(step, f"{type(self).__name__}: step (s)")

@@ -95,6 +95,12 @@ def factorise_b(s, w, t):
     """B = (Phi_q U)^-1 at the present q, from nothing; False where it is singular."""
     constraint_jacobian(s, w.q, t, w.Phi_q)
     normal_matrix(s, w)
+    return invert_normal_matrix(w)
+
+
+@kernel
+def invert_normal_matrix(w):
+    """B = N^-1, N = Phi_q U being known; False where it is singular."""
     m = w.u.size
     for i in range(m):
         for j in range(m):
@@ -147,11 +153,7 @@ def update_b(w):
             worst = max(worst, total)
         if worst > 0.5 and before == math.inf:
             before = 1e300  # a factorisation is tried once
-            for i in range(m):
-                for j in range(m):
-                    w.R[i, j] = w.N[i, j]
-            w.counters[FACTORIZATIONS] += 1
-            if not invert(w.R, w.B, m):
+            if not invert_normal_matrix(w):
                 return SINGULAR
             continue
         w.counters[B_ITERATIONS] += 1

@@ -76,11 +76,9 @@ def reaction(solution, constraint):
     """
     system = solution.system
     body = constraint.a if constraint.a.dimension else constraint.b
-    row = 0
-    for other in solution.packed.constraints:
-        if other is constraint:
-            break
-        row += other.rows
+    packed = solution.packed
+    index = packed.constraints.index(constraint)
+    row = sum(other.rows for other in packed.constraints[:index])
     at, length = system.bodies[body.index]
     k, m = solution.multipliers.shape
     load = np.empty((k, solution.q.shape[1]))
@@ -96,7 +94,7 @@ def reaction(solution, constraint):
         torque = np.einsum("kij,kjl,kl->ki", A, 0.5 * transform_g(p), load[:, at + 3 : at + 7])
         letter = "a" if body is constraint.a else "b"
         points = [
-            s for mark, s in zip(constraint.markers, constraint.coordinates, strict=True)
+            s for mark, s in zip(constraint.markers, packed.coordinates[index], strict=True)
             if mark.body == letter and mark.code == POINT
         ]  # fmt: skip
         if points:

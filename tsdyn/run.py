@@ -35,7 +35,7 @@ class Run(NamedTuple):
     y: np.ndarray  # (ny,)
     yd: np.ndarray  # (ny,)
     xd: np.ndarray  # (nx,)
-    dx: np.ndarray  # (nx,)  increments of a step
+    dx: np.ndarray  # (nx,)  increments of a step, then its error; scratch of dense output
     dy: np.ndarray  # (ny,)
     x_low: np.ndarray  # (nx,)  what the additions have lost so far (Kahan)
     y_low: np.ndarray  # (ny,)
@@ -48,14 +48,14 @@ class Run(NamedTuple):
     now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point
     before: np.ndarray  # (3, n)  at the one before; kept for a first-order system
     warm: np.ndarray  # copy of u, B, T and v while dense output moves them
-    xs: np.ndarray  # (nx,)  dense output
+    xs: np.ndarray  # (nx,)  dense output and the guess of a first step
     ys: np.ndarray  # (ny,)
     yds: np.ndarray  # (ny,)
     tableau: np.ndarray  # the method's numbers
     memory: np.ndarray  # the method's scratch
     t_eval: np.ndarray  # output times, or empty: every step
-    clock: np.ndarray  # T ... H
-    numbers: np.ndarray  # int64, FIRST_ORDER ... REJECTED
+    clock: np.ndarray  # T ... ERROR_BEFORE
+    numbers: np.ndarray  # int64, FIRST_ORDER ... REJECTED_LAST
     out: np.ndarray  # (rows, 1 + 3 n)  t, q, qd, qdd
     history: np.ndarray  # (rows, 3)  t, h, accepted
     charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left
@@ -206,6 +206,13 @@ def _store_now(w, r):
 
 
 @kernel
+def _restore_now(w, r):
+    copy(r.now[0], w.q)
+    copy(r.now[1], w.qd)
+    copy(r.now[2], w.qdd)
+
+
+@kernel
 def _begin(context, w, r, at):
     """The first chart, the accelerations there, and the first output. Status."""
     status = _begin_chart(context, w, r, at, AT_START)
@@ -341,9 +348,7 @@ def advance(c, r, at, most):
             if not w.control[CONTRACTION] < CONTRACTION_LOST:
                 status = CHART_LOST
         if status != 0:  # back to the start of the step, on a new chart if this one has been used
-            copy(r.now[0], w.q)
-            copy(r.now[1], w.qd)
-            copy(r.now[2], w.qdd)
+            _restore_now(w, r)
             r.numbers[REJECTED] += 1
             if r.numbers[IN_CHART] == 0:
                 if not adaptive or status == NOT_FINITE:
@@ -371,9 +376,7 @@ def advance(c, r, at, most):
         if status != 0:
             return status
         if reason != 0 and not last:
-            copy(r.now[0], w.q)
-            copy(r.now[1], w.qd)
-            copy(r.now[2], w.qdd)
+            _restore_now(w, r)
             status = _begin_chart(context, w, r, at, reason)
             if status != 0:
                 return status

@@ -181,7 +181,7 @@ def simulate(
 
 def _drive(context, run, addresses, max_steps, report, span):
     """Run slice by slice; returns the status, why it was interrupted, and rows of outputs, history and charts."""
-    chunks = {"out": [], "history": [], "charts": []}
+    chunks = {"out": [], "history": []}
     most, limit = FIRST_SLICE, int(run.numbers[STEPS_WANTED]) if max_steps is None else max_steps
     per_step = run.t_eval.size == 0
     width = 1 + 3 * context.work.q.size
@@ -189,10 +189,8 @@ def _drive(context, run, addresses, max_steps, report, span):
     def fresh(run, rows):
         """New arrays for the next slice; what the last one filled goes to the chunks."""
         _collect(run, chunks, per_step)
-        run.numbers[HISTORY] = 0
         changes = {"history": np.empty((rows, 3))}
         if per_step:
-            run.numbers[ROWS] = 0
             changes["out"] = np.empty((rows + 1, width))
         if run.numbers[CHART_ROWS] + CHART_ROOM > run.charts.shape[0]:
             changes["charts"] = np.resize(run.charts, (2 * run.charts.shape[0], 5))

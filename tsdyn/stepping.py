@@ -137,10 +137,8 @@ def runge_kutta_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tab
     for i in range(stages):
         kx, ky = memory[(1 + i) * n :], memory[(1 + i) * n + nx :]
         if i == 0:
-            for c in range(nx):
-                kx[c] = xd[c]
-            for c in range(ny):
-                ky[c] = yd[c]
+            copy(xd, kx)
+            copy(yd, ky)
             continue
         row = tableau[1 + i * width :]
         for c in range(n):

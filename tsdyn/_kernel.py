@@ -140,7 +140,7 @@ _integers = types.Array(types.int64, 1, "C")
 def _array(context, builder, kind, pointer, shape):
     """An array over memory that somebody else owns."""
     array = context.make_array(kind)(context, builder)
-    size = context.get_constant(types.intp, 8)
+    size = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
     strides = [size]
     for length in reversed(shape[1:]):
         strides.insert(0, builder.mul(strides[0], length))
@@ -155,28 +155,36 @@ def _literal(value):
     return value.literal_value
 
 
-@intrinsic(prefer_literal=True)
-def stack(typing, n):
-    """A vector of n floats on the stack, n a constant; its content is undefined."""
-    length = _literal(n)
+def _stacker(kind, cell):
+    """Make the kernels of vectors and matrices of some kind of number on the stack; their content is undefined."""
 
-    def generate(context, builder, signature, arguments):
-        pointer = cgutils.alloca_once(builder, ir.ArrayType(_f64, length))
-        return _array(context, builder, _vector, pointer, [context.get_constant(types.intp, length)])
+    @intrinsic(prefer_literal=True)
+    def one(typing, n):
+        length = _literal(n)
 
-    return _vector(n), generate
+        def generate(context, builder, signature, arguments):
+            pointer = cgutils.alloca_once(builder, ir.ArrayType(cell, length))
+            return _array(context, builder, signature.return_type, pointer, [context.get_constant(types.intp, length)])
+
+        return types.Array(kind, 1, "C")(n), generate
+
+    @intrinsic(prefer_literal=True)
+    def two(typing, n, m):
+        shape = _literal(n), _literal(m)
+
+        def generate(context, builder, signature, arguments):
+            pointer = cgutils.alloca_once(builder, ir.ArrayType(cell, shape[0] * shape[1]))
+            lengths = [context.get_constant(types.intp, s) for s in shape]
+            return _array(context, builder, signature.return_type, pointer, lengths)
+
+        return types.Array(kind, 2, "C")(n, m), generate
+
+    return one, two
 
 
-@intrinsic(prefer_literal=True)
-def stack2(typing, n, m):
-    """An n x m matrix on the stack, both constants; its content is undefined."""
-    shape = _literal(n), _literal(m)
-
-    def generate(context, builder, signature, arguments):
-        pointer = cgutils.alloca_once(builder, ir.ArrayType(_f64, shape[0] * shape[1]))
-        return _array(context, builder, _matrix, pointer, [context.get_constant(types.intp, s) for s in shape])
-
-    return _matrix(n, m), generate
+# stack(n) is a vector of n floats on the stack, stack2(n, m) a matrix; n and m are constants
+stack, stack2 = _stacker(types.float64, _f64)
+complex_stack, complex_stack2 = _stacker(types.complex128, ir.LiteralStructType([_f64, _f64]))
 
 
 def _viewer(kind):
@@ -265,6 +273,14 @@ if DEBUG:
     def stack2(n, m):
         """An n x m matrix."""
         return np.zeros((n, m))
+
+    def complex_stack(n):
+        """A vector of n complex numbers."""
+        return np.zeros(n, complex)
+
+    def complex_stack2(n, m):
+        """An n x m complex matrix."""
+        return np.zeros((n, m), complex)
 
     def vector(array, n):
         """The array itself: in debug mode nothing is passed by address."""

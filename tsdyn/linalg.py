@@ -165,3 +165,41 @@ def _jacobi(R, m):
         s = math.sqrt(s)
         smallest, largest = min(smallest, s), max(largest, s)
     return smallest, largest
+
+
+@kernel
+def lu(A, pivots, n):
+    """Factor A (n, n) in place with partial pivoting; False where it is singular or not finite."""
+    for c in range(n):
+        p = c
+        for i in range(c + 1, n):
+            if abs(A[i, c]) > abs(A[p, c]):
+                p = i
+        pivots[c] = p
+        if not 0.0 < abs(A[p, c]) < math.inf:
+            return False
+        if p != c:
+            for j in range(n):
+                A[c, j], A[p, j] = A[p, j], A[c, j]
+        for i in range(c + 1, n):
+            f = A[i, c] / A[c, c]
+            A[i, c] = f
+            if f != 0.0:
+                for j in range(c + 1, n):
+                    A[i, j] -= f * A[c, j]
+    return True
+
+
+@kernel
+def lu_solve(A, pivots, b, n):
+    """Solve in place with the factors that `lu` left."""
+    for i in range(n):
+        p = pivots[i]
+        if p != i:
+            b[i], b[p] = b[p], b[i]
+        for j in range(i):
+            b[i] -= A[i, j] * b[j]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            b[i] -= A[i, j] * b[j]
+        b[i] /= A[i, i]

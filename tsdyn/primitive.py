@@ -15,6 +15,7 @@ and on truncated Taylor series: that is how they are checked.
 
 from types import MappingProxyType
 
+from . import curvature
 from ._kernel import Callback, caller, integers, kernel, specialised, stack, stack2, vector
 from .bodies import Ground, PointMass
 from .checks import demand_known
@@ -203,6 +204,10 @@ def _compile(cls, functions):
         names = {**constants, **inner, "kernel_value": inner[f"kernel_{name}"]}
         copy = specialised(loops[name], f"{cls.__qualname__}.{name}_loop", owner, **names)
         result[name] = Callback(copy, SIGNATURE)
+    owner = getattr(functions["gamma"], "py_func", functions["gamma"])
+    places = {"AT": AT, "DIMENSION": DIMENSION, "ROW": ROW, "INTS": INTS}
+    copy = specialised(curvature.loop, f"{cls.__qualname__}.curvature_loop", owner, **constants, **inner, **places)
+    result["curvature"] = Callback(copy, curvature.SIGNATURE)
     return result
 
 

@@ -39,7 +39,7 @@ from .run import (
 from .scene import Scene
 from .solution import Solution
 from .stepping import embedded_error
-from .workspace import Context, allocate
+from .workspace import Context, allocate, allocate_linear
 
 SLICE_SECONDS = 0.2  # how often a run comes back to Python: progress, interrupts
 MARGIN = 30.0  # of one step's error below the tolerances: errors of many steps add up
@@ -159,7 +159,7 @@ def simulate(
     addresses = [*form.addresses(), step_kernel.address]
     addresses += [embedded_error.address, form.norm()] if adaptive else [0, 0]
     addresses = np.array(addresses, np.int64)
-    context = Context(system, work)
+    context = Context(system, work, allocate_linear(system, n, m, False))
     advance(context, run, addresses, 0)  # loads the driver, before the clock starts
     prepared = time.perf_counter()
     status, reason, chunks = _drive(context, run, addresses, max_steps, report, (t0, t1))

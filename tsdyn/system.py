@@ -10,8 +10,8 @@ from .errors import InvalidConstraint
 from .motion import Motion
 from .primitive import AT, BLOCK, DIMENSION, INTS, ROW, STRIDE
 
-# columns of System.kinds: four addresses, then where a kind's instances are
-PHI, JACOBIAN, GAMMA, PHI_T, COUNT, REALS, FIRST_INT, FIRST_REAL, COLUMNS = range(9)
+# columns of System.kinds: four addresses, where a kind's instances are, the address that implicit methods need
+PHI, JACOBIAN, GAMMA, PHI_T, COUNT, REALS, FIRST_INT, FIRST_REAL, CURVATURE, COLUMNS = range(10)
 
 
 class System(NamedTuple):
@@ -21,7 +21,7 @@ class System(NamedTuple):
     mass: np.ndarray  # float64 (nb,)
     inertia: np.ndarray  # float64 (nb, 9): J' row by row; zero for a point mass
     gravity: np.ndarray  # float64 (3,)
-    kinds: np.ndarray  # int64 (kinds, 8): addresses and extents, columns above
+    kinds: np.ndarray  # int64 (kinds, 9): addresses and extents, columns above
     table: np.ndarray  # int64: for each instance the places in q and Phi_q, primitive.INTS numbers
     reals: np.ndarray  # float64: for each instance marker coordinates, then parameters
     motions: np.ndarray  # int64 (motions, 4): addresses of f, fd, fdd; place of the first in reals
@@ -83,7 +83,7 @@ def pack(scene):
         addresses = [_address(kind, name) for name in ("phi", "jacobian", "gamma")]
         moving = any(constraint.rheonomic for constraint, _ in members)
         addresses.append(_address(kind, "phi_t") if moving else 0)
-        kinds.append([*addresses, len(members), stride, *first])
+        kinds.append([*addresses, len(members), stride, *first, 0])
 
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
@@ -101,6 +101,14 @@ def pack(scene):
     coordinates = tuple(constraint.coordinates for constraint in scene.constraints)
     size = max((np.abs(s).max() for each in coordinates for s in each), default=0.0)
     return Packed(system, scene.bodies, scene.constraints, tuple(parameters.values()), coordinates, float(size))
+
+
+def with_curvatures(packed):
+    """The system with the kernels of second derivatives, which only implicit methods load."""
+    kinds = packed.system.kinds.copy()
+    classes = dict.fromkeys(type(constraint) for constraint in packed.constraints)
+    kinds[:, CURVATURE] = [_address(kind, "curvature") for kind in classes]
+    return packed.system._replace(kinds=kinds)
 
 
 def _parameters(constraint):

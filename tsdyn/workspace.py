@@ -40,7 +40,34 @@ class Work(NamedTuple):
 
 
 U_TOL, B_TOL, SIZE, FLOOR, RATE, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(9)
-EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS, COUNTERS = range(7)
+EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS = range(6)
+JACOBIANS, ITERATION_MATRICES, STAGE_ITERATIONS, COUNTERS = range(6, 10)
+
+
+class Linear(NamedTuple):
+    """What implicit methods need besides; empty for explicit ones. l = 6 a rigid body and 3 a point mass.
+
+    Body frame means: of a body's displacement, the components A^T dr and dpi' = 2 G dp.
+    """
+
+    K: np.ndarray  # (n, n)  stiffness in q, then scratch; linearise.linearise
+    C: np.ndarray  # (n, n)  damping in q, then scratch; linearise.linearise
+    G1: np.ndarray  # (m, n)  (Phi_q qd + Phi_t)_q; assembly.constraint_curvature
+    G2: np.ndarray  # (m, n)  (Phi_q qdd + gamma)_q; assembly.constraint_curvature
+    UB: np.ndarray  # (n, m)  U B; linearise.linearise
+    Y: np.ndarray  # (n, n)  U B G1; linearise.linearise
+    Z: np.ndarray  # (n, n)  U B G2; linearise.linearise
+    lam: np.ndarray  # (m,)  multipliers; linearise.linearise
+    r: np.ndarray  # (n,)  Q_A + S - M qdd; linearise.linearise
+    K_body: np.ndarray  # (l, l)  stiffness in body frames, kept over steps and charts; linearise.linearise
+    C_body: np.ndarray  # (l, l)  damping in body frames; linearise.linearise
+    F: np.ndarray  # (l, k)  D in body frames; linearise.reduce
+    X: np.ndarray  # (l, k)  scratch
+    K_hat: np.ndarray  # (k, k)  F^T K_body F; linearise.reduce
+    C_hat: np.ndarray  # (k, k)  F^T C_body F; linearise.reduce
+    P: np.ndarray  # (k, k)  LU factors of D^T M D - g C_hat + g^2 K_hat; linearise.factorise
+    b: np.ndarray  # (k,)  scratch
+    pivots: np.ndarray  # int64 (k,)  row exchanges of P
 
 
 class Context(NamedTuple):
@@ -48,6 +75,7 @@ class Context(NamedTuple):
 
     system: System
     work: Work
+    linear: Linear
 
 
 def allocate(n, m, bodies, constraint_tol, size=1.0):
@@ -74,11 +102,30 @@ def allocate(n, m, bodies, constraint_tol, size=1.0):
     return Work(**arrays, counters=np.zeros(COUNTERS, np.int64))
 
 
+def allocate_linear(system, n, m, wanted):
+    """Lay out the memory of implicit methods; of no size where it is not wanted."""
+    k, l = n - m, sum(6 if length == 7 else 3 for length in system.bodies[:, -1])
+    if not wanted:
+        n = m = k = l = 0
+    shapes = {
+        **dict.fromkeys(("K", "C", "Y", "Z"), (n, n)),
+        **dict.fromkeys(("G1", "G2"), (m, n)),
+        "UB": (n, m),
+        "lam": (m,),
+        "r": (n,),
+        **dict.fromkeys(("K_body", "C_body"), (l, l)),
+        **dict.fromkeys(("F", "X"), (l, k)),
+        **dict.fromkeys(("K_hat", "C_hat", "P"), (k, k)),
+        "b": (k,),
+    }
+    return Linear(**{name: np.zeros(shape) for name, shape in shapes.items()}, pivots=np.zeros(k, np.int64))
+
+
 def _example():
     one, two = np.zeros(1), np.zeros((1, 1))
     ones, twos = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
     system = System(twos, one, two, one, twos, ones, one, twos, ones, twos)
-    return Context(system, allocate(2, 1, 1, 1.0))
+    return Context(system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False))
 
 
 load = loader(_example())

@@ -1,0 +1,305 @@
+"""The Jacobian of the tangent-space ODE, for implicit methods: vdd = f(t, v, vd), Eq. 26, differentiated exactly.
+
+With dq = D dv and, from Eqs. 2 and 3, Phi_q dqd = -G1 dq and Phi_q dqdd = -G2 dq - 2 G1 dqd (G1, G2 as in
+tsdyn.curvature), Eq. 4 gives, the multipliers dropping out because Phi_q D = 0,
+
+    A f_v = -D^T K* D,    A f_vd = D^T C* D,    A = D^T M D
+    C* = Q_qd + S_qd + 2 M Y,                          Y = U B G1
+    K* = (M qdd - S - Q)_q + (Phi_q^T lam)_q - M Z + C* Y,    Z = U B G2
+
+K* and C* are kept in the bodies' own frames: there a joint's springs and dampers stay what they are while the mechanism
+moves, so one evaluation serves many steps and charts. With the place last taken, `reduce` and `factorise` make
+P = A - g C_hat + g^2 K_hat, the iteration matrix of a stage with g = h a_ii.
+"""
+
+from ._kernel import callback, kernel, stack, stack2, vector
+from .assembly import constraint_curvature
+from .linalg import lu, lu_solve
+from .newton import NOT_FINITE, OK, SINGULAR
+from .workspace import ITERATION_MATRICES, JACOBIANS, load
+
+
+@kernel
+def transform(p, G):
+    """G(p) (3, 4)."""
+    e0, e1, e2, e3 = p[0], p[1], p[2], p[3]
+    G[0, 0], G[0, 1], G[0, 2], G[0, 3] = -e1, e0, e3, -e2
+    G[1, 0], G[1, 1], G[1, 2], G[1, 3] = -e2, -e3, e0, e1
+    G[2, 0], G[2, 1], G[2, 2], G[2, 3] = -e3, e2, -e1, e0
+
+
+@kernel
+def rotation(p, A):
+    """A(p) (3, 3)."""
+    e0, e1, e2, e3 = p[0], p[1], p[2], p[3]
+    a = e0 * e0 - e1 * e1 - e2 * e2 - e3 * e3
+    A[0, 0], A[0, 1], A[0, 2] = a + 2.0 * e1 * e1, 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)
+    A[1, 0], A[1, 1], A[1, 2] = 2.0 * (e1 * e2 + e0 * e3), a + 2.0 * e2 * e2, 2.0 * (e2 * e3 - e0 * e1)
+    A[2, 0], A[2, 1], A[2, 2] = 2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), a + 2.0 * e3 * e3
+
+
+@kernel
+def _transposed_product(G, J, X, f, out):
+    """out += f G^T J X (4, 4); G and X (3, 4), J (9,)."""
+    for i in range(4):
+        for j in range(4):
+            total = 0.0
+            for a in range(3):
+                for b in range(3):
+                    total += G[a, i] * J[3 * a + b] * X[b, j]
+            out[i, j] += f * total
+
+
+@kernel
+def _crossed(h, f, out):
+    """out += f H, where H p = G(p)^T h."""
+    for i in range(3):
+        out[0, 1 + i] -= f * h[i]
+        out[1 + i, 0] += f * h[i]
+    out[1, 2] += f * h[2]
+    out[1, 3] -= f * h[1]
+    out[2, 1] -= f * h[2]
+    out[2, 3] += f * h[0]
+    out[3, 1] += f * h[1]
+    out[3, 2] -= f * h[0]
+
+
+@kernel
+def _moment(G, J, p, out):
+    """out = J G p (3,)."""
+    x = stack(3)
+    for a in range(3):
+        x[a] = G[a, 0] * p[0] + G[a, 1] * p[1] + G[a, 2] * p[2] + G[a, 3] * p[3]
+    for a in range(3):
+        out[a] = J[3 * a] * x[0] + J[3 * a + 1] * x[1] + J[3 * a + 2] * x[2]
+
+
+@kernel
+def _inertia_terms(s, w, l):
+    """l.r = gravity + S - M qdd, K += (M qdd - S)_q, C += S_qd; S_p = 8 Gd^T J' Gd p, M_p = 4 G^T J' G."""
+    G, Gd, Gdd, h, g = stack2(3, 4), stack2(3, 4), stack2(3, 4), stack(3), stack(3)
+    for b in range(s.mass.size):
+        at = s.bodies[b, 0]
+        for c in range(3):
+            l.r[at + c] = s.mass[b] * (s.gravity[c] - w.qdd[at + c])
+        if s.bodies[b, 1] == 7:
+            p, pd, pdd, J = w.q[at + 3 : at + 7], w.qd[at + 3 : at + 7], w.qdd[at + 3 : at + 7], s.inertia[b]
+            transform(p, G)
+            transform(pd, Gd)
+            transform(pdd, Gdd)
+            _moment(G, J, pdd, h)
+            _moment(Gd, J, p, g)
+            for i in range(4):
+                total = 0.0
+                for a in range(3):
+                    total += 8.0 * Gd[a, i] * g[a] - 4.0 * G[a, i] * h[a]
+                l.r[at + 3 + i] = total
+            K, C = l.K[at + 3 : at + 7, at + 3 : at + 7], l.C[at + 3 : at + 7, at + 3 : at + 7]
+            _crossed(h, 4.0, K)
+            _transposed_product(G, J, Gdd, -4.0, K)
+            _transposed_product(Gd, J, Gd, -8.0, K)
+            _crossed(g, 8.0, C)
+            _transposed_product(Gd, J, G, -8.0, C)
+
+
+@kernel
+def _add_mass_times(s, q, f, X, out):
+    """out += f M X; X and out (n, n)."""
+    G, a = stack2(3, 4), stack(3)
+    n = q.size
+    for b in range(s.mass.size):
+        at = s.bodies[b, 0]
+        for c in range(at, at + 3):
+            for j in range(n):
+                out[c, j] += f * s.mass[b] * X[c, j]
+        if s.bodies[b, 1] == 7:
+            transform(q[at + 3 : at + 7], G)
+            J = s.inertia[b]
+            for j in range(n):
+                for i in range(3):
+                    a[i] = 0.0
+                    for c in range(4):
+                        a[i] += G[i, c] * X[at + 3 + c, j]
+                x = J[0] * a[0] + J[1] * a[1] + J[2] * a[2]
+                y = J[3] * a[0] + J[4] * a[1] + J[5] * a[2]
+                z = J[6] * a[0] + J[7] * a[1] + J[8] * a[2]
+                for c in range(4):
+                    out[at + 3 + c, j] += 4.0 * f * (G[0, c] * x + G[1, c] * y + G[2, c] * z)
+
+
+@kernel
+def _multiply(A, B, out):
+    """out = A B."""
+    for i in range(A.shape[0]):
+        for j in range(B.shape[1]):
+            out[i, j] = 0.0
+        for c in range(A.shape[1]):
+            f = A[i, c]
+            if f != 0.0:
+                for j in range(B.shape[1]):
+                    out[i, j] += f * B[c, j]
+
+
+@kernel
+def _to_body_frames(s, q, X, scratch, out):
+    """out (l, l) = T^T X T, X (n, n): dr = A dr', dp = G^T dpi' / 2."""
+    n, G, A = q.size, stack2(3, 4), stack2(3, 3)
+    to = 0
+    for b in range(s.mass.size):  # X T
+        at = s.bodies[b, 0]
+        if s.bodies[b, 1] == 7:
+            transform(q[at + 3 : at + 7], G)
+            rotation(q[at + 3 : at + 7], A)
+            for i in range(n):
+                for c in range(3):
+                    scratch[i, to + c] = X[i, at] * A[0, c] + X[i, at + 1] * A[1, c] + X[i, at + 2] * A[2, c]
+                    total = 0.0
+                    for d in range(4):
+                        total += X[i, at + 3 + d] * G[c, d]
+                    scratch[i, to + 3 + c] = 0.5 * total
+            to += 6
+        else:
+            for i in range(n):
+                for c in range(3):
+                    scratch[i, to + c] = X[i, at + c]
+            to += 3
+    width, to = to, 0
+    for b in range(s.mass.size):
+        at = s.bodies[b, 0]
+        if s.bodies[b, 1] == 7:
+            transform(q[at + 3 : at + 7], G)
+            rotation(q[at + 3 : at + 7], A)
+            for j in range(width):
+                for c in range(3):
+                    total = 0.0
+                    for d in range(3):
+                        total += A[d, c] * scratch[at + d, j]
+                    out[to + c, j] = total
+                    total = 0.0
+                    for d in range(4):
+                        total += G[c, d] * scratch[at + 3 + d, j]
+                    out[to + 3 + c, j] = 0.5 * total
+            to += 6
+        else:
+            for j in range(width):
+                for c in range(3):
+                    out[to + c, j] = scratch[at + c, j]
+            to += 3
+
+
+@callback("pd")
+def linearise(context, t):
+    """K_body and C_body at the state last completed. Status."""
+    c = load(context)
+    s, w, l = c.system, c.work, c.linear
+    n, m = w.q.size, w.u.size
+    for i in range(n):
+        for j in range(n):
+            l.K[i, j] = 0.0
+            l.C[i, j] = 0.0
+    _inertia_terms(s, w, l)
+    _multiply(w.U, w.B, l.UB)
+    for i in range(m):  # Phi_q^T lam = r, so lam = (U B)^T r
+        x = 0.0
+        for j in range(n):
+            x += l.UB[j, i] * l.r[j]
+        l.lam[i] = x
+    constraint_curvature(s, w.q, w.qd, w.qdd, t, l.lam, l.K, l.G1, l.G2)
+    _multiply(l.UB, l.G1, l.Y)
+    _multiply(l.UB, l.G2, l.Z)
+    _add_mass_times(s, w.q, 2.0, l.Y, l.C)
+    _add_mass_times(s, w.q, -1.0, l.Z, l.K)
+    total = 0.0
+    for i in range(n):
+        for d in range(n):
+            f = l.C[i, d]
+            for j in range(n):
+                l.K[i, j] += f * l.Y[d, j]
+        for j in range(n):
+            total += abs(l.K[i, j]) + abs(l.C[i, j])
+    _to_body_frames(s, w.q, l.K, l.Z, l.K_body)
+    _to_body_frames(s, w.q, l.C, l.Z, l.C_body)
+    w.counters[JACOBIANS] += 1
+    return OK if total < 1e300 else NOT_FINITE
+
+
+@kernel
+def _sandwich(F, X, scratch, out):
+    """out = F^T X F."""
+    _multiply(X, F, scratch)
+    for i in range(F.shape[1]):
+        for j in range(F.shape[1]):
+            out[i, j] = 0.0
+    for c in range(F.shape[0]):
+        for i in range(F.shape[1]):
+            f = F[c, i]
+            if f != 0.0:
+                for j in range(F.shape[1]):
+                    out[i, j] += f * scratch[c, j]
+
+
+@callback("p")
+def reduce(context):
+    """K_hat and C_hat of the place last taken."""
+    c = load(context)
+    s, w, l = c.system, c.work, c.linear
+    k, to, A = w.v.size, 0, stack2(3, 3)
+    for b in range(s.mass.size):
+        at = s.bodies[b, 0]
+        if s.bodies[b, 1] == 7:
+            rotation(w.q[at + 3 : at + 7], A)
+            for i in range(3):
+                for j in range(k):
+                    l.F[to + i, j] = A[0, i] * w.D[at, j] + A[1, i] * w.D[at + 1, j] + A[2, i] * w.D[at + 2, j]
+                    l.F[to + 3 + i, j] = w.E[3 * b + i, j]
+            to += 6
+        else:
+            for i in range(3):
+                for j in range(k):
+                    l.F[to + i, j] = w.D[at + i, j]
+            to += 3
+    _sandwich(l.F, l.K_body, l.X, l.K_hat)
+    _sandwich(l.F, l.C_body, l.X, l.C_hat)
+    return OK
+
+
+@callback("pd")
+def factorise(context, g):
+    """LU factors of P = D^T M D - g C_hat + g^2 K_hat. Status."""
+    c = load(context)
+    w, l = c.work, c.linear
+    k = w.v.size
+    for i in range(k):
+        for j in range(i + 1):
+            x = 0.0  # A = L L^T, the diagonal holding reciprocals
+            for d in range(j):
+                x += w.A[i, d] * w.A[j, d]
+            x += (w.A[i, j] if i != j else 1.0 / w.A[i, i]) / w.A[j, j]
+            l.P[i, j] = x
+            l.P[j, i] = x
+    for i in range(k):
+        for j in range(k):
+            l.P[i, j] += g * (g * l.K_hat[i, j] - l.C_hat[i, j])
+    w.counters[ITERATION_MATRICES] += 1
+    return OK if lu(l.P, l.pivots, k) else SINGULAR
+
+
+@callback("pp")
+def solve(context, rho):
+    """rho <- P^-1 D^T M D rho."""
+    c = load(context)
+    w, l = c.work, c.linear
+    k = w.v.size
+    rho = vector(rho, k)
+    for j in range(k):  # b = L^T rho
+        x = rho[j] / w.A[j, j]
+        for i in range(j + 1, k):
+            x += w.A[i, j] * rho[i]
+        l.b[j] = x
+    for i in range(k - 1, -1, -1):
+        x = l.b[i] / w.A[i, i]
+        for j in range(i):
+            x += w.A[i, j] * l.b[j]
+        rho[i] = x
+    lu_solve(l.P, l.pivots, rho, k)
+    return OK

@@ -60,6 +60,7 @@ class Status(IntEnum):
     CHART_LOST = 7
     STEP_COLLAPSED = 8
     SLICE_DONE = 9
+    STAGE_FAILED = 10
 
     def __str__(self):
         return self.name.lower()
@@ -104,6 +105,10 @@ _SENTENCES = {
     Status.STEP_COLLAPSED: (
         "The step that the tolerances ask for is down to rounding of the time.",
         "Look for a singular configuration, a jump in a motion or stiff parts near this time; or loosen rtol and atol.",
+    ),
+    Status.STAGE_FAILED: (
+        "Newton's method for a stage of the implicit method did not converge.",
+        "Take a smaller step, or an adaptive one.",
     ),
     Status.MAX_STEPS: ("The run reached max_steps.", "Raise max_steps, or take a larger step."),
     Status.INTERRUPTED: ("The run was interrupted.", "Go on with simulate(scene, (t, t_end), state=solution.state)."),

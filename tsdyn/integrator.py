@@ -3,7 +3,8 @@
 from types import MappingProxyType
 
 from .checks import positive
-from .stepping import nystrom_step, runge_kutta_step, second_order_step
+from .implicit import implicit_step
+from .stepping import embedded_error, nystrom_step, runge_kutta_step, second_order_step
 
 _registry = {}
 
@@ -25,6 +26,7 @@ class Integrator:
     order = 0
     embedded_order = 0  # of the error estimate; zero for a method that has none
     rtol = atol = max_step = first_step = None
+    implicit = False
 
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)
@@ -78,6 +80,40 @@ class ExplicitRungeKutta(Integrator):
         stages = len(self.tableau.c)
         step = runge_kutta_step if first_order else second_order_step
         return step, self.tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny)
+
+    def __repr__(self):
+        settings = f"rtol={self.rtol:g}, atol={self.atol:g}" if self.step is None else f"step={self.step:g}"
+        return f"{type(self).__name__}({settings})"
+
+
+class DiagonallyImplicit(Integrator):
+    """A method that is an `ImplicitTableau`: adaptive, or fixed in step; it serves the tangent-space form.
+
+    One stiffness and damping, exact, and one factorised iteration matrix are kept over iterations, stages, steps and
+    charts until the measured contraction says otherwise.
+    """
+
+    tableau = None
+    implicit = True
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        if cls.tableau is not None:
+            cls.embedded_order = cls.tableau.embedded_order
+
+    def __init__(self, rtol=1e-6, atol=1e-8, step=None, max_step=None, first_step=None):
+        what = type(self).__name__
+        self.rtol, self.atol = positive(rtol, f"{what}: rtol"), positive(atol, f"{what}: atol")
+        self.step = None if step is None else positive(step, f"{what}: step (s)")
+        self.max_step = None if max_step is None else positive(max_step, f"{what}: max_step (s)")
+        self.first_step = None if first_step is None else positive(first_step, f"{what}: first_step (s)")
+
+    def kernel(self, first_order):
+        """The tableau, packed, and the kernel that steps by it."""
+        stages = len(self.tableau.c)
+        return implicit_step, self.tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny) + 5 * nx + 1
+
+    error_kernel = embedded_error
 
     def __repr__(self):
         settings = f"rtol={self.rtol:g}, atol={self.atol:g}" if self.step is None else f"step={self.step:g}"

@@ -17,6 +17,16 @@ def _rows(values, stages, what):
     return matrix
 
 
+def _lower(values, stages, what):
+    """A lower triangular matrix from its rows up to the diagonal."""
+    matrix = np.zeros((stages, stages))
+    for i, row in enumerate(values):
+        if len(row) != i + 1:
+            raise InvalidArgument(f"{what}: row {i} of a diagonally implicit tableau has {i + 1} entries.")
+        matrix[i, : i + 1] = row
+    return matrix
+
+
 def _demand(what, **conditions):
     for name, value in conditions.items():
         if np.abs(value).max() > 1e-14:
@@ -60,6 +70,76 @@ class RungeKuttaTableau:
         a, b, c = self.arrays
         stages = [[0.0, c[i], *a[i]] for i in range(len(c))]
         return np.concatenate([[len(c)], np.ravel(stages), b, self.error])
+
+
+@dataclass(frozen=True)
+class ImplicitTableau:
+    """A diagonally implicit Runge-Kutta method: rows of a up to the diagonal, the first row zero, the last the weights.
+
+    Such a method is stiffly accurate and begins with the derivative at the step's start; error holds the weights of
+    the error estimate, one a stage, none where the method has an estimate of its own.
+    """
+
+    a: tuple
+    c: tuple
+    order: int
+    error: tuple = ()
+    embedded_order: int = 0
+
+    def __post_init__(self):
+        what = "ImplicitTableau"
+        a, b, c = self.arrays
+        ones, diagonal = np.ones(len(c)), np.diag(a)
+        if a[0, 0] != 0.0 or np.ptp(diagonal[1:]) > 0.0 or not diagonal[1] > 0.0:
+            raise InvalidArgument(f"{what}: the first row is zero, and the other diagonal entries one positive number.")
+        _demand(what, **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
+        if self.error:
+            _demand(what, **_quadrature(b - np.array(self.error), c, self.embedded_order))
+        ac, aac = a @ c, a @ a @ c
+        trees = {
+            3: {"b a c = 1/6": b @ ac - 1 / 6},
+            4: {
+                "b c a c = 1/8": (b * c) @ ac - 1 / 8,
+                "b a c^2 = 1/12": b @ a @ c**2 - 1 / 12,
+                "b a a c = 1/24": b @ aac - 1 / 24,
+            },
+            5: {
+                "b c^2 a c = 1/10": (b * c**2) @ ac - 1 / 10,
+                "b (a c)^2 = 1/20": b @ ac**2 - 1 / 20,
+                "b c a c^2 = 1/15": (b * c) @ a @ c**2 - 1 / 15,
+                "b a c^3 = 1/20": b @ a @ c**3 - 1 / 20,
+                "b c a a c = 1/30": (b * c) @ aac - 1 / 30,
+                "b a c a c = 1/40": b @ a @ (c * ac) - 1 / 40,
+                "b a a c^2 = 1/60": b @ a @ a @ c**2 - 1 / 60,
+                "b a a a c = 1/120": b @ a @ aac - 1 / 120,
+            },
+        }
+        for order, conditions in trees.items():
+            if order <= self.order:
+                _demand(what, **conditions)
+
+    @property
+    def arrays(self):
+        """a (s, s), b (s,), c (s,)."""
+        a = _lower(self.a, len(self.c), "ImplicitTableau")
+        return a, a[-1], np.array(self.c)
+
+    def predictor(self, points=4):
+        """First guess of stage i from the stages before, (s, s): extrapolation through the nearest of them in time."""
+        c = np.array(self.c)
+        weights = np.zeros((len(c), len(c)))
+        for i in range(1, len(c)):
+            near = sorted(range(i), key=lambda j: abs(c[j] - c[i]))[:points]
+            for j in near:
+                weights[i, j] = np.prod([(c[i] - c[k]) / (c[j] - c[k]) for k in near if k != j])
+        return weights
+
+    def packed(self):
+        """As `RungeKuttaTableau.packed`, followed by the predictor."""
+        a, b, c = self.arrays
+        stages = [[0.0, c[i], *a[i]] for i in range(len(c))]
+        error = [*(self.error or np.zeros(len(c))), 0.0]
+        return np.concatenate([[len(c)], np.ravel(stages), b, error, self.predictor().ravel()])
 
 
 @dataclass(frozen=True)

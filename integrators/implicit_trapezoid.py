@@ -1,0 +1,28 @@
+"""ImplicitTrapezoid: the trapezoidal rule, order 2, A-stable, without damping; its Jacobian is kept and used again."""
+
+from ..implicit import trapezoid_error
+from ..integrator import DiagonallyImplicit
+from ..tableau import ImplicitTableau
+
+
+class ImplicitTrapezoid(DiagonallyImplicit):
+    """The trapezoidal rule with Jacobian reuse, adaptive or of a fixed step, for stiff scenes at modest accuracy.
+
+    Parameters
+    ----------
+    rtol, atol : float; default 1e-6, 1e-8
+        Each step's error, from differences over two steps, is kept to a fraction of atol + rtol |value|.
+    step : float, s, optional
+        A fixed step instead.
+    max_step, first_step : float, s, optional
+        Bound on the step; the first step to try.
+
+    Raises
+    ------
+    InvalidArgument
+        If a tolerance or a step is not positive and finite.
+    """
+
+    order = 2
+    tableau = ImplicitTableau(a=((0,), (1 / 2, 1 / 2)), c=(0, 1), order=2, embedded_order=2)
+    error_kernel = trapezoid_error

@@ -1,0 +1,176 @@
+"""The step kernel of diagonally implicit Runge-Kutta methods, and its Newton iteration.
+
+Stage i of (v, vd)' = (vd, f) has the unknown k_i = vdd there:
+
+    vd_i = vd + h sum_{j<i} a_ij k_j + g k_i,    v_i = v + h sum_{j<i} a_ij vd_j + g vd_i,    g = h a_ii
+    k_i <- k_i + P^-1 A (f(v_i, vd_i) - k_i),    P = A - g C_hat + g^2 K_hat  (tsdyn.linearise)
+
+P is kept over iterations, stages and steps. Where the measured contraction is poor it is made anew, first from the same
+stiffness and damping at the present place, then, if that does not help, from new ones.
+"""
+
+import math
+
+from ._kernel import callback, caller, kernel, vector
+from .errors import Status
+from .linalg import copy
+from .primitive import ANY
+from .stepping import ERROR, STEP, call_accelerate, call_norm, call_place
+from .workspace import CHARTS, STAGE_ITERATIONS, load
+
+STAGE_FAILED = int(Status.STAGE_FAILED)
+ITERATIONS = 15
+KAPPA = 0.01  # of the tolerance: what a stage's iteration may leave
+SLOW = 0.2  # contraction above which the iteration matrix is made anew
+DIVERGING = 0.9
+ROUNDING = 1e-15
+# Linear.kernels
+LINEARISE, REDUCE, FACTORISE, SOLVE, COMPLETE, ERROR_NORM, KERNELS = range(7)
+# Linear.numbers; CHART is the chart that P belongs to
+RTOL, ATOL, G, CHART, KNOWN, THETA, T_BEFORE, NUMBERS = range(8)
+
+call_linearise = caller("pd")
+call_reduce = caller("p")
+call_solve = caller("pp")
+
+
+@kernel
+def _matrix(context, w, l, t, g, f, anew):
+    """P at the place last taken, f being the accelerations there; with anew, from new stiffness and damping. Status."""
+    status = 0
+    if anew or l.numbers[KNOWN] == 0.0:
+        call_solve(l.kernels[COMPLETE], context, f)
+        status = call_linearise(l.kernels[LINEARISE], context, t)
+        l.numbers[KNOWN] = 1.0
+    if status == 0:
+        call_reduce(l.kernels[REDUCE], context)
+        status = call_linearise(l.kernels[FACTORISE], context, g)
+    l.numbers[G] = g if status == 0 else 0.0
+    l.numbers[CHART] = w.counters[CHARTS]
+    return status
+
+
+@kernel
+def _stage(context, place, accelerate, w, l, t, g, x, y, k, xs, ys, f, dx):
+    """Solve one stage: x, y are its known parts, k the unknown, predicted on entry. xs, ys at the solution. Status."""
+    n = k.size
+    before, level = math.inf, 0
+    floor = ROUNDING / (l.numbers[RTOL] + l.numbers[ATOL])
+    theta = l.numbers[THETA]
+    for iteration in range(ITERATIONS):
+        for c in range(n):
+            ys[c] = y[c] + g * k[c]
+            xs[c] = x[c] + g * ys[c]
+        status = call_place(place, context, t, xs)
+        if status == 0:
+            status = call_accelerate(accelerate, context, t, ys, f, f)
+        if status != 0:
+            return status
+        w.counters[STAGE_ITERATIONS] += 1
+        stale = l.numbers[CHART] != w.counters[CHARTS] or abs(g - l.numbers[G]) > 0.3 * g
+        if stale or (theta > SLOW and level < 2 and iteration > 0):
+            level = 0 if stale else level + 1
+            status = _matrix(context, w, l, t, g, f, level == 2)
+            if status != 0:
+                return STAGE_FAILED
+            before = math.inf
+        for c in range(n):
+            f[c] -= k[c]
+        call_solve(l.kernels[SOLVE], context, f)
+        for c in range(n):
+            k[c] += f[c]
+            f[c] *= g
+            dx[c] = g * f[c]
+        size = call_norm(l.kernels[ERROR_NORM], context, dx, f, l.now, l.numbers[RTOL], l.numbers[ATOL])
+        if not size < math.inf:
+            return STAGE_FAILED
+        if before < math.inf:
+            theta = size / before
+            if theta > DIVERGING and size > 100.0 * floor and level == 2:
+                return STAGE_FAILED
+        if size <= floor or (theta < 1.0 and size * theta <= KAPPA * (1.0 - theta)):
+            l.numbers[THETA] = max(0.5 * theta, 1e-3) if iteration == 0 else min(theta, 0.9)
+            for c in range(n):
+                ys[c] = y[c] + g * k[c]
+                xs[c] = x[c] + g * ys[c]
+            return 0
+        before = size
+    return STAGE_FAILED
+
+
+@callback(STEP)
+def implicit_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+    """One step of a method whose first stage is explicit; memory (stages + 1) 2n + 5n + 1."""
+    data = load(context)
+    w, l = data.work, data.linear
+    n = nx
+    x, y, yd, dx, dy = vector(x, n), vector(y, n), vector(yd, n), vector(dx, n), vector(dy, n)
+    tableau, memory = vector(tableau, ANY), vector(memory, ANY)
+    stages = int(tableau[0])
+    width = 2 + stages
+    predictor = tableau[1 + stages * width + stages + stages + 1 :]
+    scratch = memory[(stages + 1) * 2 * n :]
+    bx, by, f, low = memory[:n], memory[n : 2 * n], scratch[:n], scratch[n : 2 * n]
+    xs, y_before, k_before = scratch[2 * n : 3 * n], scratch[3 * n : 4 * n], scratch[4 * n : 5 * n]
+    h_before = t - l.numbers[T_BEFORE] if l.numbers[T_BEFORE] > -math.inf else 0.0
+    scratch[5 * n] = h_before
+    if h_before > 0.0:
+        for c in range(n):  # v = V^T (q - q0) wherever q is, so the point before is known in this chart
+            sx, sy = 0.0, 0.0
+            for j in range(w.q.size):
+                sx += w.V[j, c] * l.before[1, j]
+                sy += w.V[j, c] * l.before[2, j]
+            y_before[c], k_before[c] = sx, sy
+    copy(y, memory[2 * n : 3 * n])
+    copy(yd, memory[3 * n : 4 * n])
+    for i in range(1, stages):
+        row = tableau[1 + i * width :]
+        ys, k = memory[(1 + i) * 2 * n :][:n], memory[(1 + i) * 2 * n + n :][:n]
+        for c in range(n):
+            sx, sy, guess = 0.0, 0.0, 0.0
+            for j in range(i):
+                at = (1 + j) * 2 * n + c
+                sx += row[2 + j] * memory[at]
+                sy += row[2 + j] * memory[at + n]
+                guess += predictor[i * stages + j] * memory[at + n]
+            bx[c] = x[c] + h * sx
+            by[c] = y[c] + h * sy
+            k[c] = guess
+        if i == 1 and h_before > 0.0:  # along the line through the step before
+            ratio = row[1] * h / h_before
+            for c in range(n):
+                k[c] += ratio * (yd[c] - k_before[c])
+        status = _stage(
+            context, place, accelerate, w, l, t + h * row[1], h * row[2 + i], bx, by, k, xs, ys, f, low
+        )  # fmt: skip
+        if status != 0:
+            return status
+    weights = tableau[1 + stages * width :]
+    for c in range(n):
+        sx, sy = 0.0, 0.0
+        for j in range(stages):
+            at = (1 + j) * 2 * n + c
+            sx += weights[j] * memory[at]
+            sy += weights[j] * memory[at + n]
+        dx[c], dy[c] = h * sx, h * sy
+    return 0
+
+
+@callback(ERROR)
+def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
+    """The trapezoidal rule's -h^3 / 12 times the third derivatives of v and vd, by differences over two steps.
+
+    Nothing where there is no step before.
+    """
+    n = nx
+    memory, ex, ey = vector(memory, ANY), vector(ex, n), vector(ey, n)
+    before = memory[6 * n :]
+    h_before = before[5 * n]
+    for c in range(n):
+        ex[c], ey[c] = 0.0, 0.0
+        if h_before > 0.0:
+            for part, out in ((0, ex), (n, ey)):
+                now, end = memory[2 * n + part + c], memory[4 * n + part + c]
+                slope = (now - before[3 * n + part + c]) / h_before
+                out[c] = -h * h * ((end - now) - h * slope) / (6.0 * (h + h_before))
+    return 0

@@ -11,6 +11,7 @@ stiffness and damping at the present place, then, if that does not help, from ne
 
 import math
 
+from . import linearise, null_space
 from ._kernel import callback, caller, kernel, vector
 from .errors import Status
 from .linalg import copy
@@ -20,14 +21,17 @@ from .workspace import CHARTS, STAGE_ITERATIONS, load
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
 ITERATIONS = 15
-KAPPA = 0.01  # of the tolerance: what a stage's iteration may leave
-SLOW = 0.2  # contraction above which the iteration matrix is made anew
+KAPPA = 0.001  # of the tolerance: what a stage's iteration may leave
+SLOW = 0.1  # contraction above which the iteration matrix is made anew
+GUESS, LEAST = 0.3, 0.02  # contraction taken for granted where none has been measured
 DIVERGING = 0.9
 ROUNDING = 1e-15
 # Linear.kernels
 LINEARISE, REDUCE, FACTORISE, SOLVE, COMPLETE, ERROR_NORM, KERNELS = range(7)
 # Linear.numbers; CHART is the chart that P belongs to
 RTOL, ATOL, G, CHART, KNOWN, THETA, T_BEFORE, NUMBERS = range(8)
+
+FIXED_TOL = 1e-12  # of the iteration, where no tolerance sets the step
 
 call_linearise = caller("pd")
 call_reduce = caller("p")
@@ -54,10 +58,9 @@ def _matrix(context, w, l, t, g, f, anew):
 def _stage(context, place, accelerate, w, l, t, g, x, y, k, xs, ys, f, dx):
     """Solve one stage: x, y are its known parts, k the unknown, predicted on entry. xs, ys at the solution. Status."""
     n = k.size
-    before, level = math.inf, 0
     floor = ROUNDING / (l.numbers[RTOL] + l.numbers[ATOL])
-    theta = l.numbers[THETA]
-    for iteration in range(ITERATIONS):
+    before, level, theta, measured = math.inf, 0, l.numbers[THETA], False
+    for _ in range(ITERATIONS):
         for c in range(n):
             ys[c] = y[c] + g * k[c]
             xs[c] = x[c] + g * ys[c]
@@ -68,12 +71,11 @@ def _stage(context, place, accelerate, w, l, t, g, x, y, k, xs, ys, f, dx):
             return status
         w.counters[STAGE_ITERATIONS] += 1
         stale = l.numbers[CHART] != w.counters[CHARTS] or abs(g - l.numbers[G]) > 0.3 * g
-        if stale or (theta > SLOW and level < 2 and iteration > 0):
+        if stale or (measured and theta > SLOW and level < 2):
             level = 0 if stale else level + 1
-            status = _matrix(context, w, l, t, g, f, level == 2)
-            if status != 0:
+            if _matrix(context, w, l, t, g, f, level == 2) != 0:
                 return STAGE_FAILED
-            before = math.inf
+            before, theta, measured = math.inf, GUESS, False
         for c in range(n):
             f[c] -= k[c]
         call_solve(l.kernels[SOLVE], context, f)
@@ -85,11 +87,11 @@ def _stage(context, place, accelerate, w, l, t, g, x, y, k, xs, ys, f, dx):
         if not size < math.inf:
             return STAGE_FAILED
         if before < math.inf:
-            theta = size / before
+            theta, measured = size / before, True
             if theta > DIVERGING and size > 100.0 * floor and level == 2:
                 return STAGE_FAILED
         if size <= floor or (theta < 1.0 and size * theta <= KAPPA * (1.0 - theta)):
-            l.numbers[THETA] = max(0.5 * theta, 1e-3) if iteration == 0 else min(theta, 0.9)
+            l.numbers[THETA] = min(max(theta, LEAST), GUESS)
             for c in range(n):
                 ys[c] = y[c] + g * k[c]
                 xs[c] = x[c] + g * ys[c]
@@ -174,3 +176,21 @@ def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
                 slope = (now - before[3 * n + part + c]) / h_before
                 out[c] = -h * h * ((end - now) - h * slope) / (6.0 * (h + h_before))
     return 0
+
+
+def prepare_implicit(linear, method, run, margin):
+    """Give the step kernel its tolerances, the addresses it calls, and sight of the run's last points."""
+    tolerances = (FIXED_TOL, FIXED_TOL) if method.step else (method.rtol / margin, method.atol / margin)
+    linear.numbers[[RTOL, ATOL, THETA, T_BEFORE]] = *tolerances, GUESS, -math.inf
+    linear.kernels[:KERNELS] = [
+        f.address
+        for f in (
+            linearise.linearise,
+            linearise.reduce,
+            linearise.factorise,
+            linearise.solve,
+            null_space.complete,
+            null_space.error_norm,
+        )
+    ]
+    return linear._replace(now=run.now, before=run.before)

@@ -8,12 +8,13 @@ import numpy as np
 from ._kernel import address_of, caller, entry, kernel
 from .chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .errors import Status
+from .implicit import KNOWN, T_BEFORE
 from .linalg import copy
 from .stepping import call_accelerate, call_error, call_norm, call_place, call_step
 from .workspace import CONDITION, CONTRACTION
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
-STEP_COLLAPSED = int(Status.STEP_COLLAPSED)
+STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
 # addresses
 A_PLACE, A_ACCELERATE, A_COMPLETE, A_CHECK, A_CHART, A_STEP, A_ERROR, A_NORM = range(8)
@@ -21,7 +22,7 @@ A_PLACE, A_ACCELERATE, A_COMPLETE, A_CHECK, A_CHART, A_STEP, A_ERROR, A_NORM = r
 T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, CLOCKS = range(10)
 # numbers
 FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
-HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, NUMBERS = range(8, 14)
+HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, STAGE_AT, NUMBERS = range(8, 15)
 
 call_complete = caller("pp")
 call_check = caller("p")
@@ -342,6 +343,15 @@ def advance(c, r, at, most):
             _add(r.x, r.x_low, r.dx)
             _add(r.y, r.y_low, r.dy)
             status = _evaluate(context, w, at, t1, r.x, r.y, r.yd, r.xd)
+            if r.numbers[STAGE_AT] > 0:  # the stage's own accelerations: f would amplify what Newton has left
+                copy(r.memory[r.numbers[STAGE_AT] :][:ny], r.yd)
+                call_complete(at[A_COMPLETE], context, r.yd)
+        elif status == STAGE_FAILED and adaptive:
+            _restore_now(w, r)
+            c.linear.numbers[KNOWN] = 0.0
+            r.numbers[REJECTED] += 1
+            r.clock[H] = 0.25 * h
+            continue
         reason = 0
         if status == 0:
             reason = call_check(at[A_CHECK], context)
@@ -363,9 +373,10 @@ def advance(c, r, at, most):
             _go_back(r)
             continue
         row[2] = 1.0
-        if r.numbers[FIRST_ORDER] == 1:
+        if r.numbers[FIRST_ORDER] == 1 or r.numbers[STAGE_AT] > 0:
             for j in range(3):
                 copy(r.now[j], r.before[j])
+            c.linear.numbers[T_BEFORE] = t0
         _store_now(w, r)
         r.clock[T] = t1
         r.numbers[STEPS] = i + 1

@@ -9,6 +9,7 @@ from . import integrators as _integrators  # noqa: F401  (fills the registry)
 from .checks import finite_vector, floats, positive, whole
 from .errors import InconsistentState, InvalidArgument, SingularConfiguration, Status
 from .formulation import formulation as find_formulation
+from .implicit import prepare_implicit
 from .initial import consistent
 from .integrator import Integrator, registered
 from .progress import reporter
@@ -27,6 +28,7 @@ from .run import (
     NUMBERS,
     ROWS,
     RTOL,
+    STAGE_AT,
     STEPS,
     STEPS_WANTED,
     T_END,
@@ -39,6 +41,7 @@ from .run import (
 from .scene import Scene
 from .solution import Solution
 from .stepping import embedded_error
+from .system import with_curvatures
 from .workspace import Context, allocate, allocate_linear
 
 SLICE_SECONDS = 0.2  # how often a run comes back to Python: progress, interrupts
@@ -141,12 +144,19 @@ def simulate(
         q, qd = finite_vector(state.q, q.size, "state.q"), finite_vector(state.qd, q.size, "state.qd")
     q, qd = consistent(scene, system, q, qd, t0, initial_tol)
     m, n = system.segments.shape[0], q.size
+    if method.implicit:
+        system = with_curvatures(packed)
     system = system._replace(reals=system.reals.copy())
     work = allocate(n, m, len(scene.bodies), constraint_tol, packed.size)
     work.q[:], work.qd[:] = q, qd
     step_kernel, tableau, memory = method.kernel(form.first_order)
     nx = n if form.first_order else n - m
     run = _lay_out(work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order)
+    linear = allocate_linear(system, n, m, method.implicit)
+    if method.implicit:
+        linear = prepare_implicit(linear, method, run, MARGIN)
+        run.numbers[STAGE_AT] = (2 * len(method.tableau.c) + 1) * nx
+    context = Context(system, work, linear)
     run.clock[[T, T_ORIGIN, T_END, H]] = t0, t0, t1, (method.first_step or 0.0) if adaptive else method.step
     if adaptive:
         run.clock[[RTOL, ATOL]] = method.rtol / MARGIN, method.atol / MARGIN
@@ -157,9 +167,8 @@ def simulate(
     run.numbers[STEPS_WANTED] = steps
     run.numbers[INTERVAL] = interval
     addresses = [*form.addresses(), step_kernel.address]
-    addresses += [embedded_error.address, form.norm()] if adaptive else [0, 0]
+    addresses += [getattr(method, 'error_kernel', embedded_error).address, form.norm()] if adaptive else [0, 0]
     addresses = np.array(addresses, np.int64)
-    context = Context(system, work, allocate_linear(system, n, m, False))
     advance(context, run, addresses, 0)  # loads the driver, before the clock starts
     prepared = time.perf_counter()
     status, reason, chunks = _drive(context, run, addresses, max_steps, report, (t0, t1))

@@ -21,8 +21,11 @@ from .workspace import (
     CONTRACTION,
     EVALUATIONS,
     FACTORIZATIONS,
+    ITERATION_MATRICES,
+    JACOBIANS,
     NEWTON,
     PLACEMENTS,
+    STAGE_ITERATIONS,
 )
 
 NEARLY_SINGULAR = 0.05
@@ -97,6 +100,9 @@ class Solution:
             b_iterations=int(c[B_ITERATIONS]),
             charts=int(c[CHARTS]),
             factorizations=int(c[FACTORIZATIONS]),
+            jacobians=int(c[JACOBIANS]),
+            iteration_matrices=int(c[ITERATION_MATRICES]),
+            stage_iterations=int(c[STAGE_ITERATIONS]),
             seconds=seconds,
         )
         self.message = self._message(scene)  # now: the scene may change

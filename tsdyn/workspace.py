@@ -68,6 +68,10 @@ class Linear(NamedTuple):
     P: np.ndarray  # (k, k)  LU factors of D^T M D - g C_hat + g^2 K_hat; linearise.factorise
     b: np.ndarray  # (k,)  scratch
     pivots: np.ndarray  # int64 (k,)  row exchanges of P
+    now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point; the run's own array
+    before: np.ndarray  # (3, n)  at the one before; the run's own array
+    kernels: np.ndarray  # int64 (KERNELS,)  addresses, implicit.LINEARISE ... ERROR_NORM
+    numbers: np.ndarray  # (NUMBERS,)  implicit.RTOL ... T_BEFORE
 
 
 class Context(NamedTuple):
@@ -118,7 +122,10 @@ def allocate_linear(system, n, m, wanted):
         **dict.fromkeys(("K_hat", "C_hat", "P"), (k, k)),
         "b": (k,),
     }
-    return Linear(**{name: np.zeros(shape) for name, shape in shapes.items()}, pivots=np.zeros(k, np.int64))
+    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    empty = np.zeros((3, n))
+    whole = {"pivots": np.zeros(k, np.int64), "kernels": np.zeros(8, np.int64)}
+    return Linear(**arrays, **whole, now=empty, before=empty, numbers=np.zeros(8))
 
 
 def _example():

@@ -22,14 +22,16 @@ rotation linalg motion
 markers bodies tableau
 primitive
 system stepping progress
-assembly integrator constraints.*
+assembly interpolation constraints.*
+integrator
 workspace integrators.* constraints.__init__ integrators.__init__
-newton evaluate diagnostics reactions
+newton evaluate diagnostics reactions dense
 chart rank
 initial
 assemble
 null_space maggi_kane scene
 formulation run
+events drive
 solution
 simulate testing
 tables plots

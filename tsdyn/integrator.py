@@ -3,7 +3,9 @@
 from types import MappingProxyType
 
 from .checks import positive
-from .stepping import nystrom_step, runge_kutta_step, second_order_step
+from .interpolation import HERMITE, HERMITE_FIRST_ORDER
+from .stepping import embedded_error, nystrom_step, runge_kutta_step, second_embedded_error, second_order_step
+from .tableau import RungeKuttaTableau
 
 _registry = {}
 
@@ -20,11 +22,16 @@ class Integrator:
         Order of the error of v and vd at fixed time.
     step : float, s
         The fixed step; None for an adaptive run.
+    margin : float
+        How far below the tolerances one step's error is kept: errors of many steps add up.
+    errors : tuple of Callback
+        The kernels of the error estimate; a second one tempers the first (Hairer's combination of two orders).
     """
 
     order = 0
     embedded_order = 0  # of the error estimate; zero for a method that has none
     rtol = atol = max_step = first_step = None
+    margin, errors = 30.0, (embedded_error,)
 
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)
@@ -37,6 +44,10 @@ class Integrator:
     def kernel(self, first_order):
         """Return (step kernel, its numbers (float64), floats of memory it needs for systems of sizes nx, ny)."""
         raise NotImplementedError
+
+    def interpolant(self, first_order):
+        """Return the `Interpolant` of its steps; the one for every method uses their two ends alone."""
+        return HERMITE_FIRST_ORDER if first_order else HERMITE
 
     def __repr__(self):
         return f"{type(self).__name__}(step={self.step:g})"
@@ -64,7 +75,9 @@ class ExplicitRungeKutta(Integrator):
 
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)
-        cls.embedded_order = cls.tableau.embedded_order
+        if isinstance(cls.tableau, RungeKuttaTableau):  # and not one that is made when first used
+            cls.embedded_order = cls.tableau.embedded_order
+            cls.errors = (embedded_error, second_embedded_error)[: 2 if cls.tableau.second_error else 1]
 
     def __init__(self, rtol=1e-6, atol=1e-8, step=None, max_step=None, first_step=None):
         what = type(self).__name__

@@ -20,16 +20,21 @@ _cache errors _discovery jet checks
 _kernel
 rotation linalg motion
 markers bodies tableau
+curvature
 primitive
 system stepping progress
-assembly integrator constraints.*
-workspace integrators.* constraints.__init__ integrators.__init__
-newton evaluate diagnostics reactions
+assembly interpolation constraints.*
+workspace
+implicit
+integrator
+integrators.* constraints.__init__ integrators.__init__
+newton evaluate diagnostics reactions dense
 chart rank
 initial
 assemble
-null_space maggi_kane scene
+null_space maggi_kane linearise scene
 formulation run
+events drive
 solution
 simulate testing
 tables plots

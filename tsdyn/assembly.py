@@ -3,11 +3,10 @@
 import math
 
 from ._kernel import caller, entry, kernel
-from .motion import call_motion
 from .curvature import SIGNATURE as CURVATURE_SIGNATURE
+from .motion import call_motion
 from .primitive import call_kind
 from .system import COUNT, CURVATURE, FIRST_INT, FIRST_REAL, GAMMA, JACOBIAN, PHI, PHI_T, REALS
-
 
 call_curvature = caller(CURVATURE_SIGNATURE)
 
@@ -58,11 +57,12 @@ def acceleration_bias(s, q, qd, t, gamma):
 
 @kernel
 def constraint_curvature(s, q, qd, qdd, t, lam, K, G1, G2):
-    """K += (Phi_q^T lam)_q, G1 = (Phi_q qd + Phi_t)_q, G2 = (Phi_q qdd + gamma)_q; entries off the segments are left."""
+    """K += (Phi_q^T lam)_q, G1 = (Phi_q qd + Phi_t)_q, G2 = (Phi_q qdd + gamma)_q; zero G1, G2 once."""
     for i in range(s.kinds.shape[0]):
         table, reals = s.table[s.kinds[i, FIRST_INT] :], s.reals[s.kinds[i, FIRST_REAL] :]
         call_curvature(
-            s.kinds[i, CURVATURE], s.kinds[i, COUNT], s.kinds[i, REALS], table, reals, q, qd, qdd, t, lam, q.size, K, G1, G2
+            s.kinds[i, CURVATURE], s.kinds[i, COUNT], s.kinds[i, REALS], table, reals,
+            q, qd, qdd, t, lam, q.size, K, G1, G2,
         )  # fmt: skip
 
 

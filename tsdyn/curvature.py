@@ -58,6 +58,7 @@ def _push(code, dimension, at, q, w, s, x):
 
 
 def loop(count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2):
+    """Template of the loop over all instances; the names in capitals and kernel_* are filled in by primitive.py."""
     table, reals, lam = integers(table, ANY), vector(reals, ANY), vector(lam, ANY)
     q, qd, qdd = vector(q, n), vector(qd, n), vector(qdd, n)
     K, G1, G2 = matrix(K, n, n), vector(G1, ANY), vector(G2, ANY)

@@ -60,7 +60,9 @@ class Status(IntEnum):
     CHART_LOST = 7
     STEP_COLLAPSED = 8
     SLICE_DONE = 9
-    STAGE_FAILED = 10
+    EVENT = 10
+    EVENT_FAILED = 11
+    STAGE_FAILED = 12
 
     def __str__(self):
         return self.name.lower()
@@ -112,5 +114,7 @@ _SENTENCES = {
     ),
     Status.MAX_STEPS: ("The run reached max_steps.", "Raise max_steps, or take a larger step."),
     Status.INTERRUPTED: ("The run was interrupted.", "Go on with simulate(scene, (t, t_end), state=solution.state)."),
+    Status.EVENT: ("A terminal event ended the run.", ""),
+    Status.EVENT_FAILED: ("An event function gave no number.", "Mend it, or return a finite float for every state."),
     Status.SLICE_DONE: ("A slice of the run is done.", ""),
 }

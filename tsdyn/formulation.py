@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from types import ModuleType
 
-from . import maggi_kane, null_space
+from . import linearise, maggi_kane, null_space
 from .errors import InvalidArgument
 
 
@@ -20,6 +20,11 @@ class Formulation:
         complete = null_space.complete  # qdd = D vdd - U B gamma in every form
         k = self.kernels
         return [f.address for f in (k.place, k.accelerate, complete, k.check, k.start_chart)]
+
+    def implicit(self):
+        """Addresses that implicit methods need, in the order of implicit.LINEARISE ... ERROR_NORM."""
+        kernels = linearise.linearise, linearise.reduce, linearise.factorise, linearise.solve, null_space.complete
+        return [f.address for f in (*kernels, self.kernels.error_norm)]
 
     def norm(self):
         """Address of the error norm, for adaptive methods."""

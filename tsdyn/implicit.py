@@ -11,7 +11,6 @@ stiffness and damping at the present place, then, if that does not help, from ne
 
 import math
 
-from . import linearise, null_space
 from ._kernel import callback, caller, kernel, vector
 from .errors import Status
 from .linalg import copy
@@ -21,7 +20,7 @@ from .workspace import CHARTS, STAGE_ITERATIONS, load
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
 ITERATIONS = 15
-KAPPA = 0.001  # of the tolerance: what a stage's iteration may leave
+KAPPA = 0.001  # of what a step may be off by: what a stage's iteration may leave
 SLOW = 0.1  # contraction above which the iteration matrix is made anew
 GUESS, LEAST = 0.3, 0.02  # contraction taken for granted where none has been measured
 DIVERGING = 0.9
@@ -178,19 +177,9 @@ def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
     return 0
 
 
-def prepare_implicit(linear, method, run, margin):
+def prepare_implicit(linear, method, addresses, run):
     """Give the step kernel its tolerances, the addresses it calls, and sight of the run's last points."""
-    tolerances = (FIXED_TOL, FIXED_TOL) if method.step else (method.rtol / margin, method.atol / margin)
+    tolerances = (FIXED_TOL, FIXED_TOL) if method.step else method.step_tolerances()
     linear.numbers[[RTOL, ATOL, THETA, T_BEFORE]] = *tolerances, GUESS, -math.inf
-    linear.kernels[:KERNELS] = [
-        f.address
-        for f in (
-            linearise.linearise,
-            linearise.reduce,
-            linearise.factorise,
-            linearise.solve,
-            null_space.complete,
-            null_space.error_norm,
-        )
-    ]
+    linear.kernels[:KERNELS] = addresses
     return linear._replace(now=run.now, before=run.before)

@@ -4,7 +4,9 @@ from types import MappingProxyType
 
 from .checks import positive
 from .implicit import implicit_step
-from .stepping import embedded_error, nystrom_step, runge_kutta_step, second_order_step
+from .interpolation import HERMITE, HERMITE_FIRST_ORDER
+from .stepping import embedded_error, nystrom_step, runge_kutta_step, second_embedded_error, second_order_step
+from .tableau import RungeKuttaTableau
 
 _registry = {}
 
@@ -21,12 +23,17 @@ class Integrator:
         Order of the error of v and vd at fixed time.
     step : float, s
         The fixed step; None for an adaptive run.
+    margin : float
+        How far below the tolerances one step's error is kept: errors of many steps add up.
+    errors : tuple of Callback
+        The kernels of the error estimate; a second one tempers the first (Hairer's combination of two orders).
     """
 
     order = 0
     embedded_order = 0  # of the error estimate; zero for a method that has none
-    rtol = atol = max_step = first_step = None
     implicit = False
+    rtol = atol = max_step = first_step = None
+    margin, errors = 30.0, (embedded_error,)
 
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)
@@ -39,6 +46,10 @@ class Integrator:
     def kernel(self, first_order):
         """Return (step kernel, its numbers (float64), floats of memory it needs for systems of sizes nx, ny)."""
         raise NotImplementedError
+
+    def interpolant(self, first_order):
+        """Return the `Interpolant` of its steps; the one for every method uses their two ends alone."""
+        return HERMITE_FIRST_ORDER if first_order else HERMITE
 
     def __repr__(self):
         return f"{type(self).__name__}(step={self.step:g})"
@@ -59,14 +70,8 @@ class ExplicitNystrom(Integrator):
         return nystrom_step, tableau.packed(), lambda nx, ny: (stages + 2) * nx
 
 
-class ExplicitRungeKutta(Integrator):
-    """A method that is a `RungeKuttaTableau` with an error estimate, applied to (v, vd); adaptive, or fixed in step."""
-
-    tableau = None
-
-    def __init_subclass__(cls, **keywords):
-        super().__init_subclass__(**keywords)
-        cls.embedded_order = cls.tableau.embedded_order
+class Adaptive(Integrator):
+    """A method that chooses its steps by an error estimate, unless it is given a fixed one."""
 
     def __init__(self, rtol=1e-6, atol=1e-8, step=None, max_step=None, first_step=None):
         what = type(self).__name__
@@ -75,19 +80,35 @@ class ExplicitRungeKutta(Integrator):
         self.max_step = None if max_step is None else positive(max_step, f"{what}: max_step (s)")
         self.first_step = None if first_step is None else positive(first_step, f"{what}: first_step (s)")
 
-    def kernel(self, first_order):
-        """The tableau, packed, and the kernel that steps by it."""
-        stages = len(self.tableau.c)
-        step = runge_kutta_step if first_order else second_order_step
-        return step, self.tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny)
+    def step_tolerances(self):
+        """Return (rtol, atol) that each step's error is held to."""
+        return self.rtol / self.margin, self.atol / self.margin
 
     def __repr__(self):
         settings = f"rtol={self.rtol:g}, atol={self.atol:g}" if self.step is None else f"step={self.step:g}"
         return f"{type(self).__name__}({settings})"
 
 
-class DiagonallyImplicit(Integrator):
-    """A method that is an `ImplicitTableau`: adaptive, or fixed in step; it serves the tangent-space form.
+class ExplicitRungeKutta(Adaptive):
+    """A method that is a `RungeKuttaTableau` with an error estimate, applied to (v, vd)."""
+
+    tableau = None
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        if isinstance(cls.tableau, RungeKuttaTableau):  # and not one that is made when first used
+            cls.embedded_order = cls.tableau.embedded_order
+            cls.errors = (embedded_error, second_embedded_error)[: 2 if cls.tableau.second_error else 1]
+
+    def kernel(self, first_order):
+        """The tableau, packed, and the kernel that steps by it."""
+        stages = len(self.tableau.c)
+        step = runge_kutta_step if first_order else second_order_step
+        return step, self.tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny)
+
+
+class DiagonallyImplicit(Adaptive):
+    """A method that is an `ImplicitTableau`; it serves the tangent-space form.
 
     One stiffness and damping, exact, and one factorised iteration matrix are kept over iterations, stages, steps and
     charts until the measured contraction says otherwise.
@@ -98,26 +119,12 @@ class DiagonallyImplicit(Integrator):
 
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)
-        if cls.tableau is not None:
-            cls.embedded_order = cls.tableau.embedded_order
-
-    def __init__(self, rtol=1e-6, atol=1e-8, step=None, max_step=None, first_step=None):
-        what = type(self).__name__
-        self.rtol, self.atol = positive(rtol, f"{what}: rtol"), positive(atol, f"{what}: atol")
-        self.step = None if step is None else positive(step, f"{what}: step (s)")
-        self.max_step = None if max_step is None else positive(max_step, f"{what}: max_step (s)")
-        self.first_step = None if first_step is None else positive(first_step, f"{what}: first_step (s)")
+        cls.embedded_order = cls.tableau.embedded_order
 
     def kernel(self, first_order):
         """The tableau, packed, and the kernel that steps by it."""
         stages = len(self.tableau.c)
         return implicit_step, self.tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny) + 5 * nx + 1
-
-    error_kernel = embedded_error
-
-    def __repr__(self):
-        settings = f"rtol={self.rtol:g}, atol={self.atol:g}" if self.step is None else f"step={self.step:g}"
-        return f"{type(self).__name__}({settings})"
 
 
 def registered():

@@ -7,26 +7,47 @@ import numpy as np
 
 from ._kernel import address_of, caller, entry, kernel
 from .chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
+from .dense import (
+    A_ACCELERATE,
+    A_CHART,
+    A_CHECK,
+    A_COMPLETE,
+    A_ERROR,
+    A_ERROR_2,
+    A_FILL,
+    A_NORM,
+    A_PLACE,
+    A_STEP,
+    B_CHART,
+    B_DATA,
+    B_END,
+    B_H,
+    B_START,
+    between,
+    bring_back,
+    call_chart,
+    call_complete,
+    evaluate,
+    keep,
+)
 from .errors import Status
 from .implicit import KNOWN, T_BEFORE
+from .interpolation import call_fill
 from .linalg import copy
-from .stepping import call_accelerate, call_error, call_norm, call_place, call_step
+from .stepping import call_error, call_norm, call_step
 from .workspace import CONDITION, CONTRACTION
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
-# addresses
-A_PLACE, A_ACCELERATE, A_COMPLETE, A_CHECK, A_CHART, A_STEP, A_ERROR, A_NORM = range(8)
 # clock
 T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, CLOCKS = range(10)
 # numbers
 FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
-HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, STAGE_AT, NUMBERS = range(8, 15)
+HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, DENSE, BLOCKS, STAGE_AT, NUMBERS = range(8, 17)
+FILLED, STORED = 1, 2  # DENSE: every step's block is made, and kept
 
-call_complete = caller("pp")
 call_check = caller("p")
-call_chart = caller("pdpppp")
 
 
 class Run(NamedTuple):
@@ -48,7 +69,7 @@ class Run(NamedTuple):
     y_low_old: np.ndarray  # (ny,)
     now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point
     before: np.ndarray  # (3, n)  at the one before; kept for a first-order system
-    warm: np.ndarray  # copy of u, B, T and v while dense output moves them
+    warm: np.ndarray  # what `dense.keep` copies while dense output moves it
     xs: np.ndarray  # (nx,)  dense output and the guess of a first step
     ys: np.ndarray  # (ny,)
     yds: np.ndarray  # (ny,)
@@ -56,10 +77,13 @@ class Run(NamedTuple):
     memory: np.ndarray  # the method's scratch
     t_eval: np.ndarray  # output times, or empty: every step
     clock: np.ndarray  # T ... ERROR_BEFORE
-    numbers: np.ndarray  # int64, FIRST_ORDER ... REJECTED_LAST
+    numbers: np.ndarray  # int64, FIRST_ORDER ... STAGE_AT (where an implicit method leaves its last stage, or 0)
     out: np.ndarray  # (rows, 1 + 3 n)  t, q, qd, qdd
     history: np.ndarray  # (rows, 3)  t, h, accepted
     charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left
+    points: np.ndarray  # (rows, n)  q0 of each chart, or (0, n) where nothing asks for it
+    block: np.ndarray  # the present step's: start, h, end, chart, the interpolant's data
+    blocks: np.ndarray  # (rows, block)  those of accepted steps
 
 
 @kernel
@@ -90,24 +114,9 @@ def _begin_chart(context, w, r, at, reason):
         r.x_low[j] = 0.0
     for j in range(r.y.size):
         r.y_low[j] = 0.0
+    if r.points.shape[0] > 0:
+        copy(w.q, r.points[i])
     return call_chart(at[A_CHART], context, r.clock[T], r.x, r.y, r.yd, r.xd)
-
-
-@kernel
-def _evaluate(context, w, at, t, x, y, yd, xd):
-    """q, qd, qdd, yd (and xd) at (t, x, y). Status."""
-    status = call_place(at[A_PLACE], context, t, x)
-    if status == 0:
-        status = call_accelerate(at[A_ACCELERATE], context, t, y, yd, xd)
-    if status == 0:
-        status = call_complete(at[A_COMPLETE], context, yd)
-    if status == 0:
-        total = 0.0
-        for i in range(w.q.size):
-            total += abs(w.q[i]) + abs(w.qd[i]) + abs(w.qdd[i])
-        if not total < math.inf:
-            return NOT_FINITE
-    return status
 
 
 @kernel
@@ -118,85 +127,6 @@ def _record(r, t, q, qd, qdd):
     for j in range(n):
         row[1 + j], row[1 + n + j], row[1 + 2 * n + j] = q[j], qd[j], qdd[j]
     r.numbers[ROWS] = i + 1
-
-
-@kernel
-def _hermite(s, h, a, ad, add, b, bd, bdd, out, outd):
-    """Quintic Hermite interpolation at s in (0, 1) of a step h, and its derivative."""
-    s2 = s * s
-    s3 = s2 * s
-    f = s3 * (10.0 + s * (6.0 * s - 15.0))
-    fd = 30.0 * s2 * (1.0 + s * (s - 2.0)) / h
-    g0, g0d = s + s3 * (s * (8.0 - 3.0 * s) - 6.0), 1.0 + s2 * (s * (32.0 - 15.0 * s) - 18.0)
-    g1, g1d = s3 * (s * (7.0 - 3.0 * s) - 4.0), s2 * (s * (28.0 - 15.0 * s) - 12.0)
-    k0, k0d = 0.5 * (s2 - s3 * (3.0 + s * (s - 3.0))), s + 0.5 * s2 * (s * (12.0 - 5.0 * s) - 9.0)
-    k1, k1d = 0.5 * s3 * (1.0 + s * (s - 2.0)), 0.5 * s2 * (3.0 + s * (5.0 * s - 8.0))
-    for i in range(a.size):
-        step = b[i] - a[i]
-        out[i] = a[i] + f * step + h * (g0 * ad[i] + g1 * bd[i]) + h * h * (k0 * add[i] + k1 * bdd[i])
-        outd[i] = fd * step + g0d * ad[i] + g1d * bd[i] + h * (k0d * add[i] + k1d * bdd[i])
-
-
-@kernel
-def _cubic(s, h, a, ad, b, bd, out):
-    """Cubic Hermite interpolation."""
-    f = s * s * (3.0 - 2.0 * s)
-    g0, g1 = s * (s - 1.0) * (s - 1.0), s * s * (s - 1.0)
-    for i in range(a.size):
-        out[i] = a[i] + f * (b[i] - a[i]) + h * (g0 * ad[i] + g1 * bd[i])
-
-
-@kernel
-def _warm(w, r, store):
-    """Keep, or bring back, what the Newton solvers start from, so that outputs never change the steps."""
-    i = 0
-    for part in (w.u, w.v):
-        for j in range(part.size):
-            if store:
-                r.warm[i] = part[j]
-            else:
-                part[j] = r.warm[i]
-            i += 1
-    for part in (w.B, w.T):
-        for a in range(part.shape[0]):
-            for b in range(part.shape[1]):
-                if store:
-                    r.warm[i] = part[a, b]
-                else:
-                    part[a, b] = r.warm[i]
-                i += 1
-
-
-@kernel
-def _outputs(context, w, r, at, t0, h, t1):
-    """Record what t_eval asks for in (t0, t1], or the step's end where it asks for nothing. Status."""
-    if r.t_eval.size == 0:
-        _record(r, t1, w.q, w.qd, w.qdd)
-        return 0
-    stored = False
-    while r.numbers[NEXT_EVAL] < r.t_eval.size and r.t_eval[r.numbers[NEXT_EVAL]] <= t1:
-        t = r.t_eval[r.numbers[NEXT_EVAL]]
-        r.numbers[NEXT_EVAL] += 1
-        if t == t1:
-            _record(r, t1, r.now[0], r.now[1], r.now[2])
-            continue
-        if not stored:
-            stored = True
-            _warm(w, r, True)
-        s = (t - t0) / h
-        if r.numbers[FIRST_ORDER] == 1:
-            a, b = r.before, r.now
-            _hermite(s, h, a[0], a[1], a[2], b[0], b[1], b[2], r.xs, r.dx)
-            _cubic(s, h, r.y_old, r.yd_old, r.y, r.yd, r.ys)
-        else:
-            _hermite(s, h, r.x_old, r.y_old, r.yd_old, r.x, r.y, r.yd, r.xs, r.ys)
-        status = _evaluate(context, w, at, t, r.xs, r.ys, r.yds, r.dx)  # xd is the next step's
-        if status != 0:
-            return status
-        _record(r, t, w.q, w.qd, w.qdd)
-    if stored:
-        _warm(w, r, False)
-    return 0
 
 
 @kernel
@@ -214,11 +144,59 @@ def _restore_now(w, r):
 
 
 @kernel
+def _wanted_within(r, t1):
+    """Whether the step's inside is asked for."""
+    i = r.numbers[NEXT_EVAL]
+    return r.numbers[DENSE] != 0 or (i < r.t_eval.size and r.t_eval[i] < t1)
+
+
+@kernel
+def _fill(context, w, r, at, t0, h, t1):
+    """The block of the step just made. Status."""
+    r.block[B_START], r.block[B_H], r.block[B_END], r.block[B_CHART] = t0, h, t1, r.numbers[CHART_ROWS]
+    status = call_fill(
+        at[A_FILL], context, at[A_PLACE], at[A_ACCELERATE], r.numbers[FIRST_ORDER], t0, h, w.q.size, r.x.size, r.y.size,
+        r.x_old, r.y_old, r.yd_old, r.x, r.y, r.yd, r.xd, r.before, r.now, r.tableau, r.memory, r.block[B_DATA:],
+    )  # fmt: skip
+    if status == 0 and r.numbers[DENSE] == STORED:
+        copy(r.block, r.blocks[r.numbers[BLOCKS]])
+        r.numbers[BLOCKS] += 1
+    return status
+
+
+@kernel
+def _outputs(context, w, r, at, t0, h, t1):
+    """Record what t_eval asks for in (t0, t1], or the step's end where it asks for nothing. Status."""
+    if r.t_eval.size == 0:
+        _record(r, t1, w.q, w.qd, w.qdd)
+    within = _wanted_within(r, t1)
+    if within:
+        keep(w, r.warm)
+        status = _fill(context, w, r, at, t0, h, t1)
+        if status != 0:
+            return status
+    while r.numbers[NEXT_EVAL] < r.t_eval.size and r.t_eval[r.numbers[NEXT_EVAL]] <= t1:
+        t = r.t_eval[r.numbers[NEXT_EVAL]]
+        r.numbers[NEXT_EVAL] += 1
+        if t == t1:
+            _record(r, t1, r.now[0], r.now[1], r.now[2])
+            continue
+        status = between(context, w, at, t, r.block, r.xs, r.ys, r.yds, r.dx)  # xd is the next step's
+        if status != 0:
+            return status
+        _record(r, t, w.q, w.qd, w.qdd)
+    if within:
+        bring_back(w, r.warm)
+        _restore_now(w, r)
+    return 0
+
+
+@kernel
 def _begin(context, w, r, at):
     """The first chart, the accelerations there, and the first output. Status."""
     status = _begin_chart(context, w, r, at, AT_START)
     if status == 0:
-        status = _evaluate(context, w, at, r.clock[T], r.x, r.y, r.yd, r.xd)
+        status = evaluate(context, w, at, r.clock[T], r.x, r.y, r.yd, r.xd)
     if status == 0:
         _store_now(w, r)
         call_check(at[A_CHECK], context)
@@ -249,7 +227,7 @@ def _first_step(context, w, r, at):
         r.xs[i] = r.x[i] + h * first[i]
     for i in range(r.y.size):
         r.ys[i] = r.y[i] + h * r.yd[i]
-    if _evaluate(context, w, at, r.clock[T] + h, r.xs, r.ys, r.yds, r.dx) != 0:
+    if evaluate(context, w, at, r.clock[T] + h, r.xs, r.ys, r.yds, r.dx) != 0:
         return h
     second = r.dx if r.numbers[FIRST_ORDER] == 1 else r.ys
     for i in range(r.x.size):
@@ -278,6 +256,11 @@ def _accept(context, w, r, at, h):
     end = r.xd if r.numbers[FIRST_ORDER] == 1 else r.y
     call_error(at[A_ERROR], h, r.x.size, r.y.size, end, r.yd, r.tableau, r.memory, r.dx, r.dy)
     error = call_norm(at[A_NORM], context, r.dx, r.dy, r.now, r.clock[RTOL], r.clock[ATOL])
+    if at[A_ERROR_2] != 0:  # Hairer's combination of two orders; nan stays nan
+        call_error(at[A_ERROR_2], h, r.x.size, r.y.size, end, r.yd, r.tableau, r.memory, r.dx, r.dy)
+        second = call_norm(at[A_NORM], context, r.dx, r.dy, r.now, r.clock[RTOL], r.clock[ATOL])
+        if error != 0.0:
+            error *= error / math.hypot(error, 0.1 * second)
     power = r.clock[EXPONENT]
     if not error <= 1.0:
         factor = SAFETY * error**-power if error < math.inf else SHRINK
@@ -297,13 +280,13 @@ def _accept(context, w, r, at, h):
 def advance(c, r, at, most):
     """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or why it stopped.
 
-    The first call that may make a step begins the run.
+    The first call, but one with most = 0, begins the run; with most = -1 it does no more.
     """
     context = address_of(c)
     w = c.work
     nx, ny = r.x.size, r.y.size
-    adaptive = r.numbers[ADAPTIVE] == 1
-    if r.numbers[BEGUN] == 0 and most > 0:
+    adaptive, implicit = r.numbers[ADAPTIVE] == 1, r.numbers[STAGE_AT] > 0
+    if r.numbers[BEGUN] == 0 and most != 0:
         status = _begin(context, w, r, at)
         if status != 0:
             return status
@@ -342,8 +325,8 @@ def advance(c, r, at, most):
         if status == 0:
             _add(r.x, r.x_low, r.dx)
             _add(r.y, r.y_low, r.dy)
-            status = _evaluate(context, w, at, t1, r.x, r.y, r.yd, r.xd)
-            if r.numbers[STAGE_AT] > 0:  # the stage's own accelerations: f would amplify what Newton has left
+            status = evaluate(context, w, at, t1, r.x, r.y, r.yd, r.xd)
+            if implicit:  # the last stage's own accelerations: f would amplify what its iteration has left
                 copy(r.memory[r.numbers[STAGE_AT] :][:ny], r.yd)
                 call_complete(at[A_COMPLETE], context, r.yd)
         elif status == STAGE_FAILED and adaptive:
@@ -373,7 +356,7 @@ def advance(c, r, at, most):
             _go_back(r)
             continue
         row[2] = 1.0
-        if r.numbers[FIRST_ORDER] == 1 or r.numbers[STAGE_AT] > 0:
+        if implicit or r.numbers[FIRST_ORDER] == 1:
             for j in range(3):
                 copy(r.now[j], r.before[j])
             c.linear.numbers[T_BEFORE] = t0

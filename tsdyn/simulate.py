@@ -1,4 +1,4 @@
-"""`simulate`: check everything, lay out the memory, run the driver in slices, hand back a Solution."""
+"""`simulate`: check everything, lay out the memory, run the driver, hand back a Solution."""
 
 import math
 import time
@@ -7,46 +7,38 @@ import numpy as np
 
 from . import integrators as _integrators  # noqa: F401  (fills the registry)
 from .checks import finite_vector, floats, positive, whole
-from .errors import InconsistentState, InvalidArgument, SingularConfiguration, Status
+from .dense import Reader, Trajectory
+from .drive import drive, lay_out
+from .errors import InvalidArgument
+from .events import Watch, prepare
 from .formulation import formulation as find_formulation
 from .implicit import prepare_implicit
 from .initial import consistent
 from .integrator import Integrator, registered
+from .interpolation import hermite_second
 from .progress import reporter
 from .run import (
     ADAPTIVE,
     ATOL,
-    BEGUN,
-    CHART_ROWS,
-    CLOCKS,
     ERROR_BEFORE,
     EXPONENT,
-    FIRST_ORDER,
-    HISTORY,
+    FILLED,
     INTERVAL,
     MAX_STEP,
-    NUMBERS,
-    ROWS,
     RTOL,
     STAGE_AT,
-    STEPS,
     STEPS_WANTED,
+    STORED,
     T_END,
     T_ORIGIN,
     H,
-    Run,
     T,
     advance,
 )
 from .scene import Scene
 from .solution import Solution
-from .stepping import embedded_error
 from .system import with_curvatures
 from .workspace import Context, allocate, allocate_linear
-
-SLICE_SECONDS = 0.2  # how often a run comes back to Python: progress, interrupts
-MARGIN = 30.0  # of one step's error below the tolerances: errors of many steps add up
-FIRST_SLICE, LARGEST_SLICE, CHART_ROOM = 1024, 1 << 17, 4096
 
 
 def simulate(
@@ -91,8 +83,13 @@ def simulate(
     t_eval : array_like, s, optional
         Increasing output times within t_span, from dense output on the manifold, which never changes the steps;
         None gives every accepted step and both ends.
-    dense_output, events
-        Not there yet: refused.
+    dense_output : bool
+        Keep every step's interpolant, for `solution.at(t)` at any time.
+    events : callable or list of callables, optional
+        f(t, state) -> float, state being a `State`; each change of its sign is found on the manifold and recorded in
+        `solution.t_events`, which never changes the steps. As for scipy.integrate.solve_ivp, an attribute
+        `direction` > 0 or < 0 restricts to rising or falling ones, and `terminal` = True, or a number of occurrences,
+        ends the run there.
     max_steps : int, optional
         End the run after so many steps.
     progress : bool or callable, optional
@@ -119,12 +116,19 @@ def simulate(
     t0, t1 = _interval(t_span)
     method = _method(integrator, rtol, atol)
     form = find_formulation(formulation)
+    if method.implicit and form.first_order:
+        others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
+        raise InvalidArgument(
+            f"{type(method).__name__} solves its stages in the tangent-space form only; formulation={form.name!r} is "
+            f"served by {others}."
+        )
     constraint_tol = positive(constraint_tol, "constraint_tol")
     initial_tol = positive(initial_tol, "initial_tol")
     if redundancy != "refuse":
         raise InvalidArgument(f"redundancy must be 'refuse', got {redundancy!r}; other policies don't exist yet.")
-    if dense_output or events is not None:
-        raise InvalidArgument("dense_output and events are not there yet; give the times of output as t_eval.")
+    if not isinstance(dense_output, (bool, np.bool_)):
+        raise InvalidArgument(f"dense_output must be True or False, got {dense_output!r}.")
+    events = prepare(events)
     times = _output_times(t_eval, t0, t1)
     adaptive = method.step is None
     steps = 2**62 if adaptive else _step_count(t0, t1, method.step)
@@ -151,28 +155,39 @@ def simulate(
     work.q[:], work.qd[:] = q, qd
     step_kernel, tableau, memory = method.kernel(form.first_order)
     nx = n if form.first_order else n - m
-    run = _lay_out(work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order)
-    linear = allocate_linear(system, n, m, method.implicit)
-    if method.implicit:
-        linear = prepare_implicit(linear, method, run, MARGIN)
-        run.numbers[STAGE_AT] = (2 * len(method.tableau.c) + 1) * nx
-    context = Context(system, work, linear)
+    interpolant = method.interpolant(form.first_order)
+    width = interpolant.size(n, nx, n - m)
+    dense = STORED if dense_output else FILLED if events is not None else 0
+    run = lay_out(work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order, width, dense)
     run.clock[[T, T_ORIGIN, T_END, H]] = t0, t0, t1, (method.first_step or 0.0) if adaptive else method.step
     if adaptive:
-        run.clock[[RTOL, ATOL]] = method.rtol / MARGIN, method.atol / MARGIN
+        run.clock[[RTOL, ATOL]] = method.step_tolerances()
         run.clock[MAX_STEP] = method.max_step or np.inf
         run.clock[[EXPONENT, ERROR_BEFORE]] = 1.0 / (method.embedded_order + 1), 1.0
         run.numbers[ADAPTIVE] = 1
     run.now[:2] = q, qd
     run.numbers[STEPS_WANTED] = steps
     run.numbers[INTERVAL] = interval
-    addresses = [*form.addresses(), step_kernel.address]
-    addresses += [getattr(method, 'error_kernel', embedded_error).address, form.norm()] if adaptive else [0, 0]
+    errors = [kernel.address for kernel in method.errors] if adaptive else []
+    errors += [0] * (2 - len(errors))
+    addresses = [*form.addresses(), step_kernel.address, *errors, form.norm() if adaptive else 0]
+    addresses += [kernel.address for kernel in interpolant[:2]] if dense or times.size else [0, 0]
+    addresses.append(hermite_second.address if method.implicit and (dense or times.size) else 0)
     addresses = np.array(addresses, np.int64)
+    linear = allocate_linear(system, n, m, method.implicit)
+    if method.implicit:
+        linear = prepare_implicit(linear, method, form.implicit(), run)
+        run.numbers[STAGE_AT] = (2 * len(method.tableau.c) + 1) * nx
+    context = Context(system, work, linear)
     advance(context, run, addresses, 0)  # loads the driver, before the clock starts
+    sizes = n, m, len(scene.bodies), constraint_tol, packed.size, nx
+    watch = None if events is None else Watch(events, packed.system, Reader(packed.system, sizes, addresses), t0)
     prepared = time.perf_counter()
-    status, reason, chunks = _drive(context, run, addresses, max_steps, report, (t0, t1))
+    status, reason, chunks = drive(context, run, addresses, max_steps, report, (t0, t1), watch)
     ended = time.perf_counter()
+    trajectory = None
+    if dense_output:
+        trajectory = Trajectory(packed.system, sizes, addresses, *chunks["dense"], t0, np.array([*run.now]))
     return Solution(
         scene,
         packed,
@@ -184,94 +199,9 @@ def simulate(
         run=run,
         work=work,
         chunks=chunks,
+        trajectory=trajectory,
+        events=None if watch is None else watch.found(n),
         seconds={"prepare": prepared - started, "run": ended - prepared},
-    )
-
-
-def _drive(context, run, addresses, max_steps, report, span):
-    """Run slice by slice; returns the status, why it was interrupted, and rows of outputs, history and charts."""
-    chunks = {"out": [], "history": []}
-    most, limit = FIRST_SLICE, int(run.numbers[STEPS_WANTED]) if max_steps is None else max_steps
-    per_step = run.t_eval.size == 0
-    width = 1 + 3 * context.work.q.size
-
-    def fresh(run, rows):
-        """New arrays for the next slice; what the last one filled goes to the chunks."""
-        _collect(run, chunks, per_step)
-        changes = {"history": np.empty((rows, 3))}
-        if per_step:
-            changes["out"] = np.empty((rows + 1, width))
-        if run.numbers[CHART_ROWS] + CHART_ROOM > run.charts.shape[0]:
-            changes["charts"] = np.resize(run.charts, (2 * run.charts.shape[0], 5))
-        return run._replace(**changes)
-
-    status, reason = Status.SLICE_DONE, ""
-    try:
-        run = fresh(run, min(most, limit))
-        while status == Status.SLICE_DONE:
-            done = int(run.numbers[STEPS])
-            if done >= limit:
-                status = Status.MAX_STEPS
-                break
-            started = time.perf_counter()
-            rows = min(most, limit - done)
-            status = Status(advance(context, run, addresses, rows))
-            seconds = time.perf_counter() - started
-            if not run.numbers[BEGUN]:
-                singular = status in (Status.SINGULAR, Status.MASS_SINGULAR)
-                kind = SingularConfiguration if singular else InconsistentState
-                raise kind(f"no step could be made from the start. {status.sentence} {status.remedy}")
-            if seconds < SLICE_SECONDS / 2:
-                most = min(2 * most, LARGEST_SLICE)
-            elif seconds > 2 * SLICE_SECONDS:
-                most = max(most // 2, 1)
-            try:
-                report((run.clock[T] - span[0]) / (span[1] - span[0]))
-            except Exception as error:  # what has been computed is worth more than a progress bar
-                if status == Status.SLICE_DONE:
-                    status, reason = Status.INTERRUPTED, f"progress raised {type(error).__name__}: {error}."
-            run = fresh(run, min(most, max(limit - int(run.numbers[STEPS]), 1)))
-    except KeyboardInterrupt:
-        if run.clock[T] >= span[1]:
-            status = Status.SUCCESS
-        elif status == Status.SLICE_DONE:
-            status = Status.INTERRUPTED
-    finally:
-        report(None)
-    _collect(run, chunks, per_step)
-    chunks["charts"] = run.charts
-    if not per_step:
-        chunks["out"] = [run.out[: run.numbers[ROWS]]]
-    return status, reason, chunks
-
-
-def _collect(run, chunks, per_step):
-    if per_step:
-        chunks["out"].append(run.out[: run.numbers[ROWS]])
-        run.numbers[ROWS] = 0
-    chunks["history"].append(run.history[: run.numbers[HISTORY]])
-    run.numbers[HISTORY] = 0
-
-
-def _lay_out(work, nx, ny, tableau, memory, times, first_order):
-    n = work.q.size
-    zeros = np.zeros
-    numbers = zeros(NUMBERS, np.int64)
-    numbers[FIRST_ORDER] = first_order
-    return Run(
-        **{name: zeros(nx) for name in ("x", "xd", "xd_old", "dx", "x_low", "x_low_old", "x_old", "xs")},
-        **{name: zeros(ny) for name in ("y", "yd", "dy", "y_low", "y_low_old", "y_old", "yd_old", "ys", "yds")},
-        now=zeros((3, n)),
-        before=zeros((3, n)),
-        warm=zeros(work.u.size + work.v.size + work.B.size + work.T.size),
-        tableau=tableau,
-        memory=zeros(memory),
-        t_eval=times,
-        clock=zeros(CLOCKS),
-        numbers=numbers,
-        out=np.empty((times.size, 1 + 3 * n)),
-        history=np.empty((0, 3)),
-        charts=zeros((2 * CHART_ROOM, 5)),
     )
 
 

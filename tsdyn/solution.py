@@ -10,7 +10,8 @@ import numpy as np
 from . import diagnostics, reactions
 from .bodies import rotation_matrix
 from .chart import REASONS
-from .errors import InvalidBody, InvalidConstraint, Status, StepFailure
+from .checks import floats
+from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
 from .rank import weakest_row
 from .run import CHART_ROWS, IN_CHART, REJECTED, STEPS, T
@@ -70,17 +71,37 @@ class Solution:
     multipliers : ndarray (k, m)
         M qdd + Phi_q^T lam = Q_A + S; rows in the order added, then the normalisations in body order.
     success : bool
+        Whether the run reached the end of the interval, or a terminal event.
     status : Status
     message : str
         What happened, where, and what to try.
+    t_events : list of ndarray (k_i,), s, or None
+        Times of each event; q_events and qd_events are lists of (k_i, n).
     stats : SimpleNamespace
         steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds.
     """
 
-    def __init__(self, scene, packed, *, reason, method, formulation, status, span, run, work, chunks, seconds):
+    def __init__(
+        self,
+        scene,
+        packed,
+        *,
+        reason,
+        method,
+        formulation,
+        status,
+        span,
+        run,
+        work,
+        chunks,
+        trajectory,
+        events,
+        seconds,
+    ):
         self.scene, self.packed, self.method, self.formulation = scene, packed, method, formulation
         self.system, self._reason = packed.system, reason
-        self.status, self.span = status, span
+        self.status, self.span, self._trajectory = status, span, trajectory
+        self.t_events, self.q_events, self.qd_events = events or (None, None, None)
         rows = chunks["out"][0] if len(chunks["out"]) == 1 else np.concatenate(chunks["out"])
         n = work.q.size
         self.t = rows[:, 0].copy()
@@ -109,13 +130,13 @@ class Solution:
 
     @property
     def success(self):
-        """Whether the run reached the end of the interval."""
-        return self.status == Status.SUCCESS
+        """Whether the run reached the end of the interval, or a terminal event."""
+        return self.status in (Status.SUCCESS, Status.EVENT)
 
     def _message(self, scene):
         """How the run ended, in words."""
         if self.success:
-            return self.status.sentence
+            return f"{self.status.sentence} {self._reason}".strip()
         steps = f"{self.stats.steps} step{'' if self.stats.steps == 1 else 's'}"
         where = f"It stopped at t = {self._reached:.9g} s of {self.span[1]:g} s, after {steps}."
         suspect = self._suspect(scene)
@@ -148,6 +169,42 @@ class Solution:
         q, qd, qdd = (a.copy() for a in self._last)
         lam = reactions.multipliers(self.system, np.array([self._reached]), q[None], qd[None], qdd[None])[0]
         return State(self._reached, q, qd, qdd, lam)
+
+    def at(self, t):
+        """State at any time of a run with dense_output=True, on the manifold as the steps are.
+
+        Parameters
+        ----------
+        t : float or array_like (k,), s
+            Between the start and the time reached, in any order.
+
+        Returns
+        -------
+        State
+            t, q (n,), qd, qdd and multipliers (m,), with (k,) before each for a vector of times. Between steps they
+            are of the interpolant's order; at a step's ends they are the step's own to rounding.
+
+        Raises
+        ------
+        InvalidArgument
+            If the run kept no dense output, or t isn't finite, one time or a vector of them, or is outside the run.
+        StepFailure
+            If the constraints can't be solved there.
+        """
+        if self._trajectory is None:
+            raise InvalidArgument("at(t) needs the steps' interpolants: simulate(..., dense_output=True) keeps them.")
+        times, start, end = floats(t), self._trajectory.start, self._trajectory.end
+        if times.ndim > 1 or (times.ndim == 1 and np.size(t) != times.size) or not np.isfinite(times).all():
+            raise InvalidArgument(f"t must be a finite time in s, or a vector of them, got {t!r}.")
+        if times.size and (times.min() < start or times.max() > end):
+            raise InvalidArgument(f"t must lie within the run, from {start!r} to {end!r} s, got {t!r}.")
+        every = np.atleast_1d(times)
+        states, status = self._trajectory(every)
+        if status != Status.SUCCESS:
+            raise StepFailure(f"no state could be found at some t in {t!r}. {status.sentence} {status.remedy}", self)
+        q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
+        state = State(every, q, qd, qdd, reactions.multipliers(self.system, every, q, qd, qdd))
+        return state if times.ndim else State(float(times), *(part[0] for part in state[1:]))
 
     @property
     def steps(self):

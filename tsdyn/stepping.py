@@ -7,7 +7,7 @@ The equations are given by two kernels of the formulation, called by address:
 
 A step kernel returns the increments dx, dy, so that the driver can add them with compensation. Signature of a step
 kernel: context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy; yd and xd are those of the
-step's start.
+step's start. The memory of a Runge-Kutta method holds n = nx + ny floats of scratch, then n for each stage: (x', y').
 """
 
 from ._kernel import callback, caller, kernel, vector
@@ -70,51 +70,75 @@ def nystrom_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau
     return 0
 
 
-@callback(STEP)
-def second_order_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
-    """One step of an explicit Runge-Kutta method on (x, y) with xd = y; memory as for `runge_kutta_step`."""
-    n = nx
-    x, y, yd, dx, dy = vector(x, n), vector(y, n), vector(yd, n), vector(dx, n), vector(dy, n)
-    tableau, memory = vector(tableau, ANY), vector(memory, ANY)
+@kernel
+def combine(weights, count, h, n, memory, out):
+    """out = h sum_j weights_j k_j over the first stages in the memory of a Runge-Kutta method."""
+    out = out[:n]
+    for c in range(n):
+        out[c] = 0.0
+    for j in range(count):
+        _add(out, h * weights[j], memory[(1 + j) * n :])
+
+
+@kernel
+def stage(context, place, accelerate, second, t, h, i, nx, ny, x, y, weights, memory):
+    """Derivatives at t and (x, y) + h sum_j weights_j k_j, as stage i; second: where x' = y. Status."""
+    n = nx + ny
+    xs, ys, k = memory[:nx], memory[nx:n], memory[(1 + i) * n :][:n]
+    combine(weights, i, h, n, memory, memory)
+    for c in range(nx):
+        xs[c] += x[c]
+    for c in range(ny):
+        ys[c] += y[c]
+    status = call_place(place, context, t, xs)
+    if status == 0:
+        if second:
+            copy(ys, k[:nx])
+        status = call_accelerate(accelerate, context, t, ys, k[nx:], k[:nx])  # of a second order it leaves x' alone
+    return status
+
+
+@kernel
+def _step(context, place, accelerate, second, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+    n = nx + ny
     stages = int(tableau[0])
-    xs = memory[:n]
     width = 2 + stages
-    copy(y, memory[2 * n : 3 * n])
-    copy(yd, memory[3 * n : 4 * n])
+    copy(xd, memory[n:])
+    copy(yd, memory[n + nx :])
     for i in range(1, stages):
         row = tableau[1 + i * width :]
-        ys, k = memory[(1 + i) * 2 * n :][:n], memory[(1 + i) * 2 * n + n :]
-        for c in range(n):
-            xs[c] = 0.0
-        copy(y, ys)
-        for j in range(i):
-            _add(xs, h * row[2 + j], memory[(1 + j) * 2 * n :])
-            _add(ys, h * row[2 + j], memory[(1 + j) * 2 * n + n :])
-        for c in range(n):
-            xs[c] += x[c]
-        status = call_place(place, context, t + h * row[1], xs)
-        if status == 0:
-            status = call_accelerate(accelerate, context, t + h * row[1], ys, k, xd)
+        status = stage(context, place, accelerate, second, t + h * row[1], h, i, nx, ny, x, y, row[2:], memory)
         if status != 0:
             return status
-    weights = tableau[1 + stages * width :]
-    for c in range(n):
-        dx[c] = 0.0
-        dy[c] = 0.0
-    for j in range(stages):
-        _add(dx, h * weights[j], memory[(1 + j) * 2 * n :])
-        _add(dy, h * weights[j], memory[(1 + j) * 2 * n + n :])
+    combine(tableau[1 + stages * width :], stages, h, n, memory, memory)
+    copy(memory[:nx], dx)
+    copy(memory[nx:n], dy)
     return 0
 
 
-@callback(ERROR)
-def embedded_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
-    """Errors ex, ey of the step that `memory` holds, y and yd being the derivatives at its end."""
+@callback(STEP)
+def second_order_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+    """One step of an explicit Runge-Kutta method on (x, y) with xd = y; memory (stages + 1) 2 n."""
+    x, y, yd, dx, dy = vector(x, nx), vector(y, nx), vector(yd, nx), vector(dx, nx), vector(dy, nx)
+    tableau, memory = vector(tableau, ANY), vector(memory, ANY)
+    return _step(context, place, accelerate, True, t, h, nx, nx, x, y, yd, y, tableau, memory, dx, dy)
+
+
+@callback(STEP)
+def runge_kutta_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+    """One step of an explicit Runge-Kutta method on the first-order system (x, y); memory (stages + 1)(nx + ny)."""
+    x, y, yd, xd = vector(x, nx), vector(y, ny), vector(yd, ny), vector(xd, nx)
+    dx, dy, tableau, memory = vector(dx, nx), vector(dy, ny), vector(tableau, ANY), vector(memory, ANY)
+    return _step(context, place, accelerate, False, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy)
+
+
+@kernel
+def _error(row, h, nx, ny, y, yd, tableau, memory, ex, ey):
     n = nx + ny
     y, yd, ex, ey = vector(y, nx), vector(yd, ny), vector(ex, nx), vector(ey, ny)
     tableau, memory = vector(tableau, ANY), vector(memory, ANY)
     stages = int(tableau[0])
-    weights = tableau[1 + stages * (2 + stages) + stages :]
+    weights = tableau[1 + stages * (2 + stages) + stages + row * (stages + 1) :]
     for c in range(nx):
         ex[c] = h * weights[stages] * y[c]
     for c in range(ny):
@@ -125,42 +149,13 @@ def embedded_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
     return 0
 
 
-@callback(STEP)
-def runge_kutta_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
-    """One step of an explicit Runge-Kutta method on the first-order system (x, y); memory (stages + 1)(nx + ny)."""
-    x, y, yd, xd = vector(x, nx), vector(y, ny), vector(yd, ny), vector(xd, nx)
-    dx, dy, tableau, memory = vector(dx, nx), vector(dy, ny), vector(tableau, ANY), vector(memory, ANY)
-    stages = int(tableau[0])
-    n = nx + ny
-    xs, ys = memory[:nx], memory[nx:n]
-    width = 2 + stages
-    for i in range(stages):
-        kx, ky = memory[(1 + i) * n :], memory[(1 + i) * n + nx :]
-        if i == 0:
-            copy(xd, kx)
-            copy(yd, ky)
-            continue
-        row = tableau[1 + i * width :]
-        for c in range(n):
-            s = 0.0
-            for j in range(i):
-                s += row[2 + j] * memory[(1 + j) * n + c]
-            if c < nx:
-                xs[c] = x[c] + h * s
-            else:
-                ys[c - nx] = y[c - nx] + h * s
-        status = call_place(place, context, t + h * row[1], xs)
-        if status == 0:
-            status = call_accelerate(accelerate, context, t + h * row[1], ys, ky, kx)
-        if status != 0:
-            return status
-    weights = tableau[1 + stages * width :]
-    for c in range(n):
-        s = 0.0
-        for j in range(stages):
-            s += weights[j] * memory[(1 + j) * n + c]
-        if c < nx:
-            dx[c] = h * s
-        else:
-            dy[c - nx] = h * s
-    return 0
+@callback(ERROR)
+def embedded_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
+    """Errors ex, ey of the step that `memory` holds, y and yd being the derivatives at its end."""
+    return _error(0, h, nx, ny, y, yd, tableau, memory, ex, ey)
+
+
+@callback(ERROR)
+def second_embedded_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
+    """The same by the tableau's second row of error weights."""
+    return _error(1, h, nx, ny, y, yd, tableau, memory, ex, ey)

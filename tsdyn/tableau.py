@@ -27,9 +27,10 @@ def _lower(values, stages, what):
     return matrix
 
 
-def _demand(what, **conditions):
+def _demand(what, size=1.0, **conditions):
+    """Refuse what fails by more than rounding of coefficients of that size."""
     for name, value in conditions.items():
-        if np.abs(value).max() > 1e-14:
+        if np.abs(value).max() > 1e-14 * size:
             raise InvalidArgument(f"{what}: the condition {name} fails by {np.abs(value).max():.3g}.")
 
 
@@ -42,20 +43,23 @@ class RungeKuttaTableau:
     c: tuple
     order: int
     error: tuple = ()  # weights of the error estimate: one a stage, and one of the derivative at the step's end
+    second_error: tuple = ()  # those of a second, lower one
     embedded_order: int = 0
 
     def __post_init__(self):
         a, b, c = self.arrays
-        if self.error:
-            estimate = np.array(self.error[:-1])
-            _demand("RungeKuttaTableau", **{"sum of the error weights = 0": estimate.sum() + self.error[-1]})
-        ones = np.ones(len(c))
-        _demand("RungeKuttaTableau", **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
+        ones, size = np.ones(len(c)), max(1.0, np.abs(a).sum(axis=1).max(), np.abs(b).sum())
+        what = "RungeKuttaTableau", size
+        for weights in (self.error, self.second_error):
+            if len(weights) not in (0, len(c) + 1):
+                raise InvalidArgument(f"{what[0]}: an error estimate has {len(c) + 1} weights, got {len(weights)}.")
+            _demand(*what, **{"sum of the error weights = 0": np.sum(weights)})
+        _demand(*what, **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
         if self.order >= 3:
-            _demand("RungeKuttaTableau", **{"b a c = 1/6": b @ a @ c - 1 / 6})
+            _demand(*what, **{"b a c = 1/6": b @ a @ c - 1 / 6})
         if self.order >= 4:
             _demand(
-                "RungeKuttaTableau",
+                *what,
                 **{"b c a c = 1/8": (b * c) @ a @ c - 1 / 8},
                 **{"b a c^2 = 1/12": b @ a @ c**2 - 1 / 12, "b a a c = 1/24": b @ a @ a @ c - 1 / 24},
             )
@@ -66,10 +70,10 @@ class RungeKuttaTableau:
         return _rows(self.a, len(self.c), "RungeKuttaTableau"), np.array(self.b), np.array(self.c)
 
     def packed(self):
-        """The numbers as the step kernel reads them: s, then a stage's same-place flag, c, row of a; then b."""
+        """The numbers as the kernels read them: s; a stage's same-place flag, c, row of a; b; rows of error weights."""
         a, b, c = self.arrays
         stages = [[0.0, c[i], *a[i]] for i in range(len(c))]
-        return np.concatenate([[len(c)], np.ravel(stages), b, self.error])
+        return np.concatenate([[len(c)], np.ravel(stages), b, self.error, self.second_error])
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,190 @@
+"""States between the steps, on the manifold: interpolated in the chart, then placed as every stage is.
+
+The driver uses it at the times of t_eval, `Solution.at` and the events through a `Reader`, which makes the chart of a
+step anew (a chart follows from its q0 and time alone) in a workspace of its own.
+"""
+
+import math
+
+import numpy as np
+
+from ._kernel import address_of, caller, entry, kernel
+from .errors import Status
+from .interpolation import call_value
+from .linalg import copy
+from .stepping import call_accelerate, call_place
+from .workspace import RATE, Context, allocate, allocate_linear
+
+NOT_FINITE = int(Status.NOT_FINITE)
+# addresses that the driver and the reader are given
+A_PLACE, A_ACCELERATE, A_COMPLETE, A_CHECK, A_CHART, A_STEP, A_ERROR, A_ERROR_2, A_NORM, A_FILL, A_VALUE, A_SECOND = (
+    range(12)
+)
+# what a step's block begins with, before the interpolant's data
+B_START, B_H, B_END, B_CHART, B_DATA = range(5)
+
+call_complete = caller("pp")
+call_chart = caller("pdpppp")
+
+
+@kernel
+def evaluate(context, w, at, t, x, y, yd, xd):
+    """q, qd, qdd, yd (and xd) at (t, x, y). Status."""
+    status = call_place(at[A_PLACE], context, t, x)
+    if status == 0:
+        status = call_accelerate(at[A_ACCELERATE], context, t, y, yd, xd)
+    if status == 0:
+        status = call_complete(at[A_COMPLETE], context, yd)
+    if status == 0:
+        total = 0.0
+        for i in range(w.q.size):
+            total += abs(w.q[i]) + abs(w.qd[i]) + abs(w.qdd[i])
+        if not total < math.inf:
+            return NOT_FINITE
+    return status
+
+
+@kernel
+def between(context, w, at, t, block, xs, ys, yds, xds):
+    """q, qd, qdd at a time within the step of this block. Status."""
+    h = block[B_H]
+    call_value(at[A_VALUE], (t - block[B_START]) / h, h, w.q.size, xs.size, ys.size, block[B_DATA:], xs, ys)
+    status = evaluate(context, w, at, t, xs, ys, yds, xds)
+    if status == 0 and at[A_SECOND] != 0:  # what f would amplify in a stiff scene
+        call_value(at[A_SECOND], (t - block[B_START]) / h, h, w.q.size, xs.size, ys.size, block[B_DATA:], xs, yds)
+        call_complete(at[A_COMPLETE], context, yds)
+    return status
+
+
+@kernel
+def keep(w, store):
+    """Copy what the Newton solvers start from."""
+    _warm(w, store, True)
+
+
+@kernel
+def bring_back(w, store):
+    """Put it back."""
+    _warm(w, store, False)
+
+
+@kernel
+def _warm(w, store, out):
+    i = 0
+    for part in (w.u, w.v):
+        for j in range(part.size):
+            if out:
+                store[i] = part[j]
+            else:
+                part[j] = store[i]
+            i += 1
+    for part in (w.B, w.T):
+        for a in range(part.shape[0]):
+            for b in range(part.shape[1]):
+                if out:
+                    store[i] = part[a, b]
+                else:
+                    part[a, b] = store[i]
+                i += 1
+    if out:
+        store[i] = w.control[RATE]
+    else:
+        w.control[RATE] = store[i]
+
+
+def warm_size(work):
+    """Floats that `keep` stores."""
+    return work.u.size + work.v.size + work.B.size + work.T.size + 1
+
+
+@entry
+def read(c, at, t, rows, blocks, charts, points, xs, ys, yds, xds, store, out):
+    """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows]. Status.
+
+    Every time starts from its chart's q0, so that it gives the same numbers whatever was asked for before it.
+    """
+    context = address_of(c)
+    w = c.work
+    chart = -1
+    for i in range(t.size):
+        block = blocks[rows[i]]
+        if int(block[B_CHART]) == chart:
+            bring_back(w, store)
+        else:
+            chart = int(block[B_CHART])
+            copy(points[chart], w.q)
+            status = call_chart(at[A_CHART], context, charts[chart, 0], xs, ys, yds, xds)
+            if status != 0:
+                return status
+            keep(w, store)
+        status = between(context, w, at, t[i], block, xs, ys, yds, xds)
+        if status != 0:
+            return status
+        copy(w.q, out[i, 0])
+        copy(w.qd, out[i, 1])
+        copy(w.qdd, out[i, 2])
+    return 0
+
+
+class Reader:
+    """Reads states between steps; one thread at a time.
+
+    Parameters
+    ----------
+    system : System
+        As it was run.
+    sizes : tuple
+        n, m, bodies, constraint_tol and size, as for `workspace.allocate`; then nx.
+    addresses : ndarray
+        Those of the run.
+    """
+
+    def __init__(self, system, sizes, addresses):
+        *sizes, nx = sizes
+        work = allocate(*sizes)
+        system = system._replace(reals=system.reals.copy())  # the motions' places are written to
+        self.context = Context(system, work, allocate_linear(system, sizes[0], sizes[1], False))
+        self.addresses = addresses
+        ny = work.v.size
+        self.scratch = [np.zeros(size) for size in (nx, ny, ny, nx, warm_size(work))]
+
+    def __call__(self, t, rows, blocks, charts, points):
+        """States (k, 3, n) at times t (k,), in the steps blocks[rows]; and the Status."""
+        out = np.zeros((t.size, 3, self.context.work.q.size))
+        status = read(self.context, self.addresses, t, rows, blocks, charts, points, *self.scratch, out)
+        return out, Status(status)
+
+
+class Trajectory:
+    """What a run with dense_output leaves to its solution.
+
+    Parameters
+    ----------
+    blocks : ndarray (steps, ...)
+    charts : ndarray (charts, 5)
+    points : ndarray (charts, n)
+        q0 of each chart.
+    start : float, s
+    first : ndarray (3, n)
+        q, qd, qdd there, for a run that has made no step.
+    """
+
+    def __init__(self, system, sizes, addresses, blocks, charts, points, start, first):
+        self.reader = system, sizes, addresses
+        self.blocks, self.charts, self.points = blocks, charts, points
+        self.start, self.first = start, first
+
+    @property
+    def end(self):
+        """The time reached."""
+        return float(self.blocks[-1, B_END]) if len(self.blocks) else self.start
+
+    def __call__(self, t):
+        """States (k, 3, n) at times t (k,) between start and end; and the Status."""
+        if not len(self.blocks):
+            return np.repeat(self.first[None], t.size, axis=0), Status.SUCCESS
+        rows = np.searchsorted(self.blocks[:, B_END], t)
+        order = np.argsort(rows, kind="stable")  # so that a chart is made once
+        out = np.empty((t.size, *self.first.shape))
+        out[order], status = Reader(*self.reader)(t[order], rows[order], self.blocks, self.charts, self.points)
+        return out, status

@@ -1,0 +1,196 @@
+"""Events: changes of sign of a user's function along a run, found on the manifold, by the rules of SciPy's solve_ivp.
+
+The driver is called one step at a time and never learns of them, so they change no step. A step's ends are looked at;
+where the sign has changed, Brent's method asks the step's dense output for states.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from . import reactions
+from .checks import number
+from .dense import B_END
+from .errors import InvalidArgument, Status
+from .run import BEGUN, BLOCKS, CHART_ROWS, DENSE, ROWS, STEPS, STORED, T, advance
+
+EPS = float(np.finfo(float).eps)
+
+
+class Event(NamedTuple):
+    """One of a user's functions."""
+
+    function: object
+    name: str
+    limit: float  # occurrences that end the run; inf for never
+    direction: float  # of the changes that count; 0 for both
+
+
+class Occurrence(NamedTuple):
+    """An event found."""
+
+    t: float
+    index: int
+    state: np.ndarray  # (3, n)
+
+
+class Failed(Exception):
+    """An event function raised, or gave no finite number."""
+
+
+def prepare(events):
+    """Check a user's events; a list of `Event`, or None."""
+    if events is None:
+        return None
+    if callable(events):
+        events = [events]
+    if not isinstance(events, (list, tuple)):
+        raise InvalidArgument(f"events must be a function f(t, state), or a list of them, got {events!r}.")
+    found = []
+    for i, function in enumerate(events):
+        name = f"event {i} ({getattr(function, '__name__', type(function).__name__)})"
+        if not callable(function):
+            raise InvalidArgument(f"events must be functions f(t, state); events[{i}] is {function!r}.")
+        terminal, direction = getattr(function, "terminal", None), getattr(function, "direction", 0.0)
+        limit = 0.0 if terminal is None else float(terminal) if isinstance(terminal, bool) else number(terminal)
+        if not (limit >= 0.0 and limit == math.floor(limit) < math.inf):
+            raise InvalidArgument(
+                f"{name}: terminal must be True, False or a number of occurrences, 0 or more, got {terminal!r}."
+            )
+        if math.isnan(number(direction)):
+            raise InvalidArgument(f"{name}: direction must be a number, of which the sign counts, got {direction!r}.")
+        found.append(Event(function, name, limit or math.inf, number(direction)))
+    return found
+
+
+class Instant:
+    """What an event function is given: as a `State`, with multipliers made when asked for."""
+
+    __slots__ = ("_system", "q", "qd", "qdd", "t")
+
+    def __init__(self, system, t, state):
+        self._system, self.t = system, t
+        self.q, self.qd, self.qdd = state.copy()  # the function may keep or change it
+
+    @property
+    def multipliers(self):
+        """Multipliers (m,)."""
+        parts = (part[None] for part in (self.q, self.qd, self.qdd))
+        return reactions.multipliers(self._system, np.array([self.t]), *parts)[0]
+
+    def __iter__(self):
+        return iter((self.t, self.q, self.qd, self.qdd, self.multipliers))
+
+
+class Watch:
+    """The events of one run: the functions' last values, and what has been found."""
+
+    def __init__(self, events, system, reader, start):
+        self.events, self.system, self.reader = events, system, reader
+        self.t, self.state, self.values = start, None, None  # at the last step's end
+        self.list = [[] for _ in events]
+        none = np.empty(0)
+        reader(none, none.astype(int), np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0)))  # loads the kernel
+
+    def found(self, n):
+        """Times, positions and velocities of each event."""
+        times = [np.array([each.t for each in found]) for found in self.list]
+        states = [np.array([each.state for each in found]).reshape(-1, 3, n) for found in self.list]
+        return times, *([np.ascontiguousarray(state[:, i]) for state in states] for i in (0, 1))
+
+    def advance(self, context, run, addresses, most):
+        """As the driver's `advance`; the Status, and what there is to say of it."""
+        if not run.numbers[BEGUN]:
+            status = Status(advance(context, run, addresses, -1))
+            if not run.numbers[BEGUN]:
+                return status, ""
+            self.state = run.now.copy()
+            try:
+                self.values = [self._value(i, self.t, self.state) for i in range(len(self.events))]
+            except Failed as failure:
+                raise InvalidArgument(f"events: {failure}") from failure.__cause__
+        for _ in range(most):
+            done = run.numbers[STEPS]
+            status = Status(advance(context, run, addresses, 1))
+            if run.numbers[STEPS] > done:
+                try:
+                    last = self._step(run)
+                except Failed as failure:
+                    return Status.EVENT_FAILED, str(failure)
+                if last is not None:
+                    return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
+            if status != Status.SLICE_DONE or run.numbers[CHART_ROWS] + 2 >= run.charts.shape[0]:
+                return status, ""
+        return status, ""
+
+    def _value(self, i, t, state):
+        event = self.events[i]
+        try:
+            given = event.function(t, Instant(self.system, t, state))
+        except Exception as error:
+            raise Failed(f"{event.name} raised {type(error).__name__} at t = {t:.9g} s: {error}.") from error
+        value = number(given)
+        if not math.isfinite(value):
+            raise Failed(f"{event.name} must return a finite number; at t = {t:.9g} s it gave {given!r}.")
+        return value
+
+    def _step(self, run):
+        """Look at the step just made; the `Occurrence` that ends the run, or None."""
+        t0, t1 = self.t, float(run.clock[T])
+        before, now = self.state, run.now.copy()
+        values = self.values
+        self.t, self.state = t1, now
+        self.values = [self._value(i, t1, now) for i in range(len(self.events))]
+        found = []
+        for i, (a, b) in enumerate(zip(values, self.values, strict=True)):
+            direction = self.events[i].direction
+            rises, falls = a <= 0.0 <= b and direction >= 0.0, a >= 0.0 >= b and direction <= 0.0
+            if not (rises or falls) or (a == 0.0 and self.list[i] and self.list[i][-1].t == t0):
+                continue  # a zero at the end of the step before has been reported
+            if b == 0.0 and a != 0.0:
+                found.append(Occurrence(t1, i, now))
+            elif a == 0.0:
+                found.append(Occurrence(t0, i, before))
+            else:
+                found.append(self._root(run, i, t0, a, t1, b))
+        for each in sorted(found, key=lambda each: each.t):
+            self.list[each.index].append(each)
+            if len(self.list[each.index]) >= self.events[each.index].limit:
+                self._end(run, each, t0)
+                return each
+        return None
+
+    def _root(self, run, i, t0, a, t1, b):
+        """Where event i is zero within the step, being a at its start and b, of the other sign, at its end."""
+        from scipy.optimize import brentq  # takes a while to import
+
+        def value(t):
+            return a if t == t0 else b if t == t1 else self._value(i, t, self._at(run, t))
+
+        root = brentq(value, t0, t1, xtol=4.0 * EPS, rtol=4.0 * EPS)
+        shift = 4.0 * EPS * max(abs(root), 1.0)
+        # a run that goes on from a terminal event had better find it behind itself
+        while self.events[i].limit < math.inf and root + shift < t1 and value(root) * b < 0.0:
+            root, shift = root + shift, 2.0 * shift
+        return Occurrence(root, i, self.state if root == t1 else self._at(run, root))
+
+    def _at(self, run, t):
+        states, status = self.reader(np.array([t]), np.zeros(1, int), run.block[None], run.charts, run.points)
+        if status != Status.SUCCESS:
+            raise Failed(f"there is no state at t = {t:.9g} s to evaluate it at. {status.sentence}")
+        return states[0]
+
+    def _end(self, run, last, t0):
+        """Let the run end at an event."""
+        run.now[:] = last.state
+        run.clock[T] = last.t
+        if run.t_eval.size > 0:
+            while run.numbers[ROWS] > 0 and run.out[run.numbers[ROWS] - 1, 0] > last.t:
+                run.numbers[ROWS] -= 1
+        elif last.t > t0:
+            run.out[run.numbers[ROWS] - 1] = [last.t, *last.state.ravel()]
+        else:
+            run.numbers[ROWS] -= 1
+        if run.numbers[DENSE] == STORED:
+            run.blocks[run.numbers[BLOCKS] - 1, B_END] = last.t

@@ -8,7 +8,12 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = {"tsdyn": ROOT / "tsdyn", "constraints": ROOT / "constraints", "integrators": ROOT / "integrators"}
+FOLDERS = {
+    "tsdyn": ROOT / "tsdyn",
+    "constraints": ROOT / "constraints",
+    "forces": ROOT / "tsdyn" / "forces",
+    "integrators": ROOT / "integrators",
+}
 FILES = {
     (f"{name}.{file.stem}" if name != "tsdyn" else file.stem): file
     for name, folder in FOLDERS.items()
@@ -18,20 +23,25 @@ FILES = {
 LAYERS = """
 _cache errors _discovery jet checks
 _kernel
-rotation linalg motion
-markers bodies tableau
+rotation linalg motion signal angle
+markers bodies tableau friction
+attachment marker_forces
 primitive
+force_loops
+force force_pack
+state_function
 system stepping progress
-assembly integrator constraints.*
-workspace integrators.* constraints.__init__ integrators.__init__
-newton evaluate diagnostics reactions
+assembly integrator constraints.* forces.*
+workspace integrators.* constraints.__init__ forces.__init__ integrators.__init__
+loads
+newton evaluate diagnostics reactions power
 chart rank
 initial
 assemble
 null_space maggi_kane scene
 formulation run
 solution
-simulate testing
+simulate force_check testing
 tables plots
 cli __init__
 __main__
@@ -57,7 +67,7 @@ def imports(module, file, everywhere=False):
             target = node.module or ""
             names = [f"{base}{target}"] if target else [f"{base}{alias.name}" for alias in node.names]
             for name in names:
-                yield f"{name}.__init__" if name in ("constraints", "integrators") else name
+                yield f"{name}.__init__" if name in ("constraints", "forces", "integrators") else name
 
 
 @pytest.mark.parametrize("module", FILES, ids=str)

@@ -135,12 +135,13 @@ _i64, _f64 = ir.IntType(64), ir.DoubleType()
 _vector = types.Array(types.float64, 1, "C")
 _matrix = types.Array(types.float64, 2, "C")
 _integers = types.Array(types.int64, 1, "C")
+_complexes = types.Array(types.complex128, 1, "C")
 
 
 def _array(context, builder, kind, pointer, shape):
     """An array over memory that somebody else owns."""
     array = context.make_array(kind)(context, builder)
-    size = context.get_constant(types.intp, 8)
+    size = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
     strides = [size]
     for length in reversed(shape[1:]):
         strides.insert(0, builder.mul(strides[0], length))
@@ -165,6 +166,18 @@ def stack(typing, n):
         return _array(context, builder, _vector, pointer, [context.get_constant(types.intp, length)])
 
     return _vector(n), generate
+
+
+@intrinsic(prefer_literal=True)
+def stack_complex(typing, n):
+    """A vector of n complex numbers on the stack, n a constant; its content is undefined."""
+    length = _literal(n)
+
+    def generate(context, builder, signature, arguments):
+        pointer = cgutils.alloca_once(builder, ir.ArrayType(_f64, 2 * length))
+        return _array(context, builder, _complexes, pointer, [context.get_constant(types.intp, length)])
+
+    return _complexes(n), generate
 
 
 @intrinsic(prefer_literal=True)
@@ -261,6 +274,10 @@ if DEBUG:
     def stack(n):
         """A vector of n floats."""
         return np.zeros(n)
+
+    def stack_complex(n):
+        """A vector of n complex numbers."""
+        return np.zeros(n, complex)
 
     def stack2(n, m):
         """An n x m matrix."""

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._kernel import address_of, caller, entry, kernel
+from .assembly import remember
 from .chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .errors import Status
 from .linalg import copy
@@ -51,12 +52,13 @@ class Run(NamedTuple):
     xs: np.ndarray  # (nx,)  dense output and the guess of a first step
     ys: np.ndarray  # (ny,)
     yds: np.ndarray  # (ny,)
+    remembered: np.ndarray  # (slots,)  what forces remember of the last accepted point
     tableau: np.ndarray  # the method's numbers
     memory: np.ndarray  # the method's scratch
     t_eval: np.ndarray  # output times, or empty: every step
     clock: np.ndarray  # T ... ERROR_BEFORE
     numbers: np.ndarray  # int64, FIRST_ORDER ... REJECTED_LAST
-    out: np.ndarray  # (rows, 1 + 3 n)  t, q, qd, qdd
+    out: np.ndarray  # (rows, 1 + 3 n + slots)  t, q, qd, qdd, remembered
     history: np.ndarray  # (rows, 3)  t, h, accepted
     charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left
 
@@ -116,6 +118,8 @@ def _record(r, t, q, qd, qdd):
     row[0] = t
     for j in range(n):
         row[1 + j], row[1 + n + j], row[1 + 2 * n + j] = q[j], qd[j], qdd[j]
+    for j in range(r.remembered.size):
+        row[1 + 3 * n + j] = r.remembered[j]
     r.numbers[ROWS] = i + 1
 
 
@@ -303,6 +307,7 @@ def advance(c, r, at, most):
     nx, ny = r.x.size, r.y.size
     adaptive = r.numbers[ADAPTIVE] == 1
     if r.numbers[BEGUN] == 0 and most > 0:
+        remember(c.system, w.q, w.qd, r.clock[T], r.remembered)
         status = _begin(context, w, r, at)
         if status != 0:
             return status
@@ -367,6 +372,7 @@ def advance(c, r, at, most):
             for j in range(3):
                 copy(r.now[j], r.before[j])
         _store_now(w, r)
+        remember(c.system, w.q, w.qd, t1, r.remembered)
         r.clock[T] = t1
         r.numbers[STEPS] = i + 1
         r.numbers[IN_CHART] += 1

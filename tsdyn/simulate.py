@@ -37,7 +37,7 @@ from .run import (
     advance,
 )
 from .scene import Scene
-from .solution import Solution
+from .solution import Solution, remembered
 from .stepping import embedded_error
 from .workspace import Context, allocate
 
@@ -142,11 +142,12 @@ def simulate(
     q, qd = consistent(scene, system, q, qd, t0, initial_tol)
     m, n = system.segments.shape[0], q.size
     system = system._replace(reals=system.reals.copy())
+    system.reals[system.memory] = remembered(state, system.memory.size)
     work = allocate(n, m, len(scene.bodies), constraint_tol, packed.size)
     work.q[:], work.qd[:] = q, qd
     step_kernel, tableau, memory = method.kernel(form.first_order)
     nx = n if form.first_order else n - m
-    run = _lay_out(work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order)
+    run = _lay_out(work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order, system.memory.size)
     run.clock[[T, T_ORIGIN, T_END, H]] = t0, t0, t1, (method.first_step or 0.0) if adaptive else method.step
     if adaptive:
         run.clock[[RTOL, ATOL]] = method.rtol / MARGIN, method.atol / MARGIN
@@ -184,7 +185,7 @@ def _drive(context, run, addresses, max_steps, report, span):
     chunks = {"out": [], "history": []}
     most, limit = FIRST_SLICE, int(run.numbers[STEPS_WANTED]) if max_steps is None else max_steps
     per_step = run.t_eval.size == 0
-    width = 1 + 3 * context.work.q.size
+    width = 1 + 3 * context.work.q.size + run.remembered.size
 
     def fresh(run, rows):
         """New arrays for the next slice; what the last one filled goes to the chunks."""
@@ -244,7 +245,7 @@ def _collect(run, chunks, per_step):
     run.numbers[HISTORY] = 0
 
 
-def _lay_out(work, nx, ny, tableau, memory, times, first_order):
+def _lay_out(work, nx, ny, tableau, memory, times, first_order, slots):
     n = work.q.size
     zeros = np.zeros
     numbers = zeros(NUMBERS, np.int64)
@@ -255,12 +256,13 @@ def _lay_out(work, nx, ny, tableau, memory, times, first_order):
         now=zeros((3, n)),
         before=zeros((3, n)),
         warm=zeros(work.u.size + work.v.size + work.B.size + work.T.size),
+        remembered=zeros(slots),
         tableau=tableau,
         memory=zeros(memory),
         t_eval=times,
         clock=zeros(CLOCKS),
         numbers=numbers,
-        out=np.empty((times.size, 1 + 3 * n)),
+        out=np.empty((times.size, 1 + 3 * n + slots)),
         history=np.empty((0, 3)),
         charts=zeros((2 * CHART_ROOM, 5)),
     )

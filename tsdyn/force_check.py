@@ -112,12 +112,12 @@ def _check(scene, force, name, rng):
     size = np.abs(value) @ np.abs(qd)
     if lost < -ROUNDING * size:
         raise CheckFailed(f"{name}: dissipation is {lost:.6g} W; it is what the force takes and can't be negative.")
-    if force.conservative and all(Signal.is_zero(getattr(force, attribute)) for attribute in force.loads):
-        if not abs(applied) <= ROUNDING * (1.0 + size):
-            raise CheckFailed(
-                f"{name}: its power {value @ qd:.15g} W is not that of its potential and dissipation, {applied:.6g} W "
-                "are left over. Correct them, or name the attributes that drive it in `loads`."
-            )
+    undriven = force.conservative and all(Signal.is_zero(getattr(force, attribute)) for attribute in force.loads)
+    if undriven and not abs(applied) <= ROUNDING * (1.0 + size):
+        raise CheckFailed(
+            f"{name}: its power {value @ qd:.15g} W is not that of its potential and dissipation, {applied:.6g} W are "
+            "left over. Correct them, or name the attributes that drive it in `loads`."
+        )
 
 
 def _check_twin(packed, load, name, t, q, qd, value, coordinates):

@@ -84,7 +84,8 @@ class Signal:
         plain = getattr(source, "py_func", source)
         if not isinstance(plain, FunctionType) or plain.__code__.co_argcount != 1:
             raise error(
-                f"{what}: {source!r} is no plain Python function of one argument, the time; wrap it in one: lambda t: ..."
+                f"{what}: {source!r} is no plain Python function of one argument, the time; wrap it in one, "
+                "lambda t: ..."
             )
         self.value(0.0)
 

@@ -7,7 +7,8 @@
     U = (d.K d + phi.K_t phi) / 2                                                (3)
     dissipation = dd.C dd + w.C_t w                                              (4)
 
-(1) and (2) are minus the derivatives of U: phid = e0 w + w x e. U has a maximum at half a turn, beyond which it pulls on.
+(1) and (2) are minus the derivatives of U: phid = e0 w + w x e. U is largest at half a turn; beyond, it pulls on to the
+full turn.
 """
 
 from types import MappingProxyType
@@ -110,7 +111,7 @@ class Bushing(Force):
     def potential(x, par, t):
         """Eq. (3)."""
         d0, d1, d2 = to_body(x[6], x[7], x[8], x[9], x[3] - x[0], x[4] - x[1], x[5] - x[2])
-        e0, e1, e2, e3 = relative(x)
+        _, e1, e2, e3 = relative(x)
         translation = par[0] * d0 * d0 + par[1] * d1 * d1 + par[2] * d2 * d2
         return 0.5 * translation + 2.0 * (par[6] * e1 * e1 + par[7] * e2 * e2 + par[8] * e3 * e3)
 

@@ -1,7 +1,8 @@
 """Scenes as plain data, the same in reference files and in random tests, and formulas of their own for what they mean.
 
 A definition is a dictionary: gravity; bodies, each a dictionary of the arguments of `add_body` (or, without an inertia,
-of `add_point_mass`); constraints, each (class name, body a, body b, arguments), the ground being body 0.
+of `add_point_mass`); constraints, each (class name, body a, body b, arguments), the ground being body 0; forces, if
+there are any, each (class name, bodies, arguments).
 """
 
 from itertools import pairwise
@@ -21,6 +22,8 @@ def build(definition):
         bodies.append(scene.add_body(**body) if "inertia" in body else scene.add_point_mass(**body))
     for kind, a, b, arguments in definition["constraints"]:
         scene.add(getattr(ts.constraints, kind)(bodies[a], bodies[b], **arguments))
+    for kind, *on, arguments in definition.get("forces", ()):
+        scene.add(getattr(ts.forces, kind)(*(bodies[i] for i in on), **arguments))
     return scene
 
 

@@ -45,6 +45,14 @@ def test_error_follows_the_tolerance(name, tol):
         assert (level <= factor * np.finfo(float).eps * (1.0 + np.abs(values).max(axis=1))).all()
 
 
+@pytest.mark.parametrize(("name", "tol", "end"), [("chain_4", 1e-9, 1.0), ("chain_16", 1e-6, 0.4)])
+def test_chains_with_a_force_on_the_last_body(name, tol, end):
+    scene, reference = load(name)
+    reference = reference.until(end)
+    solution = ts.simulate(scene, (0.0, end), integrator=RK45(rtol=tol, atol=tol), t_eval=reference.t)
+    assert error(solution, reference) < 100.0 * tol
+
+
 @pytest.mark.parametrize("formulation", FORMS)
 def test_rejected_steps_leave_no_trace(formulation):
     """Steps far too long are tried first, and rejected; the end is that of a cautious start."""

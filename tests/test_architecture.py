@@ -8,7 +8,12 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = {"tsdyn": ROOT / "tsdyn", "constraints": ROOT / "constraints", "integrators": ROOT / "integrators"}
+FOLDERS = {
+    "tsdyn": ROOT / "tsdyn",
+    "constraints": ROOT / "constraints",
+    "forces": ROOT / "tsdyn" / "forces",
+    "integrators": ROOT / "integrators",
+}
 FILES = {
     (f"{name}.{file.stem}" if name != "tsdyn" else file.stem): file
     for name, folder in FOLDERS.items()
@@ -18,17 +23,21 @@ FILES = {
 LAYERS = """
 _cache errors _discovery jet checks
 _kernel
-rotation linalg motion
-markers bodies tableau
-curvature
+rotation linalg motion signal angle
+markers bodies tableau friction
+attachment marker_forces curvature
 primitive
+force_loops
+force force_pack
+state_function
 system stepping progress
-assembly interpolation constraints.*
+assembly interpolation constraints.* forces.*
 workspace
 implicit
 integrator
-integrators.* constraints.__init__ integrators.__init__
-newton evaluate diagnostics reactions dense
+integrators.* constraints.__init__ forces.__init__ integrators.__init__
+loads
+newton evaluate diagnostics reactions power dense
 chart rank
 initial
 assemble
@@ -36,7 +45,7 @@ null_space maggi_kane linearise scene
 formulation run
 events drive
 solution
-simulate testing
+simulate force_check testing
 tables plots
 cli __init__
 __main__
@@ -62,7 +71,7 @@ def imports(module, file, everywhere=False):
             target = node.module or ""
             names = [f"{base}{target}"] if target else [f"{base}{alias.name}" for alias in node.names]
             for name in names:
-                yield f"{name}.__init__" if name in ("constraints", "integrators") else name
+                yield f"{name}.__init__" if name in ("constraints", "forces", "integrators") else name
 
 
 @pytest.mark.parametrize("module", FILES, ids=str)

@@ -6,6 +6,7 @@ Nothing of tsdyn is used here; the tolerances are those of SciPy's DOP853, far a
 import numpy as np
 import pytest
 from reference import NAMES, load, read
+from scenes import rotation
 from scipy.integrate import solve_ivp
 
 RTOL = 1e-12
@@ -85,10 +86,57 @@ def pendulum(definition):
     return np.concatenate((*begin, np.eye(3).ravel(), two["angular_velocity"])), rates, outputs
 
 
+def sort(name):
+    return next(word for word in ("top", "pendulum", "chain") if word in name)
+
+
+def chain(definition):
+    """Bodies on spherical joints; state r, v, A, w of each, joint forces from the accelerations of the joints."""
+    bodies, g = definition["bodies"], np.array(definition["gravity"])
+    n = len(bodies)
+    mass, J = np.array([b["mass"] for b in bodies]), np.array([b["inertia"] for b in bodies])
+    W = np.zeros((6 * n, 6 * n))  # inverse masses and inertias
+    for i in range(n):
+        W[6 * i : 6 * i + 3, 6 * i : 6 * i + 3] = np.eye(3) / mass[i]
+        W[6 * i + 3 : 6 * i + 6, 6 * i + 3 : 6 * i + 6] = np.linalg.inv(J[i])
+    pushes = [(j - 1, np.array(at["point_a"]), np.array(at["force"])) for _, j, at in definition["forces"]]
+
+    def rates(t, y):
+        y = y.reshape(n, 18)
+        v, A, w = y[:, 3:6], y[:, 6:15].reshape(n, 3, 3), y[:, 15:]
+        load, C, bias = np.zeros(6 * n), np.zeros((3 * n, 6 * n)), np.zeros(3 * n)
+        for i in range(n):
+            load[6 * i : 6 * i + 3] = mass[i] * g
+            load[6 * i + 3 : 6 * i + 6] = cross(J[i] @ w[i], w[i])
+        for i, s, F in pushes:
+            load[6 * i : 6 * i + 3] += F
+            load[6 * i + 3 : 6 * i + 6] += cross(s, A[i].T @ F)
+        for row, (_, a, b, at) in enumerate(definition["constraints"]):
+            rows = slice(3 * row, 3 * row + 3)
+            for i, s, sign in ((a - 1, np.array(at["point_a"]), 1.0), (b - 1, np.array(at["point_b"]), -1.0)):
+                if i >= 0:  # acceleration of a point: vd - A s~ wd + A w~ w~ s
+                    C[rows, 6 * i : 6 * i + 3] = sign * np.eye(3)
+                    C[rows, 6 * i + 3 : 6 * i + 6] = -sign * A[i] @ skew(s)
+                    bias[rows] += sign * A[i] @ cross(w[i], cross(w[i], s))
+        free = W @ load
+        a = (free - W @ C.T @ np.linalg.solve(C @ W @ C.T, C @ free + bias)).reshape(n, 6)
+        Ad = np.array([A[i] @ skew(w[i]) for i in range(n)]).reshape(n, 9)
+        return np.hstack((v, a[:, :3], Ad, a[:, 3:])).ravel()
+
+    def outputs(y):
+        y = y.reshape(n, 18)
+        return y[:, :3], y[:, 6:15].reshape(n, 3, 3)
+
+    def begin(b):
+        return np.concatenate((b["position"], b["velocity"], rotation(b["orientation"]).ravel(), b["angular_velocity"]))
+
+    return np.concatenate([begin(b) for b in bodies]), rates, outputs
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_digits_from_other_equations(name):
-    asleep, kind = "sleeping" in name, top if "top" in name else pendulum
-    reference = load(name)[1].until(END)
+    asleep, kind = "sleeping" in name, {"top": top, "pendulum": pendulum, "chain": chain}[sort(name)]
+    reference = load(name)[1].until(0.3 if name == "chain_16" else END)
     begin, rates, outputs = kind(read(name)["definition"])
     atol = 1e-20 if asleep else RTOL  # the tilt of the sleeping top begins at 1e-12
     run = solve_ivp(rates, (0.0, reference.t[-1]), begin, "DOP853", reference.t, rtol=RTOL, atol=atol)

@@ -6,7 +6,7 @@ _here = _Path(__file__).parent
 if not (_here / "constraints").is_dir():  # a checkout: they stand beside this folder
     __path__.append(str(_here.parent))
 
-from . import constraints, integrators, testing  # noqa: E402
+from . import constraints, forces, integrators, testing  # noqa: E402
 from ._kernel import kernel  # noqa: E402
 from .bodies import Body, PointMass  # noqa: E402
 from .errors import (  # noqa: E402
@@ -14,6 +14,7 @@ from .errors import (  # noqa: E402
     InvalidArgument,
     InvalidBody,
     InvalidConstraint,
+    InvalidForce,
     MissingDependency,
     RedundantConstraints,
     SingularConfiguration,
@@ -22,10 +23,12 @@ from .errors import (  # noqa: E402
     TsdynError,
     UnknownAttribute,
 )
-from .markers import Parameters, Point, Vector  # noqa: E402
+from .force import Force  # noqa: E402
+from .markers import Parameters, Point, Turn, Vector  # noqa: E402
 from .motion import Motion  # noqa: E402
 from .primitive import Primitive  # noqa: E402
 from .scene import Scene  # noqa: E402
+from .signal import Table  # noqa: E402
 from .simulate import simulate  # noqa: E402
 from .solution import Solution, State  # noqa: E402
 
@@ -33,10 +36,12 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Body",
+    "Force",
     "InconsistentState",
     "InvalidArgument",
     "InvalidBody",
     "InvalidConstraint",
+    "InvalidForce",
     "MissingDependency",
     "Motion",
     "Parameters",
@@ -50,10 +55,13 @@ __all__ = [
     "State",
     "Status",
     "StepFailure",
+    "Table",
     "TsdynError",
+    "Turn",
     "UnknownAttribute",
     "Vector",
     "constraints",
+    "forces",
     "integrators",
     "kernel",
     "plots",

@@ -26,10 +26,10 @@ _KEEP_DAYS = 30
 
 
 def package_folders():
-    """Return the three folders whose sources make up the package."""
+    """Return the four folders whose sources make up the package."""
     here = Path(__file__).resolve().parent
     beside = here if (here / "constraints").is_dir() else here.parent
-    return here, beside / "constraints", beside / "integrators"
+    return here, here / "forces", beside / "constraints", beside / "integrators"
 
 
 @cache

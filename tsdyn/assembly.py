@@ -1,24 +1,37 @@
-"""Phi, Phi_q, Phi_t and gamma of a whole system: one call by address for each kind of constraint it has."""
+"""Phi, Phi_q, Phi_t, gamma and forces of a whole system: one call by address for each kind that it has."""
 
 import math
 
 from ._kernel import caller, entry, kernel
 from .curvature import SIGNATURE as CURVATURE_SIGNATURE
+from .force_loops import JACOBIAN as FORCE_JACOBIAN_SIGNATURE
+from .force_pack import F_COUNT, F_FIRST_INT, F_FIRST_REAL, F_REALS, F_REMEMBER, FORCE, FORCE_JACOBIAN
 from .motion import call_motion
 from .primitive import call_kind
+from .signal import call_signal, spline
 from .system import COUNT, CURVATURE, FIRST_INT, FIRST_REAL, GAMMA, JACOBIAN, PHI, PHI_T, REALS
 
 call_curvature = caller(CURVATURE_SIGNATURE)
 
+call_jacobian = caller(FORCE_JACOBIAN_SIGNATURE)
+
 
 @kernel
 def set_time(s, t):
-    """Write value, rate and acceleration of every motion at t into its places; False where one is not finite."""
+    """Write every motion (value, rate, acceleration) and signal at t to its places; False where one is not finite."""
     total = 0.0
     for i in range(s.motions.shape[0]):
         place = s.motions[i, 3]
         for j in range(3):
             s.reals[place + j] = call_motion(s.motions[i, j], t)
+            total += abs(s.reals[place + j])
+    for i in range(s.signals.shape[0]):
+        address, place, width, first, knots = s.signals[i]
+        if address != 0:
+            call_signal(address, t, s.reals[place:])
+        else:
+            spline(t, s.reals[first:], knots, width, s.reals[place:])
+        for j in range(width):
             total += abs(s.reals[place + j])
     return total < math.inf
 
@@ -64,6 +77,39 @@ def constraint_curvature(s, q, qd, qdd, t, lam, K, G1, G2):
             s.kinds[i, CURVATURE], s.kinds[i, COUNT], s.kinds[i, REALS], table, reals,
             q, qd, qdd, t, lam, q.size, K, G1, G2,
         )  # fmt: skip
+
+
+@kernel
+def _run_forces(s, column, q, qd, t, out):
+    for i in range(s.forces.shape[0]):
+        kind = s.forces[i]
+        if kind[column] != 0:
+            table, reals = s.table[kind[F_FIRST_INT] :], s.reals[kind[F_FIRST_REAL] :]
+            call_kind(kind[column], kind[F_COUNT], kind[F_REALS], table, reals, q, qd, t, out)
+
+
+@kernel
+def applied_forces(s, q, qd, t, Q):
+    """Q (n,) += all forces but gravity; time has been set."""
+    _run_forces(s, FORCE, q, qd, t, Q)
+
+
+@kernel
+def remember(s, q, qd, t, out):
+    """Let the forces that do remember this accepted point; out (slots,) is what they remember."""
+    if s.memory.size > 0:
+        _run_forces(s, F_REMEMBER, q, qd, t, out)
+        for i in range(s.memory.size):
+            out[i] = s.reals[s.memory[i]]
+
+
+@kernel
+def force_jacobian(s, q, qd, t, Q_q, Q_qd):
+    """Q_q, Q_qd (n, n) += the Jacobians of all forces but gravity, of a system from `with_force_jacobians`."""
+    for i in range(s.forces.shape[0]):
+        kind = s.forces[i]
+        table, reals = s.table[kind[F_FIRST_INT] :], s.reals[kind[F_FIRST_REAL] :]
+        call_jacobian(kind[FORCE_JACOBIAN], kind[F_COUNT], kind[F_REALS], table, reals, q, qd, t, q.size, Q_q, Q_qd)
 
 
 @kernel

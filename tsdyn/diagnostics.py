@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ._kernel import twin
-from .bodies import rotation_matrix, transform_g
+from .bodies import IDENTITY, rotation_matrix, transform_g
 from .jet import Jet
-from .markers import PARAMETERS, POINT
+from .markers import PARAMETERS, POINT, TURN
 from .motion import Motion
 
 
@@ -30,7 +30,7 @@ def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0):
     """
     columns = []
     for constraint, values, places in zip(packed.constraints, packed.parameters, packed.coordinates, strict=True):
-        x = [part for marker in _markers(packed.bodies, constraint, places, q, qd, qdd) for part in marker]
+        x = [part for marker in marker_jets(packed.bodies, constraint, places, q, qd, qdd) for part in marker]
         par = [entry for value in values for entry in _parameter(value, t, time_rate)]
         out = [None] * constraint.rows
         twin(type(constraint).phi)(x, par, Jet(t, time_rate), out)
@@ -55,11 +55,22 @@ def _parameter(value, t, rate):
     return [Jet(f, rate * fd, rate * rate * fdd), Jet(fd, rate * fdd), Jet(fdd)]
 
 
-def _markers(bodies, constraint, coordinates, q, qd, qdd):
-    """The coordinates of each marker as Jets over the outputs."""
-    starts = dict(zip(bodies, np.cumsum([0, *(b.dimension for b in bodies)]), strict=False))
+def starts_of(bodies):
+    """Where the coordinates of each body begin."""
+    return dict(zip(bodies, np.cumsum([0, *(b.dimension for b in bodies)]).tolist(), strict=False))
+
+
+def marker_jets(bodies, constraint, coordinates, q, qd, qdd):
+    """Yield the coordinates of each marker of a constraint or force as Jets over the outputs."""
+    starts = starts_of(bodies)
     for marker, s in zip(constraint.markers, coordinates, strict=True):
         body = constraint.body_of(marker)
+        if marker.code == TURN:
+            yield [Jet(0.0)] * 3
+            continue
+        if marker.code == PARAMETERS and body.dimension != 7:
+            yield [Jet(value) for value in IDENTITY]
+            continue
         if body.dimension == 0:
             yield [Jet(value) for value in s]
             continue

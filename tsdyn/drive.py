@@ -34,7 +34,7 @@ def drive(context, run, addresses, max_steps, report, span, watch):
     chunks = {"out": [], "history": [], "blocks": []}
     most, limit = FIRST_SLICE, int(run.numbers[STEPS_WANTED]) if max_steps is None else max_steps
     per_step, dense = run.t_eval.size == 0, run.numbers[DENSE] == STORED
-    width = 1 + 3 * context.work.q.size
+    width = 1 + 3 * context.work.q.size + run.remembered.size
     largest = max(BLOCK_ROOM // run.block.size, 1) if dense else LARGEST_SLICE
 
     def fresh(run, rows):
@@ -108,8 +108,11 @@ def _collect(run, chunks, per_step, dense):
     run.numbers[HISTORY] = 0
 
 
-def lay_out(work, nx, ny, tableau, memory, times, first_order, width, dense):
-    """The `Run` of a system of sizes nx, ny; width is that of the interpolant's data, dense 0, FILLED or STORED."""
+def lay_out(work, nx, ny, tableau, memory, times, first_order, width, dense, slots):
+    """The `Run` of a system of sizes nx, ny; width is that of the interpolant's data, dense 0, FILLED or STORED.
+
+    slots is how many numbers forces remember.
+    """
     n = work.q.size
     zeros = np.zeros
     numbers = zeros(NUMBERS, np.int64)
@@ -120,15 +123,16 @@ def lay_out(work, nx, ny, tableau, memory, times, first_order, width, dense):
         now=zeros((3, n)),
         before=zeros((3, n)),
         warm=zeros(warm_size(work)),
+        remembered=zeros(slots),
         tableau=tableau,
         memory=zeros(memory),
         t_eval=times,
         clock=zeros(CLOCKS),
         numbers=numbers,
-        out=np.empty((times.size, 1 + 3 * n)),
+        out=np.empty((times.size, 1 + 3 * n + slots)),
         history=np.empty((0, 3)),
         charts=zeros((2 * CHART_ROOM, 5)),
         points=zeros((2 * CHART_ROOM if dense else 0, n)),
-        block=zeros(B_DATA + width),
-        blocks=np.empty((0, B_DATA + width)),
+        block=zeros(B_DATA + width + slots),
+        blocks=np.empty((0, B_DATA + width + slots)),
     )

@@ -19,6 +19,10 @@ class InvalidConstraint(TsdynError, ValueError):
     """A constraint's geometry, bodies or kernels are impossible."""
 
 
+class InvalidForce(TsdynError, ValueError):
+    """A force's numbers, functions, bodies or kernels are impossible."""
+
+
 class InconsistentState(TsdynError, ValueError):
     """Positions or velocities break a constraint; the message names it and its residual."""
 

@@ -8,6 +8,7 @@ from .assembly import evaluate_constraints
 from .bodies import transform_g
 from .checks import finite_vector, number
 from .errors import InvalidArgument, SingularConfiguration
+from .loads import applied_loads, velocity_forces
 
 
 class Evaluation(NamedTuple):
@@ -56,7 +57,8 @@ def evaluate(scene, q=None, qd=None, t=0.0):
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     Phi, Phi_q, Phi_t, gamma = constraint_arrays(system, q, qd, t)
-    M, Q_A, S = mass_matrix(system, q), applied_forces(system, q), velocity_forces(system, q, qd)
+    M, S = mass_matrix(system, q), velocity_forces(system, q[None], qd[None])[0]
+    Q_A = applied_loads(system, np.array([float(t)]), q[None], qd[None])[0]
     m, n = Phi_q.shape
     kkt = np.block([[M, Phi_q.T], [Phi_q, np.zeros((m, m))]])
     try:
@@ -96,21 +98,3 @@ def mass_matrix(system, q):
             G = transform_g(q[at + 3 : at + 7])
             M[at + 3 : at + 7, at + 3 : at + 7] = 4.0 * G.T @ J.reshape(3, 3) @ G
     return M
-
-
-def applied_forces(system, q):
-    """Q_A: gravity."""
-    Q = np.zeros(q.size)
-    for (at, _), mass in zip(system.bodies, system.mass, strict=True):
-        Q[at : at + 3] = mass * system.gravity
-    return Q
-
-
-def velocity_forces(system, q, qd):
-    """S: 8 Gd^T J' Gd p on p."""
-    S = np.zeros(q.size)
-    for (at, length), J in zip(system.bodies, system.inertia, strict=True):
-        if length == 7:
-            Gd = transform_g(qd[at + 3 : at + 7])
-            S[at + 3 : at + 7] = 8.0 * Gd.T @ J.reshape(3, 3) @ Gd @ q[at + 3 : at + 7]
-    return S

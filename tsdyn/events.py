@@ -67,17 +67,17 @@ def prepare(events):
 class Instant:
     """What an event function is given: as a `State`, with multipliers made when asked for."""
 
-    __slots__ = ("_system", "q", "qd", "qdd", "t")
+    __slots__ = ("_memory", "_system", "q", "qd", "qdd", "t")
 
-    def __init__(self, system, t, state):
-        self._system, self.t = system, t
+    def __init__(self, system, memory, t, state):
+        self._system, self._memory, self.t = system, memory, t
         self.q, self.qd, self.qdd = state.copy()  # the function may keep or change it
 
     @property
     def multipliers(self):
         """Multipliers (m,)."""
         parts = (part[None] for part in (self.q, self.qd, self.qdd))
-        return reactions.multipliers(self._system, np.array([self.t]), *parts)[0]
+        return reactions.multipliers(self._system, np.array([self.t]), *parts, self._memory[None])[0]
 
     def __iter__(self):
         return iter((self.t, self.q, self.qd, self.qdd, self.multipliers))
@@ -89,6 +89,7 @@ class Watch:
     def __init__(self, events, system, reader, start):
         self.events, self.system, self.reader = events, system, reader
         self.t, self.state, self.values = start, None, None  # at the last step's end
+        self.memory = None  # what forces remember of it
         self.list = [[] for _ in events]
         none = np.empty(0)
         reader(none, none.astype(int), np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0)))  # loads the kernel
@@ -105,7 +106,7 @@ class Watch:
             status = Status(advance(context, run, addresses, -1))
             if not run.numbers[BEGUN]:
                 return status, ""
-            self.state = run.now.copy()
+            self.state, self.memory = run.now.copy(), run.remembered.copy()
             try:
                 self.values = [self._value(i, self.t, self.state) for i in range(len(self.events))]
             except Failed as failure:
@@ -127,7 +128,7 @@ class Watch:
     def _value(self, i, t, state):
         event = self.events[i]
         try:
-            given = event.function(t, Instant(self.system, t, state))
+            given = event.function(t, Instant(self.system, self.memory, t, state))
         except Exception as error:
             raise Failed(f"{event.name} raised {type(error).__name__} at t = {t:.9g} s: {error}.") from error
         value = number(given)
@@ -140,7 +141,7 @@ class Watch:
         t0, t1 = self.t, float(run.clock[T])
         before, now = self.state, run.now.copy()
         values = self.values
-        self.t, self.state = t1, now
+        self.t, self.state, self.memory = t1, now, run.remembered.copy()
         self.values = [self._value(i, t1, now) for i in range(len(self.events))]
         found = []
         for i, (a, b) in enumerate(zip(values, self.values, strict=True)):
@@ -189,7 +190,7 @@ class Watch:
             while run.numbers[ROWS] > 0 and run.out[run.numbers[ROWS] - 1, 0] > last.t:
                 run.numbers[ROWS] -= 1
         elif last.t > t0:
-            run.out[run.numbers[ROWS] - 1] = [last.t, *last.state.ravel()]
+            run.out[run.numbers[ROWS] - 1] = [last.t, *last.state.ravel(), *run.remembered]
         else:
             run.numbers[ROWS] -= 1
         if run.numbers[DENSE] == STORED:

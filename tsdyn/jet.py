@@ -22,6 +22,11 @@ class Jet:
         """The value itself, or a constant as a Jet."""
         return value if isinstance(value, Jet) else Jet(value)
 
+    @property
+    def real(self):
+        """The value without its derivatives, as complex numbers have it."""
+        return self.x
+
     def __add__(self, other):
         o = Jet.of(other)
         return Jet(self.x + o.x, self.xd + o.xd, self.xdd + o.xdd)

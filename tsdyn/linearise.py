@@ -13,7 +13,7 @@ P = A - g C_hat + g^2 K_hat, the iteration matrix of a stage with g = h a_ii.
 """
 
 from ._kernel import callback, kernel, stack, stack2, vector
-from .assembly import constraint_curvature
+from .assembly import applied_forces, constraint_curvature, force_jacobian
 from .linalg import lu, lu_solve
 from .newton import NOT_FINITE, OK, SINGULAR
 from .workspace import ITERATION_MATRICES, JACOBIANS, load
@@ -76,12 +76,12 @@ def _moment(G, J, p, out):
 
 @kernel
 def _inertia_terms(s, w, l):
-    """l.r = gravity + S - M qdd, K += (M qdd - S)_q, C += S_qd; S_p = 8 Gd^T J' Gd p, M_p = 4 G^T J' G."""
+    """l.r += gravity + S - M qdd, K += (M qdd - S)_q, C += S_qd; S_p = 8 Gd^T J' Gd p, M_p = 4 G^T J' G."""
     G, Gd, Gdd, h, g = stack2(3, 4), stack2(3, 4), stack2(3, 4), stack(3), stack(3)
     for b in range(s.mass.size):
         at = s.bodies[b, 0]
         for c in range(3):
-            l.r[at + c] = s.mass[b] * (s.gravity[c] - w.qdd[at + c])
+            l.r[at + c] += s.mass[b] * (s.gravity[c] - w.qdd[at + c])
         if s.bodies[b, 1] == 7:
             p, pd, pdd, J = w.q[at + 3 : at + 7], w.qd[at + 3 : at + 7], w.qdd[at + 3 : at + 7], s.inertia[b]
             transform(p, G)
@@ -93,7 +93,7 @@ def _inertia_terms(s, w, l):
                 total = 0.0
                 for a in range(3):
                     total += 8.0 * Gd[a, i] * g[a] - 4.0 * G[a, i] * h[a]
-                l.r[at + 3 + i] = total
+                l.r[at + 3 + i] += total
             K, C = l.K[at + 3 : at + 7, at + 3 : at + 7], l.C[at + 3 : at + 7, at + 3 : at + 7]
             _crossed(h, 4.0, K)
             _transposed_product(G, J, Gdd, -4.0, K)
@@ -197,6 +197,13 @@ def linearise(context, t):
         for j in range(n):
             l.K[i, j] = 0.0
             l.C[i, j] = 0.0
+        l.r[i] = 0.0
+    if s.forces.shape[0] > 0:
+        force_jacobian(s, w.q, w.qd, t, l.K, l.C)
+        applied_forces(s, w.q, w.qd, t, l.r)
+        for i in range(n):
+            for j in range(n):
+                l.K[i, j] = -l.K[i, j]
     _inertia_terms(s, w, l)
     _multiply(w.U, w.B, l.UB)
     for i in range(m):  # Phi_q^T lam = r, so lam = (U B)^T r

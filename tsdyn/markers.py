@@ -1,10 +1,12 @@
-"""Markers: the points, vectors and Euler parameters of a body on which constraints are written.
+"""Markers: the points, vectors and Euler parameters of a body on which constraints and forces are written.
 
     Point       x = r + A(p) s    xd = rd + (A s)_p pd    at qdd = 0: xdd = 2 A(pd) s
     Vector      x = A(p) s        xd = (A s)_p pd                     xdd = 2 A(pd) s
     Parameters  x = p             xd = pd                             xdd = 0
+    Turn        x = 0             xd = 2 E(p) pd, the angular velocity; for forces only
 
-x is in the ground frame, s in the body frame. On the ground x = s, and nothing moves; a point mass has r only.
+x and xd are in the ground frame, s in the body frame. On the ground x = s, or p = (1, 0, 0, 0), and nothing moves; a
+point mass has r only.
 """
 
 from dataclasses import dataclass
@@ -16,12 +18,12 @@ from .checks import vector3
 from .errors import InvalidBody, InvalidConstraint
 from .rotation import rotate, rotate_gradient, rotate_rate
 
-POINT, VECTOR, PARAMETERS = 0, 1, 2  # codes in kernels
+POINT, VECTOR, PARAMETERS, TURN = 0, 1, 2, 3  # codes in kernels
 
 
 @dataclass(frozen=True)
 class Marker:
-    """What one slot of a primitive is attached to: body "a" or "b", and the argument that places it there."""
+    """What one slot of a constraint or force is on: body "a" or "b", and the argument that places it there."""
 
     body: str
     argument: str = ""
@@ -35,9 +37,9 @@ class Marker:
         if not self.argument:
             object.__setattr__(self, "argument", self.prefix + self.body)
 
-    def coordinates(self, body, value, where):
+    def coordinates(self, body, value, where, error=InvalidConstraint):
         """Check the body-frame coordinates that a user gave, return them as an array (3,)."""
-        place = vector3(value, f"{where}: {self.argument}", InvalidConstraint)
+        place = vector3(value, f"{where}: {self.argument}", error)
         place.setflags(write=False)
         return place
 
@@ -45,11 +47,11 @@ class Marker:
 class Point(Marker):
     """A point of a body, by its coordinates in the body frame, m."""
 
-    def coordinates(self, body, value, where):
+    def coordinates(self, body, value, where, error=InvalidConstraint):
         """Check the coordinates; a point mass has no other point than itself."""
-        value = super().coordinates(body, value, where)
+        value = super().coordinates(body, value, where, error)
         if body.dimension == 3 and value.any():
-            raise InvalidConstraint(f"{where}: {self.argument} must be (0, 0, 0) on the point mass {body.name!r}.")
+            raise error(f"{where}: {self.argument} must be (0, 0, 0) on the point mass {body.name!r}.")
         return value
 
 
@@ -59,30 +61,40 @@ class Vector(Marker):
     code = VECTOR
     prefix = "axis_"
 
-    def coordinates(self, body, value, where):
+    def coordinates(self, body, value, where, error=InvalidConstraint):
         """Check and normalise the direction."""
-        value = super().coordinates(body, value, where)
+        value = super().coordinates(body, value, where, error)
         _needs_rotation(body, f"{where}: {self.argument}")
         length = np.linalg.norm(value)
         if not length > 0.0:
-            raise InvalidConstraint(f"{where}: {self.argument} has length zero; give a direction, such as (0, 0, 1).")
+            raise error(f"{where}: {self.argument} has length zero; give a direction, such as (0, 0, 1).")
         value = value / length
         value.setflags(write=False)
         return value
 
 
 class Parameters(Marker):
-    """The Euler parameters of a rigid body themselves."""
+    """The Euler parameters of a rigid body themselves; (1, 0, 0, 0) on the ground."""
 
     code = PARAMETERS
     size = 4
     prefix = "parameters_"
 
-    def coordinates(self, body, value, where):
+    def coordinates(self, body, value, where, error=InvalidConstraint):
         """Nothing to place: the marker is p."""
         _needs_rotation(body, where)
-        if body.dimension == 0:
-            raise InvalidConstraint(f"{where}: the ground has no Euler parameters.")
+        return np.zeros(3)
+
+
+class Turn(Marker):
+    """The turning of a rigid body, for forces: xd is its angular velocity, conjugate is a torque, ground frame."""
+
+    code = TURN
+    prefix = "turn_"
+
+    def coordinates(self, body, value, where, error=InvalidConstraint):
+        """Nothing to place: all points of a body turn alike."""
+        _needs_rotation(body, where)
         return np.zeros(3)
 
 
@@ -94,7 +106,14 @@ def _needs_rotation(body, where):
 @kernel
 def position(code, dimension, at, q, s, x):
     """x of one marker; its body's coordinates begin at q[at]."""
-    if dimension == 7:
+    if code == TURN:
+        for i in range(3):
+            x[i] = 0.0
+    elif code == PARAMETERS and dimension != 7:
+        x[0] = 1.0
+        for i in range(1, 4):
+            x[i] = 0.0
+    elif dimension == 7:
         if code == PARAMETERS:
             for i in range(4):
                 x[i] = q[at + 3 + i]
@@ -115,14 +134,13 @@ def position(code, dimension, at, q, s, x):
 def motion(code, dimension, at, q, qd, s, x, xd, xdd):
     """x, xd, and xdd at qdd = 0, of one marker."""
     position(code, dimension, at, q, s, x)
-    for i in range(3):
+    for i in range(4 if code == PARAMETERS else 3):
         xd[i] = 0.0
         xdd[i] = 0.0
     if dimension == 7:
         if code == PARAMETERS:
             for i in range(4):
                 xd[i] = qd[at + 3 + i]
-            xdd[3] = 0.0
             return
         rotate_rate(q[at + 3 : at + 7], qd[at + 3 : at + 7], s, xd)
         rotate(qd[at + 3 : at + 7], s, xdd)

@@ -12,7 +12,7 @@ per vd; S_p = 8 Gd^T J' Gd p.
 import math
 
 from ._kernel import callback, kernel, vector
-from .assembly import acceleration_bias, is_rheonomic, set_time, time_derivative
+from .assembly import acceleration_bias, applied_forces, is_rheonomic, set_time, time_derivative
 from .chart import inspect, new_chart, tangent_map
 from .errors import Status
 from .linalg import cholesky, cholesky_solve
@@ -131,6 +131,15 @@ def reduced_acceleration(s, w, t, vdd):
                     + s2 * w.D[at + 5, j]
                     + s3 * w.D[at + 6, j]
                 )
+    if s.forces.shape[0] > 0:
+        for c in range(n):
+            w.Q[c] = 0.0
+        applied_forces(s, w.q, w.qd, t, w.Q)
+        for c in range(n):
+            f = w.Q[c]
+            if f != 0.0:
+                for j in range(k):
+                    vdd[j] += f * w.D[c, j]
     cholesky_solve(w.A, vdd, k)
     total = 0.0
     for j in range(k):

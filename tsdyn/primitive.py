@@ -16,11 +16,10 @@ and on truncated Taylor series: that is how they are checked.
 from types import MappingProxyType
 
 from . import curvature
-from ._kernel import Callback, caller, integers, kernel, specialised, stack, stack2, vector
-from .bodies import Ground, PointMass
-from .checks import demand_known
+from ._kernel import Callback, caller, integers, specialised, stack, stack2, vector
+from .attachment import Attachment, inlined, layout, static_kernel
 from .errors import InvalidConstraint
-from .markers import PARAMETERS, Marker, chain_rule, motion, position
+from .markers import PARAMETERS, TURN, Marker, chain_rule, motion, position
 from .motion import Motion
 
 # what the table of a kind holds for each instance
@@ -34,7 +33,7 @@ _KERNELS = {"phi": 4, "jacobian": 4, "gamma": 5}  # and their numbers of argumen
 _OPTIONAL = {"phi_t": 4}
 
 
-class Primitive:
+class Primitive(Attachment):
     """Base class of all constraints that have rows of their own.
 
     Subclass it in one file of your own: set `rows` and `markers`, write the kernels as static methods, and pass the
@@ -55,9 +54,7 @@ class Primitive:
     """
 
     rows = 0
-    markers = ()
     prescribed = ""
-    added = False  # to its scene
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
 
     def __init_subclass__(cls, **keywords):
@@ -66,94 +63,29 @@ class Primitive:
         if isinstance(cls.rows, bool) or not isinstance(cls.rows, int) or cls.rows < 1:
             raise InvalidConstraint(f"{where}: rows must be the number of its scalar constraints, 1 or more.")
         markers = cls.markers if isinstance(cls.markers, (tuple, list)) else ()
-        if not markers or not all(isinstance(m, Marker) for m in markers):
+        if not markers or not all(isinstance(m, Marker) and m.code != TURN for m in markers):
             raise InvalidConstraint(f"{where}: markers must be a tuple of Point, Vector or Parameters.")
         functions = {}
         for name, arguments in {**_KERNELS, **_OPTIONAL}.items():
-            function = getattr(cls, name, None)
-            if function is None and name in _OPTIONAL:
+            if getattr(cls, name, None) is None and name in _OPTIONAL:
                 continue
-            code = getattr(getattr(function, "py_func", function), "__code__", None)
-            if code is None or code.co_argcount != arguments:
-                raise InvalidConstraint(f"{where}: write {name} as a static method with {arguments} arguments.")
-            functions[name] = function
+            functions[name] = static_kernel(cls, name, arguments, where, InvalidConstraint)
         cls.kernels = MappingProxyType(_compile(cls, functions))
         _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
     def __init__(self, a, b=None, coordinates=(), name=""):
         """Attach the primitive to its bodies; coordinates has an entry for each marker, in the body frame."""
-        self.a, self.b = a, b
-        kind = type(self).__name__
         if not self.rows:
             raise InvalidConstraint(
                 "Primitive is the base of constraints and has no rows; use one of them, or a subclass."
             )
-        needed = {marker.body for marker in self.markers} | {"a"}
-        bodies = [body for body, letter in ((a, "a"), (b, "b")) if body is not None or letter in needed]
-        for body in bodies:
-            if not isinstance(body, (PointMass, Ground)):
-                raise InvalidConstraint(
-                    f"{name or kind}: {body!r} is not a body; pass one that add_body returned, or the ground."
-                )
-        self.name = str(name) or f"{kind}({', '.join(body.name for body in bodies)})"
-        if all(body.dimension == 0 for body in bodies):
-            raise InvalidConstraint(f"{self.name}: one of the bodies must not be the ground.")
-        if len(bodies) == 2 and a is b:
-            raise InvalidConstraint(f"{self.name}: it joins {a.name!r} to itself; pass two different bodies.")
-        if len({id(body.scene) for body in bodies}) != 1:
-            raise InvalidConstraint(f"{self.name}: {a.name!r} and {b.name!r} belong to different scenes.")
-        given = list(coordinates) or [None] * len(self.markers)
-        if len(given) != len(self.markers):
-            raise InvalidConstraint(f"{self.name}: {len(self.markers)} markers, but {len(given)} coordinates.")
-        self.coordinates = tuple(
-            marker.coordinates(self.body_of(marker), value, self.name)
-            for marker, value in zip(self.markers, given, strict=True)
-        )
+        super().__init__(a, b, coordinates, name)
 
     def __setattr__(self, name, value):
-        """Set an attribute, checked; the scene packs its numbers again.
-
-        A marker's argument (`point_a`, ...) may be set as well as a prescribed value. Once the constraint is in its
-        scene, a name that it does not have is refused.
-        """
+        """Set an attribute, checked; a prescribed one may be a number or three functions of time."""
         if name == self.prescribed:
             value = Motion.wrap(value, f"{self.name}: {name}")
-        slots = [marker.argument for marker in self.markers]
-        if name in slots and "coordinates" in self.__dict__:
-            i = slots.index(name)
-            place = self.markers[i].coordinates(self.body_of(self.markers[i]), value, self.name)
-            name, value = "coordinates", (*self.coordinates[:i], place, *self.coordinates[i + 1 :])
-        if not self.added:
-            super().__setattr__(name, value)
-            return
-        demand_known(self, name, self.__dict__)
-        before = self.__dict__[name]
         super().__setattr__(name, value)
-        try:
-            self.check()
-        except InvalidConstraint:
-            super().__setattr__(name, before)
-            raise
-        self.scene.touch()
-
-    def __getattr__(self, name):
-        """The body-frame coordinates of a marker, by its argument."""
-        for marker, place in zip(self.markers, self.__dict__.get("coordinates", ()), strict=False):
-            if marker.argument == name:
-                return place
-        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-
-    def check(self):
-        """Raise InvalidConstraint where an attribute has an impossible value; asked again when one is set."""
-
-    @property
-    def scene(self):
-        """The scene of its bodies."""
-        return self.a.scene
-
-    def body_of(self, marker):
-        """The body that a marker is on."""
-        return self.a if marker.body == "a" else self.b
 
     @property
     def rheonomic(self):
@@ -161,18 +93,11 @@ class Primitive:
         moves = not self.prescribed or isinstance(getattr(self, self.prescribed), Motion)
         return moves and "phi_t" in self.kernels
 
-    def parameters(self):
-        """The floats and motions that the kernels get as `par`."""
-        return ()
-
     @classmethod
     def example(cls, rng, a, b):
         """Return a random valid instance between two bodies, for tests."""
         places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code != PARAMETERS}
         return cls(a, b, **places) if any(m.body == "b" for m in cls.markers) else cls(a, **places)
-
-    def __repr__(self):
-        return f"<{type(self).__name__} {self.name!r}>"
 
 
 def registered():
@@ -182,19 +107,9 @@ def registered():
 
 def _compile(cls, functions):
     """Make the callbacks of a kind: each runs over all its instances."""
-    owners = [0 if m.body == "a" else 1 for m in cls.markers]
-    sizes = [m.size for m in cls.markers]
-    constants = {
-        "ROWS": cls.rows,
-        "MARKERS": len(cls.markers),
-        "CODES": tuple(m.code for m in cls.markers),
-        "OWNERS": tuple(owners),
-        "STARTS": tuple(sum(sizes[:i]) for i in range(len(sizes))),
-        "FIRST": tuple(int(owner not in owners[:i]) for i, owner in enumerate(owners)),
-        "SIZE": sum(sizes),
-    }
+    constants = {"ROWS": cls.rows, **layout(cls.markers)}
     try:
-        inner = {f"kernel_{name}": _inlined(function) for name, function in functions.items()}
+        inner = {f"kernel_{name}": inlined(function) for name, function in functions.items()}
     except InvalidConstraint as error:
         raise InvalidConstraint(f"primitive {cls.__name__}: {error}") from error
     loops = {"phi": _values, "phi_t": _values, "jacobian": _jacobian, "gamma": _gamma}
@@ -209,10 +124,6 @@ def _compile(cls, functions):
     copy = specialised(curvature.loop, f"{cls.__qualname__}.curvature_loop", owner, **constants, **inner, **places)
     result["curvature"] = Callback(copy, curvature.SIGNATURE)
     return result
-
-
-def _inlined(function):
-    return function if hasattr(function, "py_func") else kernel(function)
 
 
 # The loops over all instances of a kind. The names in capitals and kernel_* are filled in by `_compile`.

@@ -8,6 +8,7 @@ from ._kernel import entry
 from .assembly import constraint_jacobian, set_time
 from .bodies import rotation_matrix, transform_g
 from .linalg import cholesky, cholesky_solve
+from .loads import applied_loads, force_loads, inertial_forces, velocity_forces
 from .markers import POINT
 
 
@@ -46,27 +47,17 @@ def solve_multipliers(s, t, q, f, Phi_q, A, b, out):
                 out[row, i] += b[i]
 
 
-def multipliers(system, t, q, qd, qdd):
-    """Multipliers (k, m) of M qdd + Phi_q^T lam = Q_A + S; NaN where Phi_q has lost rank."""
+def multipliers(system, t, q, qd, qdd, memory=None):
+    """Multipliers (k, m) of M qdd + Phi_q^T lam = Q_A + S; NaN where Phi_q has lost rank.
+
+    memory (k, slots) is what forces remember, zeros by default.
+    """
     m = system.segments.shape[0]
     out = np.zeros((t.size, m))
     system = system._replace(reals=system.reals.copy())
-    f = unbalanced(system, q, qd, qdd)
+    f = applied_loads(system, t, q, qd, memory) + velocity_forces(system, q, qd) - inertial_forces(system, q, qdd)
     solve_multipliers(system, t, q, f, np.zeros((m, q.shape[1])), np.zeros((m, m)), np.zeros(m), out)
     return out
-
-
-def unbalanced(system, q, qd, qdd):
-    """Q_A + S - M qdd (k, n): what the constraints have to provide, Phi_q^T lam."""
-    f = np.empty_like(q)
-    for (at, length), mass, J in zip(system.bodies, system.mass, system.inertia, strict=True):
-        f[:, at : at + 3] = mass * (system.gravity - qdd[:, at : at + 3])
-        if length == 7:
-            part, J = slice(at + 3, at + 7), J.reshape(3, 3)
-            G, Gd = transform_g(q[:, part]), transform_g(qd[:, part])
-            S = 8.0 * np.einsum("kji,jl,klm,km->ki", Gd, J, Gd, q[:, part])
-            f[:, part] = S - 4.0 * np.einsum("kji,jl,klm,km->ki", G, J, G, qdd[:, part])
-    return f
 
 
 def reaction(solution, constraint):
@@ -79,7 +70,6 @@ def reaction(solution, constraint):
     packed = solution.packed
     index = packed.constraints.index(constraint)
     row = sum(other.rows for other in packed.constraints[:index])
-    at, length = system.bodies[body.index]
     k, m = solution.multipliers.shape
     load = np.empty((k, solution.q.shape[1]))
     motions = system._replace(reals=system.reals.copy())
@@ -87,16 +77,28 @@ def reaction(solution, constraint):
     lam = np.zeros_like(solution.multipliers)
     lam[:, rows] = solution.multipliers[:, rows]
     constraint_loads(motions, solution.t, solution.q, lam, np.zeros((m, solution.q.shape[1])), load)
-    force, torque = load[:, at : at + 3].copy(), np.zeros((k, 3))
+    return _at_first_point(solution, body, load, constraint, packed.coordinates[index])
+
+
+def force_reaction(solution, load):
+    """Force and torque (k, 3) that a force exerts on its body, torque about its first point, ground frame."""
+    force, system = load.force, solution.system._replace(forces=load.row[None])
+    body = force.a if force.a.dimension else force.b
+    Q = force_loads(system, solution.t, solution.q, solution.qd, solution._memory)
+    return _at_first_point(solution, body, Q, force, load.coordinates)
+
+
+def _at_first_point(solution, body, load, item, coordinates):
+    """Force and torque of generalised forces load (k, n) on a body, about the first point that the item has on it."""
+    at, length = solution.system.bodies[body.index]
+    force, torque = load[:, at : at + 3].copy(), np.zeros((load.shape[0], 3))
     if length == 7:
         p = solution.q[:, at + 3 : at + 7]
         A = rotation_matrix(p)
         torque = np.einsum("kij,kjl,kl->ki", A, 0.5 * transform_g(p), load[:, at + 3 : at + 7])
-        letter = "a" if body is constraint.a else "b"
-        points = [
-            s for mark, s in zip(constraint.markers, packed.coordinates[index], strict=True)
-            if mark.body == letter and mark.code == POINT
-        ]  # fmt: skip
+        letter = "a" if body is item.a else "b"
+        pairs = zip(item.markers, coordinates, strict=True)
+        points = [s for marker, s in pairs if marker.body == letter and marker.code == POINT]
         if points:
             torque -= np.cross(A @ points[0], force)
     return force, torque

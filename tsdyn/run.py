@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._kernel import address_of, caller, entry, kernel
+from .assembly import remember
 from .chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .dense import (
     A_ACCELERATE,
@@ -73,12 +74,13 @@ class Run(NamedTuple):
     xs: np.ndarray  # (nx,)  dense output and the guess of a first step
     ys: np.ndarray  # (ny,)
     yds: np.ndarray  # (ny,)
+    remembered: np.ndarray  # (slots,)  what forces remember of the last accepted point
     tableau: np.ndarray  # the method's numbers
     memory: np.ndarray  # the method's scratch
     t_eval: np.ndarray  # output times, or empty: every step
     clock: np.ndarray  # T ... ERROR_BEFORE
     numbers: np.ndarray  # int64, FIRST_ORDER ... STAGE_AT (where an implicit method leaves its last stage, or 0)
-    out: np.ndarray  # (rows, 1 + 3 n)  t, q, qd, qdd
+    out: np.ndarray  # (rows, 1 + 3 n + slots)  t, q, qd, qdd, remembered
     history: np.ndarray  # (rows, 3)  t, h, accepted
     charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left
     points: np.ndarray  # (rows, n)  q0 of each chart, or (0, n) where nothing asks for it
@@ -126,6 +128,8 @@ def _record(r, t, q, qd, qdd):
     row[0] = t
     for j in range(n):
         row[1 + j], row[1 + n + j], row[1 + 2 * n + j] = q[j], qd[j], qdd[j]
+    for j in range(r.remembered.size):
+        row[1 + 3 * n + j] = r.remembered[j]
     r.numbers[ROWS] = i + 1
 
 
@@ -158,6 +162,7 @@ def _fill(context, w, r, at, t0, h, t1):
         at[A_FILL], context, at[A_PLACE], at[A_ACCELERATE], r.numbers[FIRST_ORDER], t0, h, w.q.size, r.x.size, r.y.size,
         r.x_old, r.y_old, r.yd_old, r.x, r.y, r.yd, r.xd, r.before, r.now, r.tableau, r.memory, r.block[B_DATA:],
     )  # fmt: skip
+    copy(r.remembered, r.block[r.block.size - r.remembered.size :])
     if status == 0 and r.numbers[DENSE] == STORED:
         copy(r.block, r.blocks[r.numbers[BLOCKS]])
         r.numbers[BLOCKS] += 1
@@ -287,6 +292,7 @@ def advance(c, r, at, most):
     nx, ny = r.x.size, r.y.size
     adaptive, implicit = r.numbers[ADAPTIVE] == 1, r.numbers[STAGE_AT] > 0
     if r.numbers[BEGUN] == 0 and most != 0:
+        remember(c.system, w.q, w.qd, r.clock[T], r.remembered)
         status = _begin(context, w, r, at)
         if status != 0:
             return status
@@ -361,6 +367,7 @@ def advance(c, r, at, most):
                 copy(r.now[j], r.before[j])
             c.linear.numbers[T_BEFORE] = t0
         _store_now(w, r)
+        remember(c.system, w.q, w.qd, t1, r.remembered)
         r.clock[T] = t1
         r.numbers[STEPS] = i + 1
         r.numbers[IN_CHART] += 1

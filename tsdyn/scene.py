@@ -1,4 +1,4 @@
-"""The scene: what a user assembles from bodies and constraints, checked piece by piece."""
+"""The scene: what a user assembles from bodies, constraints and forces, checked piece by piece."""
 
 from collections import Counter
 from itertools import count
@@ -11,13 +11,15 @@ from .checks import demand_known, vector3
 from .constraints.euler_normalization import EulerNormalization
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint
 from .evaluate import evaluate
+from .force import Force
 from .motion import Motion
 from .primitive import Primitive
+from .signal import Signal
 from .system import pack
 
 
 class Scene:
-    """Bodies, constraints and gravity.
+    """Bodies, constraints, forces and gravity.
 
     Parameters
     ----------
@@ -30,6 +32,8 @@ class Scene:
         The inertial frame, to attach constraints to.
     bodies, constraints : tuple
         In the order added; the normalisations of the rigid bodies come last, in body order.
+    forces : tuple
+        In the order added.
 
     Notes
     -----
@@ -39,7 +43,7 @@ class Scene:
 
     def __init__(self, gravity=(0.0, 0.0, -9.81)):
         self.ground = Ground(self)
-        self._bodies, self._added, self._normalisations = [], [], {}
+        self._bodies, self._added, self._forces, self._normalisations = [], [], [], {}
         self.gravity = gravity
 
     def __setattr__(self, name, value):
@@ -67,6 +71,11 @@ class Scene:
     def constraints(self):
         """The constraints, in the order of their rows."""
         return (*self._added, *self._normalisations.values())
+
+    @property
+    def forces(self):
+        """The forces, in the order added."""
+        return tuple(self._forces)
 
     def add_body(
         self,
@@ -132,27 +141,29 @@ class Scene:
         return body
 
     def add(self, item):
-        """Add a constraint and return it; a second EulerNormalization of a body gives back the one it has.
+        """Add a constraint or a force and return it; a second EulerNormalization of a body gives back the one it has.
 
         Raises
         ------
-        InvalidConstraint
-            If it is no constraint, belongs to another scene, or has been added before.
+        InvalidConstraint, InvalidForce
+            If it is neither, belongs to another scene, or has been added before.
         """
-        if not isinstance(item, Primitive):
+        if not isinstance(item, (Primitive, Force)):
             raise InvalidConstraint(
-                f"{item!r} is not a constraint; pass an instance, such as ts.constraints.Spherical(...)."
+                f"{item!r} is not a constraint or force; pass an instance, such as ts.constraints.Spherical(...) or "
+                "ts.forces.Spring(...)."
             )
+        word, members = ("force", self._forces) if isinstance(item, Force) else ("constraint", self._added)
         if not hasattr(item, "coordinates"):
-            raise InvalidConstraint(f"{type(item).__name__}: its __init__ must call super().__init__(...).")
+            raise item.error(f"{type(item).__name__}: its __init__ must call super().__init__(...).")
         if item.scene is not self:
-            raise InvalidConstraint(f"{item.name}: its bodies belong to another scene; use bodies of this one.")
+            raise item.error(f"{item.name}: its bodies belong to another scene; use bodies of this one.")
         if type(item) is EulerNormalization:
             return self._normalisations[item.a]
-        if any(item is other for other in self._added):
-            raise InvalidConstraint(f"{item.name}: it has been added to this scene before; add each constraint once.")
+        if any(item is other for other in members):
+            raise item.error(f"{item.name}: it has been added to this scene before; add each {word} once.")
         item.added = True
-        self._added.append(item)
+        members.append(item)
         self.touch()
         return item
 
@@ -175,8 +186,9 @@ class Scene:
         return self.packed.system
 
     def motions(self):
-        """The functions of time that the constraints are given."""
-        return [value for values in self.packed.parameters for value in values if isinstance(value, Motion)]
+        """The functions of time and tables that constraints and forces are given."""
+        given = [*self.packed.parameters, *(load.parameters for load in self.packed.loads)]
+        return [value for values in given for value in values if isinstance(value, (Motion, Signal))]
 
     @property
     def start(self):
@@ -215,4 +227,5 @@ class Scene:
     def __repr__(self):
         rows = sum(constraint.rows for constraint in self.constraints)
         n = sum(body.dimension for body in self._bodies)
-        return f"<Scene of {len(self._bodies)} bodies: {n} coordinates, {rows} constraint rows>"
+        forces = f", {len(self._forces)} forces" if self._forces else ""
+        return f"<Scene of {len(self._bodies)} bodies: {n} coordinates, {rows} constraint rows{forces}>"

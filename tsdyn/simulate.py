@@ -11,6 +11,7 @@ from .dense import Reader, Trajectory
 from .drive import drive, lay_out
 from .errors import InvalidArgument
 from .events import Watch, prepare
+from .force_pack import with_force_jacobians
 from .formulation import formulation as find_formulation
 from .implicit import prepare_implicit
 from .initial import consistent
@@ -36,7 +37,7 @@ from .run import (
     advance,
 )
 from .scene import Scene
-from .solution import Solution
+from .solution import Solution, remembered
 from .system import with_curvatures
 from .workspace import Context, allocate, allocate_linear
 
@@ -149,8 +150,9 @@ def simulate(
     q, qd = consistent(scene, system, q, qd, t0, initial_tol)
     m, n = system.segments.shape[0], q.size
     if method.implicit:
-        system = with_curvatures(packed)
+        system = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
     system = system._replace(reals=system.reals.copy())
+    system.reals[system.memory] = remembered(state, system.memory.size)
     work = allocate(n, m, len(scene.bodies), constraint_tol, packed.size)
     work.q[:], work.qd[:] = q, qd
     step_kernel, tableau, memory = method.kernel(form.first_order)
@@ -158,7 +160,9 @@ def simulate(
     interpolant = method.interpolant(form.first_order)
     width = interpolant.size(n, nx, n - m)
     dense = STORED if dense_output else FILLED if events is not None else 0
-    run = lay_out(work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order, width, dense)
+    run = lay_out(
+        work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order, width, dense, system.memory.size
+    )
     run.clock[[T, T_ORIGIN, T_END, H]] = t0, t0, t1, (method.first_step or 0.0) if adaptive else method.step
     if adaptive:
         run.clock[[RTOL, ATOL]] = method.step_tolerances()

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import diagnostics, reactions
+from . import diagnostics, power, reactions
 from .bodies import rotation_matrix
 from .chart import REASONS
 from .checks import floats
@@ -40,6 +40,22 @@ class State(NamedTuple):
     qd: np.ndarray
     qdd: np.ndarray
     multipliers: np.ndarray
+
+
+class _Remembering(State):
+    """A State that also says what forces remember, so that a run from it goes on counting turns."""
+
+
+def remembered(state, slots):
+    """What forces remember in a state given to `simulate`: zeros where it doesn't say."""
+    memory = getattr(state, "memory", None)
+    if memory is None:
+        return np.zeros(slots)
+    if np.shape(memory) != (slots,):
+        raise InvalidArgument(
+            f"the state remembers {np.size(memory)} angles and the scene has {slots}; use a state of this scene."
+        )
+    return memory
 
 
 class Steps(NamedTuple):
@@ -106,6 +122,8 @@ class Solution:
         n = work.q.size
         self.t = rows[:, 0].copy()
         self.q, self.qd, self.qdd = (np.ascontiguousarray(rows[:, 1 + i * n : 1 + (i + 1) * n]) for i in range(3))
+        self._memory = np.ascontiguousarray(rows[:, 1 + 3 * n :])  # (k, slots), what forces remember
+        self._remembered = run.remembered.copy()
         self._history = np.concatenate(chunks["history"])
         self._reached = float(run.clock[T])
         self._last = [a.copy() for a in run.now]
@@ -167,8 +185,11 @@ class Solution:
     def state(self):
         """The last point reached, to go on from: simulate(scene, (state.t, t_end), state=state)."""
         q, qd, qdd = (a.copy() for a in self._last)
-        lam = reactions.multipliers(self.system, np.array([self._reached]), q[None], qd[None], qdd[None])[0]
-        return State(self._reached, q, qd, qdd, lam)
+        t, memory = np.array([self._reached]), self._remembered[None]
+        lam = reactions.multipliers(self.system, t, q[None], qd[None], qdd[None], memory)[0]
+        state = _Remembering(self._reached, q, qd, qdd, lam)
+        state.memory = self._remembered.copy()
+        return state
 
     def at(self, t):
         """State at any time of a run with dense_output=True, on the manifold as the steps are.
@@ -199,11 +220,11 @@ class Solution:
         if times.size and (times.min() < start or times.max() > end):
             raise InvalidArgument(f"t must lie within the run, from {start!r} to {end!r} s, got {t!r}.")
         every = np.atleast_1d(times)
-        states, status = self._trajectory(every)
+        states, memory, status = self._trajectory(every)
         if status != Status.SUCCESS:
             raise StepFailure(f"no state could be found at some t in {t!r}. {status.sentence} {status.remedy}", self)
         q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
-        state = State(every, q, qd, qdd, reactions.multipliers(self.system, every, q, qd, qdd))
+        state = State(every, q, qd, qdd, reactions.multipliers(self.system, every, q, qd, qdd, memory))
         return state if times.ndim else State(float(times), *(part[0] for part in state[1:]))
 
     @property
@@ -222,21 +243,25 @@ class Solution:
     @cached_property
     def multipliers(self):
         """Multipliers (k, m), computed when first asked for."""
-        return reactions.multipliers(self.system, self.t, self.q, self.qd, self.qdd)
+        return reactions.multipliers(self.system, self.t, self.q, self.qd, self.qdd, self._memory)
 
     @cached_property
     def constraint_error(self):
         """Maximum norms of Eqs. 1-3 at every output, recomputed by code that is not the solver's."""
         return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd)
 
-    def reaction(self, constraint):
-        """Force (N) and torque (N m) that a constraint exerts, each (k, 3), ground frame.
+    def reaction(self, item):
+        """Force (N) and torque (N m) that a constraint or force exerts, each (k, 3), ground frame.
 
-        On body a, or on b where a is the ground; the torque is about the constraint's first point on that body.
+        On body a, or on b where a is the ground; the torque is about its first point on that body, or the centroid
+        where it has none.
         """
-        if constraint not in self.packed.constraints:
-            raise InvalidConstraint(f"{constraint!r} is not a constraint of this solution's scene.")
-        return reactions.reaction(self, constraint)
+        for load in self.packed.loads:
+            if item is load.force:
+                return reactions.force_reaction(self, load)
+        if item not in self.packed.constraints:
+            raise InvalidConstraint(f"{item!r} is not a constraint or force of this solution's scene.")
+        return reactions.reaction(self, item)
 
     def _span(self, body, part):
         if body not in self.packed.bodies:
@@ -282,13 +307,27 @@ class Solution:
 
     @cached_property
     def potential_energy(self):
-        """Potential energy of gravity (k,), J, zero at the ground's origin."""
-        return diagnostics.potential_energy(self.system, self.q)
+        """Potential energy (k,), J, of gravity, zero at the ground's origin, and of springs; loads have none."""
+        return diagnostics.potential_energy(self.system, self.q) + self._force_powers.potential
 
     @property
     def energy(self):
         """Kinetic and potential energy together (k,), J."""
         return self.kinetic_energy + self.potential_energy
+
+    @cached_property
+    def _force_powers(self):
+        return power.force_powers(self)
+
+    @cached_property
+    def power(self):
+        """Power (k,), W, of applied forces, actuators and driven constraints: dE/dt = power - dissipation."""
+        return self._force_powers.applied + power.driving_power(self)
+
+    @property
+    def dissipation(self):
+        """Power (k,), W, that dampers and friction take; not negative."""
+        return self._force_powers.dissipation
 
     @cached_property
     def linear_momentum(self):

@@ -7,6 +7,7 @@ from numba.core.errors import NumbaError
 
 from .checks import number
 from .errors import InvalidConstraint
+from .force_pack import FORCE_COLUMNS, pack_forces
 from .motion import Motion
 from .primitive import AT, BLOCK, DIMENSION, INTS, ROW, STRIDE
 
@@ -27,6 +28,9 @@ class System(NamedTuple):
     motions: np.ndarray  # int64 (motions, 4): addresses of f, fd, fdd; place of the first in reals
     rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
     segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
+    forces: np.ndarray  # int64 (kinds, 7): addresses and extents, columns in force_pack
+    signals: np.ndarray  # int64 (signals, 5): functions of time and tables that loads are given, force_pack
+    memory: np.ndarray  # int64 (slots,): places in reals of what forces remember from step to step
 
 
 class Packed(NamedTuple):
@@ -38,6 +42,7 @@ class Packed(NamedTuple):
     parameters: tuple  # of each constraint: floats and Motions
     coordinates: tuple  # of each constraint: where its markers are, (3,) each
     size: float  # largest number among the coordinates
+    loads: tuple  # a force_pack.Load for each force, in the order added
 
 
 def pack(scene):
@@ -85,6 +90,7 @@ def pack(scene):
         addresses.append(_address(kind, "phi_t") if moving else 0)
         kinds.append([*addresses, len(members), stride, *first, 0])
 
+    forces, signals, memory, loads = pack_forces(scene.forces, where, table, reals)
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
@@ -97,10 +103,14 @@ def pack(scene):
         motions=np.array(motions, np.int64).reshape(-1, 4),
         rheonomic=np.array([any(kind[PHI_T] for kind in kinds)], np.int64),
         segments=np.array(segments, np.int64).reshape(-1, 4),
+        forces=np.array(forces, np.int64).reshape(-1, FORCE_COLUMNS),
+        signals=np.array(signals, np.int64).reshape(-1, 5),
+        memory=np.array(memory, np.int64),
     )
     coordinates = tuple(constraint.coordinates for constraint in scene.constraints)
     size = max((np.abs(s).max() for each in coordinates for s in each), default=0.0)
-    return Packed(system, scene.bodies, scene.constraints, tuple(parameters.values()), coordinates, float(size))
+    parameters = tuple(parameters.values())
+    return Packed(system, scene.bodies, scene.constraints, parameters, coordinates, float(size), loads)
 
 
 def with_curvatures(packed):

@@ -33,6 +33,7 @@ class Work(NamedTuple):
     D: np.ndarray  # (n, k)  (I - U B Phi_q) V, Eq. 9; chart.tangent_map
     E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.reduced_mass
     A: np.ndarray  # (k, k)  D^T M D, then its Cholesky factor; null_space.reduced_mass
+    Q: np.ndarray  # (n,)    applied forces without gravity; null_space.reduced_acceleration
     h: np.ndarray  # (n,)    -U B gamma, and scratch of newton.update_b; null_space.reduced_acceleration
     householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; linalg.null_space
     control: np.ndarray  # (CONTROLS,)  tolerances and criteria, below
@@ -86,7 +87,7 @@ def allocate(n, m, bodies, constraint_tol, size=1.0):
     """Lay out the scratch memory of a run in one block of floats; size is that of the numbers in the constraints."""
     k = n - m
     shapes = {
-        **dict.fromkeys(("q", "qd", "qdd", "q0", "base", "h"), (n,)),
+        **dict.fromkeys(("q", "qd", "qdd", "q0", "base", "Q", "h"), (n,)),
         **dict.fromkeys(("Phi", "Phi_t", "gamma", "z", "scale", "u"), (m,)),
         **dict.fromkeys(("B", "N", "R"), (m, m)),
         **dict.fromkeys(("U", "householder"), (n, m)),
@@ -131,7 +132,7 @@ def allocate_linear(system, n, m, wanted):
 def _example():
     one, two = np.zeros(1), np.zeros((1, 1))
     ones, twos = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    system = System(twos, one, two, one, twos, ones, one, twos, ones, twos)
+    system = System(twos, one, two, one, twos, ones, one, twos, ones, twos, twos, twos, ones)
     return Context(system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False))
 
 

@@ -1,0 +1,140 @@
+"""What constraints and forces share: two bodies, a name, markers, and attributes that are checked when they are set."""
+
+import numpy as np
+
+from ._kernel import kernel
+from .bodies import Ground, PointMass
+from .checks import demand_known
+from .errors import InvalidConstraint
+from .markers import PARAMETERS, TURN
+
+
+class Attachment:
+    """Base of Primitive and Force: attached to one or two bodies of a scene by markers.
+
+    Attributes
+    ----------
+    a, b : Body or ground
+        The bodies; b is None where there are markers on a only.
+    name : str
+        What error messages call it.
+    coordinates : tuple of ndarray (3,)
+        Where each marker is, body frame.
+    """
+
+    markers = ()
+    error = InvalidConstraint
+    particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
+    added = False  # to its scene
+
+    def __init__(self, a, b=None, coordinates=(), name=""):
+        """Attach it to its bodies; coordinates has an entry for each marker, in the body frame."""
+        self.a, self.b = a, b
+        kind = self._kind()
+        needed = {marker.body for marker in self.markers} | {"a"}
+        bodies = [body for body, letter in ((a, "a"), (b, "b")) if body is not None or letter in needed]
+        for body in bodies:
+            if not isinstance(body, (PointMass, Ground)):
+                raise self.error(
+                    f"{name or kind}: {body!r} is not a body; pass one that add_body returned, or the ground."
+                )
+        self.name = str(name) or f"{kind}({', '.join(body.name for body in bodies)})"
+        if all(body.dimension == 0 for body in bodies):
+            raise self.error(f"{self.name}: one of the bodies must not be the ground.")
+        if len(bodies) == 2 and a is b:
+            raise self.error(f"{self.name}: it joins {a.name!r} to itself; pass two different bodies.")
+        if len({id(body.scene) for body in bodies}) != 1:
+            raise self.error(f"{self.name}: {a.name!r} and {b.name!r} belong to different scenes.")
+        given = list(coordinates) or [None] * len(self.markers)
+        if len(given) != len(self.markers):
+            raise self.error(f"{self.name}: {len(self.markers)} markers, but {len(given)} coordinates.")
+        self.coordinates = tuple(self._place(*pair) for pair in zip(self.markers, given, strict=True))
+
+    @classmethod
+    def _kind(cls):
+        """The name of the class that users know: a private one is a variant of it."""
+        return next(c.__name__ for c in cls.__mro__ if issubclass(c, Attachment) and not c.__name__.startswith("_"))
+
+    def _place(self, marker, value):
+        body = self.body_of(marker)
+        if self.particles and body.dimension == 3 and marker.code in (PARAMETERS, TURN):
+            return np.zeros(3)
+        return marker.coordinates(body, value, self.name, self.error)
+
+    def __setattr__(self, name, value):
+        """Set an attribute, checked; the scene packs its numbers again.
+
+        A marker's argument (`point_a`, ...) may be set too. Once it is in its scene, a name that it does not have is
+        refused.
+        """
+        slots = [marker.argument for marker in self.markers]
+        if name in slots and "coordinates" in self.__dict__:
+            i = slots.index(name)
+            place = self._place(self.markers[i], value)
+            name, value = "coordinates", (*self.coordinates[:i], place, *self.coordinates[i + 1 :])
+        if not self.added:
+            super().__setattr__(name, value)
+            return
+        demand_known(self, name, self.__dict__)
+        before = self.__dict__[name]
+        super().__setattr__(name, value)
+        try:
+            self.check()
+        except self.error:
+            super().__setattr__(name, before)
+            raise
+        self.scene.touch()
+
+    def __getattr__(self, name):
+        """The body-frame coordinates of a marker, by its argument."""
+        for marker, place in zip(self.markers, self.__dict__.get("coordinates", ()), strict=False):
+            if marker.argument == name:
+                return place
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    def check(self):
+        """Raise an error where an attribute has an impossible value; asked again when one is set."""
+
+    @property
+    def scene(self):
+        """The scene of its bodies."""
+        return self.a.scene
+
+    def body_of(self, marker):
+        """The body that a marker is on."""
+        return self.a if marker.body == "a" else self.b
+
+    def parameters(self):
+        """What the kernels get as `par`: floats, and functions of time."""
+        return ()
+
+    def __repr__(self):
+        return f"<{self._kind()} {self.name!r}>"
+
+
+def layout(markers):
+    """Constants of the loops over all instances of a kind: where each marker is in x, and on which body."""
+    owners = [0 if m.body == "a" else 1 for m in markers]
+    sizes = [m.size for m in markers]
+    return {
+        "MARKERS": len(markers),
+        "CODES": tuple(m.code for m in markers),
+        "OWNERS": tuple(owners),
+        "STARTS": tuple(sum(sizes[:i]) for i in range(len(sizes))),
+        "FIRST": tuple(int(owner not in owners[:i]) for i, owner in enumerate(owners)),
+        "SIZE": sum(sizes),
+    }
+
+
+def inlined(function):
+    """A kernel of a function that may be one already."""
+    return function if hasattr(function, "py_func") else kernel(function)
+
+
+def static_kernel(cls, name, arguments, where, error):
+    """The static method that a class has as a kernel, or an error that says how to write it."""
+    function = getattr(cls, name, None)
+    code = getattr(getattr(function, "py_func", function), "__code__", None)
+    if code is None or code.co_argcount != arguments:
+        raise error(f"{where}: write {name} as a static method with {arguments} arguments.")
+    return function

@@ -1,0 +1,117 @@
+"""Forces packed for the kernels: one row a kind, each instance's places and numbers in the shared arrays."""
+
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numba.core.errors import NumbaError
+
+from .checks import number
+from .errors import InvalidForce
+from .force_loops import AT, DIMENSION, INTS
+from .signal import Signal, Table
+
+# columns of System.forces: three addresses, then where a kind's instances are
+FORCE, FORCE_JACOBIAN, F_COUNT, F_REALS, F_FIRST_INT, F_FIRST_REAL, F_REMEMBER, FORCE_COLUMNS = range(8)
+# columns of System.signals: the function's address, zero for a table; its places in reals; a table's numbers in reals
+S_ADDRESS, S_PLACE, S_WIDTH, S_FIRST, S_KNOTS = range(5)
+
+
+class Load(NamedTuple):
+    """One force as it was when it was packed."""
+
+    force: object
+    kernels: MappingProxyType
+    parameters: tuple  # floats and Signals
+    coordinates: tuple  # where its markers are, (3,) each
+    row: np.ndarray  # (FORCE_COLUMNS,) a row of System.forces that has this instance alone
+    slot: int  # of System.memory; -1 for none
+
+
+def pack_forces(forces, where, table, reals):
+    """Append the instances to `table` and `reals`; return rows of System.forces, .signals, .memory, and Loads.
+
+    Raises
+    ------
+    InvalidForce
+        If a plug-in's parameters are no finite numbers or Signals, or Numba can't compile its kernels.
+    """
+    groups = {}
+    for force in forces:
+        groups.setdefault(id(force.kernels), []).append(force)  # user functions have kernels of their own
+    rows, signals, memory, loads = [], [], [], {}
+    tables = {}
+    for members in groups.values():
+        kernels = members[0].kernels
+        address = _address(members[0], "force")
+        remember = _address(members[0], "remember") if "remember" in kernels else 0
+        first, stride = (len(table), len(reals)), None
+        for force in members:
+            begin = len(table), len(reals)
+            parameters = _parameters(force)
+            table += _places(force, where)
+            reals += np.concatenate(force.coordinates).tolist()
+            for value in parameters:
+                if not isinstance(value, Signal):
+                    reals.append(float(value))
+                    continue
+                signals.append([value.address, len(reals), value.width, 0, 0])
+                if isinstance(value.source, Table):
+                    tables.setdefault(id(value.source), (value.source, []))[1].append(signals[-1])
+                reals += [np.nan] * value.width  # until the time is set
+            if force.memory:
+                memory.append(len(reals))
+                reals.append(0.0)
+            size = len(reals) - begin[1]
+            if stride not in (None, size):
+                raise InvalidForce(
+                    f"{force.name}: parameters() must return as many values as for every other {type(force).__name__}."
+                )
+            stride = size
+            row = np.array([address, 0, 1, stride, *begin, remember], np.int64)
+            slot = len(memory) - 1 if force.memory else -1
+            loads[id(force)] = Load(force, kernels, parameters, force.coordinates, row, slot)
+        rows.append([address, 0, len(members), stride, *first, remember])
+    for source, users in tables.values():
+        for signal in users:
+            signal[S_FIRST], signal[S_KNOTS] = len(reals), source.times.size
+        reals += source.numbers()
+    return rows, signals, memory, tuple(loads[id(force)] for force in forces)
+
+
+def with_force_jacobians(packed):
+    """The system of a packed scene with the addresses of the forces' Jacobian loops, which are loaded now."""
+    rows = packed.system.forces.copy()
+    for load in packed.loads:
+        same = (rows[:, FORCE] == load.row[FORCE]) & (rows[:, F_REALS] == load.row[F_REALS])
+        rows[same, FORCE_JACOBIAN] = _address(load.force, "jacobian", load.kernels)
+    return packed.system._replace(forces=rows)
+
+
+def _parameters(force):
+    """A force's parameters, checked."""
+    given = force.parameters()
+    if isinstance(given, (tuple, list)) and all(isinstance(p, Signal) or np.isfinite(number(p)) for p in given):
+        return tuple(given)
+    raise InvalidForce(
+        f"{force.name}: parameters() must return a tuple of finite numbers and loads, it gave {given!r}."
+    )
+
+
+def _address(force, name, kernels=None):
+    """The address of a kind's kernel."""
+    try:
+        return (kernels or force.kernels)[name].address
+    except NumbaError as error:
+        raise InvalidForce(
+            f"{force.name}: Numba can't compile {name}; use plain arithmetic, NumPy functions of scalars and constants "
+            f"in it, and allocate nothing.\n{error}"
+        ) from error
+
+
+def _places(force, where):
+    """The table entry of one instance; the ground has dimension 0 and no place."""
+    entry = np.zeros(INTS, np.int64)
+    for i, body in enumerate((force.a, force.b)):
+        entry[AT + i], entry[DIMENSION + i] = where.get(id(body), (0, 0))
+    return entry.tolist()

@@ -1,0 +1,98 @@
+"""Coulomb friction of constant size between two bodies, of a point and of their turning, smooth at rest.
+
+    v, w as for ViscousFriction: relative velocity at the place of a's point, relative angular velocity
+    F = -R v / sqrt(v.v + v0^2)     on a at x_a, the opposite on b at the same place     (1)
+    N = -N0 w / sqrt(w.w + w0^2)    on a, the opposite on b                              (2)
+    dissipation = -F.v - N.w                                                             (3)
+
+Below the slip velocity v0 it is viscous: it does not hold a body at rest but lets it creep.
+"""
+
+from types import MappingProxyType
+
+import numpy as np
+
+from ..force import Force, not_negative, positive_number
+from ..friction import act, demand_bodies, slip
+from ..markers import Point, Turn
+
+
+class CoulombFriction(Force):
+    """Resist the motion of a relative to b by a force and a torque of constant size.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene. b is the ground or a rigid body, a may be a point mass.
+    point_a : array_like (3,), m
+        Where the force acts, body frame of a.
+    force : float, N
+        Size of the friction force: the friction coefficient times the normal force.
+    torque : float, N m
+        Size of the friction torque.
+    slip_velocity : float, m/s
+        Regularisation: at this velocity the force is 71% of its size.
+    slip_rate : float, rad/s
+        The same for the torque.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidForce
+        If a size is negative, a regularisation not positive, or both sizes are zero, or a torque would act on a point
+        mass.
+    """
+
+    markers = (Point("a"), Turn("a"), Point("b"), Turn("b"))
+    particles = True
+    quantities = MappingProxyType(
+        {"force": not_negative, "torque": not_negative, "slip_velocity": positive_number, "slip_rate": positive_number}
+    )
+
+    def __init__(
+        self,
+        a,
+        b,
+        *,
+        point_a=(0.0, 0.0, 0.0),
+        force=0.0,
+        torque=0.0,
+        slip_velocity=1e-3,
+        slip_rate=1e-3,
+        name="",
+    ):
+        super().__init__(a, b, (point_a, None, (0.0, 0.0, 0.0), None), name)
+        self.force, self.torque, self.slip_velocity, self.slip_rate = force, torque, slip_velocity, slip_rate
+        self.check()
+
+    def check(self):
+        """It must do something, and to bodies that can take it."""
+        self.demand_any("force", "torque")
+        demand_bodies(self, self.torque, "torque")
+
+    def parameters(self):
+        """(R, N0, v0, w0)."""
+        return self.force, self.torque, self.slip_velocity, self.slip_rate
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Eqs. (1), (2)."""
+        v0, v1, v2 = slip(x, xd)
+        w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
+        f = -par[0] / np.sqrt(v0 * v0 + v1 * v1 + v2 * v2 + par[2] * par[2])
+        n = -par[1] / np.sqrt(w0 * w0 + w1 * w1 + w2 * w2 + par[3] * par[3])
+        act(x, f * v0, f * v1, f * v2, n * w0, n * w1, n * w2, out)
+
+    @staticmethod
+    def dissipation(x, xd, par, t):
+        """Eq. (3)."""
+        v0, v1, v2 = slip(x, xd)
+        w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
+        vv, ww = v0 * v0 + v1 * v1 + v2 * v2, w0 * w0 + w1 * w1 + w2 * w2
+        return par[0] * vv / np.sqrt(vv + par[2] * par[2]) + par[1] * ww / np.sqrt(ww + par[3] * par[3])
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A random one, regularised over the velocities of a test."""
+        R, N, v, w = rng.uniform(0.5, 2.0, 4)
+        return cls(a, b, point_a=rng.normal(size=3), force=R, torque=N, slip_velocity=v, slip_rate=w)

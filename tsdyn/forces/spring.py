@@ -1,0 +1,116 @@
+"""Spring, damper and actuator between two points.
+
+    d = x_a - x_b,   l = sqrt(d.d),   ld = d.dd / l
+    N = k (l - l0) + c ld + actuator     (1)  [N], positive pulls the points together
+    f = [ -N d / l, N d / l ]            (2)  ground frame
+    U = k (l - l0)^2 / 2                 (3)
+    dissipation = c ld^2                 (4)
+
+Singular where l = 0: the run ends there.
+"""
+
+from types import MappingProxyType
+
+import numpy as np
+
+from ..bodies import rotation_matrix
+from ..errors import InvalidForce
+from ..force import Force, load, not_negative
+from ..markers import Point
+from ..signal import Signal
+
+
+class Spring(Force):
+    """Pull two points together by stiffness (l - free_length) + damping ld + actuator, l being their distance.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene.
+    point_a, point_b : array_like (3,), m
+        The points in the bodies' own frames.
+    stiffness : float, N/m
+    damping : float, N s/m
+    free_length : float, m; optional
+        None takes the distance of the bodies as they stand now.
+    actuator : float, function of time, or ts.Table, N
+        A tension of its own; its power is applied power.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidForce
+        If a number is negative or not finite, the points coincide, or stiffness, damping and actuator are all zero.
+    """
+
+    markers = (Point("a"), Point("b"))
+    quantities = MappingProxyType(
+        {"stiffness": not_negative, "damping": not_negative, "free_length": not_negative, "actuator": load}
+    )
+    loads = ("actuator",)
+
+    def __init__(
+        self,
+        a,
+        b,
+        *,
+        point_a=(0.0, 0.0, 0.0),
+        point_b=(0.0, 0.0, 0.0),
+        stiffness=0.0,
+        damping=0.0,
+        free_length=None,
+        actuator=0.0,
+        name="",
+    ):
+        super().__init__(a, b, (point_a, point_b), name)
+        ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
+        length = np.linalg.norm(ends[0] - ends[1])
+        if not length > 0.0:
+            raise InvalidForce(
+                f"{self.name}: its two points coincide at the start, so it has no direction; move point_a or point_b."
+            )
+        self.stiffness, self.damping, self.actuator = stiffness, damping, actuator
+        self.free_length = length if free_length is None else free_length
+        self.check()
+
+    def check(self):
+        """It must do something."""
+        self.demand_any("stiffness", "damping", "actuator")
+
+    def parameters(self):
+        """(k, c, l0, actuator)."""
+        return self.stiffness, self.damping, self.free_length, *Signal.places(self.actuator)
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Eqs. (1), (2)."""
+        d0, d1, d2 = x[0] - x[3], x[1] - x[4], x[2] - x[5]
+        l = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+        ld = (d0 * (xd[0] - xd[3]) + d1 * (xd[1] - xd[4]) + d2 * (xd[2] - xd[5])) / l
+        f = (par[0] * (l - par[2]) + par[1] * ld + par[3]) / l
+        out[0], out[1], out[2] = -f * d0, -f * d1, -f * d2
+        out[3], out[4], out[5] = f * d0, f * d1, f * d2
+
+    @staticmethod
+    def potential(x, par, t):
+        """Eq. (3)."""
+        d0, d1, d2 = x[0] - x[3], x[1] - x[4], x[2] - x[5]
+        stretch = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2) - par[2]
+        return 0.5 * par[0] * stretch * stretch
+
+    @staticmethod
+    def dissipation(x, xd, par, t):
+        """Eq. (4)."""
+        d0, d1, d2 = x[0] - x[3], x[1] - x[4], x[2] - x[5]
+        rate = d0 * (xd[0] - xd[3]) + d1 * (xd[1] - xd[4]) + d2 * (xd[2] - xd[5])
+        return par[1] * rate * rate / (d0 * d0 + d1 * d1 + d2 * d2)
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A random spring and damper."""
+        numbers = dict(zip(("stiffness", "damping", "free_length"), rng.uniform(0.5, 2.0, 3), strict=True))
+        return cls(a, b, point_a=rng.normal(size=3), point_b=rng.normal(size=3), **numbers)
+
+
+def _ground_point(body, s):
+    return body.position + (rotation_matrix(body.orientation) @ s if body.dimension != 3 else 0.0)

@@ -1,0 +1,154 @@
+"""Torsional spring, damper and actuator about an axis of body a; its angle is counted over full turns.
+
+    u = A_a axis_a,  f_a = A_a reference_a (perpendicular to u),  f_b = A_b reference_b
+    angle = atan2(f_b.(u x f_a), f_b.f_a) + 2 pi turns                     (1)
+    N = actuator - k (angle - free_angle) - c u.(omega_b - omega_a)        (2)  [N m], torque N u on b, -N u on a
+    U = k (angle - free_angle)^2 / 2                                       (3)
+    dissipation = c (u.(omega_b - omega_a))^2                              (4)
+
+The turn counted is the one nearest to the angle at the last accepted step, so a step must turn less than half a turn.
+Singular where f_b is parallel to u.
+"""
+
+from types import MappingProxyType
+
+import numpy as np
+
+from ..angle import angle_near
+from ..bodies import rotation_matrix
+from ..checks import vector3
+from ..errors import InvalidForce
+from ..force import Force, finite, load, not_negative
+from ..markers import Turn, Vector
+from ..signal import Signal
+
+PARALLEL = 1e-6  # sine of the angle below which a reference has no direction about the axis
+
+
+class TorsionalSpring(Force):
+    """Turn b about an axis of a by actuator - stiffness (angle - free_angle) - damping times its rate, and a back.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene, held on a common axis by a joint. Without one the moment about axis_a has no
+        potential, and what it adds is counted as applied power.
+    axis_a : array_like (3,)
+        The axis, in the frame of a; turning b positively about it (right hand) increases the angle.
+    reference_a, reference_b : array_like (3,)
+        Directions in the frames of a and b; the angle goes from the first to the second about the axis. reference_a is
+        made perpendicular to the axis.
+    stiffness : float, N m/rad
+    damping : float, N m s/rad
+    free_angle : float, rad
+        The angle at the start lies in (-pi, pi].
+    actuator : float, function of time, or ts.Table, N m
+        Torque about the axis on b, the opposite on a; its power is applied power.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidForce
+        If a number is negative or not finite, a reference is parallel to the axis, or all of stiffness, damping and
+        actuator are zero.
+    """
+
+    markers = (Vector("a"), Vector("a", "reference_a"), Vector("b", "reference_b"), Turn("a"), Turn("b"))
+    memory = 1
+    conservative = False  # only about an axis that a joint holds
+    quantities = MappingProxyType(
+        {"stiffness": not_negative, "damping": not_negative, "free_angle": finite, "actuator": load}
+    )
+    loads = ("actuator",)
+
+    def __init__(
+        self,
+        a,
+        b,
+        *,
+        axis_a,
+        reference_a,
+        reference_b,
+        stiffness=0.0,
+        damping=0.0,
+        free_angle=0.0,
+        actuator=0.0,
+        name="",
+    ):
+        super().__init__(a, b, (axis_a, reference_a, reference_b, None, None), name)
+        self.reference_a = self.coordinates[1]
+        self.stiffness, self.damping, self.free_angle, self.actuator = stiffness, damping, free_angle, actuator
+        axis, _, reference = (self._turned(i) for i in range(3))
+        if np.linalg.norm(np.cross(axis, reference)) < PARALLEL:
+            raise InvalidForce(
+                f"{self.name}: reference_b is parallel to the axis at the start; choose one across it, such as the one "
+                "that coincides with reference_a at the angle zero."
+            )
+        self.check()
+
+    def _turned(self, i):
+        return rotation_matrix(self.body_of(self.markers[i]).orientation) @ self.coordinates[i]
+
+    def __setattr__(self, name, value):
+        """Set an attribute; reference_a is made perpendicular to the axis, as is the present one to a new axis."""
+        if name == "reference_a" and "coordinates" in self.__dict__:
+            value = self._across(self.coordinates[0], value)
+        super().__setattr__(name, value)
+        if name == "axis_a" and "coordinates" in self.__dict__:
+            self.reference_a = self.coordinates[1]
+
+    def _across(self, axis, value):
+        value = vector3(value, f"{self.name}: reference_a", InvalidForce)
+        across = value - axis * (axis @ value)
+        if not np.linalg.norm(across) > PARALLEL * np.linalg.norm(value):
+            raise InvalidForce(f"{self.name}: reference_a is parallel to axis_a; choose a direction across the axis.")
+        return across
+
+    def check(self):
+        """It must do something."""
+        self.demand_any("stiffness", "damping", "actuator")
+
+    def parameters(self):
+        """(k, c, free angle, actuator), and the angle remembered."""
+        return self.stiffness, self.damping, self.free_angle, *Signal.places(self.actuator)
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Eqs. (1), (2)."""
+        w0, w1, w2 = x[1] * x[5] - x[2] * x[4], x[2] * x[3] - x[0] * x[5], x[0] * x[4] - x[1] * x[3]  # u x f_a
+        y = x[6] * w0 + x[7] * w1 + x[8] * w2
+        turned = angle_near(y, x[6] * x[3] + x[7] * x[4] + x[8] * x[5], par[4])
+        rate = x[0] * (xd[12] - xd[9]) + x[1] * (xd[13] - xd[10]) + x[2] * (xd[14] - xd[11])
+        f = par[3] - par[0] * (turned - par[2]) - par[1] * rate
+        for i in range(9):
+            out[i] = 0.0 * x[i]
+        out[9], out[10], out[11] = -f * x[0], -f * x[1], -f * x[2]
+        out[12], out[13], out[14] = f * x[0], f * x[1], f * x[2]
+
+    @staticmethod
+    def remember(x, xd, par, t):
+        """The angle, Eq. (1)."""
+        w0, w1, w2 = x[1] * x[5] - x[2] * x[4], x[2] * x[3] - x[0] * x[5], x[0] * x[4] - x[1] * x[3]
+        y = x[6] * w0 + x[7] * w1 + x[8] * w2
+        return angle_near(y, x[6] * x[3] + x[7] * x[4] + x[8] * x[5], par[4])
+
+    @staticmethod
+    def potential(x, par, t):
+        """Eq. (3)."""
+        w0, w1, w2 = x[1] * x[5] - x[2] * x[4], x[2] * x[3] - x[0] * x[5], x[0] * x[4] - x[1] * x[3]
+        y = x[6] * w0 + x[7] * w1 + x[8] * w2
+        turned = angle_near(y, x[6] * x[3] + x[7] * x[4] + x[8] * x[5], par[4])
+        return 0.5 * par[0] * (turned - par[2]) * (turned - par[2])
+
+    @staticmethod
+    def dissipation(x, xd, par, t):
+        """Eq. (4)."""
+        rate = x[0] * (xd[12] - xd[9]) + x[1] * (xd[13] - xd[10]) + x[2] * (xd[14] - xd[11])
+        return par[1] * rate * rate
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A random spring and damper."""
+        k, c = rng.uniform(0.5, 2.0, 2)
+        axis, one, two = rng.normal(size=(3, 3))
+        return cls(a, b, axis_a=axis, reference_a=one, reference_b=two, stiffness=k, damping=c, free_angle=0.3)

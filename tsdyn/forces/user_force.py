@@ -1,0 +1,147 @@
+"""A force between two bodies by any function of time and both states.
+
+    function(t, a, b, par, out)   a, b (13,): point, Euler parameters, velocity of the point, angular velocity
+                                  out (6,): force on a at x_a, torque on a
+    f = [F, 0, T; -F, 0, -T - (x_a - x_b) x F]    conjugate to x_a, p_a, turning of a; x_b, p_b, turning of b   (1)
+
+so that b gets the opposite force at the same place x_a. Everything is in the ground frame.
+"""
+
+import math
+from types import MappingProxyType
+
+import numpy as np
+
+from .._kernel import specialised, stack
+from ..checks import floats
+from ..errors import InvalidForce
+from ..force import Force
+from ..markers import Parameters, Point, Turn
+from ..state_function import arguments_of, fill_state, kernels_of
+
+
+def _numbers(value, what, error):
+    result = floats(value)
+    if result.ndim != 1 or not np.isfinite(result).all():
+        if len(np.atleast_1d(value)) == 0:
+            return np.zeros(0)
+        raise error(f"{what} must be a list of finite numbers, got {value!r}.")
+    result.setflags(write=False)
+    return result
+
+
+class UserForce(Force):
+    """A force and torque on a, and the opposite on b, by a function of time and of both states.
+
+    Parameters
+    ----------
+    a : Body
+    b : Body or ground, optional
+        None is the ground.
+    function : callable (t, a, b, par, out)
+        A plain Python function that Numba can compile. a and b are arrays (13,): position of the point (m), Euler
+        parameters, velocity of the point (m/s), angular velocity (rad/s), all in the ground frame; those of the ground
+        are point_b, (1, 0, 0, 0) and zeros. It writes out (6,): force on a at point_a (N), torque on a (N m), ground
+        frame. It may compare and allocate; what it raises ends the run. A NaN does, too.
+    point_a, point_b : array_like (3,), m
+        Body frame.
+    parameters : array_like, optional
+        Numbers that the function gets as par; to be changed as `force.values`.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidForce
+        If the function is no plain function of five arguments, or a number is not finite.
+
+    Notes
+    -----
+    b gets the opposite force at the place x_a, so momentum is conserved. A point mass takes no torque: on one the
+    force alone acts, and its Euler parameters are (1, 0, 0, 0). The power of the force is applied power.
+    """
+
+    markers = (Point("a"), Parameters("a"), Turn("a"), Point("b"), Parameters("b"), Turn("b"))
+    analytic = False
+    particles = True
+    loads = ("function",)
+    quantities = MappingProxyType({"values": _numbers})
+
+    def __init__(
+        self,
+        a,
+        b=None,
+        *,
+        function,
+        point_a=(0.0, 0.0, 0.0),
+        point_b=(0.0, 0.0, 0.0),
+        parameters=(),
+        name="",
+    ):
+        if b is None:
+            b = getattr(getattr(a, "scene", None), "ground", None)
+        super().__init__(a, b, (point_a, None, None, point_b, None, None), name)
+        self.values = parameters
+        self.function = function
+        self.check()
+
+    def check(self):
+        """A plain function of five arguments."""
+        if arguments_of(self.function) != 5:
+            raise InvalidForce(
+                f"{self.name}: function must be a plain Python function of five arguments (t, a, b, par, out), got "
+                f"{self.function!r}."
+            )
+
+    @property
+    def kernels(self):
+        """The callbacks of this function."""
+        if self.__dict__.get("_of") is not self.function:
+            self.__dict__["_kernels"], self.__dict__["_of"] = kernels_of(UserForce, self.function), self.function
+        return self.__dict__["_kernels"]
+
+    def parameters(self):
+        """The numbers given."""
+        return tuple(self.values)
+
+    @staticmethod
+    def wrap(inner, owner):
+        """The kernel of a user's function."""
+        return specialised(_law, f"{owner.__qualname__}.law", owner, function=inner)
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Eq. (1), of no function: the base that instances replace."""
+        for i in range(20):
+            out[i] = math.nan
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A drag that depends on everything."""
+        return cls(a, b, function=_example, point_a=rng.normal(size=3), point_b=rng.normal(size=3), parameters=(0.7,))
+
+
+function = None  # filled in by `wrap`
+
+
+def _law(x, xd, par, t, out):
+    a, b, load = stack(13), stack(13), stack(6)
+    fill_state(x, xd, 0, a)
+    fill_state(x, xd, 10, b)
+    for i in range(6):
+        load[i] = 0.0
+    try:
+        function(t, a, b, par, load)
+    except Exception:
+        load[0] = math.nan
+    d0, d1, d2 = x[0] - x[10], x[1] - x[11], x[2] - x[12]
+    for i in range(3):
+        out[i], out[7 + i], out[10 + i] = load[i], load[3 + i], -load[i]
+    out[17] = -load[3] - (d1 * load[2] - d2 * load[1])
+    out[18] = -load[4] - (d2 * load[0] - d0 * load[2])
+    out[19] = -load[5] - (d0 * load[1] - d1 * load[0])
+
+
+def _example(t, a, b, par, out):
+    for i in range(3):
+        out[i] = -par[0] * (a[7 + i] - b[7 + i]) + np.sin(t) * a[4 + i]
+        out[3 + i] = a[i] * b[3] - b[10 + i] * a[10 + i]

@@ -1,0 +1,72 @@
+"""Viscous friction between two bodies, of a point and of their turning.
+
+v = xd_a - xd_b - omega_b x (x_a - x_b)    velocity of a's point relative to the material of b at its place
+w = omega_a - omega_b
+F = -c v     on a at x_a, the opposite on b at the same place     (1)
+N = -c_t w   on a, the opposite on b                              (2)
+dissipation = c v.v + c_t w.w                                     (3)
+"""
+
+from types import MappingProxyType
+
+from ..force import Force, not_negative
+from ..friction import act, demand_bodies, slip
+from ..markers import Point, Turn
+
+
+class ViscousFriction(Force):
+    """Resist the motion of a relative to b in proportion to its velocity.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene. b is the ground or a rigid body, a may be a point mass.
+    point_a : array_like (3,), m
+        Where the force acts, body frame of a.
+    damping : float, N s/m
+    torsional_damping : float, N m s/rad
+    name : str, optional
+
+    Raises
+    ------
+    InvalidForce
+        If a number is negative or not finite, or both are zero, or a torque would act on a point mass.
+    """
+
+    markers = (Point("a"), Turn("a"), Point("b"), Turn("b"))
+    particles = True
+    quantities = MappingProxyType({"damping": not_negative, "torsional_damping": not_negative})
+
+    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), damping=0.0, torsional_damping=0.0, name=""):
+        super().__init__(a, b, (point_a, None, (0.0, 0.0, 0.0), None), name)
+        self.damping, self.torsional_damping = damping, torsional_damping
+        self.check()
+
+    def check(self):
+        """It must do something, and to bodies that can take it."""
+        self.demand_any("damping", "torsional_damping")
+        demand_bodies(self, self.torsional_damping, "torsional_damping")
+
+    def parameters(self):
+        """(c, c_t)."""
+        return self.damping, self.torsional_damping
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Eqs. (1), (2)."""
+        v0, v1, v2 = slip(x, xd)
+        w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
+        act(x, -par[0] * v0, -par[0] * v1, -par[0] * v2, -par[1] * w0, -par[1] * w1, -par[1] * w2, out)
+
+    @staticmethod
+    def dissipation(x, xd, par, t):
+        """Eq. (3)."""
+        v0, v1, v2 = slip(x, xd)
+        w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
+        return par[0] * (v0 * v0 + v1 * v1 + v2 * v2) + par[1] * (w0 * w0 + w1 * w1 + w2 * w2)
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A random one."""
+        c, c_t = rng.uniform(0.5, 2.0, 2)
+        return cls(a, b, point_a=rng.normal(size=3), damping=c, torsional_damping=c_t)

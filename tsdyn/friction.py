@@ -1,0 +1,36 @@
+"""What friction laws share: the slip of a's point over b, and how force and torque act on both.
+
+Markers: Point a, Turn a, Point b, Turn b.
+"""
+
+from ._kernel import kernel
+
+
+@kernel
+def slip(x, xd):
+    """xd_a - xd_b - omega_b x (x_a - x_b)."""
+    d0, d1, d2 = x[0] - x[6], x[1] - x[7], x[2] - x[8]
+    return (
+        xd[0] - xd[6] - (xd[10] * d2 - xd[11] * d1),
+        xd[1] - xd[7] - (xd[11] * d0 - xd[9] * d2),
+        xd[2] - xd[8] - (xd[9] * d1 - xd[10] * d0),
+    )
+
+
+@kernel
+def act(x, F0, F1, F2, N0, N1, N2, out):
+    """F at x_a and N on a, the opposite on b at the same place."""
+    d0, d1, d2 = x[0] - x[6], x[1] - x[7], x[2] - x[8]
+    out[0], out[1], out[2], out[3], out[4], out[5] = F0, F1, F2, N0, N1, N2
+    out[6], out[7], out[8] = -F0, -F1, -F2
+    out[9] = -N0 - (d1 * F2 - d2 * F1)
+    out[10] = -N1 - (d2 * F0 - d0 * F2)
+    out[11] = -N2 - (d0 * F1 - d1 * F0)
+
+
+def demand_bodies(force, torque, name):
+    """Refuse what would put a torque on a point mass."""
+    if force.b.dimension == 3 or (force.a.dimension == 3 and torque != 0.0):
+        body = force.b if force.b.dimension == 3 else force.a
+        hint = "make it a, and the other body b" if body is force.b else f"set {name}=0"
+        raise force.error(f"{force.name}: the point mass {body.name!r} can't take the torque of it; {hint}.")

@@ -199,6 +199,22 @@ def test_an_ended_run_keeps_what_it_had():
     assert part.at(part.state.t).t == 1.5
 
 
+def test_more_charts_than_there_was_room_for():
+    solution = run(point_pendulum()[0], I.Nystrom4(END / 9000), chart_interval=1)
+    assert solution.stats.charts == 9000
+    np.testing.assert_allclose(solution.at(solution.t[::50]).q, solution.q[::50], rtol=0, atol=1e-14)
+
+
+def test_a_run_of_no_steps():
+    """Ended by an event at its very start."""
+    start = lambda t, state: t  # noqa: E731
+    start.terminal = True
+    solution = run(point_pendulum()[0], METHODS["dop853"], events=start)
+    np.testing.assert_allclose(solution.at(0.0).q, solution.q[0], atol=1e-15)
+    with pytest.raises(ts.InvalidArgument, match="t must"):
+        solution.at(1e-9)
+
+
 def test_a_solution_outlives_a_change_of_its_scene():
     scene = driven()
     one, two = run(scene, METHODS["dop853"]), run(scene, METHODS["dop853"])

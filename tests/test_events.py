@@ -192,6 +192,8 @@ def test_a_function_is_given_a_state():
     def tension(t, state):
         assert t == state.t
         time, q, qd, qdd, multipliers = state
+        assert len(state) == 5
+        assert state[1] is q
         seen.append((time, np.linalg.norm(q), q @ qd, *multipliers, *state.multipliers))
         q[:] = qd[:] = qdd[:] = 0.0  # its own copies
         return multipliers[0] - 1.0

@@ -46,10 +46,15 @@ def evaluate(context, w, at, t, x, y, yd, xd):
 
 @kernel
 def between(context, w, at, t, block, xs, ys, yds, xds):
-    """q, qd, qdd at a time within the step of this block. Status."""
+    """q, qd, qdd at a time within the step of this block. Status.
+
+    Placed twice: Newton's method comes from further away than in a run, and ends nearer to rounding from nearby.
+    """
     h = block[B_H]
     call_value(at[A_VALUE], (t - block[B_START]) / h, h, w.q.size, xs.size, ys.size, block[B_DATA:], xs, ys)
-    status = evaluate(context, w, at, t, xs, ys, yds, xds)
+    status = call_place(at[A_PLACE], context, t, xs)
+    if status == 0:
+        status = evaluate(context, w, at, t, xs, ys, yds, xds)
     if status == 0 and at[A_SECOND] != 0:  # what f would amplify in a stiff scene
         call_value(at[A_SECOND], (t - block[B_START]) / h, h, w.q.size, xs.size, ys.size, block[B_DATA:], xs, yds)
         call_complete(at[A_COMPLETE], context, yds)

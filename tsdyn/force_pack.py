@@ -1,6 +1,5 @@
 """Forces packed for the kernels: one row a kind, each instance's places and numbers in the shared arrays."""
 
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,6 @@ class Load(NamedTuple):
     """One force as it was when it was packed."""
 
     force: object
-    kernels: MappingProxyType
     parameters: tuple  # floats and Signals
     coordinates: tuple  # where its markers are, (3,) each
     row: np.ndarray  # (FORCE_COLUMNS,) a row of System.forces that has this instance alone
@@ -70,7 +68,7 @@ def pack_forces(forces, where, table, reals):
             stride = size
             row = np.array([address, 0, 1, stride, *begin, remember], np.int64)
             slot = len(memory) - 1 if force.memory else -1
-            loads[id(force)] = Load(force, kernels, parameters, force.coordinates, row, slot)
+            loads[id(force)] = Load(force, parameters, force.coordinates, row, slot)
         rows.append([address, 0, len(members), stride, *first, remember])
     for source, users in tables.values():
         for signal in users:
@@ -84,7 +82,7 @@ def with_force_jacobians(packed):
     rows = packed.system.forces.copy()
     for load in packed.loads:
         same = (rows[:, FORCE] == load.row[FORCE]) & (rows[:, F_REALS] == load.row[F_REALS])
-        rows[same, FORCE_JACOBIAN] = _address(load.force, "jacobian", load.kernels)
+        rows[same, FORCE_JACOBIAN] = _address(load.force, "jacobian")
     return packed.system._replace(forces=rows)
 
 
@@ -98,10 +96,10 @@ def _parameters(force):
     )
 
 
-def _address(force, name, kernels=None):
+def _address(force, name):
     """The address of a kind's kernel."""
     try:
-        return (kernels or force.kernels)[name].address
+        return force.kernels[name].address
     except NumbaError as error:
         raise InvalidForce(
             f"{force.name}: Numba can't compile {name}; use plain arithmetic, NumPy functions of scalars and constants "

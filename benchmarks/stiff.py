@@ -1,10 +1,10 @@
 """Stiff scenes, fully stated: what they are made of, and how stiff they are.
 
-    jointed   a planar double pendulum of rods 1 m long, m = 1 kg, I = 0.1 kg m^2, released at rest from the horizontal;
-              a torsional spring and damper at the second joint, k = 1e6 N m/rad and c = 1e3 N m s/rad, keeps it straight
-    hung      three particles of 1 kg in a row, 1 m apart, on springs and dampers, k = 1e5 N/m and c = 1e5 N s/m, the
-              first at the end of a rigid 1 m link; released from the horizontal. The fast modes are overdamped,
-              |lambda| from 1e5 to 3e5 1/s, the slow modes of the springs decay with k / c = 1 s
+jointed   a planar double pendulum of rods 1 m long, m = 1 kg, I = 0.1 kg m^2, released at rest from the horizontal;
+a torsional spring and damper at the second joint, k = 1e6 N m/rad and c = 1e3 N m s/rad, keeps it straight
+hung      three particles of 1 kg in a row, 1 m apart, on springs and dampers, k = 1e5 N/m and c = 1e5 N s/m, the
+first at the end of a rigid 1 m link; released from the horizontal. The fast modes are overdamped,
+|lambda| from 1e5 to 3e5 1/s, the slow modes of the springs decay with k / c = 1 s
 """
 
 import tsdyn as ts

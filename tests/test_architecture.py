@@ -25,7 +25,7 @@ _cache errors _discovery jet checks
 _kernel
 rotation linalg motion signal angle
 markers bodies tableau friction
-attachment marker_forces curvature
+attachment marker_forces frames curvature
 primitive
 force_loops
 force force_pack

@@ -97,6 +97,42 @@ report()
     assert "compiling" not in errors
 
 
+FORCES = (
+    REPORT
+    + """
+import tsdyn as ts
+scene = ts.Scene()
+mass = scene.add_point_mass(1.0, position=(1.0, 2.0, 2.0))
+body = scene.add_body(1.0, (1.0, 1.0, 1.0))
+scene.add(ts.forces.Spring(mass, body, stiffness=3.0))
+scene.add(ts.forces.PointForce(body, force=lambda t: (t, 0.0, 0.0)))
+scene.add(ts.forces.Torque(body, torque=lambda t, state: (state[0], 0.0, 0.0)))
+def drag(t, a, b, par, out):
+    out[0] = -par[0] * a[7]
+scene.add(ts.forces.UserForce(mass, body, function=drag, parameters=(2.0,)))
+solution = ts.simulate(scene, (0.0, 0.01))
+solution.multipliers, solution.power, solution.reaction(scene.forces[0])
+kernels = [force.kernels for force in scene.forces] + [kind.own_kernels for kind in ts.forces.registered()]
+loaded = lambda name: sum(k[name]._address is not None for k in kernels)
+report(q=solution.q[-1].tolist(), forces=loaded("force"), jacobians=loaded("jacobian"))
+"""
+)
+
+
+def test_forces_are_cached_and_only_those_used_are_loaded(warm):
+    first, _ = run(FORCES, warm)
+    second, _ = run(FORCES, warm)
+    assert (second["misses"], second["q"]) == (0, first["q"])
+    edited, _ = run(FORCES.replace("-par[0] * a[7]", "-par[0] * a[8]"), warm)
+    assert edited["misses"] == 1  # the loop of the one function
+    assert edited["q"] != first["q"]
+    assert second["forces"] == 4 + 2  # those of the four; Spring's and PointForce's are their classes', too
+    assert second["jacobians"] == 0  # only implicit methods ask for them
+    empty = FORCES.replace("scene.add(ts.forces", "(ts.forces").replace(", solution.reaction(scene.forces[0])", "")
+    without, _ = run(empty, warm)
+    assert (without["misses"], without["forces"]) == (0, 0)
+
+
 def test_first_compilation_is_announced_once(tmp_path):
     result, errors = run(SMALL, {"NUMBA_CACHE_DIR": str(tmp_path)})
     assert result["misses"] == KERNELS

@@ -129,7 +129,7 @@ def test_scenes_refuse_what_is_not_theirs():
 
 def test_what_numba_cannot_compile_is_refused_with_the_reason():
     w = World()
-    w.scene.add(F.PointForce(w.a, force=lambda t: (open("x") if t > 1e9 else 1.0, 0.0, 0.0)))
+    w.scene.add(F.PointForce(w.a, force=lambda t: ({1: t}[1], __import__("os").getpid(), 0.0)))
     with pytest.raises(ts.InvalidForce, match="Numba can't compile"):
         w.scene.evaluate()
 

@@ -288,7 +288,7 @@ def test_moving_the_whole_scene_turns_the_forces(kind, rng):
 
 
 def test_the_sum_in_evaluate(rng):
-    scene, a, b = pair(rng)
+    scene, a, _ = pair(rng)
     scene.add(F.PointForce(a, force=(1, 2, 3)))
     scene.add(F.PointForce(a, force=(1, 0, 0)))
     np.testing.assert_allclose(scene.evaluate().Q_A[:3], (2, 2, 3 - 1.5 * 9.81))
@@ -297,7 +297,7 @@ def test_the_sum_in_evaluate(rng):
 
 
 def test_attributes_can_be_set(rng):
-    scene, a, b = pair(rng)
+    scene, a, _ = pair(rng)
     push = scene.add(F.PointForce(a, force=(1, 2, 3)))
     push.force = (3, 2, 1)
     push.point_a = (0, 0, 1)

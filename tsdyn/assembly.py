@@ -5,7 +5,7 @@ import math
 from ._kernel import caller, entry, kernel
 from .curvature import SIGNATURE as CURVATURE_SIGNATURE
 from .force_loops import JACOBIAN as FORCE_JACOBIAN_SIGNATURE
-from .force_pack import F_COUNT, F_FIRST_INT, F_FIRST_REAL, F_REALS, F_REMEMBER, FORCE, FORCE_JACOBIAN
+from .force_pack import F_COUNT, F_FIRST_INT, F_FIRST_REAL, F_KEPT, F_REALS, F_REMEMBER, FORCE, FORCE_JACOBIAN
 from .motion import call_motion
 from .primitive import call_kind
 from .signal import call_signal, spline
@@ -104,12 +104,18 @@ def remember(s, q, qd, t, out):
 
 
 @kernel
-def force_jacobian(s, q, qd, t, Q_q, Q_qd):
-    """Q_q, Q_qd (n, n) += the Jacobians of all forces but gravity, of a system from `with_force_jacobians`."""
+def force_jacobian(s, q, qd, t, Q_q, Q_qd, anew, kept):
+    """Q_q, Q_qd (n, n) += the Jacobians of all forces but gravity, of a system from `with_force_jacobians`.
+
+    anew is 1 to take the derivatives of the laws and keep them, 0 to use those kept.
+    """
     for i in range(s.forces.shape[0]):
         kind = s.forces[i]
         table, reals = s.table[kind[F_FIRST_INT] :], s.reals[kind[F_FIRST_REAL] :]
-        call_jacobian(kind[FORCE_JACOBIAN], kind[F_COUNT], kind[F_REALS], table, reals, q, qd, t, q.size, Q_q, Q_qd)
+        call_jacobian(
+            kind[FORCE_JACOBIAN], kind[F_COUNT], kind[F_REALS], table, reals,
+            q, qd, t, q.size, Q_q, Q_qd, anew, kept[kind[F_KEPT] :],
+        )  # fmt: skip
 
 
 @kernel

@@ -25,7 +25,7 @@ from ._kernel import Callback, kernel, specialised
 from .attachment import Attachment, inlined, layout, static_kernel
 from .checks import number
 from .errors import InvalidForce
-from .markers import PARAMETERS, TURN, Marker
+from .markers import PARAMETERS, TURN, Marker, Point
 from .primitive import SIGNATURE
 from .signal import Signal
 
@@ -172,6 +172,8 @@ def callbacks(cls, functions, owner=None):
     names = {**constants, "kernel_law": make(functions["law"])}
     steps = loops.complex_steps if cls.analytic else loops.central_differences
     names["kernel_derivatives"] = make(specialised(steps, f"{label}.derivatives", home, **names))
+    names["KEPT"] = loops.kept_size(cls.markers)
+    names["ALONG"] = 3 if [type(m) for m in cls.markers] == [Point, Point] else -1  # a frame along its two points
     result = {}
     for name, template, signature in (("force", loops.forces, SIGNATURE), ("jacobian", loops.jacobian, loops.JACOBIAN)):
         copy = specialised(template, f"{label}.{name}_loop", home, **names)

@@ -22,19 +22,19 @@ class CheckFailed(TsdynError, AssertionError):
 
 
 @entry
-def evaluate_force_jacobian(s, q, qd, t, Q_q, Q_qd):
+def evaluate_force_jacobian(s, q, qd, t, Q_q, Q_qd, anew, kept):
     """Q_q, Q_qd (n, n) += the Jacobians of the forces; s is from `with_force_jacobians`."""
     set_time(s, t)
-    force_jacobian(s, q, qd, t, Q_q, Q_qd)
+    force_jacobian(s, q, qd, t, Q_q, Q_qd, anew, kept)
 
 
 def jacobians(packed, q, qd, t):
     """dQ/dq and dQ/dqd (n, n) of all forces of a packed scene, gravity has none."""
-    system = with_force_jacobians(packed)
+    system, size = with_force_jacobians(packed)
     system = system._replace(reals=system.reals.copy())
     Q_q, Q_qd = np.zeros((2, q.size, q.size))
     if len(system.forces):
-        evaluate_force_jacobian(system, q, qd, float(t), Q_q, Q_qd)
+        evaluate_force_jacobian(system, q, qd, float(t), Q_q, Q_qd, 1, np.zeros(size))
     return Q_q, Q_qd
 
 

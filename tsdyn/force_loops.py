@@ -9,18 +9,26 @@ central differences where it is not analytic. The names in capitals and kernel_*
 """
 
 from ._kernel import complex_stack, integers, stack, stack2, vector
+from .frames import turn_block, turn_of_bodies, turn_of_directions
 from .marker_forces import carry_back, carry_back_derivative, derivatives, state
 from .primitive import ANY
 
 # what the table of a kind holds for each instance
 AT, DIMENSION, INTS = 0, 2, 4
-JACOBIAN = "iippppdipp"  # count, reals per instance, table, reals, q, qd, t, n, Q_q, Q_qd
+JACOBIAN = "iippppdippip"  # count, reals per instance, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept
+FRAME = 7  # floats of an instance's frame: Euler parameters of a body, or a direction
 STEP = 1e-40  # of complex steps: nothing cancels, so as small as can be
 QUOTIENT = 7e-4  # of central differences of fourth order, relative: the fifth root of rounding
 
-MARKERS = SIZE = 1
+MARKERS = SIZE = KEPT = ALONG = 1
 CODES = OWNERS = STARTS = (0,)
 kernel_law = kernel_derivatives = kernel_remember = None
+
+
+def kept_size(markers):
+    """Floats that an instance keeps of its law's derivatives."""
+    size = sum(marker.size for marker in markers)
+    return 2 * size * size + FRAME
 
 
 def forces(count, stride, table, reals, q, qd, t, out):
@@ -102,12 +110,18 @@ def central_differences(x, xd, par, t, fx, fxd):
                     fxd[r, c] += weight / hd * g[r]
 
 
-def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd):
-    """Q_q, Q_qd (n, n) += the Jacobians of all instances."""
+def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept):
+    """Q_q, Q_qd (n, n) += the Jacobians of all instances.
+
+    With anew the derivatives of the law are taken and kept, (2 SIZE^2 + FRAME) floats an instance; without, those kept
+    are turned to where the force's frame is now. What follows from geometry is always exact.
+    """
+    kept, r = vector(kept, ANY), stack(4)
     table, reals, q, qd = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(qd, ANY)
     Q_q, Q_qd = vector(Q_q, ANY), vector(Q_qd, ANY)
     x, xd, f, h, hd = stack(SIZE), stack(SIZE), stack(SIZE), stack(SIZE), stack(SIZE)
     fx, fxd = stack2(SIZE, SIZE), stack2(SIZE, SIZE)
+    f_ab = stack(3)
     W, X, Y = stack2(SIZE, 14), stack2(SIZE, 14), stack2(SIZE, 14)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
@@ -120,7 +134,36 @@ def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd):
             state(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:])
             derivatives(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, c, 7 * k, W, X, Y)
         kernel_law(x, xd, real[3 * MARKERS :], t, f)
-        kernel_derivatives(x, xd, real[3 * MARKERS :], t, fx, fxd)
+        old_x, old_xd = kept[i * KEPT :], kept[i * KEPT + SIZE * SIZE :]
+        frame = kept[i * KEPT + 2 * SIZE * SIZE :]
+        if anew != 0:
+            kernel_derivatives(x, xd, real[3 * MARKERS :], t, fx, fxd)
+            for k in range(SIZE):
+                for c in range(SIZE):
+                    old_x[k * SIZE + c], old_xd[k * SIZE + c] = fx[k, c], fxd[k, c]
+        if ALONG >= 0:
+            for c in range(3):
+                f_ab[c] = x[ALONG + c] - x[c]
+            if anew != 0:
+                for c in range(3):
+                    frame[4 + c] = f_ab[c]
+            else:
+                turn_of_directions(frame[4:], f_ab, r)
+        else:
+            r[0], r[1], r[2], r[3] = 1.0, 0.0, 0.0, 0.0
+            for k in range(1, -1, -1):
+                if own[DIMENSION + k] == 7:
+                    p = q[own[AT + k] + 3 : own[AT + k] + 7]
+                    if anew != 0:
+                        for c in range(4):
+                            frame[c] = p[c]
+                    else:
+                        turn_of_bodies(frame, p, r)
+        if anew == 0:
+            for j in range(MARKERS):
+                for k in range(MARKERS):
+                    turn_block(CODES[j], CODES[k], r, old_x, SIZE, STARTS[j], STARTS[k], fx)
+                    turn_block(CODES[j], CODES[k], r, old_xd, SIZE, STARTS[j], STARTS[k], fxd)
         for j in range(MARKERS):
             k, s = OWNERS[j], real[3 * j : 3 * j + 3]
             carry_back_derivative(CODES[j], own[DIMENSION + k], own[AT + k], s, f[STARTS[j] :], n, Q_q)

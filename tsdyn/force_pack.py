@@ -1,6 +1,5 @@
 """Forces packed for the kernels: one row a kind, each instance's places and numbers in the shared arrays."""
 
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -8,11 +7,11 @@ from numba.core.errors import NumbaError
 
 from .checks import number
 from .errors import InvalidForce
-from .force_loops import AT, DIMENSION, INTS
+from .force_loops import AT, DIMENSION, INTS, kept_size
 from .signal import Signal, Table
 
 # columns of System.forces: three addresses, then where a kind's instances are
-FORCE, FORCE_JACOBIAN, F_COUNT, F_REALS, F_FIRST_INT, F_FIRST_REAL, F_REMEMBER, FORCE_COLUMNS = range(8)
+FORCE, FORCE_JACOBIAN, F_COUNT, F_REALS, F_FIRST_INT, F_FIRST_REAL, F_REMEMBER, F_KEPT, FORCE_COLUMNS = range(9)
 # columns of System.signals: the function's address, zero for a table; its places in reals; a table's numbers in reals
 S_ADDRESS, S_PLACE, S_WIDTH, S_FIRST, S_KNOTS = range(5)
 
@@ -21,7 +20,6 @@ class Load(NamedTuple):
     """One force as it was when it was packed."""
 
     force: object
-    kernels: MappingProxyType
     parameters: tuple  # floats and Signals
     coordinates: tuple  # where its markers are, (3,) each
     row: np.ndarray  # (FORCE_COLUMNS,) a row of System.forces that has this instance alone
@@ -68,10 +66,10 @@ def pack_forces(forces, where, table, reals):
                     f"{force.name}: parameters() must return as many values as for every other {type(force).__name__}."
                 )
             stride = size
-            row = np.array([address, 0, 1, stride, *begin, remember], np.int64)
+            row = np.array([address, 0, 1, stride, *begin, remember, 0], np.int64)
             slot = len(memory) - 1 if force.memory else -1
-            loads[id(force)] = Load(force, kernels, parameters, force.coordinates, row, slot)
-        rows.append([address, 0, len(members), stride, *first, remember])
+            loads[id(force)] = Load(force, parameters, force.coordinates, row, slot)
+        rows.append([address, 0, len(members), stride, *first, remember, 0])
     for source, users in tables.values():
         for signal in users:
             signal[S_FIRST], signal[S_KNOTS] = len(reals), source.times.size
@@ -80,12 +78,19 @@ def pack_forces(forces, where, table, reals):
 
 
 def with_force_jacobians(packed):
-    """The system of a packed scene with the addresses of the forces' Jacobian loops, which are loaded now."""
+    """The system of a packed scene with the forces' Jacobian loops, which are loaded now; and the floats they keep."""
     rows = packed.system.forces.copy()
     for load in packed.loads:
         same = (rows[:, FORCE] == load.row[FORCE]) & (rows[:, F_REALS] == load.row[F_REALS])
-        rows[same, FORCE_JACOBIAN] = _address(load.force, "jacobian", load.kernels)
-    return packed.system._replace(forces=rows)
+        rows[same, FORCE_JACOBIAN] = _address(load.force, "jacobian")
+    total = 0
+    for row in rows:
+        load = next(
+            load for load in packed.loads if load.row[FORCE] == row[FORCE] and load.row[F_REALS] == row[F_REALS]
+        )
+        row[F_KEPT] = total
+        total += row[F_COUNT] * kept_size(load.force.markers)
+    return packed.system._replace(forces=rows), int(total)
 
 
 def _parameters(force):
@@ -98,10 +103,10 @@ def _parameters(force):
     )
 
 
-def _address(force, name, kernels=None):
+def _address(force, name):
     """The address of a kind's kernel."""
     try:
-        return (kernels or force.kernels)[name].address
+        return force.kernels[name].address
     except NumbaError as error:
         raise InvalidForce(
             f"{force.name}: Numba can't compile {name}; use plain arithmetic, NumPy functions of scalars and constants "

@@ -23,7 +23,14 @@ class Formulation:
 
     def implicit(self):
         """Addresses that implicit methods need, in the order of implicit.LINEARISE ... ERROR_NORM."""
-        kernels = linearise.linearise, linearise.reduce, linearise.factorise, linearise.solve, null_space.complete
+        kernels = (
+            linearise.linearise,
+            linearise.reduce,
+            linearise.factorise,
+            linearise.solve,
+            linearise.soften,
+            null_space.complete,
+        )
         return [f.address for f in (*kernels, self.kernels.error_norm)]
 
     def norm(self):

@@ -24,17 +24,17 @@ KAPPA = 0.001  # of what a step may be off by: what a stage's iteration may leav
 SLOW = 0.1  # contraction above which the iteration matrix is made anew
 GUESS, LEAST = 0.3, 0.02  # contraction taken for granted where none has been measured
 DIVERGING = 0.9
-ROUNDING = 1e-15
+ROUNDING = 4e-15
 # Linear.kernels
-LINEARISE, REDUCE, FACTORISE, SOLVE, COMPLETE, ERROR_NORM, KERNELS = range(7)
+LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, COMPLETE, ERROR_NORM, KERNELS = range(8)
 # Linear.numbers; CHART is the chart that P belongs to
 RTOL, ATOL, G, CHART, KNOWN, THETA, T_BEFORE, NUMBERS = range(8)
 
 FIXED_TOL = 1e-12  # of the iteration, where no tolerance sets the step
 
 call_linearise = caller("pd")
-call_reduce = caller("p")
 call_solve = caller("pp")
+call_soften = caller("ppdp")
 
 
 @kernel
@@ -46,7 +46,7 @@ def _matrix(context, w, l, t, g, f, anew):
         status = call_linearise(l.kernels[LINEARISE], context, t)
         l.numbers[KNOWN] = 1.0
     if status == 0:
-        call_reduce(l.kernels[REDUCE], context)
+        call_linearise(l.kernels[REDUCE], context, t)
         status = call_linearise(l.kernels[FACTORISE], context, g)
     l.numbers[G] = g if status == 0 else 0.0
     l.numbers[CHART] = w.counters[CHARTS]

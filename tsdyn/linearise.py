@@ -7,9 +7,9 @@ tsdyn.curvature), Eq. 4 gives, the multipliers dropping out because Phi_q D = 0,
     C* = Q_qd + S_qd + 2 M Y,                          Y = U B G1
     K* = (M qdd - S - Q)_q + (Phi_q^T lam)_q - M Z + C* Y,    Z = U B G2
 
-K* and C* are kept in the bodies' own frames: there a joint's springs and dampers stay what they are while the mechanism
-moves, so one evaluation serves many steps and charts. With the place last taken, `reduce` and `factorise` make
-P = A - g C_hat + g^2 K_hat, the iteration matrix of a stage with g = h a_ii.
+One evaluation serves many steps and charts: K* and C*, the forces' Q_q and Q_qd left out, are kept in the bodies' own
+frames, and the derivatives of the forces' laws in frames that go along with the forces (tsdyn.frames). With the place
+last taken, `reduce` and `factorise` make P = A - g C_hat + g^2 K_hat, the iteration matrix of a stage with g = h a_ii.
 """
 
 from ._kernel import callback, kernel, stack, stack2, vector
@@ -199,11 +199,8 @@ def linearise(context, t):
             l.C[i, j] = 0.0
         l.r[i] = 0.0
     if s.forces.shape[0] > 0:
-        force_jacobian(s, w.q, w.qd, t, l.K, l.C)
         applied_forces(s, w.q, w.qd, t, l.r)
-        for i in range(n):
-            for j in range(n):
-                l.K[i, j] = -l.K[i, j]
+        _forces(s, w, l, t, 1)
     _inertia_terms(s, w, l)
     _multiply(w.U, w.B, l.UB)
     for i in range(m):  # Phi_q^T lam = r, so lam = (U B)^T r
@@ -220,6 +217,8 @@ def linearise(context, t):
     for i in range(n):
         for d in range(n):
             f = l.C[i, d]
+            if s.forces.shape[0] > 0:
+                f += l.Q_qd[i, d]
             for j in range(n):
                 l.K[i, j] += f * l.Y[d, j]
         for j in range(n):
@@ -231,23 +230,30 @@ def linearise(context, t):
 
 
 @kernel
-def _sandwich(F, X, scratch, out):
-    """out = F^T X F."""
+def _sandwich(factor, F, X, scratch, out):
+    """out += factor F^T X F."""
     _multiply(X, F, scratch)
-    for i in range(F.shape[1]):
-        for j in range(F.shape[1]):
-            out[i, j] = 0.0
     for c in range(F.shape[0]):
         for i in range(F.shape[1]):
-            f = F[c, i]
+            f = factor * F[c, i]
             if f != 0.0:
                 for j in range(F.shape[1]):
                     out[i, j] += f * scratch[c, j]
 
 
-@callback("p")
-def reduce(context):
-    """K_hat and C_hat of the place last taken."""
+@kernel
+def _forces(s, w, l, t, anew):
+    """Q_q and Q_qd of the forces."""
+    for i in range(w.q.size):
+        for j in range(w.q.size):
+            l.Q_q[i, j] = 0.0
+            l.Q_qd[i, j] = 0.0
+    force_jacobian(s, w.q, w.qd, t, l.Q_q, l.Q_qd, anew, l.kept)
+
+
+@callback("pd")
+def reduce(context, t):
+    """K_hat and C_hat of the state last taken."""
     c = load(context)
     s, w, l = c.system, c.work, c.linear
     k, to, A = w.v.size, 0, stack2(3, 3)
@@ -265,8 +271,16 @@ def reduce(context):
                 for j in range(k):
                     l.F[to + i, j] = w.D[at + i, j]
             to += 3
-    _sandwich(l.F, l.K_body, l.X, l.K_hat)
-    _sandwich(l.F, l.C_body, l.X, l.C_hat)
+    for i in range(k):
+        for j in range(k):
+            l.K_hat[i, j] = 0.0
+            l.C_hat[i, j] = 0.0
+    _sandwich(1.0, l.F, l.K_body, l.X, l.K_hat)
+    _sandwich(1.0, l.F, l.C_body, l.X, l.C_hat)
+    if s.forces.shape[0] > 0:
+        _forces(s, w, l, t, 0)
+        _sandwich(-1.0, w.D, l.Q_q, l.X, l.K_hat)
+        _sandwich(1.0, w.D, l.Q_qd, l.X, l.C_hat)
     return OK
 
 
@@ -291,14 +305,11 @@ def factorise(context, g):
     return OK if lu(l.P, l.pivots, k) else SINGULAR
 
 
-@callback("pp")
-def solve(context, rho):
-    """rho <- P^-1 D^T M D rho."""
-    c = load(context)
-    w, l = c.work, c.linear
-    k = w.v.size
-    rho = vector(rho, k)
-    for j in range(k):  # b = L^T rho
+@kernel
+def _times_mass(w, l, rho):
+    """rho <- A rho, by the Cholesky factor of A, whose diagonal holds reciprocals."""
+    k = rho.size
+    for j in range(k):
         x = rho[j] / w.A[j, j]
         for i in range(j + 1, k):
             x += w.A[i, j] * rho[i]
@@ -308,5 +319,34 @@ def solve(context, rho):
         for j in range(i):
             x += w.A[i, j] * l.b[j]
         rho[i] = x
-    lu_solve(l.P, l.pivots, rho, k)
+
+
+@callback("pp")
+def solve(context, rho):
+    """rho <- P^-1 A rho."""
+    c = load(context)
+    w, l = c.work, c.linear
+    rho = vector(rho, w.v.size)
+    _times_mass(w, l, rho)
+    lu_solve(l.P, l.pivots, rho, rho.size)
+    return OK
+
+
+@callback("ppdp")
+def soften(context, ex, g, ey):
+    """(ex, ey) <- (I - g J)^-1 (ex, ey), J the Jacobian of (vd, f): an estimate freed of what stiff modes add to it.
+
+    Hosea and Shampine, Appl. Numer. Math. 20, 21-37 (1996).
+    """
+    c = load(context)
+    w, l = c.work, c.linear
+    k = w.v.size
+    ex, ey = vector(ex, k), vector(ey, k)
+    _times_mass(w, l, ey)
+    for i in range(k):
+        for j in range(k):
+            ey[i] -= g * l.K_hat[i, j] * ex[j]
+    lu_solve(l.P, l.pivots, ey, k)
+    for i in range(k):
+        ex[i] += g * ey[i]
     return OK

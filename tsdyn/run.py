@@ -32,7 +32,7 @@ from .dense import (
     keep,
 )
 from .errors import Status
-from .implicit import KNOWN, T_BEFORE
+from .implicit import KNOWN, SOFTEN, T_BEFORE, G, call_soften
 from .interpolation import call_fill
 from .linalg import copy
 from .stepping import call_error, call_norm, call_step
@@ -256,10 +256,12 @@ def _go_back(r):
 
 
 @kernel
-def _accept(context, w, r, at, h):
+def _accept(context, l, r, at, h):
     """Judge the step h just made and choose the next (Gustafsson's PI control). Whether it is accepted."""
     end = r.xd if r.numbers[FIRST_ORDER] == 1 else r.y
     call_error(at[A_ERROR], h, r.x.size, r.y.size, end, r.yd, r.tableau, r.memory, r.dx, r.dy)
+    if l.numbers[G] > 0.0:
+        call_soften(l.kernels[SOFTEN], context, r.dx, l.numbers[G], r.dy)
     error = call_norm(at[A_NORM], context, r.dx, r.dy, r.now, r.clock[RTOL], r.clock[ATOL])
     if at[A_ERROR_2] != 0:  # Hairer's combination of two orders; nan stays nan
         call_error(at[A_ERROR_2], h, r.x.size, r.y.size, end, r.yd, r.tableau, r.memory, r.dx, r.dy)
@@ -357,7 +359,7 @@ def advance(c, r, at, most):
             if retry != 0:
                 return retry
             continue
-        if adaptive and not _accept(context, w, r, at, h):
+        if adaptive and not _accept(context, c.linear, r, at, h):
             r.numbers[REJECTED] += 1
             _go_back(r)
             continue

@@ -149,8 +149,9 @@ def simulate(
         q, qd = finite_vector(state.q, q.size, "state.q"), finite_vector(state.qd, q.size, "state.qd")
     q, qd = consistent(scene, system, q, qd, t0, initial_tol)
     m, n = system.segments.shape[0], q.size
+    kept = 0
     if method.implicit:
-        system = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
+        system, kept = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
     system = system._replace(reals=system.reals.copy())
     system.reals[system.memory] = remembered(state, system.memory.size)
     work = allocate(n, m, len(scene.bodies), constraint_tol, packed.size)
@@ -178,7 +179,7 @@ def simulate(
     addresses += [kernel.address for kernel in interpolant[:2]] if dense or times.size else [0, 0]
     addresses.append(hermite_second.address if method.implicit and (dense or times.size) else 0)
     addresses = np.array(addresses, np.int64)
-    linear = allocate_linear(system, n, m, method.implicit)
+    linear = allocate_linear(system, n, m, method.implicit, kept)
     if method.implicit:
         linear = prepare_implicit(linear, method, form.implicit(), run)
         run.numbers[STAGE_AT] = (2 * len(method.tableau.c) + 1) * nx

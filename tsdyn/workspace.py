@@ -63,7 +63,10 @@ class Linear(NamedTuple):
     K_body: np.ndarray  # (l, l)  stiffness in body frames, kept over steps and charts; linearise.linearise
     C_body: np.ndarray  # (l, l)  damping in body frames; linearise.linearise
     F: np.ndarray  # (l, k)  D in body frames; linearise.reduce
-    X: np.ndarray  # (l, k)  scratch
+    X: np.ndarray  # (n, k)  scratch
+    Q_q: np.ndarray  # (n, n)  stiffness of the forces; linearise.reduce
+    Q_qd: np.ndarray  # (n, n)  their damping; linearise.reduce
+    kept: np.ndarray  # derivatives of the forces' laws; force_loops.jacobian
     K_hat: np.ndarray  # (k, k)  F^T K_body F; linearise.reduce
     C_hat: np.ndarray  # (k, k)  F^T C_body F; linearise.reduce
     P: np.ndarray  # (k, k)  LU factors of D^T M D - g C_hat + g^2 K_hat; linearise.factorise
@@ -107,19 +110,21 @@ def allocate(n, m, bodies, constraint_tol, size=1.0):
     return Work(**arrays, counters=np.zeros(COUNTERS, np.int64))
 
 
-def allocate_linear(system, n, m, wanted):
-    """Lay out the memory of implicit methods; of no size where it is not wanted."""
+def allocate_linear(system, n, m, wanted, kept=0):
+    """Lay out the memory of implicit methods, `kept` floats of it for forces; of no size where it is not wanted."""
     k, l = n - m, sum(6 if length == 7 else 3 for length in system.bodies[:, -1])
     if not wanted:
         n = m = k = l = 0
     shapes = {
-        **dict.fromkeys(("K", "C", "Y", "Z"), (n, n)),
+        **dict.fromkeys(("K", "C", "Y", "Z", "Q_q", "Q_qd"), (n, n)),
         **dict.fromkeys(("G1", "G2"), (m, n)),
         "UB": (n, m),
         "lam": (m,),
         "r": (n,),
         **dict.fromkeys(("K_body", "C_body"), (l, l)),
-        **dict.fromkeys(("F", "X"), (l, k)),
+        "F": (l, k),
+        "X": (n, k),
+        "kept": (kept,),
         **dict.fromkeys(("K_hat", "C_hat", "P"), (k, k)),
         "b": (k,),
     }

@@ -22,9 +22,7 @@ from ..state_function import arguments_of, fill_state, kernels_of
 
 def _numbers(value, what, error):
     result = floats(value)
-    if result.ndim != 1 or not np.isfinite(result).all():
-        if len(np.atleast_1d(value)) == 0:
-            return np.zeros(0)
+    if result.ndim != 1 or result.size != np.size(value) or not np.isfinite(result).all():
         raise error(f"{what} must be a list of finite numbers, got {value!r}.")
     result.setflags(write=False)
     return result

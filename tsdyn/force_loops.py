@@ -116,12 +116,12 @@ def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept):
     With anew the derivatives of the law are taken and kept, (2 SIZE^2 + FRAME) floats an instance; without, those kept
     are turned to where the force's frame is now. What follows from geometry is always exact.
     """
-    kept, r = vector(kept, ANY), stack(4)
+    kept, turn = vector(kept, ANY), stack(4)
     table, reals, q, qd = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(qd, ANY)
     Q_q, Q_qd = vector(Q_q, ANY), vector(Q_qd, ANY)
     x, xd, f, h, hd = stack(SIZE), stack(SIZE), stack(SIZE), stack(SIZE), stack(SIZE)
     fx, fxd = stack2(SIZE, SIZE), stack2(SIZE, SIZE)
-    f_ab = stack(3)
+    d = stack(3)
     W, X, Y = stack2(SIZE, 14), stack2(SIZE, 14), stack2(SIZE, 14)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
@@ -143,14 +143,14 @@ def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept):
                     old_x[k * SIZE + c], old_xd[k * SIZE + c] = fx[k, c], fxd[k, c]
         if ALONG >= 0:
             for c in range(3):
-                f_ab[c] = x[ALONG + c] - x[c]
+                d[c] = x[ALONG + c] - x[c]
             if anew != 0:
                 for c in range(3):
-                    frame[4 + c] = f_ab[c]
+                    frame[4 + c] = d[c]
             else:
-                turn_of_directions(frame[4:], f_ab, r)
+                turn_of_directions(frame[4:], d, turn)
         else:
-            r[0], r[1], r[2], r[3] = 1.0, 0.0, 0.0, 0.0
+            turn[0], turn[1], turn[2], turn[3] = 1.0, 0.0, 0.0, 0.0
             for k in range(1, -1, -1):
                 if own[DIMENSION + k] == 7:
                     p = q[own[AT + k] + 3 : own[AT + k] + 7]
@@ -158,12 +158,12 @@ def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept):
                         for c in range(4):
                             frame[c] = p[c]
                     else:
-                        turn_of_bodies(frame, p, r)
+                        turn_of_bodies(frame, p, turn)
         if anew == 0:
             for j in range(MARKERS):
                 for k in range(MARKERS):
-                    turn_block(CODES[j], CODES[k], r, old_x, SIZE, STARTS[j], STARTS[k], fx)
-                    turn_block(CODES[j], CODES[k], r, old_xd, SIZE, STARTS[j], STARTS[k], fxd)
+                    turn_block(CODES[j], CODES[k], turn, old_x, SIZE, STARTS[j], STARTS[k], fx)
+                    turn_block(CODES[j], CODES[k], turn, old_xd, SIZE, STARTS[j], STARTS[k], fxd)
         for j in range(MARKERS):
             k, s = OWNERS[j], real[3 * j : 3 * j + 3]
             carry_back_derivative(CODES[j], own[DIMENSION + k], own[AT + k], s, f[STARTS[j] :], n, Q_q)

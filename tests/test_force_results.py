@@ -212,14 +212,15 @@ def test_torsional_damper_and_actuator():
 
 
 def test_a_spring_shrunk_to_nothing_ends_the_run():
+    """A free mass that arrives at the other end exactly at t = 1, in steps of powers of two."""
     scene = ts.Scene(gravity=(0, 0, 0))
     mass = scene.add_point_mass(1.0, (1, 0, 0), (-1, 0, 0))
-    scene.add(F.Spring(scene.ground, mass, damping=0.1))
-    scene.add(F.PointForce(mass, force=lambda t, s: (0.1 * s[7], 0.0, 0.0)))
-    scene.add(F.Spring(scene.ground, mass, actuator=1e-9))
+    scene.add(F.Spring(scene.ground, mass, actuator=lambda t: 0.0))
     solution = ts.simulate(scene, (0, 2), integrator=ts.integrators.Nystrom4(0.25))
-    assert not solution.success or np.isfinite(solution.q).all()
-    assert np.isfinite(solution.q).all()
+    assert solution.status == ts.Status.NOT_FINITE
+    assert solution.t[-1] == 0.75
+    assert np.isfinite(solution.qdd).all()
+    assert "force" in solution.message
 
 
 def test_a_spring_that_starts_at_nothing_is_refused():

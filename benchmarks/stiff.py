@@ -7,6 +7,8 @@ first at the end of a rigid 1 m link; released from the horizontal. The fast mod
 |lambda| from 1e5 to 3e5 1/s, the slow modes of the springs decay with k / c = 1 s
 """
 
+from itertools import pairwise
+
 import tsdyn as ts
 
 Y = (0.0, 1.0, 0.0)
@@ -47,6 +49,6 @@ def hung(scale=1.0):
     scene = ts.Scene(gravity=(0.0, 0.0, -9.81))
     beads = [scene.add_point_mass(1.0, (1.0 + i, 0.0, 0.0), name=f"bead{i + 1}") for i in range(3)]
     scene.add(ts.constraints.Distance(beads[0], scene.ground))
-    for a, b in zip(beads[:-1], beads[1:], strict=True):
+    for a, b in pairwise(beads):
         scene.add(ts.forces.Spring(a, b, stiffness=1e5 * scale, damping=1e5 * scale))
     return scene

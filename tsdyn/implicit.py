@@ -19,16 +19,19 @@ from .stepping import ERROR, STEP, call_accelerate, call_norm, call_place
 from .workspace import CHARTS, STAGE_ITERATIONS, load
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
-ITERATIONS = 15
+ITERATIONS = 20
+FAR = 0.1  # of the state's size: a solution further from its prediction may be another one
+STAGES_EAGER = 30.0  # stages with a matrix of their own from the start, after an older one has failed
 KAPPA = 0.001  # of what a step may be off by: what a stage's iteration may leave
 SLOW = 0.1  # contraction above which the iteration matrix is made anew
 GUESS, LEAST = 0.3, 0.02  # contraction taken for granted where none has been measured
 DIVERGING = 0.9
+TRIES = 3  # new matrices for one stage until stiffness and damping are made anew; diverging iterations until it fails
 ROUNDING = 4e-15
 # Linear.kernels
 LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, COMPLETE, ERROR_NORM, KERNELS = range(8)
 # Linear.numbers; CHART is the chart that P belongs to
-RTOL, ATOL, G, CHART, KNOWN, THETA, T_BEFORE, NUMBERS = range(8)
+RTOL, ATOL, G, CHART, KNOWN, THETA, T_BEFORE, EAGER, NUMBERS = range(9)
 
 FIXED_TOL = 1e-12  # of the iteration, where no tolerance sets the step
 
@@ -54,11 +57,15 @@ def _matrix(context, w, l, t, g, f, anew):
 
 
 @kernel
-def _stage(context, place, accelerate, w, l, t, g, x, y, k, xs, ys, f, dx):
+def _stage(context, place, accelerate, w, l, t, g, x, y, k, xs, ys, f, dx, guess):
     """Solve one stage: x, y are its known parts, k the unknown, predicted on entry. xs, ys at the solution. Status."""
     n = k.size
+    copy(k, guess)
     floor = ROUNDING / (l.numbers[RTOL] + l.numbers[ATOL])
-    before, level, theta, measured = math.inf, 0, l.numbers[THETA], False
+    before, theta, measured = math.inf, l.numbers[THETA], False
+    slow, apart, stuck, renewed = 0, 0, False, False
+    eager = l.numbers[EAGER] > 0.0
+    l.numbers[EAGER] -= 1.0
     for _ in range(ITERATIONS):
         for c in range(n):
             ys[c] = y[c] + g * k[c]
@@ -69,10 +76,15 @@ def _stage(context, place, accelerate, w, l, t, g, x, y, k, xs, ys, f, dx):
         if status != 0:
             return status
         w.counters[STAGE_ITERATIONS] += 1
-        stale = l.numbers[CHART] != w.counters[CHARTS] or abs(g - l.numbers[G]) > 0.3 * g
-        if stale or (measured and theta > SLOW and level < 2):
-            level = 0 if stale else level + 1
-            if _matrix(context, w, l, t, g, f, level == 2) != 0:
+        stale = eager or l.numbers[CHART] != w.counters[CHARTS] or abs(g - l.numbers[G]) > 0.3 * g
+        eager = False
+        if stale or (measured and theta > SLOW):
+            if not stale:
+                if slow == 0 and not renewed:
+                    l.numbers[EAGER] = STAGES_EAGER
+                slow += 1
+            renewed = True
+            if _matrix(context, w, l, t, g, f, slow == TRIES) != 0:
                 return STAGE_FAILED
             before, theta, measured = math.inf, GUESS, False
         for c in range(n):
@@ -87,21 +99,26 @@ def _stage(context, place, accelerate, w, l, t, g, x, y, k, xs, ys, f, dx):
             return STAGE_FAILED
         if before < math.inf:
             theta, measured = size / before, True
-            if theta > DIVERGING and size > 100.0 * floor and level == 2:
+            stuck = theta > DIVERGING and size <= 100.0 * floor  # this is rounding
+            apart += 1 if renewed and theta > DIVERGING else 0
+            if apart == TRIES:
                 return STAGE_FAILED
-        if size <= floor or (theta < 1.0 and size * theta <= KAPPA * (1.0 - theta)):
+        if size <= floor or stuck or (theta < 1.0 and size * theta <= KAPPA * (1.0 - theta)):
             l.numbers[THETA] = min(max(theta, LEAST), GUESS)
             for c in range(n):
                 ys[c] = y[c] + g * k[c]
                 xs[c] = x[c] + g * ys[c]
-            return 0
+                f[c] = g * (k[c] - guess[c])
+                dx[c] = g * f[c]
+            moved = call_norm(l.kernels[ERROR_NORM], context, dx, f, l.now, 1.0, 1.0)
+            return 0 if moved < FAR else STAGE_FAILED
         before = size
     return STAGE_FAILED
 
 
 @callback(STEP)
 def implicit_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
-    """One step of a method whose first stage is explicit; memory (stages + 1) 2n + 5n + 1."""
+    """One step of a method whose first stage is explicit; memory (stages + 1) 2n + 6n + 1."""
     data = load(context)
     w, l = data.work, data.linear
     n = nx
@@ -112,6 +129,7 @@ def implicit_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tablea
     predictor = tableau[1 + stages * width + stages + stages + 1 :]
     scratch = memory[(stages + 1) * 2 * n :]
     bx, by, f, low = memory[:n], memory[n : 2 * n], scratch[:n], scratch[n : 2 * n]
+    first = scratch[5 * n + 1 : 6 * n + 1]
     xs, y_before, k_before = scratch[2 * n : 3 * n], scratch[3 * n : 4 * n], scratch[4 * n : 5 * n]
     h_before = t - l.numbers[T_BEFORE] if l.numbers[T_BEFORE] > -math.inf else 0.0
     scratch[5 * n] = h_before
@@ -142,7 +160,7 @@ def implicit_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tablea
             for c in range(n):
                 k[c] += ratio * (yd[c] - k_before[c])
         status = _stage(
-            context, place, accelerate, w, l, t + h * row[1], h * row[2 + i], bx, by, k, xs, ys, f, low
+            context, place, accelerate, w, l, t + h * row[1], h * row[2 + i], bx, by, k, xs, ys, f, low, first
         )  # fmt: skip
         if status != 0:
             return status

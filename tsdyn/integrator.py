@@ -124,7 +124,7 @@ class DiagonallyImplicit(Adaptive):
     def kernel(self, first_order):
         """The tableau, packed, and the kernel that steps by it."""
         stages = len(self.tableau.c)
-        return implicit_step, self.tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny) + 5 * nx + 1
+        return implicit_step, self.tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny) + 6 * nx + 1
 
 
 def registered():

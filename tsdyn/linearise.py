@@ -200,7 +200,7 @@ def linearise(context, t):
         l.r[i] = 0.0
     if s.forces.shape[0] > 0:
         applied_forces(s, w.q, w.qd, t, l.r)
-        _forces(s, w, l, t, 1)
+        _forces(s, w, l, t, 1)  # the laws' derivatives are kept; `reduce` takes the rest anew
     _inertia_terms(s, w, l)
     _multiply(w.U, w.B, l.UB)
     for i in range(m):  # Phi_q^T lam = r, so lam = (U B)^T r
@@ -217,8 +217,6 @@ def linearise(context, t):
     for i in range(n):
         for d in range(n):
             f = l.C[i, d]
-            if s.forces.shape[0] > 0:
-                f += l.Q_qd[i, d]
             for j in range(n):
                 l.K[i, j] += f * l.Y[d, j]
         for j in range(n):
@@ -230,15 +228,14 @@ def linearise(context, t):
 
 
 @kernel
-def _sandwich(factor, F, X, scratch, out):
-    """out += factor F^T X F."""
-    _multiply(X, F, scratch)
+def _add_product(factor, F, X, out):
+    """out += factor F^T X."""
     for c in range(F.shape[0]):
         for i in range(F.shape[1]):
             f = factor * F[c, i]
             if f != 0.0:
                 for j in range(F.shape[1]):
-                    out[i, j] += f * scratch[c, j]
+                    out[i, j] += f * X[c, j]
 
 
 @kernel
@@ -275,12 +272,19 @@ def reduce(context, t):
         for j in range(k):
             l.K_hat[i, j] = 0.0
             l.C_hat[i, j] = 0.0
-    _sandwich(1.0, l.F, l.K_body, l.X, l.K_hat)
-    _sandwich(1.0, l.F, l.C_body, l.X, l.C_hat)
+    _multiply(l.K_body, l.F, l.X)
+    _add_product(1.0, l.F, l.X, l.K_hat)
+    _multiply(l.C_body, l.F, l.X)
+    _add_product(1.0, l.F, l.X, l.C_hat)
     if s.forces.shape[0] > 0:
         _forces(s, w, l, t, 0)
-        _sandwich(-1.0, w.D, l.Q_q, l.X, l.K_hat)
-        _sandwich(1.0, w.D, l.Q_qd, l.X, l.C_hat)
+        _multiply(l.Q_q, w.D, l.X)
+        _add_product(-1.0, w.D, l.X, l.K_hat)
+        _multiply(l.Q_qd, w.D, l.X)
+        _add_product(1.0, w.D, l.X, l.C_hat)
+        _multiply(l.Y, w.D, l.X)  # Q_qd Y with the Q_qd of now: what a stale one points to may be soft by now
+        _multiply(l.Q_qd, l.X, l.X2)
+        _add_product(1.0, w.D, l.X2, l.K_hat)
     return OK
 
 

@@ -32,7 +32,7 @@ from .dense import (
     keep,
 )
 from .errors import Status
-from .implicit import KNOWN, SOFTEN, T_BEFORE, G, call_soften
+from .implicit import SOFTEN, T_BEFORE, G, call_soften
 from .interpolation import call_fill
 from .linalg import copy
 from .stepping import call_error, call_norm, call_step
@@ -46,6 +46,7 @@ T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, CLOCKS = ra
 # numbers
 FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
 HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, DENSE, BLOCKS, STAGE_AT, NUMBERS = range(8, 17)
+AGAIN = 2  # REJECTED_LAST: by a failed stage
 FILLED, STORED = 1, 2  # DENSE: every step's block is made, and kept
 
 call_check = caller("p")
@@ -276,7 +277,7 @@ def _accept(context, l, r, at, h):
         return False
     error = max(error, 1e-10)
     factor = SAFETY * error ** (-0.7 * power) * r.clock[ERROR_BEFORE] ** (0.4 * power)
-    factor = min(max(factor, SHRINK), 1.0 if r.numbers[REJECTED_LAST] == 1 else GROW)
+    factor = min(max(factor, SHRINK), 1.0 if r.numbers[REJECTED_LAST] != 0 else GROW)
     r.clock[ERROR_BEFORE] = max(error, 1e-4)
     r.clock[H] = min(h * factor, r.clock[MAX_STEP])
     r.numbers[REJECTED_LAST] = 0
@@ -339,9 +340,11 @@ def advance(c, r, at, most):
                 call_complete(at[A_COMPLETE], context, r.yd)
         elif status == STAGE_FAILED and adaptive:
             _restore_now(w, r)
-            c.linear.numbers[KNOWN] = 0.0
             r.numbers[REJECTED] += 1
-            r.clock[H] = 0.25 * h
+            if r.numbers[REJECTED_LAST] == AGAIN:
+                c.linear.numbers[KNOWN] = 0.0
+            r.numbers[REJECTED_LAST] = AGAIN
+            r.clock[H] = 0.5 * h
             continue
         reason = 0
         if status == 0:

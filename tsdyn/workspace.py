@@ -64,6 +64,7 @@ class Linear(NamedTuple):
     C_body: np.ndarray  # (l, l)  damping in body frames; linearise.linearise
     F: np.ndarray  # (l, k)  D in body frames; linearise.reduce
     X: np.ndarray  # (n, k)  scratch
+    X2: np.ndarray  # (n, k)  scratch
     Q_q: np.ndarray  # (n, n)  stiffness of the forces; linearise.reduce
     Q_qd: np.ndarray  # (n, n)  their damping; linearise.reduce
     kept: np.ndarray  # derivatives of the forces' laws; force_loops.jacobian
@@ -123,7 +124,7 @@ def allocate_linear(system, n, m, wanted, kept=0):
         "r": (n,),
         **dict.fromkeys(("K_body", "C_body"), (l, l)),
         "F": (l, k),
-        "X": (n, k),
+        **dict.fromkeys(("X", "X2"), (n, k)),
         "kept": (kept,),
         **dict.fromkeys(("K_hat", "C_hat", "P"), (k, k)),
         "b": (k,),
@@ -131,7 +132,7 @@ def allocate_linear(system, n, m, wanted, kept=0):
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
     empty = np.zeros((3, n))
     whole = {"pivots": np.zeros(k, np.int64), "kernels": np.zeros(8, np.int64)}
-    return Linear(**arrays, **whole, now=empty, before=empty, numbers=np.zeros(8))
+    return Linear(**arrays, **whole, now=empty, before=empty, numbers=np.zeros(9))
 
 
 def _example():

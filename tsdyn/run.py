@@ -32,7 +32,7 @@ from .dense import (
     keep,
 )
 from .errors import Status
-from .implicit import SOFTEN, T_BEFORE, G, call_soften
+from .implicit import KNOWN, SOFTEN, T_BEFORE, G, call_soften
 from .interpolation import call_fill
 from .linalg import copy
 from .stepping import call_error, call_norm, call_step

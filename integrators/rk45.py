@@ -28,6 +28,7 @@ class RK45(ExplicitRungeKutta):
     """
 
     order = 5
+    stability_limit = 3.25
     tableau = RungeKuttaTableau(
         a=(
             (),

@@ -45,7 +45,7 @@ null_space maggi_kane linearise scene
 formulation run
 events drive
 solution
-simulate force_check testing
+simulate choice force_check testing
 tables plots
 cli __init__
 __main__

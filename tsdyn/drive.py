@@ -18,6 +18,7 @@ from .run import (
     ROWS,
     STEPS,
     STEPS_WANTED,
+    STIFF,
     STORED,
     Run,
     T,
@@ -29,8 +30,11 @@ FIRST_SLICE, LARGEST_SLICE, CHART_ROOM = 1024, 1 << 17, 4096
 BLOCK_ROOM = 1 << 22  # floats of a slice's blocks
 
 
-def drive(context, run, addresses, max_steps, report, span, watch):
-    """Run slice by slice; returns the status, what there is to say about it, and rows of all that was recorded."""
+def drive(context, run, addresses, max_steps, report, span, watch, choose):
+    """Run slice by slice; returns the status, what there is to say about it, and rows of all that was recorded.
+
+    `choose(run)` is asked when the motion is found stiff; where it says so the run ends with Status.STIFF.
+    """
     chunks = {"out": [], "history": [], "blocks": []}
     most, limit = FIRST_SLICE, int(run.numbers[STEPS_WANTED]) if max_steps is None else max_steps
     per_step, dense = run.t_eval.size == 0, run.numbers[DENSE] == STORED
@@ -74,6 +78,10 @@ def drive(context, run, addresses, max_steps, report, span, watch):
                 most = min(2 * most, largest)
             elif seconds > 2 * SLICE_SECONDS:
                 most = max(most // 2, 1)
+            if choose is not None and run.numbers[STIFF] and status == Status.SLICE_DONE:
+                if choose(run):
+                    status = Status.STIFF
+                choose = None
             try:
                 report((run.clock[T] - span[0]) / (span[1] - span[0]))
             except Exception as error:  # what has been computed is worth more than a progress bar

@@ -67,6 +67,7 @@ class Status(IntEnum):
     EVENT = 10
     EVENT_FAILED = 11
     STAGE_FAILED = 12
+    STIFF = 13
 
     def __str__(self):
         return self.name.lower()
@@ -120,5 +121,6 @@ _SENTENCES = {
     Status.INTERRUPTED: ("The run was interrupted.", "Go on with simulate(scene, (t, t_end), state=solution.state)."),
     Status.EVENT: ("A terminal event ended the run.", ""),
     Status.EVENT_FAILED: ("An event function gave no number.", "Mend it, or return a finite float for every state."),
+    Status.STIFF: ("The motion is stiff, and an implicit method is cheaper.", ""),
     Status.SLICE_DONE: ("A slice of the run is done.", ""),
 }

@@ -42,10 +42,12 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
 # clock
-T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, CLOCKS = range(10)
+T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, STABLE, CLOCKS = range(11)
 # numbers
 FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
-HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, DENSE, BLOCKS, STAGE_AT, NUMBERS = range(8, 17)
+HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, DENSE, BLOCKS, STAGE_AT = range(8, 16)
+LAST_STAGE, AT_LIMIT, BELOW_LIMIT, STIFF, LEAVE_WHEN_STIFF, NUMBERS = range(16, 22)
+STIFF_STEPS, MILD_STEPS = 15, 6  # at the limit of stability until a motion is called stiff; below it until forgotten
 AGAIN = 2  # REJECTED_LAST: by a failed stage
 FILLED, STORED = 1, 2  # DENSE: every step's block is made, and kept
 
@@ -284,6 +286,31 @@ def _accept(context, l, r, at, h):
     return True
 
 
+@kernel
+def _watch_stiffness(r, h):
+    """Whether the motion has just been found stiff: many steps at the method's limit of stability.
+
+    h |lambda| from the last stage and the step's end, both at the same time (Hairer, Wanner, Solving ODEs II, IV.2).
+    """
+    n, at = r.x.size, r.numbers[LAST_STAGE]
+    rates, speeds = 0.0, 0.0
+    for c in range(n):
+        speed, rate = r.memory[at + c] - r.y[c], r.memory[at + n + c] - r.yd[c]
+        speeds += speed * speed
+        rates += rate * rate
+    if h * h * rates > r.clock[STABLE] * r.clock[STABLE] * speeds:
+        r.numbers[AT_LIMIT] += 1
+        r.numbers[BELOW_LIMIT] = 0
+        if r.numbers[AT_LIMIT] == STIFF_STEPS:
+            r.numbers[STIFF] = 1
+            return True
+    elif r.numbers[AT_LIMIT] > 0:
+        r.numbers[BELOW_LIMIT] += 1
+        if r.numbers[BELOW_LIMIT] == MILD_STEPS:
+            r.numbers[AT_LIMIT] = 0
+    return False
+
+
 @entry
 def advance(c, r, at, most):
     """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or why it stopped.
@@ -367,6 +394,9 @@ def advance(c, r, at, most):
             _go_back(r)
             continue
         row[2] = 1.0
+        leave = False
+        if r.numbers[LAST_STAGE] > 0 and _watch_stiffness(r, h):
+            leave = r.numbers[LEAVE_WHEN_STIFF] == 1
         if implicit or r.numbers[FIRST_ORDER] == 1:
             for j in range(3):
                 copy(r.now[j], r.before[j])
@@ -386,6 +416,6 @@ def advance(c, r, at, most):
             status = _begin_chart(context, w, r, at, reason)
             if status != 0:
                 return status
-        if r.numbers[CHART_ROWS] + 2 >= r.charts.shape[0] or r.numbers[HISTORY] >= r.history.shape[0]:
+        if leave or r.numbers[CHART_ROWS] + 2 >= r.charts.shape[0] or r.numbers[HISTORY] >= r.history.shape[0]:
             break
     return 0 if r.clock[T] >= r.clock[T_END] else SLICE_DONE

@@ -5,11 +5,11 @@ import time
 
 import numpy as np
 
-from . import integrators as _integrators  # noqa: F401  (fills the registry)
+from . import choice
 from .checks import finite_vector, floats, positive, whole
 from .dense import Reader, Trajectory
 from .drive import drive, lay_out
-from .errors import InvalidArgument
+from .errors import InvalidArgument, Status
 from .events import Watch, prepare
 from .force_pack import with_force_jacobians
 from .formulation import formulation as find_formulation
@@ -25,8 +25,11 @@ from .run import (
     EXPONENT,
     FILLED,
     INTERVAL,
+    LAST_STAGE,
+    LEAVE_WHEN_STIFF,
     MAX_STEP,
     RTOL,
+    STABLE,
     STAGE_AT,
     STEPS_WANTED,
     STORED,
@@ -40,6 +43,8 @@ from .scene import Scene
 from .solution import Solution, remembered
 from .system import with_curvatures
 from .workspace import Context, allocate, allocate_linear
+
+_OF_METHOD = "integrator", "rtol", "atol"
 
 
 def simulate(
@@ -69,9 +74,10 @@ def simulate(
     t_span : (float, float), s
         Start and end, the end later.
     integrator : Integrator or str, optional
-        A method, or its name with its defaults ("nystrom4", "rk45", "dop853"); default Nystrom4(step=1e-3).
+        A method, or its name with its defaults ("nystrom4", "rk45", "dop853", ...). By default DOP853, and SDIRK54
+        from the start where the motion turns out to be stiff and evaluations are saved by it.
     rtol, atol : float, optional
-        Tolerances for an adaptive method that is given by its name.
+        Tolerances for the default method, 1e-8 if not given, or for an adaptive method that is given by its name.
     formulation : {"tangent", "null-space", "maggi-kane"}
         "tangent": the tangent-space ODE, at present in the form of Eq. 26, which "null-space" names explicitly;
         "maggi-kane": Eqs. 17-18, which drift off the constraints, for comparison.
@@ -112,10 +118,11 @@ def simulate(
         One of its kinds, before anything runs: InvalidArgument, InvalidBody, InconsistentState, RedundantConstraints,
         SingularConfiguration.
     """
+    arguments = {name: value for name, value in locals().items() if name not in ("scene", "t_span", *_OF_METHOD)}
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     t0, t1 = _interval(t_span)
-    method = _method(integrator, rtol, atol)
+    method = choice.explicit(rtol, atol) if integrator is None else _method(integrator, rtol, atol)
     form = find_formulation(formulation)
     if method.implicit and form.first_order:
         others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
@@ -173,6 +180,14 @@ def simulate(
     run.now[:2] = q, qd
     run.numbers[STEPS_WANTED] = steps
     run.numbers[INTERVAL] = interval
+    choose = None
+    if method.stability_limit and adaptive and not form.first_order:
+        run.clock[STABLE] = method.stability_limit
+        run.numbers[LAST_STAGE] = 2 * len(method.tableau.c) * nx
+        if integrator is None:
+            run.numbers[LEAVE_WHEN_STIFF] = 1
+            options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol}
+            choose = choice.chooser(simulate, scene, method, t1, options)
     errors = [kernel.address for kernel in method.errors] if adaptive else []
     errors += [0] * (2 - len(errors))
     addresses = [*form.addresses(), step_kernel.address, *errors, form.norm() if adaptive else 0]
@@ -188,7 +203,9 @@ def simulate(
     sizes = n, m, len(scene.bodies), constraint_tol, packed.size, nx
     watch = None if events is None else Watch(events, packed.system, Reader(packed.system, sizes, addresses), t0)
     prepared = time.perf_counter()
-    status, reason, chunks = drive(context, run, addresses, max_steps, report, (t0, t1), watch)
+    status, reason, chunks = drive(context, run, addresses, max_steps, report, (t0, t1), watch, choose)
+    if status == Status.STIFF:
+        return simulate(scene, (t0, t1), integrator=choice.implicit(method), **arguments)
     ended = time.perf_counter()
     trajectory = None
     if dense_output:
@@ -225,8 +242,6 @@ def _interval(t_span):
 def _method(integrator, rtol, atol):
     known = registered()
     tolerances = {name: value for name, value in (("rtol", rtol), ("atol", atol)) if value is not None}
-    if integrator is None:
-        integrator = "nystrom4"
     if tolerances and not (isinstance(integrator, str) and getattr(known.get(_key(integrator)), "embedded_order", 0)):
         raise InvalidArgument(
             f"{' and '.join(tolerances)} set the tolerances of an adaptive method given by its name, such as "

@@ -14,7 +14,7 @@ from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
 from .rank import weakest_row
-from .run import CHART_ROWS, IN_CHART, REJECTED, STEPS, T
+from .run import CHART_ROWS, IN_CHART, REJECTED, STEPS, STIFF, T
 from .workspace import (
     B_ITERATIONS,
     CHARTS,
@@ -139,6 +139,7 @@ class Solution:
             b_iterations=int(c[B_ITERATIONS]),
             charts=int(c[CHARTS]),
             factorizations=int(c[FACTORIZATIONS]),
+            stiff=bool(run.numbers[STIFF]),
             jacobians=int(c[JACOBIANS]),
             iteration_matrices=int(c[ITERATION_MATRICES]),
             stage_iterations=int(c[STAGE_ITERATIONS]),

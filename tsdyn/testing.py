@@ -90,7 +90,7 @@ def _unit(rng):
 
 def _check_kernels(constraint, name, rng):
     kind = type(constraint)
-    f = SimpleNamespace(**{k: _python(getattr(kind, k), constraint, k) for k in kind.kernels})
+    f = SimpleNamespace(**{k: _python(getattr(kind, k), constraint, k) for k in kind.kernels if hasattr(kind, k)})
     size = sum(m.size for m in kind.markers)
     x, xd, t = rng.normal(size=size), 10.0 * rng.normal(size=size), rng.uniform(0.1, 2.0)
     # entries are named by the argument that places their marker

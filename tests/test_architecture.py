@@ -36,8 +36,11 @@ null_space maggi_kane linearise scene
 formulation run
 events drive
 solution
-simulate testing
+simulate
+integrator_scenes integrator_checks agreement
+testing benchmark_report benchmark
 tables plots
+benchmark_plot
 cli __init__
 __main__
 """

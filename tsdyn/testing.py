@@ -7,8 +7,9 @@ import numpy as np
 
 from ._kernel import twin
 from .diagnostics import constraint_rows
-from .errors import InvalidArgument, TsdynError
+from .errors import CheckFailed, InvalidArgument, TsdynError
 from .evaluate import constraint_arrays
+from .integrator_checks import check_integrator
 from .motion import Motion
 from .primitive import Primitive
 from .scene import Scene
@@ -16,10 +17,6 @@ from .scene import Scene
 STEP = 1e-40  # of complex steps: no cancellation, so as small as can be
 TOLERANCE = 1e-11  # relative to the size of what is compared
 _AXES = "xyz"
-
-
-class CheckFailed(TsdynError, AssertionError):
-    """A check of a plug-in failed; the message says which entry, what it gave and what it should have given."""
 
 
 def check_primitive(kind, *, seed=0, states=3):
@@ -204,4 +201,4 @@ def _compare(name, entry, got, expected, scale):
         raise CheckFailed(f"{name}: {entry} is {got:.15g} and should be {np.real(expected):.15g}.")
 
 
-__all__ = ["CheckFailed", "check_primitive"]
+__all__ = ["CheckFailed", "check_integrator", "check_primitive"]

@@ -81,6 +81,9 @@ from examples import top
 from examples.bead_on_surface import build
 for form in ("tangent", "maggi-kane"):
     tsdyn.simulate(top.build(), (0.0, 0.01), formulation=form, t_eval=[0.0, 0.0055])
+    tsdyn.simulate(
+        top.build(), (0.0, 0.01), formulation=form, integrator="dop853", dense_output=True, events=lambda t, _: t - 0.1
+    ).at(0.001)
 tsdyn.simulate(build(), (0.0, 0.01)).multipliers
 report()
 """

@@ -46,10 +46,15 @@ def evaluate(context, w, at, t, x, y, yd, xd):
 
 @kernel
 def between(context, w, at, t, block, xs, ys, yds, xds):
-    """q, qd, qdd at a time within the step of this block. Status."""
+    """q, qd, qdd at a time within the step of this block. Status.
+
+    Placed twice: Newton's method comes from further away than in a run, and ends nearer to rounding from nearby.
+    """
     h = block[B_H]
     call_value(at[A_VALUE], (t - block[B_START]) / h, h, w.q.size, xs.size, ys.size, block[B_DATA:], xs, ys)
-    status = evaluate(context, w, at, t, xs, ys, yds, xds)
+    status = call_place(at[A_PLACE], context, t, xs)
+    if status == 0:
+        status = evaluate(context, w, at, t, xs, ys, yds, xds)
     if status == 0 and at[A_SECOND] != 0:  # what f would amplify in a stiff scene
         call_value(at[A_SECOND], (t - block[B_START]) / h, h, w.q.size, xs.size, ys.size, block[B_DATA:], xs, yds)
         call_complete(at[A_COMPLETE], context, yds)
@@ -117,6 +122,8 @@ def read(c, at, t, rows, blocks, charts, points, xs, ys, yds, xds, store, out):
             if status != 0:
                 return status
             keep(w, store)
+        for j in range(c.system.memory.size):
+            c.system.reals[c.system.memory[j]] = block[block.size - c.system.memory.size + j]
         status = between(context, w, at, t[i], block, xs, ys, yds, xds)
         if status != 0:
             return status
@@ -180,11 +187,12 @@ class Trajectory:
         return float(self.blocks[-1, B_END]) if len(self.blocks) else self.start
 
     def __call__(self, t):
-        """States (k, 3, n) at times t (k,) between start and end; and the Status."""
+        """States (k, 3, n) at times t (k,) between start and end, what forces remember (k, slots), and the Status."""
+        slots = self.reader[0].memory.size
         if not len(self.blocks):
-            return np.repeat(self.first[None], t.size, axis=0), Status.SUCCESS
+            return np.repeat(self.first[None], t.size, axis=0), np.zeros((t.size, slots)), Status.SUCCESS
         rows = np.searchsorted(self.blocks[:, B_END], t)
         order = np.argsort(rows, kind="stable")  # so that a chart is made once
         out = np.empty((t.size, *self.first.shape))
         out[order], status = Reader(*self.reader)(t[order], rows[order], self.blocks, self.charts, self.points)
-        return out, status
+        return out, self.blocks[rows, self.blocks.shape[1] - slots :], status

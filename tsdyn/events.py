@@ -82,6 +82,12 @@ class Instant:
     def __iter__(self):
         return iter((self.t, self.q, self.qd, self.qdd, self.multipliers))
 
+    def __len__(self):
+        return 5
+
+    def __getitem__(self, i):
+        return tuple(self)[i]
+
 
 class Watch:
     """The events of one run: the functions' last values, and what has been found."""
@@ -168,7 +174,7 @@ class Watch:
         def value(t):
             return a if t == t0 else b if t == t1 else self._value(i, t, self._at(run, t))
 
-        root = brentq(value, t0, t1, xtol=4.0 * EPS, rtol=4.0 * EPS)
+        root = brentq(value, t0, t1, xtol=4.0 * EPS, rtol=4.0 * EPS, maxiter=1000)
         shift = 4.0 * EPS * max(abs(root), 1.0)
         # a run that goes on from a terminal event had better find it behind itself
         while self.events[i].limit < math.inf and root + shift < t1 and value(root) * b < 0.0:

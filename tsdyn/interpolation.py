@@ -141,14 +141,6 @@ def fill_dop853(
     first, last = memory[size:], memory[(1 + stages) * size :]
     copy(vector(xd1, nx) if first_order == 1 else y1, last)
     copy(yd1, last[nx:])
-    total = stages + 4
-    for i in range(stages + 1, total):
-        status = stage(
-            context, place, accelerate, first_order == 0, t + h * numbers[0], h, i, nx, ny, x0, y0, numbers[1:], memory
-        )
-        if status != 0:
-            return status
-        numbers = numbers[1 + total :]
     copy(x0, data)
     copy(y0, data[nx:])
     for c in range(size):
@@ -156,6 +148,16 @@ def fill_dop853(
         data[size + c] = step
         data[2 * size + c] = h * first[c] - step
         data[3 * size + c] = 2.0 * step - h * (last[c] + first[c])
+    total = stages + 4
+    for i in range(stages + 1, total):
+        status = stage(
+            context, place, accelerate, first_order == 0, t + h * numbers[0], h, i, nx, ny, x0, y0, numbers[1:], memory
+        )
+        if status != 0:  # too long a step, with tolerances as loose: the cubic of its two ends is what it gets
+            for c in range(4 * size, (1 + POWER) * size):
+                data[c] = 0.0
+            return 0
+        numbers = numbers[1 + total :]
     for row in range(4, 1 + POWER):
         combine(numbers, total, h, size, memory, data[row * size :])
         numbers = numbers[total:]

@@ -68,7 +68,7 @@ def simulate(
     t_span : (float, float), s
         Start and end, the end later.
     integrator : Integrator or str, optional
-        A method, or its name with its defaults ("nystrom4", "rk45"); default Nystrom4(step=1e-3).
+        A method, or its name with its defaults ("nystrom4", "rk45", "dop853"); default Nystrom4(step=1e-3).
     rtol, atol : float, optional
         Tolerances for an adaptive method that is given by its name.
     formulation : {"tangent", "null-space", "maggi-kane"}
@@ -89,7 +89,7 @@ def simulate(
         f(t, state) -> float, state being a `State`; each change of its sign is found on the manifold and recorded in
         `solution.t_events`, which never changes the steps. As for scipy.integrate.solve_ivp, an attribute
         `direction` > 0 or < 0 restricts to rising or falling ones, and `terminal` = True, or a number of occurrences,
-        ends the run there.
+        ends the run there. A function that raises, or gives no finite number, ends it too, with success=False.
     max_steps : int, optional
         End the run after so many steps.
     progress : bool or callable, optional

@@ -8,6 +8,7 @@ if not (_here / "constraints").is_dir():  # a checkout: they stand beside this f
 
 from . import constraints, integrators, testing  # noqa: E402
 from ._kernel import kernel  # noqa: E402
+from .benchmark import benchmark  # noqa: E402
 from .bodies import Body, PointMass  # noqa: E402
 from .errors import (  # noqa: E402
     InconsistentState,
@@ -22,28 +23,44 @@ from .errors import (  # noqa: E402
     TsdynError,
     UnknownAttribute,
 )
+from .integrator import (  # noqa: E402
+    Adaptive,
+    DiagonallyImplicit,
+    ExplicitNystrom,
+    ExplicitRungeKutta,
+    Integrator,
+)
 from .markers import Parameters, Point, Vector  # noqa: E402
 from .motion import Motion  # noqa: E402
 from .primitive import Primitive  # noqa: E402
 from .scene import Scene  # noqa: E402
 from .simulate import simulate  # noqa: E402
 from .solution import Solution, State  # noqa: E402
+from .tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau  # noqa: E402
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Adaptive",
     "Body",
+    "DiagonallyImplicit",
+    "ExplicitNystrom",
+    "ExplicitRungeKutta",
+    "ImplicitTableau",
     "InconsistentState",
+    "Integrator",
     "InvalidArgument",
     "InvalidBody",
     "InvalidConstraint",
     "MissingDependency",
     "Motion",
+    "NystromTableau",
     "Parameters",
     "Point",
     "PointMass",
     "Primitive",
     "RedundantConstraints",
+    "RungeKuttaTableau",
     "Scene",
     "SingularConfiguration",
     "Solution",
@@ -53,6 +70,7 @@ __all__ = [
     "TsdynError",
     "UnknownAttribute",
     "Vector",
+    "benchmark",
     "constraints",
     "integrators",
     "kernel",

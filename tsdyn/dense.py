@@ -122,8 +122,6 @@ def read(c, at, t, rows, blocks, charts, points, xs, ys, yds, xds, store, out):
             if status != 0:
                 return status
             keep(w, store)
-        for j in range(c.system.memory.size):
-            c.system.reals[c.system.memory[j]] = block[block.size - c.system.memory.size + j]
         status = between(context, w, at, t[i], block, xs, ys, yds, xds)
         if status != 0:
             return status
@@ -187,12 +185,11 @@ class Trajectory:
         return float(self.blocks[-1, B_END]) if len(self.blocks) else self.start
 
     def __call__(self, t):
-        """States (k, 3, n) at times t (k,) between start and end, what forces remember (k, slots), and the Status."""
-        slots = self.reader[0].memory.size
+        """States (k, 3, n) at times t (k,) between start and end; and the Status."""
         if not len(self.blocks):
-            return np.repeat(self.first[None], t.size, axis=0), np.zeros((t.size, slots)), Status.SUCCESS
+            return np.repeat(self.first[None], t.size, axis=0), Status.SUCCESS
         rows = np.searchsorted(self.blocks[:, B_END], t)
         order = np.argsort(rows, kind="stable")  # so that a chart is made once
         out = np.empty((t.size, *self.first.shape))
         out[order], status = Reader(*self.reader)(t[order], rows[order], self.blocks, self.charts, self.points)
-        return out, self.blocks[rows, self.blocks.shape[1] - slots :], status
+        return out, status

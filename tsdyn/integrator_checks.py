@@ -91,7 +91,7 @@ def check_integrator(method, *, order=None, dense_order=None):
             dense = _dense_order(steps, between, wanted, where, case.trusted)
             errors = ()
             if adaptive:
-                _repeats(lambda: _make(method, rtol=1e-4, atol=1e-4), case, form, where)  # noqa: B023
+                _repeats(lambda: _make(method, rtol=1e-4, atol=1e-4), case, form, where)
                 errors = _tolerances(method, case, form, where, order)
                 _rejections(method, case, form, where)
                 _bounds(method, case, form, where)
@@ -178,8 +178,8 @@ def _slopes(steps, off, trusted, where):
     good = (off > _floor(trusted)) & (off < COARSEST)
     if good.sum() < 3:
         raise CheckFailed(
-            f"{where}: the errors of {steps[0]} to {steps[-1]} steps go from {off[0]:.1e} to {off[-1]:.1e}: they do not "
-            "converge to the solution, or too fast for an order to be seen."
+            f"{where}: the errors of {steps[0]} to {steps[-1]} steps go from {off[0]:.1e} to {off[-1]:.1e}: they do "
+            "not converge to the solution, or too fast for an order to be seen."
         )
     steps, off = np.log(steps[good]), np.log(off[good])
     return [-np.polyfit(steps[-n:], off[-n:], 1)[0] for n in POINTS]
@@ -266,8 +266,8 @@ def _tolerances(method, case, form, where, order):
         steps.append(solution.stats.steps)
         if found[-1] > FACTOR * tol + 10.0 * case.trusted:
             raise CheckFailed(
-                f"{at}: the error is {found[-1]:.2g}, {found[-1] / tol:.0f} times the tolerance; {FACTOR:.0f} times are "
-                "allowed. The error estimate is too small, or the method's margin."
+                f"{at}: the error is {found[-1]:.2g}, {found[-1] / tol:.0f} times the tolerance; {FACTOR:.0f} times "
+                "are allowed. The error estimate is too small, or the method's margin."
             )
     if not (np.diff(found) < 0.0).all():
         pairs = ", ".join(f"{off:.1e} at {tol:g}" for tol, off in zip(tolerances, found, strict=True))

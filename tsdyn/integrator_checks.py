@@ -309,7 +309,7 @@ def _rejections(method, case, form, where):
         raise CheckFailed(f"{where}: a step of {plain.first_step:g} s is accepted after a rejection, and not at once.")
     gap = max(distance(after.state.q, before.state.q), distance(after.state.qd, before.state.qd))
     left = (
-        0.1 * max(bold.step_tolerances()) if bold.implicit else 1e-11
+        0.1 * max(bold.step_tolerances()) if bold.implicit else 1e-12
     )  # an iteration ends elsewhere within its tolerance
     if not gap < left:
         raise CheckFailed(f"{where}: rejected steps leave a trace of {gap:.1e} in the step that is accepted.")

@@ -96,14 +96,13 @@ def scaled(factor):
     return Bold
 
 
-@pytest.mark.parametrize("factor", [1e-4, 1e-6])
-def test_error_estimate_too_small(factor, one_scene):
-    fails(scaled(factor), r"the error is .* times the tolerance; 100 times are allowed")
+def test_error_estimate_too_small(one_scene):
+    fails(scaled(1e-2), r"the error is .* times the tolerance; 100 times are allowed")
 
 
 def test_no_error_estimate(one_scene):
     """All its weights are zero: steps grow until they are too long for anything."""
-    fails(scaled(0.0), "times the tolerance|stopped at|is accepted")
+    fails(scaled(0.0), "ended early")
 
 
 def test_error_estimate_of_a_lower_order(one_scene):

@@ -3,10 +3,10 @@
 import datetime
 import html
 import platform
+from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 COUNTS = (
@@ -175,5 +175,5 @@ def machine():
             line.partition(":")[2].strip() for line in cpuinfo.read_text().splitlines() if line.startswith("model name")
         ]
         name = models[0] if models else name
-    versions = f"Python {platform.python_version()}, NumPy {np.__version__}, Numba {numba.__version__}"
+    versions = f"Python {platform.python_version()}, NumPy {np.__version__}, Numba {version('numba')}"
     return f"{name}, {platform.system()}; tsdyn {__version__}, {versions}; {datetime.date.today()}."

@@ -91,8 +91,8 @@ def check_integrator(method, *, order=None, dense_order=None):
             dense = _dense_order(steps, between, wanted, where, case.trusted)
             errors = ()
             if adaptive:
-                _repeats(lambda: _make(method, rtol=1e-4, atol=1e-4), case, form, where)
                 errors = _tolerances(method, case, form, where, order)
+                _repeats(lambda: _make(method, rtol=1e-4, atol=1e-4), case, form, where)
                 _rejections(method, case, form, where)
                 _bounds(method, case, form, where)
             findings.append(Finding(case.name, form, found, dense, errors))
@@ -125,6 +125,13 @@ def _make(method, **settings):
 
 def _run(case, method, form, **options):
     return simulate(case.scene, (0.0, case.end), integrator=method, formulation=form, **options)
+
+
+def _finished(solution, where):
+    """The solution, if it has reached its end."""
+    if not solution.success:
+        raise CheckFailed(f"{where}: {solution.method} ended early. {solution.message}")
+    return solution
 
 
 def _serves(case, method, form):
@@ -231,7 +238,7 @@ def _levels(solution, where, state=None):
 def _repeats(make, case, form, where):
     """The same bits again, and the same steps whatever is put out."""
     method = make()
-    first = _run(case, method, form).raise_if_failed()
+    first = _finished(_run(case, method, form), where)
     again = _run(case, make(), form)
     if not all(_same(a, b) for a, b in zip(_bits(first), _bits(again), strict=True)):
         raise CheckFailed(f"{where}: {method!r} gives other numbers when it is run again.")
@@ -256,9 +263,7 @@ def _tolerances(method, case, form, where, order):
     for tol in tolerances:
         made = _make(method, rtol=tol, atol=tol)
         at = f"{where}, tolerance {tol:g}"
-        solution = _run(case, made, form, t_eval=case.grid)
-        if not solution.success:
-            raise CheckFailed(f"{at}: {solution.message}")
+        solution = _finished(_run(case, made, form, t_eval=case.grid), at)
         _levels(solution, at)
         _history(solution, at)
         found.append(max(distance(solution.q, case.q), distance(solution.qd, case.qd)))
@@ -319,7 +324,7 @@ def _bounds(method, case, form, where):
     """first_step and max_step are kept."""
     made = _make(method, rtol=1e-3, atol=1e-3)
     made.first_step, made.max_step = case.end / 1000.0, case.end / 400.0
-    steps = _run(case, made, form).raise_if_failed().steps
+    steps = _finished(_run(case, made, form), where).steps
     if steps.h[0] != made.first_step:
         raise CheckFailed(f"{where}: the first step is {steps.h[0]:g} s, not the first_step of {made.first_step:g} s.")
     if steps.h.max() > made.max_step * 1.002:  # the last one may be stretched by a thousandth, to end on time

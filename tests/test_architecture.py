@@ -45,8 +45,11 @@ null_space maggi_kane linearise scene
 formulation run
 events drive
 solution
-simulate choice force_check testing
+simulate choice force_check
+integrator_scenes integrator_checks agreement
+testing benchmark_report benchmark
 tables plots
+benchmark_plot
 cli __init__
 __main__
 """

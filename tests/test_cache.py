@@ -268,6 +268,23 @@ def test_functions_on_one_line_are_told_apart(plug_in, warm):
         assert found["gamma"] == pytest.approx(expected, rel=1e-14)
 
 
+def test_plug_in_integrator_is_cached(warm):
+    code = (
+        REPORT
+        + """
+from examples import top
+from examples.plug_in_integrator import METHODS
+for method in METHODS:
+    for form in ("tangent", "maggi-kane"):
+        tsdyn.simulate(top.build(), (0.0, 0.01), formulation=form, integrator=method(1e-6, 1e-6), t_eval=[0.0, 0.0055])
+report()
+"""
+    )
+    run(code.replace("METHODS:", "(tsdyn.integrators.RK45,):"), warm)  # so that all of the core is in the cache
+    assert run(code, warm)[0]["misses"] == 3  # two step kernels and an error estimate: nothing of the core
+    assert run(code, warm)[0]["misses"] == 0
+
+
 def test_threads_that_start_together(warm):
     """In a process that has loaded nothing yet."""
     code = (

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import tsdyn as ts
-from examples import bead_on_surface, driven_pivot, pendulum_chain, top, two_body_pendulum
+from examples import bead_on_surface, driven_pivot, pendulum_chain, plug_in_integrator, top, two_body_pendulum
 
 ROOT = Path(__file__).parents[1]
 RUNS = {
@@ -25,11 +25,24 @@ def test_example(module, build, end, step):
     module.check(solution)
 
 
-@pytest.mark.parametrize("module", [top, two_body_pendulum, pendulum_chain, bead_on_surface, driven_pivot])
+@pytest.mark.parametrize(
+    "module", [top, two_body_pendulum, pendulum_chain, bead_on_surface, driven_pivot, plug_in_integrator]
+)
 def test_main_reports(module, capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", ["example"])
     module.main()
     assert "Solution" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("formulation", ["tangent", "maggi-kane"])
+def test_plug_in_integrator(formulation):
+    for method in plug_in_integrator.METHODS:
+        solution = ts.simulate(
+            plug_in_integrator.build(), (0.0, 2.0), integrator=method(1e-8, 1e-8), formulation=formulation
+        )
+        if formulation == "tangent":
+            plug_in_integrator.check(solution)
+        assert solution.raise_if_failed().stats.steps > 50
 
 
 def test_readme_example(capsys):

@@ -8,6 +8,7 @@ if not (_here / "constraints").is_dir():  # a checkout: they stand beside this f
 
 from . import constraints, forces, integrators, testing  # noqa: E402
 from ._kernel import kernel  # noqa: E402
+from .benchmark import benchmark  # noqa: E402
 from .bodies import Body, PointMass  # noqa: E402
 from .errors import (  # noqa: E402
     InconsistentState,
@@ -24,6 +25,13 @@ from .errors import (  # noqa: E402
     UnknownAttribute,
 )
 from .force import Force  # noqa: E402
+from .integrator import (  # noqa: E402
+    Adaptive,
+    DiagonallyImplicit,
+    ExplicitNystrom,
+    ExplicitRungeKutta,
+    Integrator,
+)
 from .markers import Parameters, Point, Turn, Vector  # noqa: E402
 from .motion import Motion  # noqa: E402
 from .primitive import Primitive  # noqa: E402
@@ -31,24 +39,33 @@ from .scene import Scene  # noqa: E402
 from .signal import Table  # noqa: E402
 from .simulate import simulate  # noqa: E402
 from .solution import Solution, State  # noqa: E402
+from .tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau  # noqa: E402
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Adaptive",
     "Body",
+    "DiagonallyImplicit",
+    "ExplicitNystrom",
+    "ExplicitRungeKutta",
     "Force",
+    "ImplicitTableau",
     "InconsistentState",
+    "Integrator",
     "InvalidArgument",
     "InvalidBody",
     "InvalidConstraint",
     "InvalidForce",
     "MissingDependency",
     "Motion",
+    "NystromTableau",
     "Parameters",
     "Point",
     "PointMass",
     "Primitive",
     "RedundantConstraints",
+    "RungeKuttaTableau",
     "Scene",
     "SingularConfiguration",
     "Solution",
@@ -60,6 +77,7 @@ __all__ = [
     "Turn",
     "UnknownAttribute",
     "Vector",
+    "benchmark",
     "constraints",
     "forces",
     "integrators",

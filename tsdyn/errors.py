@@ -51,6 +51,10 @@ class StepFailure(TsdynError, ArithmeticError):
         self.solution = solution
 
 
+class CheckFailed(TsdynError, AssertionError):
+    """A check of a plug-in failed; the message says which entry, what it gave and what it should have given."""
+
+
 class Status(IntEnum):
     """How a run ended, or the stop of one slice of it; `sentence` says it, `remedy` what to do."""
 

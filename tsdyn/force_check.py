@@ -4,7 +4,7 @@ import numpy as np
 
 from ._kernel import entry, twin
 from .assembly import force_jacobian, set_time
-from .errors import InvalidArgument, InvalidForce, TsdynError
+from .errors import CheckFailed, InvalidArgument, InvalidForce
 from .force import Force
 from .force_pack import with_force_jacobians
 from .loads import force_loads
@@ -15,10 +15,6 @@ from .signal import Signal
 SPACING = 4e-3  # of central differences of sixth order
 QUOTIENT = 1e-8  # what they leave, relative to the size of the Jacobian
 ROUNDING = 1e-11  # relative to the size of what is compared
-
-
-class CheckFailed(TsdynError, AssertionError):
-    """A check of a plug-in failed; the message says which entry, what it gave and what it should have given."""
 
 
 @entry

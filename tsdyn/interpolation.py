@@ -22,11 +22,12 @@ call_value = caller(VALUE)
 
 
 class Interpolant(NamedTuple):
-    """Two kernels and the floats that a step's block takes."""
+    """Two kernels, the floats that a step's block takes, and the order of the error between the steps."""
 
     fill: Callback
     value: Callback
     size: Callable  # of n, nx, ny
+    order: int = 5  # of x and y together
 
 
 @kernel
@@ -120,7 +121,7 @@ def hermite_second(s, h, n, nx, ny, data, x, y):
 
 
 HERMITE = Interpolant(fill_hermite, hermite, lambda n, nx, ny: 6 * nx)
-HERMITE_FIRST_ORDER = Interpolant(fill_hermite_first_order, hermite_first_order, lambda n, nx, ny: 6 * n + 4 * ny)
+HERMITE_FIRST_ORDER = Interpolant(fill_hermite_first_order, hermite_first_order, lambda n, nx, ny: 6 * n + 4 * ny, 4)
 
 POWER = 7  # rows of the polynomial of DOP853
 
@@ -180,4 +181,4 @@ def dop853(s, h, n, nx, ny, data, x, y):
     return 0
 
 
-DOP853 = Interpolant(fill_dop853, dop853, lambda n, nx, ny: (1 + POWER) * (nx + ny))
+DOP853 = Interpolant(fill_dop853, dop853, lambda n, nx, ny: (1 + POWER) * (nx + ny), 7)

@@ -23,6 +23,23 @@ call_accelerate = caller(ACCELERATE)
 call_step = caller(STEP)
 
 
+def step_kernel(function):
+    """Decorate a step kernel: f(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy).
+
+    It writes the increments dx, dy and returns 0, or the status that `call_place` or `call_accelerate` gave. Arrays
+    come as addresses: `vector(x, nx)` is the array.
+    """
+    return callback(STEP)(function)
+
+
+def error_kernel(function):
+    """Decorate the kernel of an error estimate: f(h, nx, ny, y, yd, tableau, memory, ex, ey).
+
+    It writes the errors ex, ey of the step that `memory` holds, y and yd being x' and y' at its end, and returns 0.
+    """
+    return callback(ERROR)(function)
+
+
 @kernel
 def _add(out, f, k):
     """out += f k, where f is not zero."""

@@ -1,0 +1,45 @@
+"""The scenes of the benchmarks; add one here, with its file in tests/references where it has one.
+
+SCENES["chain of 16"] = Benchmarked(build, (0.0, 5.0))                 its reference is made by ts.benchmark
+Benchmarked(build, (0.0, 10.0), "sliding_top", implicit=False)         its reference is read from the checkout
+"""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from examples import top, two_body_pendulum
+from tsdyn.agreement import Reference
+
+FOLDER = Path(__file__).parents[1] / "tests" / "references"
+
+
+class Benchmarked(NamedTuple):
+    """A scene, its span (s), its reference's file, and the fixed steps (s) that it is worth trying with."""
+
+    build: Callable
+    span: tuple
+    file: str = ""
+    steps: tuple = (1e-2, 3e-3, 1e-3, 3e-4)
+
+    def reference(self):
+        """Its `Reference`, or None where there is no file."""
+        path = FOLDER / f"{self.file}.json"
+        if not (self.file and path.exists()):
+            return None
+        data = json.loads(path.read_text())
+        r, A = np.array(data["r"]), np.array(data["A"])
+        trusted = max(10.0 ** -data["digits"], np.finfo(float).eps)
+        return Reference(np.array(data["t"]), r, A.reshape(*r.shape, 3), trusted, f"tests/references/{path.name}")
+
+
+SCENES = {
+    "sliding top": Benchmarked(top.build, (0.0, 10.0), "sliding_top"),
+    "two-body pendulum": Benchmarked(two_body_pendulum.build, (0.0, 10.0), "two_body_pendulum"),
+    "two-body pendulum in space": Benchmarked(
+        lambda: two_body_pendulum.build(((0.3, 0.0, 0.0), (1.0, 5.0, 2.0))), (0.0, 10.0), "two_body_pendulum_spatial"
+    ),
+}

@@ -43,7 +43,7 @@ initial
 assemble
 null_space maggi_kane linearise scene
 formulation run
-events drive
+events drive work
 solution
 simulate choice force_check
 integrator_scenes integrator_checks agreement

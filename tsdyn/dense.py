@@ -186,6 +186,11 @@ class Trajectory:
         """The time reached."""
         return float(self.blocks[-1, B_END]) if len(self.blocks) else self.start
 
+    @property
+    def edges(self):
+        """The steps' ends (k,), s."""
+        return self.blocks[:, B_END] if len(self.blocks) else np.array([self.start])
+
     def __call__(self, t):
         """States (k, 3, n) at times t (k,) between start and end, what forces remember (k, slots), and the Status."""
         slots = self.reader[0].memory.size

@@ -15,6 +15,7 @@ from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, Ste
 from .evaluate import constraint_arrays
 from .rank import weakest_row
 from .run import CHART_ROWS, IN_CHART, REJECTED, STEPS, STIFF, T
+from .work import work as integrate_work
 from .workspace import (
     B_ITERATIONS,
     CHARTS,
@@ -30,6 +31,7 @@ from .workspace import (
 )
 
 NEARLY_SINGULAR = 0.05
+BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
 
 
 class State(NamedTuple):
@@ -160,8 +162,18 @@ class Solution:
         where = f"It stopped at t = {self._reached:.9g} s of {self.span[1]:g} s, after {steps}."
         suspect = self._suspect(scene)
         remedy = Status.SINGULAR.remedy if suspect else self.status.remedy
+        if not suspect and self.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
+            suspect = self._growth()
         parts = (self.status.sentence, self._reason, where, suspect, remedy)
         return " ".join(part for part in parts if part)
+
+    def _growth(self):
+        """Say that the motion is stiff, or that its speed has grown beyond all measure."""
+        said = "The motion is stiff: an implicit method, such as SDIRK54, may go on. " if self.stats.stiff else ""
+        first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (self.qd[:1], self._last[1]))
+        if last > BLOW_UP * (1.0 + first):
+            said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion itself blows up."
+        return said.strip()
 
     def _suspect(self, scene):
         """Name what is nearly singular at the last point."""
@@ -329,6 +341,23 @@ class Solution:
     def dissipation(self):
         """Power (k,), W, that dampers and friction take; not negative."""
         return self._force_powers.dissipation
+
+    @cached_property
+    def work(self):
+        """Work (k,), J, since the start: of applied and driving forces, less what dampers and friction have taken.
+
+        energy - work is constant but for the method's error. It is integrated over the dense output.
+
+        Raises
+        ------
+        InvalidArgument
+            If the run kept no dense output.
+        """
+        if self._trajectory is None:
+            raise InvalidArgument(
+                "work is integrated over the dense output: simulate(..., dense_output=True) keeps it."
+            )
+        return integrate_work(self, self._trajectory)
 
     @cached_property
     def linear_momentum(self):

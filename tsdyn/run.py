@@ -46,7 +46,7 @@ T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, STABLE, CLO
 # numbers
 FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
 HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, DENSE, BLOCKS, STAGE_AT = range(8, 16)
-LAST_STAGE, AT_LIMIT, BELOW_LIMIT, STIFF, LEAVE_WHEN_STIFF, NUMBERS = range(16, 22)
+LAST_STAGE, AT_LIMIT, BELOW_LIMIT, STIFF, LEAVE_WHEN_STIFF, FAILED, NUMBERS = range(16, 23)
 STIFF_STEPS, MILD_STEPS = 15, 6  # at the limit of stability until a motion is called stiff; below it until forgotten
 AGAIN = 2  # REJECTED_LAST: by a failed stage
 FILLED, STORED = 1, 2  # DENSE: every step's block is made, and kept
@@ -336,7 +336,7 @@ def advance(c, r, at, most):
         if adaptive:
             t1 = t0 + r.clock[H]
             if not t1 > t0 + 4e-16 * abs(t0):
-                return STEP_COLLAPSED
+                return NOT_FINITE if r.numbers[FAILED] == NOT_FINITE else STEP_COLLAPSED
             last = t1 + 1e-3 * r.clock[H] >= r.clock[T_END]
         else:
             t1 = r.clock[T_ORIGIN] + (i + 1) * r.clock[H]
@@ -365,7 +365,8 @@ def advance(c, r, at, most):
             if implicit:  # the last stage's own accelerations: f would amplify what its iteration has left
                 copy(r.memory[r.numbers[STAGE_AT] :][:ny], r.yd)
                 call_complete(at[A_COMPLETE], context, r.yd)
-        elif status == STAGE_FAILED and adaptive:
+        elif implicit and adaptive and (status == STAGE_FAILED or r.numbers[IN_CHART] == 0):
+            r.numbers[FAILED] = status
             _restore_now(w, r)
             r.numbers[REJECTED] += 1
             if r.numbers[REJECTED_LAST] == AGAIN:
@@ -394,6 +395,7 @@ def advance(c, r, at, most):
             _go_back(r)
             continue
         row[2] = 1.0
+        r.numbers[FAILED] = 0
         leave = False
         if r.numbers[LAST_STAGE] > 0 and _watch_stiffness(r, h):
             leave = r.numbers[LEAVE_WHEN_STIFF] == 1

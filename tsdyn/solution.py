@@ -354,9 +354,7 @@ class Solution:
             If the run kept no dense output.
         """
         if self._trajectory is None:
-            raise InvalidArgument(
-                "work is integrated over the dense output: simulate(..., dense_output=True) keeps it."
-            )
+            raise InvalidArgument("work is integrated over dense output: simulate(..., dense_output=True) keeps it.")
         return integrate_work(self, self._trajectory)
 
     @cached_property

@@ -32,12 +32,13 @@ force force_pack
 state_function
 system stepping progress
 assembly interpolation constraints.* forces.*
-workspace
+workspace run_state
 implicit
 integrator
 integrators.* constraints.__init__ forces.__init__ integrators.__init__
 loads
 newton evaluate diagnostics reactions power dense
+control
 chart rank
 initial
 assemble

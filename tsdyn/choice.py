@@ -10,7 +10,7 @@ import numpy as np
 
 from .errors import Status
 from .integrators import DOP853, SDIRK54
-from .run import H, T
+from .run_state import H, T
 
 PILOT = 60  # steps
 COST = 1.5  # of an evaluation in an implicit stage, its share of matrices included, against an explicit one

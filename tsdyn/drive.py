@@ -6,7 +6,8 @@ import numpy as np
 
 from .dense import B_DATA, warm_size
 from .errors import InconsistentState, SingularConfiguration, Status
-from .run import (
+from .run import advance
+from .run_state import (
     BEGUN,
     BLOCKS,
     CHART_ROWS,
@@ -22,7 +23,6 @@ from .run import (
     STORED,
     Run,
     T,
-    advance,
 )
 
 SLICE_SECONDS = 0.2  # how often a run comes back to Python: progress, interrupts

@@ -13,7 +13,8 @@ from . import reactions
 from .checks import number
 from .dense import B_END
 from .errors import InvalidArgument, Status
-from .run import BEGUN, BLOCKS, CHART_ROWS, DENSE, ROWS, STEPS, STORED, T, advance
+from .run import advance
+from .run_state import BEGUN, BLOCKS, CHART_ROWS, DENSE, ROWS, STEPS, STORED, T
 
 EPS = float(np.finfo(float).eps)
 

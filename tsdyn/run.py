@@ -1,22 +1,15 @@
 """The driver: steps, outputs, charts. One kernel for every scene, method and formulation; it calls them by address."""
 
-import math
-from typing import NamedTuple
-
-import numpy as np
-
 from ._kernel import address_of, caller, entry, kernel
 from .assembly import remember
 from .chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
+from .control import accept, first_step, watch_stiffness
 from .dense import (
     A_ACCELERATE,
     A_CHART,
     A_CHECK,
     A_COMPLETE,
-    A_ERROR,
-    A_ERROR_2,
     A_FILL,
-    A_NORM,
     A_PLACE,
     A_STEP,
     B_CHART,
@@ -32,63 +25,44 @@ from .dense import (
     keep,
 )
 from .errors import Status
-from .implicit import KNOWN, SOFTEN, T_BEFORE, G, call_soften
+from .implicit import KNOWN, T_BEFORE
 from .interpolation import call_fill
 from .linalg import copy
-from .stepping import call_error, call_norm, call_step
+from .run_state import (
+    ADAPTIVE,
+    AGAIN,
+    BEGUN,
+    BLOCKS,
+    CHART_ROWS,
+    DENSE,
+    FAILED,
+    FIRST_ORDER,
+    HISTORY,
+    IN_CHART,
+    INTERVAL,
+    LAST_STAGE,
+    LEAVE_WHEN_STIFF,
+    MAX_STEP,
+    NEXT_EVAL,
+    REJECTED,
+    REJECTED_LAST,
+    ROWS,
+    STAGE_AT,
+    STEPS,
+    STEPS_WANTED,
+    STORED,
+    T_END,
+    T_ORIGIN,
+    H,
+    T,
+)
+from .stepping import call_step
 from .workspace import CONDITION, CONTRACTION
 
-SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
-# clock
-T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, STABLE, CLOCKS = range(11)
-# numbers
-FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
-HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, DENSE, BLOCKS, STAGE_AT = range(8, 16)
-LAST_STAGE, AT_LIMIT, BELOW_LIMIT, STIFF, LEAVE_WHEN_STIFF, FAILED, NUMBERS = range(16, 23)
-STIFF_STEPS, MILD_STEPS = 15, 6  # at the limit of stability until a motion is called stiff; below it until forgotten
-AGAIN = 2  # REJECTED_LAST: by a failed stage
-FILLED, STORED = 1, 2  # DENSE: every step's block is made, and kept
 
 call_check = caller("p")
-
-
-class Run(NamedTuple):
-    """State and output of one run. x, y are v, vd (tangent-space ODE) or q, w (Maggi/Kane)."""
-
-    x: np.ndarray  # (nx,)
-    y: np.ndarray  # (ny,)
-    yd: np.ndarray  # (ny,)
-    xd: np.ndarray  # (nx,)
-    dx: np.ndarray  # (nx,)  increments of a step, then its error; scratch of dense output
-    dy: np.ndarray  # (ny,)
-    x_low: np.ndarray  # (nx,)  what the additions have lost so far (Kahan)
-    y_low: np.ndarray  # (ny,)
-    x_old: np.ndarray  # (nx,)  at the start of the step, for dense output and to go back to
-    y_old: np.ndarray  # (ny,)
-    yd_old: np.ndarray  # (ny,)
-    xd_old: np.ndarray  # (nx,)
-    x_low_old: np.ndarray  # (nx,)
-    y_low_old: np.ndarray  # (ny,)
-    now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point
-    before: np.ndarray  # (3, n)  at the one before; kept for a first-order system
-    warm: np.ndarray  # what `dense.keep` copies while dense output moves it
-    xs: np.ndarray  # (nx,)  dense output and the guess of a first step
-    ys: np.ndarray  # (ny,)
-    yds: np.ndarray  # (ny,)
-    remembered: np.ndarray  # (slots,)  what forces remember of the last accepted point
-    tableau: np.ndarray  # the method's numbers
-    memory: np.ndarray  # the method's scratch
-    t_eval: np.ndarray  # output times, or empty: every step
-    clock: np.ndarray  # T ... ERROR_BEFORE
-    numbers: np.ndarray  # int64, FIRST_ORDER ... STAGE_AT (where an implicit method leaves its last stage, or 0)
-    out: np.ndarray  # (rows, 1 + 3 n + slots)  t, q, qd, qdd, remembered
-    history: np.ndarray  # (rows, 3)  t, h, accepted
-    charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left
-    points: np.ndarray  # (rows, n)  q0 of each chart, or (0, n) where nothing asks for it
-    block: np.ndarray  # the present step's: start, h, end, chart, the interpolant's data
-    blocks: np.ndarray  # (rows, block)  those of accepted steps
 
 
 @kernel
@@ -218,36 +192,6 @@ def _begin(context, w, r, at):
 
 
 @kernel
-def _first_step(context, w, r, at):
-    """A first step from the sizes of y, y' and y'' (Hairer, Norsett, Wanner, Solving ODEs I, II.4)."""
-    first = r.xd if r.numbers[FIRST_ORDER] == 1 else r.y
-    rtol, atol = r.clock[RTOL], r.clock[ATOL]
-    n = w.q.size
-    d0 = 0.0
-    for i in range(n):
-        a, b = w.q[i] / (atol + rtol * abs(w.q[i])), w.qd[i] / (atol + rtol * abs(w.qd[i]))
-        d0 += a * a + b * b
-    d0 = math.sqrt(d0 / (2 * n))
-    d1 = call_norm(at[A_NORM], context, first, r.yd, r.now, rtol, atol)
-    span = r.clock[T_END] - r.clock[T]
-    h = min(0.01 * d0 / d1 if d1 > 1e-5 and d0 > 1e-5 else 1e-6, 0.1 * span)
-    for i in range(r.x.size):
-        r.xs[i] = r.x[i] + h * first[i]
-    for i in range(r.y.size):
-        r.ys[i] = r.y[i] + h * r.yd[i]
-    if evaluate(context, w, at, r.clock[T] + h, r.xs, r.ys, r.yds, r.dx) != 0:
-        return h
-    second = r.dx if r.numbers[FIRST_ORDER] == 1 else r.ys
-    for i in range(r.x.size):
-        r.dx[i] = second[i] - first[i]
-    for i in range(r.y.size):
-        r.dy[i] = r.yds[i] - r.yd[i]
-    d2 = call_norm(at[A_NORM], context, r.dx, r.dy, r.now, rtol, atol) / h
-    size = max(d1, d2)
-    return min(100.0 * h, (0.01 / size) ** r.clock[EXPONENT] if size > 1e-15 else 100.0 * h, span)
-
-
-@kernel
 def _go_back(r):
     """Everything as at the start of the step."""
     copy(r.x_old, r.x)
@@ -256,59 +200,6 @@ def _go_back(r):
     copy(r.xd_old, r.xd)
     copy(r.x_low_old, r.x_low)
     copy(r.y_low_old, r.y_low)
-
-
-@kernel
-def _accept(context, l, r, at, h):
-    """Judge the step h just made and choose the next (Gustafsson's PI control). Whether it is accepted."""
-    end = r.xd if r.numbers[FIRST_ORDER] == 1 else r.y
-    call_error(at[A_ERROR], h, r.x.size, r.y.size, end, r.yd, r.tableau, r.memory, r.dx, r.dy)
-    if l.numbers[G] > 0.0:
-        call_soften(l.kernels[SOFTEN], context, r.dx, l.numbers[G], r.dy)
-    error = call_norm(at[A_NORM], context, r.dx, r.dy, r.now, r.clock[RTOL], r.clock[ATOL])
-    if at[A_ERROR_2] != 0:  # Hairer's combination of two orders; nan stays nan
-        call_error(at[A_ERROR_2], h, r.x.size, r.y.size, end, r.yd, r.tableau, r.memory, r.dx, r.dy)
-        second = call_norm(at[A_NORM], context, r.dx, r.dy, r.now, r.clock[RTOL], r.clock[ATOL])
-        if error != 0.0:
-            error *= error / math.hypot(error, 0.1 * second)
-    power = r.clock[EXPONENT]
-    if not error <= 1.0:
-        factor = SAFETY * error**-power if error < math.inf else SHRINK
-        r.clock[H] = h * max(factor, SHRINK)
-        r.numbers[REJECTED_LAST] = 1
-        return False
-    error = max(error, 1e-10)
-    factor = SAFETY * error ** (-0.7 * power) * r.clock[ERROR_BEFORE] ** (0.4 * power)
-    factor = min(max(factor, SHRINK), 1.0 if r.numbers[REJECTED_LAST] != 0 else GROW)
-    r.clock[ERROR_BEFORE] = max(error, 1e-4)
-    r.clock[H] = min(h * factor, r.clock[MAX_STEP])
-    r.numbers[REJECTED_LAST] = 0
-    return True
-
-
-@kernel
-def _watch_stiffness(r, h):
-    """Whether the motion has just been found stiff: many steps at the method's limit of stability.
-
-    h |lambda| from the last stage and the step's end, both at the same time (Hairer, Wanner, Solving ODEs II, IV.2).
-    """
-    n, at = r.x.size, r.numbers[LAST_STAGE]
-    rates, speeds = 0.0, 0.0
-    for c in range(n):
-        speed, rate = r.memory[at + c] - r.y[c], r.memory[at + n + c] - r.yd[c]
-        speeds += speed * speed
-        rates += rate * rate
-    if h * h * rates > r.clock[STABLE] * r.clock[STABLE] * speeds:
-        r.numbers[AT_LIMIT] += 1
-        r.numbers[BELOW_LIMIT] = 0
-        if r.numbers[AT_LIMIT] == STIFF_STEPS:
-            r.numbers[STIFF] = 1
-            return True
-    elif r.numbers[AT_LIMIT] > 0:
-        r.numbers[BELOW_LIMIT] += 1
-        if r.numbers[BELOW_LIMIT] == MILD_STEPS:
-            r.numbers[AT_LIMIT] = 0
-    return False
 
 
 @entry
@@ -328,7 +219,7 @@ def advance(c, r, at, most):
             return status
         r.numbers[BEGUN] = 1
         if adaptive and r.clock[H] == 0.0:
-            r.clock[H] = min(_first_step(context, w, r, at), r.clock[MAX_STEP])
+            r.clock[H] = min(first_step(context, w, r, at), r.clock[MAX_STEP])
     for _ in range(most):
         i, t0 = r.numbers[STEPS], r.clock[T]
         if t0 >= r.clock[T_END]:
@@ -390,14 +281,14 @@ def advance(c, r, at, most):
             if retry != 0:
                 return retry
             continue
-        if adaptive and not _accept(context, c.linear, r, at, h):
+        if adaptive and not accept(context, c.linear, r, at, h):
             r.numbers[REJECTED] += 1
             _go_back(r)
             continue
         row[2] = 1.0
         r.numbers[FAILED] = 0
         leave = False
-        if r.numbers[LAST_STAGE] > 0 and _watch_stiffness(r, h):
+        if r.numbers[LAST_STAGE] > 0 and watch_stiffness(r, h):
             leave = r.numbers[LEAVE_WHEN_STIFF] == 1
         if implicit or r.numbers[FIRST_ORDER] == 1:
             for j in range(3):

@@ -18,7 +18,8 @@ from .initial import consistent
 from .integrator import Integrator, registered
 from .interpolation import hermite_second
 from .progress import reporter
-from .run import (
+from .run import advance
+from .run_state import (
     ADAPTIVE,
     ATOL,
     ERROR_BEFORE,
@@ -37,7 +38,6 @@ from .run import (
     T_ORIGIN,
     H,
     T,
-    advance,
 )
 from .scene import Scene
 from .solution import Solution, remembered

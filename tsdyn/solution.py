@@ -14,7 +14,7 @@ from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
 from .rank import weakest_row
-from .run import CHART_ROWS, IN_CHART, REJECTED, STEPS, STIFF, T
+from .run_state import CHART_ROWS, IN_CHART, REJECTED, STEPS, STIFF, T
 from .work import work as integrate_work
 from .workspace import (
     B_ITERATIONS,

@@ -1,0 +1,51 @@
+"""The memory of one run, as the driver's kernels see it: arrays, and what stands where in them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+# clock
+T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, STABLE, CLOCKS = range(11)
+# numbers
+FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
+HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, DENSE, BLOCKS, STAGE_AT = range(8, 16)
+LAST_STAGE, AT_LIMIT, BELOW_LIMIT, STIFF, LEAVE_WHEN_STIFF, FAILED, NUMBERS = range(16, 23)
+AGAIN = 2  # REJECTED_LAST: by a failed stage
+FILLED, STORED = 1, 2  # DENSE: every step's block is made, and kept
+
+
+class Run(NamedTuple):
+    """State and output of one run. x, y are v, vd (tangent-space ODE) or q, w (Maggi/Kane)."""
+
+    x: np.ndarray  # (nx,)
+    y: np.ndarray  # (ny,)
+    yd: np.ndarray  # (ny,)
+    xd: np.ndarray  # (nx,)
+    dx: np.ndarray  # (nx,)  increments of a step, then its error; scratch of dense output
+    dy: np.ndarray  # (ny,)
+    x_low: np.ndarray  # (nx,)  what the additions have lost so far (Kahan)
+    y_low: np.ndarray  # (ny,)
+    x_old: np.ndarray  # (nx,)  at the start of the step, for dense output and to go back to
+    y_old: np.ndarray  # (ny,)
+    yd_old: np.ndarray  # (ny,)
+    xd_old: np.ndarray  # (nx,)
+    x_low_old: np.ndarray  # (nx,)
+    y_low_old: np.ndarray  # (ny,)
+    now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point
+    before: np.ndarray  # (3, n)  at the one before; kept for a first-order system
+    warm: np.ndarray  # what `dense.keep` copies while dense output moves it
+    xs: np.ndarray  # (nx,)  dense output and the guess of a first step
+    ys: np.ndarray  # (ny,)
+    yds: np.ndarray  # (ny,)
+    remembered: np.ndarray  # (slots,)  what forces remember of the last accepted point
+    tableau: np.ndarray  # the method's numbers
+    memory: np.ndarray  # the method's scratch
+    t_eval: np.ndarray  # output times, or empty: every step
+    clock: np.ndarray  # T ... ERROR_BEFORE
+    numbers: np.ndarray  # int64, FIRST_ORDER ... STAGE_AT (where an implicit method leaves its last stage, or 0)
+    out: np.ndarray  # (rows, 1 + 3 n + slots)  t, q, qd, qdd, remembered
+    history: np.ndarray  # (rows, 3)  t, h, accepted
+    charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left
+    points: np.ndarray  # (rows, n)  q0 of each chart, or (0, n) where nothing asks for it
+    block: np.ndarray  # the present step's: start, h, end, chart, the interpolant's data
+    blocks: np.ndarray  # (rows, block)  those of accepted steps

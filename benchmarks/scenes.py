@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+import tsdyn as ts
+from benchmarks import stiff
 from examples import top, two_body_pendulum
 from tsdyn.agreement import Reference
 
@@ -36,10 +38,30 @@ class Benchmarked(NamedTuple):
         return Reference(np.array(data["t"]), r, A.reshape(*r.shape, 3), trusted, f"tests/references/{path.name}")
 
 
+def of_file(name):
+    """Make the builder of the scene that a reference's file defines, the ground being body 0."""
+
+    def build():
+        definition = json.loads((FOLDER / f"{name}.json").read_text())["definition"]
+        scene = ts.Scene(gravity=definition["gravity"])
+        bodies = [scene.ground, *(scene.add_body(**body) for body in definition["bodies"])]
+        for kind, a, b, arguments in definition["constraints"]:
+            scene.add(getattr(ts.constraints, kind)(bodies[a], bodies[b], **arguments))
+        for kind, a, arguments in definition.get("forces", ()):
+            scene.add(getattr(ts.forces, kind)(bodies[a], **arguments))
+        return scene
+
+    return build
+
+
 SCENES = {
     "sliding top": Benchmarked(top.build, (0.0, 10.0), "sliding_top"),
     "two-body pendulum": Benchmarked(two_body_pendulum.build, (0.0, 10.0), "two_body_pendulum"),
     "two-body pendulum in space": Benchmarked(
         lambda: two_body_pendulum.build(((0.3, 0.0, 0.0), (1.0, 5.0, 2.0))), (0.0, 10.0), "two_body_pendulum_spatial"
     ),
+    "chain of 4": Benchmarked(of_file("chain_4"), (0.0, 1.0), "chain_4"),
+    "chain of 16": Benchmarked(of_file("chain_16"), (0.0, 1.0), "chain_16", steps=(1e-2, 3e-3)),
+    "stiff joint": Benchmarked(stiff.jointed, (0.0, 5.0), steps=()),
+    "stiff springs": Benchmarked(stiff.hung, (0.0, 5.0), steps=()),
 }

@@ -3,10 +3,19 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tsdyn as ts
-from examples import bead_on_surface, driven_pivot, pendulum_chain, plug_in_integrator, top, two_body_pendulum
+from examples import (
+    bead_on_surface,
+    drive_train,
+    driven_pivot,
+    pendulum_chain,
+    plug_in_integrator,
+    top,
+    two_body_pendulum,
+)
 
 ROOT = Path(__file__).parents[1]
 RUNS = {
@@ -26,12 +35,24 @@ def test_example(module, build, end, step):
 
 
 @pytest.mark.parametrize(
-    "module", [top, two_body_pendulum, pendulum_chain, bead_on_surface, driven_pivot, plug_in_integrator]
+    "module", [top, two_body_pendulum, pendulum_chain, bead_on_surface, driven_pivot, drive_train, plug_in_integrator]
 )
 def test_main_reports(module, capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", ["example"])
     module.main()
     assert "Solution" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("build", "end"),
+    [(build, end) for _, build, end, _ in RUNS.values()] + [(drive_train.build, 4.0), (plug_in_integrator.build, 2.0)],
+    ids=[*RUNS, "drive_train", "plug_in_integrator"],
+)
+def test_energy_less_work_is_constant(build, end):
+    """To the tolerance, relative to what the energy's parts are."""
+    solution = ts.simulate(build(), (0.0, end), rtol=1e-9, atol=1e-9, dense_output=True).raise_if_failed()
+    size = np.abs(solution.kinetic_energy).max() + np.ptp(solution.potential_energy)
+    assert np.ptp(solution.energy - solution.work) < 1e-8 * size
 
 
 @pytest.mark.parametrize("formulation", ["tangent", "maggi-kane"])

@@ -1,0 +1,81 @@
+"""A motor turns a wheel through a soft shaft; a brake rubs on the wheel, and a weight on a spring hangs from its rim.
+
+Forces of every sort: a torque given as a function of time, a torsional spring and damper, Coulomb friction, a spring.
+Energy less the work of motor, damper and brake is constant: the balance is the example's check.
+
+Run it: python examples/drive_train.py
+"""
+
+import numpy as np
+
+import tsdyn as ts
+
+AXIS = (0.0, 1.0, 0.0)
+
+
+def torque(t):
+    """Torque of the motor, N m, ground frame: it swells and fades in two seconds."""
+    return (0.0, 8.0 * np.sin(0.5 * np.pi * t) ** 2, 0.0)
+
+
+def bearing(scene, body):
+    """Let a body turn about its own y axis on the ground."""
+    point = tuple(body.position)
+    scene.add(ts.constraints.Spherical(body, scene.ground, point_b=point, name=f"bearing of {body.name}"))
+    for axis in ((1, 0, 0), (0, 0, 1)):
+        scene.add(ts.constraints.Dot1(scene.ground, body, axis_a=axis, axis_b=AXIS, name=f"axis of {body.name}"))
+
+
+def build():
+    """Return the scene."""
+    scene = ts.Scene()
+    rotor = scene.add_body(2.0, (0.02, 0.03, 0.02), position=(0.0, -0.5, 0.0), name="rotor")
+    wheel = scene.add_body(5.0, (0.15, 0.25, 0.15), name="wheel")
+    weight = scene.add_point_mass(1.5, position=(0.3, 0.0, -0.4), name="weight")
+    bearing(scene, rotor)
+    bearing(scene, wheel)
+    scene.add(ts.forces.Torque(rotor, torque=torque, name="motor"))
+    scene.add(
+        ts.forces.TorsionalSpring(
+            rotor,
+            wheel,
+            axis_a=AXIS,
+            reference_a=(1, 0, 0),
+            reference_b=(1, 0, 0),
+            stiffness=40.0,
+            damping=0.2,
+            name="shaft",
+        )
+    )
+    scene.add(ts.forces.CoulombFriction(wheel, scene.ground, torque=1.0, slip_rate=0.05, name="brake"))
+    scene.add(ts.forces.Spring(wheel, weight, point_a=(0.3, 0, 0), stiffness=400.0, damping=2.0, name="cord"))
+    return scene
+
+
+def check(solution):
+    """The balance of energy and work, and the shaft's torque against the rotor's equation of motion."""
+    solution.raise_if_failed()
+    scene = solution.scene
+    rotor = scene.body("rotor")
+    motor, shaft = (next(force for force in scene.forces if force.name == name) for name in ("motor", "shaft"))
+    moments = solution.reaction(motor)[1][:, 1] + solution.reaction(shaft)[1][:, 1]
+    rates = 0.03 * solution.angular_acceleration(rotor)[:, 1]
+    assert np.abs(moments - rates).max() < 1e-9 * np.abs(rates).max()
+    balance = solution.energy - solution.work
+    assert np.ptp(balance) < 1e-6 * np.ptp(solution.energy)
+    assert solution.dissipation.min() >= 0.0
+
+
+def main():
+    """Run it for 4 s and print where the motor's work has gone."""
+    solution = ts.simulate(build(), (0.0, 4.0), rtol=1e-9, atol=1e-9, dense_output=True)
+    check(solution)
+    print(solution)
+    speed = np.abs(solution.angular_velocity(solution.scene.body("wheel"))[:, 1]).max()
+    print(f"  the wheel turns at up to {speed:.2f} rad/s")
+    gain, done = solution.energy[-1] - solution.energy[0], solution.work[-1]
+    print(f"  the motor's work less all losses is {done:.9f} J, the gain in energy {gain:.9f} J")
+
+
+if __name__ == "__main__":
+    main()

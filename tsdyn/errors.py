@@ -125,6 +125,6 @@ _SENTENCES = {
     Status.INTERRUPTED: ("The run was interrupted.", "Go on with simulate(scene, (t, t_end), state=solution.state)."),
     Status.EVENT: ("A terminal event ended the run.", ""),
     Status.EVENT_FAILED: ("An event function gave no number.", "Mend it, or return a finite float for every state."),
-    Status.STIFF: ("The motion is stiff, and an implicit method is cheaper.", ""),
+    Status.STIFF: ("The motion is stiff, and an implicit method is cheaper.", "Use SDIRK54."),
     Status.SLICE_DONE: ("A slice of the run is done.", ""),
 }

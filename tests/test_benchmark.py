@@ -107,9 +107,12 @@ def test_interrupt_hands_back_what_is_there(after):
         if fraction >= after:
             signal.raise_signal(signal.SIGINT)
 
-    before = signal.getsignal(signal.SIGINT)
-    found = ts.benchmark(sliding_top(), ["rk45", "dop853"], (1e-4, 1e-6), SPAN, repeats=2, progress=interrupt)
-    assert signal.getsignal(signal.SIGINT) is before
+    outside = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
+    try:
+        found = ts.benchmark(sliding_top(), ["rk45", "dop853"], (1e-4, 1e-6), SPAN, repeats=2, progress=interrupt)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, outside)
     assert found.interrupted
     assert 1 <= len(found.rows) <= 4
     assert "Interrupted" in found.table()
@@ -189,6 +192,9 @@ def test_scenes_of_the_benchmarks_agree_with_their_references():
 
     for name, scene in SCENES.items():
         reference = scene.reference()
+        if reference is None:
+            assert name.startswith("stiff")
+            continue
         assert reference.digits > 14, name
         found = ts.benchmark(scene.build(), ["dop853"], (1e-10,), scene.span, reference=reference, repeats=1)
         assert found.rows[0].error < 1e-8

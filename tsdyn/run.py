@@ -274,8 +274,9 @@ def advance(c, r, at, most):
             _restore_now(w, r)
             r.numbers[REJECTED] += 1
             if r.numbers[IN_CHART] == 0:
-                if not adaptive or status == NOT_FINITE:
+                if not adaptive:
                     return status
+                r.numbers[FAILED] = status
                 r.clock[H] = 0.25 * h
             retry = _begin_chart(context, w, r, at, BY_FAILURE)
             if retry != 0:

@@ -9,6 +9,7 @@ import math
 
 from ._kernel import kernel, stack, stack2
 from .markers import PARAMETERS
+from .rotation import matrix_a
 
 
 @kernel
@@ -48,10 +49,7 @@ def turn_matrix(code, r, T):
         T[2, 0], T[2, 1], T[2, 2], T[2, 3] = e2, e3, e0, -e1
         T[3, 0], T[3, 1], T[3, 2], T[3, 3] = e3, -e2, e1, e0
         return
-    a = e0 * e0 - e1 * e1 - e2 * e2 - e3 * e3
-    T[0, 0], T[0, 1], T[0, 2] = a + 2.0 * e1 * e1, 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)
-    T[1, 0], T[1, 1], T[1, 2] = 2.0 * (e1 * e2 + e0 * e3), a + 2.0 * e2 * e2, 2.0 * (e2 * e3 - e0 * e1)
-    T[2, 0], T[2, 1], T[2, 2] = 2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), a + 2.0 * e3 * e3
+    matrix_a(r, T)
 
 
 @kernel

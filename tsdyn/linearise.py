@@ -16,26 +16,8 @@ from ._kernel import callback, kernel, stack, stack2, vector
 from .assembly import applied_forces, constraint_curvature, force_jacobian
 from .linalg import lu, lu_solve
 from .newton import NOT_FINITE, OK, SINGULAR
+from .rotation import matrix_a, matrix_g
 from .workspace import ITERATION_MATRICES, JACOBIANS, load
-
-
-@kernel
-def transform(p, G):
-    """G(p) (3, 4)."""
-    e0, e1, e2, e3 = p[0], p[1], p[2], p[3]
-    G[0, 0], G[0, 1], G[0, 2], G[0, 3] = -e1, e0, e3, -e2
-    G[1, 0], G[1, 1], G[1, 2], G[1, 3] = -e2, -e3, e0, e1
-    G[2, 0], G[2, 1], G[2, 2], G[2, 3] = -e3, e2, -e1, e0
-
-
-@kernel
-def rotation(p, A):
-    """A(p) (3, 3)."""
-    e0, e1, e2, e3 = p[0], p[1], p[2], p[3]
-    a = e0 * e0 - e1 * e1 - e2 * e2 - e3 * e3
-    A[0, 0], A[0, 1], A[0, 2] = a + 2.0 * e1 * e1, 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)
-    A[1, 0], A[1, 1], A[1, 2] = 2.0 * (e1 * e2 + e0 * e3), a + 2.0 * e2 * e2, 2.0 * (e2 * e3 - e0 * e1)
-    A[2, 0], A[2, 1], A[2, 2] = 2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), a + 2.0 * e3 * e3
 
 
 @kernel
@@ -84,9 +66,9 @@ def _inertia_terms(s, w, l):
             l.r[at + c] += s.mass[b] * (s.gravity[c] - w.qdd[at + c])
         if s.bodies[b, 1] == 7:
             p, pd, pdd, J = w.q[at + 3 : at + 7], w.qd[at + 3 : at + 7], w.qdd[at + 3 : at + 7], s.inertia[b]
-            transform(p, G)
-            transform(pd, Gd)
-            transform(pdd, Gdd)
+            matrix_g(p, G)
+            matrix_g(pd, Gd)
+            matrix_g(pdd, Gdd)
             _moment(G, J, pdd, h)
             _moment(Gd, J, p, g)
             for i in range(4):
@@ -113,7 +95,7 @@ def _add_mass_times(s, q, f, X, out):
             for j in range(n):
                 out[c, j] += f * s.mass[b] * X[c, j]
         if s.bodies[b, 1] == 7:
-            transform(q[at + 3 : at + 7], G)
+            matrix_g(q[at + 3 : at + 7], G)
             J = s.inertia[b]
             for j in range(n):
                 for i in range(3):
@@ -148,8 +130,8 @@ def _to_body_frames(s, q, X, scratch, out):
     for b in range(s.mass.size):  # X T
         at = s.bodies[b, 0]
         if s.bodies[b, 1] == 7:
-            transform(q[at + 3 : at + 7], G)
-            rotation(q[at + 3 : at + 7], A)
+            matrix_g(q[at + 3 : at + 7], G)
+            matrix_a(q[at + 3 : at + 7], A)
             for i in range(n):
                 for c in range(3):
                     scratch[i, to + c] = X[i, at] * A[0, c] + X[i, at + 1] * A[1, c] + X[i, at + 2] * A[2, c]
@@ -167,8 +149,8 @@ def _to_body_frames(s, q, X, scratch, out):
     for b in range(s.mass.size):
         at = s.bodies[b, 0]
         if s.bodies[b, 1] == 7:
-            transform(q[at + 3 : at + 7], G)
-            rotation(q[at + 3 : at + 7], A)
+            matrix_g(q[at + 3 : at + 7], G)
+            matrix_a(q[at + 3 : at + 7], A)
             for j in range(width):
                 for c in range(3):
                     total = 0.0
@@ -257,7 +239,7 @@ def reduce(context, t):
     for b in range(s.mass.size):
         at = s.bodies[b, 0]
         if s.bodies[b, 1] == 7:
-            rotation(w.q[at + 3 : at + 7], A)
+            matrix_a(w.q[at + 3 : at + 7], A)
             for i in range(3):
                 for j in range(k):
                     l.F[to + i, j] = A[0, i] * w.D[at, j] + A[1, i] * w.D[at + 1, j] + A[2, i] * w.D[at + 2, j]

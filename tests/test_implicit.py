@@ -187,7 +187,7 @@ def cheapest(make, method, target):
 
 @pytest.mark.parametrize(("make", "end"), [(jointed, 0.3), (hung, 0.05)], **by_name)
 def test_the_reference_of_stiff_scenes(make, end):
-    """From beginning to end of the fast motion, and on, against RK45 in steps a hundred times finer than stability's."""
+    """From beginning to end of the fast motion, and on, against RK45 at tight tolerances."""
     one, two = (
         ts.simulate(make(), (0.0, end), integrator=m, t_eval=[0.0, 0.2 * end, end])
         for m in (SDIRK54(1e-9, 1e-9), RK45(1e-11, 1e-11))

@@ -1,17 +1,21 @@
 """Stiff scenes, fully stated: what they are made of, and how stiff they are.
 
-jointed   a planar double pendulum of rods 1 m long, m = 1 kg, I = 0.1 kg m^2, released at rest from the horizontal;
-a torsional spring and damper at the second joint, k = 1e6 N m/rad and c = 1e3 N m s/rad, keeps it straight
-hung      three particles of 1 kg in a row, 1 m apart, on springs and dampers, k = 1e5 N/m and c = 1e5 N s/m, the
-first at the end of a rigid 1 m link; released from the horizontal. The fast modes are overdamped,
-|lambda| from 1e5 to 3e5 1/s, the slow modes of the springs decay with k / c = 1 s
+jointed   a planar double pendulum of rods 1 m long, m = 1 kg, I = 0.1 kg m^2, released at rest 45 degrees from hanging;
+a torsional spring and damper at the second joint, k = 1e6 N m/rad and c = 1e3 N m s/rad, keeps it straight. The fast
+mode has |lambda| near 1e4 1/s
+hung      two particles of 1 kg in a row, 1 m apart, on a spring and damper, k = 1e5 N/m and c = 1e5 N s/m, the first at
+the end of a rigid 1 m link; released at rest 45 degrees from hanging. The fast mode is overdamped, |lambda| near 2e5
+1/s, the slow mode of the spring decays with k / c = 1 1/s
 """
 
 from itertools import pairwise
 
+import numpy as np
+
 import tsdyn as ts
 
 Y = (0.0, 1.0, 0.0)
+RELEASE = np.radians(45.0)  # from hanging
 
 
 def hinge(scene, a, b, point_a, point_b):
@@ -21,13 +25,17 @@ def hinge(scene, a, b, point_a, point_b):
         scene.add(ts.constraints.Dot1(a, b, axis_a=axis, axis_b=Y))
 
 
-def jointed(scale=1.0):
+def jointed(scale=1.0, release=RELEASE):
     """The double pendulum with a stiff joint; scale multiplies stiffness and damping."""
     scene = ts.Scene(gravity=(0.0, 0.0, -9.81))
+    along, turn = np.array([np.sin(release), 0.0, -np.cos(release)]), np.pi / 4 - release / 2
     rods = [
-        scene.add_body(mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.5 + i, 0.0, 0.0), name=name)
+        scene.add_body(
+            mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.5 + i) * along,
+            orientation=(np.cos(turn), 0.0, np.sin(turn), 0.0), name=name,
+        )
         for i, name in enumerate(("upper", "lower"))
-    ]
+    ]  # fmt: skip
     hinge(scene, scene.ground, rods[0], (0, 0, 0), (-0.5, 0, 0))
     hinge(scene, rods[0], rods[1], (0.5, 0, 0), (-0.5, 0, 0))
     scene.add(
@@ -44,10 +52,11 @@ def jointed(scale=1.0):
     return scene
 
 
-def hung(scale=1.0):
+def hung(scale=1.0, release=RELEASE, count=2):
     """Particles on overdamped springs below a link; scale multiplies stiffness and damping."""
     scene = ts.Scene(gravity=(0.0, 0.0, -9.81))
-    beads = [scene.add_point_mass(1.0, (1.0 + i, 0.0, 0.0), name=f"bead{i + 1}") for i in range(3)]
+    along = np.array([np.sin(release), 0.0, -np.cos(release)])
+    beads = [scene.add_point_mass(1.0, (1.0 + i) * along, name=f"bead{i + 1}") for i in range(count)]
     scene.add(ts.constraints.Distance(beads[0], scene.ground))
     for a, b in pairwise(beads):
         scene.add(ts.forces.Spring(a, b, stiffness=1e5 * scale, damping=1e5 * scale))

@@ -2,6 +2,7 @@
 
 from ..implicit import trapezoid_error
 from ..integrator import DiagonallyImplicit
+from ..interpolation import linear_second
 from ..tableau import ImplicitTableau
 
 
@@ -25,7 +26,7 @@ class ImplicitTrapezoid(DiagonallyImplicit):
 
     order = 2
     tableau = ImplicitTableau(a=((0,), (1 / 2, 1 / 2)), c=(0, 1), order=2, embedded_order=2)
-    errors = (trapezoid_error,)
+    errors, second = (trapezoid_error,), linear_second
 
     def step_tolerances(self):
         """A step's error has order 3 and a run's order 2: the power makes the latter follow the tolerance."""

@@ -5,7 +5,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scenes import build
+from scenes import EPS, build
+
+import tsdyn as ts
+from tsdyn.diagnostics import constraint_error
 
 FOLDER = Path(__file__).parent / "references"
 NAMES = tuple(sorted(path.stem for path in FOLDER.glob("*.json")))
@@ -53,3 +56,18 @@ def error(solution, reference, rows=slice(None)):
     """Largest error in r and A over all outputs, or over those rows of them."""
     solution.raise_if_failed()
     return max(np.abs(part[rows]).max() for part in errors(solution, reference))
+
+
+def run(name, method, end=10.0, **options):
+    """A run of a reference's scene to an end that it knows, and its error."""
+    scene, reference = load(name)
+    reference = reference.until(end)
+    solution = ts.simulate(scene, (0.0, end), integrator=method, t_eval=reference.t, **options).raise_if_failed()
+    return solution, error(solution, reference)
+
+
+def demand_on_the_manifold(solution, state):
+    """All three levels of the constraints to rounding, at the outputs (of the solution itself, or of its `at`)."""
+    found = constraint_error(solution.packed, state.t, state.q, state.qd, state.qdd)
+    for level, values, factor in zip(found, (state.q, state.qd, state.qdd), (50, 500, 5000), strict=True):
+        assert (level <= factor * EPS * (1.0 + np.abs(values).max(axis=1))).all()

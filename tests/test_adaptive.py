@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from reference import error, load
+from reference import error, load, run
 
 import tsdyn as ts
 
@@ -10,12 +10,6 @@ C = ts.constraints
 RK45 = ts.integrators.RK45
 SCENES = ("sliding_top", "two_body_pendulum", "two_body_pendulum_spatial")
 FORMS = ("tangent", "maggi-kane")
-
-
-def run(name, method, **options):
-    scene, reference = load(name)
-    solution = ts.simulate(scene, (0.0, 10.0), integrator=method, t_eval=reference.t, **options).raise_if_failed()
-    return solution, error(solution, reference)
 
 
 def observed_order(name, steps, **options):

@@ -133,6 +133,38 @@ def test_forces_are_cached_and_only_those_used_are_loaded(warm):
     assert (without["misses"], without["forces"]) == (0, 0)
 
 
+IMPLICIT = (
+    REPORT
+    + """
+from tsdyn import linearise
+from benchmarks.stiff import hung, jointed
+def loaded(scene):
+    kinds = {type(c): c.kernels["curvature"] for c in scene.constraints}.values()
+    forces = [force.kernels["jacobian"] for force in scene.forces]
+    own = [getattr(linearise, name) for name in ("linearise", "reduce", "factorise", "solve", "soften")]
+    return [sum(kernel._address is not None for kernel in kernels) for kernels in (kinds, forces, own)]
+scene = jointed()
+for method in ("nystrom4", "rk45", "dop853"):
+    tsdyn.simulate(scene, (0.0, 1e-3), integrator=method, t_eval=[0.0, 3.3e-4]).multipliers
+explicit = loaded(scene)
+for method in ("implicittrapezoid", "sdirk54"):
+    for build in (jointed, hung):
+        ends = tsdyn.simulate(build(), (0.0, 0.01), integrator=method, dense_output=True).at([0.001, 0.002]).q
+report(explicit=explicit, implicit=loaded(scene), q=ends.tolist())
+"""
+)
+
+
+def test_implicit_methods_are_cached_and_load_what_explicit_ones_do_not(warm):
+    first, _ = run(IMPLICIT, warm)
+    second, errors = run(IMPLICIT, warm)
+    assert (second["misses"], second["q"]) == (0, first["q"])
+    assert "compiling" not in errors
+    for result in (first, second):
+        assert result["explicit"] == [0, 0, 0]
+        assert result["implicit"] == [3, 1, 5]  # Spherical, Dot1 and normalisations; TorsionalSpring; all
+
+
 def test_first_compilation_is_announced_once(tmp_path):
     result, errors = run(SMALL, {"NUMBA_CACHE_DIR": str(tmp_path)})
     assert result["misses"] == KERNELS

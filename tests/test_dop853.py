@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reference import error, load
+from reference import load, run
 
 import tsdyn as ts
 from tsdyn.tableau import RungeKuttaTableau
@@ -14,12 +14,6 @@ from tsdyn.tableau import RungeKuttaTableau
 DOP853, RK45 = ts.integrators.DOP853, ts.integrators.RK45
 SCENES = ("sliding_top", "two_body_pendulum", "two_body_pendulum_spatial")
 FORMS = ("tangent", "maggi-kane")
-
-
-def run(name, method, **options):
-    scene, reference = load(name)
-    solution = ts.simulate(scene, (0.0, 10.0), integrator=method, t_eval=reference.t, **options).raise_if_failed()
-    return solution, error(solution, reference)
 
 
 def test_tableau_meets_its_order_conditions():

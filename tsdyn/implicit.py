@@ -179,19 +179,18 @@ def implicit_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tablea
 def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
     """The trapezoidal rule's -h^3 / 12 times the third derivatives of v and vd, by differences over two steps.
 
-    Nothing where there is no step before.
+    Where there is no step before, as if one as long had been without slope: more than the error of a short step.
     """
     n = nx
     memory, ex, ey = vector(memory, ANY), vector(ex, n), vector(ey, n)
     before = memory[6 * n :]
     h_before = before[5 * n]
     for c in range(n):
-        ex[c], ey[c] = 0.0, 0.0
-        if h_before > 0.0:
-            for part, out in ((0, ex), (n, ey)):
-                now, end = memory[2 * n + part + c], memory[4 * n + part + c]
+        for part, out in ((0, ex), (n, ey)):
+            now, end, slope = memory[2 * n + part + c], memory[4 * n + part + c], 0.0
+            if h_before > 0.0:
                 slope = (now - before[3 * n + part + c]) / h_before
-                out[c] = -h * h * ((end - now) - h * slope) / (6.0 * (h + h_before))
+            out[c] = -h * h * ((end - now) - h * slope) / (6.0 * (h + (h_before if h_before > 0.0 else h)))
     return 0
 
 

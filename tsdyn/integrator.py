@@ -4,7 +4,7 @@ from types import MappingProxyType
 
 from .checks import positive
 from .implicit import implicit_step
-from .interpolation import HERMITE, HERMITE_FIRST_ORDER
+from .interpolation import HERMITE, HERMITE_FIRST_ORDER, hermite_second
 from .stepping import embedded_error, nystrom_step, runge_kutta_step, second_embedded_error, second_order_step
 from .tableau import RungeKuttaTableau
 
@@ -117,6 +117,7 @@ class DiagonallyImplicit(Adaptive):
 
     tableau = None
     implicit = True
+    second = hermite_second  # accelerations between the ends of a step
 
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)

@@ -120,6 +120,15 @@ def hermite_second(s, h, n, nx, ny, data, x, y):
     return 0
 
 
+@callback(VALUE)
+def linear_second(s, h, n, nx, ny, data, x, y):
+    """In place of `hermite_second` for methods of order two, whose steps' errors it divides by h^2."""
+    d, k, y = vector(data, 6 * nx), nx, vector(y, nx)
+    for i in range(nx):
+        y[i] = (1.0 - s) * d[2 * k + i] + s * d[5 * k + i]
+    return 0
+
+
 HERMITE = Interpolant(fill_hermite, hermite, lambda n, nx, ny: 6 * nx)
 HERMITE_FIRST_ORDER = Interpolant(fill_hermite_first_order, hermite_first_order, lambda n, nx, ny: 6 * n + 4 * ny, 4)
 

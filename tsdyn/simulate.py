@@ -16,7 +16,6 @@ from .formulation import formulation as find_formulation
 from .implicit import prepare_implicit
 from .initial import consistent
 from .integrator import Integrator, registered
-from .interpolation import hermite_second
 from .progress import reporter
 from .run import advance
 from .run_state import (
@@ -192,7 +191,7 @@ def simulate(
     errors += [0] * (2 - len(errors))
     addresses = [*form.addresses(), step_kernel.address, *errors, form.norm() if adaptive else 0]
     addresses += [kernel.address for kernel in interpolant[:2]] if dense or times.size else [0, 0]
-    addresses.append(hermite_second.address if method.implicit and (dense or times.size) else 0)
+    addresses.append(method.second.address if method.implicit and (dense or times.size) else 0)
     addresses = np.array(addresses, np.int64)
     linear = allocate_linear(system, n, m, method.implicit, kept)
     if method.implicit:

@@ -1,0 +1,115 @@
+"""The reduced ODE vdd = f(t, v, vd) of a scene and its linearisation, from Python: the kernels that a run calls."""
+
+import numpy as np
+
+from tsdyn._kernel import address_of, caller, entry
+from tsdyn.assembly import constraint_curvature, set_time
+from tsdyn.evaluate import mass_matrix
+from tsdyn.force_pack import with_force_jacobians
+from tsdyn.formulation import formulation
+from tsdyn.stepping import call_accelerate, call_place
+from tsdyn.system import with_curvatures
+from tsdyn.workspace import Context, allocate, allocate_linear
+
+WEIGHTS = {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}  # central differences of sixth order
+
+_call_vector, _call_number, _call_chart, _call_soften = caller("pp"), caller("pd"), caller("pdpppp"), caller("ppdp")
+
+
+@entry
+def _start(c, at, t, v, vd, vdd):
+    return _call_chart(at[4], address_of(c), t, v, vd, vdd, vdd)
+
+
+@entry
+def _accelerations(c, at, t, v, vd, vdd):
+    context = address_of(c)
+    status = call_place(at[0], context, t, v)
+    if status == 0:
+        status = call_accelerate(at[1], context, t, vd, vdd, vdd)
+    if status == 0:
+        status = _call_vector(at[2], context, vdd)
+    return status
+
+
+@entry
+def _linearise(c, at, t, anew):
+    context, status = address_of(c), 0
+    if anew:
+        status = _call_number(at[5], context, t)
+    return _call_number(at[6], context, t) if status == 0 else status
+
+
+@entry
+def _solve(c, at, g, rho):
+    context = address_of(c)
+    status = _call_number(at[7], context, g)
+    return _call_vector(at[8], context, rho) if status == 0 else status
+
+
+@entry
+def _soften(c, at, ex, g, ey):
+    context = address_of(c)
+    status = _call_number(at[7], context, g)
+    return _call_soften(at[9], context, ex, g, ey) if status == 0 else status
+
+
+@entry
+def evaluate_curvature(s, q, qd, qdd, t, lam, K, G1, G2):
+    """K += (Phi_q^T lam)_q, G1 and G2 of tsdyn.curvature; s is from `with_curvatures`."""
+    set_time(s, t)
+    constraint_curvature(s, q, qd, qdd, t, lam, K, G1, G2)
+
+
+class Tangent:
+    """The reduced ODE of a scene in the chart of its start."""
+
+    def __init__(self, scene, t=0.0):
+        packed = scene.packed
+        system, kept = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
+        system = system._replace(reals=system.reals.copy())
+        q, qd = scene.start
+        n, m = q.size, system.segments.shape[0]
+        work = allocate(n, m, len(scene.bodies), 1e-14, packed.size)
+        work.q[:], work.qd[:] = q, qd
+        self.context = Context(system, work, allocate_linear(system, n, m, True, kept))
+        form = formulation("tangent")
+        self.at = np.array([*form.addresses(), *form.implicit()[:5]], np.int64)
+        self.k, self.t = n - m, t
+        v, self.vd, vdd = np.zeros((3, self.k))
+        assert _start(self.context, self.at, t, v, self.vd, vdd) == 0
+
+    def f(self, v, vd, t):
+        """Accelerations vdd; the place is taken."""
+        vdd = np.zeros(self.k)
+        assert _accelerations(self.context, self.at, t, v, vd, vdd) == 0
+        return vdd
+
+    def jacobians(self, t, anew=True):
+        """(f_v, f_vd) at the place last taken; without anew, from the stiffness and damping kept."""
+        assert _linearise(self.context, self.at, t, int(anew)) == 0
+        work, linear = self.context.work, self.context.linear
+        A = work.D.T @ mass_matrix(self.context.system, work.q) @ work.D
+        return np.linalg.solve(A, -linear.K_hat), np.linalg.solve(A, linear.C_hat)
+
+    def solved(self, g, rho):
+        """P^-1 A rho, of the linearisation last made."""
+        rho = rho.copy()
+        assert _solve(self.context, self.at, g, rho) == 0
+        return rho
+
+    def softened(self, ex, g, ey):
+        """(I - g J)^-1 (ex, ey)."""
+        ex, ey = ex.copy(), ey.copy()
+        assert _soften(self.context, self.at, ex, g, ey) == 0
+        return np.concatenate((ex, ey))
+
+
+def difference(f, x, h):
+    """df/dx by central differences of sixth order, columns last."""
+    columns = []
+    for j in range(x.size):
+        step = np.zeros(x.size)
+        step[j] = h
+        columns.append(sum(w * (f(x + k * step) - f(x - k * step)) for k, w in WEIGHTS.items()) / h)
+    return np.stack(columns, axis=-1)

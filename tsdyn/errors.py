@@ -118,7 +118,7 @@ _SENTENCES = {
         "Look for a singular configuration, a jump in a motion or stiff parts near this time; or loosen rtol and atol.",
     ),
     Status.STAGE_FAILED: (
-        "Newton's method for a stage of the implicit method did not converge.",
+        "Newton's method for a stage of the implicit method did not converge, or went far from its prediction.",
         "Take a smaller step, or an adaptive one.",
     ),
     Status.MAX_STEPS: ("The run reached max_steps.", "Raise max_steps, or take a larger step."),

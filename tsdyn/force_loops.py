@@ -151,14 +151,14 @@ def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept):
                 turn_of_directions(frame[4:], d, turn)
         else:
             turn[0], turn[1], turn[2], turn[3] = 1.0, 0.0, 0.0, 0.0
-            for k in range(1, -1, -1):
-                if own[DIMENSION + k] == 7:
-                    p = q[own[AT + k] + 3 : own[AT + k] + 7]
-                    if anew != 0:
-                        for c in range(4):
-                            frame[c] = p[c]
-                    else:
-                        turn_of_bodies(frame, p, turn)
+            k = 0 if own[DIMENSION] != 3 else 1  # a law has the axes of a; those of the ground stay where they are
+            if own[DIMENSION + k] == 7:
+                p = q[own[AT + k] + 3 : own[AT + k] + 7]
+                if anew != 0:
+                    for c in range(4):
+                        frame[c] = p[c]
+                else:
+                    turn_of_bodies(frame, p, turn)
         if anew == 0:
             for j in range(MARKERS):
                 for k in range(MARKERS):

@@ -30,7 +30,7 @@ primitive
 force_loops
 force force_pack
 state_function
-system stepping progress
+system stepping progress state
 assembly interpolation constraints.* forces.*
 workspace run_state
 implicit

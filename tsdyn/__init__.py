@@ -38,7 +38,8 @@ from .primitive import Primitive  # noqa: E402
 from .scene import Scene  # noqa: E402
 from .signal import Table  # noqa: E402
 from .simulate import simulate  # noqa: E402
-from .solution import Solution, State  # noqa: E402
+from .solution import Solution  # noqa: E402
+from .state import State  # noqa: E402
 from .tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau  # noqa: E402
 
 __version__ = "0.1.0"

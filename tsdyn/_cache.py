@@ -117,9 +117,15 @@ def deep_hash(function):
             digest.update(name.encode())
             if name in namespace:
                 add(namespace[name])
-            for module in modules:  # a function reached as module.function
-                if isinstance(value := getattr(module, name, None), types.FunctionType) or hasattr(value, "py_func"):
+        for module in modules:  # what is reached as module.name, or package.module.name
+            for name in code.co_names:
+                value = getattr(module, name, None)
+                if not isinstance(value, types.ModuleType):
+                    if hasattr(module, name):
+                        add(value)
+                elif value not in modules and not _foreign(value):
                     add(value)
+                    modules.append(value)
 
     def add(value):
         value = getattr(value, "py_func", getattr(value, "_defn", value))  # of a kernel, of an intrinsic

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from .errors import Status
+from .errors import Status, TsdynError
 from .integrators import DOP853, SDIRK54
 from .run_state import H, T
 
@@ -32,7 +32,12 @@ def chooser(simulate, scene, method, end, options):
     def choose(run):
         start = float(run.clock[T])
         state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered.copy())
-        pilot = simulate(scene, (start, end), integrator=implicit(method), max_steps=PILOT, state=state, **options)
+        try:
+            pilot = simulate(scene, (start, end), integrator=implicit(method), max_steps=PILOT, state=state, **options)
+        except TsdynError:  # the run itself goes on
+            return False
+        if pilot.status == Status.INTERRUPTED:
+            raise KeyboardInterrupt
         if pilot.status not in (Status.SUCCESS, Status.MAX_STEPS):
             return False
         h = pilot.steps.h[pilot.steps.accepted]

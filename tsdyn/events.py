@@ -75,6 +75,11 @@ class Instant:
         self.q, self.qd, self.qdd = state.copy()  # the function may keep or change it
 
     @property
+    def memory(self):
+        """What forces remember, for a run from here."""
+        return self._memory
+
+    @property
     def multipliers(self):
         """Multipliers (m,)."""
         parts = (part[None] for part in (self.q, self.qd, self.qdd))

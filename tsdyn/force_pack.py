@@ -93,6 +93,25 @@ def with_force_jacobians(packed):
     return packed.system._replace(forces=rows), int(total)
 
 
+def find_forces(system, loads):
+    """Write this process's addresses into the rows of an unpickled system; the loads with theirs."""
+    signals, rows = iter(system.signals), {}
+    for row in system.forces:
+        old = tuple(row[[FORCE, F_REALS]])
+        members = [load for load in loads if tuple(load.row[[FORCE, F_REALS]]) == old]
+        kernels = members[0].force.kernels
+        row[FORCE], row[FORCE_JACOBIAN] = kernels["force"].address, 0
+        row[F_REMEMBER] = kernels["remember"].address if row[F_REMEMBER] else 0
+        for load in members:
+            one = load.row.copy()
+            one[[FORCE, FORCE_JACOBIAN, F_REMEMBER]] = row[[FORCE, FORCE_JACOBIAN, F_REMEMBER]]
+            rows[id(load)] = load._replace(row=one)
+            for value in load.parameters:
+                if isinstance(value, Signal):
+                    next(signals)[S_ADDRESS] = value.address
+    return tuple(rows[id(load)] for load in loads)
+
+
 def _parameters(force):
     """A force's parameters, checked."""
     given = force.parameters()

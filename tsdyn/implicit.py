@@ -47,7 +47,7 @@ def _matrix(context, w, l, t, g, f, anew):
     if anew or l.numbers[KNOWN] == 0.0:
         call_solve(l.kernels[COMPLETE], context, f)
         status = call_linearise(l.kernels[LINEARISE], context, t)
-        l.numbers[KNOWN] = 1.0
+        l.numbers[KNOWN] = 1.0 if status == 0 else 0.0
     if status == 0:
         call_linearise(l.kernels[REDUCE], context, t)
         status = call_linearise(l.kernels[FACTORISE], context, g)
@@ -108,8 +108,8 @@ def _stage(context, place, accelerate, w, l, t, g, x, y, k, xs, ys, f, dx, guess
             for c in range(n):
                 ys[c] = y[c] + g * k[c]
                 xs[c] = x[c] + g * ys[c]
-                f[c] = g * (k[c] - guess[c])
-                dx[c] = g * f[c]
+                f[c] = 0.0  # of velocities a stiff transient may change any amount
+                dx[c] = g * g * (k[c] - guess[c])
             moved = call_norm(l.kernels[ERROR_NORM], context, dx, f, l.now, 1.0, 1.0)
             return 0 if moved < FAR else STAGE_FAILED
         before = size

@@ -106,6 +106,10 @@ class Motion:
                 f"{self.what}: the motion can't be evaluated near t = {times[0]:g} ... {times[-1]:g}: {error!r}"
             ) from error
 
+    def forget(self):
+        """Drop the compiled functions; they are made again when asked for."""
+        self._callbacks = None
+
     @property
     def addresses(self):
         """The addresses of the three compiled functions."""

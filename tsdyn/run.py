@@ -1,7 +1,7 @@
 """The driver: steps, outputs, charts. One kernel for every scene, method and formulation; it calls them by address."""
 
 from ._kernel import address_of, caller, entry, kernel
-from .assembly import remember
+from .assembly import remember, set_time
 from .chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .control import accept, first_step, watch_stiffness
 from .dense import (
@@ -213,6 +213,7 @@ def advance(c, r, at, most):
     nx, ny = r.x.size, r.y.size
     adaptive, implicit = r.numbers[ADAPTIVE] == 1, r.numbers[STAGE_AT] > 0
     if r.numbers[BEGUN] == 0 and most != 0:
+        set_time(c.system, r.clock[T])
         remember(c.system, w.q, w.qd, r.clock[T], r.remembered)
         status = _begin(context, w, r, at)
         if status != 0:
@@ -221,12 +222,14 @@ def advance(c, r, at, most):
         if adaptive and r.clock[H] == 0.0:
             r.clock[H] = min(first_step(context, w, r, at), r.clock[MAX_STEP])
     for _ in range(most):
+        if r.numbers[CHART_ROWS] + 2 >= r.charts.shape[0] or r.numbers[HISTORY] >= r.history.shape[0]:
+            break
         i, t0 = r.numbers[STEPS], r.clock[T]
         if t0 >= r.clock[T_END]:
             return 0
         if adaptive:
             t1 = t0 + r.clock[H]
-            if not t1 > t0 + 4e-16 * abs(t0):
+            if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 return NOT_FINITE if r.numbers[FAILED] == NOT_FINITE else STEP_COLLAPSED
             last = t1 + 1e-3 * r.clock[H] >= r.clock[T_END]
         else:
@@ -241,6 +244,8 @@ def advance(c, r, at, most):
         copy(r.x, r.x_old)
         copy(r.y, r.y_old)
         copy(r.yd, r.yd_old)
+        if implicit:
+            keep(w, r.warm)  # a stage that fails may leave u far away
         if adaptive:
             copy(r.xd, r.xd_old)
             copy(r.x_low, r.x_low_old)
@@ -256,8 +261,9 @@ def advance(c, r, at, most):
             if implicit:  # the last stage's own accelerations: f would amplify what its iteration has left
                 copy(r.memory[r.numbers[STAGE_AT] :][:ny], r.yd)
                 call_complete(at[A_COMPLETE], context, r.yd)
-        elif implicit and adaptive and (status == STAGE_FAILED or r.numbers[IN_CHART] == 0):
+        elif implicit and adaptive and status == STAGE_FAILED:
             r.numbers[FAILED] = status
+            bring_back(w, r.warm)
             _restore_now(w, r)
             r.numbers[REJECTED] += 1
             if r.numbers[REJECTED_LAST] == AGAIN:
@@ -310,6 +316,6 @@ def advance(c, r, at, most):
             status = _begin_chart(context, w, r, at, reason)
             if status != 0:
                 return status
-        if leave or r.numbers[CHART_ROWS] + 2 >= r.charts.shape[0] or r.numbers[HISTORY] >= r.history.shape[0]:
+        if leave:
             break
     return 0 if r.clock[T] >= r.clock[T_END] else SLICE_DONE

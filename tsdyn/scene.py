@@ -5,6 +5,7 @@ from itertools import count
 
 import numpy as np
 
+from ._cache import deep_hash
 from .assemble import assemble
 from .bodies import IDENTITY, Body, Ground, PointMass
 from .checks import demand_known, vector3
@@ -15,7 +16,7 @@ from .force import Force
 from .motion import Motion
 from .primitive import Primitive
 from .signal import Signal
-from .system import pack
+from .system import pack, user_functions
 
 
 class Scene:
@@ -167,6 +168,20 @@ class Scene:
         self.touch()
         return item
 
+    def refresh(self):
+        """Compile those functions of a user's again of which a global has changed since the scene was packed."""
+        if self._packed is not None and _marks(self._packed) != self._functions:
+            for owner, _ in user_functions(self._packed):
+                owner.forget()
+            self.touch()
+
+    def __getstate__(self):
+        """What is packed holds addresses of this process, so it stays here."""
+        return {**self.__dict__, "_packed": None, "_start": None}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+
     def touch(self):
         """Forget the packed numbers: something has changed."""
         self._packed = self._start = None
@@ -178,6 +193,7 @@ class Scene:
             raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
         if self._packed is None:
             self._packed = pack(self)
+            self._functions = _marks(self._packed)
         return self._packed
 
     @property
@@ -229,3 +245,8 @@ class Scene:
         n = sum(body.dimension for body in self._bodies)
         forces = f", {len(self._forces)} forces" if self._forces else ""
         return f"<Scene of {len(self._bodies)} bodies: {n} coordinates, {rows} constraint rows{forces}>"
+
+
+def _marks(packed):
+    """What the compiled forms of the users' functions depend on."""
+    return [deep_hash(function) for _, functions in user_functions(packed) for function in functions]

@@ -150,6 +150,10 @@ class Signal:
                     "table or shorten t_span."
                 )
 
+    def forget(self):
+        """Drop the compiled function; it is made again when asked for."""
+        self._callback = None
+
     @property
     def address(self):
         """The address of the compiled function; zero for a table."""

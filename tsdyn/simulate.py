@@ -39,7 +39,8 @@ from .run_state import (
     T,
 )
 from .scene import Scene
-from .solution import Solution, remembered
+from .solution import Solution
+from .state import remembered
 from .system import with_curvatures
 from .workspace import Context, allocate, allocate_linear
 
@@ -144,6 +145,7 @@ def simulate(
     report = reporter(progress)
 
     started = time.perf_counter()
+    scene.refresh()
     packed = scene.packed
     system = packed.system
     for motion in scene.motions():
@@ -170,7 +172,7 @@ def simulate(
     run = lay_out(
         work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order, width, dense, system.memory.size
     )
-    run.clock[[T, T_ORIGIN, T_END, H]] = t0, t0, t1, (method.first_step or 0.0) if adaptive else method.step
+    run.clock[[T, T_ORIGIN, T_END, H]] = t0, t0, t1, _first_step(method) if adaptive else method.step
     if adaptive:
         run.clock[[RTOL, ATOL]] = method.step_tolerances()
         run.clock[MAX_STEP] = method.max_step or np.inf
@@ -224,6 +226,11 @@ def simulate(
         events=None if watch is None else watch.found(n),
         seconds={"prepare": prepared - started, "run": ended - prepared},
     )
+
+
+def _first_step(method):
+    """The first step to try, s; 0 for one of the driver's own choice."""
+    return min(method.first_step or 0.0, method.max_step or np.inf)
 
 
 def _interval(t_span):

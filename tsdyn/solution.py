@@ -15,6 +15,7 @@ from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, Ste
 from .evaluate import constraint_arrays
 from .rank import weakest_row
 from .run_state import CHART_ROWS, IN_CHART, REJECTED, STEPS, STIFF, T
+from .state import RememberingState
 from .work import work as integrate_work
 from .workspace import (
     B_ITERATIONS,
@@ -32,32 +33,6 @@ from .workspace import (
 
 NEARLY_SINGULAR = 0.05
 BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
-
-
-class State(NamedTuple):
-    """Time, positions, velocities, accelerations and multipliers at one instant."""
-
-    t: float
-    q: np.ndarray
-    qd: np.ndarray
-    qdd: np.ndarray
-    multipliers: np.ndarray
-
-
-class _Remembering(State):
-    """A State that also says what forces remember, so that a run from it goes on counting turns."""
-
-
-def remembered(state, slots):
-    """What forces remember in a state given to `simulate`: zeros where it doesn't say."""
-    memory = getattr(state, "memory", None)
-    if memory is None:
-        return np.zeros(slots)
-    if np.shape(memory) != (slots,):
-        raise InvalidArgument(
-            f"the state remembers {np.size(memory)} angles and the scene has {slots}; use a state of this scene."
-        )
-    return memory
 
 
 class Steps(NamedTuple):
@@ -149,6 +124,14 @@ class Solution:
         )
         self.message = self._message(scene)  # now: the scene may change
 
+    def __getstate__(self):
+        """All but the dense output, which holds addresses of this process."""
+        return {**self.__dict__, "_trajectory": None}
+
+    def __setstate__(self, state):
+        """Take over what was pickled; the packed scene finds its kernels again."""
+        self.__dict__.update(state, system=state["packed"].system)
+
     @property
     def success(self):
         """Whether the run reached the end of the interval, or a terminal event."""
@@ -200,9 +183,7 @@ class Solution:
         q, qd, qdd = (a.copy() for a in self._last)
         t, memory = np.array([self._reached]), self._remembered[None]
         lam = reactions.multipliers(self.system, t, q[None], qd[None], qdd[None], memory)[0]
-        state = _Remembering(self._reached, q, qd, qdd, lam)
-        state.memory = self._remembered.copy()
-        return state
+        return RememberingState.of(self._remembered.copy(), self._reached, q, qd, qdd, lam)
 
     def at(self, t):
         """State at any time of a run with dense_output=True, on the manifold as the steps are.
@@ -237,8 +218,10 @@ class Solution:
         if status != Status.SUCCESS:
             raise StepFailure(f"no state could be found at some t in {t!r}. {status.sentence} {status.remedy}", self)
         q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
-        state = State(every, q, qd, qdd, reactions.multipliers(self.system, every, q, qd, qdd, memory))
-        return state if times.ndim else State(float(times), *(part[0] for part in state[1:]))
+        parts = q, qd, qdd, reactions.multipliers(self.system, every, q, qd, qdd, memory)
+        if times.ndim:
+            return RememberingState.of(memory, every, *parts)
+        return RememberingState.of(memory[0], float(times), *(part[0] for part in parts))
 
     @property
     def steps(self):

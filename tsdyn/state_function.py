@@ -3,6 +3,7 @@
 from types import FunctionType
 from weakref import WeakValueDictionary
 
+from ._cache import deep_hash
 from ._kernel import kernel
 from .force import callbacks
 
@@ -28,9 +29,10 @@ class Kernels(dict):
 def kernels_of(kind, function):
     """The kernels of a kind with a user's function; the same ones for the same two."""
     function = getattr(function, "py_func", function)
-    found = _made.get((kind, function))
+    key = kind, function, deep_hash(function)  # a global of it may have changed
+    found = _made.get(key)
     if found is None:
-        found = _made[kind, function] = Kernels(kind, function)
+        found = _made[key] = Kernels(kind, function)
     return found
 
 
@@ -70,6 +72,15 @@ class ByState:
         if self.__dict__.get("_of") is not function:
             self.__dict__["_kernels"], self.__dict__["_of"] = kernels_of(type(self), function), function
         return self.__dict__["_kernels"]
+
+    @property
+    def function_of_state(self):
+        """The user's function."""
+        return getattr(self, self.given)
+
+    def forget(self):
+        """Drop its compiled form; it is made again when asked for."""
+        self.__dict__.pop("_of", None)
 
     def check(self):
         """Nothing is known of a function."""

@@ -1,5 +1,6 @@
 """The packed system: what the kernels see of a scene, as a named tuple of arrays whose type never changes."""
 
+import os
 from typing import NamedTuple
 
 import numpy as np
@@ -7,9 +8,10 @@ from numba.core.errors import NumbaError
 
 from .checks import number
 from .errors import InvalidConstraint
-from .force_pack import FORCE_COLUMNS, pack_forces
+from .force_pack import FORCE_COLUMNS, find_forces, pack_forces
 from .motion import Motion
 from .primitive import AT, BLOCK, DIMENSION, INTS, ROW, STRIDE
+from .signal import Signal, Table
 
 # columns of System.kinds: four addresses, where a kind's instances are, the address that implicit methods need
 PHI, JACOBIAN, GAMMA, PHI_T, COUNT, REALS, FIRST_INT, FIRST_REAL, CURVATURE, COLUMNS = range(10)
@@ -43,6 +45,34 @@ class Packed(NamedTuple):
     coordinates: tuple  # of each constraint: where its markers are, (3,) each
     size: float  # largest number among the coordinates
     loads: tuple  # a force_pack.Load for each force, in the order added
+
+    def __reduce__(self):
+        """In another process the kernels have other addresses."""
+        return _found_again, (os.getpid(), *self)
+
+
+def _found_again(process, *parts):
+    """A `Packed` from a pickle, its addresses those of this process."""
+    packed = Packed(*parts)
+    if process == os.getpid():
+        return packed
+    system = packed.system
+    classes = dict.fromkeys(type(constraint) for constraint in packed.constraints)
+    for row, kind in zip(system.kinds, classes, strict=True):
+        for column, name in ((PHI, "phi"), (JACOBIAN, "jacobian"), (GAMMA, "gamma"), (PHI_T, "phi_t")):
+            row[column] = _address(kind, name) if row[column] else 0
+        row[CURVATURE] = 0
+    values = [
+        value
+        for kind in classes
+        for constraint, given in zip(packed.constraints, packed.parameters, strict=True)
+        if type(constraint) is kind
+        for value in given
+        if isinstance(value, Motion)
+    ]
+    for row, motion in zip(system.motions, values, strict=True):
+        row[:3] = motion.addresses
+    return packed._replace(loads=find_forces(system, packed.loads))
 
 
 def pack(scene):
@@ -111,6 +141,20 @@ def pack(scene):
     size = max((np.abs(s).max() for each in coordinates for s in each), default=0.0)
     parameters = tuple(parameters.values())
     return Packed(system, scene.bodies, scene.constraints, parameters, coordinates, float(size), loads)
+
+
+def user_functions(packed):
+    """Yield whatever holds compiled functions of a user's, and those functions."""
+    for given in packed.parameters:
+        for value in given:
+            if isinstance(value, Motion):
+                yield value, value.functions
+    for load in packed.loads:
+        for value in load.parameters:
+            if isinstance(value, Signal) and not isinstance(value.source, Table):
+                yield value, (value.source,)
+        if hasattr(load.force, "function_of_state"):
+            yield load.force, (load.force.function_of_state,)
 
 
 def with_curvatures(packed):

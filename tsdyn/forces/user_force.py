@@ -91,6 +91,15 @@ class UserForce(Force):
             )
 
     @property
+    def function_of_state(self):
+        """The user's function."""
+        return self.function
+
+    def forget(self):
+        """Drop its compiled form; it is made again when asked for."""
+        self.__dict__.pop("_of", None)
+
+    @property
     def kernels(self):
         """The callbacks of this function."""
         if self.__dict__.get("_of") is not self.function:

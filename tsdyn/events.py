@@ -66,7 +66,7 @@ def prepare(events):
 
 
 class Instant:
-    """What an event function is given: as a `State`, with multipliers made when asked for."""
+    """What an event function is given: t, q, qd, qdd as of a `State`, with multipliers made when asked for."""
 
     __slots__ = ("_memory", "_system", "q", "qd", "qdd", "t")
 

@@ -16,7 +16,7 @@ from .errors import Status
 from .linalg import copy
 from .primitive import ANY
 from .stepping import ERROR, STEP, call_accelerate, call_norm, call_place
-from .workspace import CHARTS, STAGE_ITERATIONS, load
+from .workspace import CHARTS, ROOM, STAGE_ITERATIONS, load
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
 ITERATIONS = 20
@@ -34,6 +34,8 @@ LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, COMPLETE, ERROR_NORM, KERNELS = ran
 RTOL, ATOL, G, CHART, KNOWN, THETA, T_BEFORE, EAGER, NUMBERS = range(9)
 
 FIXED_TOL = 1e-12  # of the iteration, where no tolerance sets the step
+
+assert max(KERNELS, NUMBERS) <= ROOM
 
 call_linearise = caller("pd")
 call_solve = caller("pp")

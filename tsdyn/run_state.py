@@ -32,7 +32,7 @@ class Run(NamedTuple):
     x_low_old: np.ndarray  # (nx,)
     y_low_old: np.ndarray  # (ny,)
     now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point
-    before: np.ndarray  # (3, n)  at the one before; kept for a first-order system
+    before: np.ndarray  # (3, n)  at the one before; kept for a first-order system and for implicit methods
     warm: np.ndarray  # what `dense.keep` copies while dense output moves it
     xs: np.ndarray  # (nx,)  dense output and the guess of a first step
     ys: np.ndarray  # (ny,)
@@ -41,8 +41,8 @@ class Run(NamedTuple):
     tableau: np.ndarray  # the method's numbers
     memory: np.ndarray  # the method's scratch
     t_eval: np.ndarray  # output times, or empty: every step
-    clock: np.ndarray  # T ... ERROR_BEFORE
-    numbers: np.ndarray  # int64, FIRST_ORDER ... STAGE_AT (where an implicit method leaves its last stage, or 0)
+    clock: np.ndarray  # T ... STABLE
+    numbers: np.ndarray  # int64, FIRST_ORDER ... FAILED; STAGE_AT: where an implicit method leaves its last stage
     out: np.ndarray  # (rows, 1 + 3 n + slots)  t, q, qd, qdd, remembered
     history: np.ndarray  # (rows, 3)  t, h, accepted
     charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left

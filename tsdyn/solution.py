@@ -71,7 +71,9 @@ class Solution:
     t_events : list of ndarray (k_i,), s, or None
         Times of each event; q_events and qd_events are lists of (k_i, n).
     stats : SimpleNamespace
-        steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds.
+        steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds; of
+        implicit methods also jacobians, iteration_matrices, stage_iterations; stiff: whether an explicit adaptive
+        method has met its limit of stability for a while.
     """
 
     def __init__(

@@ -30,7 +30,7 @@ class System(NamedTuple):
     motions: np.ndarray  # int64 (motions, 4): addresses of f, fd, fdd; place of the first in reals
     rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
     segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
-    forces: np.ndarray  # int64 (kinds, 7): addresses and extents, columns in force_pack
+    forces: np.ndarray  # int64 (kinds, 9): addresses and extents, columns in force_pack
     signals: np.ndarray  # int64 (signals, 5): functions of time and tables that loads are given, force_pack
     memory: np.ndarray  # int64 (slots,): places in reals of what forces remember from step to step
 

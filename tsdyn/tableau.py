@@ -1,4 +1,4 @@
-"""Tableaus of explicit Runge-Kutta and Nystrom methods: data that checks itself."""
+"""Tableaus of Runge-Kutta, diagonally implicit and Nystrom methods: data that checks itself."""
 
 from dataclasses import dataclass
 

@@ -45,6 +45,9 @@ EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS = range(6)
 JACOBIANS, ITERATION_MATRICES, STAGE_ITERATIONS, COUNTERS = range(6, 10)
 
 
+ROOM = 16  # for implicit.KERNELS addresses and implicit.NUMBERS floats
+
+
 class Linear(NamedTuple):
     """What implicit methods need besides; empty for explicit ones. l = 6 a rigid body and 3 a point mass.
 
@@ -76,7 +79,7 @@ class Linear(NamedTuple):
     now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point; the run's own array
     before: np.ndarray  # (3, n)  at the one before; the run's own array
     kernels: np.ndarray  # int64 (KERNELS,)  addresses, implicit.LINEARISE ... ERROR_NORM
-    numbers: np.ndarray  # (NUMBERS,)  implicit.RTOL ... T_BEFORE
+    numbers: np.ndarray  # (NUMBERS,)  implicit.RTOL ... EAGER
 
 
 class Context(NamedTuple):
@@ -131,8 +134,8 @@ def allocate_linear(system, n, m, wanted, kept=0):
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
     empty = np.zeros((3, n))
-    whole = {"pivots": np.zeros(k, np.int64), "kernels": np.zeros(8, np.int64)}
-    return Linear(**arrays, **whole, now=empty, before=empty, numbers=np.zeros(9))
+    whole = {"pivots": np.zeros(k, np.int64), "kernels": np.zeros(ROOM, np.int64)}
+    return Linear(**arrays, **whole, now=empty, before=empty, numbers=np.zeros(ROOM))
 
 
 def _example():

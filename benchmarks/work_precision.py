@@ -12,10 +12,9 @@ from tsdyn.benchmark_plot import figure
 from tsdyn.plots import save
 
 FIGURE = Path(__file__).parents[1] / "docs" / "images" / "work_precision.png"
-TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 
 
-def measure(scenes=SCENES, tolerances=TOLERANCES, repeats=3):
+def measure(scenes=SCENES, repeats=3):
     """Yield the title and the Benchmark of each scene."""
     for title, scene in scenes.items():
         yield (
@@ -29,10 +28,10 @@ def measure(scenes=SCENES, tolerances=TOLERANCES, repeats=3):
                     and (scene.steps or kind.embedded_order)
                     and kind.__name__ not in scene.without
                 ],
-                tolerances,
+                scene.tolerances,
                 scene.span,
                 steps=scene.steps,
-                max_steps=40_000,
+                max_steps=scene.max_steps,
                 repeats=repeats,
                 reference=scene.reference(),
             ),

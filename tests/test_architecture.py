@@ -30,6 +30,7 @@ primitive
 force_loops
 force force_pack
 state_function
+given_load
 system stepping progress state
 assembly interpolation constraints.* forces.*
 workspace run_state

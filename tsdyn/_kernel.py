@@ -29,6 +29,7 @@ DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
 _lock = threading.RLock()
 _table = [None]  # debug mode: what an address stands for; zero is no address
+ANY = 1 << 40  # the length of arrays whose length a kernel doesn't need
 _letters = {"i": types.int64, "d": types.float64, "p": types.int64}
 
 

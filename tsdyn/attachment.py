@@ -1,10 +1,11 @@
 """What constraints and forces share: two bodies, a name, markers, and attributes that are checked when they are set."""
 
 import numpy as np
+from numba.core.errors import NumbaError
 
 from ._kernel import kernel
 from .bodies import Ground, PointMass
-from .checks import demand_known
+from .checks import demand_known, number
 from .errors import InvalidConstraint
 from .markers import PARAMETERS, TURN
 
@@ -129,6 +130,25 @@ def layout(markers):
 def inlined(function):
     """A kernel of a function that may be one already."""
     return function if hasattr(function, "py_func") else kernel(function)
+
+
+def address(kernels, name, what, error):
+    """The address of a kernel; `what` is whose it is, `error` what it raises where Numba can't compile it."""
+    try:
+        return kernels[name].address
+    except NumbaError as reason:
+        raise error(
+            f"{what}: Numba can't compile {name}; use plain arithmetic, NumPy functions of scalars and constants in "
+            f"it, and allocate nothing.\n{reason}"
+        ) from reason
+
+
+def checked_parameters(item, kind, kinds):
+    """What `item.parameters()` gives, as a tuple of finite numbers and instances of `kind`, `kinds` in messages."""
+    given = item.parameters()
+    if isinstance(given, (tuple, list)) and all(isinstance(p, kind) or np.isfinite(number(p)) for p in given):
+        return tuple(given)
+    raise item.error(f"{item.name}: parameters() must return a tuple of finite numbers and {kinds}, it gave {given!r}.")
 
 
 def static_kernel(cls, name, arguments, where, error):

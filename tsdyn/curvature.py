@@ -8,26 +8,19 @@ The primitive's own part comes from complex steps of its jacobian and gamma in t
 exact to rounding; the chain rule x(q) is quadratic in q, so its second derivative is `rotate_gradient` with another p.
 """
 
-from ._kernel import complex_stack, complex_stack2, integers, kernel, matrix, stack, stack2, vector
-from .markers import PARAMETERS, POINT, chain_rule, motion
-from .rotation import rotate_gradient, rotate_rate
+from ._kernel import ANY, complex_stack, complex_stack2, integers, kernel, matrix, stack, stack2, vector
+from .markers import PARAMETERS, chain_rule, motion, rate
+from .rotation import rotate_gradient
 
 SIGNATURE = "iipppppdpippp"  # count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2
 STEP = 1e-100
 SPAN = 14  # coordinates of two bodies
-ANY = 1 << 40
 
 # filled in by primitive._compile
 ROWS = MARKERS = SIZE = 1
-CODES = OWNERS = STARTS = FIRST = (0,)
+CODES = OWNERS = STARTS = (0,)
 AT = DIMENSION = ROW = INTS = 0
 kernel_jacobian = kernel_gamma = None
-
-
-@kernel
-def _chain(code, dimension, at, q, s, f, out):
-    """out += f x_q over the coordinates of one body; f (3,) or (4,), out (7,) or (3,)."""
-    chain_rule(code, dimension, at, q, s, f, 0, out)
 
 
 @kernel
@@ -40,23 +33,6 @@ def _chain_second(code, dimension, at, w, s, f, out):
             out[3 + i] += g[i]
 
 
-@kernel
-def _push(code, dimension, at, q, w, s, x):
-    """x += x_q w of one marker."""
-    if code == PARAMETERS:
-        for i in range(4):
-            x[i] += w[at + 3 + i]
-        return
-    if dimension == 7:
-        g = stack(3)
-        rotate_rate(q[at + 3 : at + 7], w[at + 3 : at + 7], s, g)
-        for i in range(3):
-            x[i] += g[i]
-    if dimension != 0 and code == POINT:
-        for i in range(3):
-            x[i] += w[at + i]
-
-
 def loop(count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2):
     """Template of the loop over all instances; the names in capitals and kernel_* are filled in by primitive.py."""
     table, reals, lam = integers(table, ANY), vector(reals, ANY), vector(lam, ANY)
@@ -67,7 +43,7 @@ def loop(count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2):
     zJ, zg = complex_stack2(ROWS, SIZE), complex_stack(ROWS)
     J, a1, a2, g_xd = stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE)
     H, HX, XHX, f = stack2(SIZE, SIZE), stack2(SIZE, SPAN), stack2(SPAN, SPAN), stack(SIZE)
-    row, e, where = stack(SPAN), stack(4), stack(4)
+    row, e, where, pushed = stack(SPAN), stack(4), stack(4), stack(4)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         par = real[3 * MARKERS :]
@@ -75,7 +51,9 @@ def loop(count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2):
         for j in range(MARKERS):
             k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
             motion(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:], xdd[c:])
-            _push(CODES[j], own[DIMENSION + k], own[AT + k], q, qdd, s, xdd[c:])
+            rate(CODES[j], own[DIMENSION + k], own[AT + k], q, qdd, s, pushed)
+            for b in range(4 if CODES[j] == PARAMETERS else 3):
+                xdd[c + b] += pushed[b]
         for c in range(SIZE):
             z[c], zd[c] = x[c], xd[c]
             f[c] = 0.0
@@ -114,7 +92,7 @@ def loop(count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2):
                 for j in range(MARKERS):
                     k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
                     code, dimension, at = CODES[j], own[DIMENSION + k], own[AT + k]
-                    _chain(code, dimension, at, q, s, along_x[r, c:], row[7 * k :])
+                    chain_rule(code, dimension, at, q, s, along_x[r, c:], 0, row[7 * k :])
                     _chain_second(code, dimension, at, qd, s, along_second[r, c:], row[7 * k :])
                 for k in range(2):
                     for c in range(own[DIMENSION + k]):
@@ -131,7 +109,7 @@ def loop(count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2):
                 HX[c, d] = 0.0
             for j in range(MARKERS):
                 k, s = OWNERS[j], real[3 * j : 3 * j + 3]
-                _chain(CODES[j], own[DIMENSION + k], own[AT + k], q, s, H[c, STARTS[j] :], HX[c, 7 * k :])
+                chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, H[c, STARTS[j] :], 0, HX[c, 7 * k :])
         for d in range(SPAN):
             for j in range(MARKERS):
                 k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
@@ -139,7 +117,7 @@ def loop(count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2):
                     where[b] = HX[c + b, d] if c + b < SIZE else 0.0
                 for b in range(7):
                     row[b] = 0.0
-                _chain(CODES[j], own[DIMENSION + k], own[AT + k], q, s, where, row)
+                chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, where, 0, row)
                 for b in range(own[DIMENSION + k]):
                     XHX[7 * k + b, d] += row[b]
         for j in range(MARKERS):

@@ -8,10 +8,9 @@ with W = xd_qd, X = x_q, Y = xd_q of the markers. f_x and f_xd are complex steps
 central differences where it is not analytic. The names in capitals and kernel_* are filled in by `force.callbacks`.
 """
 
-from ._kernel import complex_stack, integers, stack, stack2, vector
+from ._kernel import ANY, complex_stack, integers, stack, stack2, vector
 from .frames import turn_block, turn_of_bodies, turn_of_directions
 from .marker_forces import carry_back, carry_back_derivative, derivatives, state
-from .primitive import ANY
 
 # what the table of a kind holds for each instance
 AT, DIMENSION, INTS = 0, 2, 4

@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba.core.errors import NumbaError
 
-from .checks import number
+from .attachment import address, checked_parameters
 from .errors import InvalidForce
 from .force_loops import AT, DIMENSION, INTS, kept_size
 from .signal import Signal, Table
@@ -41,12 +40,12 @@ def pack_forces(forces, where, table, reals):
     tables = {}
     for members in groups.values():
         kernels = members[0].kernels
-        address = _address(members[0], "force")
+        force_address = _address(members[0], "force")
         remember = _address(members[0], "remember") if "remember" in kernels else 0
         first, stride = (len(table), len(reals)), None
         for force in members:
             begin = len(table), len(reals)
-            parameters = _parameters(force)
+            parameters = checked_parameters(force, Signal, "loads")
             table += _places(force, where)
             reals += np.concatenate(force.coordinates).tolist()
             for value in parameters:
@@ -66,10 +65,10 @@ def pack_forces(forces, where, table, reals):
                     f"{force.name}: parameters() must return as many values as for every other {type(force).__name__}."
                 )
             stride = size
-            row = np.array([address, 0, 1, stride, *begin, remember, 0], np.int64)
+            row = np.array([force_address, 0, 1, stride, *begin, remember, 0], np.int64)
             slot = len(memory) - 1 if force.memory else -1
             loads[id(force)] = Load(force, parameters, force.coordinates, row, slot)
-        rows.append([address, 0, len(members), stride, *first, remember, 0])
+        rows.append([force_address, 0, len(members), stride, *first, remember, 0])
     for source, users in tables.values():
         for signal in users:
             signal[S_FIRST], signal[S_KNOTS] = len(reals), source.times.size
@@ -79,17 +78,11 @@ def pack_forces(forces, where, table, reals):
 
 def with_force_jacobians(packed):
     """The system of a packed scene with the forces' Jacobian loops, which are loaded now; and the floats they keep."""
-    rows = packed.system.forces.copy()
-    for load in packed.loads:
-        same = (rows[:, FORCE] == load.row[FORCE]) & (rows[:, F_REALS] == load.row[F_REALS])
-        rows[same, FORCE_JACOBIAN] = _address(load.force, "jacobian")
-    total = 0
+    rows, total = packed.system.forces.copy(), 0
     for row in rows:
-        load = next(
-            load for load in packed.loads if load.row[FORCE] == row[FORCE] and load.row[F_REALS] == row[F_REALS]
-        )
-        row[F_KEPT] = total
-        total += row[F_COUNT] * kept_size(load.force.markers)
+        force = _members(row, packed.loads)[0].force
+        row[FORCE_JACOBIAN], row[F_KEPT] = _address(force, "jacobian"), total
+        total += row[F_COUNT] * kept_size(force.markers)
     return packed.system._replace(forces=rows), int(total)
 
 
@@ -97,11 +90,9 @@ def find_forces(system, loads):
     """Write this process's addresses into the rows of an unpickled system; the loads with theirs."""
     signals, rows = iter(system.signals), {}
     for row in system.forces:
-        old = tuple(row[[FORCE, F_REALS]])
-        members = [load for load in loads if tuple(load.row[[FORCE, F_REALS]]) == old]
-        kernels = members[0].force.kernels
-        row[FORCE], row[FORCE_JACOBIAN] = kernels["force"].address, 0
-        row[F_REMEMBER] = kernels["remember"].address if row[F_REMEMBER] else 0
+        members = _members(row, loads)
+        row[FORCE], row[FORCE_JACOBIAN] = _address(members[0].force, "force"), 0
+        row[F_REMEMBER] = _address(members[0].force, "remember") if row[F_REMEMBER] else 0
         for load in members:
             one = load.row.copy()
             one[[FORCE, FORCE_JACOBIAN, F_REMEMBER]] = row[[FORCE, FORCE_JACOBIAN, F_REMEMBER]]
@@ -112,25 +103,13 @@ def find_forces(system, loads):
     return tuple(rows[id(load)] for load in loads)
 
 
-def _parameters(force):
-    """A force's parameters, checked."""
-    given = force.parameters()
-    if isinstance(given, (tuple, list)) and all(isinstance(p, Signal) or np.isfinite(number(p)) for p in given):
-        return tuple(given)
-    raise InvalidForce(
-        f"{force.name}: parameters() must return a tuple of finite numbers and loads, it gave {given!r}."
-    )
+def _members(row, loads):
+    """The loads that a row of System.forces runs."""
+    return [load for load in loads if (load.row[[FORCE, F_REALS]] == row[[FORCE, F_REALS]]).all()]
 
 
 def _address(force, name):
-    """The address of a kind's kernel."""
-    try:
-        return force.kernels[name].address
-    except NumbaError as error:
-        raise InvalidForce(
-            f"{force.name}: Numba can't compile {name}; use plain arithmetic, NumPy functions of scalars and constants "
-            f"in it, and allocate nothing.\n{error}"
-        ) from error
+    return address(force.kernels, name, force.name, InvalidForce)
 
 
 def _places(force, where):

@@ -11,11 +11,10 @@ stiffness and damping at the present place, then, if that does not help, from ne
 
 import math
 
-from ._kernel import callback, caller, kernel, vector
+from ._kernel import ANY, callback, caller, kernel, vector
 from .errors import Status
-from .linalg import copy
-from .primitive import ANY
-from .stepping import ERROR, STEP, call_accelerate, call_norm, call_place
+from .linalg import copy, transposed_times
+from .stepping import ERROR, STEP, call_accelerate, call_norm, call_place, combine
 from .workspace import CHARTS, ROOM, STAGE_ITERATIONS, load
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
@@ -136,27 +135,19 @@ def implicit_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tablea
     h_before = t - l.numbers[T_BEFORE] if l.numbers[T_BEFORE] > -math.inf else 0.0
     scratch[5 * n] = h_before
     if h_before > 0.0:
-        for c in range(n):  # v = V^T (q - q0) wherever q is, so the point before is known in this chart
-            sx, sy = 0.0, 0.0
-            for j in range(w.q.size):
-                sx += w.V[j, c] * l.before[1, j]
-                sy += w.V[j, c] * l.before[2, j]
-            y_before[c], k_before[c] = sx, sy
+        transposed_times(w.V, l.before[1], y_before)  # v = V^T (q - q0) wherever q is: the point before in this chart
+        transposed_times(w.V, l.before[2], k_before)
     copy(y, memory[2 * n : 3 * n])
     copy(yd, memory[3 * n : 4 * n])
     for i in range(1, stages):
         row = tableau[1 + i * width :]
         ys, k = memory[(1 + i) * 2 * n :][:n], memory[(1 + i) * 2 * n + n :][:n]
+        combine(predictor[i * stages :], i, 1.0, 2 * n, memory, memory)
+        copy(by, k)
+        combine(row[2:], i, h, 2 * n, memory, memory)
         for c in range(n):
-            sx, sy, guess = 0.0, 0.0, 0.0
-            for j in range(i):
-                at = (1 + j) * 2 * n + c
-                sx += row[2 + j] * memory[at]
-                sy += row[2 + j] * memory[at + n]
-                guess += predictor[i * stages + j] * memory[at + n]
-            bx[c] = x[c] + h * sx
-            by[c] = y[c] + h * sy
-            k[c] = guess
+            bx[c] += x[c]
+            by[c] += y[c]
         if i == 1 and h_before > 0.0:  # along the line through the step before
             ratio = row[1] * h / h_before
             for c in range(n):
@@ -166,14 +157,9 @@ def implicit_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tablea
         )  # fmt: skip
         if status != 0:
             return status
-    weights = tableau[1 + stages * width :]
-    for c in range(n):
-        sx, sy = 0.0, 0.0
-        for j in range(stages):
-            at = (1 + j) * 2 * n + c
-            sx += weights[j] * memory[at]
-            sy += weights[j] * memory[at + n]
-        dx[c], dy[c] = h * sx, h * sy
+    combine(tableau[1 + stages * width :], stages, h, 2 * n, memory, memory)
+    copy(bx, dx)
+    copy(by, dy)
     return 0
 
 

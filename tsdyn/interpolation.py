@@ -11,9 +11,8 @@ place and accelerate, and leaves the workspace to its caller to put back.
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ._kernel import Callback, callback, caller, kernel, vector
+from ._kernel import ANY, Callback, callback, caller, kernel, vector
 from .linalg import copy
-from .primitive import ANY
 from .stepping import combine, stage
 
 FILL, VALUE = "piiiddiii" + 12 * "p", "ddiiippp"

@@ -13,6 +13,16 @@ def copy(a, b):
 
 
 @kernel
+def transposed_times(A, x, out):
+    """out = A^T x."""
+    for j in range(out.size):
+        total = 0.0
+        for i in range(x.size):
+            total += A[i, j] * x[i]
+        out[j] = total
+
+
+@kernel
 def cholesky(A, n, limit):
     """Factor the lower triangle of A (n, n) in place, A = L L^T; the diagonal holds the reciprocals of L's.
 

@@ -14,7 +14,7 @@ last taken, `reduce` and `factorise` make P = A - g C_hat + g^2 K_hat, the itera
 
 from ._kernel import callback, kernel, stack, stack2, vector
 from .assembly import applied_forces, constraint_curvature, force_jacobian
-from .linalg import lu, lu_solve
+from .linalg import lu, lu_solve, transposed_times
 from .newton import NOT_FINITE, OK, SINGULAR
 from .rotation import matrix_a, matrix_g
 from .workspace import ITERATION_MATRICES, JACOBIANS, load
@@ -174,7 +174,7 @@ def linearise(context, t):
     """K_body and C_body at the state last completed. Status."""
     c = load(context)
     s, w, l = c.system, c.work, c.linear
-    n, m = w.q.size, w.u.size
+    n = w.q.size
     for i in range(n):
         for j in range(n):
             l.K[i, j] = 0.0
@@ -185,11 +185,7 @@ def linearise(context, t):
         _forces(s, w, l, t, 1)  # the laws' derivatives are kept; `reduce` takes the rest anew
     _inertia_terms(s, w, l)
     _multiply(w.U, w.B, l.UB)
-    for i in range(m):  # Phi_q^T lam = r, so lam = (U B)^T r
-        x = 0.0
-        for j in range(n):
-            x += l.UB[j, i] * l.r[j]
-        l.lam[i] = x
+    transposed_times(l.UB, l.r, l.lam)  # Phi_q^T lam = r
     constraint_curvature(s, w.q, w.qd, w.qdd, t, l.lam, l.K, l.G1, l.G2)
     _multiply(l.UB, l.G1, l.Y)
     _multiply(l.UB, l.G2, l.Z)

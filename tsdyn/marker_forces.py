@@ -8,7 +8,7 @@ W = xd_qd is what a force f conjugate to the marker is carried back by, Q = W^T 
 """
 
 from ._kernel import kernel, stack
-from .markers import PARAMETERS, POINT, TURN, position
+from .markers import PARAMETERS, POINT, TURN, chain_rule, position, rate
 from .rotation import rotate_gradient, rotate_rate
 
 
@@ -35,39 +35,23 @@ def torque_on_parameters(p, n0, n1, n2, out):
 def state(code, dimension, at, q, qd, s, x, xd):
     """x and xd of one marker; its body's coordinates begin at q[at]."""
     position(code, dimension, at, q, s, x)
-    for i in range(4 if code == PARAMETERS else 3):
-        xd[i] = 0.0
-    if dimension == 7:
-        p, pd = q[at + 3 : at + 7], qd[at + 3 : at + 7]
-        if code == PARAMETERS:
-            for i in range(4):
-                xd[i] = pd[i]
-            return
-        if code == TURN:
-            turning(p, pd, xd)
-            return
-        rotate_rate(p, pd, s, xd)
-    if dimension != 0 and code == POINT:
+    if code != TURN:
+        rate(code, dimension, at, q, qd, s, xd)
+    elif dimension == 7:
+        turning(q[at + 3 : at + 7], qd[at + 3 : at + 7], xd)
+    else:
         for i in range(3):
-            xd[i] += qd[at + i]
+            xd[i] = 0.0
 
 
 @kernel
 def carry_back(code, dimension, at, q, s, f, Q):
     """Q (n,) += W^T f; f (3,) or (4,)."""
-    if dimension != 0 and code == POINT:
-        for i in range(3):
-            Q[at + i] += f[i]
-    if dimension == 7:
-        if code == PARAMETERS:
-            for i in range(4):
-                Q[at + 3 + i] += f[i]
-            return
+    if code != TURN:
+        chain_rule(code, dimension, at, q, s, f, 0, Q[at:])
+    elif dimension == 7:
         g = stack(4)
-        if code == TURN:
-            torque_on_parameters(q[at + 3 : at + 7], f[0], f[1], f[2], g)
-        else:
-            rotate_gradient(q[at + 3 : at + 7], s, f[0], f[1], f[2], g)
+        torque_on_parameters(q[at + 3 : at + 7], f[0], f[1], f[2], g)
         for i in range(4):
             Q[at + 3 + i] += g[i]
 

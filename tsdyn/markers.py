@@ -131,24 +131,32 @@ def position(code, dimension, at, q, s, x):
 
 
 @kernel
-def motion(code, dimension, at, q, qd, s, x, xd, xdd):
-    """x, xd, and xdd at qdd = 0, of one marker."""
-    position(code, dimension, at, q, s, x)
+def rate(code, dimension, at, q, qd, s, xd):
+    """xd = x_q qd of one marker that is no Turn."""
     for i in range(4 if code == PARAMETERS else 3):
         xd[i] = 0.0
-        xdd[i] = 0.0
     if dimension == 7:
         if code == PARAMETERS:
             for i in range(4):
                 xd[i] = qd[at + 3 + i]
             return
         rotate_rate(q[at + 3 : at + 7], qd[at + 3 : at + 7], s, xd)
-        rotate(qd[at + 3 : at + 7], s, xdd)
-        for i in range(3):
-            xdd[i] *= 2.0
     if dimension != 0 and code == POINT:
         for i in range(3):
             xd[i] += qd[at + i]
+
+
+@kernel
+def motion(code, dimension, at, q, qd, s, x, xd, xdd):
+    """x, xd, and xdd at qdd = 0, of one marker."""
+    position(code, dimension, at, q, s, x)
+    rate(code, dimension, at, q, qd, s, xd)
+    for i in range(4 if code == PARAMETERS else 3):
+        xdd[i] = 0.0
+    if dimension == 7 and code != PARAMETERS:
+        rotate(qd[at + 3 : at + 7], s, xdd)
+        for i in range(3):
+            xdd[i] *= 2.0
 
 
 @kernel

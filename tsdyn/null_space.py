@@ -15,7 +15,7 @@ from ._kernel import callback, kernel, vector
 from .assembly import acceleration_bias, applied_forces, is_rheonomic, set_time, time_derivative
 from .chart import inspect, new_chart, tangent_map
 from .errors import Status
-from .linalg import cholesky, cholesky_solve
+from .linalg import cholesky, cholesky_solve, transposed_times
 from .newton import NOT_FINITE, OK, solve_positions, subtract_normal
 from .stepping import ACCELERATE, NORM, PLACE
 from .workspace import EVALUATIONS, FACTORIZATIONS, PLACEMENTS, load
@@ -242,9 +242,5 @@ def start_chart(context, t, v, vd, vdd, unused):
 @kernel
 def project(w, vd, vdd):
     """vd = V^T qd and vdd = V^T qdd."""
-    for j in range(vd.size):
-        x, y = 0.0, 0.0
-        for i in range(w.q.size):
-            x += w.V[i, j] * w.qd[i]
-            y += w.V[i, j] * w.qdd[i]
-        vd[j], vdd[j] = x, y
+    transposed_times(w.V, w.qd, vd)
+    transposed_times(w.V, w.qdd, vdd)

@@ -16,7 +16,7 @@ and on truncated Taylor series: that is how they are checked.
 from types import MappingProxyType
 
 from . import curvature
-from ._kernel import Callback, caller, integers, specialised, stack, stack2, vector
+from ._kernel import ANY, Callback, caller, integers, specialised, stack, stack2, vector
 from .attachment import Attachment, inlined, layout, static_kernel
 from .errors import InvalidConstraint
 from .markers import PARAMETERS, TURN, Marker, chain_rule, motion, position
@@ -25,7 +25,6 @@ from .motion import Motion
 # what the table of a kind holds for each instance
 AT, DIMENSION, BLOCK, ROW, STRIDE, INTS = 0, 2, 4, 6, 7, 8
 SIGNATURE = "iippppdp"  # count, reals per instance, table, reals, q, qd, t, out
-ANY = 1 << 40  # the length of arrays whose length a kernel doesn't need
 call_kind = caller(SIGNATURE)
 
 _registry = {}

@@ -261,7 +261,7 @@ def advance(c, r, at, most):
             if implicit:  # the last stage's own accelerations: f would amplify what its iteration has left
                 copy(r.memory[r.numbers[STAGE_AT] :][:ny], r.yd)
                 call_complete(at[A_COMPLETE], context, r.yd)
-        elif implicit and adaptive and status == STAGE_FAILED:
+        elif adaptive and status == STAGE_FAILED:
             r.numbers[FAILED] = status
             bring_back(w, r.warm)
             _restore_now(w, r)

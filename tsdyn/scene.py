@@ -179,9 +179,6 @@ class Scene:
         """What is packed holds addresses of this process, so it stays here."""
         return {**self.__dict__, "_packed": None, "_start": None}
 
-    def __setstate__(self, state):
-        self.__dict__.update(state)
-
     def touch(self):
         """Forget the packed numbers: something has changed."""
         self._packed = self._start = None

@@ -44,8 +44,6 @@ from .state import remembered
 from .system import with_curvatures
 from .workspace import Context, allocate, allocate_linear
 
-_OF_METHOD = "integrator", "rtol", "atol"
-
 
 def simulate(
     scene,
@@ -118,7 +116,6 @@ def simulate(
         One of its kinds, before anything runs: InvalidArgument, InvalidBody, InconsistentState, RedundantConstraints,
         SingularConfiguration.
     """
-    arguments = {name: value for name, value in locals().items() if name not in ("scene", "t_span", *_OF_METHOD)}
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     t0, t1 = _interval(t_span)
@@ -136,7 +133,7 @@ def simulate(
         raise InvalidArgument(f"redundancy must be 'refuse', got {redundancy!r}; other policies don't exist yet.")
     if not isinstance(dense_output, (bool, np.bool_)):
         raise InvalidArgument(f"dense_output must be True or False, got {dense_output!r}.")
-    events = prepare(events)
+    watched = prepare(events)
     times = _output_times(t_eval, t0, t1)
     adaptive = method.step is None
     steps = 2**62 if adaptive else _step_count(t0, t1, method.step)
@@ -168,7 +165,7 @@ def simulate(
     nx = n if form.first_order else n - m
     interpolant = method.interpolant(form.first_order)
     width = interpolant.size(n, nx, n - m)
-    dense = STORED if dense_output else FILLED if events is not None else 0
+    dense = STORED if dense_output else FILLED if watched is not None else 0
     run = lay_out(
         work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order, width, dense, system.memory.size
     )
@@ -202,11 +199,26 @@ def simulate(
     context = Context(system, work, linear)
     advance(context, run, addresses, 0)  # loads the driver, before the clock starts
     sizes = n, m, len(scene.bodies), constraint_tol, packed.size, nx
-    watch = None if events is None else Watch(events, packed.system, Reader(packed.system, sizes, addresses), t0)
+    watch = None if watched is None else Watch(watched, packed.system, Reader(packed.system, sizes, addresses), t0)
     prepared = time.perf_counter()
     status, reason, chunks = drive(context, run, addresses, max_steps, report, (t0, t1), watch, choose)
     if status == Status.STIFF:
-        return simulate(scene, (t0, t1), integrator=choice.implicit(method), **arguments)
+        return simulate(
+            scene,
+            t_span,
+            integrator=choice.implicit(method),
+            formulation=formulation,
+            constraint_tol=constraint_tol,
+            initial_tol=initial_tol,
+            redundancy=redundancy,
+            t_eval=t_eval,
+            dense_output=dense_output,
+            events=events,
+            max_steps=max_steps,
+            progress=progress,
+            chart_interval=chart_interval,
+            state=state,
+        )
     ended = time.perf_counter()
     trajectory = None
     if dense_output:

@@ -60,15 +60,14 @@ def state_load(value, what, error):
 
 
 class ByState:
-    """Mixed into forces on a that are given by a function of (t, state), the attribute `given`."""
+    """Mixed into forces that are given by a user's function, which the attribute named by `given` holds."""
 
     analytic = False
-    given = ""
 
     @property
     def kernels(self):
         """The callbacks of the present function."""
-        function = getattr(self, self.given)
+        function = self.function_of_state
         if self.__dict__.get("_of") is not function:
             self.__dict__["_kernels"], self.__dict__["_of"] = kernels_of(type(self), function), function
         return self.__dict__["_kernels"]

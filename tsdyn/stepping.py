@@ -10,9 +10,8 @@ kernel: context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory,
 step's start. The memory of a Runge-Kutta method holds n = nx + ny floats of scratch, then n for each stage: (x', y').
 """
 
-from ._kernel import callback, caller, kernel, vector
+from ._kernel import ANY, callback, caller, kernel, vector
 from .linalg import copy
-from .primitive import ANY
 
 PLACE, ACCELERATE, STEP = "pdp", "pdppp", "piiddiipppppppp"
 ERROR, NORM = "diipppppp", "ppppdd"

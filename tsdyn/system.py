@@ -4,9 +4,8 @@ import os
 from typing import NamedTuple
 
 import numpy as np
-from numba.core.errors import NumbaError
 
-from .checks import number
+from .attachment import address, checked_parameters
 from .errors import InvalidConstraint
 from .force_pack import FORCE_COLUMNS, find_forces, pack_forces
 from .motion import Motion
@@ -167,25 +166,14 @@ def with_curvatures(packed):
 
 def _parameters(constraint):
     """A constraint's parameters, checked."""
-    given = constraint.parameters()
-    if isinstance(given, (tuple, list)) and all(isinstance(p, Motion) or np.isfinite(number(p)) for p in given):
-        if "phi_t" not in constraint.kernels and any(isinstance(p, Motion) for p in given):
-            raise InvalidConstraint(f"{constraint.name}: a Motion is among its parameters, so it needs a kernel phi_t.")
-        return tuple(given)
-    raise InvalidConstraint(
-        f"{constraint.name}: parameters() must return a tuple of finite numbers and Motions, it gave {given!r}."
-    )
+    given = checked_parameters(constraint, Motion, "Motions")
+    if "phi_t" not in constraint.kernels and any(isinstance(p, Motion) for p in given):
+        raise InvalidConstraint(f"{constraint.name}: a Motion is among its parameters, so it needs a kernel phi_t.")
+    return given
 
 
 def _address(kind, name):
-    """The address of a kind's kernel."""
-    try:
-        return kind.kernels[name].address
-    except NumbaError as error:
-        raise InvalidConstraint(
-            f"{kind.__name__}: Numba can't compile {name}; use plain arithmetic, NumPy functions of scalars and "
-            f"constants in it, and allocate nothing.\n{error}"
-        ) from error
+    return address(kind.kernels, name, kind.__name__, InvalidConstraint)
 
 
 def _places(constraint, row, n, where):

@@ -55,14 +55,7 @@ class RungeKuttaTableau:
                 raise InvalidArgument(f"{what[0]}: an error estimate has {len(c) + 1} weights, got {len(weights)}.")
             _demand(*what, **{"sum of the error weights = 0": np.sum(weights)})
         _demand(*what, **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
-        if self.order >= 3:
-            _demand(*what, **{"b a c = 1/6": b @ a @ c - 1 / 6})
-        if self.order >= 4:
-            _demand(
-                *what,
-                **{"b c a c = 1/8": (b * c) @ a @ c - 1 / 8},
-                **{"b a c^2 = 1/12": b @ a @ c**2 - 1 / 12, "b a a c = 1/24": b @ a @ a @ c - 1 / 24},
-            )
+        _demand(*what, **_trees(a, b, c, min(self.order, 4)))
 
     @property
     def arrays(self):
@@ -99,28 +92,7 @@ class ImplicitTableau:
         _demand(what, **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
         if self.error:
             _demand(what, **_quadrature(b - np.array(self.error), c, self.embedded_order))
-        ac, aac = a @ c, a @ a @ c
-        trees = {
-            3: {"b a c = 1/6": b @ ac - 1 / 6},
-            4: {
-                "b c a c = 1/8": (b * c) @ ac - 1 / 8,
-                "b a c^2 = 1/12": b @ a @ c**2 - 1 / 12,
-                "b a a c = 1/24": b @ aac - 1 / 24,
-            },
-            5: {
-                "b c^2 a c = 1/10": (b * c**2) @ ac - 1 / 10,
-                "b (a c)^2 = 1/20": b @ ac**2 - 1 / 20,
-                "b c a c^2 = 1/15": (b * c) @ a @ c**2 - 1 / 15,
-                "b a c^3 = 1/20": b @ a @ c**3 - 1 / 20,
-                "b c a a c = 1/30": (b * c) @ aac - 1 / 30,
-                "b a c a c = 1/40": b @ a @ (c * ac) - 1 / 40,
-                "b a a c^2 = 1/60": b @ a @ a @ c**2 - 1 / 60,
-                "b a a a c = 1/120": b @ a @ aac - 1 / 120,
-            },
-        }
-        for order, conditions in trees.items():
-            if order <= self.order:
-                _demand(what, **conditions)
+        _demand(what, **_trees(a, b, c, self.order))
 
     @property
     def arrays(self):
@@ -173,18 +145,16 @@ class NystromTableau:
                 "it (gamma, S): it would be of order one. Use a tableau with coefficients a."
             )
         _demand(what, **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
-        _demand(what, **{"bbar 1 = 1/2": bbar @ ones - 1 / 2})
+        _demand(what, **{"bbar 1 = 1/2": bbar @ ones - 1 / 2}, **_trees(a, b, c, min(self.order, 4)))
         if self.order >= 3:
             _demand(
                 what,
-                **{"b abar 1 = 1/6": b @ abar @ ones - 1 / 6, "b a c = 1/6": b @ a @ c - 1 / 6},
-                **{"bbar c = 1/6": bbar @ c - 1 / 6},
+                **{"b abar 1 = 1/6": b @ abar @ ones - 1 / 6, "bbar c = 1/6": bbar @ c - 1 / 6},
             )
         if self.order >= 4:
             _demand(
                 what,
-                **{"b c a c = 1/8": (b * c) @ a @ c - 1 / 8, "b a c^2 = 1/12": b @ a @ c**2 - 1 / 12},
-                **{"b a a c = 1/24": b @ a @ a @ c - 1 / 24, "b abar c = 1/24": b @ abar @ c - 1 / 24},
+                **{"b abar c = 1/24": b @ abar @ c - 1 / 24},
                 **{"bbar c^2 = 1/12": bbar @ c**2 - 1 / 12, "bbar a c = 1/24": bbar @ a @ c - 1 / 24},
                 **{"bbar abar 1 = 1/24": bbar @ abar @ ones - 1 / 24},
                 **{
@@ -212,3 +182,27 @@ class NystromTableau:
 
 def _quadrature(b, c, order):
     return {f"b c^{j} = 1/{j + 1}": b @ c**j - 1 / (j + 1) for j in range(order)}
+
+
+def _trees(a, b, c, order):
+    """The conditions of orders 3 to 5 that are no quadratures (Hairer, Norsett, Wanner, II.2), up to an order."""
+    ac, aac = a @ c, a @ a @ c
+    conditions = {
+        3: {"b a c = 1/6": b @ ac - 1 / 6},
+        4: {
+            "b c a c = 1/8": (b * c) @ ac - 1 / 8,
+            "b a c^2 = 1/12": b @ a @ c**2 - 1 / 12,
+            "b a a c = 1/24": b @ aac - 1 / 24,
+        },
+        5: {
+            "b c^2 a c = 1/10": (b * c**2) @ ac - 1 / 10,
+            "b (a c)^2 = 1/20": b @ ac**2 - 1 / 20,
+            "b c a c^2 = 1/15": (b * c) @ a @ c**2 - 1 / 15,
+            "b a c^3 = 1/20": b @ a @ c**3 - 1 / 20,
+            "b c a a c = 1/30": (b * c) @ aac - 1 / 30,
+            "b a c a c = 1/40": b @ a @ (c * ac) - 1 / 40,
+            "b a a c^2 = 1/60": b @ a @ a @ c**2 - 1 / 60,
+            "b a a a c = 1/120": b @ a @ aac - 1 / 120,
+        },
+    }
+    return {name: value for at, some in conditions.items() if at <= order for name, value in some.items()}

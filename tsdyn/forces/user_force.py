@@ -17,7 +17,7 @@ from ..checks import floats
 from ..errors import InvalidForce
 from ..force import Force
 from ..markers import Parameters, Point, Turn
-from ..state_function import arguments_of, fill_state, kernels_of
+from ..state_function import ByState, arguments_of, fill_state
 
 
 def _numbers(value, what, error):
@@ -28,7 +28,7 @@ def _numbers(value, what, error):
     return result
 
 
-class UserForce(Force):
+class UserForce(ByState, Force):
     """A force and torque on a, and the opposite on b, by a function of time and of both states.
 
     Parameters
@@ -59,9 +59,9 @@ class UserForce(Force):
     """
 
     markers = (Point("a"), Parameters("a"), Turn("a"), Point("b"), Parameters("b"), Turn("b"))
-    analytic = False
     particles = True
     loads = ("function",)
+    given = "function"
     quantities = MappingProxyType({"values": _numbers})
 
     def __init__(
@@ -89,22 +89,6 @@ class UserForce(Force):
                 f"{self.name}: function must be a plain Python function of five arguments (t, a, b, par, out), got "
                 f"{self.function!r}."
             )
-
-    @property
-    def function_of_state(self):
-        """The user's function."""
-        return self.function
-
-    def forget(self):
-        """Drop its compiled form; it is made again when asked for."""
-        self.__dict__.pop("_of", None)
-
-    @property
-    def kernels(self):
-        """The callbacks of this function."""
-        if self.__dict__.get("_of") is not self.function:
-            self.__dict__["_kernels"], self.__dict__["_of"] = kernels_of(UserForce, self.function), self.function
-        return self.__dict__["_kernels"]
 
     def parameters(self):
         """The numbers given."""

@@ -88,6 +88,15 @@ class Distance(Primitive):
         d0, d1, d2 = xd[0] - xd[3], xd[1] - xd[4], xd[2] - xd[5]
         out[0] = (d0 * d0 + d1 * d1 + d2 * d2 - par[1] * par[1] - par[0] * par[2]) / par[3]
 
+    @staticmethod
+    def series(x, par, k, s, out):
+        """Of Eq. (2)."""
+        scale = 1.0 / par[3]
+        for i in range(3):
+            d = (x[i] - x[3 + i]) * scale
+            out[0, i] = d
+            out[0, 3 + i] = -d
+
 
 def _ground_point(body, s):
     return body.position + (rotation_matrix(body.orientation) @ s if body.dimension != 3 else 0.0)

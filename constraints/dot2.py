@@ -69,3 +69,11 @@ class Dot2(Primitive):
     def gamma(x, xd, par, t, out):
         """Eq. (4)."""
         out[0] = 2.0 * (xd[0] * (xd[6] - xd[3]) + xd[1] * (xd[7] - xd[4]) + xd[2] * (xd[8] - xd[5])) - par[2]
+
+    @staticmethod
+    def series(x, par, k, s, out):
+        """Of Eq. (2)."""
+        for i in range(3):
+            out[0, i] = x[6 + i] - x[3 + i]
+            out[0, 3 + i] = -x[i]
+            out[0, 6 + i] = x[i]

@@ -29,6 +29,7 @@ class EulerNormalization(Primitive):
 
     rows = 1
     markers = (Parameters("a"),)
+    normalises = True
 
     def __init__(self, a, *, name=""):
         super().__init__(a, None, (None,), name)

@@ -60,3 +60,11 @@ class PlaneContact(Primitive):
     def gamma(x, xd, par, t, out):
         """Eq. (3)."""
         out[0] = 2.0 * (xd[6] * (xd[0] - xd[3]) + xd[7] * (xd[1] - xd[4]) + xd[8] * (xd[2] - xd[5]))
+
+    @staticmethod
+    def series(x, par, k, s, out):
+        """Of Eq. (2)."""
+        for i in range(3):
+            out[0, i] = x[6 + i]
+            out[0, 3 + i] = -x[6 + i]
+            out[0, 6 + i] = x[i] - x[3 + i]

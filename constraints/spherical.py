@@ -56,3 +56,11 @@ class Spherical(Primitive):
         """Eq. (3)."""
         for i in range(3):
             out[i] = 0.0
+
+    @staticmethod
+    def series(x, par, k, s, out):
+        """Of Eq. (2)."""
+        if k == 0:
+            for i in range(3):
+                out[i, i] = 1.0
+                out[i, 3 + i] = -1.0

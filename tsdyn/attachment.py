@@ -124,6 +124,7 @@ def layout(markers):
         "STARTS": tuple(sum(sizes[:i]) for i in range(len(sizes))),
         "FIRST": tuple(int(owner not in owners[:i]) for i, owner in enumerate(owners)),
         "SIZE": sum(sizes),
+        "ROOM": sum(sizes) + 1,  # for a store of four floats at the last marker
     }
 
 

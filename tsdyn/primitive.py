@@ -15,7 +15,7 @@ and on truncated Taylor series: that is how they are checked.
 
 from types import MappingProxyType
 
-from . import curvature
+from . import body_loops, curvature, series_loops
 from ._kernel import ANY, Callback, caller, integers, specialised, stack, stack2, vector
 from .attachment import Attachment, inlined, layout, static_kernel
 from .errors import InvalidConstraint
@@ -29,7 +29,7 @@ call_kind = caller(SIGNATURE)
 
 _registry = {}
 _KERNELS = {"phi": 4, "jacobian": 4, "gamma": 5}  # and their numbers of arguments
-_OPTIONAL = {"phi_t": 4}
+_OPTIONAL = {"phi_t": 4, "series": 5}
 
 
 class Primitive(Attachment):
@@ -53,6 +53,8 @@ class Primitive(Attachment):
     """
 
     rows = 0
+    slots = 0
+    normalises = False  # whether it does no more than keep the length of p
     prescribed = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
 
@@ -111,13 +113,25 @@ def _compile(cls, functions):
         inner = {f"kernel_{name}": inlined(function) for name, function in functions.items()}
     except InvalidConstraint as error:
         raise InvalidConstraint(f"primitive {cls.__name__}: {error}") from error
-    loops = {"phi": _values, "phi_t": _values, "jacobian": _jacobian, "gamma": _gamma}
+    loops = {  # name: template, whose kernel it is cached with, signature
+        "phi": (_values, "phi", SIGNATURE),
+        "phi_t": (_values, "phi_t", SIGNATURE),
+        "jacobian": (_jacobian, "jacobian", SIGNATURE),
+        "gamma": (_gamma, "gamma", SIGNATURE),
+        "values": (body_loops.values, "phi", body_loops.SIGNATURE),
+        "drift": (body_loops.values, "phi_t", body_loops.SIGNATURE),
+        "reduced": (body_loops.reduced, "jacobian", body_loops.SIGNATURE),
+        "bias": (body_loops.bias, "gamma", body_loops.SIGNATURE),
+        "series": (series_loops.series, "series", series_loops.SIGNATURE),
+    }
+    sizes = {"WIDTH": series_loops.row_width(len(cls.markers), cls.rows), "SLOTS": cls.slots}
     result = {}
-    for name, function in functions.items():
-        owner = getattr(function, "py_func", function)
-        names = {**constants, **inner, "kernel_value": inner[f"kernel_{name}"]}
-        copy = specialised(loops[name], f"{cls.__qualname__}.{name}_loop", owner, **names)
-        result[name] = Callback(copy, SIGNATURE)
+    for name, (template, whose, signature) in loops.items():
+        if whose in functions:
+            owner = getattr(functions[whose], "py_func", functions[whose])
+            names = {**constants, **inner, **sizes, "kernel_value": inner[f"kernel_{whose}"]}
+            copy = specialised(template, f"{cls.__qualname__}.{name}_loop", owner, **names)
+            result[name] = Callback(copy, signature)
     owner = getattr(functions["gamma"], "py_func", functions["gamma"])
     places = {"AT": AT, "DIMENSION": DIMENSION, "ROW": ROW, "INTS": INTS}
     copy = specialised(curvature.loop, f"{cls.__qualname__}.curvature_loop", owner, **constants, **inner, **places)

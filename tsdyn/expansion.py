@@ -1,0 +1,129 @@
+"""Taylor coefficients of the motion of all bodies, order by order, from the state at order zero.
+
+    (k+1) A_{k+1}           = sum_j A_j omega'~_{k-j}                                            (1)
+    (k+1)(k+2) m r_{k+2}    = F_k - [Phi_r^T lam]_k                                              (2)
+    (k+1) J' omega'_{k+1}   = T_k - sum_j omega'_j x (J' omega')_{k-j} - [Phi_pi'^T lam]_k       (3)
+    Phi_{k+2}               = 0                                                                  (4)
+
+(4) is linear in lam_k: S lam_k = (k+1)(k+2) Phi_{k+2} with what (1)-(3) give for lam_k = 0, and S = H W H^T at order
+zero for every k, factorised once a step.
+"""
+
+from ._four import add, cross, fma, four, put, splat, sub, times
+from ._kernel import kernel
+from .block_kernels import solve
+from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS
+from .normal import scatter, weigh
+from .poses import OMEGA, POSE, RD, R
+from .series_loops import BODY_ROW, HISTORY, RESIDUAL, S_OMEGA, S_R, S_SPIN, UPDATE, call_series
+
+
+@kernel
+def begin(network, poses, orders, bodies):
+    """Order zero of all bodies, and order one of their places."""
+    for b in range(network.bodies.shape[0]):
+        at, p = b * orders * BODY_ROW, b * POSE
+        for c in range(3):
+            put(bodies, at + 4 * c, four(poses, p + 4 * c))
+        put(bodies, at + S_R, four(poses, p + R))
+        put(bodies, at + BODY_ROW + S_R, four(poses, p + RD))
+        if network.bodies[b, 1] == 7:
+            put(bodies, at + S_OMEGA, four(poses, p + OMEGA))
+            _spin(network, b, bodies, at)
+            _turn_on(bodies, at, 0)
+
+
+@kernel
+def _spin(network, b, bodies, at):
+    """(J' omega')_k at bodies[at]."""
+    if network.spins[b] != 0:
+        w, o = 16 * b + 4, at + S_OMEGA
+        f = times(four(network.mass, w), splat(bodies[o]))
+        f = fma(four(network.mass, w + 4), splat(bodies[o + 1]), f)
+        put(bodies, at + S_SPIN, fma(four(network.mass, w + 8), splat(bodies[o + 2]), f))
+
+
+@kernel
+def _turn_on(bodies, at, k):
+    """A_{k+1} of (1), the body's series beginning at bodies[at]."""
+    x, y, z = splat(0.0), splat(0.0), splat(0.0)
+    for j in range(k + 1):
+        c, o = at + j * BODY_ROW, at + (k - j) * BODY_ROW + S_OMEGA
+        a0, a1, a2 = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8)
+        w0, w1, w2 = splat(bodies[o]), splat(bodies[o + 1]), splat(bodies[o + 2])
+        x = sub(fma(a1, w2, x), times(a2, w1))
+        y = sub(fma(a2, w0, y), times(a0, w2))
+        z = sub(fma(a0, w1, z), times(a1, w0))
+    o, f = at + (k + 1) * BODY_ROW, splat(1.0 / (k + 1))
+    put(bodies, o, times(x, f))
+    put(bodies, o + 4, times(y, f))
+    put(bodies, o + 8, times(z, f))
+
+
+@kernel
+def run_loops(network, reals, mode, k, orders, bodies, values, places, b, Z):
+    """One mode of the series loops of every kind."""
+    for i in range(network.kinds.shape[0]):
+        kind = network.kinds[i]
+        call_series(
+            places[i, 0], mode, k, orders, kind[N_COUNT], kind[N_REALS], network.table[kind[N_FIRST_INT] :],
+            reals[kind[N_FIRST_REAL] :], bodies, values[places[i, 1] :], b, Z,
+        )  # fmt: skip
+
+
+@kernel
+def expand(network, system, k, orders, x, f):
+    """Order k of the forces and multipliers, k + 1 of omega', k + 2 of r and A; k in turn from zero.
+
+    x is a `taylor.Expansion`, f a `workspace.Free`.
+    """
+    bodies, Z = x.bodies, f.Z
+    nb = network.bodies.shape[0]
+    for b in range(nb):
+        z, at = 8 * b, b * orders * BODY_ROW
+        put(Z, z, splat(0.0))
+        if k == 0:
+            m = network.mass[16 * b]
+            for c in range(3):
+                Z[z + c] = m * system.gravity[c]
+        spin = splat(0.0)
+        if network.spins[b] != 0:
+            for j in range(k + 1):
+                w = four(bodies, at + j * BODY_ROW + S_OMEGA)
+                spin = add(spin, cross(four(bodies, at + (k - j) * BODY_ROW + S_SPIN), w))
+        put(Z, z + 4, spin)
+    if k > 0:
+        run_loops(network, system.reals, HISTORY, k, orders, bodies, x.constraints, x.places, f.b, Z)
+    for i in range(x.forces.shape[0]):
+        kind = x.forces[i]
+        call_series(
+            kind[0], 0, k, orders, kind[2], kind[3], x.table[kind[4] :], system.reals[kind[5] :], bodies,
+            x.loads[kind[1] :], f.b, Z,
+        )  # fmt: skip
+    g, h = 1.0 / (k + 1), 1.0 / ((k + 1) * (k + 2))
+    for b in range(nb):
+        at = b * orders * BODY_ROW
+        weigh(network.inverse, b, Z, 8 * b, Z, 8 * b)
+        put(bodies, at + (k + 2) * BODY_ROW + S_R, times(four(Z, 8 * b), splat(h)))
+        if network.bodies[b, 1] == 7:
+            put(bodies, at + (k + 1) * BODY_ROW + S_OMEGA, times(four(Z, 8 * b + 4), splat(g)))
+            _turn_on(bodies, at, k + 1)
+    run_loops(network, system.reals, RESIDUAL, k, orders, bodies, x.constraints, x.places, f.b, Z)
+    solve(network.pattern, f.S, f.b)
+    for i in range(Z.size):
+        Z[i] = 0.0
+    scatter(network, f.Y, f.b, Z)
+    for b in range(nb):
+        at = b * orders * BODY_ROW
+        high = at + (k + 2) * BODY_ROW
+        put(bodies, high + S_R, fma(four(Z, 8 * b), splat(h), four(bodies, high + S_R)))
+        if network.bodies[b, 1] == 7:
+            o = at + (k + 1) * BODY_ROW
+            put(bodies, o + S_OMEGA, fma(four(Z, 8 * b + 4), splat(g), four(bodies, o + S_OMEGA)))
+            _spin(network, b, bodies, o)
+            w0, w1, w2 = h * Z[8 * b + 4], h * Z[8 * b + 5], h * Z[8 * b + 6]  # A_0 of the change of omega'
+            a0, a1, a2 = four(bodies, at), four(bodies, at + 4), four(bodies, at + 8)
+            put(bodies, high, add(four(bodies, high), sub(times(a1, splat(w2)), times(a2, splat(w1)))))
+            put(bodies, high + 4, add(four(bodies, high + 4), sub(times(a2, splat(w0)), times(a0, splat(w2)))))
+            put(bodies, high + 8, add(four(bodies, high + 8), sub(times(a0, splat(w1)), times(a1, splat(w0)))))
+    run_loops(network, system.reals, UPDATE, k + 2, orders, bodies, x.constraints, x.places, f.b, Z)

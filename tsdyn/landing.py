@@ -1,0 +1,180 @@
+"""From the end of a series, or anywhere near the manifold, onto it: positions, then velocities (Eqs. 20, 23, 29).
+
+The normal space is that of the place itself, W H^T, so that one factorisation of S = H W H^T serves both and, renewed
+where positions have moved by more than rounding, the accelerations too.
+"""
+
+import math
+
+from ._four import add, fma, four, put, splat
+from ._kernel import kernel
+from .block_kernels import factor, solve
+from .body_loops import call_body_loop
+from .errors import Status
+from .free import RESIDUAL
+from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS, REDUCED, VALUES
+from .normal import gather, multiply_rows, scatter, weigh_rows
+from .poses import OMEGA, POSE, RD, P, R, set_pose
+from .series_loops import BODY_ROW, S_OMEGA, S_R
+from .workspace import FACTORIZATIONS, FLOOR, NEWTON
+
+OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
+NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
+PIVOT_LIMIT = 1e-13  # of S: less of a diagonal entry than this is rounding
+SWEEPS = 12
+MOVED = 1e-15  # corrections above this are more than rounding: S is made anew
+
+
+@kernel
+def run_loops(network, reals, column, poses, t, out, H):
+    """One of the loops of body_loops, for every kind that has it."""
+    for i in range(network.kinds.shape[0]):
+        kind = network.kinds[i]
+        if kind[column] != 0:
+            call_body_loop(
+                kind[column], kind[N_COUNT], kind[N_REALS], network.table[kind[N_FIRST_INT] :],
+                reals[kind[N_FIRST_REAL] :], poses, poses, t, out, H,
+            )  # fmt: skip
+
+
+@kernel
+def factorise(network, system, w, f, t):
+    """b = Phi, and H, W H^T and the factors of S, at the present poses. Status."""
+    run_loops(network, system.reals, REDUCED, f.poses, t, f.b, f.H)
+    weigh_rows(network, f.H, f.Y)
+    multiply_rows(network, f.H, f.Y, f.S)
+    w.counters[FACTORIZATIONS] += 1
+    return OK if factor(network.pattern, f.S, PIVOT_LIMIT) < 0 else SINGULAR
+
+
+@kernel
+def _largest(values):
+    """The largest size; infinite where one is not finite."""
+    worst = 0.0
+    for i in range(values.size):
+        size = abs(values[i])
+        if not size < math.inf:
+            return math.inf
+        worst = max(worst, size)
+    return worst
+
+
+@kernel
+def land(network, system, w, f, t):
+    """Bring positions onto the manifold along W H^T; H, Y and S are those of where they land. Status."""
+    status = factorise(network, system, w, f, t)
+    if status != OK:
+        return status
+    floor, before, moved = w.control[FLOOR], math.inf, 0.0
+    f.sizes[RESIDUAL] = _largest(f.b)
+    for _ in range(SWEEPS):
+        worst = _largest(f.b)
+        if not worst < math.inf:
+            return NOT_FINITE
+        if worst <= floor or worst > 0.5 * before:
+            if worst > 100.0 * floor:
+                return NEWTON_FAILED
+            return factorise(network, system, w, f, t) if moved > MOVED else OK
+        before = worst
+        w.counters[NEWTON] += 1
+        solve(network.pattern, f.S, f.b)
+        moved = max(moved, _displace(network, f))
+        run_loops(network, system.reals, VALUES, f.poses, t, f.b, f.H)
+    return NEWTON_FAILED
+
+
+@kernel
+def _displace(network, f):
+    """Move and turn the bodies by -Y b; by how much, at most."""
+    for i in range(f.Z.size):
+        f.Z[i] = 0.0
+    scatter(network, f.Y, f.b, f.Z)
+    p = f.p
+    for b in range(network.bodies.shape[0]):
+        at, o = b * POSE, 8 * b
+        put(f.poses, at + R, add(four(f.poses, at + R), four(f.Z, o)))
+        if network.bodies[b, 1] == 7:
+            x, y, z = 0.5 * f.Z[o + 4], 0.5 * f.Z[o + 5], 0.5 * f.Z[o + 6]
+            e0, e1, e2, e3 = (f.poses[at + P], f.poses[at + P + 1], f.poses[at + P + 2], f.poses[at + P + 3])
+            p[0] = e0 - e1 * x - e2 * y - e3 * z
+            p[1] = e1 + e0 * x - e3 * y + e2 * z
+            p[2] = e2 + e3 * x + e0 * y - e1 * z
+            p[3] = e3 - e2 * x + e1 * y + e0 * z
+            normalise(p)
+            set_pose(f.poses, at, p)
+    return _largest(f.Z)
+
+
+@kernel
+def normalise(p):
+    """Scale p to unit length."""
+    f = 1.0 / math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3])
+    for i in range(4):
+        p[i] *= f
+
+
+@kernel
+def land_velocities(network, f):
+    """Take out of the velocities of the poses what is normal to the manifold, twice: the second time it is rounding."""
+    nb = network.bodies.shape[0]
+    for _ in range(2):
+        for b in range(nb):
+            put(f.Z, 8 * b, four(f.poses, b * POSE + RD))
+            put(f.Z, 8 * b + 4, four(f.poses, b * POSE + OMEGA))
+        gather(network, f.H, f.Z, f.b)
+        solve(network.pattern, f.S, f.b)
+        scatter(network, f.Y, f.b, f.Z)
+        for b in range(nb):
+            put(f.poses, b * POSE + RD, four(f.Z, 8 * b))
+            put(f.poses, b * POSE + OMEGA, four(f.Z, 8 * b + 4))
+
+
+@kernel
+def sum_series(network, bodies, orders, top, h, poses, p):
+    """The poses at h: A and r from coefficients up to top + 1, omega' up to top. A is made orthogonal by way of p."""
+    for b in range(network.bodies.shape[0]):
+        first, at = b * orders * BODY_ROW, b * POSE
+        s, o = splat(h), first + (top + 1) * BODY_ROW
+        r, rd = four(bodies, o + S_R), splat(0.0)
+        for k in range(top, -1, -1):
+            rd = fma(rd, s, r)
+            r = fma(r, s, four(bodies, first + k * BODY_ROW + S_R))
+        put(poses, at + R, r)
+        put(poses, at + RD, rd)
+        if network.bodies[b, 1] == 7:
+            x, y, z, w = four(bodies, o), four(bodies, o + 4), four(bodies, o + 8), splat(0.0)
+            for k in range(top, -1, -1):
+                o = first + k * BODY_ROW
+                x = fma(x, s, four(bodies, o))
+                y = fma(y, s, four(bodies, o + 4))
+                z = fma(z, s, four(bodies, o + 8))
+                w = fma(w, s, four(bodies, o + S_OMEGA))
+            put(poses, at, x)
+            put(poses, at + 4, y)
+            put(poses, at + 8, z)
+            put(poses, at + OMEGA, w)
+            _parameters(poses, at, p)
+            set_pose(poses, at, p)
+
+
+@kernel
+def _parameters(poses, at, p):
+    """Euler parameters of the matrix at poses[at], on the side of those there were; from the largest of the four."""
+    a, b, c = poses[at], poses[at + 5], poses[at + 10]  # the diagonal
+    x, y, z = poses[at + 6] - poses[at + 9], poses[at + 8] - poses[at + 2], poses[at + 1] - poses[at + 4]
+    u, v, w = poses[at + 9] + poses[at + 6], poses[at + 2] + poses[at + 8], poses[at + 4] + poses[at + 1]
+    e0, e1, e2, e3 = 1.0 + a + b + c, 1.0 + a - b - c, 1.0 - a + b - c, 1.0 - a - b + c
+    largest = max(max(e0, e1), max(e2, e3))
+    if largest == e0:
+        p[0], p[1], p[2], p[3] = e0, x, y, z
+    elif largest == e1:
+        p[0], p[1], p[2], p[3] = x, e1, w, v
+    elif largest == e2:
+        p[0], p[1], p[2], p[3] = y, w, e2, u
+    else:
+        p[0], p[1], p[2], p[3] = z, v, u, e3
+    normalise(p)
+    side = p[0] * poses[at + P] + p[1] * poses[at + P + 1] + p[2] * poses[at + P + 2] + p[3] * poses[at + P + 3]
+    if side < 0.0:
+        for i in range(4):
+            p[i] = -p[i]

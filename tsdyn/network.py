@@ -1,0 +1,144 @@
+"""The graph of a scene for the basis-free forms: which rows meet at which bodies, and where their products go.
+
+Normalisation rows are no part of it: in terms of (dr, dpi') every body's is fulfilled (see body_loops). What is left
+of Phi_q W Phi_q^T, S = H W H^T, couples rows that share a body; its blocks, their order of elimination and all places
+are found once for a scene.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .attachment import address
+from .blocks import Pattern, analyse
+from .body_loops import BODY, INTS, MASK, ROW
+from .errors import InvalidConstraint
+
+# columns of Network.kinds: addresses of the loops, then where a kind's instances are
+REDUCED, VALUES, BIAS, DRIFT, N_COUNT, N_REALS, N_FIRST_INT, N_FIRST_REAL, N_COLUMNS = range(9)
+# columns of Network.products
+P_LEFT, P_ROWS, P_RIGHT, P_COLUMNS, P_TARGET, P_STRIDE, P_SAME, P_WIDTH = range(8)
+W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
+
+
+class Network(NamedTuple):
+    """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H."""
+
+    bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length 7 or 3
+    kinds: np.ndarray  # int64 (kinds, N_COLUMNS)
+    table: np.ndarray  # int64: body_loops.INTS for each instance
+    sides: np.ndarray  # int64 (m, 2): the bodies of a row; nb is the ground
+    row: np.ndarray  # int64 (m,): its place among the rows of Phi
+    products: np.ndarray  # int64 (products, P_WIDTH): rows of sides that meet at a body, and where their product goes
+    inverse: np.ndarray  # ((nb + 1) 16,): 1 / m and three zeros, columns of J'^-1; zero for the ground
+    mass: np.ndarray  # ((nb + 1) 16,): m and three zeros, columns of J'
+    spins: np.ndarray  # int64 (nb,): whether omega' x J' omega' is ever other than zero
+    pattern: Pattern  # of S
+
+
+def is_regular(scene):
+    """Whether all inertias can be inverted; a body without inertia about an axis needs D^T M D."""
+    for body in scene.bodies:
+        if body.dimension == 7:
+            principal = np.linalg.eigvalsh(body.values["inertia"])
+            if not principal[0] > 1e-12 * principal[2]:
+                return False
+    return True
+
+
+def build(scene, packed):
+    """The network of a packed scene, with the addresses of the loops still zero, and the classes of its kinds."""
+    system = packed.system
+    bodies = {id(body): i for i, body in enumerate(scene.bodies)}
+    nb = len(bodies)
+    joints, row = [], 0
+    for constraint in packed.constraints:
+        if not constraint.normalises:
+            pair = tuple(bodies.get(id(body), nb) for body in (constraint.a, constraint.b))
+            joints.append((constraint, pair, row))
+        row += constraint.rows
+    nodes, sizes, inside = {}, [], []
+    for constraint, pair, _ in joints:
+        node = nodes.setdefault(tuple(sorted(pair)), len(nodes))
+        if node == len(sizes):
+            sizes.append(0)
+        inside.append((node, sizes[node]))
+        sizes[node] += constraint.rows
+    cliques = [[] for _ in range(nb)]
+    for pair, node in nodes.items():
+        for body in set(pair) - {nb}:
+            cliques[body].append(node)
+    starts, pattern, where = analyse(sizes, cliques)
+
+    m = sum(sizes)
+    firsts = [int(starts[node]) + offset for node, offset in inside]
+    sides, places = np.zeros((m, 2), np.int64), np.zeros(m, np.int64)
+    at_body = [[] for _ in range(nb)]
+    for i, (constraint, pair, row) in enumerate(joints):
+        e = np.arange(firsts[i], firsts[i] + constraint.rows)
+        sides[e], places[e] = pair, np.arange(row, row + constraint.rows)
+        for side, body in enumerate(pair):
+            if body < nb:
+                at_body[body].append((i, side))
+    products = []
+    for found in at_body:
+        for i, side in found:
+            for j, other in found:
+                if firsts[i] > firsts[j]:
+                    continue
+                (node, r), (other_node, c) = inside[i], inside[j]
+                target, stride, _ = where(node, other_node)
+                target += r * stride + c
+                left, right = 16 * firsts[i] + 8 * side, 16 * firsts[j] + 8 * other
+                rows, columns = joints[i][0].rows, joints[j][0].rows
+                products.append((left, rows, right, columns, target, stride, int(i == j)))
+
+    index = {id(constraint): i for i, (constraint, _, _) in enumerate(joints)}
+    classes = dict.fromkeys(type(constraint) for constraint in packed.constraints)
+    kinds, table, used = [], [], []
+    for kind, packed_kind in zip(classes, system.kinds, strict=True):
+        if kind.normalises:
+            continue
+        first = len(table)
+        for constraint in (c for c in packed.constraints if type(c) is kind):
+            i = index[id(constraint)]
+            entry = [0] * INTS
+            entry[BODY : BODY + 2], entry[ROW], entry[MASK] = joints[i][1], firsts[i], 0
+            table += entry
+        _, _, _, phi_t, count, stride, _, first_real, _ = packed_kind
+        kinds.append([0, 0, 0, int(phi_t != 0), count, stride, first, first_real])
+        used.append(kind)
+
+    inverse, mass = np.zeros((nb + 1, WEIGHTS)), np.zeros((nb + 1, WEIGHTS))
+    spins = np.zeros(nb, np.int64)
+    for i, body in enumerate(scene.bodies):
+        inverse[i, W_MASS], mass[i, W_MASS] = 1.0 / body.values["mass"], body.values["mass"]
+        if body.dimension == 7:
+            J = body.values["inertia"]
+            inverse[i, W_ROTATION:].reshape(3, 4)[:, :3] = np.linalg.inv(J)
+            mass[i, W_ROTATION:].reshape(3, 4)[:, :3] = J
+            spins[i] = (J != J[0, 0] * np.eye(3)).any()
+    network = Network(
+        bodies=system.bodies,
+        kinds=np.array(kinds, np.int64).reshape(-1, N_COLUMNS),
+        table=np.array(table, np.int64),
+        sides=sides,
+        row=places,
+        products=np.array(products, np.int64).reshape(-1, P_WIDTH),
+        inverse=inverse.ravel(),
+        mass=mass.ravel(),
+        spins=spins,
+        pattern=pattern,
+    )
+    return network, tuple(used)
+
+
+def with_loops(network, kinds, *columns):
+    """The network with the addresses of these loops, which are loaded now."""
+    names = {REDUCED: "reduced", VALUES: "values", BIAS: "bias", DRIFT: "drift"}
+    table = network.kinds.copy()
+    for row, kind in zip(table, kinds, strict=True):
+        for column in columns:
+            if column != DRIFT or row[DRIFT] != 0:
+                row[column] = address(kind.kernels, names[column], kind.__name__, InvalidConstraint)
+    return network._replace(kinds=table)

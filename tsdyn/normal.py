@@ -1,0 +1,79 @@
+"""Products with H, the rows of [Phi_r, Phi_pi'] of a network: S = H W H^T, its sides, and the way to and from bodies.
+
+Quantities of bodies are rows of eight floats, (linear, 0, angular in the body frame, 0); the last row is the ground's.
+"""
+
+from ._four import add, fma, four, put, splat, times, total
+from ._kernel import kernel
+from .network import (
+    P_COLUMNS,
+    P_LEFT,
+    P_RIGHT,
+    P_ROWS,
+    P_SAME,
+    P_STRIDE,
+    P_TARGET,
+    W_MASS,
+    W_ROTATION,
+    WEIGHTS,
+)
+
+
+@kernel
+def weigh(weights, at, values, i, out, o):
+    """out[o : o + 8] = the weights of one body, 1 / m and J'^-1 or m and J', times values[i : i + 8]."""
+    w = at * WEIGHTS
+    f = times(four(weights, w + W_ROTATION), splat(values[i + 4]))
+    f = fma(four(weights, w + W_ROTATION + 4), splat(values[i + 5]), f)
+    f = fma(four(weights, w + W_ROTATION + 8), splat(values[i + 6]), f)
+    put(out, o, times(four(values, i), splat(weights[w + W_MASS])))
+    put(out, o + 4, f)
+
+
+@kernel
+def weigh_rows(network, H, Y):
+    """Y = W H^T, side by side."""
+    for e in range(network.sides.shape[0]):
+        for k in range(2):
+            at = 16 * e + 8 * k
+            weigh(network.inverse, network.sides[e, k], H, at, Y, at)
+
+
+@kernel
+def _inner(H, h, Y, y):
+    return total(fma(four(H, h), four(Y, y), times(four(H, h + 4), four(Y, y + 4))))
+
+
+@kernel
+def multiply_rows(network, H, Y, values):
+    """The upper triangle of H Y^T, Y = W H^T, into the blocks of the pattern, with zeros where elimination fills in."""
+    for i in range(values.size):
+        values[i] = 0.0
+    for i in range(network.products.shape[0]):
+        product = network.products[i]
+        left, right, target, stride = product[P_LEFT], product[P_RIGHT], product[P_TARGET], product[P_STRIDE]
+        same = product[P_SAME] != 0
+        for r in range(product[P_ROWS]):
+            for c in range(r if same else 0, product[P_COLUMNS]):
+                values[target + r * stride + c] += _inner(H, left + 16 * r, Y, right + 16 * c)
+
+
+@kernel
+def gather(network, H, Z, out):
+    """out = H Z."""
+    for e in range(network.sides.shape[0]):
+        at, a, b = 16 * e, 8 * network.sides[e, 0], 8 * network.sides[e, 1]
+        f = fma(four(H, at), four(Z, a), times(four(H, at + 4), four(Z, a + 4)))
+        g = fma(four(H, at + 8), four(Z, b), times(four(H, at + 12), four(Z, b + 4)))
+        out[e] = total(add(f, g))
+
+
+@kernel
+def scatter(network, Y, lam, Z):
+    """Z -= Y^T lam."""
+    for e in range(network.sides.shape[0]):
+        f = splat(-lam[e])
+        for k in range(2):
+            at, z = 16 * e + 8 * k, 8 * network.sides[e, k]
+            put(Z, z, fma(four(Y, at), f, four(Z, z)))
+            put(Z, z + 4, fma(four(Y, at + 4), f, four(Z, z + 4)))

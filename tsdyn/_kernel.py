@@ -207,6 +207,17 @@ integers = _viewer(_integers)
 
 
 @intrinsic
+def data_of(typing, array):
+    """The address of an array's first number."""
+
+    def generate(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, value=arguments[0]).data
+        return builder.ptrtoint(data, _i64)
+
+    return types.int64(array), generate
+
+
+@intrinsic
 def address_of(typing, value):
     """The address of a copy of a named tuple of arrays, valid until the calling kernel returns."""
 
@@ -292,6 +303,10 @@ if DEBUG:
         return array.reshape(-1)[: n * m].reshape(n, m)
 
     integers = vector
+
+    def data_of(array):
+        """The array itself."""
+        return array
 
     def address_of(value):
         """The value itself."""

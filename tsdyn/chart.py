@@ -20,7 +20,7 @@ from .newton import OK, SINGULAR, invert_normal_matrix, normal_matrix, update_b
 from .workspace import CHARTS, CONDITION, CONDITION_M0, CONTRACTION, FLOOR, RATE, SIZE
 
 # reasons to leave a chart, as stored; REASONS names them
-STAY, BY_CONTRACTION, BY_CONDITION, BY_OFFSET, BY_INTERVAL, BY_FAILURE, AT_START = range(7)
+STAY, BY_CONTRACTION, BY_CONDITION, BY_OFFSET, BY_INTERVAL, BY_FAILURE, AT_START, BY_SERIES = range(8)
 REASONS = (
     "",
     "contraction",
@@ -29,6 +29,7 @@ REASONS = (
     "chart_interval",
     "failed step",
     "start",
+    "step of a series",
 )
 
 CONTRACTION_LIMIT = 0.15

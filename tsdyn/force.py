@@ -21,6 +21,7 @@ from types import MappingProxyType
 import numpy as np
 
 from . import force_loops as loops
+from . import force_series, series_loops
 from ._kernel import Callback, kernel, specialised
 from .attachment import Attachment, inlined, layout, static_kernel
 from .checks import number
@@ -31,7 +32,7 @@ from .signal import Signal
 
 _registry = {}
 _KERNELS = {"law": 5}  # and their numbers of arguments
-_OPTIONAL = {"potential": 3, "dissipation": 4, "remember": 4}
+_OPTIONAL = {"potential": 3, "dissipation": 4, "remember": 4, "series": 6}
 
 
 class Force(Attachment):
@@ -62,6 +63,7 @@ class Force(Attachment):
 
     error = InvalidForce
     memory = 0
+    slots = 0
     analytic = True
     quantities = MappingProxyType({})
     loads = ()
@@ -182,4 +184,9 @@ def callbacks(cls, functions, owner=None):
         home = getattr(functions["remember"], "py_func", functions["remember"])
         names["kernel_remember"] = inlined(functions["remember"])
         result["remember"] = Callback(specialised(loops.remembers, f"{label}.remember_loop", home, **names), SIGNATURE)
+    if "series" in functions:
+        home = getattr(functions["series"], "py_func", functions["series"])
+        names.update(kernel_series=inlined(functions["series"]), SLOTS=cls.slots)
+        copy = specialised(force_series.series, f"{label}.series_loop", home, **names)
+        result["series"] = Callback(copy, series_loops.SIGNATURE)
     return MappingProxyType(result)

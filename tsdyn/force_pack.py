@@ -80,7 +80,7 @@ def with_force_jacobians(packed):
     """The system of a packed scene with the forces' Jacobian loops, which are loaded now; and the floats they keep."""
     rows, total = packed.system.forces.copy(), 0
     for row in rows:
-        force = _members(row, packed.loads)[0].force
+        force = members_of(row, packed.loads)[0].force
         row[FORCE_JACOBIAN], row[F_KEPT] = _address(force, "jacobian"), total
         total += row[F_COUNT] * kept_size(force.markers)
     return packed.system._replace(forces=rows), int(total)
@@ -90,7 +90,7 @@ def find_forces(system, loads):
     """Write this process's addresses into the rows of an unpickled system; the loads with theirs."""
     signals, rows = iter(system.signals), {}
     for row in system.forces:
-        members = _members(row, loads)
+        members = members_of(row, loads)
         row[FORCE], row[FORCE_JACOBIAN] = _address(members[0].force, "force"), 0
         row[F_REMEMBER] = _address(members[0].force, "remember") if row[F_REMEMBER] else 0
         for load in members:
@@ -103,7 +103,7 @@ def find_forces(system, loads):
     return tuple(rows[id(load)] for load in loads)
 
 
-def _members(row, loads):
+def members_of(row, loads):
     """The loads that a row of System.forces runs."""
     return [load for load in loads if (load.row[[FORCE, F_REALS]] == row[[FORCE, F_REALS]]).all()]
 

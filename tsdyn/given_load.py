@@ -41,6 +41,13 @@ class Given:
         for i in range(3):
             out[i] = par[i] + 0.0 * x[i]
 
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """The vector at order zero."""
+        if k == 0:
+            for i in range(3):
+                out[i] = par[i]
+
 
 class GivenInBody:
     """Mixed in before `Given`, with the markers' Parameters second: in axes of the body."""

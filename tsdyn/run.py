@@ -28,6 +28,7 @@ from .errors import Status
 from .implicit import KNOWN, T_BEFORE
 from .interpolation import call_fill
 from .linalg import copy
+from .outputs import record, restore_now, store_now
 from .run_state import (
     ADAPTIVE,
     AGAIN,
@@ -46,7 +47,6 @@ from .run_state import (
     NEXT_EVAL,
     REJECTED,
     REJECTED_LAST,
-    ROWS,
     STAGE_AT,
     STEPS,
     STEPS_WANTED,
@@ -99,32 +99,6 @@ def _begin_chart(context, w, r, at, reason):
 
 
 @kernel
-def _record(r, t, q, qd, qdd):
-    n, i = q.size, r.numbers[ROWS]
-    row = r.out[i]
-    row[0] = t
-    for j in range(n):
-        row[1 + j], row[1 + n + j], row[1 + 2 * n + j] = q[j], qd[j], qdd[j]
-    for j in range(r.remembered.size):
-        row[1 + 3 * n + j] = r.remembered[j]
-    r.numbers[ROWS] = i + 1
-
-
-@kernel
-def _store_now(w, r):
-    copy(w.q, r.now[0])
-    copy(w.qd, r.now[1])
-    copy(w.qdd, r.now[2])
-
-
-@kernel
-def _restore_now(w, r):
-    copy(r.now[0], w.q)
-    copy(r.now[1], w.qd)
-    copy(r.now[2], w.qdd)
-
-
-@kernel
 def _wanted_within(r, t1):
     """Whether the step's inside is asked for."""
     i = r.numbers[NEXT_EVAL]
@@ -150,7 +124,7 @@ def _fill(context, w, r, at, t0, h, t1):
 def _outputs(context, w, r, at, t0, h, t1):
     """Record what t_eval asks for in (t0, t1], or the step's end where it asks for nothing. Status."""
     if r.t_eval.size == 0:
-        _record(r, t1, w.q, w.qd, w.qdd)
+        record(r, t1, w.q, w.qd, w.qdd)
     within = _wanted_within(r, t1)
     if within:
         keep(w, r.warm)
@@ -161,15 +135,15 @@ def _outputs(context, w, r, at, t0, h, t1):
         t = r.t_eval[r.numbers[NEXT_EVAL]]
         r.numbers[NEXT_EVAL] += 1
         if t == t1:
-            _record(r, t1, r.now[0], r.now[1], r.now[2])
+            record(r, t1, r.now[0], r.now[1], r.now[2])
             continue
         status = between(context, w, at, t, r.block, r.xs, r.ys, r.yds, r.dx)  # xd is the next step's
         if status != 0:
             return status
-        _record(r, t, w.q, w.qd, w.qdd)
+        record(r, t, w.q, w.qd, w.qdd)
     if within:
         bring_back(w, r.warm)
-        _restore_now(w, r)
+        restore_now(w, r)
     return 0
 
 
@@ -180,14 +154,14 @@ def _begin(context, w, r, at):
     if status == 0:
         status = evaluate(context, w, at, r.clock[T], r.x, r.y, r.yd, r.xd)
     if status == 0:
-        _store_now(w, r)
+        store_now(w, r)
         call_check(at[A_CHECK], context)
         wanted = r.t_eval.size == 0
         if not wanted and r.t_eval[0] == r.clock[T]:
             wanted = True
             r.numbers[NEXT_EVAL] = 1
         if wanted:
-            _record(r, r.clock[T], w.q, w.qd, w.qdd)
+            record(r, r.clock[T], w.q, w.qd, w.qdd)
     return status
 
 
@@ -264,7 +238,7 @@ def advance(c, r, at, most):
         elif adaptive and status == STAGE_FAILED:
             r.numbers[FAILED] = status
             bring_back(w, r.warm)
-            _restore_now(w, r)
+            restore_now(w, r)
             r.numbers[REJECTED] += 1
             if r.numbers[REJECTED_LAST] == AGAIN:
                 c.linear.numbers[KNOWN] = 0.0
@@ -277,7 +251,7 @@ def advance(c, r, at, most):
             if not w.control[CONTRACTION] < CONTRACTION_LOST:
                 status = CHART_LOST
         if status != 0:  # back to the start of the step, on a new chart if this one has been used
-            _restore_now(w, r)
+            restore_now(w, r)
             r.numbers[REJECTED] += 1
             if r.numbers[IN_CHART] == 0:
                 if not adaptive:
@@ -301,7 +275,7 @@ def advance(c, r, at, most):
             for j in range(3):
                 copy(r.now[j], r.before[j])
             c.linear.numbers[T_BEFORE] = t0
-        _store_now(w, r)
+        store_now(w, r)
         remember(c.system, w.q, w.qd, t1, r.remembered)
         r.clock[T] = t1
         r.numbers[STEPS] = i + 1
@@ -312,7 +286,7 @@ def advance(c, r, at, most):
         if status != 0:
             return status
         if reason != 0 and not last:
-            _restore_now(w, r)
+            restore_now(w, r)
             status = _begin_chart(context, w, r, at, reason)
             if status != 0:
                 return status

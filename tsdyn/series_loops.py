@@ -14,7 +14,7 @@ beyond order zero, nor in (2); that of the ground has no force.
 """
 
 from ._four import add, cross, fma, four, lanes, put, splat, times, total
-from ._kernel import ANY, caller, integers, kernel, matrix, stack, stack2, vector
+from ._kernel import ANY, caller, data_of, integers, kernel, matrix, stack, stack2, vector
 from .body_loops import INTS, MASK, ROW
 from .markers import POINT
 from .poses import turned
@@ -80,7 +80,7 @@ def series(mode, k, orders, count, stride, table, reals, bodies, values, b, Z):
             for r in range(ROWS):
                 for c in range(SIZE):
                     f[r, c] = 0.0
-            kernel_series(x, real[3 * MARKERS :], k, matrix(values[first + orders * WIDTH :], SLOTS, orders), f)
+            kernel_series(x, real[3 * MARKERS :], k, matrix(data_of(values[first + orders * WIDTH :]), SLOTS, orders), f)
             for r in range(ROWS):
                 for j in range(MARKERS):
                     c = STARTS[j]

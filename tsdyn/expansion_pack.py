@@ -1,0 +1,107 @@
+"""The memory of a Taylor run, and which parts of a scene have no series."""
+
+import numpy as np
+
+from . import force_series
+from .attachment import address
+from .bodies import Ground
+from .body_loops import INTS, MASK
+from .errors import InvalidConstraint, InvalidForce
+from .force_pack import F_FIRST_REAL, F_REALS, members_of
+from .motion import Motion
+from .network import N_COUNT, N_FIRST_INT
+from .signal import Signal
+from .series_loops import BODY_ROW, GROUND, instance_width
+from .taylor import Expansion
+
+
+def without_series(packed):
+    """Names of the constraints and forces that have no series, each with the reason."""
+    found = []
+    for constraint, given in zip(packed.constraints, packed.parameters, strict=True):
+        if constraint.normalises:
+            continue
+        if any(isinstance(value, Motion) for value in given):
+            found.append(f"{constraint.name} (a function of time)")
+        elif "series" not in constraint.kernels:
+            found.append(f"{constraint.name} ({type(constraint).__name__} gives no series)")
+    for load in packed.loads:
+        if any(isinstance(value, Signal) for value in load.parameters):
+            found.append(f"{load.force.name} (a function of time or a table)")
+        elif "series" not in load.force.kernels:
+            found.append(f"{load.force.name} ({type(load.force).__name__} gives no series)")
+    return found
+
+
+def allocate_expansion(network, kinds, packed, order):
+    """Lay out the series of a method of this order (of omega'), with the addresses of the loops, loaded now."""
+    orders = order + 2
+    nb = len(network.bodies)
+    bodies = np.zeros((nb + 1, orders, BODY_ROW))
+    bodies[:, 0, [0, 5, 10]] = 1.0
+    places, total = np.zeros((len(kinds), 2), np.int64), 0
+    for i, kind in enumerate(kinds):
+        places[i] = address(kind.kernels, "series", kind.__name__, InvalidConstraint), total
+        width = instance_width(len(kind.markers), kind.rows, kind.slots, orders)
+        total += int(network.kinds[i, N_COUNT]) * width
+    forces, table, loads = _forces(packed, orders)
+    return Expansion(
+        order=np.array([order, orders]),
+        bodies=bodies.ravel(),
+        constraints=np.zeros(total + 4),
+        places=places,
+        forces=forces,
+        table=table,
+        loads=loads,
+    )
+
+
+def _forces(packed, orders):
+    """Expansion.forces, .table and .loads."""
+    nb = len(packed.bodies)
+    index = {id(body): i for i, body in enumerate(packed.bodies)}
+    rows, table, total = [], [], 0
+    for row in packed.system.forces:
+        members = members_of(row, packed.loads)
+        kind = members[0].force
+        series = address(kind.kernels, "series", kind.name, InvalidForce)
+        rows.append([series, total, len(members), row[F_REALS], len(table), row[F_FIRST_REAL]])
+        total += len(members) * force_series.instance_width(len(kind.markers), kind.slots, orders)
+        for load in members:
+            pair = [index.get(id(body), nb) for body in (load.force.a, load.force.b)]
+            table += [*pair, (pair[0] == nb) | (pair[1] == nb) << 1]
+    return np.array(rows, np.int64).reshape(-1, 6), np.array(table, np.int64), np.zeros(total + 4)
+
+
+def masks(network, packed, kinds):
+    """Write into the network's table which markers' columns vary along a motion, and which are on the ground.
+
+    Columns are constant where the primitive's own series says so for a random motion.
+    """
+    rng = np.random.default_rng(0)
+    for row, kind in zip(network.kinds, kinds, strict=True):
+        members = [c for c in packed.constraints if type(c) is kind]
+        patterns = {}
+        for i, constraint in enumerate(members):
+            grounded = tuple(isinstance(constraint.body_of(marker), Ground) for marker in kind.markers)
+            if grounded not in patterns:
+                patterns[grounded] = _mask(kind, packed, constraint, grounded, rng)
+            network.table[row[N_FIRST_INT] + i * INTS + MASK] = patterns[grounded]
+
+
+def _mask(kind, packed, constraint, grounded, rng):
+    series = getattr(kind.series, "py_func", kind.series)
+    par = packed.parameters[[c is constraint for c in packed.constraints].index(True)]
+    size = 3 * len(kind.markers)
+    scratch, varies = np.zeros((kind.slots, 5)), np.zeros(size, bool)
+    for k in range(4):
+        x, out = rng.normal(size=size), np.zeros((kind.rows, size))
+        if k > 0:
+            x[np.repeat(grounded, 3)] = 0.0
+        series(x, np.array(par, float), k, scratch, out)
+        if k > 0:
+            varies |= out.any(axis=0)
+    bits = [bool(varies[3 * j : 3 * j + 3].any()) << j for j in range(len(kind.markers))]
+    bits += [bool(on) << (GROUND + j) for j, on in enumerate(grounded)]
+    return sum(bits)
+

@@ -33,12 +33,12 @@ def without_series(packed):
     return found
 
 
-def allocate_expansion(network, kinds, packed, order):
-    """Lay out the series of a method of this order (of omega'), with the addresses of the loops, loaded now."""
-    orders = order + 2
+def allocate_expansion(network, kinds, packed, order, lowest, highest):
+    """Lay out the series of a method that begins with this order (of omega'); the loops are loaded now."""
+    orders = highest + 2
     nb = len(network.bodies)
-    bodies = np.zeros((nb + 1, orders, BODY_ROW))
-    bodies[:, 0, [0, 5, 10]] = 1.0
+    bodies = np.zeros((nb + 1, orders * BODY_ROW))
+    bodies[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
     places, total = np.zeros((len(kinds), 2), np.int64), 0
     for i, kind in enumerate(kinds):
         places[i] = address(kind.kernels, "series", kind.__name__, InvalidConstraint), total
@@ -46,7 +46,7 @@ def allocate_expansion(network, kinds, packed, order):
         total += int(network.kinds[i, N_COUNT]) * width
     forces, table, loads = _forces(packed, orders)
     return Expansion(
-        order=np.array([order, orders]),
+        order=np.array([order, orders, order, lowest, highest]),
         bodies=bodies.ravel(),
         constraints=np.zeros(total + 4),
         places=places,

@@ -17,6 +17,7 @@ class Free(NamedTuple):
     b: np.ndarray  # (m,)  right-hand sides and solutions
     gamma: np.ndarray  # (m,)  acceleration bias in terms of omega'; body_loops.bias
     Z: np.ndarray  # ((b + 1) * 8,)  forces, then accelerations of bodies
+    a: np.ndarray  # ((b + 1) * 8,)  accelerations of bodies; taylor
     Q: np.ndarray  # (n,)  applied forces
     p: np.ndarray  # (4,)  scratch
     sizes: np.ndarray  # (SIZES,)  numbers about the last landing, below
@@ -33,5 +34,5 @@ def allocate_free(network, n):
     zeros = np.zeros
     return Free(
         poses.ravel(), zeros(16 * m), zeros(16 * m), zeros(network.pattern.shape[2]), zeros(m), zeros(m),
-        zeros(8 * (nb + 1)), zeros(n), zeros(4), zeros(SIZES),
+        zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n), zeros(4), zeros(SIZES),
     )  # fmt: skip

@@ -9,12 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ._four import four, put, splat, times
 from ._kernel import entry, kernel
 from .assembly import remember, set_time
 from .chart import AT_START, BY_SERIES
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
 from .errors import Status
-from .expansion import begin, expand, run_loops
+from .expansion import begin, expand
 from .free import RESIDUAL, Free
 from .free_accelerations import accelerate_bodies
 from .landing import land, land_velocities, sum_series
@@ -40,7 +41,7 @@ from .run_state import (
     H,
     T,
 )
-from .series_loops import BODY_ROW, S_OMEGA, S_R, UPDATE
+from .series_loops import BODY_ROW, S_OMEGA, S_R
 from .system import System
 from .workspace import CHARTS, EVALUATIONS, Work
 
@@ -49,10 +50,14 @@ NOT_FINITE = int(Status.NOT_FINITE)
 MISSED = 100.0  # times the tolerance: a landing further away than this is no truncation error
 
 
+STEP_COST = 3  # of a step's landing, in orders
+TOP, ORDERS, NEXT, LOWEST, HIGHEST = range(5)  # of Expansion.order
+
+
 class Expansion(NamedTuple):
     """The series of a step; orders is what fits, from zero to two above the order of the method."""
 
-    order: np.ndarray  # int64 (2,): that of omega' and of the estimates; orders of each series
+    order: np.ndarray  # int64 (5,): TOP of omega', one less than that of r and A; room for; the next step's; bounds
     bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
     constraints: np.ndarray  # each kind's instances; series_loops.series
     places: np.ndarray  # int64 (kinds, 2): addresses of the loops; where a kind's series begin
@@ -75,17 +80,14 @@ class TaylorContext(NamedTuple):
 def _begin_series(c, t):
     """Orders up to one of omega' and two of r, at the poses; qdd from them."""
     w, x, f = c.work, c.expansion, c.free
-    orders = x.order[1]
-    begin(c.network, f.poses, orders, x.bodies)
-    run_loops(c.network, c.system.reals, UPDATE, 0, orders, x.bodies, x.constraints, x.places, f.b, f.Z)
-    run_loops(c.network, c.system.reals, UPDATE, 1, orders, x.bodies, x.constraints, x.places, f.b, f.Z)
+    orders = x.order[ORDERS]
+    begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
     expand(c.network, c.system, 0, orders, x, f)
     for b in range(c.network.bodies.shape[0]):
         at = b * orders * BODY_ROW
-        for i in range(3):
-            f.Z[8 * b + i] = 2.0 * x.bodies[at + 2 * BODY_ROW + S_R + i]
-            f.Z[8 * b + 4 + i] = x.bodies[at + BODY_ROW + S_OMEGA + i]
-    write_accelerations(c.network.bodies, f.poses, f.Z, w.qdd)
+        put(f.a, 8 * b, times(four(x.bodies, at + S_R * orders + 8), splat(2.0)))
+        put(f.a, 8 * b + 4, four(x.bodies, at + S_OMEGA * orders + 4))
+    write_accelerations(c.network.bodies, f.poses, f.a, w.qdd)
 
 
 @kernel
@@ -108,7 +110,7 @@ def _land_here(c, t):
 @kernel
 def state_within(c, h, t):
     """q, qd, qdd at h after the series' origin, t being the time there. Status."""
-    sum_series(c.network, c.expansion.bodies, c.expansion.order[1], c.expansion.order[0], h, c.free.poses, c.free.p)
+    sum_series(c.network, c.expansion.bodies, c.expansion.order[ORDERS], c.expansion.order[TOP], h, c.free.poses, c.free.p)
     status = _land_here(c, t)
     if status == 0:
         accelerate_bodies(c.network, c.system, c.work, c.free, t)
@@ -116,43 +118,56 @@ def state_within(c, h, t):
 
 
 @kernel
-def _size(bodies, nb, orders, k, scale):
-    """The largest coefficient k of r and A, and k - 1 of omega', each over what is tolerated of it."""
+def _size(bodies, nb, orders, k, far, fast):
+    """The largest coefficient k of A and of r over far, and k - 1 of omega' over fast."""
     worst = 0.0
     for b in range(nb):
-        at = (b * orders + k) * BODY_ROW
-        turn = 0.0
+        at = b * orders * BODY_ROW
+        turn, shift, spin = 0.0, 0.0, 0.0
         for i in range(12):
-            turn = max(turn, abs(bodies[at + i]))
+            turn = max(turn, abs(bodies[at + 12 * k + i]))
         for i in range(3):
-            worst = max(worst, abs(bodies[at + S_R + i]) / scale[0])
-            worst = max(worst, abs(bodies[at - BODY_ROW + S_OMEGA + i]) / scale[2])
-        worst = max(worst, turn / scale[1])
+            shift = max(shift, abs(bodies[at + S_R * orders + 4 * k + i]))
+            spin = max(spin, abs(bodies[at + S_OMEGA * orders + 4 * (k - 1) + i]))
+        worst = max(worst, max(turn, max(shift * far, spin * fast)))
     return worst
 
 
 @kernel
+def _radius(bodies, nb, orders, top, far, fast):
+    """The radius of convergence as the last coefficients up to top + 1 have it (Jorba, Zou, 2005); 0 if not finite.
+
+    More than their two: where a motion began at rest every fourth coefficient can vanish.
+    """
+    rho = math.inf
+    for k in range(top + 1, max(top - 3, 1), -1):
+        size = _size(bodies, nb, orders, k, far, fast)
+        if not size < math.inf:
+            return 0.0
+        if size > 0.0:
+            rho = min(rho, size ** (-1.0 / k))
+    return rho
+
+
+@kernel
 def _step_length(c, r):
-    """From the last two coefficients (Jorba, Zou, Experiment. Math. 14, 2005, section 3), each over its tolerance."""
+    """h = rho tol^(1 / (top + 2)); and the order of the next step, that with the longer step for the work."""
     x, nb = c.expansion, c.network.bodies.shape[0]
-    top, orders = x.order[0], x.order[1]
+    top, orders = x.order[TOP], x.order[ORDERS]
     rtol, atol = r.clock[RTOL], r.clock[ATOL]
-    scale = c.free.p
     far, fast = 0.0, 0.0
     for b in range(nb):
         at = b * orders * BODY_ROW
         for i in range(3):
-            far = max(far, abs(x.bodies[at + S_R + i]))
-            fast = max(fast, abs(x.bodies[at + S_OMEGA + i]))
-    scale[0], scale[1], scale[2] = atol + rtol * far, atol + rtol, atol + rtol * fast
-    last, before = _size(x.bodies, nb, orders, top + 1, scale), _size(x.bodies, nb, orders, top, scale)
-    if not (last < math.inf and before < math.inf):
-        return 0.0
-    h = math.inf
-    if last > 0.0:
-        h = last ** (-1.0 / (top + 1))
-    if before > 0.0:
-        h = min(h, before ** (-1.0 / top))
+            far = max(far, abs(x.bodies[at + S_R * orders + i]))
+            fast = max(fast, abs(x.bodies[at + S_OMEGA * orders + i]))
+    tol = atol + rtol
+    far, fast = tol / (atol + rtol * far), tol / (atol + rtol * fast)
+    h = _radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2))
+    if x.order[HIGHEST] > x.order[LOWEST]:
+        lower = _radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top)
+        change = 1 if h * (top + STEP_COST - 2) > lower * (top + STEP_COST) else -1
+        x.order[NEXT] = min(max(top + change, x.order[LOWEST]), x.order[HIGHEST])
     return h
 
 
@@ -205,7 +220,7 @@ def _begin_run(c, r):
 def _reach(c, t0, t1):
     """The state at the end of the step, but for qdd. Status."""
     x = c.expansion
-    sum_series(c.network, x.bodies, x.order[1], x.order[0], t1 - t0, c.free.poses, c.free.p)
+    sum_series(c.network, x.bodies, x.order[ORDERS], x.order[TOP], t1 - t0, c.free.poses, c.free.p)
     return _land_here(c, t1)
 
 
@@ -239,9 +254,10 @@ def advance_series(c, r, most):
         t0 = r.clock[T]
         if t0 >= r.clock[T_END]:
             return 0
-        for k in range(1, x.order[0]):
-            expand(c.network, c.system, k, x.order[1], x, f)
-        w.counters[EVALUATIONS] += x.order[0]
+        x.order[TOP] = x.order[NEXT]
+        for k in range(1, x.order[TOP]):
+            expand(c.network, c.system, k, x.order[ORDERS], x, f)
+        w.counters[EVALUATIONS] += x.order[TOP]
         h, t1, last = min(_step_length(c, r), r.clock[MAX_STEP]), t0, False
         if r.numbers[STEPS] == 0 and r.clock[H] > 0.0:
             h = min(h, r.clock[H])

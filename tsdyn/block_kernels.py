@@ -200,6 +200,11 @@ def factor_lu(pattern, lower, upper, limit):
     for j in range(heads.size):
         first, width, below, above = starts[j], widths[j], lower[heads[j] :], upper[heads[j] :]
         size = starts[j + 1] - first
+        if size == 3 and width == 6 and updates[j + 1] - updates[j] == 1:
+            failed = _link_lu(below, above, lower, upper, pattern.records[6 * updates[j] :], kept[first:], limit)
+            if failed >= 0:
+                return first + failed
+            continue
         for k in range(0, size, 3):
             l, u, count = below[k * (width + 1) :], above[k * (width + 1) :], min(3, size - k)
             failed = _eliminate_lu(l, u, count, width, width - k, kept[first + k :], limit)
@@ -264,6 +269,56 @@ def _eliminate_lu(l, u, size, width, n, kept, limit):
 
 
 @kernel
+def _link_lu(l, u, lower, upper, record, kept, limit):
+    """Eliminate a 3 x 3 block that updates one other, as in a chain; which row fails, or -1."""
+    target, stride = record[4], record[5]
+    v, w, m, n = u[6:], u[12:], l[6:], l[12:]
+    u00, u01, u02, l01, l02 = u[0], u[1], u[2], l[1], l[2]
+    if not limit * abs(kept[0]) < abs(u00) < math.inf:
+        return 0
+    d0 = 1.0 / u00
+    f01, f02, g01, g02 = l01 * d0, l02 * d0, u01 * d0, u02 * d0
+    u11, u12, l12 = v[1] - f01 * u01, v[2] - f01 * u02, m[2] - g01 * l02
+    if not limit * abs(kept[1]) < abs(u11) < math.inf:
+        return 1
+    d1 = 1.0 / u11
+    f12, g12 = l12 * d1, u12 * d1
+    u22 = w[2] - f02 * u02 - f12 * u12
+    if not limit * abs(kept[2]) < abs(u22) < math.inf:
+        return 2
+    d2 = 1.0 / u22
+    u[0], v[1], v[2], w[2] = d0, d1, u12, d2
+    l[0], m[1], m[2], n[2] = d0, d1, l12, d2
+    a0, a1, a2 = u[3], u[4], u[5]
+    b0, b1, b2 = v[3] - f01 * a0, v[4] - f01 * a1, v[5] - f01 * a2
+    c0, c1, c2 = w[3] - f02 * a0 - f12 * b0, w[4] - f02 * a1 - f12 * b1, w[5] - f02 * a2 - f12 * b2
+    v[3], v[4], v[5] = b0, b1, b2
+    w[3], w[4], w[5] = c0, c1, c2
+    x0, x1, x2 = l[3], l[4], l[5]
+    y0, y1, y2 = m[3] - g01 * x0, m[4] - g01 * x1, m[5] - g01 * x2
+    z0, z1, z2 = n[3] - g02 * x0 - g12 * y0, n[4] - g02 * x1 - g12 * y1, n[5] - g02 * x2 - g12 * y2
+    m[3], m[4], m[5] = y0, y1, y2
+    n[3], n[4], n[5] = z0, z1, z2
+    a0, a1, a2 = a0 * d0, a1 * d0, a2 * d0
+    b0, b1, b2 = b0 * d1, b1 * d1, b2 * d1
+    c0, c1, c2 = c0 * d2, c1 * d2, c2 * d2
+    o = upper[target:]
+    p, q = o[stride:], o[2 * stride :]
+    o[0] -= x0 * a0 + y0 * b0 + z0 * c0
+    o[1] -= x0 * a1 + y0 * b1 + z0 * c1
+    o[2] -= x0 * a2 + y0 * b2 + z0 * c2
+    p[1] -= x1 * a1 + y1 * b1 + z1 * c1
+    p[2] -= x1 * a2 + y1 * b2 + z1 * c2
+    q[2] -= x2 * a2 + y2 * b2 + z2 * c2
+    o = lower[target:]
+    p = o[stride:]
+    o[1] -= x1 * a0 + y1 * b0 + z1 * c0
+    o[2] -= x2 * a0 + y2 * b0 + z2 * c0
+    p[2] -= x2 * a1 + y2 * b1 + z2 * c1
+    return -1
+
+
+@kernel
 def solve(pattern, values, b):
     """Solve S x = b in place, b (rows,) in the eliminated order, with what `factor` left."""
     solve_lu(pattern, values, values, b)
@@ -281,62 +336,137 @@ def solve_lu(pattern, lower, upper, b):
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     columns, segments = pattern.columns, pattern.segments
     for j in range(heads.size):
-        first, width, panel = starts[j], widths[j], lower[heads[j] :]
-        size = starts[j + 1] - first
-        for k in range(0, size, 3):
-            u, own = panel[k * (width + 1) :], b[first + k :]
-            x = own[0] * u[0]
-            y, z = 0.0, 0.0
-            own[0] = x
-            v, w = u, u
-            if size - k > 1:
-                v = u[width:]
-                y = (own[1] - x * u[1]) * v[1]
-                own[1] = y
-            if size - k > 2:
-                w = u[2 * width :]
-                z = (own[2] - x * u[2] - y * v[2]) * w[2]
-                own[2] = z
-            for i in range(3, size - k):
-                own[i] -= x * u[i] + y * v[i] + z * w[i]
-            at = size - k
-            for e in range(columns[j], columns[j + 1]):
-                n = segments[2 * e + 1]
-                target, us, vs, ws = b[segments[2 * e] :], u[at:], v[at:], w[at:]
-                for i in range(n):
-                    target[i] -= x * us[i] + y * vs[i] + z * ws[i]
-                at += n
+        first, width, head = starts[j], widths[j], heads[j]
+        size, own, u = starts[j + 1] - first, b[first:], lower[head:]
+        one = columns[j + 1] - columns[j] == 1
+        while True:
+            _forward(size, width, u, own)
+            if one and width == 6 and size == 3:
+                v, w, out = u[6:], u[12:], b[segments[2 * columns[j]] :]
+                x, y, z = own[0], own[1], own[2]
+                out[0] -= x * u[3] + y * v[3] + z * w[3]
+                out[1] -= x * u[4] + y * v[4] + z * w[4]
+                out[2] -= x * u[5] + y * v[5] + z * w[5]
+                break
+            _forward_rest(size, width, u, own, b, columns[j], columns[j + 1], segments)
+            if size <= 3:
+                break
+            u, own, size = u[3 * (width + 1) :], own[3:], size - 3
     for j in range(heads.size - 1, -1, -1):
-        first, width, panel = starts[j], widths[j], upper[heads[j] :]
+        first, width, head = starts[j], widths[j], heads[j]
         size = starts[j + 1] - first
-        for k in range((size - 1) // 3 * 3, -1, -3):
-            u, own = panel[k * (width + 1) :], b[first + k :]
-            v, w = u, u
-            if size - k > 1:
-                v = u[width:]
-            if size - k > 2:
-                w = u[2 * width :]
-            x, y, z = 0.0, 0.0, 0.0
-            for i in range(3, size - k):
-                x += u[i] * own[i]
-                y += v[i] * own[i]
-                z += w[i] * own[i]
-            at = size - k
-            for e in range(columns[j], columns[j + 1]):
-                n = segments[2 * e + 1]
-                source, us, vs, ws = b[segments[2 * e] :], u[at:], v[at:], w[at:]
-                for i in range(n):
-                    x += us[i] * source[i]
-                    y += vs[i] * source[i]
-                    z += ws[i] * source[i]
-                at += n
-            if size - k > 2:
-                z = own[2] - w[2] * z
-                own[2] = z
-                x += u[2] * z
-                y += v[2] * z
-            if size - k > 1:
-                y = own[1] - v[1] * y
-                own[1] = y
-                x += u[1] * y
-            own[0] -= u[0] * x
+        one = columns[j + 1] - columns[j] == 1
+        k = (size - 1) // 3 * 3
+        while k >= 0:
+            own, u = b[first + k :], upper[head + k * (width + 1) :]
+            if one and width == 6 and size == 3:
+                v, w, out = u[6:], u[12:], b[segments[2 * columns[j]] :]
+                e, f, g = out[0], out[1], out[2]
+                x, y, z = (
+                    e * u[3] + f * u[4] + g * u[5],
+                    e * v[3] + f * v[4] + g * v[5],
+                    e * w[3] + f * w[4] + g * w[5],
+                )
+            else:
+                x, y, z = _backward_rest(size - k, width, u, own, b, columns[j], columns[j + 1], segments)
+            _backward(size - k, width, u, own, x, y, z)
+            k -= 3
+
+
+@kernel
+def _forward(size, width, u, own):
+    x = own[0] * u[0]
+    own[0] = x
+    if size > 1:
+        v = u[width:]
+        y = (own[1] - x * u[1]) * v[1]
+        own[1] = y
+        if size > 2:
+            w = v[width:]
+            own[2] = (own[2] - x * u[2] - y * v[2]) * w[2]
+
+
+@kernel
+def _forward_rest(size, width, u, own, b, here, end, segments):
+    """Take up to three unknowns from the rows after them."""
+    if size == 1:
+        x = own[0]
+        at = 1
+        for e in range(here, end):
+            out, n, us = b[segments[2 * e] :], segments[2 * e + 1], u[at:]
+            for i in range(n):
+                out[i] -= x * us[i]
+            at += n
+    elif size == 2:
+        x, y = own[0], own[1]
+        v = u[width:]
+        at = 2
+        for e in range(here, end):
+            out, n, us, vs = b[segments[2 * e] :], segments[2 * e + 1], u[at:], v[at:]
+            for i in range(n):
+                out[i] -= x * us[i] + y * vs[i]
+            at += n
+    else:
+        x, y, z = own[0], own[1], own[2]
+        v, w = u[width:], u[2 * width :]
+        for i in range(3, size):
+            own[i] -= x * u[i] + y * v[i] + z * w[i]
+        at = size
+        for e in range(here, end):
+            out, n, us, vs, ws = b[segments[2 * e] :], segments[2 * e + 1], u[at:], v[at:], w[at:]
+            for i in range(n):
+                out[i] -= x * us[i] + y * vs[i] + z * ws[i]
+            at += n
+
+
+@kernel
+def _backward(size, width, u, own, x, y, z):
+    if size > 1:
+        v = u[width:]
+        if size > 2:
+            w = v[width:]
+            z = own[2] - w[2] * z
+            own[2] = z
+            x += u[2] * z
+            y += v[2] * z
+        y = own[1] - v[1] * y
+        own[1] = y
+        x += u[1] * y
+    own[0] -= u[0] * x
+
+
+@kernel
+def _backward_rest(size, width, u, own, b, here, end, segments):
+    """What the rows after them give to up to three unknowns."""
+    x, y, z = 0.0, 0.0, 0.0
+    if size == 1:
+        at = 1
+        for e in range(here, end):
+            source, n, us = b[segments[2 * e] :], segments[2 * e + 1], u[at:]
+            for i in range(n):
+                x += us[i] * source[i]
+            at += n
+    elif size == 2:
+        v = u[width:]
+        at = 2
+        for e in range(here, end):
+            source, n, us, vs = b[segments[2 * e] :], segments[2 * e + 1], u[at:], v[at:]
+            for i in range(n):
+                x += us[i] * source[i]
+                y += vs[i] * source[i]
+            at += n
+    else:
+        v, w = u[width:], u[2 * width :]
+        for i in range(3, size):
+            x += u[i] * own[i]
+            y += v[i] * own[i]
+            z += w[i] * own[i]
+        at = size
+        for e in range(here, end):
+            source, n, us, vs, ws = b[segments[2 * e] :], segments[2 * e + 1], u[at:], v[at:], w[at:]
+            for i in range(n):
+                x += us[i] * source[i]
+                y += vs[i] * source[i]
+                z += ws[i] * source[i]
+            at += n
+    return x, y, z

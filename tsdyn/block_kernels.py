@@ -30,6 +30,8 @@ def factor(pattern, values, limit):
 
     Returns -1, or the row of the eliminated vector where elimination leaves less than `limit` of a diagonal entry.
     """
+    if pattern.shape[0] == 1:
+        return _eliminate(values, 1, 1, 1, values, limit)
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     _keep_diagonal(pattern, values)
     kept = values[pattern.shape[1] :]
@@ -42,20 +44,26 @@ def factor(pattern, values, limit):
                 return first + failed
             continue
         for k in range(0, size, 3):
-            rest, count = panel[k * (width + 1) :], min(3, size - k)
-            failed = _eliminate(rest, count, width, width - k, kept[first + k :], limit)
+            u = panel[k * (width + 1) :]
+            failed = _eliminate(u, size - k, width, width - k, kept[first + k :], limit)
             if failed >= 0:
                 return first + k + failed
             if size - k > 3:
-                corner, right = rest[3 * (width + 1) :], rest[3:]
-                _apply(rest, 3, width, corner, width, right, right, size - k - 3, width - k - 3, True)
+                out, right = u[3 * (width + 1) :], u[3:]
+                _apply(u, 3, width, right, right, out, width, size - k - 3, width - k - 3, True)
         for e in range(updates[j], updates[j + 1]):
-            record = pattern.records[6 * e :]
-            at, run, out = record[0], record[2], values[record[4] :]
+            at, rows, run, n, target, stride = _record(pattern, e)
             for k in range(0, size, 3):
-                rest, rows = panel[k * (width + 1) :], panel[k * width :]
-                _apply(rest, size - k, width, out, record[5], rows[at:], rows[run:], record[1], record[3], at == run)
+                u, r = panel[k * (width + 1) :], panel[k * width :]
+                _apply(u, size - k, width, r[at:], r[run:], values[target:], stride, rows, n, at == run)
     return -1
+
+
+@kernel
+def _record(pattern, e):
+    """Which products go where: columns of a panel and how many, twice; place and row length of what they change."""
+    record = pattern.records[6 * e :]
+    return record[0], record[1], record[2], record[3], record[4], record[5]
 
 
 @kernel
@@ -100,7 +108,7 @@ def _eliminate(u, size, width, n, kept, limit):
 
 
 @kernel
-def _apply(pivots, size, width, out, stride, left, right, rows, n, diagonal):
+def _apply(pivots, size, width, left, right, out, stride, rows, n, diagonal):
     """Subtract from out, up to three pivots: left's columns times right's rows; of a diagonal block the upper part."""
     if size >= 3:
         d0, d1, d2 = pivots[0], pivots[width + 1], pivots[2 * width + 2]
@@ -194,6 +202,8 @@ def factor_lu(pattern, lower, upper, limit):
     Returns -1, or the row of the eliminated vector where elimination leaves less than `limit` of a diagonal entry's
     size, or a number that is not finite.
     """
+    if pattern.shape[0] == 1:
+        return _eliminate_lu(lower, upper, 1, 1, 1, upper, limit)
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     _keep_diagonal(pattern, upper)
     kept = upper[pattern.shape[1] :]
@@ -206,21 +216,24 @@ def factor_lu(pattern, lower, upper, limit):
                 return first + failed
             continue
         for k in range(0, size, 3):
-            l, u, count = below[k * (width + 1) :], above[k * (width + 1) :], min(3, size - k)
-            failed = _eliminate_lu(l, u, count, width, width - k, kept[first + k :], limit)
+            l, u = below[k * (width + 1) :], above[k * (width + 1) :]
+            failed = _eliminate_lu(l, u, size - k, width, width - k, kept[first + k :], limit)
             if failed >= 0:
                 return first + k + failed
             if size - k > 3:
-                corner, rows, n = 3 * (width + 1), size - k - 3, width - k - 3
-                _apply(u, 3, width, u[corner:], width, l[3:], u[3:], rows, n, True)
-                _apply(u, 3, width, l[corner:], width, u[3:], l[3:], rows, n, True)
+                left, right, corner = l[3:], u[3:], 3 * (width + 1)
+                out, other = u[corner:], l[corner:]
+                for _ in range(2):
+                    _apply(u, 3, width, left, right, out, width, size - k - 3, width - k - 3, True)
+                    left, right, out = right, left, other
         for e in range(updates[j], updates[j + 1]):
-            record = pattern.records[6 * e :]
-            at, rows, run, n, target, stride = record[0], record[1], record[2], record[3], record[4], record[5]
-            for k in range(0, size, 3):
-                u, l, r = above[k * (width + 1) :], below[k * width :], above[k * width :]
-                _apply(u, size - k, width, upper[target:], stride, l[at:], r[run:], rows, n, at == run)
-                _apply(u, size - k, width, lower[target:], stride, r[at:], l[run:], rows, n, at == run)
+            at, rows, run, n, target, stride = _record(pattern, e)
+            left, right, out = below, above, upper[target:]
+            for _ in range(2):
+                for k in range(0, size, 3):
+                    u, l, r = above[k * (width + 1) :], left[k * width + at :], right[k * width + run :]
+                    _apply(u, size - k, width, l, r, out, stride, rows, n, at == run)
+                left, right, out = above, below, lower[target:]
     return -1
 
 
@@ -333,6 +346,9 @@ def solve_lu_transposed(pattern, lower, upper, b):
 @kernel
 def solve_lu(pattern, lower, upper, b):
     """Solve N x = b in place, b (rows,) in the eliminated order, with what `factor_lu` left."""
+    if pattern.shape[0] == 1:
+        b[0] *= lower[0]
+        return
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     columns, segments = pattern.columns, pattern.segments
     for j in range(heads.size):

@@ -17,7 +17,7 @@ from ..tableau import RungeKuttaTableau
 
 @cache
 def _coefficients():
-    """The tableau, and the numbers of the interpolant: c and a of three stages, then D (4, 16)."""
+    """The tableau; its numbers, then the interpolant's: c and a of three stages, D (4, 16)."""
     from scipy.integrate import DOP853 as scipys  # at first use: it takes longer to import than all of tsdyn
 
     tableau = RungeKuttaTableau(
@@ -30,7 +30,7 @@ def _coefficients():
         embedded_order=7,
     )
     extra = np.column_stack((scipys.C_EXTRA, scipys.A_EXTRA))
-    return tableau, np.concatenate((np.ravel(extra), np.ravel(scipys.D)))
+    return tableau, np.concatenate((tableau.numbers, np.ravel(extra), np.ravel(scipys.D)))
 
 
 class DOP853(ExplicitRungeKutta):
@@ -65,8 +65,7 @@ class DOP853(ExplicitRungeKutta):
 
     def kernel(self, first_order):
         """The step kernel; the interpolant's numbers after the tableau's, and room for its four derivatives."""
-        step, numbers, _ = super().kernel(first_order)
-        return step, np.concatenate((numbers, _coefficients()[1])), lambda nx, ny: 17 * (nx + ny)
+        return super().kernel(first_order)[0], _coefficients()[1], lambda nx, ny: 17 * (nx + ny)
 
     def interpolant(self, first_order):
         """Its own, of order seven, for either form."""

@@ -46,8 +46,9 @@ initial
 assemble
 null_space maggi_kane linearise scene
 formulation run
+memory prepare task arguments
 events drive work
-solution
+steps solution
 simulate choice force_check
 integrator_scenes integrator_checks agreement
 testing benchmark_report benchmark

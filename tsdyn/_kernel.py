@@ -229,6 +229,41 @@ def address_of(typing, value):
     return types.int64(value), generate
 
 
+@intrinsic
+def _store(typing, value, address):
+    """Write a named tuple of arrays to an address; its size in bytes."""
+
+    def generate(context, builder, signature, arguments):
+        data = context.data_model_manager[signature.args[0]].as_data(builder, arguments[0])
+        builder.store(data, builder.inttoptr(arguments[1], data.type.as_pointer()))
+        return context.get_constant(types.int64, context.get_abi_sizeof(data.type))
+
+    return types.int64(value, types.int64), generate
+
+
+@entry
+def _imprint(value, address):
+    return _store(value, address)
+
+
+def resident(value):
+    """A named tuple of arrays in memory, for kernels that `loader` makes: its address, and what keeps it there.
+
+    To call a kernel with the tuple itself takes 0.2 us an array, each time.
+    """
+    if DEBUG:
+        return value, None
+    image = np.zeros(_words(value), np.int64)
+    size = _imprint(value, image.ctypes.data)
+    assert size == image.nbytes
+    return image.ctypes.data, (image, value)
+
+
+def _words(value):
+    """How many words Numba's form of arrays, or of tuples of them, takes: five, lengths and strides each."""
+    return 5 + 2 * value.ndim if isinstance(value, np.ndarray) else sum(map(_words, value))
+
+
 def loader(example):
     """Make the kernel that reads a named tuple of example's type back from its address."""
     if DEBUG:

@@ -19,6 +19,8 @@ def floats(value):
 
 def number(value):
     """Return one real number as a float, NaN for anything else."""
+    if type(value) is float:
+        return value
     array = floats(value)
     return float(array) if array.shape == () else math.nan
 

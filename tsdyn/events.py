@@ -13,7 +13,6 @@ from . import reactions
 from .checks import number
 from .dense import B_END
 from .errors import InvalidArgument, Status
-from .run import advance
 from .run_state import BEGUN, BLOCKS, CHART_ROWS, DENSE, ROWS, STEPS, STORED, T
 
 EPS = float(np.finfo(float).eps)
@@ -112,10 +111,11 @@ class Watch:
         states = [np.array([each.state for each in found]).reshape(-1, 3, n) for found in self.list]
         return times, *([np.ascontiguousarray(state[:, i]) for state in states] for i in (0, 1))
 
-    def advance(self, context, run, addresses, most):
-        """As the driver's `advance`; the Status, and what there is to say of it."""
+    def advance(self, memory, record, most):
+        """As `Memory.advance`; the Status, and what there is to say of it."""
+        run = memory.run
         if not run.numbers[BEGUN]:
-            status = Status(advance(context, run, addresses, -1))
+            status = memory.advance(record, -1)
             if not run.numbers[BEGUN]:
                 return status, ""
             self.state, self.memory = run.now.copy(), run.remembered.copy()
@@ -125,15 +125,15 @@ class Watch:
                 raise InvalidArgument(f"events: {failure}") from failure.__cause__
         for _ in range(most):
             done = run.numbers[STEPS]
-            status = Status(advance(context, run, addresses, 1))
+            status = memory.advance(record, 1)
             if run.numbers[STEPS] > done:
                 try:
-                    last = self._step(run)
+                    last = self._step(run, record)
                 except Failed as failure:
                     return Status.EVENT_FAILED, str(failure)
                 if last is not None:
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
-            if status != Status.SLICE_DONE or run.numbers[CHART_ROWS] + 2 >= run.charts.shape[0]:
+            if status != Status.SLICE_DONE or run.numbers[CHART_ROWS] + 2 >= len(record.charts):
                 return status, ""
         return status, ""
 
@@ -148,7 +148,7 @@ class Watch:
             raise Failed(f"{event.name} must return a finite number; at t = {t:.9g} s it gave {given!r}.")
         return value
 
-    def _step(self, run):
+    def _step(self, run, record):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
         t0, t1 = self.t, float(run.clock[T])
         before, now = self.state, run.now.copy()
@@ -166,44 +166,45 @@ class Watch:
             elif a == 0.0:
                 found.append(Occurrence(t0, i, before))
             else:
-                found.append(self._root(run, i, t0, a, t1, b))
+                found.append(self._root(run, record, i, t0, a, t1, b))
         for each in sorted(found, key=lambda each: each.t):
             self.list[each.index].append(each)
             if len(self.list[each.index]) >= self.events[each.index].limit:
-                self._end(run, each, t0)
+                self._end(run, record, each, t0)
                 return each
         return None
 
-    def _root(self, run, i, t0, a, t1, b):
+    def _root(self, run, record, i, t0, a, t1, b):
         """Where event i is zero within the step, being a at its start and b, of the other sign, at its end."""
         from scipy.optimize import brentq  # takes a while to import
 
         def value(t):
-            return a if t == t0 else b if t == t1 else self._value(i, t, self._at(run, t))
+            return a if t == t0 else b if t == t1 else self._value(i, t, self._at(run, record, t))
 
         root = brentq(value, t0, t1, xtol=4.0 * EPS, rtol=4.0 * EPS, maxiter=1000)
         shift = 4.0 * EPS * max(abs(root), 1.0)
         # a run that goes on from a terminal event had better find it behind itself
         while self.events[i].limit < math.inf and root + shift < t1 and value(root) * b < 0.0:
             root, shift = root + shift, 2.0 * shift
-        return Occurrence(root, i, self.state if root == t1 else self._at(run, root))
+        return Occurrence(root, i, self.state if root == t1 else self._at(run, record, root))
 
-    def _at(self, run, t):
-        states, status = self.reader(np.array([t]), np.zeros(1, int), run.block[None], run.charts, run.points)
+    def _at(self, run, record, t):
+        rows = np.zeros(1, int)
+        states, status = self.reader(np.array([t]), rows, run.block[None], record.charts, record.points)
         if status != Status.SUCCESS:
             raise Failed(f"there is no state at t = {t:.9g} s to evaluate it at. {status.sentence}")
         return states[0]
 
-    def _end(self, run, last, t0):
+    def _end(self, run, record, last, t0):
         """Let the run end at an event."""
         run.now[:] = last.state
         run.clock[T] = last.t
-        if run.t_eval.size > 0:
-            while run.numbers[ROWS] > 0 and run.out[run.numbers[ROWS] - 1, 0] > last.t:
+        if record.t_eval.size > 0:
+            while run.numbers[ROWS] > 0 and record.out[run.numbers[ROWS] - 1, 0] > last.t:
                 run.numbers[ROWS] -= 1
         elif last.t > t0:
-            run.out[run.numbers[ROWS] - 1] = [last.t, *last.state.ravel(), *run.remembered]
+            record.out[run.numbers[ROWS] - 1] = [last.t, *last.state.ravel(), *run.remembered]
         else:
             run.numbers[ROWS] -= 1
         if run.numbers[DENSE] == STORED:
-            run.blocks[run.numbers[BLOCKS] - 1, B_END] = last.t
+            record.blocks[run.numbers[BLOCKS] - 1, B_END] = last.t

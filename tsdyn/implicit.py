@@ -182,9 +182,8 @@ def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
     return 0
 
 
-def prepare_implicit(linear, method, addresses, run):
-    """Give the step kernel its tolerances, the addresses it calls, and sight of the run's last points."""
+def prepare_implicit(linear, method, addresses):
+    """Give the step kernel its tolerances and the addresses it calls."""
     tolerances = (FIXED_TOL, FIXED_TOL) if method.step else method.step_tolerances()
     linear.numbers[[RTOL, ATOL, THETA, T_BEFORE]] = *tolerances, GUESS, -math.inf
     linear.kernels[:KERNELS] = addresses
-    return linear._replace(now=run.now, before=run.before)

@@ -32,6 +32,7 @@ class Integrator:
     order = 0
     embedded_order = 0  # of the error estimate; zero for a method that has none
     implicit = False
+    driver = "steps"  # which one runs it; see tsdyn.task
     stability_limit = 0.0  # h |lambda| that its last stage and the step's end, of one time, may show; 0: not watched
     rtol = atol = max_step = first_step = None
     margin, errors = 30.0, (embedded_error,)
@@ -63,12 +64,12 @@ class ExplicitNystrom(Integrator):
     first_order = None
 
     def kernel(self, first_order):
-        """The tableau, packed, and the kernel that steps by it."""
+        """The numbers of the tableau, and the kernel that steps by it."""
         tableau = self.first_order if first_order else self.tableau
         stages = len(tableau.c)
         if first_order:
-            return runge_kutta_step, tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny)
-        return nystrom_step, tableau.packed(), lambda nx, ny: (stages + 2) * nx
+            return runge_kutta_step, tableau.numbers, lambda nx, ny: (stages + 1) * (nx + ny)
+        return nystrom_step, tableau.numbers, lambda nx, ny: (stages + 2) * nx
 
 
 class Adaptive(Integrator):
@@ -102,10 +103,10 @@ class ExplicitRungeKutta(Adaptive):
             cls.errors = (embedded_error, second_embedded_error)[: 2 if cls.tableau.second_error else 1]
 
     def kernel(self, first_order):
-        """The tableau, packed, and the kernel that steps by it."""
+        """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
         step = runge_kutta_step if first_order else second_order_step
-        return step, self.tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny)
+        return step, self.tableau.numbers, lambda nx, ny: (stages + 1) * (nx + ny)
 
 
 class DiagonallyImplicit(Adaptive):
@@ -124,9 +125,9 @@ class DiagonallyImplicit(Adaptive):
         cls.embedded_order = cls.tableau.embedded_order
 
     def kernel(self, first_order):
-        """The tableau, packed, and the kernel that steps by it."""
+        """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
-        return implicit_step, self.tableau.packed(), lambda nx, ny: (stages + 1) * (nx + ny) + 6 * nx + 1
+        return implicit_step, self.tableau.numbers, lambda nx, ny: (stages + 1) * (nx + ny) + 6 * nx + 1
 
 
 def registered():

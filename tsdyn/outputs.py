@@ -6,10 +6,10 @@ from .run_state import ROWS
 
 
 @kernel
-def record(r, t, q, qd, qdd):
+def record(r, log, t, q, qd, qdd):
     """One row of output."""
     n, i = q.size, r.numbers[ROWS]
-    row = r.out[i]
+    row = log.out[i]
     row[0] = t
     for j in range(n):
         row[1 + j], row[1 + n + j], row[1 + 2 * n + j] = q[j], qd[j], qdd[j]

@@ -1,6 +1,6 @@
 """The driver: steps, outputs, charts. One kernel for every scene, method and formulation; it calls them by address."""
 
-from ._kernel import address_of, caller, entry, kernel
+from ._kernel import caller, entry, kernel
 from .assembly import remember, set_time
 from .chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .control import accept, first_step, watch_stiffness
@@ -55,9 +55,10 @@ from .run_state import (
     T_ORIGIN,
     H,
     T,
+    load_run,
 )
 from .stepping import call_step
-from .workspace import CONDITION, CONTRACTION
+from .workspace import CONDITION, CONTRACTION, load
 
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
@@ -76,37 +77,37 @@ def _add(x, low, dx):
 
 
 @kernel
-def _begin_chart(context, w, r, at, reason):
+def _begin_chart(context, w, r, log, at, reason):
     """A new chart at the present q, qd, qdd; closes the record of the old one. Status."""
     i = r.numbers[CHART_ROWS]
     if reason != AT_START:
-        r.charts[i, 2], r.charts[i, 3], r.charts[i, 4] = (
+        log.charts[i, 2], log.charts[i, 3], log.charts[i, 4] = (
             w.control[CONDITION],
             w.control[CONTRACTION],
             r.numbers[IN_CHART],
         )
         i += 1
         r.numbers[CHART_ROWS] = i
-    r.charts[i, 0], r.charts[i, 1] = r.clock[T], reason
+    log.charts[i, 0], log.charts[i, 1] = r.clock[T], reason
     r.numbers[IN_CHART] = 0
     for j in range(r.x.size):
         r.x_low[j] = 0.0
     for j in range(r.y.size):
         r.y_low[j] = 0.0
-    if r.points.shape[0] > 0:
-        copy(w.q, r.points[i])
+    if log.points.shape[0] > 0:
+        copy(w.q, log.points[i])
     return call_chart(at[A_CHART], context, r.clock[T], r.x, r.y, r.yd, r.xd)
 
 
 @kernel
-def _wanted_within(r, t1):
+def _wanted_within(r, log, t1):
     """Whether the step's inside is asked for."""
     i = r.numbers[NEXT_EVAL]
-    return r.numbers[DENSE] != 0 or (i < r.t_eval.size and r.t_eval[i] < t1)
+    return r.numbers[DENSE] != 0 or (i < log.t_eval.size and log.t_eval[i] < t1)
 
 
 @kernel
-def _fill(context, w, r, at, t0, h, t1):
+def _fill(context, w, r, log, at, t0, h, t1):
     """The block of the step just made. Status."""
     r.block[B_START], r.block[B_H], r.block[B_END], r.block[B_CHART] = t0, h, t1, r.numbers[CHART_ROWS]
     status = call_fill(
@@ -115,32 +116,32 @@ def _fill(context, w, r, at, t0, h, t1):
     )  # fmt: skip
     copy(r.remembered, r.block[r.block.size - r.remembered.size :])
     if status == 0 and r.numbers[DENSE] == STORED:
-        copy(r.block, r.blocks[r.numbers[BLOCKS]])
+        copy(r.block, log.blocks[r.numbers[BLOCKS]])
         r.numbers[BLOCKS] += 1
     return status
 
 
 @kernel
-def _outputs(context, w, r, at, t0, h, t1):
+def _outputs(context, w, r, log, at, t0, h, t1):
     """Record what t_eval asks for in (t0, t1], or the step's end where it asks for nothing. Status."""
-    if r.t_eval.size == 0:
-        record(r, t1, w.q, w.qd, w.qdd)
-    within = _wanted_within(r, t1)
+    if log.t_eval.size == 0:
+        record(r, log, t1, w.q, w.qd, w.qdd)
+    within = _wanted_within(r, log, t1)
     if within:
         keep(w, r.warm)
-        status = _fill(context, w, r, at, t0, h, t1)
+        status = _fill(context, w, r, log, at, t0, h, t1)
         if status != 0:
             return status
-    while r.numbers[NEXT_EVAL] < r.t_eval.size and r.t_eval[r.numbers[NEXT_EVAL]] <= t1:
-        t = r.t_eval[r.numbers[NEXT_EVAL]]
+    while r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] <= t1:
+        t = log.t_eval[r.numbers[NEXT_EVAL]]
         r.numbers[NEXT_EVAL] += 1
         if t == t1:
-            record(r, t1, r.now[0], r.now[1], r.now[2])
+            record(r, log, t1, r.now[0], r.now[1], r.now[2])
             continue
         status = between(context, w, at, t, r.block, r.xs, r.ys, r.yds, r.dx)  # xd is the next step's
         if status != 0:
             return status
-        record(r, t, w.q, w.qd, w.qdd)
+        record(r, log, t, w.q, w.qd, w.qdd)
     if within:
         bring_back(w, r.warm)
         restore_now(w, r)
@@ -148,20 +149,20 @@ def _outputs(context, w, r, at, t0, h, t1):
 
 
 @kernel
-def _begin(context, w, r, at):
+def _begin(context, w, r, log, at):
     """The first chart, the accelerations there, and the first output. Status."""
-    status = _begin_chart(context, w, r, at, AT_START)
+    status = _begin_chart(context, w, r, log, at, AT_START)
     if status == 0:
         status = evaluate(context, w, at, r.clock[T], r.x, r.y, r.yd, r.xd)
     if status == 0:
         store_now(w, r)
         call_check(at[A_CHECK], context)
-        wanted = r.t_eval.size == 0
-        if not wanted and r.t_eval[0] == r.clock[T]:
+        wanted = log.t_eval.size == 0
+        if not wanted and log.t_eval[0] == r.clock[T]:
             wanted = True
             r.numbers[NEXT_EVAL] = 1
         if wanted:
-            record(r, r.clock[T], w.q, w.qd, w.qdd)
+            record(r, log, r.clock[T], w.q, w.qd, w.qdd)
     return status
 
 
@@ -177,26 +178,27 @@ def _go_back(r):
 
 
 @entry
-def advance(c, r, at, most):
+def advance(context, run, log, at, most):
     """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or why it stopped.
 
-    The first call, but one with most = 0, begins the run; with most = -1 it does no more.
+    context and run are the addresses of a `Context` and a `Run`, log is a `Record`. The first call, but one with
+    most = 0, begins the run; with most = -1 it does no more.
     """
-    context = address_of(c)
+    c, r = load(context), load_run(run)
     w = c.work
     nx, ny = r.x.size, r.y.size
     adaptive, implicit = r.numbers[ADAPTIVE] == 1, r.numbers[STAGE_AT] > 0
     if r.numbers[BEGUN] == 0 and most != 0:
         set_time(c.system, r.clock[T])
         remember(c.system, w.q, w.qd, r.clock[T], r.remembered)
-        status = _begin(context, w, r, at)
+        status = _begin(context, w, r, log, at)
         if status != 0:
             return status
         r.numbers[BEGUN] = 1
         if adaptive and r.clock[H] == 0.0:
             r.clock[H] = min(first_step(context, w, r, at), r.clock[MAX_STEP])
     for _ in range(most):
-        if r.numbers[CHART_ROWS] + 2 >= r.charts.shape[0] or r.numbers[HISTORY] >= r.history.shape[0]:
+        if r.numbers[CHART_ROWS] + 2 >= log.charts.shape[0] or r.numbers[HISTORY] >= log.history.shape[0]:
             break
         i, t0 = r.numbers[STEPS], r.clock[T]
         if t0 >= r.clock[T_END]:
@@ -212,7 +214,7 @@ def advance(c, r, at, most):
         if last:
             t1 = r.clock[T_END]
         h = t1 - t0
-        row = r.history[r.numbers[HISTORY]]
+        row = log.history[r.numbers[HISTORY]]
         row[0], row[1], row[2] = t0, h, 0.0
         r.numbers[HISTORY] += 1
         copy(r.x, r.x_old)
@@ -258,7 +260,7 @@ def advance(c, r, at, most):
                     return status
                 r.numbers[FAILED] = status
                 r.clock[H] = 0.25 * h
-            retry = _begin_chart(context, w, r, at, BY_FAILURE)
+            retry = _begin_chart(context, w, r, log, at, BY_FAILURE)
             if retry != 0:
                 return retry
             continue
@@ -282,12 +284,12 @@ def advance(c, r, at, most):
         r.numbers[IN_CHART] += 1
         if reason == 0 and r.numbers[INTERVAL] > 0 and r.numbers[IN_CHART] >= r.numbers[INTERVAL]:
             reason = BY_INTERVAL
-        status = _outputs(context, w, r, at, t0, h, t1)
+        status = _outputs(context, w, r, log, at, t0, h, t1)
         if status != 0:
             return status
         if reason != 0 and not last:
             restore_now(w, r)
-            status = _begin_chart(context, w, r, at, reason)
+            status = _begin_chart(context, w, r, log, at, reason)
             if status != 0:
                 return status
         if leave:

@@ -4,6 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ._kernel import loader
+from .workspace import carve
+
 # clock
 T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, STABLE, CLOCKS = range(11)
 # numbers
@@ -15,7 +18,7 @@ FILLED, STORED = 1, 2  # DENSE: every step's block is made, and kept
 
 
 class Run(NamedTuple):
-    """State and output of one run. x, y are v, vd (tangent-space ODE) or q, w (Maggi/Kane)."""
+    """The state of a run, and the driver's scratch. x, y are v, vd (tangent-space ODE) or q, w (Maggi/Kane)."""
 
     x: np.ndarray  # (nx,)
     y: np.ndarray  # (ny,)
@@ -40,12 +43,36 @@ class Run(NamedTuple):
     remembered: np.ndarray  # (slots,)  what forces remember of the last accepted point
     tableau: np.ndarray  # the method's numbers
     memory: np.ndarray  # the method's scratch
-    t_eval: np.ndarray  # output times, or empty: every step
+    block: np.ndarray  # the present step's: start, h, end, chart, the interpolant's data
     clock: np.ndarray  # T ... STABLE
     numbers: np.ndarray  # int64, FIRST_ORDER ... FAILED; STAGE_AT: where an implicit method leaves its last stage
+
+
+class Record(NamedTuple):
+    """What is asked of a run and what it records: arrays of its own, unlike those of `Run`."""
+
+    t_eval: np.ndarray  # output times, or empty: every step
     out: np.ndarray  # (rows, 1 + 3 n + slots)  t, q, qd, qdd, remembered
     history: np.ndarray  # (rows, 3)  t, h, accepted
     charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left
     points: np.ndarray  # (rows, n)  q0 of each chart, or (0, n) where nothing asks for it
-    block: np.ndarray  # the present step's: start, h, end, chart, the interpolant's data
     blocks: np.ndarray  # (rows, block)  those of accepted steps
+
+
+def lay_out(n, nx, ny, tableau, memory, warm, block, slots):
+    """The `Run` of a system of sizes nx, ny, the other lengths being those of its arrays; slots that of remembered."""
+    shapes = {
+        **dict.fromkeys(("x", "xd", "xd_old", "dx", "x_low", "x_low_old", "x_old", "xs"), (nx,)),
+        **dict.fromkeys(("y", "yd", "dy", "y_low", "y_low_old", "y_old", "yd_old", "ys", "yds"), (ny,)),
+        **dict.fromkeys(("now", "before"), (3, n)),
+        "warm": (warm,),
+        "remembered": (slots,),
+        "tableau": (tableau,),
+        "memory": (memory,),
+        "block": (block,),
+        "clock": (CLOCKS,),
+    }
+    return Run(**carve(shapes), numbers=np.zeros(NUMBERS, np.int64))
+
+
+load_run = loader(lay_out(1, 1, 1, 1, 1, 1, 1, 1))

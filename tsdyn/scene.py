@@ -170,18 +170,18 @@ class Scene:
 
     def refresh(self):
         """Compile those functions of a user's again of which a global has changed since the scene was packed."""
-        if self._packed is not None and _marks(self._packed) != self._functions:
-            for owner, _ in user_functions(self._packed):
+        if self._packed is not None and self._users and _marks(self._users) != self._functions:
+            for owner, _ in self._users:
                 owner.forget()
             self.touch()
 
     def __getstate__(self):
         """What is packed holds addresses of this process, so it stays here."""
-        return {**self.__dict__, "_packed": None, "_start": None}
+        return {**self.__dict__, "_packed": None, "_start": None, "_prepared": None}
 
     def touch(self):
         """Forget the packed numbers: something has changed."""
-        self._packed = self._start = None
+        self._packed = self._start = self._prepared = None
 
     @property
     def packed(self):
@@ -190,7 +190,8 @@ class Scene:
             raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
         if self._packed is None:
             self._packed = pack(self)
-            self._functions = _marks(self._packed)
+            self._users = list(user_functions(self._packed))
+            self._functions = _marks(self._users)
         return self._packed
 
     @property
@@ -244,6 +245,6 @@ class Scene:
         return f"<Scene of {len(self._bodies)} bodies: {n} coordinates, {rows} constraint rows{forces}>"
 
 
-def _marks(packed):
+def _marks(users):
     """What the compiled forms of the users' functions depend on."""
-    return [deep_hash(function) for _, functions in user_functions(packed) for function in functions]
+    return [deep_hash(function) for _, functions in users for function in functions]

@@ -1,48 +1,25 @@
-"""`simulate`: check everything, lay out the memory, run the driver, hand back a Solution."""
+"""`simulate`: check everything, hand a task to the method's driver, make a Solution of what it hands back."""
 
-import math
 import time
 
 import numpy as np
 
 from . import choice
-from .checks import finite_vector, floats, positive, whole
-from .dense import Reader, Trajectory
-from .drive import drive, lay_out
+from .arguments import interval, method_of, output_times, state_arrays
+from .checks import positive, whole
 from .errors import InvalidArgument, Status
-from .events import Watch, prepare
-from .force_pack import with_force_jacobians
+from .events import prepare
 from .formulation import formulation as find_formulation
-from .implicit import prepare_implicit
-from .initial import consistent
-from .integrator import Integrator, registered
+from .integrator import registered
+from .prepare import prepared
 from .progress import reporter
-from .run import advance
-from .run_state import (
-    ADAPTIVE,
-    ATOL,
-    ERROR_BEFORE,
-    EXPONENT,
-    FILLED,
-    INTERVAL,
-    LAST_STAGE,
-    LEAVE_WHEN_STIFF,
-    MAX_STEP,
-    RTOL,
-    STABLE,
-    STAGE_AT,
-    STEPS_WANTED,
-    STORED,
-    T_END,
-    T_ORIGIN,
-    H,
-    T,
-)
 from .scene import Scene
 from .solution import Solution
 from .state import remembered
-from .system import with_curvatures
-from .workspace import Context, allocate, allocate_linear
+from .steps import run_steps
+from .task import Task
+
+DRIVERS = {"steps": run_steps}  # by Integrator.driver; see tsdyn.task
 
 
 def simulate(
@@ -118,8 +95,8 @@ def simulate(
     """
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
-    t0, t1 = _interval(t_span)
-    method = choice.explicit(rtol, atol) if integrator is None else _method(integrator, rtol, atol)
+    span = interval(t_span)
+    method = choice.explicit(rtol, atol) if integrator is None else method_of(integrator, rtol, atol)
     form = find_formulation(formulation)
     if method.implicit and form.first_order:
         others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
@@ -134,75 +111,28 @@ def simulate(
     if not isinstance(dense_output, (bool, np.bool_)):
         raise InvalidArgument(f"dense_output must be True or False, got {dense_output!r}.")
     watched = prepare(events)
-    times = _output_times(t_eval, t0, t1)
-    adaptive = method.step is None
-    steps = 2**62 if adaptive else _step_count(t0, t1, method.step)
+    times = output_times(t_eval, *span)
     max_steps = whole(max_steps, "max_steps")
-    interval = whole(chart_interval, "chart_interval") or 0
+    chart_interval = whole(chart_interval, "chart_interval")
     report = reporter(progress)
 
     started = time.perf_counter()
-    scene.refresh()
-    packed = scene.packed
-    system = packed.system
-    for motion in scene.motions():
-        motion.check(t0, t1)
-    q, qd = scene.start
-    if state is not None:
-        if not (hasattr(state, "q") and hasattr(state, "qd")):
-            raise InvalidArgument(f"state must have q and qd, such as solution.state, got {state!r}.")
-        q, qd = finite_vector(state.q, q.size, "state.q"), finite_vector(state.qd, q.size, "state.qd")
-    q, qd = consistent(scene, system, q, qd, t0, initial_tol)
-    m, n = system.segments.shape[0], q.size
-    kept = 0
-    if method.implicit:
-        system, kept = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
-    system = system._replace(reals=system.reals.copy())
-    system.reals[system.memory] = remembered(state, system.memory.size)
-    work = allocate(n, m, len(scene.bodies), constraint_tol, packed.size)
-    work.q[:], work.qd[:] = q, qd
-    step_kernel, tableau, memory = method.kernel(form.first_order)
-    nx = n if form.first_order else n - m
-    interpolant = method.interpolant(form.first_order)
-    width = interpolant.size(n, nx, n - m)
-    dense = STORED if dense_output else FILLED if watched is not None else 0
-    run = lay_out(
-        work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order, width, dense, system.memory.size
-    )
-    run.clock[[T, T_ORIGIN, T_END, H]] = t0, t0, t1, _first_step(method) if adaptive else method.step
-    if adaptive:
-        run.clock[[RTOL, ATOL]] = method.step_tolerances()
-        run.clock[MAX_STEP] = method.max_step or np.inf
-        run.clock[[EXPONENT, ERROR_BEFORE]] = 1.0 / (method.embedded_order + 1), 1.0
-        run.numbers[ADAPTIVE] = 1
-    run.now[:2] = q, qd
-    run.numbers[STEPS_WANTED] = steps
-    run.numbers[INTERVAL] = interval
+    kept = prepared(scene)
+    for motion in kept.motions:
+        motion.check(*span)
+    q, qd = scene.start if state is None else state_arrays(state, kept.n)
+    q, qd = kept.start(scene, q, qd, span[0], initial_tol)
     choose = None
-    if method.stability_limit and adaptive and not form.first_order:
-        run.clock[STABLE] = method.stability_limit
-        run.numbers[LAST_STAGE] = 2 * len(method.tableau.c) * nx
-        if integrator is None:
-            run.numbers[LEAVE_WHEN_STIFF] = 1
-            options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol}
-            choose = choice.chooser(simulate, scene, method, t1, options)
-    errors = [kernel.address for kernel in method.errors] if adaptive else []
-    errors += [0] * (2 - len(errors))
-    addresses = [*form.addresses(), step_kernel.address, *errors, form.norm() if adaptive else 0]
-    addresses += [kernel.address for kernel in interpolant[:2]] if dense or times.size else [0, 0]
-    addresses.append(method.second.address if method.implicit and (dense or times.size) else 0)
-    addresses = np.array(addresses, np.int64)
-    linear = allocate_linear(system, n, m, method.implicit, kept)
-    if method.implicit:
-        linear = prepare_implicit(linear, method, form.implicit(), run)
-        run.numbers[STAGE_AT] = (2 * len(method.tableau.c) + 1) * nx
-    context = Context(system, work, linear)
-    advance(context, run, addresses, 0)  # loads the driver, before the clock starts
-    sizes = n, m, len(scene.bodies), constraint_tol, packed.size, nx
-    watch = None if watched is None else Watch(watched, packed.system, Reader(packed.system, sizes, addresses), t0)
-    prepared = time.perf_counter()
-    status, reason, chunks = drive(context, run, addresses, max_steps, report, (t0, t1), watch, choose)
-    if status == Status.STIFF:
+    if integrator is None:
+        options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol}
+        choose = choice.chooser(simulate, scene, method, span[1], options)
+    task = Task(
+        kept, method, form, span, q, qd, remembered(state, kept.packed.system.memory.size), times, bool(dense_output),
+        watched, constraint_tol, max_steps, chart_interval or 0, report, choose,
+    )  # fmt: skip
+    outcome = DRIVERS[method.driver](task)
+    ended = time.perf_counter()
+    if outcome.status == Status.STIFF:
         return simulate(
             scene,
             t_span,
@@ -219,86 +149,5 @@ def simulate(
             chart_interval=chart_interval,
             state=state,
         )
-    ended = time.perf_counter()
-    trajectory = None
-    if dense_output:
-        trajectory = Trajectory(packed.system, sizes, addresses, *chunks["dense"], t0, np.array([*run.now]))
-    return Solution(
-        scene,
-        packed,
-        reason=reason,
-        method=repr(method),
-        formulation=form.name,
-        status=status,
-        span=(t0, t1),
-        run=run,
-        work=work,
-        chunks=chunks,
-        trajectory=trajectory,
-        events=None if watch is None else watch.found(n),
-        seconds={"prepare": prepared - started, "run": ended - prepared},
-    )
-
-
-def _first_step(method):
-    """The first step to try, s; 0 for one of the driver's own choice."""
-    return min(method.first_step or 0.0, method.max_step or np.inf)
-
-
-def _interval(t_span):
-    span = floats(t_span)
-    if span.shape != (2,) or not np.isfinite(span).all():
-        raise InvalidArgument(f"t_span must be two finite times in s, (start, end), got {t_span!r}.")
-    t0, t1 = map(float, span)
-    if not t1 > t0:
-        raise InvalidArgument(
-            f"t_span must end after it starts, got ({t0:g}, {t1:g}); swap them, or choose a later end."
-        )
-    return t0, t1
-
-
-def _method(integrator, rtol, atol):
-    known = registered()
-    tolerances = {name: value for name, value in (("rtol", rtol), ("atol", atol)) if value is not None}
-    if tolerances and not (isinstance(integrator, str) and getattr(known.get(_key(integrator)), "embedded_order", 0)):
-        raise InvalidArgument(
-            f"{' and '.join(tolerances)} set the tolerances of an adaptive method given by its name, such as "
-            f"integrator='rk45', not of {integrator!r}; give an instance its own, such as RK45(rtol=1e-8)."
-        )
-    if isinstance(integrator, str):
-        if _key(integrator) not in known:
-            raise InvalidArgument(f"unknown integrator {integrator!r}; there are {', '.join(map(repr, known))}.")
-        return known[_key(integrator)](**tolerances)
-    if isinstance(integrator, type) and integrator in known.values():
-        return integrator()
-    if not isinstance(integrator, Integrator):
-        raise InvalidArgument(
-            f"integrator must be a name or an instance such as ts.integrators.Nystrom4(step=1e-3), got {integrator!r}."
-        )
-    return integrator
-
-
-def _key(name):
-    return name.lower().replace("-", "").replace("_", "")
-
-
-def _output_times(t_eval, t0, t1):
-    if t_eval is None:
-        return np.empty(0)
-    times = floats(t_eval)
-    if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
-        raise InvalidArgument("t_eval must be a non-empty vector of finite times in s.")
-    if (np.diff(times) <= 0.0).any():
-        raise InvalidArgument("t_eval must increase from each time to the next.")
-    if times[0] < t0 or times[-1] > t1:
-        raise InvalidArgument(
-            f"t_eval must lie within t_span, ({t0:g}, {t1:g}); it runs from {times[0]:g} to {times[-1]:g}."
-        )
-    return times
-
-
-def _step_count(t0, t1, step):
-    count = (t1 - t0) / step
-    if not count < 2**53 or t0 + step == t0:
-        raise InvalidArgument(f"the step of {step:g} s is too small for the interval ({t0:g}, {t1:g}).")
-    return max(1, math.ceil(count * (1.0 - 1e-12)))
+    seconds = {"prepare": outcome.began - started, "run": ended - outcome.began}
+    return Solution(scene, task, outcome, seconds)

@@ -14,22 +14,8 @@ from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
 from .rank import weakest_row
-from .run_state import CHART_ROWS, IN_CHART, REJECTED, STEPS, STIFF, T
 from .state import RememberingState
 from .work import work as integrate_work
-from .workspace import (
-    B_ITERATIONS,
-    CHARTS,
-    CONDITION,
-    CONTRACTION,
-    EVALUATIONS,
-    FACTORIZATIONS,
-    ITERATION_MATRICES,
-    JACOBIANS,
-    NEWTON,
-    PLACEMENTS,
-    STAGE_ITERATIONS,
-)
 
 NEARLY_SINGULAR = 0.05
 BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
@@ -76,55 +62,20 @@ class Solution:
         method has met its limit of stability for a while.
     """
 
-    def __init__(
-        self,
-        scene,
-        packed,
-        *,
-        reason,
-        method,
-        formulation,
-        status,
-        span,
-        run,
-        work,
-        chunks,
-        trajectory,
-        events,
-        seconds,
-    ):
-        self.scene, self.packed, self.method, self.formulation = scene, packed, method, formulation
-        self.system, self._reason = packed.system, reason
-        self.status, self.span, self._trajectory = status, span, trajectory
-        self.t_events, self.q_events, self.qd_events = events or (None, None, None)
-        rows = chunks["out"][0] if len(chunks["out"]) == 1 else np.concatenate(chunks["out"])
-        n = work.q.size
+    def __init__(self, scene, task, outcome, seconds):
+        self.scene, self.packed = scene, task.prepared.packed
+        self.method, self.formulation, self.span = repr(task.method), task.form.name, task.span
+        self.system = self.packed.system
+        self.status, self._trajectory = outcome.status, outcome.trajectory
+        self.t_events, self.q_events, self.qd_events = outcome.events or (None, None, None)
+        rows, n = outcome.rows, task.q.size
         self.t = rows[:, 0].copy()
-        self.q, self.qd, self.qdd = (np.ascontiguousarray(rows[:, 1 + i * n : 1 + (i + 1) * n]) for i in range(3))
-        self._memory = np.ascontiguousarray(rows[:, 1 + 3 * n :])  # (k, slots), what forces remember
-        self._remembered = run.remembered.copy()
-        self._history = np.concatenate(chunks["history"])
-        self._reached = float(run.clock[T])
-        self._last = [a.copy() for a in run.now]
-        self._charts = chunks["charts"][: run.numbers[CHART_ROWS] + 1].copy()
-        self._charts[-1, 2:] = work.control[CONDITION], work.control[CONTRACTION], run.numbers[IN_CHART]
-        c = work.counters
-        self.stats = SimpleNamespace(
-            steps=int(run.numbers[STEPS]),
-            rejected=int(run.numbers[REJECTED]),
-            evaluations=int(c[EVALUATIONS]),
-            placements=int(c[PLACEMENTS]),
-            newton_iterations=int(c[NEWTON]),
-            b_iterations=int(c[B_ITERATIONS]),
-            charts=int(c[CHARTS]),
-            factorizations=int(c[FACTORIZATIONS]),
-            stiff=bool(run.numbers[STIFF]),
-            jacobians=int(c[JACOBIANS]),
-            iteration_matrices=int(c[ITERATION_MATRICES]),
-            stage_iterations=int(c[STAGE_ITERATIONS]),
-            seconds=seconds,
-        )
-        self.message = self._message(scene)  # now: the scene may change
+        self.q, self.qd, self.qdd = (rows[:, 1 + i * n : 1 + (i + 1) * n].copy() for i in range(3))
+        self._memory = rows[:, 1 + 3 * n :].copy()  # (k, slots), what forces remember
+        self._reached, self._last, self._remembered = outcome.reached, outcome.last, outcome.remembered
+        self._history, self._charts = outcome.history, outcome.charts
+        self.stats = SimpleNamespace(**outcome.counts, seconds=seconds)
+        self.message = self._message(scene, outcome.reason)  # now: the scene may change
 
     def __getstate__(self):
         """All but the dense output, which holds addresses of this process."""
@@ -139,17 +90,17 @@ class Solution:
         """Whether the run reached the end of the interval, or a terminal event."""
         return self.status in (Status.SUCCESS, Status.EVENT)
 
-    def _message(self, scene):
+    def _message(self, scene, reason):
         """How the run ended, in words."""
         if self.success:
-            return f"{self.status.sentence} {self._reason}".strip()
+            return f"{self.status.sentence} {reason}".strip()
         steps = f"{self.stats.steps} step{'' if self.stats.steps == 1 else 's'}"
         where = f"It stopped at t = {self._reached:.9g} s of {self.span[1]:g} s, after {steps}."
         suspect = self._suspect(scene)
         remedy = Status.SINGULAR.remedy if suspect else self.status.remedy
         if not suspect and self.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
             suspect = self._growth()
-        parts = (self.status.sentence, self._reason, where, suspect, remedy)
+        parts = (self.status.sentence, reason, where, suspect, remedy)
         return " ".join(part for part in parts if part)
 
     def _growth(self):

@@ -1,6 +1,7 @@
 """Tableaus of Runge-Kutta, diagonally implicit and Nystrom methods: data that checks itself."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -62,7 +63,8 @@ class RungeKuttaTableau:
         """a (s, s), b (s,), c (s,)."""
         return _rows(self.a, len(self.c), "RungeKuttaTableau"), np.array(self.b), np.array(self.c)
 
-    def packed(self):
+    @cached_property
+    def numbers(self):
         """The numbers as the kernels read them: s; a stage's same-place flag, c, row of a; b; rows of error weights."""
         a, b, c = self.arrays
         stages = [[0.0, c[i], *a[i]] for i in range(len(c))]
@@ -110,8 +112,9 @@ class ImplicitTableau:
                 weights[i, j] = np.prod([(c[i] - c[k]) / (c[j] - c[k]) for k in near if k != j])
         return weights
 
-    def packed(self):
-        """As `RungeKuttaTableau.packed`, followed by the predictor."""
+    @cached_property
+    def numbers(self):
+        """As `RungeKuttaTableau.numbers`, followed by the predictor."""
         a, b, c = self.arrays
         stages = [[0.0, c[i], *a[i]] for i in range(len(c))]
         error = [*(self.error or np.zeros(len(c))), 0.0]
@@ -170,7 +173,8 @@ class NystromTableau:
         a, abar = _rows(self.a, s, "NystromTableau a"), _rows(self.abar, s, "NystromTableau abar")
         return a, abar, np.array(self.b), np.array(self.bbar), np.array(self.c)
 
-    def packed(self):
+    @cached_property
+    def numbers(self):
         """The numbers as the step kernel reads them: s; a stage's same-place flag, c, rows of abar and a; bbar; b."""
         a, abar, b, bbar, c = self.arrays
         stages = []

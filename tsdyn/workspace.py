@@ -1,5 +1,6 @@
 """The scratch memory of one run: every array laid out once, before the first step."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -90,8 +91,19 @@ class Context(NamedTuple):
     linear: Linear
 
 
+def carve(shapes):
+    """Arrays of zeros of these shapes, by name, cut from one block, which is the `base` of each."""
+    sizes = {name: math.prod(shape) for name, shape in shapes.items()}
+    block = np.zeros(sum(sizes.values()))
+    arrays, at = {}, 0
+    for name, shape in shapes.items():
+        arrays[name] = block[at : at + sizes[name]].reshape(shape)
+        at += sizes[name]
+    return arrays
+
+
 def allocate(n, m, bodies, constraint_tol, size=1.0):
-    """Lay out the scratch memory of a run in one block of floats; size is that of the numbers in the constraints."""
+    """Lay out the scratch memory of a formulation; size is that of the numbers in the constraints."""
     k = n - m
     shapes = {
         **dict.fromkeys(("q", "qd", "qdd", "q0", "base", "Q", "h"), (n,)),
@@ -106,12 +118,10 @@ def allocate(n, m, bodies, constraint_tol, size=1.0):
         "A": (k, k),
         "control": (CONTROLS,),
     }
-    sizes = [int(np.prod(shape)) for shape in shapes.values()]
-    block = np.zeros(sum(sizes))
-    parts = np.split(block, np.cumsum(sizes)[:-1])
-    arrays = {name: part.reshape(shape) for (name, shape), part in zip(shapes.items(), parts, strict=True)}
-    arrays["control"][[U_TOL, B_TOL, SIZE]] = constraint_tol, constraint_tol, size
-    return Work(**arrays, counters=np.zeros(COUNTERS, np.int64))
+    work = Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64))
+    work.control[U_TOL] = work.control[B_TOL] = constraint_tol
+    work.control[SIZE] = size
+    return work
 
 
 def allocate_linear(system, n, m, wanted, kept=0):
@@ -132,10 +142,8 @@ def allocate_linear(system, n, m, wanted, kept=0):
         **dict.fromkeys(("K_hat", "C_hat", "P"), (k, k)),
         "b": (k,),
     }
-    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-    empty = np.zeros((3, n))
-    whole = {"pivots": np.zeros(k, np.int64), "kernels": np.zeros(ROOM, np.int64)}
-    return Linear(**arrays, **whole, now=empty, before=empty, numbers=np.zeros(ROOM))
+    shapes |= {"now": (3, n), "before": (3, n), "numbers": (ROOM,)}
+    return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=np.zeros(ROOM, np.int64))
 
 
 def _example():

@@ -1,0 +1,116 @@
+"""The memory that one run of the step driver writes to, made once and used by one run after the other."""
+
+import numpy as np
+
+from ._kernel import resident
+from .dense import B_DATA, warm_size
+from .errors import Status
+from .implicit import prepare_implicit
+from .run import advance
+from .run_state import (
+    ADAPTIVE,
+    ATOL,
+    DENSE,
+    ERROR_BEFORE,
+    EXPONENT,
+    FIRST_ORDER,
+    INTERVAL,
+    LAST_STAGE,
+    LEAVE_WHEN_STIFF,
+    MAX_STEP,
+    RTOL,
+    STABLE,
+    STAGE_AT,
+    STEPS_WANTED,
+    T_END,
+    T_ORIGIN,
+    H,
+    Record,
+    T,
+    lay_out,
+)
+from .workspace import B_TOL, SIZE, U_TOL, Context, allocate, allocate_linear
+
+
+class Memory:
+    """System, workspace and state of a run, and where kernels find them; one run at a time.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    implicit : bool
+    nx, ny : int
+        Sizes of x and y.
+    tableau, scratch, width : int
+        Floats of the method's numbers, of its memory and of its interpolant.
+    """
+
+    def __init__(self, prepared, implicit, nx, ny, tableau, scratch, width):
+        self.packed = packed = prepared.packed
+        n, m = prepared.n, prepared.m
+        system, floats = prepared.implicit if implicit else (packed.system, 0)
+        system = system._replace(reals=system.reals.copy())  # motions, signals and what forces remember
+        self.work = allocate(n, m, len(packed.bodies), 0.0, packed.size)
+        slots = system.memory.size
+        self.run = lay_out(n, nx, ny, tableau, scratch, warm_size(self.work), B_DATA + width + slots, slots)
+        linear = allocate_linear(system, n, m, implicit, floats)
+        if implicit:
+            linear = linear._replace(now=self.run.now, before=self.run.before)
+        self.context = Context(system, self.work, linear)
+        self.addresses = np.zeros(12, np.int64)
+        self._written = [self.work.q.base, self.work.counters, self.run.x.base, self.run.numbers]
+        self._written += [linear.numbers.base, linear.pivots, linear.kernels]
+        self._context, *self._keep = resident(self.context)
+        self._run, *keep = resident(self.run)
+        self._keep += keep
+        self.nbytes = sum(array.nbytes for array in self._written)
+
+    def clear(self, task):
+        """As if it were new, for this task: whatever a run before has left behind is gone."""
+        for array in self._written:
+            array.fill(0)
+        system, work = self.context.system, self.work
+        system.reals[:] = self.packed.system.reals
+        if system.memory.size:
+            system.reals[system.memory] = task.remembered
+        work.q[:], work.qd[:] = task.q, task.qd
+        self.run.now[0], self.run.now[1] = task.q, task.qd
+        control = work.control
+        control[U_TOL] = control[B_TOL] = task.constraint_tol
+        control[SIZE] = self.packed.size
+
+    def give_method(self, task, tableau, steps, dense, addresses):
+        """The numbers of the method and what it is to do; steps is None for an adaptive run."""
+        method, clock, numbers = task.method, self.run.clock, self.run.numbers
+        first_order = task.form.first_order
+        self.run.tableau[:] = tableau
+        self.addresses[:] = addresses
+        clock[T] = clock[T_ORIGIN] = task.span[0]
+        clock[T_END] = task.span[1]
+        numbers[FIRST_ORDER], numbers[DENSE], numbers[INTERVAL] = first_order, dense, task.interval
+        nx = self.run.x.size
+        if steps is None:
+            numbers[ADAPTIVE], numbers[STEPS_WANTED] = 1, 2**62
+            clock[RTOL], clock[ATOL] = method.step_tolerances()
+            clock[EXPONENT], clock[ERROR_BEFORE] = 1.0 / (method.embedded_order + 1), 1.0
+            clock[MAX_STEP] = longest = method.max_step or np.inf
+            clock[H] = min(method.first_step or 0.0, longest)  # 0: of the driver's own choice
+            if method.stability_limit and not first_order:
+                clock[STABLE] = method.stability_limit
+                numbers[LAST_STAGE] = 2 * len(method.tableau.c) * nx
+                numbers[LEAVE_WHEN_STIFF] = task.choose is not None
+        else:
+            clock[H], numbers[STEPS_WANTED] = method.step, steps
+        if method.implicit:
+            prepare_implicit(self.context.linear, method, task.form.implicit())
+            numbers[STAGE_AT] = (2 * len(method.tableau.c) + 1) * nx
+
+    def load(self):
+        """Load the driver, where this process has not called it yet."""
+        if not getattr(advance, "signatures", True):
+            none = np.zeros((0, 1))
+            advance(self._context, self._run, Record(np.zeros(0), *[none] * 5), self.addresses, 0)
+
+    def advance(self, record, most):
+        """Make up to `most` steps; the Status, as of the driver's `advance`."""
+        return Status(advance(self._context, self._run, record, self.addresses, most))

@@ -1,0 +1,61 @@
+"""What the runs of one scene share: all that follows from the packed scene alone, until the scene changes."""
+
+from functools import cached_property
+
+from .force_pack import with_force_jacobians
+from .initial import consistent
+from .system import with_curvatures
+
+SPARE = 8  # memories of a kind that are kept for further runs: as many may run at once without making new ones
+KINDS = 16  # of memory, before all are dropped
+LARGEST = 1 << 24  # bytes of a memory that is kept
+
+
+def prepared(scene):
+    """The `Prepared` of a scene as it is now."""
+    scene.refresh()
+    packed, kept = scene.packed, scene._prepared
+    if kept is None or kept.packed is not packed:
+        kept = scene._prepared = Prepared(scene, packed)
+    return kept
+
+
+class Prepared:
+    """A packed scene, the start that was last found consistent, and the memory of runs that have ended."""
+
+    def __init__(self, scene, packed):
+        self.packed, self.motions = packed, scene.motions()
+        self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
+        self._start = None, None
+        self._spare = {}
+
+    @cached_property
+    def implicit(self):
+        """The system with what implicit methods need, and how many floats they keep for forces."""
+        return with_force_jacobians(self.packed._replace(system=with_curvatures(self.packed)))
+
+    def start(self, scene, q, qd, t, tol):
+        """(q, qd) checked against the constraints and freed of rounding; looked at once for the same numbers."""
+        given = q.tobytes(), qd.tobytes(), t, tol
+        known, start = self._start
+        if known != given:
+            start = consistent(scene, self.packed.system, q, qd, t, tol)
+            self._start = given, start
+        return start
+
+    def take(self, kind, make):
+        """A memory of some kind, for one run: one that is spare, or make()."""
+        try:
+            return self._spare[kind].pop()
+        except (KeyError, IndexError):
+            return make()
+
+    def give(self, kind, memory):
+        """Take back a memory that nothing refers to any more."""
+        if memory.nbytes > LARGEST:
+            return
+        if len(self._spare) >= KINDS:
+            self._spare = {}
+        spare = self._spare.setdefault(kind, [])
+        if len(spare) < SPARE:
+            spare.append(memory)

@@ -1,0 +1,102 @@
+"""The driver of methods that go step by step with a kernel of theirs: memory, drive, and what a run leaves."""
+
+import time
+
+from .arguments import step_count
+from .dense import Reader, Trajectory
+from .drive import drive
+from .events import Watch
+from .memory import Memory
+from .run_state import CHART_ROWS, FILLED, IN_CHART, REJECTED, STEPS, STIFF, STORED, T
+from .task import Outcome
+from .workspace import (
+    B_ITERATIONS,
+    CHARTS,
+    CONDITION,
+    CONTRACTION,
+    EVALUATIONS,
+    FACTORIZATIONS,
+    ITERATION_MATRICES,
+    JACOBIANS,
+    NEWTON,
+    PLACEMENTS,
+    STAGE_ITERATIONS,
+)
+
+
+def run_steps(task):
+    """Run a `Task`; the `Outcome`."""
+    prepared, method, form = task.prepared, task.method, task.form
+    steps = None if method.step is None else step_count(*task.span, method.step)
+    packed, n, m = prepared.packed, prepared.n, prepared.m
+    nx, ny = n if form.first_order else n - m, n - m
+    step, tableau, scratch = method.kernel(form.first_order)
+    interpolant = method.interpolant(form.first_order)
+    kind = method.implicit, nx, ny, tableau.size, scratch(nx, ny), interpolant.size(n, nx, ny)
+    memory = prepared.take((form.name, *kind), lambda: Memory(prepared, *kind))
+    memory.clear(task)
+    dense = STORED if task.dense_output else FILLED if task.events is not None else 0
+    addresses = _addresses(method, form, step, interpolant, steps is None, dense or task.times.size)
+    memory.give_method(task, tableau, steps, dense, addresses)
+    run, control = memory.run, memory.work.control
+    memory.load()
+    sizes = n, m, len(packed.bodies), task.constraint_tol, packed.size, nx
+    reading = packed.system, sizes, memory.addresses.copy()
+    watch = None if task.events is None else Watch(task.events, packed.system, Reader(*reading), task.span[0])
+
+    began = time.perf_counter()
+    status, reason, recorded = drive(memory, task, watch)
+    charts = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy()
+    charts[-1, 2:] = control[CONDITION], control[CONTRACTION], run.numbers[IN_CHART]
+    last = run.now.copy()
+    trajectory = None
+    if task.dense_output:
+        points = recorded.points[: len(charts)].copy()
+        trajectory = Trajectory(*reading, recorded.blocks, charts, points, task.span[0], last)
+    outcome = Outcome(
+        status,
+        reason,
+        recorded.out,
+        recorded.history,
+        charts,
+        float(run.clock[T]),
+        last,
+        run.remembered.copy(),
+        _counts(run.numbers, memory.work.counters.tolist()),
+        trajectory,
+        None if watch is None else watch.found(n),
+        began,
+    )
+    prepared.give((form.name, *kind), memory)
+    return outcome
+
+
+def _addresses(method, form, step, interpolant, adaptive, dense):
+    """Those that the driver and the reader are given, dense.A_PLACE ... A_SECOND."""
+    errors = [kernel.address for kernel in method.errors] if adaptive else []
+    return [
+        *form.addresses(),
+        step.address,
+        *errors,
+        *[0] * (2 - len(errors)),
+        form.norm() if adaptive else 0,
+        *([interpolant.fill.address, interpolant.value.address] if dense else [0, 0]),
+        method.second.address if dense and method.implicit else 0,
+    ]
+
+
+def _counts(numbers, counters):
+    return {
+        "steps": int(numbers[STEPS]),
+        "rejected": int(numbers[REJECTED]),
+        "evaluations": counters[EVALUATIONS],
+        "placements": counters[PLACEMENTS],
+        "newton_iterations": counters[NEWTON],
+        "b_iterations": counters[B_ITERATIONS],
+        "charts": counters[CHARTS],
+        "factorizations": counters[FACTORIZATIONS],
+        "stiff": bool(numbers[STIFF]),
+        "jacobians": counters[JACOBIANS],
+        "iteration_matrices": counters[ITERATION_MATRICES],
+        "stage_iterations": counters[STAGE_ITERATIONS],
+    }

@@ -1,0 +1,48 @@
+"""A run as its driver sees it: what is asked of it, and what it hands back.
+
+A method names its driver by the attribute `driver`, a name in simulate.DRIVERS; a driver is a function of a `Task`
+that returns an `Outcome`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .errors import Status
+
+
+class Task(NamedTuple):
+    """One run, its arguments checked and its start consistent; n coordinates, m constraint rows."""
+
+    prepared: object  # the scene's `Prepared`: the packed system, and memory for a run
+    method: object
+    form: object
+    span: tuple  # start and end, s
+    q: np.ndarray  # (n,) at the start; not to be written to
+    qd: np.ndarray  # (n,)
+    remembered: np.ndarray  # (slots,) what forces remember at the start
+    times: np.ndarray  # (k,) output times, s; empty for every step
+    dense_output: bool
+    events: list  # of `events.Event`, or None
+    constraint_tol: float
+    max_steps: int  # or None
+    interval: int  # steps between charts that are forced; 0 for none
+    report: object  # a function of the fraction done, None at the end
+    choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
+
+
+class Outcome(NamedTuple):
+    """How a run went: arrays of its own, shared with no other run."""
+
+    status: Status
+    reason: str  # what there is to say about the status
+    rows: np.ndarray  # (k, 1 + 3 n + slots)  t, q, qd, qdd, what forces remember
+    history: np.ndarray  # (steps tried, 3)  t, h, accepted
+    charts: np.ndarray  # (charts, 5)  t, reason, condition, contraction, steps in it
+    reached: float  # s
+    last: np.ndarray  # (3, n)  q, qd, qdd there
+    remembered: np.ndarray  # (slots,)  what forces remember there
+    counts: dict  # of `Solution.stats`
+    trajectory: object  # a `dense.Trajectory`, or None
+    events: tuple  # times, positions, velocities of each event; or None
+    began: float  # time.perf_counter() when the driver began, prepared

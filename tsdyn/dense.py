@@ -167,6 +167,8 @@ class Trajectory:
 
     Parameters
     ----------
+    reading : tuple
+        A kind of reader and what to make one with, the System first.
     blocks : ndarray (steps, ...)
     charts : ndarray (charts, 5)
     points : ndarray (charts, n)
@@ -176,8 +178,8 @@ class Trajectory:
         q, qd, qdd there, for a run that has made no step.
     """
 
-    def __init__(self, system, sizes, addresses, blocks, charts, points, start, first):
-        self.reader = system, sizes, addresses
+    def __init__(self, reading, blocks, charts, points, start, first):
+        self.reading = reading
         self.blocks, self.charts, self.points = blocks, charts, points
         self.start, self.first = start, first
 
@@ -193,11 +195,12 @@ class Trajectory:
 
     def __call__(self, t):
         """States (k, 3, n) at times t (k,) between start and end, what forces remember (k, slots), and the Status."""
-        slots = self.reader[0].memory.size
+        slots = self.reading[1].memory.size
         if not len(self.blocks):
             return np.repeat(self.first[None], t.size, axis=0), np.zeros((t.size, slots)), Status.SUCCESS
         rows = np.searchsorted(self.blocks[:, B_END], t)
         order = np.argsort(rows, kind="stable")  # so that a chart is made once
         out = np.empty((t.size, *self.first.shape))
-        out[order], status = Reader(*self.reader)(t[order], rows[order], self.blocks, self.charts, self.points)
+        reader, *arguments = self.reading
+        out[order], status = reader(*arguments)(t[order], rows[order], self.blocks, self.charts, self.points)
         return out, self.blocks[rows, self.blocks.shape[1] - slots :], status

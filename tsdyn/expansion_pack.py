@@ -12,7 +12,7 @@ from .motion import Motion
 from .network import N_COUNT, N_FIRST_INT
 from .signal import Signal
 from .series_loops import BODY_ROW, GROUND, instance_width
-from .taylor import Expansion
+from .series_state import Expansion
 
 
 def without_series(packed):
@@ -33,8 +33,8 @@ def without_series(packed):
     return found
 
 
-def allocate_expansion(network, kinds, packed, order, lowest, highest):
-    """Lay out the series of a method that begins with this order (of omega'); the loops are loaded now."""
+def allocate_expansion(network, kinds, packed, highest):
+    """Lay out the series of a run, room for orders up to the highest (of omega'); the loops are loaded now."""
     orders = highest + 2
     nb = len(network.bodies)
     bodies = np.zeros((nb + 1, orders * BODY_ROW))
@@ -46,7 +46,7 @@ def allocate_expansion(network, kinds, packed, order, lowest, highest):
         total += int(network.kinds[i, N_COUNT]) * width
     forces, table, loads = _forces(packed, orders)
     return Expansion(
-        order=np.array([order, orders, order, lowest, highest]),
+        order=np.array([highest, orders, highest, highest, highest]),
         bodies=bodies.ravel(),
         constraints=np.zeros(total + 4),
         places=places,

@@ -36,20 +36,18 @@ class Network(NamedTuple):
     pattern: Pattern  # of S
 
 
-def is_regular(scene):
-    """Whether all inertias can be inverted; a body without inertia about an axis needs D^T M D."""
-    for body in scene.bodies:
-        if body.dimension == 7:
-            principal = np.linalg.eigvalsh(body.values["inertia"])
-            if not principal[0] > 1e-12 * principal[2]:
-                return False
-    return True
+def is_regular(body):
+    """Whether its inertia can be inverted; a body without inertia about an axis needs D^T M D."""
+    if body.dimension == 3:
+        return True
+    principal = np.linalg.eigvalsh(body.values["inertia"])
+    return bool(principal[0] > 1e-12 * principal[2])
 
 
-def build(scene, packed):
+def build(packed):
     """The network of a packed scene, with the addresses of the loops still zero, and the classes of its kinds."""
     system = packed.system
-    bodies = {id(body): i for i, body in enumerate(scene.bodies)}
+    bodies = {id(body): i for i, body in enumerate(packed.bodies)}
     nb = len(bodies)
     joints, row = [], 0
     for constraint in packed.constraints:
@@ -111,7 +109,7 @@ def build(scene, packed):
 
     inverse, mass = np.zeros((nb + 1, WEIGHTS)), np.zeros((nb + 1, WEIGHTS))
     spins = np.zeros(nb, np.int64)
-    for i, body in enumerate(scene.bodies):
+    for i, body in enumerate(packed.bodies):
         inverse[i, W_MASS], mass[i, W_MASS] = 1.0 / body.values["mass"], body.values["mass"]
         if body.dimension == 7:
             J = body.values["inertia"]

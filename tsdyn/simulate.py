@@ -14,12 +14,13 @@ from .integrator import registered
 from .prepare import prepared
 from .progress import reporter
 from .scene import Scene
+from .series_run import run_series
 from .solution import Solution
 from .state import remembered
 from .steps import run_steps
 from .task import Task
 
-DRIVERS = {"steps": run_steps}  # by Integrator.driver; see tsdyn.task
+DRIVERS = {"steps": run_steps, "series": run_series}  # by Integrator.driver; see tsdyn.task
 
 
 def simulate(

@@ -41,8 +41,8 @@ def run_steps(task):
     run, control = memory.run, memory.work.control
     memory.load()
     sizes = n, m, len(packed.bodies), task.constraint_tol, packed.size, nx
-    reading = packed.system, sizes, memory.addresses.copy()
-    watch = None if task.events is None else Watch(task.events, packed.system, Reader(*reading), task.span[0])
+    reading = Reader, packed.system, sizes, memory.addresses.copy()
+    watch = None if task.events is None else Watch(task.events, packed.system, reading[0](*reading[1:]), task.span[0])
 
     began = time.perf_counter()
     status, reason, recorded = drive(memory, task, watch)
@@ -52,7 +52,7 @@ def run_steps(task):
     trajectory = None
     if task.dense_output:
         points = recorded.points[: len(charts)].copy()
-        trajectory = Trajectory(*reading, recorded.blocks, charts, points, task.span[0], last)
+        trajectory = Trajectory(reading, recorded.blocks, charts, points, task.span[0], last)
     outcome = Outcome(
         status,
         reason,
@@ -62,7 +62,7 @@ def run_steps(task):
         float(run.clock[T]),
         last,
         run.remembered.copy(),
-        _counts(run.numbers, memory.work.counters.tolist()),
+        counts(run.numbers, memory.work.counters.tolist()),
         trajectory,
         None if watch is None else watch.found(n),
         began,
@@ -85,7 +85,8 @@ def _addresses(method, form, step, interpolant, adaptive, dense):
     ]
 
 
-def _counts(numbers, counters):
+def counts(numbers, counters):
+    """What `Solution.stats` counts."""
     return {
         "steps": int(numbers[STEPS]),
         "rejected": int(numbers[REJECTED]),

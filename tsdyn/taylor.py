@@ -5,45 +5,42 @@ back on the manifold along W Phi_q^T.
 """
 
 import math
-from typing import NamedTuple
-
-import numpy as np
 
 from ._four import four, put, splat, times
-from ._kernel import entry, kernel
+from ._kernel import entry, kernel, loader
 from .assembly import remember, set_time
-from .chart import AT_START, BY_SERIES
+from .chart import AT_START, BY_SERIES, ROUNDING
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
 from .errors import Status
 from .expansion import begin, expand
-from .free import RESIDUAL, Free
+from .free import RESIDUAL
 from .free_accelerations import accelerate_bodies
 from .landing import land, land_velocities, sum_series
 from .linalg import copy
-from .network import Network
 from .outputs import record, store_now
 from .poses import move_bodies, place_bodies, write_accelerations, write_positions, write_velocities
 from .run_state import (
+    ATOL,
     BEGUN,
     BLOCKS,
     CHART_ROWS,
     DENSE,
     HISTORY,
+    MAX_STEP,
     NEXT_EVAL,
     REJECTED,
     RTOL,
-    ATOL,
-    MAX_STEP,
-    STEPS,
+        STEPS,
     STORED,
     T_END,
     T_ORIGIN,
     H,
     T,
+    load_run,
 )
 from .series_loops import BODY_ROW, S_OMEGA, S_R
-from .system import System
-from .workspace import CHARTS, EVALUATIONS, Work
+from .series_state import HIGHEST, LOWEST, NEXT, ORDERS, TOP, load_series
+from .workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
 
 SLICE_DONE, STEP_COLLAPSED = int(Status.SLICE_DONE), int(Status.STEP_COLLAPSED)
 NOT_FINITE = int(Status.NOT_FINITE)
@@ -51,29 +48,7 @@ MISSED = 100.0  # times the tolerance: a landing further away than this is no tr
 
 
 STEP_COST = 3  # of a step's landing, in orders
-TOP, ORDERS, NEXT, LOWEST, HIGHEST = range(5)  # of Expansion.order
-
-
-class Expansion(NamedTuple):
-    """The series of a step; orders is what fits, from zero to two above the order of the method."""
-
-    order: np.ndarray  # int64 (5,): TOP of omega', one less than that of r and A; room for; the next step's; bounds
-    bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
-    constraints: np.ndarray  # each kind's instances; series_loops.series
-    places: np.ndarray  # int64 (kinds, 2): addresses of the loops; where a kind's series begin
-    forces: np.ndarray  # int64 (kinds, 6): address, where its series begin, instances, reals each, first in table, in reals
-    table: np.ndarray  # int64: the bodies of each force
-    loads: np.ndarray  # each kind of force's instances
-
-
-class TaylorContext(NamedTuple):
-    """All that the driver's kernels use."""
-
-    system: System
-    work: Work
-    network: Network
-    free: Free
-    expansion: Expansion
+SMALL, SMALL_STEPS = 0.02, 40  # a step that turns and moves everything by less; so many of them, and it may be stiff
 
 
 @kernel
@@ -161,6 +136,7 @@ def _step_length(c, r):
         for i in range(3):
             far = max(far, abs(x.bodies[at + S_R * orders + i]))
             fast = max(fast, abs(x.bodies[at + S_OMEGA * orders + i]))
+    c.work.control[FLOOR] = ROUNDING * (c.work.control[SIZE] + far)
     tol = atol + rtol
     far, fast = tol / (atol + rtol * far), tol / (atol + rtol * fast)
     h = _radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2))
@@ -172,18 +148,20 @@ def _step_length(c, r):
 
 
 @kernel
-def _store_block(c, r, t0, h, t1):
+def _store_block(c, r, log, t0, h, t1):
     block = r.block
     block[B_START], block[B_H], block[B_END], block[B_CHART] = t0, h, t1, r.numbers[CHART_ROWS]
-    copy(c.expansion.bodies, block[B_DATA:])
+    block[B_DATA] = float(c.expansion.order[TOP])
+    copy(r.now[0], block[B_DATA + 1 :])
+    copy(c.expansion.bodies, block[B_DATA + 1 + c.work.q.size :])
     copy(r.remembered, block[block.size - r.remembered.size :])
     if r.numbers[DENSE] == STORED:
-        copy(block, r.blocks[r.numbers[BLOCKS]])
+        copy(block, log.blocks[r.numbers[BLOCKS]])
         r.numbers[BLOCKS] += 1
 
 
 @kernel
-def _accept(c, r, t):
+def _accept(c, r, log, t):
     """The poses as they are now are the state at t. Status."""
     w = c.work
     remember(c.system, w.q, w.qd, t, r.remembered)
@@ -195,25 +173,29 @@ def _accept(c, r, t):
         return NOT_FINITE
     store_now(w, r)
     r.clock[T] = t
-    r.charts[r.numbers[CHART_ROWS], 0], r.charts[r.numbers[CHART_ROWS], 2] = t, 1.0
+    log.charts[r.numbers[CHART_ROWS], 0], log.charts[r.numbers[CHART_ROWS], 2] = t, 1.0
     w.counters[CHARTS] += 1
-    if r.t_eval.size == 0:
-        record(r, t, w.q, w.qd, w.qdd)
-    elif r.numbers[NEXT_EVAL] < r.t_eval.size and r.t_eval[r.numbers[NEXT_EVAL]] == t:
-        record(r, t, w.q, w.qd, w.qdd)
+    if log.t_eval.size == 0:
+        record(r, log, t, w.q, w.qd, w.qdd)
+    elif r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] == t:
+        record(r, log, t, w.q, w.qd, w.qdd)
         r.numbers[NEXT_EVAL] += 1
     return 0
 
 
 @kernel
-def _begin_run(c, r):
+def _begin_run(c, r, log):
     w, f = c.work, c.free
     set_time(c.system, r.clock[T])
+    largest = 0.0
+    for i in range(w.q.size):
+        largest = max(largest, abs(w.q[i]))
+    w.control[FLOOR] = ROUNDING * (w.control[SIZE] + largest)
     place_bodies(c.network.bodies, w.q, f.poses)
     move_bodies(c.network.bodies, w.q, w.qd, f.poses)
     status = _land_here(c, r.clock[T])
-    r.charts[0, 1] = AT_START
-    return _accept(c, r, r.clock[T]) if status == 0 else status
+    log.charts[0, 1] = AT_START
+    return _accept(c, r, log, r.clock[T]) if status == 0 else status
 
 
 @kernel
@@ -225,31 +207,32 @@ def _reach(c, t0, t1):
 
 
 @kernel
-def _within(c, r, t0, t1):
+def _within(c, r, log, t0, t1):
     """What t_eval asks for in (t0, t1). Status."""
     w = c.work
-    while r.numbers[NEXT_EVAL] < r.t_eval.size and r.t_eval[r.numbers[NEXT_EVAL]] < t1:
-        t = r.t_eval[r.numbers[NEXT_EVAL]]
+    while r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
+        t = log.t_eval[r.numbers[NEXT_EVAL]]
         status = state_within(c, t - t0, t)
         if status != 0:
             return status
-        record(r, t, w.q, w.qd, w.qdd)
+        record(r, log, t, w.q, w.qd, w.qdd)
         r.numbers[NEXT_EVAL] += 1
     return 0
 
 
 @entry
-def advance_series(c, r, most):
-    """Make up to `most` steps, as `run.advance` does. Status."""
+def advance_series(context, run, log, most):
+    """Make up to `most` steps, as `run.advance` does; context is the address of a `SeriesContext`. Status."""
+    c, r = load_series(context), load_run(run)
     w, f, x = c.work, c.free, c.expansion
     if r.numbers[BEGUN] == 0 and most != 0:
-        status = _begin_run(c, r)
+        status = _begin_run(c, r, log)
         if status != 0:
             return status
         r.numbers[BEGUN] = 1
-    far = MISSED * (r.clock[ATOL] + r.clock[RTOL])
+    missed = MISSED * (r.clock[ATOL] + r.clock[RTOL])
     for _ in range(most):
-        if r.numbers[CHART_ROWS] + 2 >= r.charts.shape[0] or r.numbers[HISTORY] >= r.history.shape[0]:
+        if r.numbers[CHART_ROWS] + 2 >= log.charts.shape[0] or r.numbers[HISTORY] >= log.history.shape[0]:
             break
         t0 = r.clock[T]
         if t0 >= r.clock[T_END]:
@@ -268,33 +251,33 @@ def advance_series(c, r, most):
             last = t1 + 1e-3 * h >= r.clock[T_END]
             if last:
                 t1 = r.clock[T_END]
-            row = r.history[r.numbers[HISTORY]]
+            row = log.history[r.numbers[HISTORY]]
             row[0], row[1], row[2] = t0, t1 - t0, 0.0
             status = _reach(c, t0, t1)
-            if status == 0 and f.sizes[RESIDUAL] <= far:
+            if status == 0 and f.sizes[RESIDUAL] <= missed + MISSED * w.control[FLOOR]:
                 break
             copy(r.now[0], w.q)
             place_bodies(c.network.bodies, w.q, f.poses)
             r.numbers[REJECTED] += 1  # the same series serves a shorter step
-            if r.numbers[HISTORY] + 1 < r.history.shape[0]:
+            if r.numbers[HISTORY] + 1 < log.history.shape[0]:
                 r.numbers[HISTORY] += 1
             h *= 0.5
         row[2] = 1.0
         r.numbers[HISTORY] += 1
         if r.numbers[DENSE] != 0:
-            _store_block(c, r, t0, t1 - t0, t1)
-        if r.numbers[NEXT_EVAL] < r.t_eval.size and r.t_eval[r.numbers[NEXT_EVAL]] < t1:
-            status = _within(c, r, t0, t1)
+            _store_block(c, r, log, t0, t1 - t0, t1)
+        if r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
+            status = _within(c, r, log, t0, t1)
             if status == 0:
                 status = _reach(c, t0, t1)
             if status != 0:
                 return status
-        r.charts[r.numbers[CHART_ROWS], 4] = 1.0
+        log.charts[r.numbers[CHART_ROWS], 4] = 1.0
         if not last:
             r.numbers[CHART_ROWS] += 1
-            r.charts[r.numbers[CHART_ROWS], 1] = BY_SERIES
+            log.charts[r.numbers[CHART_ROWS], 1] = BY_SERIES
         r.numbers[STEPS] += 1
-        status = _accept(c, r, t1)
+        status = _accept(c, r, log, t1)
         if status != 0:
             return status
     return 0 if r.clock[T] >= r.clock[T_END] else SLICE_DONE

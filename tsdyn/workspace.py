@@ -146,11 +146,12 @@ def allocate_linear(system, n, m, wanted, kept=0):
     return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=np.zeros(ROOM, np.int64))
 
 
-def _example():
+def plain_context():
+    """A context of the right types."""
     one, two = np.zeros(1), np.zeros((1, 1))
     ones, twos = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
     system = System(twos, one, two, one, twos, ones, one, twos, ones, twos, twos, twos, ones)
     return Context(system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False))
 
 
-load = loader(_example())
+load = loader(plain_context())

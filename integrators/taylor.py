@@ -1,0 +1,63 @@
+"""Taylor series of the motion, of variable order and step (Jorba and Zou, Experiment. Math. 14, 99, 2005).
+
+The coefficients of r, A, omega' and the multipliers follow order by order from the equations of motion (see
+tsdyn.expansion); at a step's end positions and velocities are put back on the constraints.
+"""
+
+import math
+
+from ..checks import positive, whole
+from ..errors import InvalidArgument
+from ..integrator import Integrator
+
+LOWEST, HIGHEST = 4, 30
+
+
+class Taylor(Integrator):
+    """The method for smooth scenes: the higher the accuracy asked for, the longer its steps against any other's.
+
+    Serves every scene whose constraints and forces give their series, as all smooth built-in ones do; tables, friction
+    and functions of a user's without a series are refused by name.
+
+    Parameters
+    ----------
+    tol : float
+        Tolerance of a step's error, relative to 1 + size.
+    order : int, optional
+        From 4 to 30; None lets every step have the order that gets furthest for its work.
+    rtol, atol : float, optional
+        Relative and absolute tolerance where they differ from tol.
+
+    Raises
+    ------
+    InvalidArgument
+        If a tolerance is not positive, or the order is out of range.
+    """
+
+    order = embedded_order = 15
+    driver = "series"
+    margin = 30.0
+
+    def __init__(self, tol=1e-15, order=None, *, rtol=None, atol=None):
+        self.tol = positive(tol, "Taylor: tol")
+        self.rtol = self.tol if rtol is None else positive(rtol, "Taylor: rtol")
+        self.atol = self.tol if atol is None else positive(atol, "Taylor: atol")
+        self.step = None
+        self.fixed = whole(order, "Taylor: order")
+        if self.fixed is not None and not LOWEST <= self.fixed <= HIGHEST:
+            raise InvalidArgument(f"Taylor: order must be from {LOWEST} to {HIGHEST}, got {order!r}.")
+
+    def step_tolerances(self):
+        """Return (rtol, atol) that each step's error is held to: less than a rounding error is none."""
+        return max(self.rtol / self.margin, 1e-16), max(self.atol / self.margin, 1e-16)
+
+    def orders(self):
+        """Return the first step's order, and the lowest and highest of all."""
+        if self.fixed is not None:
+            return self.fixed, self.fixed, self.fixed
+        digits = -math.log10(sum(self.step_tolerances()))
+        return min(max(round(3.0 + 1.25 * digits), LOWEST), HIGHEST), LOWEST, HIGHEST
+
+    def __repr__(self):
+        tolerance = f"tol={self.tol:g}" if self.rtol == self.atol else f"rtol={self.rtol:g}, atol={self.atol:g}"
+        return f"Taylor({tolerance}" + (")" if self.fixed is None else f", order={self.fixed})")

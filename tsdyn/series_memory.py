@@ -1,0 +1,106 @@
+"""The memory that one Taylor run writes to, made once for a scene and used by one run after the other."""
+
+import numpy as np
+
+from . import network as graph
+from ._kernel import resident
+from .dense import B_DATA
+from .errors import InvalidArgument, Status
+from .expansion_pack import allocate_expansion, masks, without_series
+from .free import allocate_free
+from .run_state import ATOL, DENSE, MAX_STEP, RTOL, STEPS_WANTED, T_END, T_ORIGIN, H, Record, T, lay_out
+from .series_state import HIGHEST, LOWEST, NEXT, TOP, SeriesContext
+from .system import System
+from .taylor import advance_series
+from .workspace import CONTROLS, COUNTERS, SIZE, U_TOL, carve, plain_context
+
+
+class Series:
+    """What the Taylor runs of a packed scene share: its network, with the loops that they need.
+
+    Raises
+    ------
+    InvalidArgument
+        If a part of the scene has no series, or an inertia has no inverse; names them.
+    """
+
+    def __init__(self, packed):
+        found = refusal(packed)
+        if found:
+            raise InvalidArgument(
+                f"Taylor needs a series of every part of a scene, and there is none of\n{found}\n"
+                "Use another method: 'dop853', 'rk45' and 'nystrom4' serve every scene, 'sdirk54' stiff ones."
+            )
+        network, self.kinds = graph.build(packed)
+        masks(network, packed, self.kinds)
+        self.network = graph.with_loops(network, self.kinds, graph.REDUCED, graph.VALUES, graph.BIAS)
+        self.packed = packed
+
+
+def refusal(packed):
+    """Why a scene can't be run by Taylor series, a line for each part of it; empty where it can."""
+    lines = [f"  {line}" for line in without_series(packed)]
+    lines += [
+        f"  {body.name} (its inertia has no inverse: a principal moment is zero)"
+        for body in packed.bodies
+        if not graph.is_regular(body)
+    ]
+    return "\n".join(lines)
+
+
+def plain_work(n):
+    """A `Work` for n coordinates that has no matrices."""
+    shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name != "counters"}
+    shapes |= {"q": (n,), "qd": (n,), "qdd": (n,), "control": (CONTROLS,)}
+    return type(plain_context().work)(**carve(shapes), counters=np.zeros(COUNTERS, np.int64))
+
+
+class SeriesMemory:
+    """System, series and state of a run, and where kernels find them; one run at a time.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    highest : int
+        The highest order that there is room for.
+    """
+
+    def __init__(self, prepared, highest):
+        self.series, packed = prepared.series, prepared.packed
+        series, n, slots = self.series, prepared.n, packed.system.memory.size
+        system = System(*(array.copy() for array in packed.system))
+        self.work, free = plain_work(n), allocate_free(series.network, n)
+        expansion = allocate_expansion(series.network, series.kinds, packed, highest)
+        self.run = lay_out(n, 0, 0, 0, 0, 0, B_DATA + 1 + n + expansion.bodies.size + slots, slots)
+        self.context = SeriesContext(system, self.work, series.network, free, expansion)
+        self._context, *self._keep = resident(self.context)
+        self._run, *keep = resident(self.run)
+        self._keep += keep
+        self.nbytes = 8 * (expansion.bodies.size + expansion.constraints.size + free.S.size + self.run.block.size)
+
+    def clear(self, task, order, dense):
+        """As if it were new, for this task; the order is the first step's, and the two bounds of the others'."""
+        system, work, clock, numbers = self.context.system, self.work, self.run.clock, self.run.numbers
+        system.reals[:] = task.prepared.packed.system.reals  # what forces remember is written there
+        if system.memory.size:
+            system.reals[system.memory] = task.remembered
+        numbers.fill(0)
+        clock.fill(0.0)
+        work.counters.fill(0)
+        work.q[:], work.qd[:] = task.q, task.qd
+        work.control[U_TOL], work.control[SIZE] = task.constraint_tol, task.prepared.packed.size
+        clock[T] = clock[T_ORIGIN] = task.span[0]
+        clock[T_END], clock[H], clock[MAX_STEP] = task.span[1], 0.0, np.inf
+        clock[RTOL], clock[ATOL] = task.method.step_tolerances()
+        numbers[STEPS_WANTED], numbers[DENSE] = 2**62, dense
+        self.context.expansion.order[[TOP, NEXT, LOWEST, HIGHEST]] = order[0], *order
+
+    def load(self):
+        """Load the driver, where this process has not called it yet."""
+        if not getattr(advance_series, "overloads", True):
+            none = np.zeros((0, 1))
+            advance_series(self._context, self._run, Record(np.zeros(0), *[none] * 5), 0)
+
+    def advance(self, record, most):
+        """Make up to `most` steps; the Status, as of the driver's `advance`."""
+        return Status(advance_series(self._context, self._run, record, most))

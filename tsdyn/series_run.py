@@ -1,0 +1,63 @@
+"""The driver of Taylor series from Python's side; see tsdyn.task."""
+
+import time
+
+from .drive import drive
+from .errors import InvalidArgument
+from .events import Watch
+from .run_state import CHART_ROWS, FILLED, STORED, T
+from .dense import Trajectory
+from .series_dense import SeriesReader
+from .series_memory import SeriesMemory
+from .series_state import ORDERS
+from .steps import counts
+from .task import Outcome
+
+
+def run_series(task):
+    """Run a `Task`; the `Outcome`."""
+    prepared, method = task.prepared, task.method
+    if task.form.name != "tangent":
+        raise InvalidArgument(
+            f"Taylor series are of the motion itself and need no other form than 'tangent'; formulation="
+            f"{task.form.name!r} is served by 'dop853', 'rk45' and 'nystrom4'."
+        )
+    order = method.orders()
+    kind = "taylor", order[2]
+    memory = prepared.take(kind, lambda: SeriesMemory(prepared, order[2]))
+    if memory.series is not prepared.series:  # of the scene before it was changed
+        memory = SeriesMemory(prepared, order[2])
+    dense = STORED if task.dense_output else FILLED if task.events is not None else 0
+    memory.clear(task, order, dense)
+    memory.load()
+    run, packed = memory.run, prepared.packed
+    reading = None
+    if dense:
+        orders = int(memory.context.expansion.order[ORDERS])
+        reading = SeriesReader, packed.system, prepared.series.network, orders, packed.size
+    watch = None
+    if task.events is not None:
+        watch = Watch(task.events, packed.system, reading[0](*reading[1:]), task.span[0])
+
+    began = time.perf_counter()
+    status, reason, recorded = drive(memory, task, watch)
+    charts, last = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy(), run.now.copy()
+    trajectory = None
+    if task.dense_output:
+        trajectory = Trajectory(reading, recorded.blocks, charts, recorded.points, task.span[0], last)
+    outcome = Outcome(
+        status,
+        reason,
+        recorded.out,
+        recorded.history,
+        charts,
+        float(run.clock[T]),
+        last,
+        run.remembered.copy(),
+        counts(run.numbers, memory.work.counters.tolist()),
+        trajectory,
+        None if watch is None else watch.found(prepared.n),
+        began,
+    )
+    prepared.give(kind, memory)
+    return outcome

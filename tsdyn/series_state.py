@@ -1,0 +1,49 @@
+"""What a Taylor run works on: the series of one step, and with them all that its kernels use."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ._kernel import loader
+from .blocks import Pattern
+from .free import Free
+from .network import Network
+from .system import System
+from .workspace import Work, plain_context
+
+TOP, ORDERS, NEXT, LOWEST, HIGHEST = range(5)  # of Expansion.order
+
+
+class Expansion(NamedTuple):
+    """The series of a step; orders is what fits, from zero to two above the order of the method."""
+
+    order: np.ndarray  # int64 (5,): TOP of omega', one less than that of r and A; room for; the next step's; bounds
+    bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
+    constraints: np.ndarray  # each kind's instances; series_loops.series
+    places: np.ndarray  # int64 (kinds, 2): addresses of the loops; where a kind's series begin
+    forces: np.ndarray  # int64 (kinds, 6): address, first of loads, instances, reals each, first in table, in reals
+    table: np.ndarray  # int64: the bodies of each force
+    loads: np.ndarray  # each kind of force's instances
+
+
+class SeriesContext(NamedTuple):
+    """All that the driver's kernels use."""
+
+    system: System
+    work: Work
+    network: Network
+    free: Free
+    expansion: Expansion
+
+
+def _example():
+    """One of the right types."""
+    line, whole, table = np.zeros(1), np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
+    pattern = Pattern(*[whole] * len(Pattern._fields))
+    network = Network(table, table, whole, table, whole, table, line, line, whole, pattern)
+    expansion = Expansion(whole, line, line, table, table, whole, line)
+    plain = plain_context()
+    return SeriesContext(plain.system, plain.work, network, Free(*[line] * len(Free._fields)), expansion)
+
+
+load_series = loader(_example())

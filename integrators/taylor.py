@@ -56,7 +56,13 @@ class Taylor(Integrator):
         if self.fixed is not None:
             return self.fixed, self.fixed, self.fixed
         digits = -math.log10(sum(self.step_tolerances()))
-        return min(max(round(3.0 + 1.25 * digits), LOWEST), HIGHEST), LOWEST, HIGHEST
+        first = min(max(round(3.0 + 1.25 * digits), LOWEST), HIGHEST)
+        return first, LOWEST, min(first + 8, HIGHEST)
+
+    @property
+    def stages(self):
+        """Orders of a step, each of which costs about an evaluation."""
+        return self.orders()[0]
 
     def __repr__(self):
         tolerance = f"tol={self.tol:g}" if self.rtol == self.atol else f"rtol={self.rtol:g}, atol={self.atol:g}"

@@ -1,6 +1,7 @@
-"""The method for a motion that none was named for: DOP853, or SDIRK54 where the motion is stiff and that pays.
+"""The method for a motion that none was named for: Taylor, DOP853 where a part has no series, SDIRK54 if stiff.
 
-DOP853 begins and watches for steps at its limit of stability. When it has found enough of them, a pilot of SDIRK54
+The first two watch for steps that something other than the visible motion keeps short: DOP853 for its limit of
+stability, Taylor for many steps in which nothing moves far. When there have been enough of them, a pilot of SDIRK54
 goes on from there, and the evaluations that both need for a second of motion decide.
 """
 
@@ -9,16 +10,20 @@ from types import SimpleNamespace
 import numpy as np
 
 from .errors import Status, TsdynError
-from .integrators import DOP853, SDIRK54
+from .integrators import DOP853, SDIRK54, Taylor
 from .run_state import H, T
 
 PILOT = 60  # steps
 COST = 1.5  # of an evaluation in an implicit stage, its share of matrices included, against an explicit one
 
 
-def explicit(rtol, atol):
-    """The method that a run begins with; tolerances default to 1e-8."""
-    return DOP853(rtol=1e-8 if rtol is None else rtol, atol=1e-8 if atol is None else atol)
+LARGEST_PILOT = 700  # coordinates: above that implicit methods, whose matrices are dense, cost more than they save
+
+
+def explicit(prepared, rtol, atol, series):
+    """The method that a run begins with; tolerances default to 1e-8. Whether series may be it."""
+    rtol, atol = 1e-8 if rtol is None else rtol, 1e-8 if atol is None else atol
+    return Taylor(rtol=rtol, atol=atol) if series and not prepared.refusal else DOP853(rtol, atol)
 
 
 def implicit(method):
@@ -30,6 +35,8 @@ def chooser(simulate, scene, method, end, options):
     """Make the function that the driver asks when the motion of a run is found stiff: whether to change."""
 
     def choose(run):
+        if run.now.shape[1] > LARGEST_PILOT:
+            return False
         start = float(run.clock[T])
         state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered.copy())
         try:
@@ -42,6 +49,6 @@ def chooser(simulate, scene, method, end, options):
             return False
         h = pilot.steps.h[pilot.steps.accepted]
         stages = COST * pilot.stats.evaluations / pilot.stats.steps
-        return stages / np.mean(h[h.size // 2 :]) < len(method.tableau.c) / run.clock[H]
+        return stages / np.mean(h[h.size // 2 :]) < method.stages / run.clock[H]
 
     return choose

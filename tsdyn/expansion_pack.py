@@ -35,7 +35,7 @@ def without_series(packed):
 
 def allocate_expansion(network, kinds, packed, highest):
     """Lay out the series of a run, room for orders up to the highest (of omega'); the loops are loaded now."""
-    orders = highest + 2
+    orders = (highest + 2) | 1  # odd: parts that are powers of two apart would share their places in the cache
     nb = len(network.bodies)
     bodies = np.zeros((nb + 1, orders * BODY_ROW))
     bodies[:, [0, 5, 10]] = 1.0  # A_0 of what never turns

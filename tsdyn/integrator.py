@@ -82,6 +82,11 @@ class Adaptive(Integrator):
         self.max_step = None if max_step is None else positive(max_step, f"{what}: max_step (s)")
         self.first_step = None if first_step is None else positive(first_step, f"{what}: first_step (s)")
 
+    @property
+    def stages(self):
+        """Evaluations that a step takes."""
+        return len(self.tableau.c)
+
     def step_tolerances(self):
         """Return (rtol, atol) that each step's error is held to."""
         return self.rtol / self.margin, self.atol / self.margin

@@ -4,7 +4,7 @@ from functools import cached_property
 
 from .force_pack import with_force_jacobians
 from .initial import consistent
-from .series_memory import Series
+from .series_memory import Series, refusal
 from .system import with_curvatures
 
 SPARE = 8  # memories of a kind that are kept for further runs: as many may run at once without making new ones
@@ -36,9 +36,14 @@ class Prepared:
         return with_force_jacobians(self.packed._replace(system=with_curvatures(self.packed)))
 
     @cached_property
+    def refusal(self):
+        """Why Taylor series can't run the scene; empty where they can."""
+        return refusal(self.packed)
+
+    @cached_property
     def series(self):
         """What Taylor runs share, a `Series`."""
-        return Series(self.packed)
+        return Series(self.packed, self.refusal)
 
     def start(self, scene, q, qd, t, tol):
         """(q, qd) checked against the constraints and freed of rounding; looked at once for the same numbers."""

@@ -63,6 +63,8 @@ kernel_series = None
 def series(mode, k, orders, count, stride, table, reals, bodies, values, b, Z):
     """ADVANCE: lam_{k-1} from b, x_{k+1}, (Phi_x)_{k+1}, and f_k, but for lam_k, onto the bodies' Z.
 
+    Where all of Phi_x is constant it and x are left at order zero, which is all that is read of them.
+
     RESIDUAL: b = (k + 1)(k + 2) Phi_{k+2} as the bodies' series have it.
     """
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
@@ -78,7 +80,8 @@ def series(mode, k, orders, count, stride, table, reals, bodies, values, b, Z):
         if mode == ADVANCE:
             for r in range(ROWS if k > 0 else 0):
                 values[first + L + r * orders + k - 1] = b[own[ROW] + r]
-            for now in range(0 if k == 0 else k + 1, k + 2):
+            varies = mask & ((1 << GROUND) - 1) != 0
+            for now in range(0 if k == 0 else k + 1, k + 2 if varies else 1):
                 for j in range(MARKERS):
                     body, s = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3]
                     place = turned(bodies, body + 12 * now, s[0], s[1], s[2])
@@ -91,10 +94,11 @@ def series(mode, k, orders, count, stride, table, reals, bodies, values, b, Z):
                         f[r, c] = 0.0
                 scratch = matrix(data_of(values[first + own_scratch :]), SLOTS, orders)
                 kernel_series(x, real[3 * MARKERS :], now, scratch, f)
-                for r in range(ROWS):
-                    for j in range(MARKERS):
-                        c, at = STARTS[j], first + J + (r * MARKERS + j) * wide + 4 * now
-                        put(values, at, lanes(f[r, c], f[r, c + 1], f[r, c + 2]))
+                for j in range(MARKERS):
+                    if now == 0 or mask >> j & 1:
+                        for r in range(ROWS):
+                            c, at = STARTS[j], first + J + (r * MARKERS + j) * wide + 4 * now
+                            put(values, at, lanes(f[r, c], f[r, c + 1], f[r, c + 2]))
             for j in range(MARKERS if k > 0 else 0):
                 if mask >> (GROUND + j) & 1:
                     continue

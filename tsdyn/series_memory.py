@@ -8,7 +8,7 @@ from .dense import B_DATA
 from .errors import InvalidArgument, Status
 from .expansion_pack import allocate_expansion, masks, without_series
 from .free import allocate_free
-from .run_state import ATOL, DENSE, MAX_STEP, RTOL, STEPS_WANTED, T_END, T_ORIGIN, H, Record, T, lay_out
+from .run_state import ATOL, DENSE, LEAVE_WHEN_STIFF, MAX_STEP, RTOL, STEPS_WANTED, T_END, T_ORIGIN, H, Record, T, lay_out
 from .series_state import HIGHEST, LOWEST, NEXT, TOP, SeriesContext
 from .system import System
 from .taylor import advance_series
@@ -18,14 +18,19 @@ from .workspace import CONTROLS, COUNTERS, SIZE, U_TOL, carve, plain_context
 class Series:
     """What the Taylor runs of a packed scene share: its network, with the loops that they need.
 
+    Parameters
+    ----------
+    packed : Packed
+    found : str
+        Its `refusal`.
+
     Raises
     ------
     InvalidArgument
         If a part of the scene has no series, or an inertia has no inverse; names them.
     """
 
-    def __init__(self, packed):
-        found = refusal(packed)
+    def __init__(self, packed, found):
         if found:
             raise InvalidArgument(
                 f"Taylor needs a series of every part of a scene, and there is none of\n{found}\n"
@@ -93,6 +98,7 @@ class SeriesMemory:
         clock[T_END], clock[H], clock[MAX_STEP] = task.span[1], 0.0, np.inf
         clock[RTOL], clock[ATOL] = task.method.step_tolerances()
         numbers[STEPS_WANTED], numbers[DENSE] = 2**62, dense
+        numbers[LEAVE_WHEN_STIFF] = task.choose is not None
         self.context.expansion.order[[TOP, NEXT, LOWEST, HIGHEST]] = order[0], *order
 
     def load(self):

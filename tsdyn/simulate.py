@@ -50,8 +50,9 @@ def simulate(
     t_span : (float, float), s
         Start and end, the end later.
     integrator : Integrator or str, optional
-        A method, or its name with its defaults ("nystrom4", "rk45", "dop853", ...). By default DOP853, and SDIRK54
-        from the start where the motion turns out to be stiff and evaluations are saved by it.
+        A method, or its name with its defaults ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor,
+        DOP853 where a part of the scene has no series, and SDIRK54 from the start where the motion turns out to be
+        stiff and evaluations are saved by it.
     rtol, atol : float, optional
         Tolerances for the default method, 1e-8 if not given, or for an adaptive method that is given by its name.
     formulation : {"tangent", "null-space", "maggi-kane"}
@@ -97,8 +98,13 @@ def simulate(
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     span = interval(t_span)
-    method = choice.explicit(rtol, atol) if integrator is None else method_of(integrator, rtol, atol)
     form = find_formulation(formulation)
+    chart_interval = whole(chart_interval, "chart_interval")
+    kept = prepared(scene)
+    if integrator is None:
+        method = choice.explicit(kept, rtol, atol, form.name == "tangent" and chart_interval is None)
+    else:
+        method = method_of(integrator, rtol, atol)
     if method.implicit and form.first_order:
         others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
         raise InvalidArgument(
@@ -114,11 +120,9 @@ def simulate(
     watched = prepare(events)
     times = output_times(t_eval, *span)
     max_steps = whole(max_steps, "max_steps")
-    chart_interval = whole(chart_interval, "chart_interval")
     report = reporter(progress)
 
     started = time.perf_counter()
-    kept = prepared(scene)
     for motion in kept.motions:
         motion.check(*span)
     q, qd = scene.start if state is None else state_arrays(state, kept.n)

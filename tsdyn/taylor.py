@@ -18,19 +18,22 @@ from .free_accelerations import accelerate_bodies
 from .landing import land, land_velocities, sum_series
 from .linalg import copy
 from .outputs import record, store_now
-from .poses import move_bodies, place_bodies, write_accelerations, write_positions, write_velocities
+from .poses import OMEGA, POSE, RD, move_bodies, place_bodies, write_accelerations, write_positions, write_velocities
 from .run_state import (
+    AT_LIMIT,
     ATOL,
     BEGUN,
     BLOCKS,
     CHART_ROWS,
     DENSE,
     HISTORY,
+    LEAVE_WHEN_STIFF,
     MAX_STEP,
     NEXT_EVAL,
     REJECTED,
     RTOL,
         STEPS,
+    STIFF,
     STORED,
     T_END,
     T_ORIGIN,
@@ -220,6 +223,23 @@ def _within(c, r, log, t0, t1):
     return 0
 
 
+@kernel
+def _watch(c, r, h):
+    """Whether the steps have just been found short for what moves: many in which nothing turns or moves far."""
+    far, p = SMALL * max(c.work.control[SIZE], 1e-300) / h, c.free.poses
+    for b in range(c.network.bodies.shape[0]):
+        at = b * POSE
+        for i in range(3):
+            if abs(p[at + OMEGA + i]) * h > SMALL or abs(p[at + RD + i]) > far:
+                r.numbers[AT_LIMIT] = 0
+                return False
+    r.numbers[AT_LIMIT] += 1
+    if r.numbers[AT_LIMIT] == SMALL_STEPS:
+        r.numbers[STIFF] = 1
+        return r.numbers[LEAVE_WHEN_STIFF] == 1
+    return False
+
+
 @entry
 def advance_series(context, run, log, most):
     """Make up to `most` steps, as `run.advance` does; context is the address of a `SeriesContext`. Status."""
@@ -264,6 +284,8 @@ def advance_series(context, run, log, most):
             h *= 0.5
         row[2] = 1.0
         r.numbers[HISTORY] += 1
+        r.clock[H] = t1 - t0
+        leave = _watch(c, r, t1 - t0)
         if r.numbers[DENSE] != 0:
             _store_block(c, r, log, t0, t1 - t0, t1)
         if r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
@@ -280,4 +302,6 @@ def advance_series(context, run, log, most):
         status = _accept(c, r, log, t1)
         if status != 0:
             return status
+        if leave:
+            break
     return 0 if r.clock[T] >= r.clock[T_END] else SLICE_DONE

@@ -57,7 +57,7 @@ def analyse(sizes, cliques):
         the same: entry (r, c) stands at offset + r * stride + c, or, where transposed, at offset + c * stride + r.
         Transposed means below the diagonal. A symmetric matrix needs only one of (i, j) and (j, i). For another,
         blocks that are not transposed go to `upper` and transposed ones to `lower`; a node's own block goes to both,
-        to `lower` transposed.
+        to `lower` transposed. KeyError where the nodes are not coupled.
     """
     sizes = [int(size) for size in sizes]
     cliques = [{int(i) for i in clique if sizes[i]} for clique in cliques]
@@ -219,18 +219,7 @@ def _amalgamate(sizes, order, parent, reach):
 
 def _lay_out(sizes, cliques, groups):
     home = {i: g for g, group in enumerate(groups) for i in group}
-    rank = {i: at for at, i in enumerate(i for group in groups for i in group)}
-    above = _reached(groups, cliques, home, rank)
-    height = [0] * len(groups)
-    for g, nodes in enumerate(above):
-        if nodes:
-            up = min(home[i] for i in nodes)
-            height[up] = max(height[up], height[g] + 1)
-    # by height: neighbours in this order don't wait for one another's results
-    new = sorted(range(len(groups)), key=lambda g: (height[g], g))
-    groups, above = [groups[g] for g in new], [above[g] for g in new]
-    home = {i: g for g, group in enumerate(groups) for i in group}
-
+    above = _reached(groups, cliques, home)
     rows = np.zeros(len(sizes), np.int64)
     starts, at = [], 0
     for group in groups:
@@ -267,7 +256,10 @@ def _lay_out(sizes, cliques, groups):
     def column(g, row):
         froms, places = maps[g]
         run = bisect_right(froms, row) - 1
-        return places[run] + row - froms[run]
+        place = places[run] + row - froms[run]
+        if place >= (places[run + 1] if run + 1 < len(places) else widths[g]):
+            raise KeyError("these nodes are not coupled")
+        return place
 
     def where(i, j):
         if not sizes[i] or not sizes[j]:
@@ -314,7 +306,7 @@ def _spans(places, width):
     return zip(places, [*places[1:], width], strict=True)
 
 
-def _reached(groups, cliques, home, rank):
+def _reached(groups, cliques, home):
     """For each group, the set of later nodes that its elimination reaches."""
     waiting = [[] for _ in groups]
     for clique in cliques:

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 WIDEST = 24  # rows of a block
-OWN = 200  # nodes in loops that are ordered here, without importing scipy.sparse
+OWN = 100  # nodes in loops that are ordered here, without importing scipy.sparse
 
 
 class Pattern(NamedTuple):

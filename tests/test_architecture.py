@@ -24,7 +24,7 @@ LAYERS = """
 _cache errors _discovery jet checks
 _kernel
 rotation linalg motion signal angle
-blocks block_kernels
+blocks block_steps block_kernels
 markers bodies tableau friction
 attachment marker_forces frames curvature
 primitive

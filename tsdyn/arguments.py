@@ -12,9 +12,9 @@ from .integrator import Integrator, registered
 def interval(t_span):
     """Start and end of the interval, s."""
     span = floats(t_span)
-    if span.shape != (2,) or not (math.isfinite(span[0]) and math.isfinite(span[1])):
+    t0, t1 = span.tolist() if span.shape == (2,) else (math.nan, math.nan)
+    if not (math.isfinite(t0) and math.isfinite(t1)):
         raise InvalidArgument(f"t_span must be two finite times in s, (start, end), got {t_span!r}.")
-    t0, t1 = map(float, span)
     if not t1 > t0:
         raise InvalidArgument(
             f"t_span must end after it starts, got ({t0:g}, {t1:g}); swap them, or choose a later end."
@@ -27,6 +27,8 @@ def output_times(t_eval, t0, t1):
     if t_eval is None:
         return np.empty(0)
     times = floats(t_eval)
+    if times.ndim == 1 and times.size and t0 <= times[0] and times[-1] <= t1 and (times[1:] > times[:-1]).all():
+        return times
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
         raise InvalidArgument("t_eval must be a non-empty vector of finite times in s.")
     if not (times[1:] > times[:-1]).all():

@@ -36,33 +36,18 @@ def drive(memory, task, watch):
     width = 1 + 3 * n + run.remembered.size
     largest = max(BLOCK_ROOM // block, 1) if dense else LARGEST_SLICE
     chunks = {"out": [], "history": [], "blocks": []}
-    record = Record(
-        t_eval=times,
-        out=np.empty((times.size, width)),
-        history=np.empty((0, 3)),
-        charts=np.empty((2 * CHART_ROOM, 5)),
-        points=np.empty((2 * CHART_ROOM if numbers[DENSE] else 0, n)),
-        blocks=np.empty((0, block)),
-    )
 
-    def fresh(rows):
-        """New arrays for the next slice; what the last one filled goes to the chunks."""
-        _collect(numbers, record, chunks, per_step, dense)
-        out = np.empty((rows + 1, width)) if per_step else record.out
-        charts, points = record.charts, record.points
-        if numbers[CHART_ROWS] + CHART_ROOM > len(charts):
-            charts, points = _doubled(charts), _doubled(points)
+    def room(rows, out, charts, points):
+        """A record for the next slice, of so many rows, besides what goes on being filled."""
+        out = np.empty((rows + 1, width)) if per_step else out
         return Record(times, out, np.empty((rows, 3)), charts, points, np.empty((rows if dense else 0, block)))
 
+    rows = min(most, limit)
+    charts, points = np.zeros((2 * CHART_ROOM, 5)), np.zeros((2 * CHART_ROOM if numbers[DENSE] else 0, n))
+    record = room(rows, np.empty((times.size, width)), charts, points)
     status, reason = Status.SLICE_DONE, ""
     try:
-        while status == Status.SLICE_DONE:
-            done = int(numbers[STEPS])
-            if done >= limit:
-                status = Status.MAX_STEPS
-                break
-            rows = min(most, limit - done)
-            record = fresh(rows)
+        while True:
             started = time.perf_counter()
             if watch is None:
                 status = memory.advance(record, rows)
@@ -86,6 +71,17 @@ def drive(memory, task, watch):
             except Exception as error:  # what has been computed is worth more than a progress bar
                 if status == Status.SLICE_DONE:
                     status, reason = Status.INTERRUPTED, f"progress raised {type(error).__name__}: {error}."
+            left = limit - int(numbers[STEPS])
+            if status != Status.SLICE_DONE:
+                break
+            if left <= 0:
+                status = Status.MAX_STEPS
+                break
+            _collect(numbers, record, chunks, per_step, dense)
+            rows, charts, points = min(most, left), record.charts, record.points
+            if numbers[CHART_ROWS] + CHART_ROOM > len(charts):
+                charts, points = _doubled(charts), _doubled(points)
+            record = room(rows, record.out, charts, points)
     except KeyboardInterrupt:
         if run.clock[T] >= t1:
             status = Status.SUCCESS
@@ -94,9 +90,13 @@ def drive(memory, task, watch):
     finally:
         task.report(None)
     _collect(numbers, record, chunks, per_step, dense)
-    out = np.concatenate((record.out[:0], *chunks["out"])) if per_step else record.out[: numbers[ROWS]]
-    history, blocks = (np.concatenate((getattr(record, x)[:0], *chunks[x])) for x in ("history", "blocks"))
-    return status, reason, Recorded(out, history, blocks, record.charts, record.points)
+    out = _joined(record.out, chunks["out"]) if per_step else record.out[: numbers[ROWS]]
+    blocks = _joined(record.blocks, chunks["blocks"]) if dense else record.blocks
+    return (
+        status,
+        reason,
+        Recorded(out, _joined(record.history, chunks["history"]), blocks, record.charts, record.points),
+    )
 
 
 def _collect(numbers, record, chunks, per_step, dense):
@@ -113,3 +113,8 @@ def _collect(numbers, record, chunks, per_step, dense):
 
 def _doubled(rows):
     return np.concatenate((rows, np.empty_like(rows)))
+
+
+def _joined(rows, parts):
+    """The parts in one array, which is none of theirs."""
+    return parts[0].copy() if len(parts) == 1 else np.concatenate((rows[:0], *parts))

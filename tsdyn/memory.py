@@ -29,6 +29,7 @@ from .run_state import (
     T,
     lay_out,
 )
+from .system import System
 from .workspace import B_TOL, SIZE, U_TOL, Context, allocate, allocate_linear
 
 
@@ -39,21 +40,23 @@ class Memory:
     ----------
     prepared : Prepared
     implicit : bool
+    kept : int
+        Floats that forces keep for an implicit method.
     nx, ny : int
         Sizes of x and y.
     tableau, scratch, width : int
         Floats of the method's numbers, of its memory and of its interpolant.
     """
 
-    def __init__(self, prepared, implicit, nx, ny, tableau, scratch, width):
-        self.packed = packed = prepared.packed
+    def __init__(self, prepared, implicit, kept, nx, ny, tableau, scratch, width):
         n, m = prepared.n, prepared.m
-        system, floats = prepared.implicit if implicit else (packed.system, 0)
-        system = system._replace(reals=system.reals.copy())  # motions, signals and what forces remember
-        self.work = allocate(n, m, len(packed.bodies), 0.0, packed.size)
+        self.implicit = implicit
+        self.source, _ = prepared.system(implicit)
+        system = System(*(array.copy() for array in self.source))
+        self.work = allocate(n, m, len(prepared.packed.bodies), 0.0)
         slots = system.memory.size
         self.run = lay_out(n, nx, ny, tableau, scratch, warm_size(self.work), B_DATA + width + slots, slots)
-        linear = allocate_linear(system, n, m, implicit, floats)
+        linear = allocate_linear(system, n, m, implicit, kept)
         if implicit:
             linear = linear._replace(now=self.run.now, before=self.run.before)
         self.context = Context(system, self.work, linear)
@@ -70,14 +73,19 @@ class Memory:
         for array in self._written:
             array.fill(0)
         system, work = self.context.system, self.work
-        system.reals[:] = self.packed.system.reals
+        source, _ = task.prepared.system(self.implicit)
+        if self.source is not source:
+            self.source = source
+            for own, new in zip(system, source, strict=True):
+                own[:] = new
+        system.reals[:] = source.reals  # motions, signals and what forces remember are written there
         if system.memory.size:
             system.reals[system.memory] = task.remembered
         work.q[:], work.qd[:] = task.q, task.qd
         self.run.now[0], self.run.now[1] = task.q, task.qd
         control = work.control
         control[U_TOL] = control[B_TOL] = task.constraint_tol
-        control[SIZE] = self.packed.size
+        control[SIZE] = task.prepared.packed.size
 
     def give_method(self, task, tableau, steps, dense, addresses):
         """The numbers of the method and what it is to do; steps is None for an adaptive run."""
@@ -107,7 +115,7 @@ class Memory:
 
     def load(self):
         """Load the driver, where this process has not called it yet."""
-        if not getattr(advance, "signatures", True):
+        if not getattr(advance, "overloads", True):
             none = np.zeros((0, 1))
             advance(self._context, self._run, Record(np.zeros(0), *[none] * 5), self.addresses, 0)
 

@@ -8,7 +8,7 @@ from .series_memory import Series, refusal
 from .system import with_curvatures
 
 SPARE = 8  # memories of a kind that are kept for further runs: as many may run at once without making new ones
-KINDS = 16  # of memory, before all are dropped
+KINDS = 8  # of memory, and of shapes of a scene, before all are dropped
 LARGEST = 1 << 24  # bytes of a memory that is kept
 
 
@@ -22,13 +22,19 @@ def prepared(scene):
 
 
 class Prepared:
-    """A packed scene, the start that was last found consistent, and the memory of runs that have ended."""
+    """A packed scene and the start that was last found consistent; and the memory of runs that have ended.
+
+    That memory is the scene's own: one whose numbers have changed, and nothing else, uses it again.
+    """
 
     def __init__(self, scene, packed):
         self.packed, self.motions = packed, scene.motions()
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
         self._start = None, None
-        self._spare = {}
+        every = scene.__dict__.setdefault("_spare", {})
+        if len(every) >= KINDS:
+            every.clear()
+        self._spare = every.setdefault(tuple(array.shape for array in packed.system), {})
 
     @cached_property
     def implicit(self):
@@ -44,6 +50,10 @@ class Prepared:
     def series(self):
         """What Taylor runs share, a `Series`."""
         return Series(self.packed, self.refusal)
+
+    def system(self, implicit):
+        """The system for a method, and how many floats it keeps for forces."""
+        return self.implicit if implicit else (self.packed.system, 0)
 
     def start(self, scene, q, qd, t, tol):
         """(q, qd) checked against the constraints and freed of rounding; looked at once for the same numbers."""
@@ -66,7 +76,7 @@ class Prepared:
         if memory.nbytes > LARGEST:
             return
         if len(self._spare) >= KINDS:
-            self._spare = {}
+            self._spare.clear()
         spare = self._spare.setdefault(kind, [])
         if len(spare) < SPARE:
             spare.append(memory)

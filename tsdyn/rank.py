@@ -7,7 +7,27 @@ from .constraints.euler_normalization import EulerNormalization
 from .errors import RedundantConstraints, SingularConfiguration
 from .evaluate import mass_matrix
 
+CLEAR = 1e-3  # far above RANK_TOL: what passes needs no singular values
 RANK_TOL = 1e-7  # of the singular values of Phi_q, its rows scaled to unit length; charts work with their squares
+
+
+def independent(Phi_q):
+    """Whether the rows, scaled to unit length, are far from depending on each other; False where that is not certain.
+
+    Singular values above CLEAR of the largest: the squares of all, less that of CLEAR of a bound on the largest, are
+    still those of a positive definite matrix.
+    """
+    gram = Phi_q @ Phi_q.T
+    length = np.sqrt(gram.diagonal())
+    if not length.all():
+        return False
+    gram /= length * length[:, None]
+    gram.flat[:: len(gram) + 1] -= CLEAR**2 * np.abs(gram).sum(axis=1).max(initial=0.0)
+    try:
+        np.linalg.cholesky(gram)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def check_rank(scene, Phi_q):
@@ -16,9 +36,8 @@ def check_rank(scene, Phi_q):
     if m == 0:
         return
     lengths = np.linalg.norm(Phi_q, axis=1)
-    names = scene.row_names()
-    if (lengths == 0.0).any():
-        row = names[int(np.argmin(lengths))]
+    if not lengths.all():
+        row = scene.row_names()[int(np.argmin(lengths))]
         raise SingularConfiguration(
             f"the row of {row} in Phi_q is zero in this configuration: the constraint is singular here. "
             "Start from another configuration, or use a constraint that is regular here."
@@ -28,7 +47,7 @@ def check_rank(scene, Phi_q):
     rank = int((size > RANK_TOL * size[0]).sum())
     if rank == m:
         return
-    order = _pivots(scene, scaled)
+    names, order = scene.row_names(), _pivots(scene, scaled)
     kept, dropped = order[:rank], order[rank:]
     stories = []
     for row in sorted(dropped):
@@ -45,8 +64,8 @@ def check_rank(scene, Phi_q):
 
 def check_inertia(scene, system, q, Phi_q):
     """Refuse a direction that the constraints leave free and that carries no inertia, by body and axis."""
-    thin = [np.linalg.eigvalsh(J.reshape(3, 3))[0] <= 1e-12 * np.abs(J).max() for J in system.inertia]
-    if not any(flag and length == 7 for flag, (_, length) in zip(thin, system.bodies, strict=True)):
+    J = system.inertia[system.bodies[:, 1] == 7]
+    if not (np.linalg.eigvalsh(J.reshape(-1, 3, 3))[:, 0] <= 1e-12 * np.abs(J).max(axis=1)).any():
         return
     free = np.linalg.svd(Phi_q)[2][Phi_q.shape[0] :].T
     reduced = free.T @ mass_matrix(system, q) @ free

@@ -177,7 +177,7 @@ class Scene:
 
     def __getstate__(self):
         """What is packed holds addresses of this process, so it stays here."""
-        return {**self.__dict__, "_packed": None, "_start": None, "_prepared": None}
+        return {**self.__dict__, "_packed": None, "_start": None, "_prepared": None, "_users": None, "_spare": {}}
 
     def touch(self):
         """Forget the packed numbers: something has changed."""

@@ -32,7 +32,8 @@ def run_steps(task):
     nx, ny = n if form.first_order else n - m, n - m
     step, tableau, scratch = method.kernel(form.first_order)
     interpolant = method.interpolant(form.first_order)
-    kind = method.implicit, nx, ny, tableau.size, scratch(nx, ny), interpolant.size(n, nx, ny)
+    _, kept = prepared.system(method.implicit)
+    kind = method.implicit, kept, nx, ny, tableau.size, scratch(nx, ny), interpolant.size(n, nx, ny)
     memory = prepared.take((form.name, *kind), lambda: Memory(prepared, *kind))
     memory.clear(task)
     dense = STORED if task.dense_output else FILLED if task.events is not None else 0
@@ -41,8 +42,10 @@ def run_steps(task):
     run, control = memory.run, memory.work.control
     memory.load()
     sizes = n, m, len(packed.bodies), task.constraint_tol, packed.size, nx
-    reading = Reader, packed.system, sizes, memory.addresses.copy()
-    watch = None if task.events is None else Watch(task.events, packed.system, reading[0](*reading[1:]), task.span[0])
+    reading = (Reader, packed.system, sizes, memory.addresses.copy()) if dense else None
+    watch = None
+    if task.events is not None:
+        watch = Watch(task.events, packed.system, reading[0](*reading[1:]), task.span[0])
 
     began = time.perf_counter()
     status, reason, recorded = drive(memory, task, watch)

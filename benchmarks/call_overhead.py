@@ -1,0 +1,89 @@
+"""What a call of `ts.simulate` costs besides the computing: runs over an interval of a step or two.
+
+Python's part is the whole call less the time in the compiled driver. Run it: python -m benchmarks.call_overhead
+"""
+
+import itertools
+import time
+
+import numpy as np
+
+import tsdyn as ts
+from benchmarks.scenes import SCENES
+from examples import driven_pivot
+from tsdyn import memory
+
+SPAN, CALLS, ROUNDS = (0.0, 1e-4), 30, 15
+TOLERANCES = {"rtol": 1e-8, "atol": 1e-8}
+
+
+class Clocked:
+    """A compiled kernel, with the time spent in it."""
+
+    def __init__(self, kernel):
+        self.kernel, self.seconds, self.overloads = kernel, 0.0, True
+
+    def __call__(self, *arguments):
+        """Call it."""
+        started = time.perf_counter()
+        status = self.kernel(*arguments)
+        self.seconds += time.perf_counter() - started
+        return status
+
+
+def from_states(scene):
+    """A call that starts from another state each time."""
+    solution = ts.simulate(scene, (0.0, 1.0), dense_output=True, **TOLERANCES)
+    states = itertools.cycle([solution.at(t) for t in np.linspace(0.1, 0.9, 7)])
+    return lambda: ts.simulate(scene, SPAN, t_eval=SPAN, state=next(states), initial_tol=1e-6, **TOLERANCES)
+
+
+def edited(scene):
+    """A call with another mass each time."""
+    body, masses = scene.bodies[0], itertools.cycle(scene.bodies[0].mass * np.linspace(0.9, 1.1, 7))
+
+    def call():
+        body.mass = next(masses)
+        return ts.simulate(scene, SPAN, t_eval=SPAN, **TOLERANCES)
+
+    return call
+
+
+def contenders():
+    """The calls to be timed, by name."""
+    top, chain, driven = SCENES["sliding top"].build(), SCENES["chain of 4"].build(), driven_pivot.build()
+    step = ts.integrators.Nystrom4(step=SPAN[1])
+    return {
+        "sliding top, outputs at both ends": lambda: ts.simulate(top, SPAN, t_eval=SPAN, **TOLERANCES),
+        "  every step": lambda: ts.simulate(top, SPAN, **TOLERANCES),
+        "  dense output": lambda: ts.simulate(top, SPAN, dense_output=True, **TOLERANCES),
+        "  Nystrom4, one step": lambda: ts.simulate(top, SPAN, t_eval=SPAN, integrator=step),
+        "  from other states": from_states(top),
+        "  of other masses": edited(SCENES["sliding top"].build()),
+        "chain of 4, outputs at both ends": lambda: ts.simulate(chain, SPAN, t_eval=SPAN, **TOLERANCES),
+        "  from other states ": from_states(chain),
+        "driven pivot, outputs at both ends": lambda: ts.simulate(driven, SPAN, t_eval=SPAN, **TOLERANCES),
+    }
+
+
+def main():
+    """Print microseconds a call, the least of interleaved rounds."""
+    runs = contenders()
+    memory.advance = clock = Clocked(memory.advance)
+    least = dict.fromkeys(runs, (np.inf, np.inf))
+    for run in runs.values():
+        run()
+    for _ in range(ROUNDS):
+        for name, run in runs.items():
+            clock.seconds, started = 0.0, time.perf_counter()
+            for _ in range(CALLS):
+                run()
+            whole = time.perf_counter() - started
+            least[name] = tuple(map(min, least[name], (whole / CALLS, (whole - clock.seconds) / CALLS)))
+    print(f"{'microseconds a call':36} whole  Python's part")
+    for name, (whole, outside) in least.items():
+        print(f"{name:36} {whole * 1e6:5.0f}  {outside * 1e6:5.0f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -25,39 +25,41 @@ def begin(network, poses, orders, bodies):
         at, p = b * orders * BODY_ROW, b * POSE
         for c in range(3):
             put(bodies, at + 4 * c, four(poses, p + 4 * c))
-        put(bodies, at + S_R, four(poses, p + R))
-        put(bodies, at + BODY_ROW + S_R, four(poses, p + RD))
+        put(bodies, at + S_R * orders, four(poses, p + R))
+        put(bodies, at + S_R * orders + 4, four(poses, p + RD))
         if network.bodies[b, 1] == 7:
-            put(bodies, at + S_OMEGA, four(poses, p + OMEGA))
-            _spin(network, b, bodies, at)
-            _turn_on(bodies, at, 0)
+            put(bodies, at + S_OMEGA * orders, four(poses, p + OMEGA))
+            _spin(network, b, bodies, at, orders, 0)
+            _turn_on(bodies, at, orders, 0)
 
 
 @kernel
-def _spin(network, b, bodies, at):
-    """(J' omega')_k at bodies[at]."""
+def _spin(network, b, bodies, at, orders, k):
+    """(J' omega')_k of the body whose series begins at bodies[at]."""
     if network.spins[b] != 0:
-        w, o = 16 * b + 4, at + S_OMEGA
+        w, o = 16 * b + 4, at + S_OMEGA * orders + 4 * k
         f = times(four(network.mass, w), splat(bodies[o]))
         f = fma(four(network.mass, w + 4), splat(bodies[o + 1]), f)
-        put(bodies, at + S_SPIN, fma(four(network.mass, w + 8), splat(bodies[o + 2]), f))
+        put(bodies, at + S_SPIN * orders + 4 * k, fma(four(network.mass, w + 8), splat(bodies[o + 2]), f))
 
 
 @kernel
-def _turn_on(bodies, at, k):
-    """A_{k+1} of (1), the body's series beginning at bodies[at]."""
+def _turn_on(bodies, at, orders, k):
+    """A_{k+1} of (1)."""
     x, y, z = splat(0.0), splat(0.0), splat(0.0)
-    for j in range(k + 1):
-        c, o = at + j * BODY_ROW, at + (k - j) * BODY_ROW + S_OMEGA
+    u, v, w = splat(0.0), splat(0.0), splat(0.0)
+    o = at + S_OMEGA * orders + 4 * k
+    for c in range(at, at + 12 * (k + 1), 12):
         a0, a1, a2 = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8)
         w0, w1, w2 = splat(bodies[o]), splat(bodies[o + 1]), splat(bodies[o + 2])
-        x = sub(fma(a1, w2, x), times(a2, w1))
-        y = sub(fma(a2, w0, y), times(a0, w2))
-        z = sub(fma(a0, w1, z), times(a1, w0))
-    o, f = at + (k + 1) * BODY_ROW, splat(1.0 / (k + 1))
-    put(bodies, o, times(x, f))
-    put(bodies, o + 4, times(y, f))
-    put(bodies, o + 8, times(z, f))
+        x, u = fma(a1, w2, x), fma(a2, w1, u)  # six sums, since each waits for its last
+        y, v = fma(a2, w0, y), fma(a0, w2, v)
+        z, w = fma(a0, w1, z), fma(a1, w0, w)
+        o -= 4
+    o, f = at + 12 * (k + 1), splat(1.0 / (k + 1))
+    put(bodies, o, times(sub(x, u), f))
+    put(bodies, o + 4, times(sub(y, v), f))
+    put(bodies, o + 8, times(sub(z, w), f))
 
 
 @kernel
@@ -89,8 +91,8 @@ def expand(network, system, k, orders, x, f):
         spin = splat(0.0)
         if network.spins[b] != 0:
             for j in range(k + 1):
-                w = four(bodies, at + j * BODY_ROW + S_OMEGA)
-                spin = add(spin, cross(four(bodies, at + (k - j) * BODY_ROW + S_SPIN), w))
+                w = four(bodies, at + S_OMEGA * orders + 4 * j)
+                spin = add(spin, cross(four(bodies, at + S_SPIN * orders + 4 * (k - j)), w))
         put(Z, z + 4, spin)
     if k > 0:
         run_loops(network, system.reals, HISTORY, k, orders, bodies, x.constraints, x.places, f.b, Z)
@@ -104,10 +106,10 @@ def expand(network, system, k, orders, x, f):
     for b in range(nb):
         at = b * orders * BODY_ROW
         weigh(network.inverse, b, Z, 8 * b, Z, 8 * b)
-        put(bodies, at + (k + 2) * BODY_ROW + S_R, times(four(Z, 8 * b), splat(h)))
+        put(bodies, at + S_R * orders + 4 * (k + 2), times(four(Z, 8 * b), splat(h)))
         if network.bodies[b, 1] == 7:
-            put(bodies, at + (k + 1) * BODY_ROW + S_OMEGA, times(four(Z, 8 * b + 4), splat(g)))
-            _turn_on(bodies, at, k + 1)
+            put(bodies, at + S_OMEGA * orders + 4 * (k + 1), times(four(Z, 8 * b + 4), splat(g)))
+            _turn_on(bodies, at, orders, k + 1)
     run_loops(network, system.reals, RESIDUAL, k, orders, bodies, x.constraints, x.places, f.b, Z)
     solve(network.pattern, f.S, f.b)
     for i in range(Z.size):
@@ -115,15 +117,15 @@ def expand(network, system, k, orders, x, f):
     scatter(network, f.Y, f.b, Z)
     for b in range(nb):
         at = b * orders * BODY_ROW
-        high = at + (k + 2) * BODY_ROW
-        put(bodies, high + S_R, fma(four(Z, 8 * b), splat(h), four(bodies, high + S_R)))
+        o = at + S_R * orders + 4 * (k + 2)
+        put(bodies, o, fma(four(Z, 8 * b), splat(h), four(bodies, o)))
         if network.bodies[b, 1] == 7:
-            o = at + (k + 1) * BODY_ROW
-            put(bodies, o + S_OMEGA, fma(four(Z, 8 * b + 4), splat(g), four(bodies, o + S_OMEGA)))
-            _spin(network, b, bodies, o)
+            o = at + S_OMEGA * orders + 4 * (k + 1)
+            put(bodies, o, fma(four(Z, 8 * b + 4), splat(g), four(bodies, o)))
+            _spin(network, b, bodies, at, orders, k + 1)
             w0, w1, w2 = h * Z[8 * b + 4], h * Z[8 * b + 5], h * Z[8 * b + 6]  # A_0 of the change of omega'
-            a0, a1, a2 = four(bodies, at), four(bodies, at + 4), four(bodies, at + 8)
-            put(bodies, high, add(four(bodies, high), sub(times(a1, splat(w2)), times(a2, splat(w1)))))
-            put(bodies, high + 4, add(four(bodies, high + 4), sub(times(a2, splat(w0)), times(a0, splat(w2)))))
-            put(bodies, high + 8, add(four(bodies, high + 8), sub(times(a0, splat(w1)), times(a1, splat(w0)))))
+            a0, a1, a2, o = four(bodies, at), four(bodies, at + 4), four(bodies, at + 8), at + 12 * (k + 2)
+            put(bodies, o, add(four(bodies, o), sub(times(a1, splat(w2)), times(a2, splat(w1)))))
+            put(bodies, o + 4, add(four(bodies, o + 4), sub(times(a2, splat(w0)), times(a0, splat(w2)))))
+            put(bodies, o + 8, add(four(bodies, o + 8), sub(times(a0, splat(w1)), times(a1, splat(w0)))))
     run_loops(network, system.reals, UPDATE, k + 2, orders, bodies, x.constraints, x.places, f.b, Z)

@@ -37,8 +37,8 @@ def allocate_expansion(network, kinds, packed, order):
     """Lay out the series of a method of this order (of omega'), with the addresses of the loops, loaded now."""
     orders = order + 2
     nb = len(network.bodies)
-    bodies = np.zeros((nb + 1, orders, BODY_ROW))
-    bodies[:, 0, [0, 5, 10]] = 1.0
+    bodies = np.zeros((nb + 1, orders * BODY_ROW))
+    bodies[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
     places, total = np.zeros((len(kinds), 2), np.int64), 0
     for i, kind in enumerate(kinds):
         places[i] = address(kind.kernels, "series", kind.__name__, InvalidConstraint), total

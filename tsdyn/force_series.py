@@ -20,11 +20,11 @@ def instance_width(markers, slots, orders):
 
 
 @kernel
-def _turning(bodies, at, k):
+def _turning(bodies, at, orders, k):
     """Order k of A omega'."""
     f = splat(0.0)
     for j in range(k + 1):
-        c, o = at + j * BODY_ROW, at + (k - j) * BODY_ROW + S_OMEGA
+        c, o = at + 12 * j, at + S_OMEGA * orders + 4 * (k - j)
         f = fma(four(bodies, c), splat(bodies[o]), f)
         f = fma(four(bodies, c + 4), splat(bodies[o + 1]), f)
         f = fma(four(bodies, c + 8), splat(bodies[o + 2]), f)
@@ -32,12 +32,12 @@ def _turning(bodies, at, k):
 
 
 @kernel
-def _place(code, bodies, at, s):
-    """One order of a marker's x; bodies[at] is that of its body."""
+def _place(code, bodies, at, orders, k, s):
+    """Order k of a marker's x; its body's series begins at bodies[at]."""
     if code == TURN:
         return splat(0.0)
-    f = turned(bodies, at, s[0], s[1], s[2])
-    return add(f, four(bodies, at + S_R)) if code == POINT else f
+    f = turned(bodies, at + 12 * k, s[0], s[1], s[2])
+    return add(f, four(bodies, at + S_R * orders + 4 * k)) if code == POINT else f
 
 
 # The names in capitals and kernel_series are filled in by force.callbacks.
@@ -51,32 +51,32 @@ def series(mode, k, orders, count, stride, table, reals, bodies, values, b, Z):
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
     values, Z = vector(values, ANY), vector(Z, ANY)
     x, xd, f = stack(ROOM), stack(ROOM), stack(ROOM)
-    width = 12 * MARKERS
-    size = orders * width + 4 * ((SLOTS * orders + 3) // 4)
+    wide, body_size = 4 * orders, BODY_ROW * orders
+    size = 3 * MARKERS * wide + 4 * ((SLOTS * orders + 3) // 4)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         first = i * size
-        row = first + k * width
         for j in range(MARKERS):
-            at, s = own[OWNERS[j]] * orders * BODY_ROW, real[3 * j : 3 * j + 3]
+            at, s, place = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3], first + j * wide + 4 * k
             if k == 0:
-                put(values, row + 4 * j, _place(CODES[j], bodies, at, s))
-            following = _place(CODES[j], bodies, at + (k + 1) * BODY_ROW, s)
-            put(values, row + width + 4 * j, following)
-            rate = _turning(bodies, at, k) if CODES[j] == TURN else times(following, splat(k + 1.0))
-            put(values, row + 4 * (MARKERS + j), rate)
-            put(x, STARTS[j], four(values, row + 4 * j))
+                put(values, place, _place(CODES[j], bodies, at, orders, 0, s))
+            following = _place(CODES[j], bodies, at, orders, k + 1, s)
+            put(values, place + 4, following)
+            rate = _turning(bodies, at, orders, k) if CODES[j] == TURN else times(following, splat(k + 1.0))
+            put(values, place + MARKERS * wide, rate)
+            put(x, STARTS[j], four(values, place))
             put(xd, STARTS[j], rate)
         for c in range(SIZE):
             f[c] = 0.0
-        kernel_series(x, xd, real[3 * MARKERS :], k, matrix(data_of(values[first + orders * width :]), SLOTS, orders), f)
+        scratch = matrix(data_of(values[first + 3 * MARKERS * wide :]), SLOTS, orders)
+        kernel_series(x, xd, real[3 * MARKERS :], k, scratch, f)
         for j in range(MARKERS):
             if own[MASK] >> OWNERS[j] & 1:
                 continue
             c, s, z = STARTS[j], real[3 * j : 3 * j + 3], 8 * own[OWNERS[j]]
-            force, place = lanes(f[c], f[c + 1], f[c + 2]), row + 4 * (2 * MARKERS + j)
-            put(values, place, force)
-            y = torque(bodies, own[OWNERS[j]] * orders * BODY_ROW, k, values, place - k * width, width)
+            force, forces = lanes(f[c], f[c + 1], f[c + 2]), first + (2 * MARKERS + j) * wide
+            put(values, forces + 4 * k, force)
+            y = torque(bodies, own[OWNERS[j]] * body_size, k, values, forces)
             if CODES[j] != TURN:
                 y = cross(lanes(s[0], s[1], s[2]), y)
             put(Z, z + 4, add(four(Z, z + 4), y))

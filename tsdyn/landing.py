@@ -132,23 +132,25 @@ def land_velocities(network, f):
 @kernel
 def sum_series(network, bodies, orders, top, h, poses, p):
     """The poses at h: A and r from coefficients up to top + 1, omega' up to top. A is made orthogonal by way of p."""
+    s = splat(h)
     for b in range(network.bodies.shape[0]):
         first, at = b * orders * BODY_ROW, b * POSE
-        s, o = splat(h), first + (top + 1) * BODY_ROW
-        r, rd = four(bodies, o + S_R), splat(0.0)
+        o = first + S_R * orders
+        r, rd = four(bodies, o + 4 * (top + 1)), splat(0.0)
         for k in range(top, -1, -1):
             rd = fma(rd, s, r)
-            r = fma(r, s, four(bodies, first + k * BODY_ROW + S_R))
+            r = fma(r, s, four(bodies, o + 4 * k))
         put(poses, at + R, r)
         put(poses, at + RD, rd)
         if network.bodies[b, 1] == 7:
-            x, y, z, w = four(bodies, o), four(bodies, o + 4), four(bodies, o + 8), splat(0.0)
+            o, c = first + S_OMEGA * orders, first + 12 * (top + 1)
+            x, y, z, w = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8), splat(0.0)
             for k in range(top, -1, -1):
-                o = first + k * BODY_ROW
-                x = fma(x, s, four(bodies, o))
-                y = fma(y, s, four(bodies, o + 4))
-                z = fma(z, s, four(bodies, o + 8))
-                w = fma(w, s, four(bodies, o + S_OMEGA))
+                c = first + 12 * k
+                x = fma(x, s, four(bodies, c))
+                y = fma(y, s, four(bodies, c + 4))
+                z = fma(z, s, four(bodies, c + 8))
+                w = fma(w, s, four(bodies, o + 4 * k))
             put(poses, at, x)
             put(poses, at + 4, y)
             put(poses, at + 8, z)

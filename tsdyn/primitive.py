@@ -124,12 +124,11 @@ def _compile(cls, functions):
         "bias": (body_loops.bias, "gamma", body_loops.SIGNATURE),
         "series": (series_loops.series, "series", series_loops.SIGNATURE),
     }
-    sizes = {"WIDTH": series_loops.row_width(len(cls.markers), cls.rows), "SLOTS": cls.slots}
     result = {}
     for name, (template, whose, signature) in loops.items():
         if whose in functions:
             owner = getattr(functions[whose], "py_func", functions[whose])
-            names = {**constants, **inner, **sizes, "kernel_value": inner[f"kernel_{whose}"]}
+            names = {**constants, **inner, "SLOTS": cls.slots, "kernel_value": inner[f"kernel_{whose}"]}
             copy = specialised(template, f"{cls.__qualname__}.{name}_loop", owner, **names)
             result[name] = Callback(copy, signature)
     owner = getattr(functions["gamma"], "py_func", functions["gamma"])

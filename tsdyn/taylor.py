@@ -83,8 +83,8 @@ def _begin_series(c, t):
     for b in range(c.network.bodies.shape[0]):
         at = b * orders * BODY_ROW
         for i in range(3):
-            f.Z[8 * b + i] = 2.0 * x.bodies[at + 2 * BODY_ROW + S_R + i]
-            f.Z[8 * b + 4 + i] = x.bodies[at + BODY_ROW + S_OMEGA + i]
+            f.Z[8 * b + i] = 2.0 * x.bodies[at + S_R * orders + 8 + i]
+            f.Z[8 * b + 4 + i] = x.bodies[at + S_OMEGA * orders + 4 + i]
     write_accelerations(c.network.bodies, f.poses, f.Z, w.qdd)
 
 
@@ -120,13 +120,13 @@ def _size(bodies, nb, orders, k, scale):
     """The largest coefficient k of r and A, and k - 1 of omega', each over what is tolerated of it."""
     worst = 0.0
     for b in range(nb):
-        at = (b * orders + k) * BODY_ROW
+        at = b * orders * BODY_ROW
         turn = 0.0
         for i in range(12):
-            turn = max(turn, abs(bodies[at + i]))
+            turn = max(turn, abs(bodies[at + 12 * k + i]))
         for i in range(3):
-            worst = max(worst, abs(bodies[at + S_R + i]) / scale[0])
-            worst = max(worst, abs(bodies[at - BODY_ROW + S_OMEGA + i]) / scale[2])
+            worst = max(worst, abs(bodies[at + S_R * orders + 4 * k + i]) / scale[0])
+            worst = max(worst, abs(bodies[at + S_OMEGA * orders + 4 * (k - 1) + i]) / scale[2])
         worst = max(worst, turn / scale[1])
     return worst
 
@@ -142,8 +142,8 @@ def _step_length(c, r):
     for b in range(nb):
         at = b * orders * BODY_ROW
         for i in range(3):
-            far = max(far, abs(x.bodies[at + S_R + i]))
-            fast = max(fast, abs(x.bodies[at + S_OMEGA + i]))
+            far = max(far, abs(x.bodies[at + S_R * orders + i]))
+            fast = max(fast, abs(x.bodies[at + S_OMEGA * orders + i]))
     scale[0], scale[1], scale[2] = atol + rtol * far, atol + rtol, atol + rtol * fast
     last, before = _size(x.bodies, nb, orders, top + 1, scale), _size(x.bodies, nb, orders, top, scale)
     if not (last < math.inf and before < math.inf):

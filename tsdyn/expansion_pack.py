@@ -3,6 +3,7 @@
 import numpy as np
 
 from . import force_series
+from ._kernel import twin
 from .attachment import address
 from .bodies import Ground
 from .body_loops import INTS, MASK
@@ -80,18 +81,16 @@ def masks(network, packed, kinds):
     """
     rng = np.random.default_rng(0)
     for row, kind in zip(network.kinds, kinds, strict=True):
-        members = [c for c in packed.constraints if type(c) is kind]
-        patterns = {}
-        for i, constraint in enumerate(members):
+        members = [pair for pair in zip(packed.constraints, packed.parameters, strict=True) if type(pair[0]) is kind]
+        patterns, series = {}, twin(kind.series)
+        for i, (constraint, par) in enumerate(members):
             grounded = tuple(isinstance(constraint.body_of(marker), Ground) for marker in kind.markers)
-            if grounded not in patterns:
-                patterns[grounded] = _mask(kind, packed, constraint, grounded, rng)
-            network.table[row[N_FIRST_INT] + i * INTS + MASK] = patterns[grounded]
+            if (grounded, par) not in patterns:
+                patterns[grounded, par] = _mask(kind, series, par, grounded, rng)
+            network.table[row[N_FIRST_INT] + i * INTS + MASK] = patterns[grounded, par]
 
 
-def _mask(kind, packed, constraint, grounded, rng):
-    series = getattr(kind.series, "py_func", kind.series)
-    par = packed.parameters[[c is constraint for c in packed.constraints].index(True)]
+def _mask(kind, series, par, grounded, rng):
     size = 3 * len(kind.markers)
     scratch, varies = np.zeros((kind.slots, 5)), np.zeros(size, bool)
     for k in range(4):

@@ -4,6 +4,7 @@ import math
 
 from ._kernel import specialised, stack
 from .errors import InvalidForce
+from .recurrences import product, square
 from .rotation import rotate
 from .signal import Signal
 from .state_function import ByState, fill_state
@@ -52,12 +53,26 @@ class Given:
 class GivenInBody:
     """Mixed in before `Given`, with the markers' Parameters second: in axes of the body."""
 
+    slots = 8
+
     @staticmethod
     def law(x, xd, par, t, out):
         """A(p_a) times the vector."""
         rotate(x[3:], par, out)
         for i in range(4):
             out[3 + i] = 0.0 * x[3 + i]
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of A(p) F = (e0^2 - e.e) F + 2 (e.F) e + 2 e0 e x F; rows of p, 2 e.F and 2 e x F."""
+        e1, e2, e3 = 2.0 * x[4], 2.0 * x[5], 2.0 * x[6]
+        for i in range(4):
+            s[i, k] = x[3 + i]
+        s[4, k] = e1 * par[0] + e2 * par[1] + e3 * par[2]
+        s[5, k], s[6, k], s[7, k] = e2 * par[2] - e3 * par[1], e3 * par[0] - e1 * par[2], e1 * par[1] - e2 * par[0]
+        scale = square(s[0], k) - square(s[1], k) - square(s[2], k) - square(s[3], k)
+        for i in range(3):
+            out[i] = scale * par[i] + product(s[4], s[1 + i], k) + product(s[0], s[5 + i], k)
 
 
 class GivenByState(ByState):
@@ -67,6 +82,7 @@ class GivenByState(ByState):
     """
 
     first = 0
+    series = None  # nothing is known of a function
 
     def parameters(self):
         """Whether the vector is in axes of the body."""

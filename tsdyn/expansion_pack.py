@@ -7,31 +7,66 @@ from ._kernel import twin
 from .attachment import address
 from .bodies import Ground
 from .body_loops import INTS, MASK
-from .errors import InvalidConstraint, InvalidForce
+from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .force_pack import F_FIRST_REAL, F_REALS, members_of
 from .motion import Motion
 from .network import N_COUNT, N_FIRST_INT
-from .signal import Signal
+from .signal import Signal, Table
 from .series_loops import BODY_ROW, GROUND, instance_width
 from .taylor import Expansion
 
+SHOWN = 5  # in a message
+
+
+def demand_series(packed, method):
+    """Refuse a scene for a method that needs the series of everything in it.
+
+    Raises
+    ------
+    InvalidArgument
+        Naming each constraint and force that has none, and why.
+    """
+    found = without_series(packed)
+    if found:
+        shown = found[:SHOWN] + ([f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else [])
+        raise InvalidArgument(
+            f"{method} needs the Taylor series of every constraint and force, and these have none: {'; '.join(shown)}. "
+            "All other methods serve: DOP853 is the nearest to it, SDIRK54 is for stiff scenes. A plug-in may be given a "
+            "kernel `series` (docs/plug-ins.md)."
+        )
+
 
 def without_series(packed):
-    """Names of the constraints and forces that have no series, each with the reason."""
+    """The constraints and forces that have no series, each as `name: why`."""
     found = []
     for constraint, given in zip(packed.constraints, packed.parameters, strict=True):
         if constraint.normalises:
             continue
         if any(isinstance(value, Motion) for value in given):
-            found.append(f"{constraint.name} (a function of time)")
+            found.append((constraint, _given_by(constraint, Motion)))
+        elif constraint.rheonomic:
+            found.append((constraint, "it depends on time"))
         elif "series" not in constraint.kernels:
-            found.append(f"{constraint.name} ({type(constraint).__name__} gives no series)")
+            found.append((constraint, f"{constraint._kind()} has no kernel `series`"))
     for load in packed.loads:
         if any(isinstance(value, Signal) for value in load.parameters):
-            found.append(f"{load.force.name} (a function of time or a table)")
+            found.append((load.force, _given_by(load.force, Signal)))
         elif "series" not in load.force.kernels:
-            found.append(f"{load.force.name} ({type(load.force).__name__} gives no series)")
-    return found
+            found.append((load.force, load.force.no_series or f"{load.force._kind()} has no kernel `series`"))
+    return [f"{_label(item)}: {why}" for item, why in found]
+
+
+def _label(item):
+    return item.name if item.name.startswith(item._kind()) else f"{item._kind()} {item.name!r}"
+
+
+def _given_by(item, kind):
+    """Which attribute is a function of time, or a table."""
+    for name, value in vars(item).items():
+        if isinstance(value, kind):
+            table = isinstance(getattr(value, "source", None), Table)
+            return f"its {name} is {'a table' if table else 'a function of time'}"
+    return "it has a function of time"
 
 
 def allocate_expansion(network, kinds, packed, order):

@@ -4,7 +4,7 @@ import math
 
 from ._kernel import specialised, stack
 from .errors import InvalidForce
-from .recurrences import product, square
+from .recurrences import rotation
 from .rotation import rotate
 from .signal import Signal
 from .state_function import ByState, fill_state
@@ -53,7 +53,7 @@ class Given:
 class GivenInBody:
     """Mixed in before `Given`, with the markers' Parameters second: in axes of the body."""
 
-    slots = 8
+    slots = 13
 
     @staticmethod
     def law(x, xd, par, t, out):
@@ -64,15 +64,12 @@ class GivenInBody:
 
     @staticmethod
     def series(x, xd, par, k, s, out):
-        """Of A(p) F = (e0^2 - e.e) F + 2 (e.F) e + 2 e0 e x F; rows of p, 2 e.F and 2 e x F."""
-        e1, e2, e3 = 2.0 * x[4], 2.0 * x[5], 2.0 * x[6]
+        """Of A(p) times the vector; rows of p, then of A."""
         for i in range(4):
             s[i, k] = x[3 + i]
-        s[4, k] = e1 * par[0] + e2 * par[1] + e3 * par[2]
-        s[5, k], s[6, k], s[7, k] = e2 * par[2] - e3 * par[1], e3 * par[0] - e1 * par[2], e1 * par[1] - e2 * par[0]
-        scale = square(s[0], k) - square(s[1], k) - square(s[2], k) - square(s[3], k)
+        rotation(s, 0, 4, k)
         for i in range(3):
-            out[i] = scale * par[i] + product(s[4], s[1 + i], k) + product(s[0], s[5 + i], k)
+            out[i] = s[4 + i, k] * par[0] + s[7 + i, k] * par[1] + s[10 + i, k] * par[2]
 
 
 class GivenByState(ByState):

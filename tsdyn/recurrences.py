@@ -8,7 +8,8 @@ its arguments up to k, and from the result's own row up to k - 1. Fill rows of t
 
     product          c = a b                 c_k = sum_j a_j b_{k-j}
     square           c = a a                 half of that
-    dot, cross       of three rows each
+    dot, cross       of three rows each; scaled: of three rows and one
+    rotation         A(p) by columns, nine rows; rotated, rotated_back: A v and A^T v
     quotient         q = a / b               b_0 q_k = a_k - sum_{j>0} b_j q_{k-j}                         (1)
     root             r = sqrt(a)             2 r_0 r_k = a_k - sum_{0<j<k} r_j r_{k-j}                     (2)
     power            u = a^n                 k a_0 u_k = sum_{j>0} (n j - (k - j)) a_j u_{k-j}             (3)
@@ -79,6 +80,52 @@ def scaled(s, i, j, k):
         x += s[i, l] * f
         y += s[i + 1, l] * f
         z += s[i + 2, l] * f
+    return x, y, z
+
+
+@kernel
+def rotation(s, p, a, k):
+    """Write coefficient k of A(p) into rows a to a + 8 of s, column after column; p is in rows p to p + 3."""
+    aa, bb, cc, dd, ab, ac, ad, bc, bd, cd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for l in range(k + 1):
+        e0, e1, e2, e3 = s[p, l], s[p + 1, l], s[p + 2, l], s[p + 3, l]
+        g0, g1, g2, g3 = s[p, k - l], s[p + 1, k - l], s[p + 2, k - l], s[p + 3, k - l]
+        aa += e0 * g0
+        bb += e1 * g1
+        cc += e2 * g2
+        dd += e3 * g3
+        ab += e0 * g1
+        ac += e0 * g2
+        ad += e0 * g3
+        bc += e1 * g2
+        bd += e1 * g3
+        cd += e2 * g3
+    s[a, k], s[a + 1, k], s[a + 2, k] = aa + bb - cc - dd, 2.0 * (bc + ad), 2.0 * (bd - ac)
+    s[a + 3, k], s[a + 4, k], s[a + 5, k] = 2.0 * (bc - ad), aa - bb + cc - dd, 2.0 * (cd + ab)
+    s[a + 6, k], s[a + 7, k], s[a + 8, k] = 2.0 * (bd + ac), 2.0 * (cd - ab), aa - bb - cc + dd
+
+
+@kernel
+def rotated(s, a, v, k):
+    """Coefficient k of A times the vector in rows v to v + 2, a tuple of three; A is in rows a to a + 8."""
+    x, y, z = 0.0, 0.0, 0.0
+    for l in range(k + 1):
+        v0, v1, v2 = s[v, k - l], s[v + 1, k - l], s[v + 2, k - l]
+        x += s[a, l] * v0 + s[a + 3, l] * v1 + s[a + 6, l] * v2
+        y += s[a + 1, l] * v0 + s[a + 4, l] * v1 + s[a + 7, l] * v2
+        z += s[a + 2, l] * v0 + s[a + 5, l] * v1 + s[a + 8, l] * v2
+    return x, y, z
+
+
+@kernel
+def rotated_back(s, a, v, k):
+    """Coefficient k of A^T times the vector in rows v to v + 2, a tuple of three; A is in rows a to a + 8."""
+    x, y, z = 0.0, 0.0, 0.0
+    for l in range(k + 1):
+        v0, v1, v2 = s[v, k - l], s[v + 1, k - l], s[v + 2, k - l]
+        x += s[a, l] * v0 + s[a + 1, l] * v1 + s[a + 2, l] * v2
+        y += s[a + 3, l] * v0 + s[a + 4, l] * v1 + s[a + 5, l] * v2
+        z += s[a + 6, l] * v0 + s[a + 7, l] * v1 + s[a + 8, l] * v2
     return x, y, z
 
 

@@ -98,7 +98,7 @@ class Spring(Force):
         """Of Eq. (2), as (k + (actuator - k l0) / l + c d.dd / l^2) d."""
         for i in range(3):
             s[i, k] = x[i] - x[3 + i]
-        s[3, k] = square(s[0], k) + square(s[1], k) + square(s[2], k)
+        s[3, k] = dot(s, 0, 0, k)
         s[4, k] = inverse_root(s[3], s[4], k)
         s[5, k] = (par[3] - par[0] * par[2]) * s[4, k] + (par[0] if k == 0 else 0.0)
         if par[1] != 0.0:

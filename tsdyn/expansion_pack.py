@@ -11,8 +11,8 @@ from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .force_pack import F_FIRST_REAL, F_REALS, members_of
 from .motion import Motion
 from .network import N_COUNT, N_FIRST_INT
-from .signal import Signal, Table
 from .series_loops import BODY_ROW, GROUND, instance_width
+from .signal import Signal, Table
 from .taylor import Expansion
 
 SHOWN = 5  # in a message
@@ -31,8 +31,8 @@ def demand_series(packed, method):
         shown = found[:SHOWN] + ([f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else [])
         raise InvalidArgument(
             f"{method} needs the Taylor series of every constraint and force, and these have none: {'; '.join(shown)}. "
-            "All other methods serve: DOP853 is the nearest to it, SDIRK54 is for stiff scenes. A plug-in may be given a "
-            "kernel `series` (docs/plug-ins.md)."
+            "All other methods serve: DOP853 is the nearest to it, SDIRK54 is for stiff scenes. A plug-in may be given "
+            "a kernel `series` (docs/plug-ins.md)."
         )
 
 
@@ -138,4 +138,3 @@ def _mask(kind, series, par, grounded, rng):
     bits = [bool(varies[3 * j : 3 * j + 3].any()) << j for j in range(len(kind.markers))]
     bits += [bool(on) << (GROUND + j) for j, on in enumerate(grounded)]
     return sum(bits)
-

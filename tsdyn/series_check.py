@@ -1,7 +1,8 @@
 """The checks of `series` in `check_primitive` and `check_force`, against truncated Taylor arithmetic.
 
-The bodies go through random analytic motions. Along them phi, its jacobian or the law, run on truncated series, give the
-coefficients that `series` must give: first the Python kernel, one coefficient after the other, then the compiled loops.
+The bodies go through random analytic motions. Along them phi, its jacobian or the law, run on truncated series, give
+the coefficients that `series` must give: first the Python kernel, one coefficient after the other, then the compiled
+loops.
 """
 
 import numpy as np
@@ -109,7 +110,9 @@ def random_motion(scene, rng):
     weights = SHRINK ** np.arange(ORDER + 2)
     q = []
     for body in scene.bodies:
-        series = [Truncated(np.append(v, rng.normal(size=ORDER + 1)) * weights) for v in (*body.position, *body.orientation)]
+        series = [
+            Truncated(np.append(v, rng.normal(size=ORDER + 1)) * weights) for v in (*body.position, *body.orientation)
+        ]
         p = series[3:]
         length = np.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3])
         q += [*series[:3], *(e / length for e in p)]
@@ -223,9 +226,7 @@ def _compare(name, k, labels, got, expected):
     for label, value, series in zip(np.ravel(labels), np.ravel(got), np.ravel(expected), strict=True):
         right = _series(series).c[k]
         if not abs(value - right) <= TOLERANCE * scale:
-            raise CheckFailed(
-                f"{name}: series: coefficient {k} of {label} is {value:.15g} and should be {right:.15g}."
-            )
+            raise CheckFailed(f"{name}: series: coefficient {k} of {label} is {value:.15g} and should be {right:.15g}.")
 
 
 def _series(value):

@@ -192,8 +192,8 @@ def separation_rate(x, xd):
     return to_body(x[6], x[7], x[8], x[9], v0, v1, v2)
 
 
-# rows of the series: p_a 0, p_b 4, A_a 8, D 17, omega_a 20, Dd - omega_a x D 23, f 26 and F 29 with F = A_a f of Eq. (1),
-# (e0, e) 32, K_t phi 36, the bracket of Eq. (2) 39, omega_b - omega_a 42
+# rows of the series: p_a 0, p_b 4, A_a 8, D 17, omega_a 20, Dd - omega_a x D 23, f 26 and F 29 with F = A_a f of
+# Eq. (1), (e0, e) 32, K_t phi 36, the bracket of Eq. (2) 39, omega_b - omega_a 42
 
 
 @kernel

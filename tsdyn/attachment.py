@@ -128,6 +128,12 @@ def layout(markers):
     }
 
 
+def check_slots(cls, where, error):
+    """Refuse a class whose `slots` is no number of rows."""
+    if isinstance(cls.slots, bool) or not isinstance(cls.slots, int) or cls.slots < 0:
+        raise error(f"{where}: slots must be the number of rows of scratch memory of series, 0 or more.")
+
+
 def inlined(function):
     """A kernel of a function that may be one already."""
     return function if hasattr(function, "py_func") else kernel(function)

@@ -79,6 +79,17 @@ def run_loops(network, reals, mode, k, orders, bodies, values, places, b, Z):
 
 
 @kernel
+def run_forces(reals, x, k, orders, poses, Z):
+    """Order k of all forces, onto Z; at k = 0 the poses are those of order zero."""
+    for i in range(x.forces.shape[0]):
+        kind = x.forces[i]
+        call_series(
+            kind[0], 0, k, orders, kind[2], kind[3], x.table[kind[4] :], reals[kind[5] :], x.bodies,
+            x.loads[kind[1] :], poses, Z,
+        )  # fmt: skip
+
+
+@kernel
 def expand(network, system, k, orders, x, f):
     """Order k of the forces and multipliers, k + 1 of omega', k + 2 of r and A; k in turn from zero, after `begin`.
 
@@ -89,12 +100,7 @@ def expand(network, system, k, orders, x, f):
     bodies, Z = x.bodies, f.Z
     nb = network.bodies.shape[0]
     run_loops(network, system.reals, ADVANCE, k, orders, bodies, x.constraints, x.places, f.b, Z)
-    for i in range(x.forces.shape[0]):
-        kind = x.forces[i]
-        call_series(
-            kind[0], 0, k, orders, kind[2], kind[3], x.table[kind[4] :], system.reals[kind[5] :], bodies,
-            x.loads[kind[1] :], f.b, Z,
-        )  # fmt: skip
+    run_forces(system.reals, x, k, orders, f.poses, Z)
     g, h = 1.0 / (k + 1), 1.0 / ((k + 1) * (k + 2))
     for b in range(nb):
         at = b * orders * BODY_ROW

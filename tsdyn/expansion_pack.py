@@ -3,34 +3,66 @@
 import numpy as np
 
 from . import force_series
+from ._kernel import twin
 from .attachment import address
 from .bodies import Ground
 from .body_loops import INTS, MASK
 from .errors import InvalidConstraint, InvalidForce
 from .force_pack import F_FIRST_REAL, F_REALS, members_of
 from .motion import Motion
-from .network import N_COUNT, N_FIRST_INT
-from .signal import Signal
+from .network import N_COUNT, N_FIRST_INT, is_regular
 from .series_loops import BODY_ROW, GROUND, instance_width
 from .series_state import Expansion
+from .signal import Signal, Table
+
+SHOWN = 5  # in a message
+
+
+def refusal(packed):
+    """Why a scene can't be run by Taylor series, naming each part that has none; empty where it can."""
+    found = without_series(packed)
+    found += [f"{body.name}: a principal moment of inertia is zero" for body in packed.bodies if not is_regular(body)]
+    if not found:
+        return ""
+    shown = found[:SHOWN] + ([f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else [])
+    return (
+        f"Taylor needs the series of every constraint and force, and these have none: {'; '.join(shown)}. All other "
+        "methods serve: DOP853 is the nearest to it, SDIRK54 is for stiff scenes. A plug-in may be given a kernel "
+        "`series` (docs/plug-ins.md)."
+    )
 
 
 def without_series(packed):
-    """Names of the constraints and forces that have no series, each with the reason."""
+    """The constraints and forces that have no series, each as `name: why`."""
     found = []
     for constraint, given in zip(packed.constraints, packed.parameters, strict=True):
         if constraint.normalises:
             continue
         if any(isinstance(value, Motion) for value in given):
-            found.append(f"{constraint.name} (a function of time)")
+            found.append((constraint, _given_by(constraint, Motion)))
+        elif constraint.rheonomic:
+            found.append((constraint, "it depends on time"))
         elif "series" not in constraint.kernels:
-            found.append(f"{constraint.name} ({type(constraint).__name__} gives no series)")
+            found.append((constraint, f"{constraint._kind()} has no kernel `series`"))
     for load in packed.loads:
         if any(isinstance(value, Signal) for value in load.parameters):
-            found.append(f"{load.force.name} (a function of time or a table)")
+            found.append((load.force, _given_by(load.force, Signal)))
         elif "series" not in load.force.kernels:
-            found.append(f"{load.force.name} ({type(load.force).__name__} gives no series)")
-    return found
+            found.append((load.force, load.force.no_series or f"{load.force._kind()} has no kernel `series`"))
+    return [f"{_label(item)}: {why}" for item, why in found]
+
+
+def _label(item):
+    return item.name if item.name.startswith(item._kind()) else f"{item._kind()} {item.name!r}"
+
+
+def _given_by(item, kind):
+    """Which attribute is a function of time, or a table."""
+    for name, value in vars(item).items():
+        if isinstance(value, kind):
+            table = isinstance(getattr(value, "source", None), Table)
+            return f"its {name} is {'a table' if table else 'a function of time'}"
+    return "it has a function of time"
 
 
 def allocate_expansion(network, kinds, packed, highest):
@@ -80,18 +112,16 @@ def masks(network, packed, kinds):
     """
     rng = np.random.default_rng(0)
     for row, kind in zip(network.kinds, kinds, strict=True):
-        members = [c for c in packed.constraints if type(c) is kind]
-        patterns = {}
-        for i, constraint in enumerate(members):
+        members = [pair for pair in zip(packed.constraints, packed.parameters, strict=True) if type(pair[0]) is kind]
+        patterns, series = {}, twin(kind.series)
+        for i, (constraint, par) in enumerate(members):
             grounded = tuple(isinstance(constraint.body_of(marker), Ground) for marker in kind.markers)
-            if grounded not in patterns:
-                patterns[grounded] = _mask(kind, packed, constraint, grounded, rng)
-            network.table[row[N_FIRST_INT] + i * INTS + MASK] = patterns[grounded]
+            if (grounded, par) not in patterns:
+                patterns[grounded, par] = _mask(kind, series, par, grounded, rng)
+            network.table[row[N_FIRST_INT] + i * INTS + MASK] = patterns[grounded, par]
 
 
-def _mask(kind, packed, constraint, grounded, rng):
-    series = getattr(kind.series, "py_func", kind.series)
-    par = packed.parameters[[c is constraint for c in packed.constraints].index(True)]
+def _mask(kind, series, par, grounded, rng):
     size = 3 * len(kind.markers)
     scratch, varies = np.zeros((kind.slots, 5)), np.zeros(size, bool)
     for k in range(4):
@@ -104,4 +134,3 @@ def _mask(kind, packed, constraint, grounded, rng):
     bits = [bool(varies[3 * j : 3 * j + 3].any()) << j for j in range(len(kind.markers))]
     bits += [bool(on) << (GROUND + j) for j, on in enumerate(grounded)]
     return sum(bits)
-

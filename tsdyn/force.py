@@ -6,6 +6,7 @@ A force works on marker coordinates x and their rates xd (ground frame) and neve
     potential(x, par, t)           optional; the potential energy, J
     dissipation(x, xd, par, t)     optional; the power that dampers or friction take, W, >= 0
     remember(x, xd, par, t)        optional, with memory = 1: what par[-1] is after each accepted step
+    series(x, xd, par, k, s, out)  optional; out[len(x)]  coefficient k of the law's Taylor series, see recurrences.py
 
 x is the concatenation of the force's markers, par the floats that `parameters()` returns, functions of time among them
 evaluated at t. Conjugate to a Point is a force, to a Turn a torque, both in the ground frame. What does its work by a
@@ -14,6 +15,7 @@ potential or takes it as dissipation says so; the rest of out . xd is applied po
 `law` uses arithmetic and NumPy functions of scalars and is analytic in x and xd (no comparison, abs or norm), since
 complex steps of it are the Jacobians of implicit methods; write products instead of powers of x. Set analytic = False
 where that is impossible: then central differences do it. `potential` and `dissipation` are run by NumPy on arrays.
+`series` gets the coefficients k of x and xd, and fills column k of the scratch array s[slots, k].
 """
 
 from types import MappingProxyType
@@ -23,7 +25,7 @@ import numpy as np
 from . import force_loops as loops
 from . import force_series, series_loops
 from ._kernel import Callback, kernel, specialised
-from .attachment import Attachment, inlined, layout, static_kernel
+from .attachment import Attachment, check_slots, inlined, layout, static_kernel
 from .checks import number
 from .errors import InvalidForce
 from .markers import PARAMETERS, TURN, Marker, Point
@@ -47,6 +49,10 @@ class Force(Attachment):
         What x is made of, each on body "a" or "b".
     memory : int
         1 for a force that remembers a number from step to step: it is the last of par, and zero at first.
+    slots : int
+        Rows of scratch memory that `series` uses.
+    no_series : str
+        Why there is none.
     analytic : bool
         Whether `law` can be run on complex numbers.
     particles : bool
@@ -64,6 +70,7 @@ class Force(Attachment):
     error = InvalidForce
     memory = 0
     slots = 0
+    no_series = ""
     analytic = True
     quantities = MappingProxyType({})
     loads = ()
@@ -80,6 +87,7 @@ class Force(Attachment):
             raise InvalidForce(f"{where}: markers must be a tuple of Point, Vector, Parameters or Turn.")
         if cls.memory not in (0, 1) or (cls.memory == 1) != (getattr(cls, "remember", None) is not None):
             raise InvalidForce(f"{where}: memory = 1 needs a kernel remember, and remember needs memory = 1.")
+        check_slots(cls, where, InvalidForce)
         functions = {}
         for name, arguments in {**_KERNELS, **_OPTIONAL}.items():
             if name in _OPTIONAL and getattr(cls, name, None) is None:

@@ -10,6 +10,7 @@ from .force_pack import with_force_jacobians
 from .loads import force_loads
 from .power import load_powers, marker_states
 from .scene import Scene
+from .series_check import check_force_series
 from .signal import Signal
 
 SPACING = 4e-3  # of central differences of sixth order
@@ -57,7 +58,9 @@ def check_force(kind, *, seed=0, states=3):
         for _ in range(states):
             scene, force = _instance(kind, arrangement, rng)
             if force is not None:
-                _check(scene, force, f"{force._kind()} ({arrangement})", rng)
+                name = f"{force._kind()} ({arrangement})"
+                _check(scene, force, name, rng)
+                check_force_series(scene, force, name, rng)
 
 
 def _instance(kind, arrangement, rng):

@@ -1,14 +1,22 @@
 """Taylor series of forces: one loop a kind, over all its instances, order by order.
 
-A force says how the series of its law follows from those of x and xd, by its kernel `series`; order k of the law needs
-x up to k and xd up to k, which is x up to k + 1. The series of an instance holds for each order x, xd and the forces
-(4 floats a marker each), then its own scratch.
+A force says how the series of its law follows from those of x and xd, by its kernel `series`; the rest is the same for
+all. Order k of the law needs x up to k and xd up to k, which is x up to k + 1:
+
+    x_k             = r_k + A_k s                                   Point; of a Vector without r_k
+    (k+1) p_{k+1}   = 1/2 sum_j G(p_j)^T omega'_{k-j}               Parameters, x = p                   (1)
+    xd_k            = (k+1) x_{k+1};  sum_j A_j omega'_{k-j}        all others; Turn                    (2)
+    T_k             = s x sum_j A_j^T f_{k-j}                       torque about the centroid, body     (3)
+                      sum_j A_j^T f_{k-j};  1/2 sum_j G(p_j) f_{k-j}    frame: of a Turn; of Parameters
+
+The series of an instance holds x, xd and the forces (4 floats a marker and order each), then its own scratch, then for
+each marker the last order at which its force is not zero: (3) ends there, at once for what is constant.
 """
 
 from ._four import add, cross, fma, four, lanes, put, splat, times
 from ._kernel import ANY, data_of, integers, kernel, matrix, stack, vector
-from .markers import POINT, TURN
-from .poses import turned
+from .markers import PARAMETERS, POINT, TURN
+from .poses import POSE, P, turned
 from .series_loops import BODY_ROW, S_OMEGA, S_R, torque
 
 BODY, MASK, INTS = 0, 2, 3  # of the table: the two bodies, and which of them are the ground
@@ -16,7 +24,7 @@ BODY, MASK, INTS = 0, 2, 3  # of the table: the two bodies, and which of them ar
 
 def instance_width(markers, slots, orders):
     """Floats of an instance."""
-    return orders * 12 * markers + 4 * ((slots * orders + 3) // 4)
+    return 12 * markers * orders + 4 * ((slots * orders + markers + 3) // 4)
 
 
 @kernel
@@ -33,11 +41,40 @@ def _turning(bodies, at, orders, k):
 
 @kernel
 def _place(code, bodies, at, orders, k, s):
-    """Order k of a marker's x; its body's series begins at bodies[at]."""
+    """Order k of the x of a Point or Vector, zero for a Turn; its body's series begins at bodies[at]."""
     if code == TURN:
         return splat(0.0)
     f = turned(bodies, at + 12 * k, s[0], s[1], s[2])
     return add(f, four(bodies, at + S_R * orders + 4 * k)) if code == POINT else f
+
+
+@kernel
+def _parameters_rate(bodies, omega, k, values, p, out):
+    """out[out:out + 4] of values = order k of pd, Eq. (1); p_0 is at values[p], omega'_0 at bodies[omega]."""
+    d0, d1, d2, d3 = 0.0, 0.0, 0.0, 0.0
+    for j in range(k + 1):
+        e, o = p + 4 * j, omega + 4 * (k - j)
+        e0, e1, e2, e3 = values[e], values[e + 1], values[e + 2], values[e + 3]
+        x, y, z = bodies[o], bodies[o + 1], bodies[o + 2]
+        d0 -= e1 * x + e2 * y + e3 * z
+        d1 += e0 * x - e3 * y + e2 * z
+        d2 += e3 * x + e0 * y - e1 * z
+        d3 += e1 * y - e2 * x + e0 * z
+    values[out], values[out + 1], values[out + 2], values[out + 3] = 0.5 * d0, 0.5 * d1, 0.5 * d2, 0.5 * d3
+
+
+@kernel
+def _parameters_torque(values, p, f, k, last):
+    """1/2 sum_j G(p_{k-j}) f_j, j up to last; p_0 is at values[p], f_0 at values[f]."""
+    x, y, z = 0.0, 0.0, 0.0
+    for j in range(last + 1):
+        e, g = p + 4 * (k - j), f + 4 * j
+        e0, e1, e2, e3 = values[e], values[e + 1], values[e + 2], values[e + 3]
+        f0, f1, f2, f3 = values[g], values[g + 1], values[g + 2], values[g + 3]
+        x += e0 * f1 - e1 * f0 + e3 * f2 - e2 * f3
+        y += e0 * f2 - e2 * f0 - e3 * f1 + e1 * f3
+        z += e0 * f3 - e3 * f0 + e2 * f1 - e1 * f2
+    return lanes(0.5 * x, 0.5 * y, 0.5 * z)
 
 
 # The names in capitals and kernel_series are filled in by force.callbacks.
@@ -46,40 +83,59 @@ CODES = OWNERS = STARTS = (0,)
 kernel_series = None
 
 
-def series(mode, k, orders, count, stride, table, reals, bodies, values, b, Z):
-    """Order k of the forces, onto the bodies' Z."""
+def series(mode, k, orders, count, stride, table, reals, bodies, values, poses, Z):
+    """Order k of the forces, onto the bodies' Z; p_0 from the poses."""
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
-    values, Z = vector(values, ANY), vector(Z, ANY)
+    values, poses, Z = vector(values, ANY), vector(poses, ANY), vector(Z, ANY)
     x, xd, f = stack(ROOM), stack(ROOM), stack(ROOM)
     wide, body_size = 4 * orders, BODY_ROW * orders
-    size = 3 * MARKERS * wide + 4 * ((SLOTS * orders + 3) // 4)
+    own_scratch = 3 * MARKERS * wide
+    size = own_scratch + 4 * ((SLOTS * orders + MARKERS + 3) // 4)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         first = i * size
         for j in range(MARKERS):
             at, s, place = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3], first + j * wide + 4 * k
-            if k == 0:
-                put(values, place, _place(CODES[j], bodies, at, orders, 0, s))
-            following = _place(CODES[j], bodies, at, orders, k + 1, s)
-            put(values, place + 4, following)
-            rate = _turning(bodies, at, orders, k) if CODES[j] == TURN else times(following, splat(k + 1.0))
-            put(values, place + MARKERS * wide, rate)
+            rate = place + MARKERS * wide
+            if CODES[j] == PARAMETERS:
+                if k == 0:
+                    put(values, place, four(poses, own[OWNERS[j]] * POSE + P))
+                _parameters_rate(bodies, at + S_OMEGA * orders, k, values, first + j * wide, rate)
+                put(values, place + 4, times(four(values, rate), splat(1.0 / (k + 1))))
+            else:
+                if k == 0:
+                    put(values, place, _place(CODES[j], bodies, at, orders, 0, s))
+                following = _place(CODES[j], bodies, at, orders, k + 1, s)
+                put(values, place + 4, following)
+                turning = CODES[j] == TURN
+                put(values, rate, _turning(bodies, at, orders, k) if turning else times(following, splat(k + 1.0)))
             put(x, STARTS[j], four(values, place))
-            put(xd, STARTS[j], rate)
+            put(xd, STARTS[j], four(values, rate))
         for c in range(SIZE):
             f[c] = 0.0
-        scratch = matrix(data_of(values[first + 3 * MARKERS * wide :]), SLOTS, orders)
+        scratch = matrix(data_of(values[first + own_scratch :]), SLOTS, orders)
         kernel_series(x, xd, real[3 * MARKERS :], k, scratch, f)
         for j in range(MARKERS):
             if own[MASK] >> OWNERS[j] & 1:
                 continue
             c, s, z = STARTS[j], real[3 * j : 3 * j + 3], 8 * own[OWNERS[j]]
-            force, forces = lanes(f[c], f[c + 1], f[c + 2]), first + (2 * MARKERS + j) * wide
-            put(values, forces + 4 * k, force)
-            y = torque(bodies, own[OWNERS[j]] * body_size, k, values, forces)
-            if CODES[j] != TURN:
-                y = cross(lanes(s[0], s[1], s[2]), y)
+            at, forces = own[OWNERS[j]] * body_size, first + (2 * MARKERS + j) * wide
+            ends = first + own_scratch + SLOTS * orders + j
+            wider = CODES[j] == PARAMETERS
+            some = f[c] != 0.0 or f[c + 1] != 0.0 or f[c + 2] != 0.0 or (wider and f[c + 3] != 0.0)
+            if some or k == 0:
+                values[ends] = float(k) if some else -1.0
+            put(values, forces + 4 * k, four(f, c) if wider else lanes(f[c], f[c + 1], f[c + 2]))
+            last = int(values[ends])
+            if last < 0:
+                continue
+            if wider:
+                y = _parameters_torque(values, first + j * wide, forces, k, last)
+            else:
+                y = torque(bodies, at + 12 * (k - last), last, values, forces)
+                if CODES[j] != TURN:
+                    y = cross(lanes(s[0], s[1], s[2]), y)
             put(Z, z + 4, add(four(Z, z + 4), y))
             if CODES[j] == POINT:
-                put(Z, z, add(four(Z, z), force))
+                put(Z, z, add(four(Z, z), four(values, forces + 4 * k)))
     return 0

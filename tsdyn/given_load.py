@@ -4,6 +4,7 @@ import math
 
 from ._kernel import specialised, stack
 from .errors import InvalidForce
+from .recurrences import rotation
 from .rotation import rotate
 from .signal import Signal
 from .state_function import ByState, fill_state
@@ -52,12 +53,23 @@ class Given:
 class GivenInBody:
     """Mixed in before `Given`, with the markers' Parameters second: in axes of the body."""
 
+    slots = 13
+
     @staticmethod
     def law(x, xd, par, t, out):
         """A(p_a) times the vector."""
         rotate(x[3:], par, out)
         for i in range(4):
             out[3 + i] = 0.0 * x[3 + i]
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of A(p) times the vector; rows of p, then of A."""
+        for i in range(4):
+            s[i, k] = x[3 + i]
+        rotation(s, 0, 4, k)
+        for i in range(3):
+            out[i] = s[4 + i, k] * par[0] + s[7 + i, k] * par[1] + s[10 + i, k] * par[2]
 
 
 class GivenByState(ByState):
@@ -67,6 +79,7 @@ class GivenByState(ByState):
     """
 
     first = 0
+    series = None  # nothing is known of a function
 
     def parameters(self):
         """Whether the vector is in axes of the body."""

@@ -22,6 +22,7 @@ OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
 PIVOT_LIMIT = 1e-13  # of S: less of a diagonal entry than this is rounding
 SWEEPS = 12
+MOST_PARTS = 100.0  # of a step on which p is followed
 MOVED = 1e-15  # corrections above this are more than rounding: S is made anew
 
 
@@ -143,20 +144,35 @@ def sum_series(network, bodies, orders, top, h, poses, p):
         put(poses, at + R, r)
         put(poses, at + RD, rd)
         if network.bodies[b, 1] == 7:
-            o, c = first + S_OMEGA * orders, first + 12 * (top + 1)
-            x, y, z, w = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8), splat(0.0)
+            w, o = splat(0.0), first + S_OMEGA * orders
             for k in range(top, -1, -1):
-                c = first + 12 * k
-                x = fma(x, s, four(bodies, c))
-                y = fma(y, s, four(bodies, c + 4))
-                z = fma(z, s, four(bodies, c + 8))
                 w = fma(w, s, four(bodies, o + 4 * k))
-            put(poses, at, x)
-            put(poses, at + 4, y)
-            put(poses, at + 8, z)
             put(poses, at + OMEGA, w)
-            _parameters(poses, at, p)
+            fast = 0.0  # where it may turn far, p is followed on the way: it and -p are the same A
+            for i in range(3):
+                fast = max(fast, max(abs(bodies[o + i]), abs(poses[at + OMEGA + i])))
+            parts = int(min(fast * abs(h), MOST_PARTS)) + 1
+            for i in range(1, parts + 1):
+                _sum_rotation(bodies, first, top, h * i / parts, poses, at)
+                _parameters(poses, at, p)
+                for j in range(4):
+                    poses[at + P + j] = p[j]
             set_pose(poses, at, p)
+
+
+@kernel
+def _sum_rotation(bodies, first, top, h, poses, at):
+    """A at h."""
+    s, c = splat(h), first + 12 * (top + 1)
+    x, y, z = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8)
+    for k in range(top, -1, -1):
+        c = first + 12 * k
+        x = fma(x, s, four(bodies, c))
+        y = fma(y, s, four(bodies, c + 4))
+        z = fma(z, s, four(bodies, c + 8))
+    put(poses, at, x)
+    put(poses, at + 4, y)
+    put(poses, at + 8, z)
 
 
 @kernel

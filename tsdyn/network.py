@@ -115,7 +115,7 @@ def build(packed):
             J = body.values["inertia"]
             inverse[i, W_ROTATION:].reshape(3, 4)[:, :3] = np.linalg.inv(J)
             mass[i, W_ROTATION:].reshape(3, 4)[:, :3] = J
-            spins[i] = (J != J[0, 0] * np.eye(3)).any()
+            spins[i] = (J[0, 0] * np.eye(3) != J).any()
     network = Network(
         bodies=system.bodies,
         kinds=np.array(kinds, np.int64).reshape(-1, N_COLUMNS),

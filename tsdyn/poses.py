@@ -73,7 +73,8 @@ def write_velocities(bodies, poses, qd):
         for c in range(3):
             qd[i + c] = poses[at + RD + c]
         if bodies[b, 1] == 7:
-            _turn(poses, at, 0.5 * poses[at + OMEGA], 0.5 * poses[at + OMEGA + 1], 0.5 * poses[at + OMEGA + 2], qd, i + 3)
+            x, y, z = poses[at + OMEGA], poses[at + OMEGA + 1], poses[at + OMEGA + 2]
+            _turn(poses, at, 0.5 * x, 0.5 * y, 0.5 * z, qd, i + 3)
 
 
 @kernel

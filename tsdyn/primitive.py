@@ -6,18 +6,20 @@ A primitive works on marker coordinates x (3-vectors in the ground frame) and ne
     jacobian(x, par, t, out)     out[rows, len(x)]  Phi_x, zero on entry
     gamma(x, xd, par, t, out)    out[rows]          (Phi_x xd)_x xd + 2 Phi_xt xd + Phi_tt
     phi_t(x, par, t, out)        out[rows]          Phi_t; only for a primitive that depends on time
+    series(x, par, k, s, out)    out[rows, len(x)]  optional: coefficient k of Phi_x, zero on entry; see recurrences.py
 
 x is the concatenation of the primitive's markers, par the floats that `parameters()` returns; a motion among them takes
 three places, its value, rate and acceleration at t. The loops below apply the chain rule x(q) (Haug 2018, Eqs. 2-3).
 Kernels use arithmetic and NumPy functions, no comparison, abs or norm of x, so that they also run on complex numbers
-and on truncated Taylor series: that is how they are checked.
+and on truncated Taylor series: that is how they are checked. `series` gets the coefficients k of x, those before being
+where it has left them: in the scratch array s[slots, k], of which it fills column k.
 """
 
 from types import MappingProxyType
 
 from . import body_loops, curvature, series_loops
 from ._kernel import ANY, Callback, caller, integers, specialised, stack, stack2, vector
-from .attachment import Attachment, inlined, layout, static_kernel
+from .attachment import Attachment, check_slots, inlined, layout, static_kernel
 from .errors import InvalidConstraint
 from .markers import PARAMETERS, TURN, Marker, chain_rule, motion, position
 from .motion import Motion
@@ -44,6 +46,8 @@ class Primitive(Attachment):
         Number of scalar constraints.
     markers : tuple of Point, Vector, Parameters
         What x is made of, each on body "a" or "b".
+    slots : int
+        Rows of scratch memory that `series` uses.
     prescribed : str, optional
         The attribute that is a number or a Motion, where nothing else makes it depend on time.
     a, b : Body or ground
@@ -66,6 +70,9 @@ class Primitive(Attachment):
         markers = cls.markers if isinstance(cls.markers, (tuple, list)) else ()
         if not markers or not all(isinstance(m, Marker) and m.code != TURN for m in markers):
             raise InvalidConstraint(f"{where}: markers must be a tuple of Point, Vector or Parameters.")
+        check_slots(cls, where, InvalidConstraint)
+        if getattr(cls, "series", None) is not None and any(m.code == PARAMETERS for m in markers):
+            raise InvalidConstraint(f"{where}: series are for primitives on Points and Vectors only.")
         functions = {}
         for name, arguments in {**_KERNELS, **_OPTIONAL}.items():
             if getattr(cls, name, None) is None and name in _OPTIONAL:

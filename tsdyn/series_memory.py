@@ -6,9 +6,22 @@ from . import network as graph
 from ._kernel import resident
 from .dense import B_DATA
 from .errors import InvalidArgument, Status
-from .expansion_pack import allocate_expansion, masks, without_series
+from .expansion_pack import allocate_expansion, masks
 from .free import allocate_free
-from .run_state import ATOL, DENSE, LEAVE_WHEN_STIFF, MAX_STEP, RTOL, STEPS_WANTED, T_END, T_ORIGIN, H, Record, T, lay_out
+from .run_state import (
+    ATOL,
+    DENSE,
+    LEAVE_WHEN_STIFF,
+    MAX_STEP,
+    RTOL,
+    STEPS_WANTED,
+    T_END,
+    T_ORIGIN,
+    H,
+    Record,
+    T,
+    lay_out,
+)
 from .series_state import HIGHEST, LOWEST, NEXT, TOP, SeriesContext
 from .system import System
 from .taylor import advance_series
@@ -22,7 +35,7 @@ class Series:
     ----------
     packed : Packed
     found : str
-        Its `refusal`.
+        Its `expansion_pack.refusal`.
 
     Raises
     ------
@@ -32,25 +45,11 @@ class Series:
 
     def __init__(self, packed, found):
         if found:
-            raise InvalidArgument(
-                f"Taylor needs a series of every part of a scene, and there is none of\n{found}\n"
-                "Use another method: 'dop853', 'rk45' and 'nystrom4' serve every scene, 'sdirk54' stiff ones."
-            )
+            raise InvalidArgument(found)
         network, self.kinds = graph.build(packed)
         masks(network, packed, self.kinds)
         self.network = graph.with_loops(network, self.kinds, graph.REDUCED, graph.VALUES, graph.BIAS)
         self.packed = packed
-
-
-def refusal(packed):
-    """Why a scene can't be run by Taylor series, a line for each part of it; empty where it can."""
-    lines = [f"  {line}" for line in without_series(packed)]
-    lines += [
-        f"  {body.name} (its inertia has no inverse: a principal moment is zero)"
-        for body in packed.bodies
-        if not graph.is_regular(body)
-    ]
-    return "\n".join(lines)
 
 
 def plain_work(n):

@@ -2,11 +2,11 @@
 
 import time
 
+from .dense import Trajectory
 from .drive import drive
 from .errors import InvalidArgument
 from .events import Watch
 from .run_state import CHART_ROWS, FILLED, STORED, T
-from .dense import Trajectory
 from .series_dense import SeriesReader
 from .series_memory import SeriesMemory
 from .series_state import ORDERS

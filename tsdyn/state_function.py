@@ -63,6 +63,7 @@ class ByState:
     """Mixed into forces that are given by a user's function, which the attribute named by `given` holds."""
 
     analytic = False
+    no_series = "it is a function of the state, of which only values are known"
 
     @property
     def kernels(self):

@@ -7,7 +7,7 @@ back on the manifold along W Phi_q^T.
 import math
 
 from ._four import four, put, splat, times
-from ._kernel import entry, kernel, loader
+from ._kernel import entry, kernel
 from .assembly import remember, set_time
 from .chart import AT_START, BY_SERIES, ROUNDING
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
@@ -51,6 +51,7 @@ MISSED = 100.0  # times the tolerance: a landing further away than this is no tr
 
 
 STEP_COST = 3  # of a step's landing, in orders
+MOST_TURN = 1.0  # rad in a step, where turns are counted
 SMALL, SMALL_STEPS = 0.02, 40  # a step that turns and moves everything by less; so many of them, and it may be stiff
 
 
@@ -88,7 +89,8 @@ def _land_here(c, t):
 @kernel
 def state_within(c, h, t):
     """q, qd, qdd at h after the series' origin, t being the time there. Status."""
-    sum_series(c.network, c.expansion.bodies, c.expansion.order[ORDERS], c.expansion.order[TOP], h, c.free.poses, c.free.p)
+    x = c.expansion
+    sum_series(c.network, x.bodies, x.order[ORDERS], x.order[TOP], h, c.free.poses, c.free.p)
     status = _land_here(c, t)
     if status == 0:
         accelerate_bodies(c.network, c.system, c.work, c.free, t)
@@ -224,6 +226,16 @@ def _within(c, r, log, t0, t1):
 
 
 @kernel
+def _fastest(c):
+    """The highest angular velocity."""
+    square = 0.0
+    for b in range(c.network.bodies.shape[0]):
+        w = c.free.poses[b * POSE + OMEGA : b * POSE + OMEGA + 3]
+        square = max(square, w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    return math.sqrt(square)
+
+
+@kernel
 def _watch(c, r, h):
     """Whether the steps have just been found short for what moves: many in which nothing turns or moves far."""
     far, p = SMALL * max(c.work.control[SIZE], 1e-300) / h, c.free.poses
@@ -262,6 +274,8 @@ def advance_series(context, run, log, most):
             expand(c.network, c.system, k, x.order[ORDERS], x, f)
         w.counters[EVALUATIONS] += x.order[TOP]
         h, t1, last = min(_step_length(c, r), r.clock[MAX_STEP]), t0, False
+        if c.system.memory.size > 0:  # what counts turns must see each of them
+            h = min(h, MOST_TURN / max(_fastest(c), 1e-300))
         if r.numbers[STEPS] == 0 and r.clock[H] > 0.0:
             h = min(h, r.clock[H])
         while True:

@@ -14,6 +14,7 @@ from .integrator_checks import check_integrator
 from .motion import Motion
 from .primitive import Primitive
 from .scene import Scene
+from .series_check import check_constraint_series
 
 STEP = 1e-40  # of complex steps: no cancellation, so as small as can be
 TOLERANCE = 1e-11  # relative to the size of what is compared
@@ -55,6 +56,7 @@ def check_primitive(kind, *, seed=0, states=3):
             name = f"{type(constraint).__name__} ({arrangement})"
             _check_kernels(constraint, name, rng)
             _check_assembled(scene, constraint, name, rng)
+            check_constraint_series(scene, constraint, name, rng)
 
 
 def _instance(kind, arrangement, rng):
@@ -91,7 +93,7 @@ def _unit(rng):
 
 def _check_kernels(constraint, name, rng):
     kind = type(constraint)
-    written = [name for name in kind.kernels if name != "curvature"]  # which is made from the others
+    written = [name for name in ("phi", "jacobian", "gamma", "phi_t") if name in kind.kernels]
     f = SimpleNamespace(**{name: _python(getattr(kind, name), constraint, name) for name in written})
     size = sum(m.size for m in kind.markers)
     x, xd, t = rng.normal(size=size), 10.0 * rng.normal(size=size), rng.uniform(0.1, 2.0)

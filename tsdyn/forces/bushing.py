@@ -19,6 +19,7 @@ from .._kernel import kernel
 from ..checks import floats
 from ..force import Force
 from ..markers import Parameters, Point, Turn
+from ..recurrences import cross, rotated, rotated_back, rotation
 
 
 def _three(value, what, error):
@@ -54,6 +55,7 @@ class Bushing(Force):
     """
 
     markers = (Point("a"), Point("b"), Parameters("a"), Parameters("b"), Turn("a"), Turn("b"))
+    slots = 45
     quantities = MappingProxyType(
         dict.fromkeys(("stiffness", "damping", "torsional_stiffness", "torsional_damping"), _three)
     )
@@ -105,6 +107,26 @@ class Bushing(Force):
         out[14] = N0 + D1 * F2 - D2 * F1  # F acts on a at x_b
         out[15] = N1 + D2 * F0 - D0 * F2
         out[16] = N2 + D0 * F1 - D1 * F0
+        out[17], out[18], out[19] = -N0, -N1, -N2
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eqs. (1), (2), each part where it has a coefficient."""
+        for i in range(8):
+            s[i, k] = x[6 + i]
+        rotation(s, 0, 8, k)
+        for i in range(3):
+            s[42 + i, k] = xd[17 + i] - xd[14 + i]
+        N0, N1, N2 = torque_series(s, par, k)
+        for i in range(3):
+            s[17 + i, k] = x[3 + i] - x[i]
+            s[20 + i, k] = xd[14 + i]
+            s[23 + i, k] = xd[3 + i] - xd[i]
+        F0, F1, F2 = force_series(s, par, k)
+        s[29, k], s[30, k], s[31, k] = F0, F1, F2
+        M0, M1, M2 = cross(s, 17, 29, k)
+        out[0], out[1], out[2], out[3], out[4], out[5] = F0, F1, F2, -F0, -F1, -F2
+        out[14], out[15], out[16] = N0 + M0, N1 + M1, N2 + M2
         out[17], out[18], out[19] = -N0, -N1, -N2
 
     @staticmethod
@@ -168,3 +190,68 @@ def separation_rate(x, xd):
     v1 = xd[4] - xd[1] - (xd[16] * D0 - xd[14] * D2)
     v2 = xd[5] - xd[2] - (xd[14] * D1 - xd[15] * D0)
     return to_body(x[6], x[7], x[8], x[9], v0, v1, v2)
+
+
+# rows of the series: p_a 0, p_b 4, A_a 8, D 17, omega_a 20, Dd - omega_a x D 23, f 26 and F 29 with F = A_a f of
+# Eq. (1), (e0, e) 32, K_t phi 36, the bracket of Eq. (2) 39, omega_b - omega_a 42
+
+
+@kernel
+def force_series(s, par, k):
+    """Order k of F, Eq. (1); row 23 has Dd."""
+    stiff = par[0] != 0.0 or par[1] != 0.0 or par[2] != 0.0
+    damped = par[3] != 0.0 or par[4] != 0.0 or par[5] != 0.0
+    f0, f1, f2 = 0.0, 0.0, 0.0
+    if not (stiff or damped):
+        return f0, f1, f2
+    if stiff:
+        d0, d1, d2 = rotated_back(s, 8, 17, k)
+        f0, f1, f2 = par[0] * d0, par[1] * d1, par[2] * d2
+    if damped:
+        w0, w1, w2 = cross(s, 20, 17, k)
+        s[23, k] -= w0
+        s[24, k] -= w1
+        s[25, k] -= w2
+        v0, v1, v2 = rotated_back(s, 8, 23, k)
+        f0, f1, f2 = f0 + par[3] * v0, f1 + par[4] * v1, f2 + par[5] * v2
+    s[26, k], s[27, k], s[28, k] = f0, f1, f2
+    return rotated(s, 8, 26, k)
+
+
+@kernel
+def torque_series(s, par, k):
+    """Order k of N, Eq. (2)."""
+    stiff = par[6] != 0.0 or par[7] != 0.0 or par[8] != 0.0
+    damped = par[9] != 0.0 or par[10] != 0.0 or par[11] != 0.0
+    n0, n1, n2 = 0.0, 0.0, 0.0
+    if not (stiff or damped):
+        return n0, n1, n2
+    if damped:
+        w0, w1, w2 = rotated_back(s, 8, 42, k)
+        n0, n1, n2 = par[9] * w0, par[10] * w1, par[11] * w2
+    if stiff:
+        relative_series(s, k)
+        for i in range(3):
+            s[36 + i, k] = 2.0 * par[6 + i] * s[33 + i, k]
+        for l in range(k + 1):
+            e0, e1, e2, e3 = s[32, l], s[33, l], s[34, l], s[35, l]
+            k1, k2, k3 = s[36, k - l], s[37, k - l], s[38, k - l]
+            n0 += e0 * k1 + e2 * k3 - e3 * k2
+            n1 += e0 * k2 + e3 * k1 - e1 * k3
+            n2 += e0 * k3 + e1 * k2 - e2 * k1
+    s[39, k], s[40, k], s[41, k] = n0, n1, n2
+    return rotated(s, 8, 39, k)
+
+
+@kernel
+def relative_series(s, k):
+    """Rows 32 to 35 = order k of p_a^* p_b."""
+    e0, e1, e2, e3 = 0.0, 0.0, 0.0, 0.0
+    for l in range(k + 1):
+        a0, a1, a2, a3 = s[0, l], s[1, l], s[2, l], s[3, l]
+        b0, b1, b2, b3 = s[4, k - l], s[5, k - l], s[6, k - l], s[7, k - l]
+        e0 += a0 * b0 + a1 * b1 + a2 * b2 + a3 * b3
+        e1 += a0 * b1 - a1 * b0 - a2 * b3 + a3 * b2
+        e2 += a0 * b2 - a2 * b0 - a3 * b1 + a1 * b3
+        e3 += a0 * b3 - a3 * b0 - a1 * b2 + a2 * b1
+    s[32, k], s[33, k], s[34, k], s[35, k] = e0, e1, e2, e3

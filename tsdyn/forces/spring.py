@@ -17,6 +17,7 @@ from ..bodies import rotation_matrix
 from ..errors import InvalidForce
 from ..force import Force, load, not_negative
 from ..markers import Point
+from ..recurrences import dot, inverse_root, product, scaled, square
 from ..signal import Signal
 
 
@@ -48,6 +49,7 @@ class Spring(Force):
         {"stiffness": not_negative, "damping": not_negative, "free_length": not_negative, "actuator": load}
     )
     loads = ("actuator",)
+    slots = 11
 
     def __init__(
         self,
@@ -90,6 +92,23 @@ class Spring(Force):
         f = (par[0] * (l - par[2]) + par[1] * ld + par[3]) / l
         out[0], out[1], out[2] = -f * d0, -f * d1, -f * d2
         out[3], out[4], out[5] = f * d0, f * d1, f * d2
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eq. (2), as (k + (actuator - k l0) / l + c d.dd / l^2) d."""
+        for i in range(3):
+            s[i, k] = x[i] - x[3 + i]
+        s[3, k] = dot(s, 0, 0, k)
+        s[4, k] = inverse_root(s[3], s[4], k)
+        s[5, k] = (par[3] - par[0] * par[2]) * s[4, k] + (par[0] if k == 0 else 0.0)
+        if par[1] != 0.0:
+            for i in range(3):
+                s[6 + i, k] = xd[i] - xd[3 + i]
+            s[9, k] = dot(s, 0, 6, k)
+            s[10, k] = square(s[4], k)
+            s[5, k] += par[1] * product(s[9], s[10], k)
+        out[3], out[4], out[5] = scaled(s, 0, 5, k)
+        out[0], out[1], out[2] = -out[3], -out[4], -out[5]
 
     @staticmethod
     def potential(x, par, t):

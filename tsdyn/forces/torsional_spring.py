@@ -20,6 +20,7 @@ from ..checks import vector3
 from ..errors import InvalidForce
 from ..force import Force, finite, load, not_negative
 from ..markers import Turn, Vector
+from ..recurrences import angle, cross, dot, scaled, square
 from ..signal import Signal
 
 PARALLEL = 1e-6  # sine of the angle below which a reference has no direction about the axis
@@ -55,6 +56,7 @@ class TorsionalSpring(Force):
 
     markers = (Vector("a"), Vector("a", "reference_a"), Vector("b", "reference_b"), Turn("a"), Turn("b"))
     memory = 1
+    slots = 20
     conservative = False  # only about an axis that a joint holds
     quantities = MappingProxyType(
         {"stiffness": not_negative, "damping": not_negative, "free_angle": finite, "actuator": load}
@@ -124,6 +126,29 @@ class TorsionalSpring(Force):
             out[i] = 0.0 * x[i]
         out[9], out[10], out[11] = -f * x[0], -f * x[1], -f * x[2]
         out[12], out[13], out[14] = f * x[0], f * x[1], f * x[2]
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eqs. (1), (2); rows of u, f_a, f_b, u x f_a, the omegas' difference, then of numbers."""
+        for i in range(9):
+            s[i, k] = x[i]
+        s[19, k] = par[3] + par[0] * par[2] if k == 0 else 0.0
+        if par[0] != 0.0:
+            s[9, k], s[10, k], s[11, k] = cross(s, 0, 3, k)
+            s[15, k] = dot(s, 6, 9, k)
+            s[16, k] = dot(s, 6, 3, k)
+            s[17, k] = square(s[15], k) + square(s[16], k)
+            if k == 0:
+                s[18, 0] = angle_near(s[15, 0], s[16, 0], par[4])
+            else:
+                s[18, k] = angle(s[15], s[16], s[17], s[18], k)
+            s[19, k] -= par[0] * s[18, k]
+        if par[1] != 0.0:
+            for i in range(3):
+                s[12 + i, k] = xd[12 + i] - xd[9 + i]
+            s[19, k] -= par[1] * dot(s, 0, 12, k)
+        out[12], out[13], out[14] = scaled(s, 0, 19, k)
+        out[9], out[10], out[11] = -out[12], -out[13], -out[14]
 
     @staticmethod
     def remember(x, xd, par, t):

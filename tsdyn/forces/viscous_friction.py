@@ -12,6 +12,7 @@ from types import MappingProxyType
 from ..force import Force, not_negative
 from ..friction import act, demand_bodies, slip
 from ..markers import Point, Turn
+from ..recurrences import cross
 
 
 class ViscousFriction(Force):
@@ -35,6 +36,7 @@ class ViscousFriction(Force):
 
     markers = (Point("a"), Turn("a"), Point("b"), Turn("b"))
     particles = True
+    slots = 9
     quantities = MappingProxyType({"damping": not_negative, "torsional_damping": not_negative})
 
     def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), damping=0.0, torsional_damping=0.0, name=""):
@@ -57,6 +59,28 @@ class ViscousFriction(Force):
         v0, v1, v2 = slip(x, xd)
         w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
         act(x, -par[0] * v0, -par[0] * v1, -par[0] * v2, -par[1] * w0, -par[1] * w1, -par[1] * w2, out)
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eqs. (1), (2); rows of x_a - x_b, omega_b and F."""
+        for i in range(3):
+            out[3 + i] = -par[1] * (xd[3 + i] - xd[9 + i])
+            out[9 + i] = -out[3 + i]
+        if par[0] != 0.0:
+            for i in range(3):
+                s[i, k] = x[i] - x[6 + i]
+                s[3 + i, k] = xd[9 + i]
+            w0, w1, w2 = cross(s, 3, 0, k)
+            s[6, k] = par[0] * (w0 - xd[0] + xd[6])
+            s[7, k] = par[0] * (w1 - xd[1] + xd[7])
+            s[8, k] = par[0] * (w2 - xd[2] + xd[8])
+            n0, n1, n2 = cross(s, 0, 6, k)
+            for i in range(3):
+                out[i] = s[6 + i, k]
+                out[6 + i] = -s[6 + i, k]
+            out[9] -= n0
+            out[10] -= n1
+            out[11] -= n2
 
     @staticmethod
     def dissipation(x, xd, par, t):

@@ -1,0 +1,149 @@
+"""Truncated Taylor series of any order as numbers: a kernel run on them gives the series of its result.
+
+Nothing here is shared with `recurrences`, which it serves to check: functions go by their own Taylor coefficients at
+the value of the argument, f(x_0 + d) = sum_n f_n d^n, d^n being zero beyond the order.
+"""
+
+import numpy as np
+
+
+class Truncated:
+    """A power series in t, c[k] (K,) being the coefficient of t^k; operands have the same K, or are constants."""
+
+    __slots__ = ("c",)
+
+    def __init__(self, c):
+        self.c = np.asarray(c, float)
+
+    def of(self, value):
+        """The value itself, or a constant as a series like this one."""
+        return value if isinstance(value, Truncated) else Truncated([value, *[0.0] * (self.c.size - 1)])
+
+    @property
+    def real(self):
+        """Itself: it stands for real numbers."""
+        return self
+
+    @property
+    def rate(self):
+        """The derivative; its last coefficient, which is unknown, is zero."""
+        return Truncated(np.append(np.arange(1, self.c.size) * self.c[1:], 0.0))
+
+    def integral(self, value):
+        """The integral from 0, plus a value."""
+        return Truncated(np.append(value, self.c[:-1] / np.arange(1, self.c.size)))
+
+    def composed(self, f):
+        """sum_n f_n (self - value)^n."""
+        d, total = Truncated([0.0, *self.c[1:]]), self.of(0.0)
+        for coefficient in reversed(f):
+            total = total * d + coefficient
+        return total
+
+    def power(self, n):
+        """The n-th power, by the binomial series."""
+        x, f = self.c[0], [self.c[0] ** n]
+        for i in range(self.c.size - 1):
+            f.append(f[-1] * (n - i) / ((i + 1) * x))
+        return self.composed(f)
+
+    def __add__(self, other):
+        return Truncated(self.c + self.of(other).c)
+
+    def __neg__(self):
+        return Truncated(-self.c)
+
+    def __sub__(self, other):
+        return self + (-self.of(other))
+
+    def __rsub__(self, other):
+        return self.of(other) - self
+
+    def __mul__(self, other):
+        return Truncated(np.convolve(self.c, self.of(other).c)[: self.c.size])
+
+    def __truediv__(self, other):
+        return self * self.of(other).power(-1.0)
+
+    def __rtruediv__(self, other):
+        return self.of(other) / self
+
+    def __pow__(self, n):
+        if isinstance(n, int) and n >= 0:
+            result = self.of(1.0)
+            for _ in range(n):
+                result = result * self
+            return result
+        return self.power(n)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
+        """NumPy's functions of a series, and its arithmetic with one on the right."""
+        if method == "__call__" and not keywords:
+            if len(inputs) == 1 and ufunc.__name__ in _FUNCTIONS:
+                return _FUNCTIONS[ufunc.__name__](self)
+            if len(inputs) == 2 and ufunc.__name__ in _OPERATORS:
+                return _OPERATORS[ufunc.__name__](self.of(inputs[0]), self.of(inputs[1]))
+        raise TypeError(f"np.{ufunc.__name__} has no Taylor series here; there are {', '.join(_FUNCTIONS)}.")
+
+
+def _circular(x, values):
+    """The values, which repeat after four derivatives, over n!."""
+    n = np.arange(x.c.size)
+    return x.composed(np.resize(values, n.size) / np.cumprod(np.maximum(n, 1)))
+
+
+def _sine(x):
+    s, c = np.sin(x.c[0]), np.cos(x.c[0])
+    return _circular(x, [s, c, -s, -c])
+
+
+def _cosine(x):
+    s, c = np.sin(x.c[0]), np.cos(x.c[0])
+    return _circular(x, [c, -s, -c, s])
+
+
+def _exponential(x):
+    return _circular(x, [np.exp(x.c[0])])
+
+
+def _hyperbolic(x, sign):
+    return (_exponential(x) + sign * _exponential(-x)) * 0.5
+
+
+def _logarithm(x):
+    return (x.rate / x).integral(np.log(x.c[0]))
+
+
+def _arctangent(x):
+    return (x.rate / (1.0 + x * x)).integral(np.arctan(x.c[0]))
+
+
+def _angle(y, x):
+    return ((x * y.rate - y * x.rate) / (x * x + y * y)).integral(np.arctan2(y.c[0], x.c[0]))
+
+
+_FUNCTIONS = {
+    "sin": _sine,
+    "cos": _cosine,
+    "tan": lambda x: _sine(x) / _cosine(x),
+    "sqrt": lambda x: x.power(0.5),
+    "exp": _exponential,
+    "log": _logarithm,
+    "sinh": lambda x: _hyperbolic(x, -1.0),
+    "cosh": lambda x: _hyperbolic(x, 1.0),
+    "tanh": lambda x: _hyperbolic(x, -1.0) / _hyperbolic(x, 1.0),
+    "arctan": _arctangent,
+    "square": lambda x: x * x,
+    "negative": lambda x: -x,
+    "floor": lambda x: x.of(np.floor(x.c[0])),  # of an angle's turns: constant where it is analytic
+}
+_OPERATORS = {
+    "add": lambda x, y: x + y,
+    "subtract": lambda x, y: x - y,
+    "multiply": lambda x, y: x * y,
+    "divide": lambda x, y: x / y,
+    "power": lambda x, y: x.power(y.c[0]),
+    "arctan2": _angle,
+}

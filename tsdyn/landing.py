@@ -63,24 +63,31 @@ def _largest(values):
 @kernel
 def land(network, system, w, f, t):
     """Bring positions onto the manifold along W H^T; H, Y and S are those of where they land. Status."""
-    status = factorise(network, system, w, f, t)
-    if status != OK:
-        return status
-    floor, before, moved = w.control[FLOOR], math.inf, 0.0
-    f.sizes[RESIDUAL] = _largest(f.b)
+    floor, before, moved, renew = w.control[FLOOR], math.inf, 0.0, True
+    f.sizes[RESIDUAL] = -1.0
     for _ in range(SWEEPS):
+        if renew:
+            status = factorise(network, system, w, f, t)
+            if status != OK or f.sizes[RESIDUAL] >= 0.0:
+                return status
+            renew = False
+        else:
+            run_loops(network, system.reals, VALUES, f.poses, t, f.b, f.H)
         worst = _largest(f.b)
+        f.sizes[RESIDUAL] = max(f.sizes[RESIDUAL], worst)
         if not worst < math.inf:
             return NOT_FINITE
         if worst <= floor or worst > 0.5 * before:
             if worst > 100.0 * floor:
                 return NEWTON_FAILED
-            return factorise(network, system, w, f, t) if moved > MOVED else OK
+            if moved <= MOVED:
+                return OK
+            renew = True
+            continue
         before = worst
         w.counters[NEWTON] += 1
         solve(network.pattern, f.S, f.b)
         moved = max(moved, _displace(network, f))
-        run_loops(network, system.reals, VALUES, f.poses, t, f.b, f.H)
     return NEWTON_FAILED
 
 

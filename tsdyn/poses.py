@@ -164,4 +164,3 @@ def add_gradient(code, poses, at, s, f, i, H, h):
     H[h + 4] += s[1] * y2 - s[2] * y1
     H[h + 5] += s[2] * y0 - s[0] * y2
     H[h + 6] += s[0] * y1 - s[1] * y0
-

@@ -18,7 +18,7 @@ from .motion import Motion
 from .network import build
 from .poses import POSE, P
 from .rotation import rotate
-from .series_loops import BODY_ROW, RESIDUAL, S_OMEGA, S_R, UPDATE
+from .series_loops import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R
 from .signal import Signal
 from .truncated import Truncated
 
@@ -32,11 +32,9 @@ _AXES = ("x", "y", "z")
 def constraint_coefficients(network, reals, x, k, b, Z):
     """b = (k + 1)(k + 2) Phi_{k+2}, x being an Expansion with the bodies' series; k in turn from zero."""
     orders = x.order[1]
-    if k == 0:
-        run_loops(network, reals, UPDATE, 0, orders, x.bodies, x.constraints, x.places, b, Z)
     for i in range(b.size):
         b[i] = 0.0  # the multipliers
-    run_loops(network, reals, UPDATE, k + 1, orders, x.bodies, x.constraints, x.places, b, Z)
+    run_loops(network, reals, ADVANCE, k, orders, x.bodies, x.constraints, x.places, b, Z)
     run_loops(network, reals, RESIDUAL, k, orders, x.bodies, x.constraints, x.places, b, Z)
 
 
@@ -65,7 +63,7 @@ def check_constraint_series(scene, constraint, name, rng):
         _compare(name, k, labels, f, Phi_x)
 
     packed, order, m = scene.packed, ORDER, kind.rows
-    network, kinds = build(scene, packed)
+    network, kinds = build(packed)
     masks(network, packed, kinds)
     expansion = allocate_expansion(network, kinds, packed, order)
     write_bodies(scene, q, expansion)
@@ -91,7 +89,7 @@ def check_force_series(scene, force, name, rng):
     for k, out in _coefficients(kind, name, (x, xd), par, (len(x),)):
         _compare(name, k, labels, out, f)
 
-    network, kinds = build(scene, packed)
+    network, kinds = build(packed)
     expansion = allocate_expansion(network, kinds, packed, ORDER)
     poses = write_bodies(scene, q, expansion)
     reals = packed.system.reals.copy()

@@ -10,12 +10,12 @@ from .linalg import copy
 from .poses import place_bodies
 from .series_memory import plain_work
 from .series_state import ORDERS, TOP, Expansion, SeriesContext, load_series
-from .taylor import state_within
+from .series_steps import state_within
 from .workspace import SIZE
 
 
 @entry
-def read_series(context, t, rows, blocks, out):
+def read_series(context, steps, t, rows, blocks, out):
     """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows]. Status."""
     c = load_series(context)
     w, x, s = c.work, c.expansion, c.system
@@ -28,7 +28,7 @@ def read_series(context, t, rows, blocks, out):
         for j in range(slots):
             s.reals[s.memory[j]] = block[block.size - slots + j]
         place_bodies(c.network.bodies, w.q, c.free.poses)  # which of p and -p is meant
-        status = state_within(c, t[i] - block[B_START], t[i])
+        status = state_within(context, steps, t[i], t[i] - block[B_START])
         if status != 0:
             return status
         copy(w.q, out[i, 0])
@@ -49,9 +49,11 @@ class SeriesReader:
         That there was room for in a block.
     size : float
         Of the numbers in the constraints.
+    steps : ndarray
+        Addresses, series_steps.EXPAND ... WITHIN.
     """
 
-    def __init__(self, system, network, orders, size):
+    def __init__(self, system, network, orders, size, steps):
         system = system._replace(reals=system.reals.copy())
         n = int(system.bodies[:, 1].sum())
         work = plain_work(n)
@@ -62,9 +64,10 @@ class SeriesReader:
         order[ORDERS] = orders
         expansion = Expansion(order, bodies, none, table, table, whole, none)
         context = SeriesContext(system, work, network, allocate_free(network, n), expansion)
+        self.steps = steps
         self.n, (self.context, *self._keep) = n, resident(context)
 
     def __call__(self, t, rows, blocks, charts, points):
         """States (k, 3, n) at times t (k,), in the steps blocks[rows]; and the Status."""
         out = np.zeros((t.size, 3, self.n))
-        return out, Status(read_series(self.context, t, rows, blocks, out))
+        return out, Status(read_series(self.context, self.steps, t, rows, blocks, out))

@@ -23,6 +23,7 @@ from .run_state import (
     lay_out,
 )
 from .series_state import HIGHEST, LOWEST, NEXT, TOP, SeriesContext
+from .series_steps import STEPS
 from .system import System
 from .taylor import advance_series
 from .workspace import CONTROLS, COUNTERS, SIZE, U_TOL, carve, plain_context
@@ -75,6 +76,7 @@ class SeriesMemory:
         system = System(*(array.copy() for array in packed.system))
         self.work, free = plain_work(n), allocate_free(series.network, n)
         expansion = allocate_expansion(series.network, series.kinds, packed, highest)
+        self.steps = np.zeros(STEPS, np.int64)
         self.run = lay_out(n, 0, 0, 0, 0, 0, B_DATA + 1 + n + expansion.bodies.size + slots, slots)
         self.context = SeriesContext(system, self.work, series.network, free, expansion)
         self._context, *self._keep = resident(self.context)
@@ -104,8 +106,8 @@ class SeriesMemory:
         """Load the driver, where this process has not called it yet."""
         if not getattr(advance_series, "overloads", True):
             none = np.zeros((0, 1))
-            advance_series(self._context, self._run, Record(np.zeros(0), *[none] * 5), 0)
+            advance_series(self._context, self._run, Record(np.zeros(0), *[none] * 5), self.steps, 0)
 
     def advance(self, record, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""
-        return Status(advance_series(self._context, self._run, record, most))
+        return Status(advance_series(self._context, self._run, record, self.steps, most))

@@ -2,6 +2,8 @@
 
 import time
 
+import numpy as np
+
 from .dense import Trajectory
 from .drive import drive
 from .errors import InvalidArgument
@@ -10,8 +12,14 @@ from .run_state import CHART_ROWS, FILLED, STORED, T
 from .series_dense import SeriesReader
 from .series_memory import SeriesMemory
 from .series_state import ORDERS
+from .series_steps import accelerate_here, expand_series, reach
 from .steps import counts
 from .task import Outcome
+
+
+def addresses(within):
+    """Those that the driver and readers are given; within: whether anything is asked for between the steps."""
+    return np.array([expand_series.address, reach.address, accelerate_here.address if within else 0], np.int64)
 
 
 def run_series(task):
@@ -29,12 +37,13 @@ def run_series(task):
         memory = SeriesMemory(prepared, order[2])
     dense = STORED if task.dense_output else FILLED if task.events is not None else 0
     memory.clear(task, order, dense)
+    memory.steps = addresses(bool(dense) or task.times.size > 0)
     memory.load()
     run, packed = memory.run, prepared.packed
     reading = None
     if dense:
         orders = int(memory.context.expansion.order[ORDERS])
-        reading = SeriesReader, packed.system, prepared.series.network, orders, packed.size
+        reading = SeriesReader, packed.system, prepared.series.network, orders, packed.size, memory.steps
     watch = None
     if task.events is not None:
         watch = Watch(task.events, packed.system, reading[0](*reading[1:]), task.span[0])

@@ -6,19 +6,15 @@ back on the manifold along W Phi_q^T.
 
 import math
 
-from ._four import four, put, splat, times
 from ._kernel import entry, kernel
 from .assembly import remember, set_time
 from .chart import AT_START, BY_SERIES, ROUNDING
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
 from .errors import Status
-from .expansion import begin, expand
 from .free import RESIDUAL
-from .free_accelerations import accelerate_bodies
-from .landing import land, land_velocities, sum_series
 from .linalg import copy
 from .outputs import record, store_now
-from .poses import OMEGA, POSE, RD, move_bodies, place_bodies, write_accelerations, write_positions, write_velocities
+from .poses import OMEGA, POSE, RD, move_bodies, place_bodies
 from .run_state import (
     AT_LIMIT,
     ATOL,
@@ -32,7 +28,7 @@ from .run_state import (
     NEXT_EVAL,
     REJECTED,
     RTOL,
-        STEPS,
+    STEPS,
     STIFF,
     STORED,
     T_END,
@@ -43,6 +39,7 @@ from .run_state import (
 )
 from .series_loops import BODY_ROW, S_OMEGA, S_R
 from .series_state import HIGHEST, LOWEST, NEXT, ORDERS, TOP, load_series
+from .series_steps import EXPAND, REACH, call_expand, call_reach, state_within
 from .workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
 
 SLICE_DONE, STEP_COLLAPSED = int(Status.SLICE_DONE), int(Status.STEP_COLLAPSED)
@@ -53,48 +50,6 @@ MISSED = 100.0  # times the tolerance: a landing further away than this is no tr
 STEP_COST = 3  # of a step's landing, in orders
 MOST_TURN = 1.0  # rad in a step, where turns are counted
 SMALL, SMALL_STEPS = 0.02, 40  # a step that turns and moves everything by less; so many of them, and it may be stiff
-
-
-@kernel
-def _begin_series(c, t):
-    """Orders up to one of omega' and two of r, at the poses; qdd from them."""
-    w, x, f = c.work, c.expansion, c.free
-    orders = x.order[ORDERS]
-    begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
-    expand(c.network, c.system, 0, orders, x, f)
-    for b in range(c.network.bodies.shape[0]):
-        at = b * orders * BODY_ROW
-        put(f.a, 8 * b, times(four(x.bodies, at + S_R * orders + 8), splat(2.0)))
-        put(f.a, 8 * b + 4, four(x.bodies, at + S_OMEGA * orders + 4))
-    write_accelerations(c.network.bodies, f.poses, f.a, w.qdd)
-
-
-@kernel
-def _land_here(c, t):
-    """Put the poses and their velocities on the manifold, and write q and qd. Status."""
-    w, f = c.work, c.free
-    status = land(c.network, c.system, w, f, t)
-    if status == 0:
-        land_velocities(c.network, f)
-        write_positions(c.network.bodies, f.poses, w.q)
-        write_velocities(c.network.bodies, f.poses, w.qd)
-        total = 0.0
-        for i in range(w.q.size):
-            total += abs(w.q[i]) + abs(w.qd[i])
-        if not total < math.inf:
-            return NOT_FINITE
-    return status
-
-
-@kernel
-def state_within(c, h, t):
-    """q, qd, qdd at h after the series' origin, t being the time there. Status."""
-    x = c.expansion
-    sum_series(c.network, x.bodies, x.order[ORDERS], x.order[TOP], h, c.free.poses, c.free.p)
-    status = _land_here(c, t)
-    if status == 0:
-        accelerate_bodies(c.network, c.system, c.work, c.free, t)
-    return status
 
 
 @kernel
@@ -166,11 +121,11 @@ def _store_block(c, r, log, t0, h, t1):
 
 
 @kernel
-def _accept(c, r, log, t):
+def _accept(context, c, r, log, steps, t):
     """The poses as they are now are the state at t. Status."""
     w = c.work
     remember(c.system, w.q, w.qd, t, r.remembered)
-    _begin_series(c, t)
+    call_expand(steps[EXPAND], context, 0)
     total = 0.0
     for i in range(w.q.size):
         total += abs(w.qdd[i])
@@ -189,7 +144,7 @@ def _accept(c, r, log, t):
 
 
 @kernel
-def _begin_run(c, r, log):
+def _begin_run(context, c, r, log, steps):
     w, f = c.work, c.free
     set_time(c.system, r.clock[T])
     largest = 0.0
@@ -198,26 +153,18 @@ def _begin_run(c, r, log):
     w.control[FLOOR] = ROUNDING * (w.control[SIZE] + largest)
     place_bodies(c.network.bodies, w.q, f.poses)
     move_bodies(c.network.bodies, w.q, w.qd, f.poses)
-    status = _land_here(c, r.clock[T])
+    status = call_reach(steps[REACH], context, r.clock[T], 0.0)
     log.charts[0, 1] = AT_START
-    return _accept(c, r, log, r.clock[T]) if status == 0 else status
+    return _accept(context, c, r, log, steps, r.clock[T]) if status == 0 else status
 
 
 @kernel
-def _reach(c, t0, t1):
-    """The state at the end of the step, but for qdd. Status."""
-    x = c.expansion
-    sum_series(c.network, x.bodies, x.order[ORDERS], x.order[TOP], t1 - t0, c.free.poses, c.free.p)
-    return _land_here(c, t1)
-
-
-@kernel
-def _within(c, r, log, t0, t1):
+def _within(context, c, r, log, steps, t0, t1):
     """What t_eval asks for in (t0, t1). Status."""
     w = c.work
     while r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
         t = log.t_eval[r.numbers[NEXT_EVAL]]
-        status = state_within(c, t - t0, t)
+        status = state_within(context, steps, t, t - t0)
         if status != 0:
             return status
         record(r, log, t, w.q, w.qd, w.qdd)
@@ -253,12 +200,12 @@ def _watch(c, r, h):
 
 
 @entry
-def advance_series(context, run, log, most):
+def advance_series(context, run, log, steps, most):
     """Make up to `most` steps, as `run.advance` does; context is the address of a `SeriesContext`. Status."""
     c, r = load_series(context), load_run(run)
     w, f, x = c.work, c.free, c.expansion
     if r.numbers[BEGUN] == 0 and most != 0:
-        status = _begin_run(c, r, log)
+        status = _begin_run(context, c, r, log, steps)
         if status != 0:
             return status
         r.numbers[BEGUN] = 1
@@ -271,7 +218,7 @@ def advance_series(context, run, log, most):
             return 0
         x.order[TOP] = x.order[NEXT]
         for k in range(1, x.order[TOP]):
-            expand(c.network, c.system, k, x.order[ORDERS], x, f)
+            call_expand(steps[EXPAND], context, k)
         w.counters[EVALUATIONS] += x.order[TOP]
         h, t1, last = min(_step_length(c, r), r.clock[MAX_STEP]), t0, False
         if c.system.memory.size > 0:  # what counts turns must see each of them
@@ -287,7 +234,7 @@ def advance_series(context, run, log, most):
                 t1 = r.clock[T_END]
             row = log.history[r.numbers[HISTORY]]
             row[0], row[1], row[2] = t0, t1 - t0, 0.0
-            status = _reach(c, t0, t1)
+            status = call_reach(steps[REACH], context, t1, t1 - t0)
             if status == 0 and f.sizes[RESIDUAL] <= missed + MISSED * w.control[FLOOR]:
                 break
             copy(r.now[0], w.q)
@@ -303,9 +250,9 @@ def advance_series(context, run, log, most):
         if r.numbers[DENSE] != 0:
             _store_block(c, r, log, t0, t1 - t0, t1)
         if r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
-            status = _within(c, r, log, t0, t1)
+            status = _within(context, c, r, log, steps, t0, t1)
             if status == 0:
-                status = _reach(c, t0, t1)
+                status = call_reach(steps[REACH], context, t1, t1 - t0)
             if status != 0:
                 return status
         log.charts[r.numbers[CHART_ROWS], 4] = 1.0
@@ -313,7 +260,7 @@ def advance_series(context, run, log, most):
             r.numbers[CHART_ROWS] += 1
             log.charts[r.numbers[CHART_ROWS], 1] = BY_SERIES
         r.numbers[STEPS] += 1
-        status = _accept(c, r, log, t1)
+        status = _accept(context, c, r, log, steps, t1)
         if status != 0:
             return status
         if leave:

@@ -1,0 +1,73 @@
+"""The parts of a Taylor step as callbacks: each is compiled once, and loaded where a run needs it.
+
+They get the address of a `SeriesContext`.
+"""
+
+import math
+
+from ._four import four, put, splat, times
+from ._kernel import callback, caller, kernel
+from .errors import Status
+from .expansion import begin, expand
+from .free_accelerations import accelerate_bodies
+from .landing import land, land_velocities, sum_series
+from .poses import write_accelerations, write_positions, write_velocities
+from .series_loops import BODY_ROW, S_OMEGA, S_R
+from .series_state import ORDERS, TOP, load_series
+
+NOT_FINITE = int(Status.NOT_FINITE)
+EXPAND, REACH, WITHIN, STEPS = range(4)  # of the addresses that the driver is given
+call_expand, call_reach = caller("pi"), caller("pdd")
+
+
+@callback("pi")
+def expand_series(context, k):
+    """Order k of everything, in turn; order zero begins the series at the poses, and gives qdd."""
+    c = load_series(context)
+    w, x, f = c.work, c.expansion, c.free
+    orders = x.order[ORDERS]
+    if k == 0:
+        begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
+    expand(c.network, c.system, k, orders, x, f)
+    if k == 0:
+        for b in range(c.network.bodies.shape[0]):
+            at = b * orders * BODY_ROW
+            put(f.a, 8 * b, times(four(x.bodies, at + S_R * orders + 8), splat(2.0)))
+            put(f.a, 8 * b + 4, four(x.bodies, at + S_OMEGA * orders + 4))
+        write_accelerations(c.network.bodies, f.poses, f.a, w.qdd)
+    return 0
+
+
+@callback("pdd")
+def reach(context, t, h):
+    """The state at t, h after the series' origin, on the manifold, but for qdd; h = 0 takes the poses. Status."""
+    c = load_series(context)
+    w, x, f = c.work, c.expansion, c.free
+    if h != 0.0:
+        sum_series(c.network, x.bodies, x.order[ORDERS], x.order[TOP], h, f.poses, f.p)
+    status = land(c.network, c.system, w, f, t)
+    if status == 0:
+        land_velocities(c.network, f)
+        write_positions(c.network.bodies, f.poses, w.q)
+        write_velocities(c.network.bodies, f.poses, w.qd)
+        total = 0.0
+        for i in range(w.q.size):
+            total += abs(w.q[i]) + abs(w.qd[i])
+        if not total < math.inf:
+            return NOT_FINITE
+    return status
+
+
+@callback("pdd")
+def accelerate_here(context, t, h):
+    """Qdd where `reach` has come to, between the steps: what it asks for outlives no step."""
+    c = load_series(context)
+    accelerate_bodies(c.network, c.system, c.work, c.free, t)
+    return 0
+
+
+@kernel
+def state_within(context, steps, t, h):
+    """q, qd, qdd at t, h after the series' origin. Status."""
+    status = call_reach(steps[REACH], context, t, h)
+    return call_reach(steps[WITHIN], context, t, h) if status == 0 else status

@@ -27,6 +27,10 @@ class Taylor(Integrator):
         From 4 to 30; None lets every step have the order that gets furthest for its work.
     rtol, atol : float, optional
         Relative and absolute tolerance where they differ from tol.
+    step : float, s, optional
+        A fixed step instead of a tolerance; best with an order.
+    max_step, first_step : float, s, optional
+        Bounds on the steps, and on the first of them.
 
     Raises
     ------
@@ -38,14 +42,18 @@ class Taylor(Integrator):
     driver = "series"
     margin = 30.0
 
-    def __init__(self, tol=1e-15, order=None, *, rtol=None, atol=None):
+    def __init__(self, tol=1e-15, order=None, *, rtol=None, atol=None, step=None, max_step=None, first_step=None):
         self.tol = positive(tol, "Taylor: tol")
         self.rtol = self.tol if rtol is None else positive(rtol, "Taylor: rtol")
         self.atol = self.tol if atol is None else positive(atol, "Taylor: atol")
-        self.step = None
+        self.step = None if step is None else positive(step, "Taylor: step (s)")
+        self.max_step = None if max_step is None else positive(max_step, "Taylor: max_step (s)")
+        self.first_step = None if first_step is None else positive(first_step, "Taylor: first_step (s)")
         self.fixed = whole(order, "Taylor: order")
         if self.fixed is not None and not LOWEST <= self.fixed <= HIGHEST:
             raise InvalidArgument(f"Taylor: order must be from {LOWEST} to {HIGHEST}, got {order!r}.")
+        if self.fixed is not None:
+            self.order = self.embedded_order = self.fixed
 
     def step_tolerances(self):
         """Return (rtol, atol) that each step's error is held to: less than a rounding error is none."""
@@ -65,5 +73,9 @@ class Taylor(Integrator):
         return self.orders()[0]
 
     def __repr__(self):
-        tolerance = f"tol={self.tol:g}" if self.rtol == self.atol else f"rtol={self.rtol:g}, atol={self.atol:g}"
+        tolerance = (
+            f"tol={self.tol:g}" if self.rtol == self.atol == self.tol else (f"rtol={self.rtol:g}, atol={self.atol:g}")
+        )
+        if self.step is not None:
+            tolerance = f"step={self.step:g}"
         return f"Taylor({tolerance}" + (")" if self.fixed is None else f", order={self.fixed})")

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ._kernel import entry, resident
+from .chart import ROUNDING
 from .dense import B_DATA, B_START
 from .errors import Status
 from .free import allocate_free
@@ -11,7 +12,7 @@ from .poses import place_bodies
 from .series_memory import plain_work
 from .series_state import ORDERS, TOP, Expansion, SeriesContext, load_series
 from .series_steps import state_within
-from .workspace import SIZE
+from .workspace import FLOOR, SIZE
 
 
 @entry
@@ -27,6 +28,10 @@ def read_series(context, steps, t, rows, blocks, out):
         copy(block[B_DATA + 1 + w.q.size :][: x.bodies.size], x.bodies)
         for j in range(slots):
             s.reals[s.memory[j]] = block[block.size - slots + j]
+        largest = 0.0
+        for j in range(w.q.size):
+            largest = max(largest, abs(w.q[j]))
+        w.control[FLOOR] = ROUNDING * (w.control[SIZE] + largest)
         place_bodies(c.network.bodies, w.q, c.free.poses)  # which of p and -p is meant
         status = state_within(context, steps, t[i], t[i] - block[B_START])
         if status != 0:

@@ -4,11 +4,13 @@ import numpy as np
 
 from . import network as graph
 from ._kernel import resident
+from .arguments import step_count
 from .dense import B_DATA
 from .errors import InvalidArgument, Status
 from .expansion_pack import allocate_expansion, masks
 from .free import allocate_free
 from .run_state import (
+    ADAPTIVE,
     ATOL,
     DENSE,
     LEAVE_WHEN_STIFF,
@@ -96,9 +98,12 @@ class SeriesMemory:
         work.q[:], work.qd[:] = task.q, task.qd
         work.control[U_TOL], work.control[SIZE] = task.constraint_tol, task.prepared.packed.size
         clock[T] = clock[T_ORIGIN] = task.span[0]
-        clock[T_END], clock[H], clock[MAX_STEP] = task.span[1], 0.0, np.inf
-        clock[RTOL], clock[ATOL] = task.method.step_tolerances()
-        numbers[STEPS_WANTED], numbers[DENSE] = 2**62, dense
+        method = task.method
+        clock[T_END], clock[MAX_STEP] = task.span[1], method.max_step or np.inf
+        clock[H] = method.step or method.first_step or 0.0
+        clock[RTOL], clock[ATOL] = method.step_tolerances()
+        numbers[ADAPTIVE], numbers[DENSE] = method.step is None, dense
+        numbers[STEPS_WANTED] = step_count(*task.span, method.step) if method.step else 2**62
         numbers[LEAVE_WHEN_STIFF] = task.choose is not None
         self.context.expansion.order[[TOP, NEXT, LOWEST, HIGHEST]] = order[0], *order
 

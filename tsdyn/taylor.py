@@ -16,6 +16,7 @@ from .linalg import copy
 from .outputs import record, store_now
 from .poses import OMEGA, POSE, RD, move_bodies, place_bodies
 from .run_state import (
+    ADAPTIVE,
     AT_LIMIT,
     ATOL,
     BEGUN,
@@ -29,6 +30,7 @@ from .run_state import (
     REJECTED,
     RTOL,
     STEPS,
+    STEPS_WANTED,
     STIFF,
     STORED,
     T_END,
@@ -209,6 +211,7 @@ def advance_series(context, run, log, steps, most):
         if status != 0:
             return status
         r.numbers[BEGUN] = 1
+    adaptive = r.numbers[ADAPTIVE] == 1
     missed = MISSED * (r.clock[ATOL] + r.clock[RTOL])
     for _ in range(most):
         if r.numbers[CHART_ROWS] + 2 >= log.charts.shape[0] or r.numbers[HISTORY] >= log.history.shape[0]:
@@ -221,22 +224,28 @@ def advance_series(context, run, log, steps, most):
             call_expand(steps[EXPAND], context, k)
         w.counters[EVALUATIONS] += x.order[TOP]
         h, t1, last = min(_step_length(c, r), r.clock[MAX_STEP]), t0, False
+        if not adaptive:
+            h = r.clock[H]
         if c.system.memory.size > 0:  # what counts turns must see each of them
             h = min(h, MOST_TURN / max(_fastest(c), 1e-300))
         if r.numbers[STEPS] == 0 and r.clock[H] > 0.0:
             h = min(h, r.clock[H])
         while True:
             t1 = t0 + h
+            if not adaptive:
+                t1 = r.clock[T_ORIGIN] + (r.numbers[STEPS] + 1) * r.clock[H]
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 return STEP_COLLAPSED
-            last = t1 + 1e-3 * h >= r.clock[T_END]
+            last = t1 + 1e-3 * h >= r.clock[T_END] if adaptive else r.numbers[STEPS] + 1 == r.numbers[STEPS_WANTED]
             if last:
                 t1 = r.clock[T_END]
             row = log.history[r.numbers[HISTORY]]
             row[0], row[1], row[2] = t0, t1 - t0, 0.0
             status = call_reach(steps[REACH], context, t1, t1 - t0)
-            if status == 0 and f.sizes[RESIDUAL] <= missed + MISSED * w.control[FLOOR]:
+            if status == 0 and (not adaptive or f.sizes[RESIDUAL] <= missed + MISSED * w.control[FLOOR]):
                 break
+            if not adaptive:
+                return status
             copy(r.now[0], w.q)
             place_bodies(c.network.bodies, w.q, f.poses)
             r.numbers[REJECTED] += 1  # the same series serves a shorter step
@@ -245,7 +254,8 @@ def advance_series(context, run, log, steps, most):
             h *= 0.5
         row[2] = 1.0
         r.numbers[HISTORY] += 1
-        r.clock[H] = t1 - t0
+        if adaptive:
+            r.clock[H] = t1 - t0
         leave = _watch(c, r, t1 - t0)
         if r.numbers[DENSE] != 0:
             _store_block(c, r, log, t0, t1 - t0, t1)

@@ -19,6 +19,7 @@ from .network import build
 from .poses import POSE, P
 from .rotation import rotate
 from .series_loops import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R
+from .series_state import ORDERS
 from .signal import Signal
 from .truncated import Truncated
 
@@ -31,7 +32,7 @@ _AXES = ("x", "y", "z")
 @entry
 def constraint_coefficients(network, reals, x, k, b, Z):
     """b = (k + 1)(k + 2) Phi_{k+2}, x being an Expansion with the bodies' series; k in turn from zero."""
-    orders = x.order[1]
+    orders = x.order[ORDERS]
     for i in range(b.size):
         b[i] = 0.0  # the multipliers
     run_loops(network, reals, ADVANCE, k, orders, x.bodies, x.constraints, x.places, b, Z)
@@ -43,7 +44,7 @@ def force_coefficients(reals, x, k, poses, Z):
     """Z ((b + 1) 8,) = order k of the forces and body torques; k in turn from zero."""
     for i in range(Z.size):
         Z[i] = 0.0
-    run_forces(reals, x, k, x.order[1], poses, Z)
+    run_forces(reals, x, k, x.order[ORDERS], poses, Z)
 
 
 def check_constraint_series(scene, constraint, name, rng):
@@ -62,13 +63,13 @@ def check_constraint_series(scene, constraint, name, rng):
     for k, f in _coefficients(kind, name, (x,), list(par), (kind.rows, len(x))):
         _compare(name, k, labels, f, Phi_x)
 
-    packed, order, m = scene.packed, ORDER, kind.rows
+    packed, m = scene.packed, kind.rows
     network, kinds = build(packed)
     masks(network, packed, kinds)
-    expansion = allocate_expansion(network, kinds, packed, order)
+    expansion = allocate_expansion(network, kinds, packed, ORDER)
     write_bodies(scene, q, expansion)
     b, Z = np.zeros(m), np.zeros(8 * (len(scene.bodies) + 1))
-    for k in range(order - 1):
+    for k in range(ORDER - 1):
         constraint_coefficients(network, packed.system.reals, expansion, k, b, Z)
         value = b / ((k + 1) * (k + 2))
         _compare(name, k + 2, [f"compiled Phi[{i}]" for i in range(m)], value, Phi)
@@ -131,17 +132,18 @@ def along(scene, attachment, coordinates, q):
 
 def write_bodies(scene, q, expansion):
     """Write the bodies' series into an Expansion; return the poses ((b + 1) * POSE,) at order zero."""
-    orders = expansion.order[1]
+    orders, known = int(expansion.order[ORDERS]), q[0].c.size
     poses = np.zeros((len(scene.bodies) + 1, POSE))
     poses[:, P] = 1.0
-    for b, rows in enumerate(expansion.bodies.reshape(-1, BODY_ROW * orders)[:-1]):
+    for b, row in enumerate(expansion.bodies.reshape(-1, BODY_ROW * orders)[:-1]):
         r, p = q[7 * b : 7 * b + 3], q[7 * b + 3 : 7 * b + 7]
-        A = rows[: 12 * orders].reshape(orders, 3, 4)
+        A = row[: 12 * orders].reshape(orders, 3, 4)
         for c, column in enumerate(_columns(p)):
-            A[:, c, :3] = np.transpose([entry.c for entry in column])
+            A[:known, c, :3] = np.transpose([entry.c for entry in column])
         for first, vector in ((S_R, r), (S_OMEGA, _omega(p))):
-            rows[first * orders : (first + 4) * orders].reshape(orders, 4)[:, :3] = np.transpose([e.c for e in vector])
-        poses[b, P : P + 4] = [e.c[0] for e in p]
+            part = row[first * orders : (first + 4) * orders].reshape(orders, 4)
+            part[:known, :3] = np.transpose([entry.c for entry in vector])
+        poses[b, P : P + 4] = [entry.c[0] for entry in p]
     return poses.ravel()
 
 

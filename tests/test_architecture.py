@@ -23,10 +23,13 @@ FILES = {
 LAYERS = """
 _cache errors _discovery jet checks
 _kernel
+_four
 rotation linalg motion signal angle
 blocks block_kernels
 markers bodies tableau friction
-attachment marker_forces frames curvature
+poses
+attachment marker_forces frames curvature body_loops series_loops expansion
+network local free normal
 primitive
 force_loops
 force force_pack
@@ -39,12 +42,15 @@ implicit
 integrator
 integrators.* constraints.__init__ forces.__init__ integrators.__init__
 loads
+landing displacement free_accelerations
+local_chart
 newton evaluate diagnostics reactions power dense
 control
 chart rank
 initial
 assemble
-null_space maggi_kane linearise scene
+null_space tangent scene
+maggi_kane linearise
 formulation run
 events drive work
 solution

@@ -19,6 +19,7 @@ REDUCED, VALUES, BIAS, DRIFT, N_COUNT, N_REALS, N_FIRST_INT, N_FIRST_REAL, N_COL
 # columns of Network.products
 P_LEFT, P_ROWS, P_RIGHT, P_COLUMNS, P_TARGET, P_STRIDE, P_SAME, P_WIDTH = range(8)
 W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
+THIN = 1e-12  # of the largest principal inertia: what is less is none
 
 
 class Network(NamedTuple):
@@ -34,16 +35,41 @@ class Network(NamedTuple):
     mass: np.ndarray  # ((nb + 1) 16,): m and three zeros, columns of J'
     spins: np.ndarray  # int64 (nb,): whether omega' x J' omega' is ever other than zero
     pattern: Pattern  # of S
+    normals: np.ndarray  # int64 (nb,): the row of Phi that normalises a body's p, or -1
 
 
-def is_regular(scene):
+def is_regular(packed):
     """Whether all inertias can be inverted; a body without inertia about an axis needs D^T M D."""
-    for body in scene.bodies:
-        if body.dimension == 7:
-            principal = np.linalg.eigvalsh(body.values["inertia"])
-            if not principal[0] > 1e-12 * principal[2]:
-                return False
-    return True
+    J = packed.system.inertia[packed.system.bodies[:, 1] == 7].reshape(-1, 3, 3)
+    principal = np.linalg.eigvalsh(J)
+    return bool((principal[:, 0] > THIN * principal[:, 2]).all())
+
+
+def _inverse(J, mass):
+    """Of the inertia; of one that has none, with as much as lets it serve as a metric."""
+    size, axes = np.linalg.eigh(J)
+    if not size[0] > THIN * size[2]:
+        size = np.maximum(size, 0.1 * size[2] if size[2] > 0.0 else mass)
+        return (axes / size) @ axes.T
+    return np.linalg.inv(J)
+
+
+def network_of(packed, *columns):
+    """The network of a packed scene with the addresses of these loops, made and loaded once."""
+    kept = packed.shared
+    if columns not in kept:
+        if "network" not in kept:
+            kept["network"] = build(packed, packed)
+        kept[columns] = with_loops(*kept["network"], *columns)
+    return kept[columns]
+
+
+def no_network():
+    """The network of nothing, for its type."""
+    none, pattern = np.zeros(0, np.int64), analyse([], [])[1]
+    pairs = np.zeros((0, 2), np.int64)
+    kinds, products = np.zeros((0, N_COLUMNS), np.int64), np.zeros((0, P_WIDTH), np.int64)
+    return Network(pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none)
 
 
 def build(scene, packed):
@@ -51,9 +77,11 @@ def build(scene, packed):
     system = packed.system
     bodies = {id(body): i for i, body in enumerate(scene.bodies)}
     nb = len(bodies)
-    joints, row = [], 0
+    joints, row, normals = [], 0, np.full(nb, -1, np.int64)
     for constraint in packed.constraints:
-        if not constraint.normalises:
+        if constraint.normalises:
+            normals[bodies[id(constraint.a)]] = row
+        else:
             pair = tuple(bodies.get(id(body), nb) for body in (constraint.a, constraint.b))
             joints.append((constraint, pair, row))
         row += constraint.rows
@@ -111,11 +139,11 @@ def build(scene, packed):
 
     inverse, mass = np.zeros((nb + 1, WEIGHTS)), np.zeros((nb + 1, WEIGHTS))
     spins = np.zeros(nb, np.int64)
-    for i, body in enumerate(scene.bodies):
-        inverse[i, W_MASS], mass[i, W_MASS] = 1.0 / body.values["mass"], body.values["mass"]
-        if body.dimension == 7:
-            J = body.values["inertia"]
-            inverse[i, W_ROTATION:].reshape(3, 4)[:, :3] = np.linalg.inv(J)
+    for i, length in enumerate(system.bodies[:, 1]):
+        inverse[i, W_MASS], mass[i, W_MASS] = 1.0 / system.mass[i], system.mass[i]
+        if length == 7:
+            J = system.inertia[i].reshape(3, 3)
+            inverse[i, W_ROTATION:].reshape(3, 4)[:, :3] = _inverse(J, system.mass[i])
             mass[i, W_ROTATION:].reshape(3, 4)[:, :3] = J
             spins[i] = (J != J[0, 0] * np.eye(3)).any()
     network = Network(
@@ -129,6 +157,7 @@ def build(scene, packed):
         mass=mass.ravel(),
         spins=spins,
         pattern=pattern,
+        normals=normals,
     )
     return network, tuple(used)
 

@@ -59,6 +59,23 @@ def multiply_rows(network, H, Y, values):
 
 
 @kernel
+def multiply_both(network, H, X, lower, upper):
+    """H X^T into the blocks of the pattern, as `factor_lu` takes it: its upper triangle, and its lower one transposed."""
+    for i in range(upper.size):
+        upper[i] = 0.0
+        lower[i] = 0.0
+    for i in range(network.products.shape[0]):
+        product = network.products[i]
+        left, right, target, stride = product[P_LEFT], product[P_RIGHT], product[P_TARGET], product[P_STRIDE]
+        same = product[P_SAME] != 0
+        for r in range(product[P_ROWS]):
+            for c in range(r if same else 0, product[P_COLUMNS]):
+                at = target + r * stride + c
+                upper[at] += _inner(H, left + 16 * r, X, right + 16 * c)
+                lower[at] += _inner(H, right + 16 * c, X, left + 16 * r)
+
+
+@kernel
 def gather(network, H, Z, out):
     """out = H Z."""
     for e in range(network.sides.shape[0]):

@@ -2,7 +2,7 @@
 
 from ._kernel import address_of, caller, entry, kernel
 from .assembly import remember, set_time
-from .chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
+from .local_chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .control import accept, first_step, watch_stiffness
 from .dense import (
     A_ACCELERATE,

@@ -42,7 +42,7 @@ from .scene import Scene
 from .solution import Solution
 from .state import remembered
 from .system import with_curvatures
-from .workspace import Context, allocate, allocate_linear
+from .workspace import Context, allocate, allocate_linear, basis_free_parts
 
 
 def simulate(
@@ -159,16 +159,17 @@ def simulate(
         system, kept = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
     system = system._replace(reals=system.reals.copy())
     system.reals[system.memory] = remembered(state, system.memory.size)
-    work = allocate(n, m, len(scene.bodies), constraint_tol, packed.size)
+    form = form.serving(method, packed)
+    network = form.network(packed)
+    sizes = n, m, len(scene.bodies), constraint_tol, packed.size, len(network.row) if form.basis_free else None
+    work = allocate(*sizes)
     work.q[:], work.qd[:] = q, qd
     step_kernel, tableau, memory = method.kernel(form.first_order)
-    nx = n if form.first_order else n - m
+    nx, ny = form.sizes(n, m, len(scene.bodies))
     interpolant = method.interpolant(form.first_order)
-    width = interpolant.size(n, nx, n - m)
+    width = interpolant.size(n, nx, ny)
     dense = STORED if dense_output else FILLED if watched is not None else 0
-    run = lay_out(
-        work, nx, n - m, tableau, memory(nx, n - m), times, form.first_order, width, dense, system.memory.size
-    )
+    run = lay_out(work, nx, ny, tableau, memory(nx, ny), times, form.first_order, width, dense, system.memory.size)
     run.clock[[T, T_ORIGIN, T_END, H]] = t0, t0, t1, _first_step(method) if adaptive else method.step
     if adaptive:
         run.clock[[RTOL, ATOL]] = method.step_tolerances()
@@ -196,9 +197,9 @@ def simulate(
     if method.implicit:
         linear = prepare_implicit(linear, method, form.implicit(), run)
         run.numbers[STAGE_AT] = (2 * len(method.tableau.c) + 1) * nx
-    context = Context(system, work, linear)
+    context = Context(system, work, linear, *basis_free_parts(network, n))
     advance(context, run, addresses, 0)  # loads the driver, before the clock starts
-    sizes = n, m, len(scene.bodies), constraint_tol, packed.size, nx
+    sizes = *sizes, network, nx, ny
     watch = None if watched is None else Watch(watched, packed.system, Reader(packed.system, sizes, addresses), t0)
     prepared = time.perf_counter()
     status, reason, chunks = drive(context, run, addresses, max_steps, report, (t0, t1), watch, choose)

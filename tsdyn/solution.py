@@ -9,7 +9,7 @@ import numpy as np
 
 from . import diagnostics, power, reactions
 from .bodies import rotation_matrix
-from .chart import REASONS
+from .local_chart import REASONS
 from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays

@@ -11,35 +11,55 @@ against which pivots are judged.
 
 import math
 
+from ._four import get, let
 from ._kernel import kernel
+
+
+@kernel
+def _less(values, at, x):
+    """values[at] -= x."""
+    let(values, at, get(values, at) - x)
 
 
 @kernel
 def _keep_diagonal(pattern, values):
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
-    kept = values[pattern.shape[1] :]
+    kept = pattern.shape[1]
     for j in range(heads.size):
-        head, step, first = heads[j], widths[j] + 1, starts[j]
-        for k in range(starts[j + 1] - first):
-            kept[first + k] = values[head + k * step]
+        at, step, first = get(heads, j), get(widths, j) + 1, get(starts, j)
+        for k in range(first, get(starts, j + 1)):
+            let(values, kept + k, get(values, at))
+            at += step
 
 
 @kernel
-def _subtract(target, factor, source, n):
-    for x in range(n):
-        target[x] -= factor * source[x]
-
-
-@kernel
-def _subtract2(target, f, u, g, v, n):
-    for x in range(n):
-        target[x] -= f * u[x] + g * v[x]
-
-
-@kernel
-def _subtract3(target, f, u, g, v, h, w, n):
-    for x in range(n):
-        target[x] -= f * u[x] + g * v[x] + h * w[x]
+def _update(pattern, j, head, size, width, left, right, values):
+    """Subtract block j's products from later panels: left's columns times right's, the diagonal of both inverted."""
+    updates, records = pattern.updates, pattern.records
+    for e in range(get(updates, j), get(updates, j + 1)):
+        at, rows, run = get(records, 6 * e), get(records, 6 * e + 1), get(records, 6 * e + 2)
+        count, target, stride = get(records, 6 * e + 3), get(records, 6 * e + 4), get(records, 6 * e + 5)
+        for r in range(rows):
+            skip = r if run == at else 0  # a block on the diagonal: its upper triangle
+            row, k = head, 0
+            while k + 3 <= size:
+                second, third = row + width, row + 2 * width
+                f = get(left, row + at + r) * get(right, row + k)
+                g = get(left, second + at + r) * get(right, second + k + 1)
+                h = get(left, third + at + r) * get(right, third + k + 2)
+                row, second, third = row + run, second + run, third + run
+                for c in range(skip, count):
+                    x = f * get(right, row + c) + g * get(right, second + c) + h * get(right, third + c)
+                    _less(values, target + c, x)
+                row += 3 * width - run
+                k += 3
+            while k < size:
+                f = get(left, row + at + r) * get(right, row + k)
+                for c in range(skip, count):
+                    _less(values, target + c, f * get(right, row + run + c))
+                row += width
+                k += 1
+            target += stride
 
 
 @kernel
@@ -50,54 +70,23 @@ def factor(pattern, values, limit):
     """
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     _keep_diagonal(pattern, values)
-    kept = values[pattern.shape[1] :]
+    kept = pattern.shape[1]
     for j in range(heads.size):
-        first, width = starts[j], widths[j]
-        size = starts[j + 1] - first
-        panel = values[heads[j] :]
+        first, width, head = get(starts, j), get(widths, j), get(heads, j)
+        size = get(starts, j + 1) - first
         for k in range(size):
-            row = panel[k * width + k :]
-            pivot = row[0]
-            if not limit * kept[first + k] < pivot < math.inf:
+            row = head + k * (width + 1)
+            pivot = get(values, row)
+            if not limit * get(values, kept + first + k) < pivot < math.inf:
                 return first + k
             inverse = 1.0 / pivot
-            row[0] = inverse
+            let(values, row, inverse)
             for i in range(1, size - k):
-                _subtract(panel[(k + i) * (width + 1) :], row[i] * inverse, row[i:], width - k - i)
-        _update(pattern, j, size, width, panel, panel, values)
+                f, at = get(values, row + i) * inverse, row + i * width
+                for c in range(i, width - k):
+                    _less(values, at + c, f * get(values, row + c))
+        _update(pattern, j, head, size, width, values, values, values)
     return -1
-
-
-@kernel
-def _update(pattern, j, size, width, left, right, values):
-    """Subtract block j's products from later panels: left's columns times right's."""
-    updates, records = pattern.updates, pattern.records
-    for e in range(updates[j], updates[j + 1]):
-        record = records[6 * e : 6 * e + 6]
-        at, rows, run, count, target, stride = record[0], record[1], record[2], record[3], record[4], record[5]
-        for r in range(rows):
-            skip = r if run == at else 0  # a block on the diagonal: its upper triangle
-            out = values[target + r * stride + skip :]
-            column, source, n = left[at + r :], right[run + skip :], count - skip
-            k = 0
-            while k + 3 <= size:
-                a, b, c = k * width, (k + 1) * width, (k + 2) * width
-                u, v, w = right[k * (width + 1) :], right[(k + 1) * (width + 1) :], right[(k + 2) * (width + 1) :]
-                _subtract3(
-                    out,
-                    column[a] * u[0],
-                    source[a:],
-                    column[b] * v[0],
-                    source[b:],
-                    column[c] * w[0],
-                    source[c:],
-                    n,
-                )
-                k += 3
-            while k < size:
-                a = k * width
-                _subtract(out, column[a] * right[k * (width + 1)], source[a:], n)
-                k += 1
 
 
 @kernel
@@ -109,25 +98,27 @@ def factor_lu(pattern, lower, upper, limit):
     """
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     _keep_diagonal(pattern, upper)
-    kept = upper[pattern.shape[1] :]
+    kept = pattern.shape[1]
     for j in range(heads.size):
-        first, width = starts[j], widths[j]
-        size = starts[j + 1] - first
-        left, right = lower[heads[j] :], upper[heads[j] :]
+        first, width, head = get(starts, j), get(widths, j), get(heads, j)
+        size = get(starts, j + 1) - first
         for k in range(size):
-            row, column = right[k * width + k :], left[k * width + k :]
-            pivot = row[0]
-            if not limit * abs(kept[first + k]) < abs(pivot) < math.inf:
+            row = head + k * (width + 1)
+            pivot = get(upper, row)
+            if not limit * abs(get(upper, kept + first + k)) < abs(pivot) < math.inf:
                 return first + k
             inverse = 1.0 / pivot
-            row[0] = inverse
-            column[0] = inverse
+            let(upper, row, inverse)
+            let(lower, row, inverse)
             for i in range(1, size - k):
-                at = (k + i) * (width + 1)
-                _subtract(right[at:], column[i] * inverse, row[i:], width - k - i)
-                _subtract(left[at + 1 :], row[i] * inverse, column[i + 1 :], width - k - i - 1)
-        _update(pattern, j, size, width, left, right, upper)
-        _update(pattern, j, size, width, right, left, lower)
+                at = row + i * width
+                f, g = get(lower, row + i) * inverse, get(upper, row + i) * inverse
+                for c in range(i, width - k):
+                    _less(upper, at + c, f * get(upper, row + c))
+                for c in range(i + 1, width - k):
+                    _less(lower, at + c, g * get(lower, row + c))
+        _update(pattern, j, head, size, width, lower, upper, upper)
+        _update(pattern, j, head, size, width, upper, lower, lower)
     return -1
 
 
@@ -149,34 +140,87 @@ def solve_lu(pattern, lower, upper, b):
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     columns, segments = pattern.columns, pattern.segments
     for j in range(heads.size):
-        first, width = starts[j], widths[j]
-        size = starts[j + 1] - first
-        own = b[first:]
-        for k in range(size):
-            row = lower[heads[j] + k * width :]
-            value = own[k] * row[k]
-            own[k] = value
-            for i in range(1, size - k):
-                own[k + i] -= value * row[k + i]
+        first, width, row = get(starts, j), get(widths, j), get(heads, j)
+        size = get(starts, j + 1) - first
+        ce, cf = get(columns, j), get(columns, j + 1)
+        k = 0
+        while k + 3 <= size:
+            i = first + k
+            second, third = row + width, row + 2 * width
+            u = get(b, i) * get(lower, row + k)
+            v = (get(b, i + 1) - u * get(lower, row + k + 1)) * get(lower, second + k + 1)
+            x = (get(b, i + 2) - u * get(lower, row + k + 2) - v * get(lower, second + k + 2)) * get(
+                lower, third + k + 2
+            )
+            let(b, i, u)
+            let(b, i + 1, v)
+            let(b, i + 2, x)
+            for c in range(k + 3, size):
+                _less(b, first + c, u * get(lower, row + c) + v * get(lower, second + c) + x * get(lower, third + c))
             at = size
-            for e in range(columns[j], columns[j + 1]):
-                start, count = segments[2 * e], segments[2 * e + 1]
-                _subtract(b[start:], value, row[at:], count)
+            for e in range(ce, cf):
+                start, count = get(segments, 2 * e), get(segments, 2 * e + 1)
+                for c in range(count):
+                    f = u * get(lower, row + at + c) + v * get(lower, second + at + c) + x * get(lower, third + at + c)
+                    _less(b, start + c, f)
                 at += count
+            row += 3 * width
+            k += 3
+        while k < size:
+            u = get(b, first + k) * get(lower, row + k)
+            let(b, first + k, u)
+            for c in range(k + 1, size):
+                _less(b, first + c, u * get(lower, row + c))
+            at = size
+            for e in range(ce, cf):
+                start, count = get(segments, 2 * e), get(segments, 2 * e + 1)
+                for c in range(count):
+                    _less(b, start + c, u * get(lower, row + at + c))
+                at += count
+            row += width
+            k += 1
     for j in range(heads.size - 1, -1, -1):
-        first, width = starts[j], widths[j]
-        size = starts[j + 1] - first
-        own = b[first:]
-        for k in range(size - 1, -1, -1):
-            row = upper[heads[j] + k * width :]
-            total = 0.0
-            for i in range(1, size - k):
-                total += row[k + i] * own[k + i]
+        first, width = get(starts, j), get(widths, j)
+        size = get(starts, j + 1) - first
+        ce, cf = get(columns, j), get(columns, j + 1)
+        row = get(heads, j) + size * width
+        k = size
+        while k >= 3:
+            k -= 3
+            row -= 3 * width
+            second, third = row + width, row + 2 * width
+            u, v, x = 0.0, 0.0, 0.0
+            for c in range(k + 3, size):
+                f = get(b, first + c)
+                u += get(upper, row + c) * f
+                v += get(upper, second + c) * f
+                x += get(upper, third + c) * f
             at = size
-            for e in range(columns[j], columns[j + 1]):
-                start, count = segments[2 * e], segments[2 * e + 1]
-                source, values = b[start:], row[at:]
-                for x in range(count):
-                    total += values[x] * source[x]
+            for e in range(ce, cf):
+                start, count = get(segments, 2 * e), get(segments, 2 * e + 1)
+                for c in range(count):
+                    f = get(b, start + c)
+                    u += get(upper, row + at + c) * f
+                    v += get(upper, second + at + c) * f
+                    x += get(upper, third + at + c) * f
                 at += count
-            own[k] -= row[k] * total
+            i = first + k
+            x = get(b, i + 2) - x * get(upper, third + k + 2)
+            v = get(b, i + 1) - (v + get(upper, second + k + 2) * x) * get(upper, second + k + 1)
+            u = get(b, i) - (u + get(upper, row + k + 1) * v + get(upper, row + k + 2) * x) * get(upper, row + k)
+            let(b, i, u)
+            let(b, i + 1, v)
+            let(b, i + 2, x)
+        while k > 0:
+            k -= 1
+            row -= width
+            u = 0.0
+            for c in range(k + 1, size):
+                u += get(upper, row + c) * get(b, first + c)
+            at = size
+            for e in range(ce, cf):
+                start, count = get(segments, 2 * e), get(segments, 2 * e + 1)
+                for c in range(count):
+                    u += get(upper, row + at + c) * get(b, start + c)
+                at += count
+            _less(b, first + k, get(upper, row + k) * u)

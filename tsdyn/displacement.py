@@ -1,8 +1,8 @@
 """From coordinates of a chart on the network to poses and their velocities, and back from accelerations.
 
-    omega'  = C etad,                           C = d0 I - d~ + d d^T / d0
-    etadd   = (d0 I + d~) omega'd - |omega'|^2 d / 2
-    N       = H(q) C Y0                         what Phi changes by, with -u
+omega'  = C etad,                           C = d0 I - d~ + d d^T / d0
+etadd   = (d0 I + d~) omega'd - |omega'|^2 d / 2
+N       = H(q) C Y0                         what Phi changes by, with -u
 """
 
 import math
@@ -58,14 +58,6 @@ def turn_rates(network, l, rates, poses):
         put(poses, b * POSE + RD, four(rates, 8 * b))
         if network.bodies[b, 1] == 7:
             put(poses, b * POSE + OMEGA, _turn_by(l, b, four(rates, 8 * b + 4)))
-
-
-@kernel
-def turn_bodies(network, l, Z):
-    """Z <- C Z."""
-    for b in range(network.bodies.shape[0]):
-        if network.bodies[b, 1] == 7:
-            put(Z, 8 * b + 4, _turn_by(l, b, four(Z, 8 * b + 4)))
 
 
 @kernel
@@ -134,4 +126,3 @@ def turned_most(l):
     for i in range(0, l.d.size, 4):
         most = max(most, l.d[i] * l.d[i] + l.d[i + 1] * l.d[i + 1] + l.d[i + 2] * l.d[i + 2])
     return math.sqrt(most)
-

@@ -25,7 +25,6 @@ class Local(NamedTuple):
     lower: np.ndarray  # factors of N = H C Y0; displacement.factorise_normal
     upper: np.ndarray
     drift: np.ndarray  # (m,)  Phi_t
-    probe: np.ndarray  # (m,)  the direction in which the normal space turns most; local_chart.turning
     numbers: np.ndarray  # (NUMBERS,)  below
 
 
@@ -41,5 +40,5 @@ def allocate_local(network):
     base[:, 4] = d[:, 3] = 1.0
     return Local(
         base.ravel(), d.ravel(), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(16 * m), zeros(16 * m), zeros(size),
-        zeros(16 * m), zeros(size), zeros(size), zeros(m), zeros(m), zeros(NUMBERS),
+        zeros(16 * m), zeros(size), zeros(size), zeros(m), zeros(NUMBERS),
     )  # fmt: skip

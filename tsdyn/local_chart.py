@@ -3,22 +3,22 @@
 A chart is left at the end of a step, on signs that have no dimension and don't depend on units, scales of constraints
 or levers, the metric being that of the masses:
 
-    contraction    |S0^-1 (N - S0) y| / |y| in the norm of S0 = H0 W0 H0^T, N = H C Y0, at the y that it is largest for:
-                   how far the normal space has turned since q0, which is what the simplified Newton iteration with
-                   S0 would leave of an error. One step of a power iteration, which goes on over steps and charts
+    contraction    the largest |1 - n / s|, n and s the pivots of N = H C Y0 and of S0 = H0 W0 H0^T: how much of what
+                   elimination leaves of a row is gone; 1 where the normal space of q0 meets the manifold
     turn           |d|, the sine of half the angle that a body has turned since q0
 """
 
 import math
 
+from ._four import get
 from ._kernel import kernel
-from .block_kernels import factor, solve
-from .displacement import turn_bodies, turned_most
+from .block_kernels import factor
+from .displacement import factorise_normal, turned_most
 from .landing import run_loops
 from .linalg import copy
 from .local import END, FACTORED, TIME
 from .network import REDUCED
-from .normal import gather, multiply_rows, scatter, weigh_rows
+from .normal import multiply_rows, weigh_rows
 from .poses import POSE, P, R, place_bodies
 from .workspace import CHARTS, CONDITION, CONTRACTION, FACTORIZATIONS, FLOOR, PLACEMENTS, SIZE
 
@@ -34,7 +34,7 @@ REASONS = (
 )
 
 CONTRACTION_LIMIT = 0.15
-TURN_LIMIT = 0.15
+TURN_LIMIT = 0.25
 CONTRACTION_LOST = 0.9  # nearer to one the normal space need not meet the manifold on the way; another branch may have
 ROUNDING = 1e-15  # relative to the numbers that enter Phi: below this a residual says nothing
 PIVOT_LIMIT = 1e-15  # of S0: less of a diagonal entry than this is rounding
@@ -90,13 +90,11 @@ def measure_turns(network, q, l):
 
 @kernel
 def turning(network, w, f, l):
-    """Reason to leave the chart at the place that l.d and f.H belong to, or STAY; records contraction and condition.
-
-    f.Z, f.b and f.gamma are scratch.
-    """
+    """Reason to leave the chart at the place that l.d and f.H belong to, or STAY; records contraction and condition."""
     turn, contraction = turned_most(l), 0.0
     if f.b.size > 0:
-        contraction = _contraction(network, f, l)
+        contraction = _contraction(network, l) if factorise_normal(network, w, f, l) else math.inf
+    l.numbers[FACTORED] = 0.0  # dense output, if there is any, would come between
     w.control[CONTRACTION] = max(turn, contraction)
     w.control[CONDITION] = (1.0 + w.control[CONTRACTION]) / max(1.0 - w.control[CONTRACTION], 1e-300)
     if not contraction < CONTRACTION_LIMIT:
@@ -105,24 +103,12 @@ def turning(network, w, f, l):
 
 
 @kernel
-def _contraction(network, f, l):
-    for i in range(f.Z.size):
-        f.Z[i] = 0.0
-    scatter(network, l.Y0, l.probe, f.Z)
-    gather(network, l.H0, f.Z, f.b)
-    turn_bodies(network, l, f.Z)
-    gather(network, f.H, f.Z, f.gamma)
-    before, after = 0.0, 0.0
-    for e in range(f.b.size):
-        before -= l.probe[e] * f.b[e]
-        f.gamma[e] -= f.b[e]
-        f.b[e] = f.gamma[e]
-    solve(network.pattern, l.S0, f.b)
-    for e in range(f.b.size):
-        after += f.gamma[e] * f.b[e]
-    if not 0.0 < after < math.inf:
-        return 0.0 if after <= 0.0 else math.inf
-    scale = 1.0 / math.sqrt(after)
-    for e in range(f.b.size):
-        l.probe[e] = scale * f.b[e]
-    return math.sqrt(after / before)
+def _contraction(network, l):
+    """From the reciprocal pivots of both."""
+    pattern, worst = network.pattern, 0.0
+    for j in range(pattern.heads.size):
+        at, step = pattern.heads[j], pattern.widths[j] + 1
+        for _ in range(pattern.starts[j + 1] - pattern.starts[j]):
+            worst = max(worst, abs(1.0 - get(l.S0, at) / get(l.upper, at)))
+            at += step
+    return worst

@@ -17,7 +17,7 @@ from .errors import InvalidConstraint
 # columns of Network.kinds: addresses of the loops, then where a kind's instances are
 REDUCED, VALUES, BIAS, DRIFT, N_COUNT, N_REALS, N_FIRST_INT, N_FIRST_REAL, N_COLUMNS = range(9)
 # columns of Network.products
-P_LEFT, P_ROWS, P_RIGHT, P_COLUMNS, P_TARGET, P_STRIDE, P_SAME, P_WIDTH = range(8)
+P_LEFT, P_ROWS, P_RIGHT, P_COLUMNS, P_TARGET, P_STRIDE, P_SAME, P_WIDTH = range(8)  # SAME: with itself, both sides
 W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
 THIN = 1e-12  # of the largest principal inertia: what is less is none
 
@@ -101,25 +101,28 @@ def build(scene, packed):
     m = sum(sizes)
     firsts = [int(starts[node]) + offset for node, offset in inside]
     sides, places = np.zeros((m, 2), np.int64), np.zeros(m, np.int64)
-    at_body = [[] for _ in range(nb)]
+    at_body, products = [[] for _ in range(nb)], []
     for i, (constraint, pair, row) in enumerate(joints):
         e = np.arange(firsts[i], firsts[i] + constraint.rows)
         sides[e], places[e] = pair, np.arange(row, row + constraint.rows)
         for side, body in enumerate(pair):
             if body < nb:
                 at_body[body].append((i, side))
-    products = []
+
+    def product(i, side, j, other):
+        (node, r), (other_node, c) = inside[i], inside[j]
+        target, stride, _ = where(node, other_node)
+        left, right = 16 * firsts[i] + 8 * side, 16 * firsts[j] + 8 * other
+        rows, columns = joints[i][0].rows, joints[j][0].rows
+        products.append((left, rows, right, columns, target + r * stride + c, stride, int(i == j)))
+
+    for i in range(len(joints)):
+        product(i, 0, i, 0)
     for found in at_body:
         for i, side in found:
             for j, other in found:
-                if firsts[i] > firsts[j]:
-                    continue
-                (node, r), (other_node, c) = inside[i], inside[j]
-                target, stride, _ = where(node, other_node)
-                target += r * stride + c
-                left, right = 16 * firsts[i] + 8 * side, 16 * firsts[j] + 8 * other
-                rows, columns = joints[i][0].rows, joints[j][0].rows
-                products.append((left, rows, right, columns, target, stride, int(i == j)))
+                if firsts[i] < firsts[j]:
+                    product(i, side, j, other)
 
     index = {id(constraint): i for i, (constraint, _, _) in enumerate(joints)}
     classes = dict.fromkeys(type(constraint) for constraint in packed.constraints)
@@ -145,7 +148,7 @@ def build(scene, packed):
             J = system.inertia[i].reshape(3, 3)
             inverse[i, W_ROTATION:].reshape(3, 4)[:, :3] = _inverse(J, system.mass[i])
             mass[i, W_ROTATION:].reshape(3, 4)[:, :3] = J
-            spins[i] = (J != J[0, 0] * np.eye(3)).any()
+            spins[i] = (J[0, 0] * np.eye(3) != J).any()
     network = Network(
         bodies=system.bodies,
         kinds=np.array(kinds, np.int64).reshape(-1, N_COLUMNS),

@@ -78,7 +78,9 @@ def write_velocities(bodies, poses, qd):
         for c in range(3):
             qd[i + c] = poses[at + RD + c]
         if bodies[b, 1] == 7:
-            _turn(poses, at, 0.5 * poses[at + OMEGA], 0.5 * poses[at + OMEGA + 1], 0.5 * poses[at + OMEGA + 2], qd, i + 3)
+            _turn(
+                poses, at, 0.5 * poses[at + OMEGA], 0.5 * poses[at + OMEGA + 1], 0.5 * poses[at + OMEGA + 2], qd, i + 3
+            )
 
 
 @kernel
@@ -168,4 +170,3 @@ def add_gradient(code, poses, at, s, f, i, H, h):
     H[h + 4] += s[1] * y2 - s[2] * y1
     H[h + 5] += s[2] * y0 - s[0] * y2
     H[h + 6] += s[0] * y1 - s[1] * y0
-

@@ -9,10 +9,10 @@ import numpy as np
 
 from . import diagnostics, power, reactions
 from .bodies import rotation_matrix
-from .local_chart import REASONS
 from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
+from .local_chart import REASONS
 from .rank import weakest_row
 from .run_state import CHART_ROWS, IN_CHART, REJECTED, STEPS, STIFF, T
 from .state import RememberingState

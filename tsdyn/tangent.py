@@ -33,7 +33,7 @@ from .local import END, FACTORED, TIME
 from .local_chart import CONTRACTION_LOST, touch, turning
 from .network import BIAS, DRIFT, REDUCED, VALUES
 from .normal import gather, multiply_rows, scatter, weigh_rows
-from .poses import move_bodies, write_accelerations, write_positions, write_velocities
+from .poses import write_accelerations, write_positions, write_velocities
 from .stepping import ACCELERATE, NORM, PLACE
 from .workspace import (
     AT_ROUNDING,
@@ -54,7 +54,7 @@ OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
 CHART_LOST = int(Status.CHART_LOST)
 COLUMNS = REDUCED, VALUES, BIAS, DRIFT  # the loops of a network that are called
-SWEEPS = 16
+SWEEPS, RENEWALS = 24, 4
 PIVOT_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
 CURVATURE = 1.0  # 1 / m: what Newton's method leaves of an error, over its square, where none has been measured
 SPEED_ROUNDING = 2e-16
@@ -69,14 +69,19 @@ def place(context, t, x):
     l.numbers[TIME] = t
     if not set_time(s, t):
         return NOT_FINITE
-    copy(vector(x, l.x.size - 8), l.x)
-    scatter(network, l.Y0, w.u, l.x)
-    if not displace(network, l, f.poses):
-        return CHART_LOST
+    x, status = vector(x, l.x.size - 8), NEWTON_FAILED
+    for attempt in range(2):
+        copy(x, l.x)
+        if attempt == 1:  # a long step: from the tangent plane, P0 x
+            gather(network, l.H0, l.x, w.u)
+            solve(network.pattern, l.S0, w.u)
+        scatter(network, l.Y0, w.u, l.x)
+        status = _solve_positions(network, s, w, f, l, t, RENEWALS * attempt)
+        if status == OK or f.b.size == 0:
+            break
+    if status != OK:
+        return status
     if f.b.size > 0:
-        status = _solve_positions(network, s, w, f, l, t)
-        if status != OK:
-            return status
         weigh_rows(network, f.H, f.Y)
         multiply_rows(network, f.H, f.Y, f.S)
         w.counters[FACTORIZATIONS] += 1
@@ -88,8 +93,8 @@ def place(context, t, x):
 
 
 @kernel
-def _solve_positions(network, s, w, f, l, t):
-    """Newton's method for u, N being that of its start; H at the solution. Status.
+def _solve_positions(network, s, w, f, l, t, renewals):
+    """Newton's method for u, N being that of its start or made anew so often; poses and H at the solution. Status.
 
     It ends where what is left, |Phi| or what the convergence so far lets expect of it, is below u_tol^(3/2) or
     rounding; H is taken there, with the last |Phi|.
@@ -97,65 +102,69 @@ def _solve_positions(network, s, w, f, l, t):
     floor = w.control[FLOOR]
     tol = max(w.control[U_TOL], floor)
     left = max(tol * math.sqrt(tol), floor)
-    run_loops(network, s.reals, REDUCED, f.poses, t, f.b, f.H)
+    column, before, rate, ending, anew = REDUCED, math.inf, 0.0, False, 0
     l.numbers[FACTORED] = 0.0
-    before = largest(f.b)
-    if before <= left:
-        w.counters[AT_ROUNDING] += 1
-        return OK
-    if not before < math.inf:
-        return NOT_FINITE
-    if not factorise_normal(network, w, f, l):
-        return SINGULAR
-    l.numbers[FACTORED] = 1.0
-    rate, renewed = w.control[RATE] * before, 0
     for sweep in range(SWEEPS):
+        if not displace(network, l, f.poses):
+            return CHART_LOST
+        if f.b.size == 0:
+            return OK
+        run_loops(network, s.reals, column, f.poses, t, f.b, f.H)
+        worst = largest(f.b)
+        if not worst < math.inf:
+            return NOT_FINITE
+        slow = worst > 0.25 * before
+        if worst <= left or ending or (slow and worst <= 100.0 * floor):
+            if column == REDUCED:
+                w.counters[AT_ROUNDING if sweep == 0 else UNVERIFIED] += 0 if ending else 1
+                return OK
+            column, ending = REDUCED, True  # once more, for H
+            continue
+        if slow:  # N was that of another place
+            anew += 1
+            if anew > renewals:
+                return NEWTON_FAILED
+            l.numbers[FACTORED] = 0.0
+            if column != REDUCED:
+                column, before = REDUCED, math.inf
+                continue
+        elif before < math.inf:
+            if worst > 100.0 * floor and rate == 0.0:
+                w.control[RATE] = worst / (before * before)
+            rate = worst / before
+        if l.numbers[FACTORED] == 0.0:
+            if not factorise_normal(network, w, f, l):
+                return SINGULAR
+            l.numbers[FACTORED], rate = 1.0, 0.0
         solve_lu(network.pattern, l.lower, l.upper, f.b)
         w.counters[NEWTON] += 1
         scatter(network, l.Y0, f.b, l.x)
         for e in range(f.b.size):
             w.u[e] += f.b[e]
-        if not displace(network, l, f.poses):
-            return CHART_LOST
-        last = rate * before <= left
-        run_loops(network, s.reals, REDUCED if last else VALUES, f.poses, t, f.b, f.H)
-        worst = largest(f.b)
-        if not worst < math.inf:
-            return NOT_FINITE
-        slow = worst > 0.25 * before
-        if worst <= left or (slow and worst <= 100.0 * floor):
-            if last:
-                w.counters[UNVERIFIED] += 1
-            else:
-                run_loops(network, s.reals, REDUCED, f.poses, t, f.b, f.H)
-            return OK
-        if sweep == 0 and worst > 100.0 * floor:
-            w.control[RATE] = worst / (before * before)
-        rate, before = worst / before, worst
-        if slow:  # N was that of another place
-            renewed += 1
-            if renewed > 4:
-                return NEWTON_FAILED
-            run_loops(network, s.reals, REDUCED, f.poses, t, f.b, f.H)
-            if not factorise_normal(network, w, f, l):
-                return SINGULAR
-            rate = 0.1
+        expected = worst * (rate if rate > 0.0 else w.control[RATE] * worst)
+        column, before = REDUCED if expected <= left else VALUES, worst
     return NEWTON_FAILED
 
 
 @kernel
 def _solve_velocities(network, s, w, f, l, t):
-    """rd and omega' of the poses from the rates l.y, freed of what would leave the manifold. Whether there are any."""
-    turn_rates(network, l, l.y, f.poses)
-    if f.b.size == 0:
-        return True
+    """rd and omega' of the poses from the rates l.y, freed of what would leave the manifold. Whether there are any.
+
+    The factors are those of N at the start of the position solve, or, where it needed none, those of S.
+    """
     rheonomic = is_rheonomic(s)
     if rheonomic:
         run_loops(network, s.reals, DRIFT, f.poses, t, l.drift, f.H)
-    speed, spin = largest_rates(network, f.poses)
-    floor = SPEED_ROUNDING * (speed + w.control[SIZE] * spin)
-    before = math.inf
-    for _ in range(SWEEPS):
+    factored = l.numbers[FACTORED] > 0.0
+    lower, upper = l.lower if factored else f.S, l.upper if factored else f.S
+    floor, before = 0.0, math.inf
+    for sweep in range(SWEEPS):
+        turn_rates(network, l, l.y, f.poses)
+        if f.b.size == 0:
+            return True
+        if sweep == 0:
+            speed, spin = largest_rates(network, f.poses)
+            floor = SPEED_ROUNDING * (speed + w.control[SIZE] * spin)
         gather_rates(network, f.H, f.poses, f.b)
         if rheonomic:
             for e in range(f.b.size):
@@ -163,15 +172,10 @@ def _solve_velocities(network, s, w, f, l, t):
         worst = largest(f.b)
         if not worst < math.inf:
             return False
-        if worst <= floor or worst > 0.25 * before:
+        if worst <= floor or (worst > 0.5 * before and worst <= 100.0 * floor):
             return True
-        if l.numbers[FACTORED] == 0.0:
-            if not factorise_normal(network, w, f, l):
-                return False
-            l.numbers[FACTORED] = 1.0
-        solve_lu(network.pattern, l.lower, l.upper, f.b)
+        solve_lu(network.pattern, lower, upper, f.b)
         scatter(network, l.Y0, f.b, l.y)
-        turn_rates(network, l, l.y, f.poses)
         before = worst
     return True
 
@@ -201,7 +205,7 @@ def accelerate(context, t, y, yd, unused):
 def complete(context, yd):
     """Write q, qd and qdd after `accelerate`, the accelerations refined once by H (rdd, omega'd) + gamma."""
     c = load(context)
-    w, f, l, network = c.work, c.free, c.local, c.network
+    w, f, network = c.work, c.free, c.network
     if f.b.size > 0:
         gather(network, f.H, f.Z, f.b)
         for e in range(f.b.size):

@@ -152,9 +152,7 @@ def allocate_linear(system, n, m, wanted, kept=0):
 
 def basis_free_parts(network, n):
     """Network, Free and Local of a Context; their memory is small in every form."""
-    free, local = allocate_free(network, n), allocate_local(network)
-    local.probe[:] = np.cos(np.arange(local.probe.size) ** 2)  # any direction does
-    return network, free, local
+    return network, allocate_free(network, n), allocate_local(network)
 
 
 def _example():

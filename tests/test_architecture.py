@@ -36,6 +36,7 @@ force force_pack
 state_function
 given_load
 system stepping progress state
+sparse_rows
 assembly interpolation constraints.* forces.*
 workspace run_state
 implicit
@@ -47,7 +48,7 @@ local_chart
 newton evaluate diagnostics reactions power dense
 control
 chart rank
-initial
+initial start
 assemble
 null_space tangent scene
 maggi_kane linearise

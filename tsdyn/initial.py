@@ -13,10 +13,10 @@ def consistent(scene, system, q, qd, t, tol):
     """Check positions and velocities against the constraints, then remove what rounding is left. Returns (q, qd)."""
     Phi, Phi_q, Phi_t, _ = constraint_arrays(system, q, qd, t)
     demand_finite(scene, Phi, Phi_q, Phi_t)
-    _demand(scene, Phi, tol * (1.0 + np.abs(q).max()), "position", "Phi")
+    demand_small(scene, Phi, tol * (1.0 + np.abs(q).max()), "position", "Phi")
     check_rank(scene, Phi_q)
     check_inertia(scene, system, q, Phi_q)
-    _demand(scene, Phi_q @ qd + Phi_t, tol * (1.0 + np.abs(qd).max()), "velocity", "Phi_q qd + Phi_t")
+    demand_small(scene, Phi_q @ qd + Phi_t, tol * (1.0 + np.abs(qd).max()), "velocity", "Phi_q qd + Phi_t")
     if not Phi.size:
         return q, qd
     for _ in range(3):  # what is exact to rounding is left alone: a projection would only add noise
@@ -43,7 +43,8 @@ def demand_finite(scene, *arrays):
             )
 
 
-def _demand(scene, residual, tol, level, formula):
+def demand_small(scene, residual, tol, level, formula):
+    """Refuse residuals (m,) above tol, by name."""
     bad = np.flatnonzero(~(np.abs(residual) <= tol))
     if bad.size == 0:
         return

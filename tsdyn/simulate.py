@@ -14,7 +14,6 @@ from .events import Watch, prepare
 from .force_pack import with_force_jacobians
 from .formulation import formulation as find_formulation
 from .implicit import prepare_implicit
-from .initial import consistent
 from .integrator import Integrator, registered
 from .progress import reporter
 from .run import advance
@@ -40,6 +39,7 @@ from .run_state import (
 )
 from .scene import Scene
 from .solution import Solution
+from .start import consistent
 from .state import remembered
 from .system import with_curvatures
 from .workspace import Context, allocate, allocate_linear, basis_free_parts
@@ -200,7 +200,7 @@ def simulate(
     context = Context(system, work, linear, *basis_free_parts(network, n))
     advance(context, run, addresses, 0)  # loads the driver, before the clock starts
     sizes = *sizes, network, nx, ny
-    watch = None if watched is None else Watch(watched, packed.system, Reader(packed.system, sizes, addresses), t0)
+    watch = None if watched is None else Watch(watched, packed, Reader(packed.system, sizes, addresses), t0)
     prepared = time.perf_counter()
     status, reason, chunks = drive(context, run, addresses, max_steps, report, (t0, t1), watch, choose)
     if status == Status.STIFF:

@@ -9,7 +9,7 @@ from tsdyn.force_pack import with_force_jacobians
 from tsdyn.formulation import formulation
 from tsdyn.stepping import call_accelerate, call_place
 from tsdyn.system import with_curvatures
-from tsdyn.workspace import Context, allocate, allocate_linear
+from tsdyn.workspace import Context, allocate, allocate_linear, basis_free_parts
 
 WEIGHTS = {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}  # central differences of sixth order
 
@@ -72,8 +72,9 @@ class Tangent:
         n, m = q.size, system.segments.shape[0]
         work = allocate(n, m, len(scene.bodies), 1e-14, packed.size)
         work.q[:], work.qd[:] = q, qd
-        self.context = Context(system, work, allocate_linear(system, n, m, True, kept))
-        form = formulation("tangent")
+        form = formulation("null-space")
+        parts = basis_free_parts(form.network(packed), n)
+        self.context = Context(system, work, allocate_linear(system, n, m, True, kept), *parts)
         self.at = np.array([*form.addresses(), *form.implicit()[:5]], np.int64)
         self.k, self.t = n - m, t
         v, self.vd, vdd = np.zeros((3, self.k))

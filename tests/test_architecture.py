@@ -26,33 +26,37 @@ _kernel
 _four rotation linalg motion signal angle recurrences
 blocks block_steps block_kernels
 markers bodies tableau friction
-attachment marker_forces frames curvature poses
-body_loops
+poses
+attachment marker_forces frames curvature body_loops
 series_loops
 force_series
+network local
+free normal
 primitive
 force_loops
 force force_pack
 state_function
 given_load
 system stepping progress state
+sparse_rows
 assembly interpolation constraints.* forces.*
-network
-normal
-free expansion
+expansion
 workspace run_state
-landing outputs free_accelerations
+outputs
 series_state
 implicit
 integrator
 integrators.* constraints.__init__ forces.__init__ integrators.__init__
 loads
+landing displacement free_accelerations
+local_chart
 newton evaluate diagnostics reactions power dense
 control
 chart rank
-initial
+initial start
 assemble
-null_space maggi_kane linearise scene
+null_space tangent scene
+maggi_kane linearise
 series_steps
 taylor expansion_pack
 series_memory

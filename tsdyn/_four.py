@@ -6,6 +6,7 @@
     add(f, g), sub(f, g), times(f, g)                         first(f), second(f), third(f)   one of them
     total(f)             their sum
     cross(f, g)          of the first three; the fourth is 0
+    get(array, i), let(array, i, x)                           one number, i not counted from the end
 
 Numba vectorises loops, and none of ours is long enough. Used with lengths of four throughout, so it is safe.
 """
@@ -159,7 +160,38 @@ def cross(typing, f, g):
     return FOUR(FOUR, FOUR), generate
 
 
+@intrinsic
+def get(typing, array, index):
+    """array[index], index >= 0 and within: nothing is looked after."""
+
+    def generate(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, value=arguments[0]).data
+        return builder.load(builder.gep(data, [arguments[1]]))
+
+    return array.dtype(array, types.int64), generate
+
+
+@intrinsic
+def let(typing, array, index, value):
+    """array[index] = value, likewise."""
+
+    def generate(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, value=arguments[0]).data
+        builder.store(arguments[2], builder.gep(data, [arguments[1]]))
+        return context.get_dummy_value()
+
+    return types.none(array, types.int64, types.float64), generate
+
+
 if DEBUG:
+
+    def get(array, index):
+        """array[index]."""
+        return array[index]
+
+    def let(array, index, value):
+        """array[index] = value."""
+        array[index] = value
 
     def four(array, index):
         """The floats array[index : index + 4]."""

@@ -13,7 +13,7 @@ from .errors import Status
 from .interpolation import call_value
 from .linalg import copy
 from .stepping import call_accelerate, call_place
-from .workspace import RATE, Context, allocate, allocate_linear
+from .workspace import RATE, Context, allocate, allocate_linear, basis_free_parts
 
 NOT_FINITE = int(Status.NOT_FINITE)
 # addresses that the driver and the reader are given
@@ -141,18 +141,18 @@ class Reader:
     system : System
         As it was run.
     sizes : tuple
-        n, m, bodies, constraint_tol and size, as for `workspace.allocate`; then nx.
+        Arguments of `workspace.allocate`; then the network, nx and ny.
     addresses : ndarray
         Those of the run.
     """
 
     def __init__(self, system, sizes, addresses):
-        *sizes, nx = sizes
+        *sizes, network, nx, ny = sizes
         work = allocate(*sizes)
         system = system._replace(reals=system.reals.copy())  # the motions' places are written to
-        self.context = Context(system, work, allocate_linear(system, sizes[0], sizes[1], False))
+        linear = allocate_linear(system, sizes[0], sizes[1], False)
+        self.context = Context(system, work, linear, *basis_free_parts(network, sizes[0]))
         self.addresses = addresses
-        ny = work.v.size
         self.scratch = [np.zeros(size) for size in (nx, ny, ny, nx, warm_size(work))]
 
     def __call__(self, t, rows, blocks, charts, points):

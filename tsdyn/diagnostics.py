@@ -28,9 +28,9 @@ def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0):
 
     With time_rate=0 time stands still: the derivatives are those along (qd, qdd) alone.
     """
-    columns = []
+    columns, starts = [], starts_of(packed.bodies)
     for constraint, values, places in zip(packed.constraints, packed.parameters, packed.coordinates, strict=True):
-        x = [part for marker in marker_jets(packed.bodies, constraint, places, q, qd, qdd) for part in marker]
+        x = [part for marker in marker_jets(starts, constraint, places, q, qd, qdd) for part in marker]
         par = [entry for value in values for entry in _parameter(value, t, time_rate)]
         out = [None] * constraint.rows
         twin(type(constraint).phi)(x, par, Jet(t, time_rate), out)
@@ -60,9 +60,8 @@ def starts_of(bodies):
     return dict(zip(bodies, np.cumsum([0, *(b.dimension for b in bodies)]).tolist(), strict=False))
 
 
-def marker_jets(bodies, constraint, coordinates, q, qd, qdd):
-    """Yield the coordinates of each marker of a constraint or force as Jets over the outputs."""
-    starts = starts_of(bodies)
+def marker_jets(starts, constraint, coordinates, q, qd, qdd):
+    """Yield the coordinates of each marker of a constraint or force as Jets over the outputs; starts of `starts_of`."""
     for marker, s in zip(constraint.markers, coordinates, strict=True):
         body = constraint.body_of(marker)
         if marker.code == TURN:

@@ -9,6 +9,13 @@ from .bodies import transform_g
 from .checks import finite_vector, number
 from .errors import InvalidArgument, SingularConfiguration
 from .loads import applied_loads, velocity_forces
+from .sparse_rows import WIDTH, as_csr, with_short_rows
+
+NOT_UNIQUE = (
+    "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
+    "leave free carries no inertia."
+)
+LARGE = 1000  # coordinates from which on matrices are sparse
 
 
 class Evaluation(NamedTuple):
@@ -37,7 +44,8 @@ def evaluate(scene, q=None, qd=None, t=0.0):
     Returns
     -------
     Evaluation
-        Named tuple of dense arrays: Phi, Phi_q, Phi_t, gamma, M, Q_A, S, multipliers, qdd.
+        Named tuple of arrays: Phi, Phi_q, Phi_t, gamma, M, Q_A, S, multipliers, qdd; Phi_q and M are SciPy sparse
+        arrays where n is above 1000.
 
     Raises
     ------
@@ -56,6 +64,8 @@ def evaluate(scene, q=None, qd=None, t=0.0):
     qd = finite_vector(start[1] if qd is None else qd, start[0].size, "qd")
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
+    if q.size > LARGE:
+        return _evaluate_sparse(scene.packed, q, qd, float(t))
     Phi, Phi_q, Phi_t, gamma = constraint_arrays(system, q, qd, t)
     M, S = mass_matrix(system, q), velocity_forces(system, q[None], qd[None])[0]
     Q_A = applied_loads(system, np.array([float(t)]), q[None], qd[None])[0]
@@ -64,10 +74,28 @@ def evaluate(scene, q=None, qd=None, t=0.0):
     try:
         solution = equilibrated_solve(kkt, np.concatenate((Q_A + S, -gamma)))
     except np.linalg.LinAlgError as error:
-        raise SingularConfiguration(
-            "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the "
-            "constraints leave free carries no inertia."
-        ) from error
+        raise SingularConfiguration(NOT_UNIQUE) from error
+    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A, S, solution[n:], solution[:n])
+
+
+def _evaluate_sparse(packed, q, qd, t):
+    from scipy.sparse import block_array, diags_array
+    from scipy.sparse.linalg import splu
+
+    system = with_short_rows(packed)
+    n = q.size
+    Phi, rows, Phi_t, gamma = constraint_arrays(system, q, qd, t, WIDTH)
+    Phi_q, M = as_csr(packed, rows), mass_matrix_sparse(system, q)
+    S = velocity_forces(system, q[None], qd[None])[0]
+    Q_A = applied_loads(system, np.array([t]), q[None], qd[None])[0]
+    kkt = block_array([[M, Phi_q.T], [Phi_q, None]], format="csc")
+    scale = 1.0 / np.sqrt(np.maximum(abs(kkt).max(axis=1).toarray().ravel(), 1e-300))
+    weights = diags_array(scale)
+    try:
+        factors = splu((weights @ kkt @ weights).tocsc())
+    except RuntimeError as error:
+        raise SingularConfiguration(NOT_UNIQUE) from error
+    solution = scale * factors.solve(scale * np.concatenate((Q_A + S, -gamma)))
     return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A, S, solution[n:], solution[:n])
 
 
@@ -80,10 +108,10 @@ def equilibrated_solve(A, b):
     return np.linalg.solve(scaled, b * scale) * scale
 
 
-def constraint_arrays(system, q, qd, t):
-    """Phi, Phi_q, Phi_t and gamma as the kernels give them."""
+def constraint_arrays(system, q, qd, t, width=None):
+    """Phi, Phi_q, Phi_t and gamma as the kernels give them; with a width, of a system with short rows."""
     system = system._replace(reals=system.reals.copy())  # the motions' places are written to
-    m, n = system.segments.shape[0], q.size
+    m, n = system.segments.shape[0], width or q.size
     Phi, Phi_q, Phi_t, gamma = np.zeros(m), np.zeros((m, n)), np.zeros(m), np.zeros(m)
     evaluate_constraints(system, q, qd, float(t), Phi, Phi_q, Phi_t, gamma)
     return Phi, Phi_q, Phi_t, gamma
@@ -98,3 +126,16 @@ def mass_matrix(system, q):
             G = transform_g(q[at + 3 : at + 7])
             M[at + 3 : at + 7, at + 3 : at + 7] = 4.0 * G.T @ J.reshape(3, 3) @ G
     return M
+
+
+def mass_matrix_sparse(system, q):
+    """The same as a SciPy sparse array."""
+    from scipy.sparse import block_diag, csr_array
+
+    blocks = []
+    for (at, length), mass, J in zip(system.bodies, system.mass, system.inertia, strict=True):
+        blocks.append(mass * np.eye(3))
+        if length == 7:
+            G = transform_g(q[at + 3 : at + 7])
+            blocks.append(4.0 * G.T @ J.reshape(3, 3) @ G)
+    return csr_array(block_diag(blocks, format="csr"))

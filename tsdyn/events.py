@@ -67,10 +67,10 @@ def prepare(events):
 class Instant:
     """What an event function is given: t, q, qd, qdd as of a `State`, with multipliers made when asked for."""
 
-    __slots__ = ("_memory", "_system", "q", "qd", "qdd", "t")
+    __slots__ = ("_memory", "_packed", "q", "qd", "qdd", "t")
 
-    def __init__(self, system, memory, t, state):
-        self._system, self._memory, self.t = system, memory, t
+    def __init__(self, packed, memory, t, state):
+        self._packed, self._memory, self.t = packed, memory, t
         self.q, self.qd, self.qdd = state.copy()  # the function may keep or change it
 
     @property
@@ -82,7 +82,7 @@ class Instant:
     def multipliers(self):
         """Multipliers (m,)."""
         parts = (part[None] for part in (self.q, self.qd, self.qdd))
-        return reactions.multipliers(self._system, np.array([self.t]), *parts, self._memory[None])[0]
+        return reactions.multipliers(self._packed, np.array([self.t]), *parts, self._memory[None])[0]
 
     def __iter__(self):
         return iter((self.t, self.q, self.qd, self.qdd, self.multipliers))
@@ -97,8 +97,8 @@ class Instant:
 class Watch:
     """The events of one run: the functions' last values, and what has been found."""
 
-    def __init__(self, events, system, reader, start):
-        self.events, self.system, self.reader = events, system, reader
+    def __init__(self, events, packed, reader, start):
+        self.events, self.packed, self.reader = events, packed, reader
         self.t, self.state, self.values = start, None, None  # at the last step's end
         self.memory = None  # what forces remember of it
         self.list = [[] for _ in events]
@@ -140,7 +140,7 @@ class Watch:
     def _value(self, i, t, state):
         event = self.events[i]
         try:
-            given = event.function(t, Instant(self.system, self.memory, t, state))
+            given = event.function(t, Instant(self.packed, self.memory, t, state))
         except Exception as error:
             raise Failed(f"{event.name} raised {type(error).__name__} at t = {t:.9g} s: {error}.") from error
         value = number(given)

@@ -10,7 +10,7 @@ from .body_loops import INTS, MASK
 from .errors import InvalidConstraint, InvalidForce
 from .force_pack import F_FIRST_REAL, F_REALS, members_of
 from .motion import Motion
-from .network import N_COUNT, N_FIRST_INT, is_regular
+from .network import N_COUNT, N_FIRST_INT, is_thin
 from .series_loops import BODY_ROW, GROUND, instance_width
 from .series_state import Expansion
 from .signal import Signal, Table
@@ -21,7 +21,7 @@ SHOWN = 5  # in a message
 def refusal(packed):
     """Why a scene can't be run by Taylor series, naming each part that has none; empty where it can."""
     found = without_series(packed)
-    found += [f"{body.name}: a principal moment of inertia is zero" for body in packed.bodies if not is_regular(body)]
+    found += [f"{body.name}: a principal moment of inertia is zero" for body in packed.bodies if is_thin(body)]
     if not found:
         return ""
     shown = found[:SHOWN] + ([f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else [])

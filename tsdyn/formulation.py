@@ -1,10 +1,11 @@
 """The formulations of the equations of motion, as the addresses of their kernels."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 
-from . import linearise, maggi_kane, null_space
+from . import linearise, maggi_kane, null_space, tangent
 from .errors import InvalidArgument
+from .network import REDUCED, is_regular, network_of
 
 
 @dataclass(frozen=True)
@@ -14,11 +15,28 @@ class Formulation:
     name: str
     kernels: ModuleType
     first_order: bool = False
+    basis_free: bool = False
+
+    def serving(self, method, packed):
+        """The form that a method runs a scene in: implicit methods, and bodies without inertia, need a basis."""
+        if self.basis_free and (method.implicit or not is_regular(packed)):
+            return replace(self, kernels=null_space, basis_free=False)
+        return self
+
+    def network(self, packed):
+        """The scene's network with the loops that the kernels call."""
+        return network_of(packed, *(self.kernels.COLUMNS if self.basis_free else (REDUCED,)))
+
+    def sizes(self, n, m, bodies):
+        """Lengths of x and y."""
+        if self.basis_free:
+            return 8 * bodies, 8 * bodies
+        return n if self.first_order else n - m, n - m
 
     def addresses(self):
         """Addresses in the order that the driver expects; loads or compiles them."""
-        complete = null_space.complete  # qdd = D vdd - U B gamma in every form
         k = self.kernels
+        complete = (k if self.basis_free else null_space).complete  # qdd = D vdd - U B gamma in the others
         return [f.address for f in (k.place, k.accelerate, complete, k.check, k.start_chart)]
 
     def implicit(self):
@@ -41,7 +59,7 @@ class Formulation:
 FORMULATIONS = {
     f.name: f
     for f in (
-        Formulation("tangent", null_space),
+        Formulation("tangent", tangent, basis_free=True),
         Formulation("null-space", null_space),
         Formulation("maggi-kane", maggi_kane, first_order=True),
     )

@@ -51,13 +51,21 @@ def body_forces(network, system, w, f, t):
 @kernel
 def accelerate_bodies(network, system, w, f, t):
     """Z = (r'', omega''), b = lam; H, Y and the factors of S are those of the poses, w.q and w.qd their numbers."""
+    solve_accelerations(network, system, w, f, t)
+    write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
+
+
+@kernel
+def solve_accelerations(network, system, w, f, t):
+    """The same without qdd; w.q and w.qd are read where there are forces."""
     body_forces(network, system, w, f, t)
     for b in range(network.bodies.shape[0]):
         weigh(network.inverse, b, f.Z, 8 * b, f.Z, 8 * b)
+    if f.b.size == 0:
+        return
     gather(network, f.H, f.Z, f.b)
     run_loops(network, system.reals, BIAS, f.poses, t, f.gamma, f.H)
     for e in range(f.b.size):
         f.b[e] += f.gamma[e]
     solve(network.pattern, f.S, f.b)
     scatter(network, f.Y, f.b, f.Z)
-    write_accelerations(network.bodies, f.poses, f.Z, w.qdd)

@@ -135,8 +135,8 @@ def implicit_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tablea
     h_before = t - l.numbers[T_BEFORE] if l.numbers[T_BEFORE] > -math.inf else 0.0
     scratch[5 * n] = h_before
     if h_before > 0.0:
-        transposed_times(w.V, l.before[1], y_before)  # v = V^T (q - q0) wherever q is: the point before in this chart
-        transposed_times(w.V, l.before[2], k_before)
+        transposed_times(w.L, l.before[1], y_before)  # v = L^T (q - q0) wherever q is: the point before in this chart
+        transposed_times(w.L, l.before[2], k_before)
     copy(y, memory[2 * n : 3 * n])
     copy(yd, memory[3 * n : 4 * n])
     for i in range(1, stages):

@@ -19,11 +19,11 @@ def consistent(scene, system, q, qd, t, tol):
         clear = off <= tol * size and slip <= tol * speed and independent(Phi_q)
     if not clear:
         demand_finite(scene, Phi, Phi_q, Phi_t)
-        _demand(scene, Phi, tol * size, "position", "Phi")
+        demand_small(scene, Phi, tol * size, "position", "Phi")
         check_rank(scene, Phi_q)
     check_inertia(scene, system, q, Phi_q)
     if not clear:
-        _demand(scene, residual, tol * speed, "velocity", "Phi_q qd + Phi_t")
+        demand_small(scene, residual, tol * speed, "velocity", "Phi_q qd + Phi_t")
     if off > ROUNDING * size:  # what is exact to rounding is left alone: a projection would only add noise
         for _ in range(3):
             q = q - _least(Phi_q, Phi)
@@ -54,7 +54,8 @@ def demand_finite(scene, *arrays):
             )
 
 
-def _demand(scene, residual, tol, level, formula):
+def demand_small(scene, residual, tol, level, formula):
+    """Refuse residuals (m,) above tol, by name."""
     bad = np.flatnonzero(~(np.abs(residual) <= tol))
     if bad.size == 0:
         return

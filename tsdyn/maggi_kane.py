@@ -9,10 +9,11 @@ import math
 
 from ._kernel import callback, vector
 from .assembly import set_time
-from .chart import inspect, new_chart, tangent_map
+from .chart import new_chart, tangent_map
 from .linalg import copy
+from .local import TIME
 from .newton import NOT_FINITE, OK
-from .null_space import project, reduced_acceleration, reduced_mass, velocities, weighted_square
+from .null_space import look, project, reduced_acceleration, reduced_mass, velocities, weighted_square
 from .stepping import ACCELERATE, NORM, PLACE
 from .workspace import PLACEMENTS, load
 
@@ -23,6 +24,7 @@ def place(context, t, q):
     c = load(context)
     s, w = c.system, c.work
     w.counters[PLACEMENTS] += 1
+    c.local.numbers[TIME] = t
     if not set_time(s, t):
         return NOT_FINITE
     copy(vector(q, w.q.size), w.q)
@@ -44,7 +46,7 @@ def accelerate(context, t, velocity, wd, qd):
 @callback("p")
 def check(context):
     """Reason to choose a new V, or zero."""
-    return inspect(load(context).work, False)
+    return look(load(context))
 
 
 @callback(NORM, "d")
@@ -62,11 +64,11 @@ def error_norm(context, eq, ew, old, rtol, atol):
 
 @callback("pdpppp")
 def start_chart(context, t, q, velocity, wd, qd):
-    """Choose U and V anew at the present q; w = V^T qd, wd = V^T qdd. Status."""
+    """Choose U and V anew at the present q; w = V^T P0 qd, wd = V^T P0 qdd. Status."""
     c = load(context)
     s, w = c.system, c.work
     set_time(s, t)
-    status = new_chart(s, w, t)
+    status = new_chart(s, w, c.free, c.local, c.network, t)
     copy(w.q, vector(q, w.q.size))
     copy(w.qd, vector(qd, w.q.size))
     project(w, vector(velocity, w.v.size), vector(wd, w.v.size))

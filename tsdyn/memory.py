@@ -30,7 +30,7 @@ from .run_state import (
     lay_out,
 )
 from .system import System
-from .workspace import B_TOL, SIZE, U_TOL, Context, allocate, allocate_linear
+from .workspace import B_TOL, SIZE, U_TOL, Context, allocate, allocate_linear, basis_free_parts
 
 
 class Memory:
@@ -39,6 +39,10 @@ class Memory:
     Parameters
     ----------
     prepared : Prepared
+    network : Network
+        Of the scene, as the form needs it.
+    joint_rows : int or None
+        Rows that are no normalisations, for the form without a basis.
     implicit : bool
     kept : int
         Floats that forces keep for an implicit method.
@@ -48,25 +52,26 @@ class Memory:
         Floats of the method's numbers, of its memory and of its interpolant.
     """
 
-    def __init__(self, prepared, implicit, kept, nx, ny, tableau, scratch, width):
+    def __init__(self, prepared, network, joint_rows, implicit, kept, nx, ny, tableau, scratch, width):
         n, m = prepared.n, prepared.m
         self.implicit = implicit
         self.source, _ = prepared.system(implicit)
         system = System(*(array.copy() for array in self.source))
-        self.work = allocate(n, m, len(prepared.packed.bodies), 0.0)
+        self.network = network
+        self.work = allocate(n, m, len(prepared.packed.bodies), 0.0, joint_rows=joint_rows)
         slots = system.memory.size
         self.run = lay_out(n, nx, ny, tableau, scratch, warm_size(self.work), B_DATA + width + slots, slots)
         linear = allocate_linear(system, n, m, implicit, kept)
         if implicit:
             linear = linear._replace(now=self.run.now, before=self.run.before)
-        self.context = Context(system, self.work, linear)
+        self.context = Context(system, self.work, linear, *basis_free_parts(network, n))
         self.addresses = np.zeros(12, np.int64)
         self._written = [self.work.q.base, self.work.counters, self.run.x.base, self.run.numbers]
-        self._written += [linear.numbers.base, linear.pivots, linear.kernels]
+        self._written += [linear.numbers.base, linear.pivots, linear.kernels, self.context.local.numbers]
         self._context, *self._keep = resident(self.context)
         self._run, *keep = resident(self.run)
         self._keep += keep
-        self.nbytes = sum(array.nbytes for array in self._written)
+        self.nbytes = sum(array.nbytes for array in (*self._written, self.context.free.S, self.context.free.poses))
 
     def clear(self, task):
         """As if it were new, for this task: whatever a run before has left behind is gone."""

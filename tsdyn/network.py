@@ -17,8 +17,9 @@ from .errors import InvalidConstraint
 # columns of Network.kinds: addresses of the loops, then where a kind's instances are
 REDUCED, VALUES, BIAS, DRIFT, N_COUNT, N_REALS, N_FIRST_INT, N_FIRST_REAL, N_COLUMNS = range(9)
 # columns of Network.products
-P_LEFT, P_ROWS, P_RIGHT, P_COLUMNS, P_TARGET, P_STRIDE, P_SAME, P_WIDTH = range(8)
+P_LEFT, P_ROWS, P_RIGHT, P_COLUMNS, P_TARGET, P_STRIDE, P_SAME, P_WIDTH = range(8)  # SAME: with itself, both sides
 W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
+THIN = 1e-12  # of the largest principal inertia: what is less is none
 
 
 class Network(NamedTuple):
@@ -34,14 +35,49 @@ class Network(NamedTuple):
     mass: np.ndarray  # ((nb + 1) 16,): m and three zeros, columns of J'
     spins: np.ndarray  # int64 (nb,): whether omega' x J' omega' is ever other than zero
     pattern: Pattern  # of S
+    normals: np.ndarray  # int64 (nb,): the row of Phi that normalises a body's p, or -1
 
 
-def is_regular(body):
-    """Whether its inertia can be inverted; a body without inertia about an axis needs D^T M D."""
+def is_thin(body):
+    """Whether its inertia has no inverse: about an axis it has none."""
     if body.dimension == 3:
-        return True
+        return False
     principal = np.linalg.eigvalsh(body.values["inertia"])
-    return bool(principal[0] > 1e-12 * principal[2])
+    return not principal[0] > THIN * principal[2]
+
+
+def is_regular(packed):
+    """Whether all inertias can be inverted; a body without inertia about an axis needs D^T M D."""
+    J = packed.system.inertia[packed.system.bodies[:, 1] == 7].reshape(-1, 3, 3)
+    principal = np.linalg.eigvalsh(J)
+    return bool((principal[:, 0] > THIN * principal[:, 2]).all())
+
+
+def _inverse(J, mass):
+    """Of the inertia; of one that has none, with as much as lets it serve as a metric."""
+    size, axes = np.linalg.eigh(J)
+    if not size[0] > THIN * size[2]:
+        size = np.maximum(size, 0.1 * size[2] if size[2] > 0.0 else mass)
+        return (axes / size) @ axes.T
+    return np.linalg.inv(J)
+
+
+def network_of(packed, *columns):
+    """The network of a packed scene with the addresses of these loops, made and loaded once."""
+    kept = packed.shared
+    if columns not in kept:
+        if "network" not in kept:
+            kept["network"] = build(packed)
+        kept[columns] = with_loops(*kept["network"], *columns)
+    return kept[columns]
+
+
+def no_network():
+    """The network of nothing, for its type."""
+    none, pattern = np.zeros(0, np.int64), analyse([], [])[1]
+    pairs = np.zeros((0, 2), np.int64)
+    kinds, products = np.zeros((0, N_COLUMNS), np.int64), np.zeros((0, P_WIDTH), np.int64)
+    return Network(pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none)
 
 
 def build(packed):
@@ -49,9 +85,11 @@ def build(packed):
     system = packed.system
     bodies = {id(body): i for i, body in enumerate(packed.bodies)}
     nb = len(bodies)
-    joints, row = [], 0
+    joints, row, normals = [], 0, np.full(nb, -1, np.int64)
     for constraint in packed.constraints:
-        if not constraint.normalises:
+        if constraint.normalises:
+            normals[bodies[id(constraint.a)]] = row
+        else:
             pair = tuple(bodies.get(id(body), nb) for body in (constraint.a, constraint.b))
             joints.append((constraint, pair, row))
         row += constraint.rows
@@ -71,25 +109,28 @@ def build(packed):
     m = sum(sizes)
     firsts = [int(starts[node]) + offset for node, offset in inside]
     sides, places = np.zeros((m, 2), np.int64), np.zeros(m, np.int64)
-    at_body = [[] for _ in range(nb)]
+    at_body, products = [[] for _ in range(nb)], []
     for i, (constraint, pair, row) in enumerate(joints):
         e = np.arange(firsts[i], firsts[i] + constraint.rows)
         sides[e], places[e] = pair, np.arange(row, row + constraint.rows)
         for side, body in enumerate(pair):
             if body < nb:
                 at_body[body].append((i, side))
-    products = []
+
+    def product(i, side, j, other):
+        (node, r), (other_node, c) = inside[i], inside[j]
+        target, stride, _ = where(node, other_node)
+        left, right = 16 * firsts[i] + 8 * side, 16 * firsts[j] + 8 * other
+        rows, columns = joints[i][0].rows, joints[j][0].rows
+        products.append((left, rows, right, columns, target + r * stride + c, stride, int(i == j)))
+
+    for i in range(len(joints)):
+        product(i, 0, i, 0)
     for found in at_body:
         for i, side in found:
             for j, other in found:
-                if firsts[i] > firsts[j]:
-                    continue
-                (node, r), (other_node, c) = inside[i], inside[j]
-                target, stride, _ = where(node, other_node)
-                target += r * stride + c
-                left, right = 16 * firsts[i] + 8 * side, 16 * firsts[j] + 8 * other
-                rows, columns = joints[i][0].rows, joints[j][0].rows
-                products.append((left, rows, right, columns, target, stride, int(i == j)))
+                if firsts[i] < firsts[j]:
+                    product(i, side, j, other)
 
     index = {id(constraint): i for i, (constraint, _, _) in enumerate(joints)}
     classes = dict.fromkeys(type(constraint) for constraint in packed.constraints)
@@ -109,11 +150,11 @@ def build(packed):
 
     inverse, mass = np.zeros((nb + 1, WEIGHTS)), np.zeros((nb + 1, WEIGHTS))
     spins = np.zeros(nb, np.int64)
-    for i, body in enumerate(packed.bodies):
-        inverse[i, W_MASS], mass[i, W_MASS] = 1.0 / body.values["mass"], body.values["mass"]
-        if body.dimension == 7:
-            J = body.values["inertia"]
-            inverse[i, W_ROTATION:].reshape(3, 4)[:, :3] = np.linalg.inv(J)
+    for i, length in enumerate(system.bodies[:, 1]):
+        inverse[i, W_MASS], mass[i, W_MASS] = 1.0 / system.mass[i], system.mass[i]
+        if length == 7:
+            J = system.inertia[i].reshape(3, 3)
+            inverse[i, W_ROTATION:].reshape(3, 4)[:, :3] = _inverse(J, system.mass[i])
             mass[i, W_ROTATION:].reshape(3, 4)[:, :3] = J
             spins[i] = (J[0, 0] * np.eye(3) != J).any()
     network = Network(
@@ -127,6 +168,7 @@ def build(packed):
         mass=mass.ravel(),
         spins=spins,
         pattern=pattern,
+        normals=normals,
     )
     return network, tuple(used)
 

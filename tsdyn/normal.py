@@ -3,7 +3,7 @@
 Quantities of bodies are rows of eight floats, (linear, 0, angular in the body frame, 0); the last row is the ground's.
 """
 
-from ._four import add, fma, four, put, splat, times, total
+from ._four import add, fma, four, get, let, put, splat, times, total
 from ._kernel import kernel
 from .network import (
     P_COLUMNS,
@@ -41,21 +41,71 @@ def weigh_rows(network, H, Y):
 
 @kernel
 def _inner(H, h, Y, y):
+    """The product of two rows at one body."""
     return total(fma(four(H, h), four(Y, y), times(four(H, h + 4), four(Y, y + 4))))
+
+
+@kernel
+def _inner_both(H, h, Y, y):
+    """The product of two rows at both bodies."""
+    f = fma(four(H, h), four(Y, y), times(four(H, h + 4), four(Y, y + 4)))
+    g = fma(four(H, h + 8), four(Y, y + 8), times(four(H, h + 12), four(Y, y + 12)))
+    return total(add(f, g))
+
+
+@kernel
+def _more(values, at, x):
+    let(values, at, get(values, at) + x)
 
 
 @kernel
 def multiply_rows(network, H, Y, values):
     """The upper triangle of H Y^T, Y = W H^T, into the blocks of the pattern, with zeros where elimination fills in."""
-    for i in range(values.size):
-        values[i] = 0.0
-    for i in range(network.products.shape[0]):
-        product = network.products[i]
-        left, right, target, stride = product[P_LEFT], product[P_RIGHT], product[P_TARGET], product[P_STRIDE]
-        same = product[P_SAME] != 0
-        for r in range(product[P_ROWS]):
-            for c in range(r if same else 0, product[P_COLUMNS]):
-                values[target + r * stride + c] += _inner(H, left + 16 * r, Y, right + 16 * c)
+    products = network.products
+    for i in range(network.pattern.shape[1]):
+        let(values, i, 0.0)
+    for i in range(products.shape[0]):
+        product = products[i]
+        left, right = get(product, P_LEFT), get(product, P_RIGHT)
+        target, stride = get(product, P_TARGET), get(product, P_STRIDE)
+        rows, columns = get(product, P_ROWS), get(product, P_COLUMNS)
+        if get(product, P_SAME) != 0:
+            for r in range(rows):
+                for c in range(r, columns):
+                    _more(values, target + c, _inner_both(H, left + 16 * r, Y, right + 16 * c))
+                target += stride
+        else:
+            for r in range(rows):
+                for c in range(columns):
+                    _more(values, target + c, _inner(H, left + 16 * r, Y, right + 16 * c))
+                target += stride
+
+
+@kernel
+def multiply_both(network, H, X, lower, upper):
+    """H X^T into the blocks of the pattern, as `factor_lu` takes it: its upper triangle, its lower one transposed."""
+    products = network.products
+    for i in range(network.pattern.shape[1]):
+        let(upper, i, 0.0)
+        let(lower, i, 0.0)
+    for i in range(products.shape[0]):
+        product = products[i]
+        left, right = get(product, P_LEFT), get(product, P_RIGHT)
+        target, stride = get(product, P_TARGET), get(product, P_STRIDE)
+        rows, columns = get(product, P_ROWS), get(product, P_COLUMNS)
+        if get(product, P_SAME) != 0:
+            for r in range(rows):
+                _more(upper, target + r, _inner_both(H, left + 16 * r, X, right + 16 * r))
+                for c in range(r + 1, columns):
+                    _more(upper, target + c, _inner_both(H, left + 16 * r, X, right + 16 * c))
+                    _more(lower, target + c, _inner_both(H, right + 16 * c, X, left + 16 * r))
+                target += stride
+        else:
+            for r in range(rows):
+                for c in range(columns):
+                    _more(upper, target + c, _inner(H, left + 16 * r, X, right + 16 * c))
+                    _more(lower, target + c, _inner(H, right + 16 * c, X, left + 16 * r))
+                target += stride
 
 
 @kernel

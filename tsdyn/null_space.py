@@ -13,10 +13,15 @@ import math
 
 from ._kernel import callback, kernel, vector
 from .assembly import acceleration_bias, applied_forces, is_rheonomic, set_time, time_derivative
-from .chart import inspect, new_chart, tangent_map
+from .chart import new_chart, tangent_map
 from .errors import Status
+from .landing import run_loops
 from .linalg import cholesky, cholesky_solve, transposed_times
+from .local import TIME
+from .local_chart import measure_turns, turning
+from .network import REDUCED
 from .newton import NOT_FINITE, OK, solve_positions, subtract_normal
+from .poses import place_bodies
 from .stepping import ACCELERATE, NORM, PLACE
 from .workspace import EVALUATIONS, FACTORIZATIONS, PLACEMENTS, load
 
@@ -154,6 +159,7 @@ def place(context, t, v):
     c = load(context)
     s, w = c.system, c.work
     w.counters[PLACEMENTS] += 1
+    c.local.numbers[TIME] = t
     if not set_time(s, t):
         return NOT_FINITE
     status = solve_positions(s, w, t, vector(v, w.v.size))
@@ -196,8 +202,17 @@ def complete(context, vdd):
 @callback("p")
 def check(context):
     """Reason to leave the chart, or zero."""
-    c = load(context)
-    return inspect(c.work, not is_rheonomic(c.system))
+    return look(load(context))
+
+
+@kernel
+def look(c):
+    """Reason to leave the chart at the present q, or zero."""
+    w, f, l, network = c.work, c.free, c.local, c.network
+    place_bodies(network.bodies, w.q, f.poses)
+    measure_turns(network, w.q, l)
+    run_loops(network, c.system.reals, REDUCED, f.poses, l.numbers[TIME], f.b, f.H)
+    return turning(network, w, f, l)
 
 
 @kernel
@@ -226,11 +241,11 @@ def error_norm(context, ev, evd, old, rtol, atol):
 
 @callback("pdpppp")
 def start_chart(context, t, v, vd, vdd, unused):
-    """Make a chart at the present q; v = 0, vd = V^T qd, vdd = V^T qdd, Eq. 27. Status."""
+    """Make a chart at the present q; v = 0, vd = V^T P0 qd, vdd = V^T P0 qdd, Eq. 27. Status."""
     c = load(context)
     s, w = c.system, c.work
     set_time(s, t)
-    status = new_chart(s, w, t)
+    status = new_chart(s, w, c.free, c.local, c.network, t)
     k = w.v.size
     v = vector(v, k)
     for j in range(k):
@@ -241,6 +256,6 @@ def start_chart(context, t, v, vd, vdd, unused):
 
 @kernel
 def project(w, vd, vdd):
-    """vd = V^T qd and vdd = V^T qdd."""
-    transposed_times(w.V, w.qd, vd)
-    transposed_times(w.V, w.qdd, vdd)
+    """vd = V^T P0 qd and vdd = V^T P0 qdd."""
+    transposed_times(w.L, w.qd, vd)
+    transposed_times(w.L, w.qdd, vdd)

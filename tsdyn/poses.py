@@ -19,7 +19,12 @@ A, R, RD, OMEGA, P, POSE = 0, 12, 16, 20, 24, 28
 @kernel
 def set_pose(poses, at, p):
     """A(p) and p of the pose that begins at poses[at]; p (4,)."""
-    e0, e1, e2, e3 = p[0], p[1], p[2], p[3]
+    orient(poses, at, p[0], p[1], p[2], p[3])
+
+
+@kernel
+def orient(poses, at, e0, e1, e2, e3):
+    """The same of p = (e0, e1, e2, e3)."""
     a = e0 * e0 - e1 * e1 - e2 * e2 - e3 * e3
     e, twice = lanes(e1, e2, e3), 2.0 * e0
     put(poses, at, fma(e, splat(2.0 * e1), lanes(a, twice * e3, -twice * e2)))

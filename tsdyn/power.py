@@ -61,7 +61,7 @@ def marker_states(packed, load, q, qd):
     """x as Jets and xd as arrays, over the outputs."""
     force, starts = load.force, starts_of(packed.bodies)
     x, xd = [], []
-    jets = marker_jets(packed.bodies, force, load.coordinates, q, qd, np.zeros_like(qd))
+    jets = marker_jets(starts, force, load.coordinates, q, qd, np.zeros_like(qd))
     for marker, jet in zip(force.markers, jets, strict=True):
         body = force.body_of(marker)
         x += jet

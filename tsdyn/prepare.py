@@ -4,8 +4,8 @@ from functools import cached_property
 
 from .expansion_pack import refusal
 from .force_pack import with_force_jacobians
-from .initial import consistent
 from .series_memory import Series
+from .start import consistent
 from .system import with_curvatures
 
 SPARE = 8  # memories of a kind that are kept for further runs: as many may run at once without making new ones

@@ -6,57 +6,87 @@ import numpy as np
 
 from ._kernel import entry
 from .assembly import constraint_jacobian, set_time
+from .block_kernels import factor, solve
 from .bodies import rotation_matrix, transform_g
-from .linalg import cholesky, cholesky_solve
+from .free import allocate_free
+from .landing import run_loops
 from .loads import applied_loads, force_loads, inertial_forces, velocity_forces
 from .markers import POINT
+from .network import REDUCED, network_of
+from .normal import gather, multiply_rows, scatter, weigh_rows
+from .poses import place_bodies
+from .sparse_rows import WIDTH, with_short_rows
+
+RANK_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
 
 
 @entry
-def solve_multipliers(s, t, q, f, Phi_q, A, b, out):
-    """out (k, m) with Phi_q^T lam = f, by least squares; f (k, n) is Q_A + S - M qdd. NaN where Phi_q is singular.
+def solve_multipliers(network, s, f, t, q, r, rows, out):
+    """out (k, m) with Phi_q^T lam = r, by least squares; r (k, n) is Q_A + S - M qdd. NaN where Phi_q is singular.
 
-    Normal equations with one step of refinement, (Phi_q Phi_q^T) lam = Phi_q f; f lies in the range of Phi_q^T.
+    S lam = H W r on the network with one step of refinement, r in terms of bodies, then the normalisations from what is
+    left of r along p. s is the system with short rows, rows (m, 14) scratch, zero on entry.
     """
-    m, n = Phi_q.shape
-    for row in range(t.size):
-        set_time(s, t[row])
-        constraint_jacobian(s, q[row], t[row], Phi_q)
-        for i in range(m):
-            out[row, i] = 0.0
-            for j in range(i + 1):
-                x = 0.0
-                for c in range(n):
-                    x += Phi_q[i, c] * Phi_q[j, c]
-                A[i, j] = x
-        if not cholesky(A, m, 1e-15):
-            for i in range(m):
-                out[row, i] = math.nan
-            continue
+    bodies = network.bodies
+    for k in range(t.size):
+        set_time(s, t[k])
+        place_bodies(bodies, q[k], f.poses)
+        run_loops(network, s.reals, REDUCED, f.poses, t[k], f.b, f.H)
+        weigh_rows(network, f.H, f.Y)
+        multiply_rows(network, f.H, f.Y, f.S)
+        regular = factor(network.pattern, f.S, RANK_LIMIT) < 0
+        constraint_jacobian(s, q[k], t[k], rows)
+        for b in range(bodies.shape[0]):
+            i, o = bodies[b, 0], 8 * b
+            for c in range(3):
+                f.Q[i + c] = r[k, i + c]
+                f.Z[o + c] = r[k, i + c]
+            if bodies[b, 1] == 7:
+                e0, e1, e2, e3 = 0.5 * q[k, i + 3], 0.5 * q[k, i + 4], 0.5 * q[k, i + 5], 0.5 * q[k, i + 6]
+                x0, x1, x2, x3 = r[k, i + 3], r[k, i + 4], r[k, i + 5], r[k, i + 6]
+                f.Z[o + 4] = -e1 * x0 + e0 * x1 + e3 * x2 - e2 * x3
+                f.Z[o + 5] = -e2 * x0 - e3 * x1 + e0 * x2 + e1 * x3
+                f.Z[o + 6] = -e3 * x0 + e2 * x1 - e1 * x2 + e0 * x3
+                for c in range(3, 7):
+                    f.Q[i + c] = r[k, i + c]
+        for i in range(out.shape[1]):
+            out[k, i] = 0.0
         for _ in range(2):
-            for i in range(m):
-                b[i] = 0.0
-            for c in range(n):
-                x = f[row, c]
-                for i in range(m):
-                    x -= Phi_q[i, c] * out[row, i]
-                for i in range(m):
-                    b[i] += Phi_q[i, c] * x
-            cholesky_solve(A, b, m)
-            for i in range(m):
-                out[row, i] += b[i]
+            gather(network, f.Y, f.Z, f.b)
+            solve(network.pattern, f.S, f.b)
+            scatter(network, f.H, f.b, f.Z)
+            for e in range(f.b.size):
+                out[k, network.row[e]] += f.b[e]
+        for i in range(out.shape[1]):  # what the joints leave of r
+            for half in range(2):
+                at = s.segments[i, 2 * half]
+                for c in range(s.segments[i, 2 * half + 1]):
+                    f.Q[at + c] -= rows[i, 7 * half + c] * out[k, i]
+        for b in range(bodies.shape[0]):
+            i = network.normals[b]
+            if i >= 0:
+                x = 0.0
+                for c in range(3, 7):
+                    x += f.Q[bodies[b, 0] + c] * q[k, bodies[b, 0] + c]
+                out[k, i] = x
+        if not regular:
+            for i in range(out.shape[1]):
+                out[k, i] = math.nan
 
 
-def multipliers(system, t, q, qd, qdd, memory=None):
+def multipliers(packed, t, q, qd, qdd, memory=None):
     """Multipliers (k, m) of M qdd + Phi_q^T lam = Q_A + S; NaN where Phi_q has lost rank.
 
     memory (k, slots) is what forces remember, zeros by default.
     """
-    m = system.segments.shape[0]
-    out = np.zeros((t.size, m))
+    system, network = with_short_rows(packed), network_of(packed, REDUCED)
+    out = np.zeros((t.size, len(system.segments)))
     system = system._replace(reals=system.reals.copy())
-    f = applied_loads(system, t, q, qd, memory) + velocity_forces(system, q, qd) - inertial_forces(system, q, qdd)
-    solve_multipliers(system, t, q, f, np.zeros((m, q.shape[1])), np.zeros((m, m)), np.zeros(m), out)
+    f = applied_loads(packed.system, t, q, qd, memory)
+    f += velocity_forces(system, q, qd)
+    f -= inertial_forces(system, q, qdd)
+    free, rows = allocate_free(network, q.shape[1]), np.zeros((out.shape[1], WIDTH))
+    solve_multipliers(network, system, free, t, q, f, rows, out)
     return out
 
 
@@ -65,18 +95,18 @@ def reaction(solution, constraint):
 
     -Phi_r^T lam at the centroid and the body torque -G Phi_p^T lam / 2, moved to the point.
     """
-    system = solution.system
-    body = constraint.a if constraint.a.dimension else constraint.b
     packed = solution.packed
+    body = constraint.a if constraint.a.dimension else constraint.b
     index = packed.constraints.index(constraint)
-    row = sum(other.rows for other in packed.constraints[:index])
-    k, m = solution.multipliers.shape
-    load = np.empty((k, solution.q.shape[1]))
-    motions = system._replace(reals=system.reals.copy())
-    rows = slice(row, row + constraint.rows)
-    lam = np.zeros_like(solution.multipliers)
-    lam[:, rows] = solution.multipliers[:, rows]
-    constraint_loads(motions, solution.t, solution.q, lam, np.zeros((m, solution.q.shape[1])), load)
+    first = sum(other.rows for other in packed.constraints[:index])
+    system = with_short_rows(packed)
+    system = system._replace(reals=system.reals.copy())
+    length = system.bodies[body.index, 1]
+    half = 0 if body is constraint.a else WIDTH // 2
+    load = np.zeros((solution.t.size, length))
+    rows = np.zeros((len(system.segments), WIDTH))
+    lam = np.ascontiguousarray(solution.multipliers[:, first : first + constraint.rows])
+    constraint_loads(system, solution.t, solution.q, lam, first, half, rows, load)
     return _at_first_point(solution, body, load, constraint, packed.coordinates[index])
 
 
@@ -85,17 +115,18 @@ def force_reaction(solution, load):
     force, system = load.force, solution.system._replace(forces=load.row[None])
     body = force.a if force.a.dimension else force.b
     Q = force_loads(system, solution.t, solution.q, solution.qd, solution._memory)
-    return _at_first_point(solution, body, Q, force, load.coordinates)
+    at, length = solution.system.bodies[body.index]
+    return _at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)
 
 
 def _at_first_point(solution, body, load, item, coordinates):
-    """Force and torque of generalised forces load (k, n) on a body, about the first point that the item has on it."""
+    """Force and torque of generalised forces load (k, 7 or 3) on a body, about the first point of the item on it."""
     at, length = solution.system.bodies[body.index]
-    force, torque = load[:, at : at + 3].copy(), np.zeros((load.shape[0], 3))
+    force, torque = load[:, :3].copy(), np.zeros((load.shape[0], 3))
     if length == 7:
         p = solution.q[:, at + 3 : at + 7]
         A = rotation_matrix(p)
-        torque = np.einsum("kij,kjl,kl->ki", A, 0.5 * transform_g(p), load[:, at + 3 : at + 7])
+        torque = np.einsum("kij,kjl,kl->ki", A, 0.5 * transform_g(p), load[:, 3:])
         letter = "a" if body is item.a else "b"
         pairs = zip(item.markers, coordinates, strict=True)
         points = [s for marker, s in pairs if marker.body == letter and marker.code == POINT]
@@ -105,15 +136,11 @@ def _at_first_point(solution, body, load, item, coordinates):
 
 
 @entry
-def constraint_loads(s, t, q, lam, Phi_q, out):
-    """out (k, n) = -Phi_q^T lam at every output; lam (k, m), Phi_q scratch, zero on entry."""
-    m, n = Phi_q.shape
-    for row in range(t.size):
-        set_time(s, t[row])
-        constraint_jacobian(s, q[row], t[row], Phi_q)
-        for c in range(n):
-            out[row, c] = 0.0
-        for i in range(m):
-            if lam[row, i] != 0.0:
-                for c in range(n):
-                    out[row, c] -= Phi_q[i, c] * lam[row, i]
+def constraint_loads(s, t, q, lam, first, half, rows, out):
+    """out (k, 7 or 3) = -Phi_q^T lam of one body; lam (k, rows of the constraint), which begin at first."""
+    for k in range(t.size):
+        set_time(s, t[k])
+        constraint_jacobian(s, q[k], t[k], rows)
+        for i in range(lam.shape[1]):
+            for c in range(out.shape[1]):
+                out[k, c] -= rows[first + i, half + c] * lam[k, i]

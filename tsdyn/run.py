@@ -2,7 +2,6 @@
 
 from ._kernel import caller, entry, kernel
 from .assembly import remember, set_time
-from .chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .control import accept, first_step, watch_stiffness
 from .dense import (
     A_ACCELERATE,
@@ -28,6 +27,7 @@ from .errors import Status
 from .implicit import KNOWN, T_BEFORE
 from .interpolation import call_fill
 from .linalg import copy
+from .local_chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .outputs import record, restore_now, store_now
 from .run_state import (
     ADAPTIVE,

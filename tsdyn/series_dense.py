@@ -3,11 +3,11 @@
 import numpy as np
 
 from ._kernel import entry, resident
-from .chart import ROUNDING
 from .dense import B_DATA, B_START
 from .errors import Status
 from .free import allocate_free
 from .linalg import copy
+from .local_chart import ROUNDING
 from .poses import place_bodies
 from .series_memory import plain_work
 from .series_state import ORDERS, TOP, Expansion, SeriesContext, load_series

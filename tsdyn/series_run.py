@@ -46,7 +46,7 @@ def run_series(task):
         reading = SeriesReader, packed.system, prepared.series.network, orders, packed.size, memory.steps
     watch = None
     if task.events is not None:
-        watch = Watch(task.events, packed.system, reading[0](*reading[1:]), task.span[0])
+        watch = Watch(task.events, packed, reading[0](*reading[1:]), task.span[0])
 
     began = time.perf_counter()
     status, reason, recorded = drive(memory, task, watch)

@@ -9,15 +9,16 @@ import numpy as np
 
 from . import diagnostics, power, reactions
 from .bodies import rotation_matrix
-from .chart import REASONS
 from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
+from .local_chart import REASONS
 from .rank import weakest_row
 from .state import RememberingState
 from .work import work as integrate_work
 
 NEARLY_SINGULAR = 0.05
+MOST = 2000  # coordinates for which Phi_q is made as a matrix
 BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
 
 
@@ -59,7 +60,9 @@ class Solution:
     stats : SimpleNamespace
         steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds; of
         implicit methods also jacobians, iteration_matrices, stage_iterations; stiff: whether an explicit adaptive
-        method has met its limit of stability for a while.
+        method has met its limit of stability for a while. Of the form without a basis, what was not needed:
+        solves_skipped, placements that lay on the constraints to rounding already, checks_skipped, those whose last
+        correction was known to suffice.
     """
 
     def __init__(self, scene, task, outcome, seconds):
@@ -115,6 +118,8 @@ class Solution:
         """Name what is nearly singular at the last point."""
         if self.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
             return ""
+        if self.q.shape[1] > MOST:
+            return ""
         _, Phi_q, _, _ = constraint_arrays(self.system, self._last[0], self._last[1], self._reached)
         rows, share = weakest_row(scene, Phi_q)
         if not share < NEARLY_SINGULAR:
@@ -135,7 +140,7 @@ class Solution:
         """The last point reached, to go on from: simulate(scene, (state.t, t_end), state=state)."""
         q, qd, qdd = (a.copy() for a in self._last)
         t, memory = np.array([self._reached]), self._remembered[None]
-        lam = reactions.multipliers(self.system, t, q[None], qd[None], qdd[None], memory)[0]
+        lam = reactions.multipliers(self.packed, t, q[None], qd[None], qdd[None], memory)[0]
         return RememberingState.of(self._remembered.copy(), self._reached, q, qd, qdd, lam)
 
     def at(self, t):
@@ -171,7 +176,7 @@ class Solution:
         if status != Status.SUCCESS:
             raise StepFailure(f"no state could be found at some t in {t!r}. {status.sentence} {status.remedy}", self)
         q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
-        parts = q, qd, qdd, reactions.multipliers(self.system, every, q, qd, qdd, memory)
+        parts = q, qd, qdd, reactions.multipliers(self.packed, every, q, qd, qdd, memory)
         if times.ndim:
             return RememberingState.of(memory, every, *parts)
         return RememberingState.of(memory[0], float(times), *(part[0] for part in parts))
@@ -192,7 +197,7 @@ class Solution:
     @cached_property
     def multipliers(self):
         """Multipliers (k, m), computed when first asked for."""
-        return reactions.multipliers(self.system, self.t, self.q, self.qd, self.qdd, self._memory)
+        return reactions.multipliers(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
 
     @cached_property
     def constraint_error(self):

@@ -10,6 +10,7 @@ from .memory import Memory
 from .run_state import CHART_ROWS, FILLED, IN_CHART, REJECTED, STEPS, STIFF, STORED, T
 from .task import Outcome
 from .workspace import (
+    AT_ROUNDING,
     B_ITERATIONS,
     CHARTS,
     CONDITION,
@@ -21,31 +22,37 @@ from .workspace import (
     NEWTON,
     PLACEMENTS,
     STAGE_ITERATIONS,
+    UNVERIFIED,
 )
 
 
 def run_steps(task):
     """Run a `Task`; the `Outcome`."""
-    prepared, method, form = task.prepared, task.method, task.form
+    prepared, method = task.prepared, task.method
+    form = task.form.serving(method, prepared.packed)
     steps = None if method.step is None else step_count(*task.span, method.step)
     packed, n, m = prepared.packed, prepared.n, prepared.m
-    nx, ny = n if form.first_order else n - m, n - m
+    nx, ny = form.sizes(n, m, len(packed.bodies))
+    network = form.network(packed)
     step, tableau, scratch = method.kernel(form.first_order)
     interpolant = method.interpolant(form.first_order)
     _, kept = prepared.system(method.implicit)
-    kind = method.implicit, kept, nx, ny, tableau.size, scratch(nx, ny), interpolant.size(n, nx, ny)
-    memory = prepared.take((form.name, *kind), lambda: Memory(prepared, *kind))
+    joint_rows = len(network.row) if form.basis_free else None
+    kind = joint_rows, method.implicit, kept, nx, ny, tableau.size, scratch(nx, ny), interpolant.size(n, nx, ny)
+    memory = prepared.take((form.name, *kind), lambda: Memory(prepared, network, *kind))
+    if memory.network is not network:  # of the scene before it was changed
+        memory = Memory(prepared, network, *kind)
     memory.clear(task)
     dense = STORED if task.dense_output else FILLED if task.events is not None else 0
     addresses = _addresses(method, form, step, interpolant, steps is None, dense or task.times.size)
     memory.give_method(task, tableau, steps, dense, addresses)
     run, control = memory.run, memory.work.control
     memory.load()
-    sizes = n, m, len(packed.bodies), task.constraint_tol, packed.size, nx
+    sizes = n, m, len(packed.bodies), task.constraint_tol, packed.size, joint_rows, network, nx, ny
     reading = (Reader, packed.system, sizes, memory.addresses.copy()) if dense else None
     watch = None
     if task.events is not None:
-        watch = Watch(task.events, packed.system, reading[0](*reading[1:]), task.span[0])
+        watch = Watch(task.events, packed, reading[0](*reading[1:]), task.span[0])
 
     began = time.perf_counter()
     status, reason, recorded = drive(memory, task, watch)
@@ -103,4 +110,6 @@ def counts(numbers, counters):
         "jacobians": counters[JACOBIANS],
         "iteration_matrices": counters[ITERATION_MATRICES],
         "stage_iterations": counters[STAGE_ITERATIONS],
+        "solves_skipped": counters[AT_ROUNDING],
+        "checks_skipped": counters[UNVERIFIED],
     }

@@ -44,15 +44,16 @@ class Packed(NamedTuple):
     coordinates: tuple  # of each constraint: where its markers are, (3,) each
     size: float  # largest number among the coordinates
     loads: tuple  # a force_pack.Load for each force, in the order added
+    shared: dict  # what has been made of it, by name, for others to use
 
     def __reduce__(self):
         """In another process the kernels have other addresses."""
-        return _found_again, (os.getpid(), *self)
+        return _found_again, (os.getpid(), *self[:-1])
 
 
 def _found_again(process, *parts):
     """A `Packed` from a pickle, its addresses those of this process."""
-    packed = Packed(*parts)
+    packed = Packed(*parts, {})
     if process == os.getpid():
         return packed
     system = packed.system
@@ -139,7 +140,7 @@ def pack(scene):
     coordinates = tuple(constraint.coordinates for constraint in scene.constraints)
     size = max((np.abs(s).max() for each in coordinates for s in each), default=0.0)
     parameters = tuple(parameters.values())
-    return Packed(system, scene.bodies, scene.constraints, parameters, coordinates, float(size), loads)
+    return Packed(system, scene.bodies, scene.constraints, parameters, coordinates, float(size), loads, {})
 
 
 def user_functions(packed):

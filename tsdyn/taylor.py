@@ -8,11 +8,11 @@ import math
 
 from ._kernel import entry, kernel
 from .assembly import remember, set_time
-from .chart import AT_START, BY_SERIES, ROUNDING
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
 from .errors import Status
 from .free import RESIDUAL
 from .linalg import copy
+from .local_chart import AT_START, BY_SERIES, ROUNDING
 from .outputs import record, store_now
 from .poses import OMEGA, POSE, RD, move_bodies, place_bodies
 from .run_state import (

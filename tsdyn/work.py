@@ -30,6 +30,6 @@ def _power(solution, trajectory, t):
     system = solution.system
     at = SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=solution.packed, system=system)
     if system.rheonomic[0]:
-        at.multipliers = multipliers(system, t, q, qd, qdd, memory)
+        at.multipliers = multipliers(solution.packed, t, q, qd, qdd, memory)
     powers = force_powers(at)
     return (powers.applied + driving_power(at) - powers.dissipation) * (1.0 if status == 0 else np.nan)

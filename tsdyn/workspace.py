@@ -6,6 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ._kernel import loader
+from .free import Free, allocate_free
+from .local import Local, allocate_local
+from .network import Network, no_network
 from .system import System
 
 
@@ -21,11 +24,11 @@ class Work(NamedTuple):
     z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; newton.solve_positions, null_space
     Phi_q: np.ndarray  # (m, n)  Jacobian at q; chart.tangent_map, new_chart
     q0: np.ndarray  # (n,)   where the chart touches; chart.new_chart
-    U: np.ndarray  # (n, m)  Phi_q(q0)^T, Eq. 5; chart.new_chart
+    U: np.ndarray  # (n, m)  spans W0 Phi_q(q0)^T, in place of Eq. 5; chart.new_chart
     V: np.ndarray  # (n, k)  orthonormal basis of ker Phi_q(q0); chart.new_chart
-    scale: np.ndarray  # (m,)  reciprocal norms of the rows of Phi_q(q0); chart.new_chart
+    L: np.ndarray  # (n, k)  transposed: V^T P0, P0 the projection along U; chart.new_chart
     B: np.ndarray  # (m, m)  (Phi_q U)^-1, Eqs. 7, 28, warm-started; newton.update_b
-    u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; newton.solve_positions
+    u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; newton.solve_positions, tangent.place
     T: np.ndarray  # (m, k)  B Phi_q V = du/dv; chart.tangent_map
     v: np.ndarray  # (k,)    tangent coordinates of the latest u; newton.solve_positions
     base: np.ndarray  # (n,)   q0 + V v; newton.solve_positions
@@ -43,7 +46,7 @@ class Work(NamedTuple):
 
 U_TOL, B_TOL, SIZE, FLOOR, RATE, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(9)
 EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS = range(6)
-JACOBIANS, ITERATION_MATRICES, STAGE_ITERATIONS, COUNTERS = range(6, 10)
+JACOBIANS, ITERATION_MATRICES, STAGE_ITERATIONS, AT_ROUNDING, UNVERIFIED, COUNTERS = range(6, 12)
 
 
 ROOM = 16  # for implicit.KERNELS addresses and implicit.NUMBERS floats
@@ -89,6 +92,9 @@ class Context(NamedTuple):
     system: System
     work: Work
     linear: Linear
+    network: Network
+    free: Free
+    local: Local
 
 
 def carve(shapes):
@@ -102,15 +108,21 @@ def carve(shapes):
     return arrays
 
 
-def allocate(n, m, bodies, constraint_tol, size=1.0):
-    """Lay out the scratch memory of a formulation; size is that of the numbers in the constraints."""
+def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None):
+    """Lay out the scratch memory of a formulation; size is that of the numbers in the constraints.
+
+    With joint_rows, how many rows are no normalisations, that of the form without a basis: no matrices.
+    """
+    shapes = {**dict.fromkeys(("q", "qd", "qdd"), (n,)), "u": (m if joint_rows is None else joint_rows,)}
+    if joint_rows is not None:
+        n = m = bodies = 0
     k = n - m
-    shapes = {
-        **dict.fromkeys(("q", "qd", "qdd", "q0", "base", "Q", "h"), (n,)),
-        **dict.fromkeys(("Phi", "Phi_t", "gamma", "z", "scale", "u"), (m,)),
+    shapes |= {
+        **dict.fromkeys(("q0", "base", "Q", "h"), (n,)),
+        **dict.fromkeys(("Phi", "Phi_t", "gamma", "z"), (m,)),
         **dict.fromkeys(("B", "N", "R"), (m, m)),
         **dict.fromkeys(("U", "householder"), (n, m)),
-        **dict.fromkeys(("V", "D"), (n, k)),
+        **dict.fromkeys(("V", "L", "D"), (n, k)),
         "Phi_q": (m, n),
         "T": (m, k),
         "v": (k,),
@@ -146,12 +158,19 @@ def allocate_linear(system, n, m, wanted, kept=0):
     return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=np.zeros(ROOM, np.int64))
 
 
+def basis_free_parts(network, n):
+    """Network, Free and Local of a Context; their memory is small in every form."""
+    return network, allocate_free(network, n), allocate_local(network)
+
+
 def plain_context():
     """A context of the right types."""
     one, two = np.zeros(1), np.zeros((1, 1))
     ones, twos = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
     system = System(twos, one, two, one, twos, ones, one, twos, ones, twos, twos, twos, ones)
-    return Context(system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False))
+    return Context(
+        system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False), *basis_free_parts(no_network(), 2)
+    )
 
 
 load = loader(plain_context())

@@ -1,0 +1,128 @@
+"""From coordinates of a chart on the network to poses and their velocities, and back from accelerations.
+
+omega'  = C etad,                           C = d0 I - d~ + d d^T / d0
+etadd   = (d0 I + d~) omega'd - |omega'|^2 d / 2
+N       = H(q) C Y0                         what Phi changes by, with -u
+"""
+
+import math
+
+from ._four import cross, first, fma, four, lanes, put, second, splat, sub, third, times, total
+from ._kernel import kernel
+from .block_kernels import factor_lu
+from .normal import multiply_both
+from .poses import OMEGA, POSE, RD, R, orient
+from .workspace import FACTORIZATIONS
+
+FARTHEST = 0.9  # |d|^2: a body that has turned further is out of the chart's reach
+PIVOT_LIMIT = 1e-13  # of N: less of a diagonal entry than this is rounding
+
+
+@kernel
+def displace(network, l, poses):
+    """The poses at l.x; False where a body has turned too far."""
+    for b in range(network.bodies.shape[0]):
+        at, o = b * POSE, 8 * b
+        put(poses, at + R, fma(four(l.x, o), splat(1.0), four(l.base, o)))
+        if network.bodies[b, 1] == 7:
+            x, y, z = 0.5 * l.x[o + 4], 0.5 * l.x[o + 5], 0.5 * l.x[o + 6]
+            square = x * x + y * y + z * z
+            if not square < FARTHEST:
+                return False
+            w = math.sqrt(1.0 - square)
+            put(l.d, 4 * b, lanes(x, y, z))
+            l.d[4 * b + 3] = w
+            e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
+            p0 = w * e0 - e1 * x - e2 * y - e3 * z
+            p1 = w * e1 + e0 * x - e3 * y + e2 * z
+            p2 = w * e2 + e3 * x + e0 * y - e1 * z
+            p3 = w * e3 - e2 * x + e1 * y + e0 * z
+            f = 1.5 - 0.5 * (p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)  # rounding of many charts would add up
+            orient(poses, at, f * p0, f * p1, f * p2, f * p3)
+    return True
+
+
+@kernel
+def _turn_by(l, b, y):
+    """C y of body b, y in four lanes."""
+    x, e, z, w = l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2], l.d[4 * b + 3]
+    d = lanes(x, e, z)
+    along = total(times(d, y)) / w
+    return sub(fma(d, splat(along), times(y, splat(w))), cross(d, y))
+
+
+@kernel
+def turn_rates(network, l, rates, poses):
+    """rd and omega' of the poses, of rates in chart coordinates."""
+    for b in range(network.bodies.shape[0]):
+        put(poses, b * POSE + RD, four(rates, 8 * b))
+        if network.bodies[b, 1] == 7:
+            put(poses, b * POSE + OMEGA, _turn_by(l, b, four(rates, 8 * b + 4)))
+
+
+@kernel
+def factorise_normal(network, w, f, l):
+    """Factors of N = H C Y0, H being that of the present place; whether there are any."""
+    for e in range(network.sides.shape[0]):
+        for k in range(2):
+            at = 16 * e + 8 * k
+            put(l.X, at, four(l.Y0, at))
+            put(l.X, at + 4, _turn_by(l, network.sides[e, k], four(l.Y0, at + 4)))
+    multiply_both(network, f.H, l.X, l.lower, l.upper)
+    w.counters[FACTORIZATIONS] += 1
+    return factor_lu(network.pattern, l.lower, l.upper, PIVOT_LIMIT) < 0
+
+
+@kernel
+def gather_rates(network, H, poses, out):
+    """out = H (rd, omega') of the poses."""
+    for e in range(network.sides.shape[0]):
+        at, a, b = 16 * e, network.sides[e, 0] * POSE + RD, network.sides[e, 1] * POSE + RD
+        g = fma(four(H, at), four(poses, a), times(four(H, at + 4), four(poses, a + 4)))
+        g = fma(four(H, at + 8), four(poses, b), fma(four(H, at + 12), four(poses, b + 4), g))
+        out[e] = total(g)
+
+
+@kernel
+def write_back(network, l, poses, Z, out):
+    """Accelerations (rhodd, etadd) of (rdd, omega'd); out (8 b,)."""
+    for b in range(network.bodies.shape[0]):
+        o, at = 8 * b, b * POSE
+        put(out, o, four(Z, o))
+        if network.bodies[b, 1] == 7:
+            x, y, z, w = l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2], l.d[4 * b + 3]
+            d, omega, change = lanes(x, y, z), four(poses, at + OMEGA), four(Z, o + 4)
+            square = -0.5 * total(times(omega, omega))
+            put(out, o + 4, fma(d, splat(square), fma(change, splat(w), cross(d, change))))
+
+
+@kernel
+def largest(values):
+    """The largest size; infinite where one is not finite."""
+    worst = 0.0
+    for i in range(values.size):
+        size = abs(values[i])
+        if not size < math.inf:
+            return math.inf
+        worst = max(worst, size)
+    return worst
+
+
+@kernel
+def largest_rates(network, poses):
+    """The largest |rd| and |omega'| entries."""
+    r, w = 0.0, 0.0
+    for b in range(network.bodies.shape[0]):
+        f, g = four(poses, b * POSE + RD), four(poses, b * POSE + OMEGA)
+        r = max(r, max(abs(first(f)), max(abs(second(f)), abs(third(f)))))
+        w = max(w, max(abs(first(g)), max(abs(second(g)), abs(third(g)))))
+    return r, w
+
+
+@kernel
+def turned_most(l):
+    """The largest |d| of a body: the sine of half the angle."""
+    most = 0.0
+    for i in range(0, l.d.size, 4):
+        most = max(most, l.d[i] * l.d[i] + l.d[i + 1] * l.d[i + 1] + l.d[i + 2] * l.d[i + 2])
+    return math.sqrt(most)

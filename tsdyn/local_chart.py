@@ -1,0 +1,115 @@
+"""Charts on the network: where they touch, and the signs on which they are left, the same in every form.
+
+A chart is left at the end of a step, on signs that have no dimension and don't depend on units, scales of constraints
+or levers, the metric being that of the masses:
+
+    contraction    the largest |1 - n / s|, n and s the pivots of N = H C Y0 and of S0 = H0 W0 H0^T: how much of what
+                   elimination leaves of a row is gone; 1 where the normal space of q0 meets the manifold
+    turn           |d|, the sine of half the angle that a body has turned since q0
+"""
+
+import math
+
+from ._four import get
+from ._kernel import kernel
+from .block_kernels import factor
+from .displacement import factorise_normal, turned_most
+from .landing import run_loops
+from .linalg import copy
+from .local import END, FACTORED, TIME
+from .network import REDUCED
+from .normal import multiply_rows, weigh_rows
+from .poses import POSE, P, R, place_bodies
+from .workspace import CHARTS, CONDITION, CONTRACTION, FACTORIZATIONS, FLOOR, PLACEMENTS, SIZE
+
+# reasons to leave a chart, as stored; REASONS names them
+STAY, BY_CONTRACTION, BY_TURN, BY_INTERVAL, BY_FAILURE, AT_START, BY_SERIES = range(7)
+REASONS = (
+    "",
+    "contraction",
+    "turn of a body",
+    "chart_interval",
+    "failed step",
+    "start",
+    "step of a series",
+)
+
+CONTRACTION_LIMIT = 0.15
+TURN_LIMIT = 0.25
+CONTRACTION_LOST = 0.9  # nearer to one the normal space need not meet the manifold on the way; another branch may have
+ROUNDING = 1e-15  # relative to the numbers that enter Phi: below this a residual says nothing
+PIVOT_LIMIT = 1e-15  # of S0: less of a diagonal entry than this is rounding
+
+
+@kernel
+def touch(network, system, w, f, l, t):
+    """The chart at w.q: base, H0, Y0, the factors of S0. Whether the rows of H0 are independent."""
+    regular = True
+    if l.numbers[END] > 0.0 and l.numbers[END] == w.counters[PLACEMENTS]:  # the place that was left last
+        copy(f.H, l.H0)
+        copy(f.Y, l.Y0)
+        copy(f.S, l.S0)
+    else:
+        place_bodies(network.bodies, w.q, f.poses)
+        run_loops(network, system.reals, REDUCED, f.poses, t, f.b, l.H0)
+        weigh_rows(network, l.H0, l.Y0)
+        multiply_rows(network, l.H0, l.Y0, l.S0)
+        if f.b.size > 0:
+            w.counters[FACTORIZATIONS] += 1
+            regular = factor(network.pattern, l.S0, PIVOT_LIMIT) < 0
+    for b in range(network.bodies.shape[0]):
+        at, o = b * POSE, 8 * b
+        for c in range(3):
+            l.base[o + c] = f.poses[at + R + c]
+            l.d[4 * b + c] = 0.0
+        for c in range(4):
+            l.base[o + 4 + c] = f.poses[at + P + c]
+        l.d[4 * b + 3] = 1.0
+    size = 0.0
+    for i in range(w.q.size):
+        size = max(size, abs(w.q[i]))
+    w.counters[CHARTS] += 1
+    w.control[FLOOR] = ROUNDING * (w.control[SIZE] + size)
+    w.control[CONTRACTION], w.control[CONDITION] = 0.0, 1.0
+    l.numbers[TIME], l.numbers[FACTORED], l.numbers[END] = t, 0.0, 0.0
+    return regular
+
+
+@kernel
+def measure_turns(network, q, l):
+    """l.d of positions q: (d0, d) = p0* o p."""
+    for b in range(network.bodies.shape[0]):
+        if network.bodies[b, 1] == 7:
+            i, o = network.bodies[b, 0] + 3, 8 * b + 4
+            e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
+            p0, p1, p2, p3 = q[i], q[i + 1], q[i + 2], q[i + 3]
+            l.d[4 * b] = -e1 * p0 + e0 * p1 + e3 * p2 - e2 * p3
+            l.d[4 * b + 1] = -e2 * p0 - e3 * p1 + e0 * p2 + e1 * p3
+            l.d[4 * b + 2] = -e3 * p0 + e2 * p1 - e1 * p2 + e0 * p3
+            l.d[4 * b + 3] = e0 * p0 + e1 * p1 + e2 * p2 + e3 * p3
+
+
+@kernel
+def turning(network, w, f, l):
+    """Reason to leave the chart at the place that l.d and f.H belong to, or STAY; records contraction and condition."""
+    turn, contraction = turned_most(l), 0.0
+    if f.b.size > 0:
+        contraction = _contraction(network, l) if factorise_normal(network, w, f, l) else math.inf
+    l.numbers[FACTORED] = 0.0  # dense output, if there is any, would come between
+    w.control[CONTRACTION] = max(turn, contraction)
+    w.control[CONDITION] = (1.0 + w.control[CONTRACTION]) / max(1.0 - w.control[CONTRACTION], 1e-300)
+    if not contraction < CONTRACTION_LIMIT:
+        return BY_CONTRACTION
+    return STAY if turn < TURN_LIMIT else BY_TURN
+
+
+@kernel
+def _contraction(network, l):
+    """From the reciprocal pivots of both."""
+    pattern, worst = network.pattern, 0.0
+    for j in range(pattern.heads.size):
+        at, step = pattern.heads[j], pattern.widths[j] + 1
+        for _ in range(pattern.starts[j + 1] - pattern.starts[j]):
+            worst = max(worst, abs(1.0 - get(l.S0, at) / get(l.upper, at)))
+            at += step
+    return worst

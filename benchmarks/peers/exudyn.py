@@ -1,0 +1,202 @@
+"""Exudyn: a kinematic tree in minimal coordinates with DOPRI5, and redundant coordinates with the index-2 trapezoid."""
+
+import numpy as np
+
+from ..contender import Contender, Outcome, rotation, timed
+from .tree import hinges, is_tree, links
+
+
+class Exudyn(Contender):
+    """What both have in common."""
+
+    get = "pip install exudyn"
+
+    def version(self):
+        """The package's."""
+        import exudyn
+
+        return f"Exudyn {exudyn.__version__}"
+
+    def prepare(self, scene):
+        """Build the system."""
+        import exudyn as exu
+
+        mbs = exu.SystemContainer().AddSystem()
+        sensors = self.fill(exu, mbs, scene.definition())
+        mbs.Assemble()
+
+        def run(value):
+            settings = exu.SimulationSettings()
+            settings.solutionSettings.writeSolutionToFile = False
+            settings.solutionSettings.sensorsWritePeriod = scene.end
+            settings.timeIntegration.verboseMode = 0
+            settings.timeIntegration.endTime = scene.end
+            solver = self.tune(exu, settings, scene.end, value)
+            seconds, reached = timed(lambda: mbs.SolveDynamic(settings, solverType=solver))
+            if not reached:
+                raise RuntimeError("the solver didn't reach the end")
+            r, A = (np.array([mbs.GetSensorValues(sensor) for sensor in row]) for row in zip(*sensors, strict=True))
+            return Outcome(seconds, r, A.reshape(-1, 3, 3))
+
+        return run
+
+
+class ExudynTree(Exudyn):
+    """Hinges and slides one after another; a ball is three of them."""
+
+    name = "Exudyn, tree"
+    values = tuple(10.0**-k for k in range(2, 12))  # below, its steps collapse
+
+    def serves(self, scene):
+        """Trees."""
+        return is_tree(scene) and scene.size <= 64
+
+    def fill(self, exu, mbs, definition):
+        """One kinematic tree; returns a pair of sensors a body."""
+        from exudyn import utilities as ex
+
+        kinds, parents, turns, offsets, masses, centres, inertias, rates = ([] for _ in range(8))
+        ends, frames, middles = {-1: -1}, {-1: np.eye(3)}, {-1: np.zeros(3)}
+        for link in links(definition)[0]:
+            body = definition["bodies"][link.body]
+            last, frame, at = ends[link.parent], frames[link.parent], middles[link.parent] + link.place
+            turn = link.turn
+            for move in hinges(link):
+                one = np.cross(move.axis, np.eye(3)[np.argmin(np.abs(move.axis))])
+                one /= np.linalg.norm(one)
+                new = np.stack([one, np.cross(move.axis, one), move.axis], axis=1)  # its z is the axis
+                kinds.append(exu.JointType.RevoluteZ if move.kind == "hinge" else exu.JointType.PrismaticZ)
+                parents.append(last)
+                turns.append(frame.T @ turn @ new)
+                offsets.append(frame.T @ (at + turn @ move.step))
+                masses.append(0.0)
+                centres.append(np.zeros(3))
+                inertias.append(np.zeros((3, 3)))
+                rates.append(move.rate)
+                last, frame, at, turn = len(kinds) - 1, new, np.zeros(3), np.eye(3)
+            masses[-1], centres[-1] = body["mass"], frame.T @ link.centre
+            inertias[-1] = frame.T @ np.array(body["inertia"], float) @ frame
+            ends[link.body], frames[link.body], middles[link.body] = last, frame, link.centre
+        n = len(kinds)
+        node = mbs.AddNode(
+            ex.NodeGenericODE2(
+                numberOfODE2Coordinates=n, referenceCoordinates=[0.0] * n, initialCoordinates=[0.0] * n,
+                initialCoordinates_t=rates,
+            )
+        )  # fmt: skip
+        tree = mbs.AddObject(
+            ex.ObjectKinematicTree(
+                nodeNumber=node, jointTypes=kinds, linkParents=parents, jointTransformations=exu.Matrix3DList(turns),
+                jointOffsets=exu.Vector3DList(offsets), linkInertiasCOM=exu.Matrix3DList(inertias),
+                linkCOMs=exu.Vector3DList(centres), linkMasses=masses, gravity=list(definition["gravity"]),
+            )
+        )  # fmt: skip
+        for _, body, arguments in definition.get("forces", ()):
+            link = ends[body - 1]
+            marker = mbs.AddMarker(
+                ex.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=centres[link])
+            )
+            mbs.AddLoad(ex.LoadForceVector(markerNumber=marker, loadVector=arguments["force"]))
+        self.turned = [frames[i] for i in range(len(definition["bodies"]))]
+        return [
+            tuple(
+                mbs.AddSensor(
+                    ex.SensorKinematicTree(
+                        objectNumber=tree, linkNumber=ends[i], localPosition=centres[ends[i]], writeToFile=False,
+                        outputVariableType=kind,
+                    )
+                )  # fmt: skip
+                for kind in (exu.OutputVariableType.Position, exu.OutputVariableType.RotationMatrix)
+            )
+            for i in range(len(definition["bodies"]))
+        ]
+
+    def prepare(self, scene):
+        """Turn the frames of the last hinges back to those of the bodies."""
+        inner = super().prepare(scene)
+        frames = np.array(self.turned)
+
+        def run(value):
+            outcome = inner(value)
+            return outcome._replace(A=outcome.A @ frames.transpose(0, 2, 1))
+
+        return run
+
+    def tune(self, exu, settings, end, tol):
+        """Adaptive steps."""
+        time = settings.timeIntegration
+        time.numberOfSteps, time.initialStepSize = 1, 1e-3
+        time.absoluteTolerance = time.relativeTolerance = tol
+        time.minimumStepSize = 1e-12
+        return exu.DynamicSolverType.DOPRI5
+
+
+class ExudynConstraints(Exudyn):
+    """Bodies with Euler parameters, joints by multipliers."""
+
+    name, setting = "Exudyn, constraints", "step"
+    values = tuple(10.0 ** (-k / 2) for k in range(4, 11))
+
+    def serves(self, scene):
+        """What its own joints describe."""
+        return scene.definition is not None and scene.size <= 64
+
+    def fill(self, exu, mbs, definition):
+        """Bodies and joints; returns a pair of sensors a body."""
+        from exudyn import utilities as ex
+
+        # Euler angles serve the top best, being far from where they are singular
+        sliding = any(row[0] == "PlaneContact" for row in definition["constraints"])
+        node = exu.NodeType.RotationRxyz if sliding else exu.NodeType.RotationEulerParameters
+        ground = mbs.AddObject(ex.ObjectGround())
+        bodies = [ground]
+        for body in definition["bodies"]:
+            A = rotation(np.array([body["orientation"]], float))[0]
+            bodies.append(
+                mbs.CreateRigidBody(
+                    inertia=ex.RigidBodyInertia(body["mass"], np.array(body["inertia"], float)),
+                    referencePosition=list(body["position"]), referenceRotationMatrix=A,
+                    initialVelocity=list(body["velocity"]), gravity=list(definition["gravity"]),
+                    initialAngularVelocity=list(A @ np.array(body["angular_velocity"], float)), nodeType=node,
+                )
+            )  # fmt: skip
+        for kind, a, b, given in definition["constraints"]:
+            points = [list(given.get(name, (0.0, 0.0, 0.0))) for name in ("point_a", "point_b")]
+            if kind == "Distance":
+                mbs.CreateDistanceConstraint(
+                    bodyNumbers=[bodies[a], bodies[b]], localPosition0=points[0], localPosition1=points[1],
+                    distance=given["length"],
+                )  # fmt: skip
+                continue
+            markers = [
+                mbs.AddMarker(ex.MarkerBodyRigid(bodyNumber=bodies[i], localPosition=at))
+                for i, at in zip((a, b), points, strict=True)
+            ]
+            if kind == "Spherical":
+                mbs.AddObject(ex.ObjectJointSpherical(markerNumbers=markers))
+            else:  # a plane of the ground, through its point_b
+                normal = np.array(given["normal_b"], float)
+                one = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+                one /= np.linalg.norm(one)
+                frame = np.stack([one, np.cross(normal, one), normal], axis=1)
+                mbs.AddObject(
+                    ex.ObjectJointGeneric(
+                        markerNumbers=markers[::-1], constrainedAxes=[0, 0, 1, 0, 0, 0], rotationMarker0=frame
+                    )
+                )
+        for _, body, arguments in definition.get("forces", ()):
+            mbs.CreateForce(bodyNumber=bodies[body], loadVector=list(arguments["force"]))
+        return [
+            tuple(
+                mbs.AddSensor(ex.SensorBody(bodyNumber=body, writeToFile=False, outputVariableType=kind))
+                for kind in (exu.OutputVariableType.Position, exu.OutputVariableType.RotationMatrix)
+            )
+            for body in bodies[1:]
+        ]
+
+    def tune(self, exu, settings, end, step):
+        """Steps of one size."""
+        time = settings.timeIntegration
+        time.numberOfSteps = round(end / step)
+        time.newton.useModifiedNewton = True
+        return exu.DynamicSolverType.TrapezoidalIndex2

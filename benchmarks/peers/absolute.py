@@ -35,12 +35,12 @@ class Packed(NamedTuple):
     extra: np.ndarray  # (c, 3): length, or normal
     row: np.ndarray  # (c + 1,), first row of each
     at: np.ndarray  # (b,), where a body's unknowns begin in (3)
-    at_row: np.ndarray  # (m,), lam; mu is after all lam of its constraint
-    rows: np.ndarray  # (m,), rows of the constraint that a row is of
+    at_row: np.ndarray  # (m,), lam of a row
+    at_mu: np.ndarray  # (m,), mu
 
 
 def pack(definition):
-    """Return a Packed and the state at the start, (b, 13)."""
+    """Return (integers, reals), which `unpack` makes a Packed of, and the state at the start (b, 13)."""
     bodies, constraints = definition["bodies"], definition["constraints"]
     J = np.array([body["inertia"] for body in bodies], float)
     mass = np.array([body["mass"] for body in bodies], float)
@@ -54,16 +54,31 @@ def pack(definition):
     size = [3 if row[0] == "Spherical" else 1 for row in constraints]
     row = np.cumsum([0, *size])
     on = np.array([[a - 1, b - 1] for _, a, b, _ in constraints]).reshape(-1, 2)
-    at, at_row, end = np.zeros(len(bodies), np.int64), np.zeros(row[-1], np.int64), 0
+    at, at_row, at_mu, end = [], np.zeros(row[-1], np.int64), np.zeros(row[-1], np.int64), 0
     for body in range(len(bodies)):
-        at[body], end = end, end + BODY
+        at.append(end)
+        end += BODY
         for c in np.flatnonzero(on.max(axis=1) == body):
             at_row[row[c] : row[c + 1]] = end + np.arange(size[c])
+            at_mu[row[c] : row[c + 1]] = end + size[c] + np.arange(size[c])
             end += 2 * size[c]
     x = [[*b["position"], *b["orientation"], *b["velocity"], *b["angular_velocity"]] for b in bodies]
-    kind = np.array([KINDS[c[0]] for c in constraints])
-    rows = np.repeat(size, size)
-    return Packed(mass, J, np.linalg.inv(J), load, kind, on, point, extra, row, at, at_row, rows), np.array(x, float)
+    kind = [KINDS[c[0]] for c in constraints]
+    integers = np.concatenate([[len(bodies), len(constraints), row[-1]], kind, on.ravel(), row, at, at_row, at_mu])
+    reals = np.concatenate([part.ravel() for part in (mass, J, np.linalg.inv(J), load, point, extra)])
+    return (integers.astype(np.int64), reals), np.array(x, float)
+
+
+@numba.njit(**OPTIONS)
+def unpack(integers, reals):
+    """Return the Packed: Python hands two arrays to a kernel sooner than twelve."""
+    b, c, m = integers[0], integers[1], integers[2]
+    i, j, J, load = integers[3:], reals[22 * b :], reals[b : 19 * b], reals[19 * b : 22 * b]
+    return Packed(
+        reals[:b], J[: 9 * b].reshape(b, 3, 3), J[9 * b :].reshape(b, 3, 3), load.reshape(b, 3),
+        i[:c], i[c : 3 * c].reshape(c, 2), j[: 6 * c].reshape(c, 2, 3), j[6 * c :].reshape(c, 3), i[3 * c : 4 * c + 1],
+        i[4 * c + 1 : 4 * c + 1 + b], i[4 * c + 1 + b : 4 * c + 1 + b + m], i[4 * c + 1 + b + m :],
+    )  # fmt: skip
 
 
 @numba.njit(**OPTIONS)
@@ -186,8 +201,9 @@ def kinematics(x, turning, out):
 
 
 @numba.njit(**OPTIONS)
-def accelerate(P, x, xd, lam):
+def accelerate(integers, reals, x, xd, lam):
     """The rate xd (b, 13) and the multipliers by (2), dense."""
+    P = unpack(integers, reals)
     b, m = P.mass.size, P.row[-1]
     phi, phid, gamma, jac, f = np.empty(m), np.empty(m), np.empty(m), np.empty((m, 12)), np.empty((b, 6))
     constrain(P, x, phi, phid, gamma, jac)
@@ -237,18 +253,19 @@ def accelerate(P, x, xd, lam):
 
 
 @numba.njit(**OPTIONS)
-def residual(P, y, yd, out):
+def residual(integers, reals, y, yd, out):
     """The residual (n,) of (3)."""
+    P = unpack(integers, reals)
     b, m = P.mass.size, P.row[-1]
     phi, phid, gamma, jac = np.empty(m), np.empty(m), np.empty(m), np.empty((m, 12))
     x, f, g, lam, mu, pd = np.empty((b, STATE)), np.empty((b, 6)), np.zeros((b, 6)), np.empty(m), np.empty(m), np.empty(4)
     for i in range(b):
         x[i] = y[P.at[i] : P.at[i] + STATE]
     for j in range(m):
-        lam[j], mu[j] = y[P.at_row[j]], y[P.at_row[j] + P.rows[j]]
+        lam[j], mu[j] = y[P.at_row[j]], y[P.at_mu[j]]
     constrain(P, x, phi, phid, gamma, jac)
     for j in range(m):
-        out[P.at_row[j]], out[P.at_row[j] + P.rows[j]] = phi[j], phid[j]
+        out[P.at_row[j]], out[P.at_mu[j]] = phi[j], phid[j]
     applied(P, x, f)
     push(P, jac, lam, f)
     push(P, jac, mu, g)
@@ -268,11 +285,11 @@ def residual(P, y, yd, out):
 
 
 @numba.njit(**OPTIONS)
-def differences(P, y, yd, shift, group, first, rows, values):
+def differences(integers, reals, y, yd, shift, group, first, rows, values):
     """Entries of dF/dy + shift dF/dyd by columns, rows[first[j]:first[j + 1]] of column j, as many at once as can be."""
     n = y.size
     y, yd, f, g = y.copy(), yd.copy(), np.empty(n), np.empty(n)
-    residual(P, y, yd, f)
+    residual(integers, reals, y, yd, f)
     steps = np.zeros(n)
     for colour in range(group.max() + 1):
         for j in range(n):
@@ -281,7 +298,7 @@ def differences(P, y, yd, shift, group, first, rows, values):
                 y[j] += 1.5e-8 * max(abs(old), 1.0)
                 steps[j] = y[j] - old
                 yd[j] += shift * steps[j]
-        residual(P, y, yd, g)
+        residual(integers, reals, y, yd, g)
         for j in range(n):
             if group[j] == colour:
                 for k in range(first[j], first[j + 1]):

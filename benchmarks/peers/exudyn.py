@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..contender import Contender, Outcome, rotation, timed
-from .tree import hinges, is_tree, links
+from .tree import axes, is_tree, tree
 
 
 class Exudyn(Contender):
@@ -55,70 +55,52 @@ class ExudynTree(Exudyn):
         """One kinematic tree; returns a pair of sensors a body."""
         from exudyn import utilities as ex
 
-        kinds, parents, turns, offsets, masses, centres, inertias, rates = ([] for _ in range(8))
-        ends, frames, middles = {-1: -1}, {-1: np.eye(3)}, {-1: np.zeros(3)}
-        for link in links(definition)[0]:
-            body = definition["bodies"][link.body]
-            last, frame, at = ends[link.parent], frames[link.parent], middles[link.parent] + link.place
-            turn = link.turn
-            for move in hinges(link):
-                one = np.cross(move.axis, np.eye(3)[np.argmin(np.abs(move.axis))])
-                one /= np.linalg.norm(one)
-                new = np.stack([one, np.cross(move.axis, one), move.axis], axis=1)  # its z is the axis
-                kinds.append(exu.JointType.RevoluteZ if move.kind == "hinge" else exu.JointType.PrismaticZ)
-                parents.append(last)
-                turns.append(frame.T @ turn @ new)
-                offsets.append(frame.T @ (at + turn @ move.step))
-                masses.append(0.0)
-                centres.append(np.zeros(3))
-                inertias.append(np.zeros((3, 3)))
-                rates.append(move.rate)
-                last, frame, at, turn = len(kinds) - 1, new, np.zeros(3), np.eye(3)
-            masses[-1], centres[-1] = body["mass"], frame.T @ link.centre
-            inertias[-1] = frame.T @ np.array(body["inertia"], float) @ frame
-            ends[link.body], frames[link.body], middles[link.body] = last, frame, link.centre
-        n = len(kinds)
+        joints, on, self.frames = tree(definition, balls=False)
+        kinds = {"hinge": exu.JointType.RevoluteZ, "slide": exu.JointType.PrismaticZ}
+        n = len(joints)
         node = mbs.AddNode(
             ex.NodeGenericODE2(
                 numberOfODE2Coordinates=n, referenceCoordinates=[0.0] * n, initialCoordinates=[0.0] * n,
-                initialCoordinates_t=rates,
+                initialCoordinates_t=[joint.rate for joint in joints],
             )
         )  # fmt: skip
-        tree = mbs.AddObject(
+        one = mbs.AddObject(
             ex.ObjectKinematicTree(
-                nodeNumber=node, jointTypes=kinds, linkParents=parents, jointTransformations=exu.Matrix3DList(turns),
-                jointOffsets=exu.Vector3DList(offsets), linkInertiasCOM=exu.Matrix3DList(inertias),
-                linkCOMs=exu.Vector3DList(centres), linkMasses=masses, gravity=list(definition["gravity"]),
+                nodeNumber=node, gravity=list(definition["gravity"]), jointTypes=[kinds[joint.kind] for joint in joints],
+                linkParents=[joint.parent for joint in joints], linkMasses=[joint.mass for joint in joints],
+                jointTransformations=exu.Matrix3DList([joint.turn for joint in joints]),
+                jointOffsets=exu.Vector3DList([joint.place for joint in joints]),
+                linkInertiasCOM=exu.Matrix3DList([joint.inertia for joint in joints]),
+                linkCOMs=exu.Vector3DList([joint.centre for joint in joints]),
             )
         )  # fmt: skip
         for _, body, arguments in definition.get("forces", ()):
-            link = ends[body - 1]
+            link = on[body - 1]
             marker = mbs.AddMarker(
-                ex.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=centres[link])
+                ex.MarkerKinematicTreeRigid(objectNumber=one, linkNumber=link, localPosition=joints[link].centre)
             )
             mbs.AddLoad(ex.LoadForceVector(markerNumber=marker, loadVector=arguments["force"]))
-        self.turned = [frames[i] for i in range(len(definition["bodies"]))]
         return [
             tuple(
                 mbs.AddSensor(
                     ex.SensorKinematicTree(
-                        objectNumber=tree, linkNumber=ends[i], localPosition=centres[ends[i]], writeToFile=False,
+                        objectNumber=one, linkNumber=link, localPosition=joints[link].centre, writeToFile=False,
                         outputVariableType=kind,
                     )
                 )  # fmt: skip
                 for kind in (exu.OutputVariableType.Position, exu.OutputVariableType.RotationMatrix)
             )
-            for i in range(len(definition["bodies"]))
+            for link in on
         ]
 
     def prepare(self, scene):
         """Turn the frames of the last hinges back to those of the bodies."""
         inner = super().prepare(scene)
-        frames = np.array(self.turned)
+        frames = np.array(self.frames)
 
         def run(value):
             outcome = inner(value)
-            return outcome._replace(A=outcome.A @ frames.transpose(0, 2, 1))
+            return outcome._replace(A=outcome.A @ frames)
 
         return run
 
@@ -175,10 +157,7 @@ class ExudynConstraints(Exudyn):
             if kind == "Spherical":
                 mbs.AddObject(ex.ObjectJointSpherical(markerNumbers=markers))
             else:  # a plane of the ground, through its point_b
-                normal = np.array(given["normal_b"], float)
-                one = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-                one /= np.linalg.norm(one)
-                frame = np.stack([one, np.cross(normal, one), normal], axis=1)
+                frame = axes(np.array(given["normal_b"], float))
                 mbs.AddObject(
                     ex.ObjectJointGeneric(
                         markerNumbers=markers[::-1], constrainedAxes=[0, 0, 1, 0, 0, 0], rotationMarker0=frame

@@ -4,16 +4,17 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from ..contender import Outcome, rotation
-from .absolute import STATE, accelerate, differences, pack, residual
+from .absolute import STATE, accelerate, differences, pack, residual, unpack
 
 
 class System:
     """Start, residual, Jacobian with its pattern, and the reading of an end."""
 
     def __init__(self, definition):
-        self.P, x = P, x = pack(definition)
+        self.packed, x = pack(definition)
+        self.P = P = unpack(*self.packed)
         xd, lam = np.empty_like(x), np.empty(P.row[-1])
-        accelerate(P, x, xd, lam)
+        accelerate(*self.packed, x, xd, lam)
         self.n = n = int(P.at.size + x.size + 2 * lam.size)
         self.y, self.yd = np.zeros(n), np.zeros(n)
         state = (P.at[:, None] + np.arange(STATE)).ravel()
@@ -24,15 +25,17 @@ class System:
         self.first, self.rows = pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
         self.pattern, self.group = pattern, _colour(pattern)
         self.values = np.zeros(self.rows.size)
+        self.columns = np.repeat(np.arange(n), np.diff(self.first))
+        self.band = int(np.abs(self.rows - self.columns).max())
         self.jacobian(self.y, self.yd, 1.0)
 
     def _pattern(self):
         """Bodies and constraints that meet, as blocks."""
         P, n = self.P, self.n
-        meets = np.zeros((n, n), bool) if n < 4000 else None
+        meets = np.zeros((n, n), bool)
         blocks = [np.arange(P.at[i], P.at[i] + STATE + 1) for i in range(P.at.size)]
         rows = [
-            np.concatenate([P.at_row[a:b], P.at_row[a:b] + P.rows[a:b]])
+            np.concatenate([P.at_row[a:b], P.at_mu[a:b]])
             for a, b in zip(P.row[:-1], P.row[1:], strict=True)
         ]
         for block in blocks:
@@ -48,11 +51,11 @@ class System:
 
     def residual(self, y, yd, out):
         """Fill out with F."""
-        residual(self.P, y, yd, out)
+        residual(*self.packed, y, yd, out)
 
     def jacobian(self, y, yd, shift):
         """Entries of dF/dy + shift dF/dyd in the order of the pattern (CSC)."""
-        differences(self.P, y, yd, shift, self.group, self.first, self.rows, self.values)
+        differences(*self.packed, y, yd, shift, self.group, self.first, self.rows, self.values)
         return self.values
 
     def outcome(self, seconds, y):

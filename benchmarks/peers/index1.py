@@ -25,11 +25,11 @@ class Index1(Contender):
 
         from .absolute import accelerate, pack
 
-        P, x = pack(scene.definition())
-        xd, lam = np.empty_like(x), np.empty(P.row[-1])
+        packed, x = pack(scene.definition())
+        xd, lam = np.empty_like(x), np.empty(packed[0][2])
 
         def f(t, y):
-            accelerate(P, y.reshape(x.shape), xd, lam)
+            accelerate(*packed, y.reshape(x.shape), xd, lam)
             return xd.ravel().copy()
 
         f(0.0, x.ravel())

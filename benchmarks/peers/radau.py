@@ -37,14 +37,13 @@ class Radau(Contender):
         kept[system.state] = 1.0
         Jd = np.diag(kept)
         Jd = csc_matrix(Jd) if sparse else Jd
-        index = np.where(kept > 0.0, 0, 2)
 
         def f(t, y, yd):
             out = np.empty(n)
             system.residual(y, yd, out)
             return out
 
-        def jacobian(t, y, yd, f=None):
+        def jacobian(t, y, yd):
             J = csc_matrix((system.jacobian(y, yd, 0.0).copy(), system.rows, system.first), shape=(n, n))
             return J if sparse else J.toarray(), Jd
 
@@ -54,7 +53,6 @@ class Radau(Contender):
             seconds, found = timed(
                 lambda: solve_dae(
                     f, span, system.y, system.yd, method="Radau", rtol=max(tol, 1e-13), atol=atol, jac=jacobian,
-                    var_index=index,
                 )  # fmt: skip
             )
             if not found.success:

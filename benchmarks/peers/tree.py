@@ -79,10 +79,8 @@ def _link(definition, constraint, hung):
         moves = (ball,)
     elif kind == "PlaneContact" and a == 0:
         normal = Ab.T @ np.array(given["normal_b"], float)
-        one = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-        across = [one / np.linalg.norm(one), np.cross(normal, one / np.linalg.norm(one))]
         at = rb + Ab @ near
-        moves = (*(Move("slide", np.zeros(3), axis, tip @ axis) for axis in across), ball)
+        moves = (*(Move("slide", np.zeros(3), axis, tip @ axis) for axis in axes(normal).T[:2]), ball)
     elif kind == "Distance":
         foot = ra + Aa @ at
         rod = Ab.T @ (rb + Ab @ near - foot)
@@ -108,8 +106,59 @@ def is_tree(scene):
         return False
 
 
-def hinges(link):
-    """The moves of a link with every ball as hinges about y, x and z, singular where the second is at 90 degrees."""
+class Joint(NamedTuple):
+    """A joint at zero, about or along the z axis of its own frame, or a ball; what it carries is in that frame."""
+
+    kind: str
+    parent: int  # row of the joints, -1 the ground
+    turn: np.ndarray  # (3, 3), from its frame to the parent joint's
+    place: np.ndarray  # (3,), m, in the parent joint's frame
+    rate: np.ndarray
+    mass: float  # kg; 0 between the moves of a link
+    centre: np.ndarray  # (3,), m
+    inertia: np.ndarray  # (3, 3), kg m^2, about the centre
+
+
+class Tree(NamedTuple):
+    """Joints, and of every body its joint and the turn from its own frame to the joint's."""
+
+    joints: list
+    on: list
+    frames: list
+
+
+def tree(definition, balls=True):
+    """Return the joints of a definition, parents first; with balls=False a ball is three hinges, about y, x and z.
+
+    Those are singular where the second is at 90 degrees.
+    """
+    joints, on, frames, centres = [], {-1: -1}, {-1: np.eye(3)}, {-1: np.zeros(3)}
+    for link in links(definition)[0]:
+        body = definition["bodies"][link.body]
+        last, frame, at, turn = on[link.parent], frames[link.parent], centres[link.parent] + link.place, link.turn
+        for move in link.moves if balls else _hinges(link):
+            new = np.eye(3) if move.kind == "ball" else axes(move.axis)
+            place = frame.T @ (at + turn @ move.step)
+            joints.append(
+                Joint(move.kind, last, frame.T @ turn @ new, place, move.rate, 0.0, np.zeros(3), np.zeros((3, 3)))
+            )
+            last, frame, at, turn = len(joints) - 1, new, np.zeros(3), np.eye(3)
+        joints[-1] = joints[-1]._replace(
+            mass=body["mass"], centre=frame.T @ link.centre, inertia=frame.T @ np.array(body["inertia"], float) @ frame
+        )
+        on[link.body], frames[link.body], centres[link.body] = last, frame, link.centre
+    bodies = range(len(definition["bodies"]))
+    return Tree(joints, [on[i] for i in bodies], [frames[i].T for i in bodies])
+
+
+def axes(z):
+    """A right-handed frame, by columns, with a given z axis (unit)."""
+    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def _hinges(link):
     for move in link.moves:
         if move.kind != "ball":
             yield move

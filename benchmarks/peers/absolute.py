@@ -258,7 +258,14 @@ def residual(integers, reals, y, yd, out):
     P = unpack(integers, reals)
     b, m = P.mass.size, P.row[-1]
     phi, phid, gamma, jac = np.empty(m), np.empty(m), np.empty(m), np.empty((m, 12))
-    x, f, g, lam, mu, pd = np.empty((b, STATE)), np.empty((b, 6)), np.zeros((b, 6)), np.empty(m), np.empty(m), np.empty(4)
+    x, f, g, lam, mu, pd = (
+        np.empty((b, STATE)),
+        np.empty((b, 6)),
+        np.zeros((b, 6)),
+        np.empty(m),
+        np.empty(m),
+        np.empty(4),
+    )
     for i in range(b):
         x[i] = y[P.at[i] : P.at[i] + STATE]
     for j in range(m):
@@ -286,7 +293,7 @@ def residual(integers, reals, y, yd, out):
 
 @numba.njit(**OPTIONS)
 def differences(integers, reals, y, yd, shift, group, first, rows, values):
-    """Entries of dF/dy + shift dF/dyd by columns, rows[first[j]:first[j + 1]] of column j, as many at once as can be."""
+    """Entries of dF/dy + shift dF/dyd by columns, rows[first[j]:first[j + 1]] of column j, a group at once."""
     n = y.size
     y, yd, f, g = y.copy(), yd.copy(), np.empty(n), np.empty(n)
     residual(integers, reals, y, yd, f)

@@ -27,8 +27,8 @@ class Exudyn(Contender):
 
         def run(value):
             settings = exu.SimulationSettings()
-            settings.solutionSettings.writeSolutionToFile = False
-            settings.solutionSettings.sensorsWritePeriod = scene.end
+            settings.solution.file.write = False
+            settings.solution.sensors.writePeriod = scene.end
             settings.timeIntegration.verboseMode = 0
             settings.timeIntegration.endTime = scene.end
             solver = self.tune(exu, settings, scene.end, value)
@@ -66,7 +66,8 @@ class ExudynTree(Exudyn):
         )  # fmt: skip
         one = mbs.AddObject(
             ex.ObjectKinematicTree(
-                nodeNumber=node, gravity=list(definition["gravity"]), jointTypes=[kinds[joint.kind] for joint in joints],
+                nodeNumber=node, gravity=list(definition["gravity"]),
+                jointTypes=[kinds[joint.kind] for joint in joints],
                 linkParents=[joint.parent for joint in joints], linkMasses=[joint.mass for joint in joints],
                 jointTransformations=exu.Matrix3DList([joint.turn for joint in joints]),
                 jointOffsets=exu.Vector3DList([joint.place for joint in joints]),
@@ -84,10 +85,13 @@ class ExudynTree(Exudyn):
             tuple(
                 mbs.AddSensor(
                     ex.SensorKinematicTree(
-                        objectNumber=one, linkNumber=link, localPosition=joints[link].centre, writeToFile=False,
+                        objectNumber=one,
+                        linkNumber=link,
+                        localPosition=joints[link].centre,
+                        writeToFile=False,
                         outputVariableType=kind,
                     )
-                )  # fmt: skip
+                )
                 for kind in (exu.OutputVariableType.Position, exu.OutputVariableType.RotationMatrix)
             )
             for link in on
@@ -145,26 +149,23 @@ class ExudynConstraints(Exudyn):
         for kind, a, b, given in definition["constraints"]:
             points = [list(given.get(name, (0.0, 0.0, 0.0))) for name in ("point_a", "point_b")]
             if kind == "Distance":
-                mbs.CreateDistanceConstraint(
-                    bodyNumbers=[bodies[a], bodies[b]], localPosition0=points[0], localPosition1=points[1],
-                    distance=given["length"],
-                )  # fmt: skip
+                markers = [
+                    mbs.AddMarker(ex.MarkerBodyPosition(bodyNumber=bodies[i], localPosition=at))
+                    for i, at in zip((a, b), points, strict=True)
+                ]
+                mbs.AddObject(ex.ObjectConnectorDistance(markerNumbers=markers, distance=given["length"]))
                 continue
-            markers = [
-                mbs.AddMarker(ex.MarkerBodyRigid(bodyNumber=bodies[i], localPosition=at))
-                for i, at in zip((a, b), points, strict=True)
-            ]
+            one = mbs.AddMarker(ex.MarkerBodyRigid(bodyNumber=bodies[a], localPosition=points[0]))
             if kind == "Spherical":
-                mbs.AddObject(ex.ObjectJointSpherical(markerNumbers=markers))
+                other = mbs.AddMarker(ex.MarkerBodyRigid(bodyNumber=bodies[b], localPosition=points[1]))
+                mbs.AddObject(ex.ObjectJointSpherical(markerNumbers=[one, other]))
             else:  # a plane of the ground, through its point_b
-                frame = axes(np.array(given["normal_b"], float))
-                mbs.AddObject(
-                    ex.ObjectJointGeneric(
-                        markerNumbers=markers[::-1], constrainedAxes=[0, 0, 1, 0, 0, 0], rotationMarker0=frame
-                    )
-                )
+                frame = exu.HT(rotation=axes(np.array(given["normal_b"], float)), translation=points[1])
+                plane = mbs.AddMarker(ex.MarkerBodyRigid(bodyNumber=ground, localHT=frame))
+                mbs.AddObject(ex.ObjectJointGeneric(markerNumbers=[plane, one], constrainedAxes=[0, 0, 1, 0, 0, 0]))
         for _, body, arguments in definition.get("forces", ()):
-            mbs.CreateForce(bodyNumber=bodies[body], loadVector=list(arguments["force"]))
+            marker = mbs.AddMarker(ex.MarkerBodyPosition(bodyNumber=bodies[body], localPosition=[0.0, 0.0, 0.0]))
+            mbs.AddLoad(ex.LoadForceVector(markerNumber=marker, loadVector=list(arguments["force"])))
         return [
             tuple(
                 mbs.AddSensor(ex.SensorBody(bodyNumber=body, writeToFile=False, outputVariableType=kind))

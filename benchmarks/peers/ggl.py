@@ -34,10 +34,7 @@ class System:
         P, n = self.P, self.n
         meets = np.zeros((n, n), bool)
         blocks = [np.arange(P.at[i], P.at[i] + STATE + 1) for i in range(P.at.size)]
-        rows = [
-            np.concatenate([P.at_row[a:b], P.at_mu[a:b]])
-            for a, b in zip(P.row[:-1], P.row[1:], strict=True)
-        ]
+        rows = [np.concatenate([P.at_row[a:b], P.at_mu[a:b]]) for a, b in zip(P.row[:-1], P.row[1:], strict=True)]
         for block in blocks:
             meets[np.ix_(block, block)] = True
         for c, row in enumerate(rows):

@@ -1,4 +1,4 @@
-"""MuJoCo: a tree in minimal coordinates with its Runge-Kutta method of order 4, and free bodies with soft constraints."""
+"""MuJoCo with its Runge-Kutta method of order 4: a tree in minimal coordinates, and free bodies softly constrained."""
 
 import numpy as np
 
@@ -71,9 +71,7 @@ class MuJoCoTree(MuJoCo):
         """Nested bodies; returns their names, and the velocity at the start."""
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-        kinds = {
-            "slide": mujoco.mjtJoint.mjJNT_SLIDE, "hinge": mujoco.mjtJoint.mjJNT_HINGE, "ball": mujoco.mjtJoint.mjJNT_BALL
-        }  # fmt: skip
+        kinds = {kind: getattr(mujoco.mjtJoint, f"mjJNT_{kind.upper()}") for kind in ("slide", "hinge", "ball")}
         made, velocity = {-1: spec.worldbody}, []
         for link in links(definition)[0]:
             way = [move.step for move in link.moves]
@@ -121,9 +119,8 @@ class MuJoCoConstraints(MuJoCo):
                 for side, body, at in zip("ab", (a, b), points, strict=True)
             ]
             if kind == "Spherical":
-                equality = spec.add_equality(
-                    type=mujoco.mjtEq.mjEQ_CONNECT, name1=ends[0].name, name2=ends[1].name, objtype=mujoco.mjtObj.mjOBJ_SITE
-                )  # fmt: skip
+                equality = spec.add_equality(type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE)
+                equality.name1, equality.name2 = ends[0].name, ends[1].name
             else:
                 tendon = spec.add_tendon(name=f"rod{i}")
                 for one in ends:

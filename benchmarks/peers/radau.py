@@ -52,8 +52,15 @@ class Radau(Contender):
             atol = np.where(kept > 0.0, tol, 1e6)
             seconds, found = timed(
                 lambda: solve_dae(
-                    f, span, system.y, system.yd, method="Radau", rtol=max(tol, 1e-13), atol=atol, jac=jacobian,
-                )  # fmt: skip
+                    f,
+                    span,
+                    system.y,
+                    system.yd,
+                    method="Radau",
+                    rtol=max(tol, 1e-13),
+                    atol=atol,
+                    jac=jacobian,
+                )
             )
             if not found.success:
                 raise RuntimeError(str(found.message))

@@ -29,6 +29,8 @@ class Contender:
         "tolerance" or "step" (s).
     values : tuple of float
         What is worth trying, the cheapest first.
+    calls : int
+        How many short runs a sample is the median of.
     get : str
         How to get what it needs.
     """
@@ -36,6 +38,7 @@ class Contender:
     name = ""
     setting = "tolerance"
     values = tuple(10.0**-k for k in range(2, 15))
+    calls = 9
     get = ""
 
     def version(self):

@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 ERRORS = tuple(10.0**-k for k in range(2, 15))
-BRIEF = 0.02  # s, that a sample is made of at least, as far as CALLS go
-CALLS = 9
+BRIEF = 0.02  # s, that a sample is made of at least, as far as its calls go
 
 
 class Row(NamedTuple):
@@ -34,9 +33,10 @@ class Measured(NamedTuple):
         """Their names, in the order of the rows."""
         return tuple(dict.fromkeys(row.contender for row in self.rows))
 
-    def seconds_to(self, contender, error):
+    def seconds_to(self, contender, error, which="seconds"):
         """The least time to an error, between settings by straight lines in logarithms; inf where it isn't reached."""
-        points = sorted((row.error, row.seconds) for row in self.rows if row.contender == contender and not row.message)
+        rows = [row for row in self.rows if row.contender == contender and not row.message]
+        points = sorted((row.error, getattr(row, which)) for row in rows)
         points = [point for point in points if point[0] > 0.0]
         best = np.inf
         for e, s in points:
@@ -84,19 +84,20 @@ def measure(scene, contenders, repeats=5, budget=3.0, thin=1, report=print):
     """
     reference = scene.reference()
     r, A = reference.r[-1], reference.A[-1]
-    rows, runs = [], []
+    rows, runs, most = [], [], []
     for contender in contenders:
         if contender.serves(scene):
             report(f"{scene.name}: {contender.name}")
             for row, run in _ladder(contender, scene, r, A, budget, thin):
                 rows.append(row)
                 runs.append(run)
+                most.append(contender.calls)
     samples = [[] for _ in rows]
     for turn in range(repeats):
         report(f"{scene.name}: round {turn + 1} of {repeats}")
         for i, (row, run) in enumerate(zip(rows, runs, strict=True)):
             if not row.message and (row.seconds < 1.0 or turn < 2):
-                calls = int(np.clip(BRIEF / row.seconds, 1, CALLS))
+                calls = int(np.clip(BRIEF / row.seconds, 1, most[i]))
                 samples[i].append([run(row.value).seconds for _ in range(calls)])
     rows = [
         row._replace(
@@ -134,7 +135,7 @@ def _ladder(contender, scene, r, A, budget, thin):
         yield Row(contender.name, contender.setting, value, off, outcome.seconds, outcome.seconds, 1), run
         idle = 0 if off < 0.5 * best else idle + 1
         best = min(best, off)
-        if outcome.seconds > budget or (idle == 2 and best < 1e-6):
+        if outcome.seconds > budget or (idle == 3 and best < 1e-9):
             return
 
 

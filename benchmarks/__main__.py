@@ -1,4 +1,4 @@
-"""All benchmarks: python -m benchmarks [--quick]. Tables are printed; JSON and figures go into a folder."""
+"""All benchmarks: python -m benchmarks [--quick]. Tables are printed; JSON and figures are written."""
 
 import argparse
 import sys
@@ -21,12 +21,13 @@ def main(arguments=None):
     parser.add_argument("--repeats", type=int, default=5, help="timed rounds (5)")
     parser.add_argument("--budget", type=float, default=3.0, help="seconds that one run may take (3)")
     parser.add_argument("--largest", type=int, default=4096, help="bodies, for scaling (4096)")
-    parser.add_argument("--folder", type=Path, default=Path("benchmarks") / "results", help="of JSON and figures")
+    parser.add_argument("--folder", type=Path, default=Path("benchmarks") / "results", help="of JSON")
+    parser.add_argument("--figures", type=Path, help="of figures (the folder of JSON; docs/images for the README's)")
     given = parser.parse_args(arguments)
     unknown = set(given.parts) - set(PARTS)
     if unknown:
         parser.error(f"no part {', '.join(sorted(unknown))}; there are {', '.join(PARTS)}")
-    parts = given.parts or PARTS
+    parts, figures = given.parts or PARTS, given.figures or given.folder
 
     def report(line):
         print(line, file=sys.stderr, flush=True)
@@ -36,9 +37,10 @@ def main(arguments=None):
             given.folder, given.scenes, given.methods, not given.no_peers, given.quick, given.large, given.repeats,
             given.budget, report,
         )  # fmt: skip
-        draw("work_precision", results, given.folder)
+        draw("work_precision", results, figures)
     if "scaling" in parts:
-        draw("scaling", scaling.run(given.folder, given.quick, largest=given.largest, report=report), given.folder)
+        sizes = scaling.run(given.folder, given.quick, largest=given.largest, report=report)
+        draw("scaling", sizes, figures)
     if "cold-start" in parts:
         cold_start.main()
 

@@ -166,11 +166,19 @@ def _begin_run(context, c, r, log, steps):
 
 
 @kernel
+def _go_to_start(c, r):
+    """The poses at the step's start, from where p is followed."""
+    copy(r.now[0], c.work.q)
+    place_bodies(c.network.bodies, c.work.q, c.free.poses)
+
+
+@kernel
 def _within(context, c, r, log, steps, t0, t1):
     """What t_eval asks for in (t0, t1). Status."""
     w = c.work
     while r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
         t = log.t_eval[r.numbers[NEXT_EVAL]]
+        _go_to_start(c, r)
         status = state_within(context, steps, t, t - t0)
         if status != 0:
             return status
@@ -251,8 +259,7 @@ def advance_series(context, run, log, steps, most):
                 break
             if not adaptive:
                 return status
-            copy(r.now[0], w.q)
-            place_bodies(c.network.bodies, w.q, f.poses)
+            _go_to_start(c, r)
             r.numbers[REJECTED] += 1  # the same series serves a shorter step
             if r.numbers[HISTORY] + 1 < log.history.shape[0]:
                 r.numbers[HISTORY] += 1
@@ -267,6 +274,7 @@ def advance_series(context, run, log, steps, most):
         if r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
             status = _within(context, c, r, log, steps, t0, t1)
             if status == 0:
+                _go_to_start(c, r)
                 status = call_reach(steps[REACH], context, t1, t1 - t0)
             if status != 0:
                 return status

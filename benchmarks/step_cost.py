@@ -8,7 +8,7 @@ import time
 import numpy as np
 
 import tsdyn as ts
-from benchmarks import top_by_hand
+from benchmarks.by_hand import nystrom_top
 from examples import top
 
 END, ROUNDS = 10.0, 9
@@ -26,7 +26,7 @@ def contenders(steps, interval):
     scene = top.build()
     method = ts.integrators.Nystrom4(step=END / steps)
     return {
-        "by hand": lambda: top_by_hand.simulate(*top_by_hand.start(), END, steps, 1e-12, interval),
+        "by hand": lambda: nystrom_top.simulate(*nystrom_top.start(), END, steps, 1e-12, interval),
         "tsdyn, two outputs": lambda: ts.simulate(scene, (0.0, END), integrator=method, t_eval=[0.0, END]),
         "tsdyn, every step": lambda: ts.simulate(scene, (0.0, END), integrator=method),
     }

@@ -47,6 +47,7 @@ series_state
 implicit
 integrator
 integrators.* constraints.__init__ forces.__init__ integrators.__init__
+arguments
 loads
 landing displacement free_accelerations
 local_chart
@@ -62,7 +63,7 @@ taylor expansion_pack
 series_memory
 series_dense
 formulation run
-memory prepare task arguments
+memory prepare task
 events drive work
 series_run steps solution
 series_check

@@ -1,5 +1,9 @@
 """The checkers and `series`: right ones pass, wrong ones are named; scenes without are refused with the reason."""
 
+import re
+from importlib import import_module
+from pathlib import Path
+
 import numpy as np
 import pytest
 from plug_ins import Rod, Soft
@@ -43,6 +47,13 @@ def test_series_of_forces(make):
 def test_series_of_plug_ins():
     ts.testing.check_force(Soft)
     ts.testing.check_primitive(Rod)
+
+
+def test_the_example_of_the_docs(tmp_path, monkeypatch):
+    text = (Path(__file__).parents[1] / "docs" / "plug-ins.md").read_text().split("# Taylor series of your own")[1]
+    (tmp_path / "series_of_the_docs.py").write_text(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1])
+    monkeypatch.syspath_prepend(tmp_path)
+    import_module("series_of_the_docs")  # it checks itself
 
 
 def test_every_smooth_kind_has_a_series():
@@ -218,11 +229,19 @@ REFUSED = {
 def test_scenes_without_series_are_refused_by_name(make, message):
     scene, a, b, _ = pair()
     scene.add(make(a, b))
-    with pytest.raises(ts.InvalidArgument, match=message) as raised:
-        ts.simulate(scene, (0.0, 0.1), integrator=ts.integrators.Taylor())
-    assert "DOP853" in str(raised.value)
+    said = refusal(scene.packed)
+    assert re.search(message, said)
+    assert "DOP853" in said
     scene.add(F.CoulombFriction(b, scene.ground, force=1.0, name="brake"))
     assert len(without_series(scene.packed)) == 2
+
+
+def test_taylor_refuses_and_the_default_method_does_without():
+    scene, a, b, _ = pair()
+    scene.add(F.Spring(a, b, actuator=wave, name="left"))
+    with pytest.raises(ts.InvalidArgument, match="Spring 'left': its actuator is a function of time"):
+        ts.simulate(scene, (0.0, 0.1), integrator=ts.integrators.Taylor())
+    assert ts.simulate(scene, (0.0, 0.1)).success
 
 
 def test_scenes_with_series_are_not_refused():

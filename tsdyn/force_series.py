@@ -9,8 +9,9 @@ all. Order k of the law needs x up to k and xd up to k, which is x up to k + 1:
     T_k             = s x sum_j A_j^T f_{k-j}                       torque about the centroid, body     (3)
                       sum_j A_j^T f_{k-j};  1/2 sum_j G(p_j) f_{k-j}    frame: of a Turn; of Parameters
 
-The series of an instance holds x, xd and the forces (4 floats a marker and order each), then its own scratch, then for
-each marker the last order at which its force is not zero: (3) ends there, at once for what is constant.
+The series of an instance holds p and the forces (4 floats a marker and order each, p of Parameters only), then its own
+scratch, then for each marker the last order at which its force is not zero: (3) ends there, at once for what is
+constant. What a law makes no use of isn't stored, so that the compiler leaves it out.
 """
 
 from ._four import add, cross, fma, four, lanes, put, splat, times
@@ -24,7 +25,7 @@ BODY, MASK, INTS = 0, 2, 3  # of the table: the two bodies, and which of them ar
 
 def instance_width(markers, slots, orders):
     """Floats of an instance."""
-    return 12 * markers * orders + 4 * ((slots * orders + markers + 3) // 4)
+    return 8 * markers * orders + 4 * ((slots * orders + markers + 3) // 4)
 
 
 @kernel
@@ -41,16 +42,14 @@ def _turning(bodies, at, orders, k):
 
 @kernel
 def _place(code, bodies, at, orders, k, s):
-    """Order k of the x of a Point or Vector, zero for a Turn; its body's series begins at bodies[at]."""
-    if code == TURN:
-        return splat(0.0)
+    """Order k of the x of a Point or Vector; its body's series begins at bodies[at]."""
     f = turned(bodies, at + 12 * k, s[0], s[1], s[2])
     return add(f, four(bodies, at + S_R * orders + 4 * k)) if code == POINT else f
 
 
 @kernel
-def _parameters_rate(bodies, omega, k, values, p, out):
-    """out[out:out + 4] of values = order k of pd, Eq. (1); p_0 is at values[p], omega'_0 at bodies[omega]."""
+def _parameters_rate(bodies, omega, k, values, p, out, c):
+    """out[c : c + 4] = order k of pd, Eq. (1); p_0 is at values[p], omega'_0 at bodies[omega]."""
     d0, d1, d2, d3 = 0.0, 0.0, 0.0, 0.0
     for j in range(k + 1):
         e, o = p + 4 * j, omega + 4 * (k - j)
@@ -60,7 +59,7 @@ def _parameters_rate(bodies, omega, k, values, p, out):
         d1 += e0 * x - e3 * y + e2 * z
         d2 += e3 * x + e0 * y - e1 * z
         d3 += e1 * y - e2 * x + e0 * z
-    values[out], values[out + 1], values[out + 2], values[out + 3] = 0.5 * d0, 0.5 * d1, 0.5 * d2, 0.5 * d3
+    out[c], out[c + 1], out[c + 2], out[c + 3] = 0.5 * d0, 0.5 * d1, 0.5 * d2, 0.5 * d3
 
 
 @kernel
@@ -89,28 +88,26 @@ def series(mode, k, orders, count, stride, table, reals, bodies, values, poses, 
     values, poses, Z = vector(values, ANY), vector(poses, ANY), vector(Z, ANY)
     x, xd, f = stack(ROOM), stack(ROOM), stack(ROOM)
     wide, body_size = 4 * orders, BODY_ROW * orders
-    own_scratch = 3 * MARKERS * wide
+    own_scratch = 2 * MARKERS * wide
     size = own_scratch + 4 * ((SLOTS * orders + MARKERS + 3) // 4)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         first = i * size
         for j in range(MARKERS):
-            at, s, place = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3], first + j * wide + 4 * k
-            rate = place + MARKERS * wide
+            at, s, c = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3], STARTS[j]
             if CODES[j] == PARAMETERS:
+                p = first + j * wide
                 if k == 0:
-                    put(values, place, four(poses, own[OWNERS[j]] * POSE + P))
-                _parameters_rate(bodies, at + S_OMEGA * orders, k, values, first + j * wide, rate)
-                put(values, place + 4, times(four(values, rate), splat(1.0 / (k + 1))))
+                    put(values, p, four(poses, own[OWNERS[j]] * POSE + P))
+                _parameters_rate(bodies, at + S_OMEGA * orders, k, values, p, xd, c)
+                put(values, p + 4 * k + 4, times(four(xd, c), splat(1.0 / (k + 1))))
+                put(x, c, four(values, p + 4 * k))
+            elif CODES[j] == TURN:
+                put(x, c, splat(0.0))
+                put(xd, c, _turning(bodies, at, orders, k))
             else:
-                if k == 0:
-                    put(values, place, _place(CODES[j], bodies, at, orders, 0, s))
-                following = _place(CODES[j], bodies, at, orders, k + 1, s)
-                put(values, place + 4, following)
-                turning = CODES[j] == TURN
-                put(values, rate, _turning(bodies, at, orders, k) if turning else times(following, splat(k + 1.0)))
-            put(x, STARTS[j], four(values, place))
-            put(xd, STARTS[j], four(values, rate))
+                put(x, c, _place(CODES[j], bodies, at, orders, k, s))
+                put(xd, c, times(_place(CODES[j], bodies, at, orders, k + 1, s), splat(k + 1.0)))
         for c in range(SIZE):
             f[c] = 0.0
         scratch = matrix(data_of(values[first + own_scratch :]), SLOTS, orders)
@@ -119,7 +116,7 @@ def series(mode, k, orders, count, stride, table, reals, bodies, values, poses, 
             if own[MASK] >> OWNERS[j] & 1:
                 continue
             c, s, z = STARTS[j], real[3 * j : 3 * j + 3], 8 * own[OWNERS[j]]
-            at, forces = own[OWNERS[j]] * body_size, first + (2 * MARKERS + j) * wide
+            at, forces = own[OWNERS[j]] * body_size, first + (MARKERS + j) * wide
             ends = first + own_scratch + SLOTS * orders + j
             wider = CODES[j] == PARAMETERS
             some = f[c] != 0.0 or f[c + 1] != 0.0 or f[c + 2] != 0.0 or (wider and f[c + 3] != 0.0)

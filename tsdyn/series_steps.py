@@ -40,10 +40,10 @@ def expand_series(context, k):
 
 @callback("pdd")
 def reach(context, t, h):
-    """The state at t, h after the series' origin, on the manifold, but for qdd; h = 0 takes the poses. Status."""
+    """The state at t, h after the series' origin, on the manifold, but for qdd; h < 0 takes the poses. Status."""
     c = load_series(context)
     w, x, f = c.work, c.expansion, c.free
-    if h != 0.0:
+    if h >= 0.0:
         sum_series(c.network, x.bodies, x.order[ORDERS], x.order[TOP], h, f.poses, f.p)
     status = land(c.network, c.system, w, f, t)
     if status == 0:

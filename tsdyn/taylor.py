@@ -135,14 +135,19 @@ def _accept(context, c, r, log, steps, t):
         return NOT_FINITE
     store_now(w, r)
     r.clock[T] = t
-    log.charts[r.numbers[CHART_ROWS], 0], log.charts[r.numbers[CHART_ROWS], 2] = t, 1.0
-    w.counters[CHARTS] += 1
     if log.t_eval.size == 0:
         record(r, log, t, w.q, w.qd, w.qdd)
     elif r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] == t:
         record(r, log, t, w.q, w.qd, w.qdd)
         r.numbers[NEXT_EVAL] += 1
     return 0
+
+
+@kernel
+def _open_chart(w, r, log, t, reason):
+    row = log.charts[r.numbers[CHART_ROWS]]
+    row[0], row[1], row[2], row[3], row[4] = t, reason, 1.0, 0.0, 0.0
+    w.counters[CHARTS] += 1
 
 
 @kernel
@@ -155,9 +160,16 @@ def _begin_run(context, c, r, log, steps):
     w.control[FLOOR] = ROUNDING * (w.control[SIZE] + largest)
     place_bodies(c.network.bodies, w.q, f.poses)
     move_bodies(c.network.bodies, w.q, w.qd, f.poses)
-    status = call_reach(steps[REACH], context, r.clock[T], 0.0)
-    log.charts[0, 1] = AT_START
+    status = call_reach(steps[REACH], context, r.clock[T], -1.0)
+    _open_chart(w, r, log, r.clock[T], AT_START)
     return _accept(context, c, r, log, steps, r.clock[T]) if status == 0 else status
+
+
+@kernel
+def _go_to_start(c, r):
+    """The poses at the step's start, from where p is followed."""
+    copy(r.now[0], c.work.q)
+    place_bodies(c.network.bodies, c.work.q, c.free.poses)
 
 
 @kernel
@@ -166,6 +178,7 @@ def _within(context, c, r, log, steps, t0, t1):
     w = c.work
     while r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
         t = log.t_eval[r.numbers[NEXT_EVAL]]
+        _go_to_start(c, r)
         status = state_within(context, steps, t, t - t0)
         if status != 0:
             return status
@@ -187,7 +200,7 @@ def _fastest(c):
 @kernel
 def _watch(c, r, h):
     """Whether the steps have just been found short for what moves: many in which nothing turns or moves far."""
-    far, p = SMALL * max(c.work.control[SIZE], 1e-300) / h, c.free.poses
+    far, p = SMALL * c.work.control[FLOOR] / (ROUNDING * h), c.free.poses
     for b in range(c.network.bodies.shape[0]):
         at = b * POSE
         for i in range(3):
@@ -246,8 +259,7 @@ def advance_series(context, run, log, steps, most):
                 break
             if not adaptive:
                 return status
-            copy(r.now[0], w.q)
-            place_bodies(c.network.bodies, w.q, f.poses)
+            _go_to_start(c, r)
             r.numbers[REJECTED] += 1  # the same series serves a shorter step
             if r.numbers[HISTORY] + 1 < log.history.shape[0]:
                 r.numbers[HISTORY] += 1
@@ -262,13 +274,14 @@ def advance_series(context, run, log, steps, most):
         if r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
             status = _within(context, c, r, log, steps, t0, t1)
             if status == 0:
+                _go_to_start(c, r)
                 status = call_reach(steps[REACH], context, t1, t1 - t0)
             if status != 0:
                 return status
         log.charts[r.numbers[CHART_ROWS], 4] = 1.0
         if not last:
             r.numbers[CHART_ROWS] += 1
-            log.charts[r.numbers[CHART_ROWS], 1] = BY_SERIES
+            _open_chart(w, r, log, t1, BY_SERIES)
         r.numbers[STEPS] += 1
         status = _accept(context, c, r, log, steps, t1)
         if status != 0:

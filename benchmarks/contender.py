@@ -1,0 +1,88 @@
+"""What is compared: anything that runs a scene to its end at a tolerance or of a step, and says how long it took."""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Outcome(NamedTuple):
+    """A run's end; b bodies."""
+
+    seconds: float  # of the run alone, without building, compiling or reading results
+    r: np.ndarray  # (b, 3), m
+    A: np.ndarray  # (b, 3, 3), body to ground
+
+    def error(self, r, A):
+        """The largest difference from a reference over positions (m) and rotation matrices; nan counts as inf."""
+        off = max(np.abs(self.r - r).max(), np.abs(self.A - A).max())
+        return float(off) if np.isfinite(off) else np.inf
+
+
+class Contender:
+    """One engine or method; a subclass of it is one short file or less.
+
+    Attributes
+    ----------
+    name : str
+    setting : str
+        "tolerance" or "step" (s).
+    values : tuple of float
+        What is worth trying, the cheapest first.
+    calls : int
+        How many short runs a sample is the median of.
+    get : str
+        How to get what it needs.
+    """
+
+    name = ""
+    setting = "tolerance"
+    values = tuple(10.0**-k for k in range(2, 15))
+    calls = 9
+    get = ""
+
+    def version(self):
+        """What of which version runs, as text; raises ImportError (or OSError) where it isn't there."""
+        return ""
+
+    def missing(self):
+        """Return a line that says how to get it, empty where it is there."""
+        try:
+            self.version()
+        except (ImportError, OSError) as error:
+            return f"{self.name} is left out: {self.get} ({error})"
+        return ""
+
+    def serves(self, scene):
+        """Whether it can run a scene, a `scenes.Benchmarked`."""
+        raise NotImplementedError
+
+    def prepare(self, scene):
+        """Build the scene; return run(value) -> Outcome, which may be called again and again.
+
+        It raises RuntimeError, or a child of it, where a run doesn't reach its end.
+        """
+        raise NotImplementedError
+
+
+def timed(call, *arguments):
+    """Seconds that a call takes, and what it returns."""
+    started = time.perf_counter()
+    result = call(*arguments)
+    return time.perf_counter() - started, result
+
+
+def rotation(p):
+    """Rotation matrices (b, 3, 3) of Euler parameters (b, 4), scalar first, of any length."""
+    e0, e1, e2, e3 = np.transpose(np.asarray(p) / np.linalg.norm(p, axis=-1, keepdims=True))
+    return np.moveaxis(
+        np.array(
+            [
+                [1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)],
+                [2 * (e1 * e2 + e0 * e3), 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)],
+                [2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1 * e1 + e2 * e2)],
+            ]
+        ),
+        -1,
+        0,
+    )

@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ._kernel import loader
-from .blocks import Pattern
 from .free import Free
 from .network import Network
 from .system import System
@@ -39,11 +38,9 @@ class SeriesContext(NamedTuple):
 def _example():
     """One of the right types."""
     line, whole, table = np.zeros(1), np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    pattern = Pattern(*[whole] * len(Pattern._fields))
-    network = Network(table, table, whole, table, whole, table, line, line, whole, pattern)
     expansion = Expansion(whole, line, line, table, table, whole, line)
     plain = plain_context()
-    return SeriesContext(plain.system, plain.work, network, Free(*[line] * len(Free._fields)), expansion)
+    return SeriesContext(plain.system, plain.work, plain.network, Free(*[line] * len(Free._fields)), expansion)
 
 
 load_series = loader(_example())

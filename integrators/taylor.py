@@ -40,7 +40,7 @@ class Taylor(Integrator):
 
     order = embedded_order = 15
     driver = "series"
-    margin = 300.0
+    margin = 1000.0
 
     def __init__(self, tol=1e-15, order=None, *, rtol=None, atol=None, step=None, max_step=None, first_step=None):
         self.tol = positive(tol, "Taylor: tol")

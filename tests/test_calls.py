@@ -109,10 +109,10 @@ def test_an_edited_scene_uses_the_memory_again_and_sees_the_edit(monkeypatch):
         scene.bodies[0].mass = mass
         fresh = top.build()
         fresh.bodies[0].mass = mass
-        same(run(scene, "default"), run(fresh, "default"))
+        same(run(scene, "charts"), run(fresh, "charts"))
     assert len(made) == 1 + 3  # one for the scene, one for each of the others
     scene.add_point_mass(1.0)
-    assert run(scene, "default").q.shape[1] == 10
+    assert run(scene, "charts").q.shape[1] == 10
     assert len(made) == 5
 
 

@@ -110,27 +110,34 @@ def masks(network, packed, kinds):
 
     Columns are constant where the primitive's own series says so for a random motion.
     """
-    rng = np.random.default_rng(0)
     for row, kind in zip(network.kinds, kinds, strict=True):
         members = [pair for pair in zip(packed.constraints, packed.parameters, strict=True) if type(pair[0]) is kind]
-        patterns, series = {}, twin(kind.series)
+        motions, patterns, series = {}, {}, twin(kind.series)
         for i, (constraint, par) in enumerate(members):
             grounded = tuple(isinstance(constraint.body_of(marker), Ground) for marker in kind.markers)
             if (grounded, par) not in patterns:
-                patterns[grounded, par] = _mask(kind, series, par, grounded, rng)
+                if grounded not in motions:
+                    motions[grounded] = _random_motion(grounded)
+                patterns[grounded, par] = _mask(kind, series, par, grounded, motions[grounded])
             network.table[row[N_FIRST_INT] + i * INTS + MASK] = patterns[grounded, par]
 
 
-def _mask(kind, series, par, grounded, rng):
-    size = 3 * len(kind.markers)
-    scratch, varies = np.zeros((kind.slots, 5)), np.zeros(size, bool)
-    for k in range(4):
-        x, out = rng.normal(size=size), np.zeros((kind.rows, size))
-        if k > 0:
-            x[np.repeat(grounded, 3)] = 0.0
-        series(x, np.array(par, float), k, scratch, out)
+def _random_motion(grounded):
+    """The first coefficients of x, those of the ground constant."""
+    x = np.random.default_rng(0).normal(size=(4, len(grounded), 3))
+    x[1:, np.array(grounded)] = 0.0
+    return x.reshape(4, -1).tolist()
+
+
+def _mask(kind, series, par, grounded, motion):
+    scratch, varies = np.zeros((kind.slots, len(motion))), np.zeros(len(motion[0]), bool)
+    for k, x in enumerate(motion):
+        out = np.zeros((kind.rows, len(x)))
+        series(x, par, k, scratch, out)
         if k > 0:
             varies |= out.any(axis=0)
+            if varies.all():
+                break
     bits = [bool(varies[3 * j : 3 * j + 3].any()) << j for j in range(len(kind.markers))]
     bits += [bool(on) << (GROUND + j) for j, on in enumerate(grounded)]
     return sum(bits)

@@ -35,7 +35,7 @@ REASONS = (
 
 CONTRACTION_LIMIT = 0.15
 TURN_LIMIT = 0.25
-CONTRACTION_LOST = 0.9  # nearer to one the normal space need not meet the manifold on the way; another branch may have
+CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a turn of 60 degrees
 ROUNDING = 1e-15  # relative to the numbers that enter Phi: below this a residual says nothing
 PIVOT_LIMIT = 1e-15  # of S0: less of a diagonal entry than this is rounding
 

@@ -260,13 +260,26 @@ def start_chart(context, t, x, y, yd, unused):
 
 @kernel
 def _spin(q, qd, i, out, o):
-    """out[o : o + 3] = 2 G pd / p.p, so that rounding of |p| does not add up over charts."""
+    """out[o : o + 3] = 2 G pd / p.p, p.p - 1 being exact to rounding of itself: over many charts a bias adds up."""
     e0, e1, e2, e3 = q[i], q[i + 1], q[i + 2], q[i + 3]
     d0, d1, d2, d3 = qd[i], qd[i + 1], qd[i + 2], qd[i + 3]
-    f = 2.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
-    out[o] = f * (-e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3)
-    out[o + 1] = f * (-e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3)
-    out[o + 2] = f * (-e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3)
+    excess, low = -1.0, 0.0
+    for c in range(4):
+        e = q[i + c]
+        wide = 134217729.0 * e  # Dekker: e in two halves, so that their products are exact
+        high = wide - (wide - e)
+        rest = e - high
+        square = e * e
+        low += ((high * high - square) + 2.0 * high * rest) + rest * rest
+        total = excess + square
+        part = total - excess
+        low += (excess - (total - part)) + (square - part)
+        excess = total
+    f = 2.0 * (excess + low)
+    x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3
+    y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
+    z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
+    out[o], out[o + 1], out[o + 2] = 2.0 * x - f * x, 2.0 * y - f * y, 2.0 * z - f * z
 
 
 @kernel

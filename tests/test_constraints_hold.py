@@ -184,11 +184,12 @@ def test_errors_obey_the_tolerance(name, tolerance):
 @pytest.mark.parametrize("name", ["sliding_top", "two_body_pendulum", "two_body_pendulum_spatial"])
 def test_maggi_kane_drifts_in_position_only(name):
     scene, _ = load(name)
-    solution = run(scene, 5.0, 4e-3, formulation="maggi-kane", constraint_tol=EPS)
+    step = 4e-3 if name == "sliding_top" else 2e-3  # its drift is a hundredth of the others'
+    solution = run(scene, 5.0, step, formulation="maggi-kane", constraint_tol=EPS)
     check(solution, ("velocity", "acceleration"))
     drift = solution.constraint_error.position
     assert drift[-1] > 1e4 * BOUNDS["position"]
-    finer = run(scene, 5.0, 2e-3, formulation="maggi-kane", constraint_tol=EPS).constraint_error.position
+    finer = run(scene, 5.0, step / 2, formulation="maggi-kane", constraint_tol=EPS).constraint_error.position
     assert drift.max() / finer.max() > 2**3.85
 
 

@@ -160,7 +160,8 @@ def test_history_of_steps_and_charts(make, formulation, span):
     assert (charts.contraction >= 0.0).all()
     assert stats.evaluations == 4 * stats.steps + 1  # Nystrom4, and its first-order equivalent
     assert stats.placements >= 3 * stats.steps + 1
-    assert stats.newton_iterations >= (0 if formulation == "maggi-kane" else stats.placements)
+    solved = stats.newton_iterations + stats.solves_skipped
+    assert solved >= (0 if formulation == "maggi-kane" else stats.placements)
     assert stats.factorizations > 0
     assert set(stats.seconds) == {"prepare", "run"}
 

@@ -7,7 +7,7 @@ N       = H(q) C Y0                         what Phi changes by, with -u
 
 import math
 
-from ._four import cross, first, fma, four, lanes, put, second, splat, sub, third, times, total
+from ._four import add, cross, first, fma, four, lanes, put, second, splat, sub, third, times, total
 from ._kernel import kernel
 from .block_kernels import factor_lu
 from .normal import multiply_both
@@ -29,14 +29,16 @@ def displace(network, l, poses):
             square = x * x + y * y + z * z
             if not square < FARTHEST:
                 return False
-            w = math.sqrt(1.0 - square)
+            w = -square / (
+                1.0 + math.sqrt(1.0 - square)
+            )  # d0 - 1, not d0: its rounding would be the same in every step
             put(l.d, 4 * b, lanes(x, y, z))
             l.d[4 * b + 3] = w
             e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
-            p0 = w * e0 - e1 * x - e2 * y - e3 * z
-            p1 = w * e1 + e0 * x - e3 * y + e2 * z
-            p2 = w * e2 + e3 * x + e0 * y - e1 * z
-            p3 = w * e3 - e2 * x + e1 * y + e0 * z
+            p0 = e0 + (w * e0 - e1 * x - e2 * y - e3 * z)
+            p1 = e1 + (w * e1 + e0 * x - e3 * y + e2 * z)
+            p2 = e2 + (w * e2 + e3 * x + e0 * y - e1 * z)
+            p3 = e3 + (w * e3 - e2 * x + e1 * y + e0 * z)
             f = 1.5 - 0.5 * (p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)  # rounding of many charts would add up
             orient(poses, at, f * p0, f * p1, f * p2, f * p3)
     return True
@@ -47,8 +49,8 @@ def _turn_by(l, b, y):
     """C y of body b, y in four lanes."""
     x, e, z, w = l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2], l.d[4 * b + 3]
     d = lanes(x, e, z)
-    along = total(times(d, y)) / w
-    return sub(fma(d, splat(along), times(y, splat(w))), cross(d, y))
+    along = total(times(d, y)) / (1.0 + w)
+    return add(y, sub(fma(d, splat(along), times(y, splat(w))), cross(d, y)))
 
 
 @kernel
@@ -93,7 +95,7 @@ def write_back(network, l, poses, Z, out):
             x, y, z, w = l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2], l.d[4 * b + 3]
             d, omega, change = lanes(x, y, z), four(poses, at + OMEGA), four(Z, o + 4)
             square = -0.5 * total(times(omega, omega))
-            put(out, o + 4, fma(d, splat(square), fma(change, splat(w), cross(d, change))))
+            put(out, o + 4, add(change, fma(d, splat(square), fma(change, splat(w), cross(d, change)))))
 
 
 @kernel

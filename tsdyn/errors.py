@@ -111,7 +111,7 @@ _SENTENCES = {
     ),
     Status.CHART_LOST: (
         "The motion left its chart within a single step, so which branch of the constraints it is on is not certain.",
-        "Take a smaller step; where levers are thousands of units long, use a larger unit of length.",
+        "Take a smaller step.",
     ),
     Status.STEP_COLLAPSED: (
         "The step that the tolerances ask for is down to rounding of the time.",

@@ -15,7 +15,7 @@ class Local(NamedTuple):
     """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
 
     base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; local_chart.touch
-    d: np.ndarray  # ((b + 1) * 4,)  d, d0 of the present place; displacement.displace
+    d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 of the present place; displacement.displace
     x: np.ndarray  # ((b + 1) * 8,)  its coordinates; tangent.place
     y: np.ndarray  # ((b + 1) * 8,)  their rates; tangent.accelerate
     H0: np.ndarray  # (m * 16,)  rows of [Phi_r, Phi_pi'] at q0; local_chart.touch
@@ -37,7 +37,7 @@ def allocate_local(network):
     nb, m = len(network.bodies), len(network.row)
     size = network.pattern.shape[2]
     base, d, zeros = np.zeros((nb + 1, 8)), np.zeros((nb + 1, 4)), np.zeros
-    base[:, 4] = d[:, 3] = 1.0
+    base[:, 4] = 1.0
     return Local(
         base.ravel(), d.ravel(), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(16 * m), zeros(16 * m), zeros(size),
         zeros(16 * m), zeros(size), zeros(size), zeros(m), zeros(NUMBERS),

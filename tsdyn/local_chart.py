@@ -36,7 +36,8 @@ REASONS = (
 
 CONTRACTION_LIMIT = 0.15
 TURN_LIMIT = 0.25
-CONTRACTION_LOST = 0.9  # nearer to one the normal space need not meet the manifold on the way; another branch may have
+TURN_SHARE = 0.55  # a turn alone, which no constraint minds, may go on to |d| = 0.9 in one step
+CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a turn of 60 degrees
 ROUNDING = 1e-15  # relative to the numbers that enter Phi: below this a residual says nothing
 PIVOT_LIMIT = 1e-15  # of S0: less of a diagonal entry than this is rounding
 
@@ -64,7 +65,7 @@ def touch(network, system, w, f, l, t):
             l.d[4 * b + c] = 0.0
         for c in range(4):
             l.base[o + 4 + c] = f.poses[at + P + c]
-        l.d[4 * b + 3] = 1.0
+        l.d[4 * b + 3] = 0.0
     size = 0.0
     for i in range(w.q.size):
         size = max(size, abs(w.q[i]))
@@ -77,7 +78,7 @@ def touch(network, system, w, f, l, t):
 
 @kernel
 def measure_turns(network, q, l):
-    """l.d of positions q: (d0, d) = p0* o p."""
+    """l.d of positions q; (d0, d) = p0* o p."""
     for b in range(network.bodies.shape[0]):
         if network.bodies[b, 1] == 7:
             i, o = network.bodies[b, 0] + 3, 8 * b + 4
@@ -86,7 +87,7 @@ def measure_turns(network, q, l):
             l.d[4 * b] = -e1 * p0 + e0 * p1 + e3 * p2 - e2 * p3
             l.d[4 * b + 1] = -e2 * p0 - e3 * p1 + e0 * p2 + e1 * p3
             l.d[4 * b + 2] = -e3 * p0 + e2 * p1 - e1 * p2 + e0 * p3
-            l.d[4 * b + 3] = e0 * p0 + e1 * p1 + e2 * p2 + e3 * p3
+            l.d[4 * b + 3] = e0 * p0 + e1 * p1 + e2 * p2 + e3 * p3 - 1.0
 
 
 @kernel
@@ -96,7 +97,7 @@ def turning(network, w, f, l):
     if f.b.size > 0:
         contraction = _contraction(network, l) if factorise_normal(network, w, f, l) else math.inf
     l.numbers[FACTORED] = 0.0  # dense output, if there is any, would come between
-    w.control[CONTRACTION] = max(turn, contraction)
+    w.control[CONTRACTION] = max(contraction, TURN_SHARE * turn)
     w.control[CONDITION] = (1.0 + w.control[CONTRACTION]) / max(1.0 - w.control[CONTRACTION], 1e-300)
     if not contraction < CONTRACTION_LIMIT:
         return BY_CONTRACTION

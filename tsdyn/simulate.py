@@ -56,8 +56,9 @@ def simulate(
     rtol, atol : float, optional
         Tolerances for the default method, 1e-8 if not given, or for an adaptive method that is given by its name.
     formulation : {"tangent", "null-space", "maggi-kane"}
-        "tangent": the tangent-space ODE, at present in the form of Eq. 26, which "null-space" names explicitly;
-        "maggi-kane": Eqs. 17-18, which drift off the constraints, for comparison.
+        "tangent": the tangent-space ODE without a basis, at a cost that grows with the scene's size and fill;
+        "null-space": the same by Eq. 26, as in the paper; "maggi-kane": Eqs. 17-18, which drift off the constraints,
+        for comparison. Implicit methods solve Eq. 26 in either of the first two.
     constraint_tol : float
         u_tol and B_tol of Eqs. 28-29: bound on |Phi| (m) and on |Phi_q U B - I|.
     initial_tol : float

@@ -150,7 +150,8 @@ def _solve_positions(network, s, w, f, l, t, renewals):
 def _solve_velocities(network, s, w, f, l, t):
     """rd and omega' of the poses from the rates l.y, freed of what would leave the manifold. Whether there are any.
 
-    The factors are those of N at the start of the position solve, or, where it needed none, those of S.
+    The factors are those of N at the start of the position solve, or, where it needed none, those of S as long as they
+    do.
     """
     rheonomic = is_rheonomic(s)
     if rheonomic:
@@ -172,8 +173,13 @@ def _solve_velocities(network, s, w, f, l, t):
         worst = largest(f.b)
         if not worst < math.inf:
             return False
-        if worst <= floor or (worst > 0.5 * before and worst <= 100.0 * floor):
+        if worst <= floor or (factored and worst > 0.5 * before and worst <= 100.0 * floor):
             return True
+        if not factored and worst > 0.1 * before:
+            if not factorise_normal(network, w, f, l):
+                return False
+            lower, upper, factored = l.lower, l.upper, True
+            l.numbers[FACTORED] = 1.0
         solve_lu(network.pattern, lower, upper, f.b)
         scatter(network, l.Y0, f.b, l.y)
         before = worst
@@ -254,12 +260,26 @@ def start_chart(context, t, x, y, yd, unused):
 
 @kernel
 def _spin(q, qd, i, out, o):
-    """out[o : o + 3] = 2 G pd."""
-    e0, e1, e2, e3 = 2.0 * q[i], 2.0 * q[i + 1], 2.0 * q[i + 2], 2.0 * q[i + 3]
+    """out[o : o + 3] = 2 G pd / p.p, p.p - 1 being exact to rounding of itself: over many charts a bias adds up."""
+    e0, e1, e2, e3 = q[i], q[i + 1], q[i + 2], q[i + 3]
     d0, d1, d2, d3 = qd[i], qd[i + 1], qd[i + 2], qd[i + 3]
-    out[o] = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3
-    out[o + 1] = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
-    out[o + 2] = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
+    excess, low = -1.0, 0.0
+    for c in range(4):
+        e = q[i + c]
+        wide = 134217729.0 * e  # Dekker: e in two halves, so that their products are exact
+        high = wide - (wide - e)
+        rest = e - high
+        square = e * e
+        low += ((high * high - square) + 2.0 * high * rest) + rest * rest
+        total = excess + square
+        part = total - excess
+        low += (excess - (total - part)) + (square - part)
+        excess = total
+    f = 2.0 * (excess + low)
+    x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3
+    y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
+    z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
+    out[o], out[o + 1], out[o + 2] = 2.0 * x - f * x, 2.0 * y - f * y, 2.0 * z - f * z
 
 
 @kernel

@@ -19,7 +19,8 @@ from numba import types
 from numba.core import cgutils
 from numba.core.ccallback import CFunc
 from numba.core.errors import RequireLiteralValue
-from numba.extending import intrinsic
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
 from numba.np.arrayobj import populate_array
 
 from ._cache import cache_of
@@ -217,35 +218,6 @@ def data_of(typing, array):
     return types.int64(array), generate
 
 
-@intrinsic
-def address_of(typing, value):
-    """The address of a copy of a named tuple of arrays, valid until the calling kernel returns."""
-
-    def generate(context, builder, signature, arguments):
-        model = context.data_model_manager[signature.args[0]]
-        pointer = cgutils.alloca_once_value(builder, model.as_data(builder, arguments[0]))
-        return builder.ptrtoint(pointer, _i64)
-
-    return types.int64(value), generate
-
-
-@intrinsic
-def _store(typing, value, address):
-    """Write a named tuple of arrays to an address; its size in bytes."""
-
-    def generate(context, builder, signature, arguments):
-        data = context.data_model_manager[signature.args[0]].as_data(builder, arguments[0])
-        builder.store(data, builder.inttoptr(arguments[1], data.type.as_pointer()))
-        return context.get_constant(types.int64, context.get_abi_sizeof(data.type))
-
-    return types.int64(value, types.int64), generate
-
-
-@entry
-def _imprint(value, address):
-    return _store(value, address)
-
-
 def resident(value):
     """A named tuple of arrays in memory, for kernels that `loader` makes: its address, and what keeps it there.
 
@@ -253,29 +225,81 @@ def resident(value):
     """
     if DEBUG:
         return value, None
-    image = np.zeros(_words(value), np.int64)
-    size = _imprint(value, image.ctypes.data)
-    assert size == image.nbytes
+    image = np.array(_image(value), np.int64)
     return image.ctypes.data, (image, value)
 
 
-def _words(value):
-    """How many words Numba's form of arrays, or of tuples of them, takes: five, lengths and strides each."""
-    return 5 + 2 * value.ndim if isinstance(value, np.ndarray) else sum(map(_words, value))
+def _image(value):
+    """Of each array the address of its numbers, then its lengths; of a tuple those of its fields in turn."""
+    if isinstance(value, tuple):
+        return [word for field in value for word in _image(field)]
+    assert value.flags.c_contiguous
+    return [value.ctypes.data, *value.shape]
+
+
+def _words(kind):
+    """How many words the image of a type takes."""
+    return 1 + kind.ndim if isinstance(kind, types.Array) else sum(map(_words, kind))
+
+
+class _Seen(types.Type):
+    """A named tuple of arrays that is in memory; a kernel reads of it what it uses, when it uses it."""
+
+    def __init__(self, kind):
+        self.kind = kind
+        super().__init__(name=f"Seen({kind})")
+
+
+@register_model(_Seen)
+class _SeenModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, _i64)
+
+
+@infer_getattr
+class _SeenFields(AttributeTemplate):
+    key = _Seen
+
+    def generic_resolve(self, seen, name):
+        """The type of a field: an array, or again something seen."""
+        if name in seen.kind.fields:
+            field = seen.kind.types[seen.kind.fields.index(name)]
+            return field if isinstance(field, types.Array) else _Seen(field)
+        return None
+
+
+@lower_getattr_generic(_Seen)
+def _seen_field(context, builder, seen, address, name):
+    at = seen.kind.fields.index(name)
+    field = seen.kind.types[at]
+    place = builder.add(address, _i64(8 * sum(map(_words, seen.kind.types[:at]))))
+    if not isinstance(field, types.Array):
+        return place
+    words = builder.inttoptr(place, _i64.as_pointer())
+    pointer, *shape = (_word(builder, words, i) for i in range(1 + field.ndim))
+    return _array(context, builder, field, builder.inttoptr(pointer, _f64.as_pointer()), shape)
+
+
+def _word(builder, words, i):
+    """A word of memory that no kernel changes, which says so to the compiler."""
+    word = builder.load(builder.gep(words, [_i64(i)]))
+    word.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return word
 
 
 def loader(example):
-    """Make the kernel that reads a named tuple of example's type back from its address."""
+    """Make the kernel that gives sight of a named tuple of example's type by its address.
+
+    Passed as a value it would be hundreds of words for every kernel, most of them unused, and slow to compile.
+    """
     if DEBUG:
         return lambda value: value
-    kind = numba.typeof(example)
+    kind = _Seen(numba.typeof(example))
 
     @intrinsic
     def load(typing, address):
         def generate(context, builder, signature, arguments):
-            model = context.data_model_manager[kind]
-            pointer = builder.inttoptr(arguments[0], model.get_data_type().as_pointer())
-            return model.load_from_data_pointer(builder, pointer)
+            return arguments[0]
 
         return kind(types.int64), generate
 
@@ -342,7 +366,3 @@ if DEBUG:
     def data_of(array):
         """The array itself."""
         return array
-
-    def address_of(value):
-        """The value itself."""
-        return value

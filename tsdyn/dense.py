@@ -8,12 +8,12 @@ import math
 
 import numpy as np
 
-from ._kernel import address_of, caller, entry, kernel
+from ._kernel import caller, entry, kernel, resident
 from .errors import Status
 from .interpolation import call_value
 from .linalg import copy
 from .stepping import call_accelerate, call_place
-from .workspace import RATE, Context, allocate, allocate_linear, basis_free_parts
+from .workspace import RATE, Context, allocate, allocate_linear, basis_free_parts, load
 
 NOT_FINITE = int(Status.NOT_FINITE)
 # addresses that the driver and the reader are given
@@ -103,12 +103,12 @@ def warm_size(work):
 
 
 @entry
-def read(c, at, t, rows, blocks, charts, points, xs, ys, yds, xds, store, out):
+def read(context, at, t, rows, blocks, charts, points, xs, ys, yds, xds, store, out):
     """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows]. Status.
 
     Every time starts from its chart's q0, so that it gives the same numbers whatever was asked for before it.
     """
-    context = address_of(c)
+    c = load(context)
     w = c.work
     chart = -1
     for i in range(t.size):
@@ -151,13 +151,14 @@ class Reader:
         work = allocate(*sizes)
         system = system._replace(reals=system.reals.copy())  # the motions' places are written to
         linear = allocate_linear(system, sizes[0], sizes[1], False)
-        self.context = Context(system, work, linear, *basis_free_parts(network, sizes[0]))
+        context = Context(system, work, linear, *basis_free_parts(network, sizes[0]))
+        self.n, (self.context, *self._keep) = sizes[0], resident(context)
         self.addresses = addresses
         self.scratch = [np.zeros(size) for size in (nx, ny, ny, nx, warm_size(work))]
 
     def __call__(self, t, rows, blocks, charts, points):
         """States (k, 3, n) at times t (k,), in the steps blocks[rows]; and the Status."""
-        out = np.zeros((t.size, 3, self.context.work.q.size))
+        out = np.zeros((t.size, 3, self.n))
         status = read(self.context, self.addresses, t, rows, blocks, charts, points, *self.scratch, out)
         return out, Status(status)
 

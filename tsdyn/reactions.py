@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 
-from ._kernel import entry
+from ._kernel import entry, resident
 from .assembly import constraint_jacobian, set_time
 from .block_kernels import factor, solve
 from .bodies import rotation_matrix, transform_g
-from .free import allocate_free
 from .landing import run_loops
 from .loads import applied_loads, force_loads, inertial_forces, velocity_forces
 from .markers import POINT
@@ -16,17 +15,20 @@ from .network import REDUCED, network_of
 from .normal import gather, multiply_rows, scatter, weigh_rows
 from .poses import place_bodies
 from .sparse_rows import WIDTH, with_short_rows
+from .workspace import load_parts, parts
 
 RANK_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
 
 
 @entry
-def solve_multipliers(network, s, f, t, q, r, rows, out):
+def solve_multipliers(context, t, q, r, rows, out):
     """out (k, m) with Phi_q^T lam = r, by least squares; r (k, n) is Q_A + S - M qdd. NaN where Phi_q is singular.
 
     S lam = H W r on the network with one step of refinement, r in terms of bodies, then the normalisations from what is
-    left of r along p. s is the system with short rows, rows (m, 14) scratch, zero on entry.
+    left of r along p. The system is that with short rows, rows (m, 14) scratch, zero on entry.
     """
+    whole = load_parts(context)
+    network, s, f = whole.network, whole.system, whole.free
     bodies = network.bodies
     for k in range(t.size):
         set_time(s, t[k])
@@ -85,8 +87,8 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
     f = applied_loads(packed.system, t, q, qd, memory)
     f += velocity_forces(system, q, qd)
     f -= inertial_forces(system, q, qdd)
-    free, rows = allocate_free(network, q.shape[1]), np.zeros((out.shape[1], WIDTH))
-    solve_multipliers(network, system, free, t, q, f, rows, out)
+    context, *_keep = resident(parts(system, network, q.shape[1]))
+    solve_multipliers(context, t, q, f, np.zeros((out.shape[1], WIDTH)), out)
     return out
 
 

@@ -9,10 +9,9 @@ from .free import allocate_free
 from .linalg import copy
 from .local_chart import ROUNDING
 from .poses import place_bodies
-from .series_memory import plain_work
 from .series_state import ORDERS, TOP, Expansion, SeriesContext, load_series
 from .series_steps import state_within
-from .workspace import FLOOR, SIZE
+from .workspace import FLOOR, SIZE, plain_work
 
 
 @entry

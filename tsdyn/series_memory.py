@@ -28,7 +28,7 @@ from .series_state import HIGHEST, LOWEST, NEXT, TOP, SeriesContext
 from .series_steps import STEPS
 from .system import System
 from .taylor import advance_series
-from .workspace import CONTROLS, COUNTERS, SIZE, U_TOL, carve, plain_context
+from .workspace import SIZE, U_TOL, plain_work
 
 
 class Series:
@@ -53,13 +53,6 @@ class Series:
         masks(network, packed, self.kinds)
         self.network = graph.with_loops(network, self.kinds, graph.REDUCED, graph.VALUES, graph.BIAS)
         self.packed = packed
-
-
-def plain_work(n):
-    """A `Work` for n coordinates that has no matrices."""
-    shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name != "counters"}
-    shapes |= {"q": (n,), "qd": (n,), "qdd": (n,), "control": (CONTROLS,)}
-    return type(plain_context().work)(**carve(shapes), counters=np.zeros(COUNTERS, np.int64))
 
 
 class SeriesMemory:

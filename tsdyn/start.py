@@ -4,26 +4,27 @@ import numpy as np
 
 from . import initial
 from ._four import four, put
-from ._kernel import entry, kernel
+from ._kernel import entry, kernel, resident
 from .assembly import set_time
 from .block_kernels import factor, solve
 from .errors import RedundantConstraints, SingularConfiguration
 from .evaluate import constraint_arrays
-from .free import allocate_free
 from .initial import ROUNDING, demand_finite, demand_small
 from .landing import PIVOT_LIMIT, land, run_loops
 from .network import BIAS, DRIFT, REDUCED, VALUES, is_regular, network_of
 from .normal import gather, multiply_rows, scatter, weigh_rows
 from .poses import OMEGA, POSE, RD, move_bodies, place_bodies, write_positions, write_velocities
 from .rank import check_rank
-from .workspace import FLOOR, allocate
+from .workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 
 LARGE = 1 << 24  # entries of Phi_q from which on no dense one is made
 
 
 @entry
-def _look(network, system, f, q, qd, t, velocity):
+def _look(context, q, qd, t, velocity):
     """f.b = Phi and velocity = Phi_q qd + Phi_t of the network's rows, and H; the row that depends on others, or -1."""
+    c = load_parts(context)
+    network, system, f = c.network, c.system, c.free
     set_time(system, t)
     place_bodies(network.bodies, q, f.poses)
     move_bodies(network.bodies, q, qd, f.poses)
@@ -41,8 +42,10 @@ def _look(network, system, f, q, qd, t, velocity):
 
 
 @entry
-def _land(network, system, w, f, t):
+def _land(context, t):
     """Put w.q and w.qd onto the manifold. Status."""
+    c = load_parts(context)
+    network, system, w, f = c.network, c.system, c.work, c.free
     set_time(system, t)
     place_bodies(network.bodies, w.q, f.poses)
     move_bodies(network.bodies, w.q, w.qd, f.poses)
@@ -87,13 +90,15 @@ def consistent(scene, system, q, qd, t, tol):
     network = network_of(packed, REDUCED, VALUES, BIAS, DRIFT)
     system = system._replace(reals=system.reals.copy())
     n, m = q.size, len(system.segments)
-    free, rates = allocate_free(network, n), np.zeros(len(network.row))
+    whole = parts(system, network, n)
+    free, work, rates = whole.free, whole.work, np.zeros(len(network.row))
+    context, *_keep = resident(whole)
     at = network.bodies[network.bodies[:, 1] == 7, 0][:, None] + np.arange(3, 7)
     rows = network.normals[network.normals >= 0]
 
     def look():
         """Phi, Phi_q qd + Phi_t, and the row of H that depends on those before it."""
-        dependent = _look(network, system, free, q, qd, t, rates)
+        dependent = _look(context, q, qd, t, rates)
         Phi, velocity = np.zeros(m), np.zeros(m)
         Phi[network.row], velocity[network.row] = free.b, rates
         p, pd = q[at], qd[at]
@@ -114,10 +119,10 @@ def consistent(scene, system, q, qd, t, tol):
         q[at] /= np.linalg.norm(q[at], axis=1)[:, None]
     fast = np.abs(velocity).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max())
     if far or fast:
-        work = allocate(n, m, len(network.bodies), tol, packed.size, len(network.row))
         work.q[:], work.qd[:] = q, qd
+        work.control[U_TOL], work.control[SIZE] = tol, packed.size
         work.control[FLOOR] = ROUNDING * (packed.size + np.abs(q).max())
-        if _land(network, system, work, free, t) == 0:
+        if _land(context, t) == 0:
             q, qd = work.q.copy(), work.qd.copy()
     return q, qd
 

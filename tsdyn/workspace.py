@@ -86,6 +86,15 @@ class Linear(NamedTuple):
     numbers: np.ndarray  # (NUMBERS,)  implicit.RTOL ... EAGER
 
 
+class Parts(NamedTuple):
+    """What kernels without a formulation get, by one address."""
+
+    system: System
+    work: Work
+    network: Network
+    free: Free
+
+
 class Context(NamedTuple):
     """What a formulation's kernels get, by one address."""
 
@@ -174,3 +183,18 @@ def plain_context():
 
 
 load = loader(plain_context())
+
+
+def plain_work(n):
+    """A `Work` for n coordinates that has no matrices."""
+    shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name != "counters"}
+    shapes |= {"q": (n,), "qd": (n,), "qdd": (n,), "control": (CONTROLS,)}
+    return Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64))
+
+
+def parts(system, network, n):
+    """`Parts` for n coordinates, without matrices."""
+    return Parts(system, plain_work(n), network, allocate_free(network, n))
+
+
+load_parts = loader(parts(plain_context().system, no_network(), 0))

@@ -20,10 +20,8 @@ def torque(t):
 
 def bearing(scene, body):
     """Let a body turn about its own y axis on the ground."""
-    point = tuple(body.position)
-    scene.add(ts.constraints.Spherical(body, scene.ground, point_b=point, name=f"bearing of {body.name}"))
-    for axis in ((1, 0, 0), (0, 0, 1)):
-        scene.add(ts.constraints.Dot1(scene.ground, body, axis_a=axis, axis_b=AXIS, name=f"axis of {body.name}"))
+    name = f"bearing of {body.name}"
+    scene.add(ts.constraints.Revolute.at(scene.ground, body, point=body.position, axis=AXIS, name=name))
 
 
 def build():

@@ -33,6 +33,8 @@ force_series
 network local
 free normal
 primitive
+joint
+framed_joint
 force_loops
 force force_pack
 state_function
@@ -54,7 +56,7 @@ local_chart
 newton evaluate diagnostics reactions power dense
 control
 chart rank
-initial start
+branch initial start
 assemble
 null_space tangent scene
 maggi_kane linearise

@@ -146,9 +146,21 @@ KINDS = {
     "Dot1": {"axis_a": (1, 0, 0), "axis_b": (0, 1, 0)},
     "Dot2": {"axis_a": (1, 0, 0)},
     "PlaneContact": {"normal_b": (0, 0, 1)},
+    **{
+        kind: {"axis_a": (1, 0, 0), "axis_b": (1, 0, 0)}
+        for kind in ("Revolute", "Cylindrical", "Translational", "Planar", "Parallel")
+    },
+    "Universal": {"axis_a": (1, 0, 0), "axis_b": (0, 1, 0)},
+    "ConstantAngle": {"axis_a": (1, 0, 0), "axis_b": (0, 1, 0)},
+    "PointOnLine": {"axis_b": (1, 0, 0)},
+    "Fixed": {},
 }
-POINTS = [(kind, f"point_{x}") for kind in ("Spherical", "Distance", "Dot2", "PlaneContact") for x in "ab"]
-AXES = [("Dot1", "axis_a"), ("Dot1", "axis_b"), ("Dot2", "axis_a"), ("PlaneContact", "normal_b")]
+ALL = [kind.__name__ for kind in (*C.registered(), *C.registered_joints()) if kind.__module__.startswith("tsdyn.")]
+POINTLESS = ("Dot1", "Parallel", "ConstantAngle")
+POINTS = [(kind, f"point_{x}") for kind in KINDS if kind not in POINTLESS for x in "ab"]
+AXES = [(kind, name) for kind, arguments in KINDS.items() for name in arguments if name.startswith(("axis", "normal"))]
+OPTIONAL = [("Fixed", "axis_a"), ("Fixed", "axis_b")]
+OPTIONAL += [(kind, f"reference_{x}") for kind in ("Fixed", "Translational") for x in "ab"]
 PAIRS = [
     ("itself", lambda w: (w.rod, w.rod), ("rod", "itself")),
     ("both ground", lambda w: (w.ground, w.ground), ("ground",)),
@@ -164,6 +176,13 @@ PAIRS = [
 
 def made(kind, pair=lambda w: (w.rod, w.ground), **arguments):
     return lambda w: getattr(C, kind)(*pair(w), **{"name": "joint", **KINDS.get(kind, {}), **arguments})
+
+
+def placed(kind, pair=lambda w: (w.rod, w.ground), **arguments):
+    given = {"ConstantAngle": {"axis_a": (1, 0, 0), "axis_b": (0, 1, 0)}, "Parallel": {"axis": (1, 0, 0)}}
+    given |= {"Spherical": {"point": (0, 0, 0)}, "Universal": {"point": (0, 0, 0), "axis": (0, 1, 0)}}
+    given = given.get(kind, {"point": (0, 0, 0), "axis": (1, 0, 0)})
+    return lambda w: getattr(C, kind).at(*pair(w), **{"name": "joint", **given, **arguments})
 
 
 def zero(t):
@@ -184,6 +203,10 @@ ON_BEAD = [
     ("Dot1", (lambda w: (w.bead, w.rod)), {}, ts.InvalidBody, "axis_a"),
     ("Dot1", (lambda w: (w.rod, w.bead)), {}, ts.InvalidBody, "axis_b"),
     ("Dot2", (lambda w: (w.bead, w.rod)), {}, ts.InvalidBody, "axis_a"),
+    *((kind, (lambda w: (w.rod, w.bead)), {}, ts.InvalidBody, "axis_b") for kind in KINDS if "axis_b" in KINDS[kind]),
+    ("PointOnLine", (lambda w: (w.bead, w.ground)), {"point_a": (1, 0, 0)}, ts.InvalidConstraint, "point_a"),
+    ("Fixed", (lambda w: (w.rod, w.bead)), {}, ts.InvalidBody, "axis_b"),
+    ("Fixed", (lambda w: (w.bead, w.rod)), {}, ts.InvalidBody, "axis_a"),
 ]
 CONSTRAINTS = [
     *(
@@ -197,8 +220,72 @@ CONSTRAINTS = [
         for what, value in NO_NUMBERS.items()
     ),
     *(
+        case(f"{kind}: {argument}, {what}", made(kind, **{argument: value}), ts.InvalidConstraint, "joint", argument)
+        for kind, argument in OPTIONAL
+        for what, value in NO_NUMBERS.items()
+        if value is not None
+    ),
+    *(
         case(f"{kind}: {argument} zero", made(kind, **{argument: (0, 0, 0)}), ts.InvalidConstraint, "joint", argument)
-        for kind, argument in AXES
+        for kind, argument in AXES + OPTIONAL
+    ),
+    *(
+        case(
+            f"{kind}: reference along the axis",
+            made(kind, **KINDS[kind], axis_a=(1, 0, 0), axis_b=(1, 0, 0), reference_a=(-2, 0, 0)),
+            ts.InvalidConstraint,
+            "joint",
+            "reference_a",
+            "across",
+        )
+        for kind in ("Fixed",)
+    ),
+    case(
+        "Translational: reference along the axis",
+        made("Translational", reference_b=(1, 1e-9, 0)),
+        ts.InvalidConstraint,
+        "joint",
+        "reference_b",
+        "across",
+    ),
+    *(
+        case(f"ConstantAngle: angle {text(v)}", made("ConstantAngle", angle=v), ts.InvalidConstraint, "joint", "angle")
+        for v in (0.0, math.pi, -1.0, 4.0, 1e-12, NAN, INF, "1", 1j, [1.0], (one, zero, zero))
+    ),
+    case(
+        "ConstantAngle of parallel axes",
+        made("ConstantAngle", axis_b=(1, 0, 0)),
+        ts.InvalidConstraint,
+        "joint",
+        "Parallel",
+    ),
+    *(
+        case(f"{kind}.at: {name}", placed(kind, pair), ts.InvalidConstraint, *words)
+        for kind in KINDS
+        if kind not in ("Distance", "Dot1", "Dot2", "PlaneContact")
+        for name, pair, words in PAIRS
+    ),
+    *(
+        case(f"{kind}.at: {argument}, {what}", placed(kind, **{argument: value}), ts.InvalidConstraint, "joint", name)
+        for kind, argument, name in (
+            ("Revolute", "point", "point_a"),
+            ("Revolute", "axis", "axis_a"),
+            ("Fixed", "axis", "axis_a"),
+            ("Universal", "point", "point_a"),
+            ("Universal", "axis", "axis_a"),
+            ("Universal", "axis_b", "axis_b"),
+            ("PointOnLine", "axis", "axis_b"),
+        )
+        for what, value in NO_NUMBERS.items()
+        if value is not None
+    ),
+    *(
+        case(f"{kind}.at: no axis", placed(kind, axis=None), ts.InvalidConstraint, "joint", "axis_")
+        for kind in ("Revolute", "Cylindrical", "Translational", "Universal", "Planar", "PointOnLine", "Parallel")
+    ),
+    *(
+        case(f"{kind}.at: axis zero", placed(kind, axis=(0, 0, 0)), ts.InvalidConstraint, "joint", "axis_")
+        for kind in ("Revolute", "Cylindrical", "Translational", "Planar", "PointOnLine", "Parallel")
     ),
     *(
         case(f"Distance: length {text(v)}", made("Distance", length=v), ts.InvalidConstraint, "joint", "length")
@@ -228,6 +315,28 @@ CONSTRAINTS = [
     case("EulerNormalization of the ground", lambda w: C.EulerNormalization(w.ground), ts.InvalidConstraint, "ground"),
     case("EulerNormalization of None", lambda w: C.EulerNormalization(None), ts.InvalidConstraint, "not a body"),
     case("added twice", lambda w: w.scene.add(w.pivot), ts.InvalidConstraint, "pivot", "once"),
+    case(
+        "part of a joint",
+        lambda w: w.scene.add(C.Revolute.at(w.rod, w.ground, point=(0, 0, 0), axis=(1, 0, 0)).parts[0]),
+        ts.InvalidConstraint,
+        "Revolute(rod, ground) point",
+        "add that",
+    ),
+    case(
+        "joint added twice",
+        lambda w: [w.scene.add(j) for j in [C.Fixed.at(w.rod, w.ground, name="weld")] * 2],
+        ts.InvalidConstraint,
+        "weld",
+        "once",
+    ),
+    case(
+        "joint added to another scene",
+        lambda w: w.other.add(C.Fixed.at(w.rod, w.ground, name="weld")),
+        ts.InvalidConstraint,
+        "weld",
+        "another scene",
+    ),
+    case("base of joints", lambda w: w.scene.add(ts.Joint(w.rod, w.ground)), ts.InvalidConstraint, "subclass"),
     case("added to another scene", lambda w: w.other.add(w.pivot), ts.InvalidConstraint, "pivot", "another scene"),
     case(
         "normalisation of another scene",

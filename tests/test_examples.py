@@ -11,8 +11,10 @@ from examples import (
     bead_on_surface,
     drive_train,
     driven_pivot,
+    hooke_joint,
     pendulum_chain,
     plug_in_integrator,
+    slider_crank,
     top,
     two_body_pendulum,
 )
@@ -26,6 +28,7 @@ RUNS = {
     "bead_on_surface": (bead_on_surface, bead_on_surface.build, 5.0, 1e-3),
     "driven_pivot": (driven_pivot, driven_pivot.build, 3.0, 2e-4),
 }
+MECHANISMS = {"slider_crank": (slider_crank, 2.0), "hooke_joint": (hooke_joint, 3.0)}
 
 
 @pytest.mark.parametrize(("module", "build", "end", "step"), RUNS.values(), ids=RUNS.keys())
@@ -34,8 +37,30 @@ def test_example(module, build, end, step):
     module.check(solution)
 
 
+@pytest.mark.parametrize(("module", "end"), MECHANISMS.values(), ids=MECHANISMS.keys())
+def test_mechanism(module, end):
+    """To 1e-9 by DOP853 at 1e-11, and by Taylor, which serves all joints."""
+    method = ts.integrators.DOP853(rtol=1e-11, atol=1e-11)
+    module.check(ts.simulate(module.build(), (0.0, end), integrator=method))
+    module.check(ts.simulate(module.build(), (0.0, end), integrator=ts.integrators.Taylor(tol=1e-15)))
+    rough = ts.simulate(module.build(), (0.0, end), integrator=ts.integrators.DOP853(rtol=1e-5, atol=1e-5))
+    with pytest.raises(AssertionError):
+        module.check(rough)
+
+
 @pytest.mark.parametrize(
-    "module", [top, two_body_pendulum, pendulum_chain, bead_on_surface, driven_pivot, drive_train, plug_in_integrator]
+    "module",
+    [
+        top,
+        two_body_pendulum,
+        pendulum_chain,
+        bead_on_surface,
+        driven_pivot,
+        drive_train,
+        plug_in_integrator,
+        slider_crank,
+        hooke_joint,
+    ],
 )
 def test_main_reports(module, capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", ["example"])
@@ -45,8 +70,10 @@ def test_main_reports(module, capsys, monkeypatch):
 
 @pytest.mark.parametrize(
     ("build", "end"),
-    [(build, end) for _, build, end, _ in RUNS.values()] + [(drive_train.build, 4.0), (plug_in_integrator.build, 2.0)],
-    ids=[*RUNS, "drive_train", "plug_in_integrator"],
+    [(build, end) for _, build, end, _ in RUNS.values()]
+    + [(drive_train.build, 4.0), (plug_in_integrator.build, 2.0)]
+    + [(module.build, end) for module, end in MECHANISMS.values()],
+    ids=[*RUNS, "drive_train", "plug_in_integrator", *MECHANISMS],
 )
 def test_energy_less_work_is_constant(build, end):
     """To the tolerance, relative to what the energy's parts are."""

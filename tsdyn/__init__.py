@@ -32,6 +32,7 @@ from .integrator import (  # noqa: E402
     ExplicitRungeKutta,
     Integrator,
 )
+from .joint import Joint  # noqa: E402
 from .markers import Parameters, Point, Turn, Vector  # noqa: E402
 from .motion import Motion  # noqa: E402
 from .primitive import Primitive  # noqa: E402
@@ -58,6 +59,7 @@ __all__ = [
     "InvalidBody",
     "InvalidConstraint",
     "InvalidForce",
+    "Joint",
     "MissingDependency",
     "Motion",
     "NystromTableau",

@@ -4,14 +4,14 @@ import pkgutil
 from importlib import import_module
 
 
-def export_all(package, path, namespace, base):
-    """Put into `namespace` each class of the package's modules that descends from a class named `base`."""
+def export_all(package, path, namespace, *bases):
+    """Put into `namespace` each class of the package's modules that descends from a class named in `bases`."""
     names = []
     for module in pkgutil.iter_modules(path):
         content = import_module(f"{package}.{module.name}")
         for name, value in vars(content).items():
             own = isinstance(value, type) and value.__module__ == content.__name__ and not name.startswith("_")
-            if own and any(ancestor.__name__ == base for ancestor in value.__mro__[1:]):
+            if own and any(ancestor.__name__ in bases for ancestor in value.__mro__[1:]):
                 namespace[name] = value
                 names.append(name)
     return names

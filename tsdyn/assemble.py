@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .bodies import transform_g
+from .branch import demand_aligned
 from .checks import number, positive
 from .errors import InconsistentState, InvalidArgument, InvalidBody
 from .evaluate import constraint_arrays, mass_matrix
@@ -58,7 +59,8 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0):
     Raises
     ------
     InconsistentState
-        If the constraints can't be met; names the rows that are left over. The bodies are as before.
+        If the constraints can't be met, which names the rows that are left over, or if what was found is a mirrored
+        joint. The bodies are as before.
     SingularConfiguration, RedundantConstraints
         If rows of Phi_q vanish or depend on each other at the configuration found.
 
@@ -113,6 +115,7 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0):
         size = np.linalg.norm(Phi)
     _demand_assembled(scene, Phi, tol * (1.0 + np.abs(q).max()), iterations)
     check_rank(scene, Phi_q)
+    demand_aligned(scene.packed, q)
     for body, (at, length) in zip(scene.bodies, system.bodies, strict=True):
         if length == 7:  # the angular velocity is the user's, in the body's frame, however the body has been turned
             qd[at + 3 : at + 7] = 0.5 * transform_g(q[at + 3 : at + 7]).T @ body.angular_velocity

@@ -4,14 +4,14 @@ import numpy as np
 from numba.core.errors import NumbaError
 
 from ._kernel import kernel
-from .bodies import Ground, PointMass
-from .checks import demand_known, number
+from .bodies import Ground, PointMass, rotation_matrix
+from .checks import demand_known, floats, number
 from .errors import InvalidConstraint
-from .markers import PARAMETERS, TURN
+from .markers import PARAMETERS, POINT, TURN
 
 
 class Attachment:
-    """Base of Primitive and Force: attached to one or two bodies of a scene by markers.
+    """Base of Primitive, Joint and Force: attached to one or two bodies of a scene by markers.
 
     Attributes
     ----------
@@ -27,6 +27,7 @@ class Attachment:
     error = InvalidConstraint
     particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
     added = False  # to its scene
+    owner = None  # the joint that it is a part of
 
     def __init__(self, a, b=None, coordinates=(), name=""):
         """Attach it to its bodies; coordinates has an entry for each marker, in the body frame."""
@@ -49,7 +50,35 @@ class Attachment:
         given = list(coordinates) or [None] * len(self.markers)
         if len(given) != len(self.markers):
             raise self.error(f"{self.name}: {len(self.markers)} markers, but {len(given)} coordinates.")
-        self.coordinates = tuple(self._place(*pair) for pair in zip(self.markers, given, strict=True))
+        self.coordinates = tuple(self._places(given))
+
+    @classmethod
+    def at(cls, a, b=None, **arguments):
+        """Make one from points and directions in the ground frame, the bodies being where they stand now.
+
+        Parameters
+        ----------
+        a, b : Body or ground
+            As for the class itself.
+        **arguments
+            Those of the class, its points (m) and directions in the ground frame: `point_a=` is carried into the frame
+            of a, `point=` into those of both bodies, and so with every other pair. All else is passed on.
+        """
+        given = {}
+        for name, value in arguments.items():
+            common = [marker for marker in cls.markers if marker.argument == f"{name}_{marker.body}"]
+            own = [marker for marker in cls.markers if marker.argument == name]
+            for marker in common or own:
+                if own or marker.argument not in arguments:
+                    given[marker.argument] = in_frame(a if marker.body == "a" else b, marker, value)
+            if not common and not own:
+                given[name] = value
+        alone = b is None and all(marker.body == "a" for marker in cls.markers)
+        return cls(*((a,) if alone else (a, b)), **given)
+
+    def _places(self, given):
+        """Where the markers are, (3,) each, in the order of `markers`."""
+        return [self._place(*pair) for pair in zip(self.markers, given, strict=True)]
 
     @classmethod
     def _kind(cls):
@@ -68,6 +97,8 @@ class Attachment:
         A marker's argument (`point_a`, ...) may be set too. Once it is in its scene, a name that it does not have is
         refused.
         """
+        if self.owner is not None:
+            raise self.error(f"{self.name}: it follows from its joint; set {name} there.")
         slots = [marker.argument for marker in self.markers]
         if name in slots and "coordinates" in self.__dict__:
             i = slots.index(name)
@@ -76,7 +107,7 @@ class Attachment:
         if not self.added:
             super().__setattr__(name, value)
             return
-        demand_known(self, name, self.__dict__)
+        demand_known(self, name, (*self.__dict__, *slots))
         before = self.__dict__[name]
         super().__setattr__(name, value)
         try:
@@ -101,6 +132,16 @@ class Attachment:
         """The scene of its bodies."""
         return self.a.scene
 
+    @property
+    def on(self):
+        """The body that its reaction is given on: a, or b where a is the ground."""
+        return self.a if self.a.dimension else self.b
+
+    @property
+    def title(self):
+        """What its rows are called by."""
+        return self.name
+
     def body_of(self, marker):
         """The body that a marker is on."""
         return self.a if marker.body == "a" else self.b
@@ -111,6 +152,16 @@ class Attachment:
 
     def __repr__(self):
         return f"<{self._kind()} {self.name!r}>"
+
+
+def in_frame(body, marker, value):
+    """The body-frame coordinates of what a marker is in the ground frame now; what is no vector is left as it is."""
+    x = floats(value)
+    if x.shape != (3,) or not np.isfinite(x).all() or not isinstance(body, (PointMass, Ground)):
+        return value  # to be refused where it is placed
+    if marker.code == POINT:
+        x = x - body.position
+    return x if body.dimension != 7 else rotation_matrix(body.orientation).T @ x
 
 
 def layout(markers):

@@ -2,6 +2,7 @@
 
 from functools import cached_property
 
+from .branch import demand_aligned
 from .expansion_pack import refusal
 from .force_pack import with_force_jacobians
 from .series_memory import Series
@@ -62,6 +63,7 @@ class Prepared:
         known, start = self._start
         if known != given:
             start = consistent(scene, self.packed.system, q, qd, t, tol)
+            demand_aligned(self.packed, start[0])
             self._start = given, start
         return start
 

@@ -96,6 +96,16 @@ class Primitive(Attachment):
         super().__setattr__(name, value)
 
     @property
+    def parts(self):
+        """The primitives that it is made of: itself."""
+        return (self,)
+
+    @property
+    def row_labels(self):
+        """What follows its title in the names of its rows."""
+        return ("",) if self.rows == 1 else tuple(f"[{i}]" for i in range(self.rows))
+
+    @property
     def rheonomic(self):
         """Whether it depends on time."""
         moves = not self.prescribed or isinstance(getattr(self, self.prescribed), Motion)

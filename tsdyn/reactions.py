@@ -92,30 +92,28 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
     return out
 
 
-def reaction(solution, constraint):
-    """Force and torque (k, 3) that a constraint exerts on its body, torque about its first point, ground frame.
+def reaction(solution, member, body):
+    """Force and torque (k, 3) that a constraint exerts on a body, torque about its first point on it, ground frame.
 
-    -Phi_r^T lam at the centroid and the body torque -G Phi_p^T lam / 2, moved to the point.
+    -Phi_r^T lam at the centroid and the body torque -G Phi_p^T lam / 2, moved to the point. member is a system.Member.
     """
     packed = solution.packed
-    body = constraint.a if constraint.a.dimension else constraint.b
-    index = packed.constraints.index(constraint)
-    first = sum(other.rows for other in packed.constraints[:index])
     system = with_short_rows(packed)
     system = system._replace(reals=system.reals.copy())
-    length = system.bodies[body.index, 1]
-    half = 0 if body is constraint.a else WIDTH // 2
-    load = np.zeros((solution.t.size, length))
+    load = np.zeros((solution.t.size, system.bodies[body.index, 1]))
     rows = np.zeros((len(system.segments), WIDTH))
-    lam = np.ascontiguousarray(solution.multipliers[:, first : first + constraint.rows])
-    constraint_loads(system, solution.t, solution.q, lam, first, half, rows, load)
-    return _at_first_point(solution, body, load, constraint, packed.coordinates[index])
+    halves = []  # where the body's numbers are in each row
+    for part in packed.constraints[member.parts]:
+        halves += [0 if body is part.a else WIDTH // 2 if body is part.b else -1] * part.rows
+    lam = np.ascontiguousarray(solution.multipliers[:, member.rows])
+    first, halves = member.rows.start, np.array(halves, np.int64)
+    constraint_loads(system, solution.t, solution.q, lam, first, halves, rows, load)
+    return _at_first_point(solution, body, load, member.constraint, member.coordinates)
 
 
-def force_reaction(solution, load):
-    """Force and torque (k, 3) that a force exerts on its body, torque about its first point, ground frame."""
+def force_reaction(solution, load, body):
+    """Force and torque (k, 3) that a force exerts on a body, torque about its first point on it, ground frame."""
     force, system = load.force, solution.system._replace(forces=load.row[None])
-    body = force.a if force.a.dimension else force.b
     Q = force_loads(system, solution.t, solution.q, solution.qd, solution._memory)
     at, length = solution.system.bodies[body.index]
     return _at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)
@@ -138,11 +136,16 @@ def _at_first_point(solution, body, load, item, coordinates):
 
 
 @entry
-def constraint_loads(s, t, q, lam, first, half, rows, out):
-    """out (k, 7 or 3) = -Phi_q^T lam of one body; lam (k, rows of the constraint), which begin at first."""
+def constraint_loads(s, t, q, lam, first, halves, rows, out):
+    """out (k, 7 or 3) = -Phi_q^T lam of one body; lam (k, rows of the constraint), which begin at first.
+
+    halves (rows,) says where the body's numbers begin in each row, below zero where it has none.
+    """
     for k in range(t.size):
         set_time(s, t[k])
         constraint_jacobian(s, q[k], t[k], rows)
         for i in range(lam.shape[1]):
+            if halves[i] < 0:
+                continue
             for c in range(out.shape[1]):
-                out[k, c] -= rows[first + i, half + c] * lam[k, i]
+                out[k, c] -= rows[first + i, halves[i] + c] * lam[k, i]

@@ -13,6 +13,7 @@ from .constraints.euler_normalization import EulerNormalization
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint
 from .evaluate import evaluate
 from .force import Force
+from .joint import Joint
 from .motion import Motion
 from .primitive import Primitive
 from .signal import Signal
@@ -32,7 +33,9 @@ class Scene:
     ground : Ground
         The inertial frame, to attach constraints to.
     bodies, constraints : tuple
-        In the order added; the normalisations of the rigid bodies come last, in body order.
+        In the order added, joints whole; the normalisations of the rigid bodies come last, in body order.
+    primitives : tuple
+        The constraints in the order of their rows, joints taken apart.
     forces : tuple
         In the order added.
 
@@ -70,8 +73,13 @@ class Scene:
 
     @property
     def constraints(self):
-        """The constraints, in the order of their rows."""
+        """The constraints, in the order of their rows; joints whole."""
         return (*self._added, *self._normalisations.values())
+
+    @property
+    def primitives(self):
+        """The constraints, in the order of their rows; joints taken apart."""
+        return tuple(part for constraint in self.constraints for part in constraint.parts)
 
     @property
     def forces(self):
@@ -149,7 +157,7 @@ class Scene:
         InvalidConstraint, InvalidForce
             If it is neither, belongs to another scene, or has been added before.
         """
-        if not isinstance(item, (Primitive, Force)):
+        if not isinstance(item, (Primitive, Joint, Force)):
             raise InvalidConstraint(
                 f"{item!r} is not a constraint or force; pass an instance, such as ts.constraints.Spherical(...) or "
                 "ts.forces.Spring(...)."
@@ -159,6 +167,10 @@ class Scene:
             raise item.error(f"{type(item).__name__}: its __init__ must call super().__init__(...).")
         if item.scene is not self:
             raise item.error(f"{item.name}: its bodies belong to another scene; use bodies of this one.")
+        if item.owner is not None:
+            raise item.error(f"{item.name}: it is a part of {item.owner.title}; add that instead.")
+        if isinstance(item, Joint):
+            item.parts  # noqa: B018  it says what is wrong with them
         if type(item) is EulerNormalization:
             return self._normalisations[item.a]
         if any(item is other for other in members):
@@ -219,13 +231,13 @@ class Scene:
         raise InvalidBody(f"no body is named {name!r}; there are {', '.join(b.name for b in self._bodies) or 'none'}.")
 
     def row_names(self):
-        """Name the rows of Phi, in order: a constraint's name, with the row's number where it has several."""
+        """Name the rows of Phi, in order: a constraint's title, with the row's label where it has several."""
         names, seen = [], Counter()
         for constraint in self.constraints:
-            seen[constraint.name] += 1
-            again = seen[constraint.name]
-            name = constraint.name if again == 1 else f"{constraint.name} #{again}"
-            names += [name] if constraint.rows == 1 else [f"{name}[{i}]" for i in range(constraint.rows)]
+            title = constraint.title
+            seen[title] += 1
+            again = "" if seen[title] == 1 else f" #{seen[title]}"
+            names += [f"{title}{again}{label}" for label in constraint.row_labels]
         return names
 
     def place(self, q, qd):

@@ -48,23 +48,15 @@ def force_coefficients(reals, x, k, poses, Z):
 
 
 def check_constraint_series(scene, constraint, name, rng):
-    """Check a constraint's `series`, if it has one that a run would use."""
-    kind, par = type(constraint), constraint.parameters()
-    if "series" not in kind.kernels or any(isinstance(p, Motion) for p in par):
+    """Check the `series` of a primitive, or of a joint's parts, if it has one that a run would use."""
+    parts = constraint.parts
+    if any("series" not in part.kernels or any(isinstance(p, Motion) for p in part.parameters()) for part in parts):
         return
-    q = random_motion(scene, rng)
-    x, _ = along(scene, constraint, constraint.coordinates, q)
-    t = _time(rng)
-    Phi, Phi_x = _zeros(kind.rows), _zeros((kind.rows, len(x)))
-    _run(kind, "phi", name, x, list(par), t, Phi)
-    _run(kind, "jacobian", name, x, list(par), t, Phi_x)
-    columns = _labels(kind)
-    labels = [[f"jacobian[{i}, {j}] (d phi[{i}] / d {c})" for j, c in enumerate(columns)] for i in range(kind.rows)]
-    for k, f in _coefficients(kind, name, (x,), list(par), (kind.rows, len(x))):
-        _compare(name, k, labels, f, Phi_x)
-
-    packed, m = scene.packed, kind.rows
+    q, t = random_motion(scene, rng), _time(rng)
+    Phi = np.concatenate([_check_rows(scene, part, name, q, t) for part in parts])
+    packed, m = scene.packed, len(Phi)
     network, kinds = build(packed)
+    Phi = Phi[network.row]
     masks(network, packed, kinds)
     expansion = allocate_expansion(network, kinds, packed, ORDER)
     write_bodies(scene, q, expansion)
@@ -72,7 +64,21 @@ def check_constraint_series(scene, constraint, name, rng):
     for k in range(ORDER - 1):
         constraint_coefficients(network, packed.system.reals, expansion, k, b, Z)
         value = b / ((k + 1) * (k + 2))
-        _compare(name, k + 2, [f"compiled Phi[{i}]" for i in range(m)], value, Phi)
+        _compare(name, k + 2, [f"compiled Phi[{i}]" for i in network.row], value, Phi)
+
+
+def _check_rows(scene, primitive, name, q, t):
+    """Check the Python `series` of a primitive along a motion q; return Phi (rows,) as Truncated series."""
+    kind, par = type(primitive), list(primitive.parameters())
+    x, _ = along(scene, primitive, primitive.coordinates, q)
+    Phi, Phi_x = _zeros(kind.rows), _zeros((kind.rows, len(x)))
+    _run(kind, "phi", name, x, par, t, Phi)
+    _run(kind, "jacobian", name, x, par, t, Phi_x)
+    columns = _labels(kind)
+    labels = [[f"jacobian[{i}, {j}] (d phi[{i}] / d {c})" for j, c in enumerate(columns)] for i in range(kind.rows)]
+    for k, f in _coefficients(kind, name, (x,), par, (kind.rows, len(x))):
+        _compare(name, k, labels, f, Phi_x)
+    return Phi
 
 
 def check_force_series(scene, force, name, rng):

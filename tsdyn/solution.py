@@ -15,6 +15,7 @@ from .evaluate import constraint_arrays
 from .local_chart import REASONS
 from .rank import weakest_row
 from .state import RememberingState
+from .system import member_of
 from .work import work as integrate_work
 
 NEARLY_SINGULAR = 0.05
@@ -204,18 +205,47 @@ class Solution:
         """Maximum norms of Eqs. 1-3 at every output, recomputed by code that is not the solver's."""
         return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd)
 
-    def reaction(self, item):
-        """Force (N) and torque (N m) that a constraint or force exerts, each (k, 3), ground frame.
+    def reaction(self, item, on=None):
+        """Force (N) and torque (N m) that a constraint, a joint as a whole, or a force exerts: (k, 3) each.
 
-        On body a, or on b where a is the ground; the torque is about its first point on that body, or the centroid
-        where it has none.
+        Parameters
+        ----------
+        item : constraint or force
+        on : Body, optional
+            Which of its bodies they act on; by default a, or b where a is the ground (`item.on`).
+
+        Returns
+        -------
+        force, torque : ndarray (k, 3)
+            In the ground frame; the torque is about the item's first point on that body (`point_a`), or the centroid
+            where it has none.
         """
         for load in self.packed.loads:
             if item is load.force:
-                return reactions.force_reaction(self, load)
-        if item not in self.packed.constraints:
-            raise InvalidConstraint(f"{item!r} is not a constraint or force of this solution's scene.")
-        return reactions.reaction(self, item)
+                return reactions.force_reaction(self, load, self._acted(item, on))
+        member = self._member(item)
+        return reactions.reaction(self, member, self._acted(item, on))
+
+    def rows(self, constraint):
+        """Which columns of `multipliers` are those of a constraint, a slice."""
+        return self._member(constraint).rows
+
+    def _member(self, constraint):
+        member = member_of(self.packed, constraint)
+        if member is None:
+            raise InvalidConstraint(f"{constraint!r} is not a constraint or force of this solution's scene.")
+        return member
+
+    @staticmethod
+    def _acted(item, on):
+        """The body that a reaction is asked for."""
+        if on is None:
+            return item.on
+        if on is item.a or on is item.b:
+            if on.dimension:
+                return on
+            raise InvalidBody(f"{item.name}: what acts on the ground is the opposite of what acts on {item.on.name!r}.")
+        raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
 
     def _span(self, body, part):
         if body not in self.packed.bodies:

@@ -34,16 +34,26 @@ class System(NamedTuple):
     memory: np.ndarray  # int64 (slots,): places in reals of what forces remember from step to step
 
 
+class Member(NamedTuple):
+    """A constraint of a scene as it was when it was packed: where it is among the primitives and the rows."""
+
+    constraint: object  # a Primitive, or a Joint
+    coordinates: tuple  # where its markers are, (3,) each
+    parts: slice
+    rows: slice
+
+
 class Packed(NamedTuple):
     """A scene as it was when it was packed; a solution keeps it, whatever happens to the scene later."""
 
     system: System
     bodies: tuple
-    constraints: tuple
+    constraints: tuple  # primitives, in the order of their rows
     parameters: tuple  # of each constraint: floats and Motions
     coordinates: tuple  # of each constraint: where its markers are, (3,) each
     size: float  # largest number among the coordinates
     loads: tuple  # a force_pack.Load for each force, in the order added
+    members: tuple  # a Member for each constraint of the scene, in the order of their rows
     shared: dict  # what has been made of it, by name, for others to use
 
     def __reduce__(self):
@@ -88,8 +98,9 @@ def pack(scene):
     where = {id(body): (int(at), body.dimension) for at, body in zip(starts, scene.bodies, strict=False)}
     groups, row = {}, 0
     segments = []
-    parameters = {constraint: _parameters(constraint) for constraint in scene.constraints}
-    for constraint in scene.constraints:
+    primitives = scene.primitives
+    parameters = {constraint: _parameters(constraint) for constraint in primitives}
+    for constraint in primitives:
         groups.setdefault(type(constraint), []).append((constraint, row))
         row += constraint.rows
         spans = [where.get(id(body), (0, 0)) for body in (constraint.a, constraint.b)]
@@ -137,10 +148,32 @@ def pack(scene):
         signals=np.array(signals, np.int64).reshape(-1, 5),
         memory=np.array(memory, np.int64),
     )
-    coordinates = tuple(constraint.coordinates for constraint in scene.constraints)
+    coordinates = tuple(constraint.coordinates for constraint in primitives)
     size = max((np.abs(s).max() for each in coordinates for s in each), default=0.0)
     parameters = tuple(parameters.values())
-    return Packed(system, scene.bodies, scene.constraints, parameters, coordinates, float(size), loads, {})
+    members = tuple(_members(scene.constraints))
+    return Packed(system, scene.bodies, primitives, parameters, coordinates, float(size), loads, members, {})
+
+
+def _members(constraints):
+    part = row = 0
+    for constraint in constraints:
+        parts, rows = slice(part, part + len(constraint.parts)), slice(row, row + constraint.rows)
+        yield Member(constraint, constraint.coordinates, parts, rows)
+        part, row = parts.stop, rows.stop
+
+
+def member_of(packed, constraint):
+    """The `Member` that a constraint, or a joint's part, is; None where it is not of that scene."""
+    for member in packed.members:
+        if member.constraint is constraint:
+            return member
+    row = 0
+    for i, part in enumerate(packed.constraints):
+        if part is constraint:
+            return Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + part.rows))
+        row += part.rows
+    return None
 
 
 def user_functions(packed):

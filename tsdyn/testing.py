@@ -11,6 +11,7 @@ from .errors import CheckFailed, InvalidArgument, TsdynError
 from .evaluate import constraint_arrays
 from .force_check import check_force
 from .integrator_checks import check_integrator
+from .joint import Joint
 from .motion import Motion
 from .primitive import Primitive
 from .scene import Scene
@@ -26,9 +27,9 @@ def check_primitive(kind, *, seed=0, states=3):
 
     Parameters
     ----------
-    kind : Primitive subclass, or callable (a, b) -> Primitive
-        A class is tried with its own `example(rng, a, b)`. Primitives that have markers on a only get b too and may
-        ignore it.
+    kind : Primitive or Joint subclass, or callable (a, b) -> Primitive or Joint
+        Of a joint every part is checked, then all together. A class is tried with its own `example(rng, a, b)`.
+        Primitives that have markers on a only get b too and may ignore it.
     seed : int
         Of the random states.
     states : int
@@ -54,7 +55,9 @@ def check_primitive(kind, *, seed=0, states=3):
             if constraint is None:
                 continue
             name = f"{type(constraint).__name__} ({arrangement})"
-            _check_kernels(constraint, name, rng)
+            for part in constraint.parts:
+                own = name if part is constraint else f"{type(part).__name__} in {name}"
+                _check_kernels(part, own, rng)
             _check_assembled(scene, constraint, name, rng)
             check_constraint_series(scene, constraint, name, rng)
 
@@ -68,7 +71,7 @@ def _instance(kind, arrangement, rng):
     ]
     a = scene.ground if arrangement == "ground to body" else bodies[0]
     b = scene.ground if arrangement == "body to ground" else bodies[1]
-    if isinstance(kind, type) and issubclass(kind, Primitive):
+    if isinstance(kind, type) and issubclass(kind, (Primitive, Joint)):
         if arrangement != "body to body" and not any(m.body == "b" for m in kind.markers):
             return scene, None
         constraint = kind.example(rng, a, b)

@@ -1,0 +1,66 @@
+"""Constant angle between a direction of each body; all else stays free.
+
+    a.b = cos(angle)     (1)  Dot1
+
+Singular where a and b are parallel (an angle of 0 or pi): Parallel keeps them so.
+"""
+
+import math
+
+import numpy as np
+
+from ..bodies import rotation_matrix
+from ..checks import number
+from ..errors import InvalidConstraint
+from ..joint import Joint
+from ..markers import Vector
+from .dot1 import Dot1
+
+
+class ConstantAngle(Joint):
+    """Keep the angle between a direction of one body and a direction of another.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene.
+    axis_a, axis_b : array_like (3,)
+        The directions in the bodies' own frames; scaled to unit length.
+    angle : float, rad; optional
+        The angle kept, between 0 and pi (exclusive: there the row is singular); None takes that of the bodies as they
+        stand now.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If an axis is missing or zero, the angle is out of its range, or a body is wrong.
+
+    Notes
+    -----
+    One row: angle. `ConstantAngle.at(a, b, axis_a=, axis_b=)` takes both directions in the ground frame.
+    """
+
+    markers = (Vector("a"), Vector("b"))
+
+    def __init__(self, a, b, *, axis_a=None, axis_b=None, angle=None, name=""):
+        super().__init__(a, b, (axis_a, axis_b), name)
+        if angle is None:
+            u, v = (rotation_matrix(body.orientation) @ s for body, s in zip((a, b), self.coordinates, strict=True))
+            angle = float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
+        self.angle = angle
+        self.check()
+
+    def check(self):
+        """An angle at which the row is regular."""
+        angle = number(self.angle)
+        if not (0.0 < angle < math.pi and abs(math.cos(angle)) < 1.0):
+            raise InvalidConstraint(
+                f"{self.name}: angle must lie between 0 and pi rad, got {self.angle!r}; to keep two directions "
+                "parallel use Parallel."
+            )
+
+    def compose(self):
+        """Eq. (1)."""
+        cosine = math.cos(self.angle)
+        yield "angle", Dot1(self.a, self.b, axis_a=self.axis_a, axis_b=self.axis_b, value=cosine)

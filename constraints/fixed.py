@@ -1,0 +1,86 @@
+"""Fixed joint: nothing stays free.
+
+    x_a - x_b = 0            (1)  three rows, Spherical
+    f_a.b = 0,  g_a.b = 0    (2)  two rows, Parallel
+    f_a.g_b = 0              (3)  Dot1
+
+f_a and f_b are the references made perpendicular to the axes, g = axis x f. Holds after half a turn about f, g or the
+axis, too: a start there is refused. Never singular.
+"""
+
+from ..bodies import Ground, PointMass, rotation_matrix
+from ..framed_joint import FramedJoint
+from .dot1 import Dot1
+from .parallel import Parallel
+from .spherical import Spherical
+
+DEFAULT = (0.0, 0.0, 1.0)  # the axis in a's frame; any would do
+
+
+class Fixed(FramedJoint):
+    """Weld one body to another.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene.
+    point_a, point_b : array_like (3,), m
+        The points that coincide, in the bodies' own frames.
+    axis_a, axis_b, reference_a, reference_b : array_like (3,), optional
+        An axis and a direction beside it, in the bodies' own frames, that the joint keeps parallel; what is left out
+        follows from the bodies as they stand now. Without any, the bodies keep the orientation that they have.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If an axis is zero, a reference is parallel to its axis, or a point or body is wrong.
+
+    Notes
+    -----
+    Rows: point[0] to point[2], axis[0], axis[1], turn. `Fixed.at(a, b)` takes the bodies as they stand now; the point,
+    in the ground frame, is the centroid of b, or of a where b is the ground, unless `point=` says another.
+    """
+
+    def __init__(
+        self,
+        a,
+        b,
+        *,
+        point_a=(0.0, 0.0, 0.0),
+        point_b=(0.0, 0.0, 0.0),
+        axis_a=None,
+        axis_b=None,
+        reference_a=None,
+        reference_b=None,
+        name="",
+    ):
+        super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
+        self.check()
+
+    @classmethod
+    def at(cls, a, b=None, *, point=None, **arguments):
+        """Make one from points and directions in the ground frame; none are needed."""
+        bodies = [body for body in (b, a) if isinstance(body, (PointMass, Ground))]
+        if point is None and len(bodies) == 2 and not {"point_a", "point_b"} & arguments.keys():
+            point = (bodies[0] if bodies[0].dimension else bodies[1]).position
+        if point is not None:
+            arguments["point"] = point
+        return super().at(a, b, **arguments)
+
+    def _places(self, given):
+        """Fill in the axes that were left out: as the bodies stand."""
+        axes = [self._place(self.markers[i], DEFAULT if given[i] is None else given[i]) for i in (2, 3)]
+        A, B = (rotation_matrix(body.orientation) for body in (self.a, self.b))
+        if given[2] is None and given[3] is not None:
+            axes[0] = A.T @ (B @ axes[1])
+        elif given[3] is None:
+            axes[1] = B.T @ (A @ axes[0])
+        return super()._places([*given[:2], *axes, *given[4:]])
+
+    def compose(self):
+        """Eqs. (1) to (3)."""
+        (f_a, _), (_, g_b) = self.frames
+        yield "point", Spherical(self.a, self.b, point_a=self.point_a, point_b=self.point_b)
+        yield "axis", Parallel(self.a, self.b, axis_a=self.axis_a, axis_b=self.axis_b)
+        yield "turn", Dot1(self.a, self.b, axis_a=f_a, axis_b=g_b)

@@ -1,0 +1,47 @@
+"""Planar joint: a face of each body stay in one plane; two displacements in it and one rotation stay free.
+
+    f_a.b = 0,  g_a.b = 0    (1)  two rows, Parallel: a and b are the normals
+    a.(x_b - x_a) = 0        (2)  Dot2
+
+Holds with the normals opposed, too: a start there is refused. Never singular.
+"""
+
+from ..joint import Joint
+from ..markers import Point, Vector
+from .dot2 import Dot2
+from .parallel import Parallel
+
+
+class Planar(Joint):
+    """Let one body slide on a plane of another and turn about its normal, flat on it on either side.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene.
+    point_a, point_b : array_like (3,), m
+        A point of the plane on each body, in its own frame.
+    axis_a, axis_b : array_like (3,)
+        The normal of the plane, in the bodies' own frames; scaled to unit length.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If an axis is missing or zero, or a point or body is wrong.
+
+    Notes
+    -----
+    Rows: axis[0], axis[1], plane. `Planar.at(a, b, point=, axis=)` takes a point and the normal of the plane in the
+    ground frame. A single point on a plane is a PlaneContact.
+    """
+
+    markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
+
+    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
+        super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
+
+    def compose(self):
+        """Eqs. (1), (2)."""
+        yield "axis", Parallel(self.a, self.b, axis_a=self.axis_a, axis_b=self.axis_b)
+        yield "plane", Dot2(self.a, self.b, axis_a=self.axis_a, point_a=self.point_a, point_b=self.point_b)

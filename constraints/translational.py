@@ -1,0 +1,65 @@
+"""Translational joint: one displacement along an axis stays free.
+
+    f_a.b = 0,  g_a.b = 0                           (1)  two rows, Parallel
+    f_a.g_b = 0                                     (2)  Dot1: no turn about the axis
+    f_a.(x_b - x_a) = 0,  g_a.(x_b - x_a) = 0       (3)  two rows, PointOnLine: x_b on the axis of a
+
+f_a and f_b are the references made perpendicular to the axes, g = axis x f. Holds after half a turn, too: a start there
+is refused. Never singular.
+"""
+
+from ..framed_joint import FramedJoint
+from .dot1 import Dot1
+from .parallel import Parallel
+from .point_on_line import PointOnLine
+
+
+class Translational(FramedJoint):
+    """Let one body slide along an axis of another without turning: a slider.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene.
+    point_a, point_b : array_like (3,), m
+        A point of the axis on each body, in its own frame.
+    axis_a, axis_b : array_like (3,)
+        The axis, in the bodies' own frames; scaled to unit length.
+    reference_a, reference_b : array_like (3,), optional
+        Directions beside the axis, in the bodies' own frames, that the joint keeps parallel; what is left out follows
+        from the bodies as they stand now.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If an axis is missing or zero, a reference is parallel to its axis, or a point or body is wrong.
+
+    Notes
+    -----
+    Rows: axis[0], axis[1], turn, line[0], line[1]. `Translational.at(a, b, point=, axis=)` takes a point and the
+    direction of the axis in the ground frame.
+    """
+
+    def __init__(
+        self,
+        a,
+        b,
+        *,
+        point_a=(0.0, 0.0, 0.0),
+        point_b=(0.0, 0.0, 0.0),
+        axis_a=None,
+        axis_b=None,
+        reference_a=None,
+        reference_b=None,
+        name="",
+    ):
+        super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
+        self.check()
+
+    def compose(self):
+        """Eqs. (1) to (3)."""
+        (f_a, _), (_, g_b) = self.frames
+        yield "axis", Parallel(self.a, self.b, axis_a=self.axis_a, axis_b=self.axis_b)
+        yield "turn", Dot1(self.a, self.b, axis_a=f_a, axis_b=g_b)
+        yield "line", PointOnLine(self.b, self.a, point_a=self.point_b, point_b=self.point_a, axis_b=self.axis_a)

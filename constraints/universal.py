@@ -1,0 +1,81 @@
+"""Universal joint (Hooke, Cardan): a common point and a cross of two arms; two rotations stay free.
+
+    x_a - x_b = 0     (1)  three rows, Spherical
+    a.b = 0           (2)  Dot1: a is the arm of the cross that turns in body a, b the one that turns in body b
+
+Never singular. Shafts at an angle beta turn at the same speed on average only: w_b / w_a = cos(beta) / (1 - sin(beta)^2
+sin(theta)^2), theta being the turn of the shaft of a from where its arm is across both.
+"""
+
+import numpy as np
+
+from ..attachment import in_frame
+from ..errors import InvalidConstraint
+from ..joint import Joint
+from ..markers import Point, Vector
+from .dot1 import Dot1
+from .spherical import Spherical
+
+ALONG = 1e-6  # sine of the angle below which an arm would lie along the shaft
+
+
+class Universal(Joint):
+    """Let one body turn about each of two axes at right angles, one of which is fixed in either body.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene.
+    point_a, point_b : array_like (3,), m
+        Where the axes meet, in the bodies' own frames.
+    axis_a, axis_b : array_like (3,)
+        The axis that each body turns about on the cross between them, in the body's own frame; scaled to unit length.
+        Both are across the shafts that the joint connects, and at right angles to each other.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If an axis is missing or zero, or a point or body is wrong.
+
+    Notes
+    -----
+    Rows: point[0] to point[2], cross. `Universal.at(a, b, point=, axis=, axis_b=)` takes them in the ground frame.
+    """
+
+    markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
+
+    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
+        super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
+
+    @classmethod
+    def at(cls, a, b=None, *, point=None, axis=None, axis_b=None, **arguments):
+        """Make one from its point and axes in the ground frame, the bodies being where they stand now.
+
+        Parameters
+        ----------
+        point : array_like (3,), m
+        axis : array_like (3,)
+            The axis fixed in a.
+        axis_b : array_like (3,), optional
+            The axis fixed in b; None takes the one across `axis` and the line from the point to the centroid of b (of
+            a, where b is the ground), which is right where b is a shaft with its centroid on its line.
+        """
+        axis = arguments.pop("axis_a", axis)
+        joint = super().at(a, b, point=point, axis_a=axis, axis_b=axis if axis_b is None else axis_b, **arguments)
+        if axis_b is None:
+            body, marker = b if b.dimension else a, joint.markers[3]
+            shaft = body.position - point
+            arm = np.cross(axis, shaft)
+            if not np.linalg.norm(arm) > ALONG * np.linalg.norm(axis) * np.linalg.norm(shaft):
+                raise InvalidConstraint(
+                    f"{joint.name}: the axis fixed in b doesn't follow from the centroid of {body.name!r}, which is on "
+                    "the line through the point along axis; give axis_b, at a right angle to axis."
+                )
+            joint.axis_b = in_frame(b, marker, arm)
+        return joint
+
+    def compose(self):
+        """Eqs. (1), (2)."""
+        yield "point", Spherical(self.a, self.b, point_a=self.point_a, point_b=self.point_b)
+        yield "cross", Dot1(self.a, self.b, axis_a=self.axis_a, axis_b=self.axis_b)

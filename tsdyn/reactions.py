@@ -1,6 +1,7 @@
 """Multipliers and the forces of constraints, from positions, velocities and accelerations."""
 
 import math
+from collections import Counter
 
 import numpy as np
 
@@ -15,7 +16,9 @@ from .markers import POINT
 from .network import REDUCED, network_of
 from .normal import gather, multiply_rows, scatter, weigh_rows
 from .poses import place_bodies
+from .primitive import INTS
 from .sparse_rows import WIDTH, with_short_rows
+from .system import COUNT, FIRST_INT, FIRST_REAL, REALS, classes
 
 RANK_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
 
@@ -97,10 +100,13 @@ def reaction(solution, constraint):
     """
     packed = solution.packed
     body = constraint.a if constraint.a.dimension else constraint.b
-    index = packed.constraints.index(constraint)
-    first = sum(other.rows for other in packed.constraints[:index])
+    index, first, within = places_of(packed)[constraint]
     system = with_short_rows(packed)
-    system = system._replace(reals=system.reals.copy())
+    kind = next(row for row, cls in zip(system.kinds, classes(packed), strict=True) if cls is type(constraint)).copy()
+    kind[FIRST_INT] += INTS * within
+    kind[FIRST_REAL] += kind[REALS] * within
+    kind[COUNT] = 1
+    system = system._replace(reals=system.reals.copy(), kinds=kind[None])
     length = system.bodies[body.index, 1]
     half = 0 if body is constraint.a else WIDTH // 2
     load = np.zeros((solution.t.size, length))
@@ -108,6 +114,25 @@ def reaction(solution, constraint):
     lam = np.ascontiguousarray(solution.multipliers[:, first : first + constraint.rows])
     constraint_loads(system, solution.t, solution.q, lam, first, half, rows, load)
     return _at_first_point(solution, body, load, constraint, packed.coordinates[index])
+
+
+def places_of(packed):
+    """Of each constraint, which one it is, its first row, and which one of its kind."""
+    if "places" not in packed.shared:
+        found, row, seen = {}, 0, Counter()
+        for index, constraint in enumerate(packed.constraints):
+            found[constraint] = index, row, seen[type(constraint)]
+            row += constraint.rows
+            seen[type(constraint)] += 1
+        packed.shared["places"] = found
+    return packed.shared["places"]
+
+
+def loads_of(packed):
+    """The loads by the id of their force."""
+    if "loads" not in packed.shared:
+        packed.shared["loads"] = {id(load.force): load for load in packed.loads}
+    return packed.shared["loads"]
 
 
 def force_reaction(solution, load):

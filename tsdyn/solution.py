@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from . import diagnostics, power, reactions
-from .bodies import rotation_matrix
+from .bodies import PointMass, rotation_matrix
 from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
 from .local_chart import REASONS
+from .primitive import Primitive
 from .rank import weakest_row
 from .state import RememberingState
 from .work import work as integrate_work
@@ -210,15 +211,15 @@ class Solution:
         On body a, or on b where a is the ground; the torque is about its first point on that body, or the centroid
         where it has none.
         """
-        for load in self.packed.loads:
-            if item is load.force:
-                return reactions.force_reaction(self, load)
-        if item not in self.packed.constraints:
+        load = reactions.loads_of(self.packed).get(id(item))
+        if load is not None:
+            return reactions.force_reaction(self, load)
+        if not isinstance(item, Primitive) or item not in reactions.places_of(self.packed):
             raise InvalidConstraint(f"{item!r} is not a constraint or force of this solution's scene.")
         return reactions.reaction(self, item)
 
     def _span(self, body, part):
-        if body not in self.packed.bodies:
+        if not isinstance(body, PointMass) or self.packed.bodies[body.index : body.index + 1] != (body,):
             raise InvalidBody(f"{body!r} is not a body of this solution's scene.")
         at = int(self.system.bodies[body.index, 0])
         if part == "r":

@@ -57,14 +57,14 @@ def _found_again(process, *parts):
     if process == os.getpid():
         return packed
     system = packed.system
-    classes = dict.fromkeys(type(constraint) for constraint in packed.constraints)
-    for row, kind in zip(system.kinds, classes, strict=True):
+    kinds = classes(packed)
+    for row, kind in zip(system.kinds, kinds, strict=True):
         for column, name in ((PHI, "phi"), (JACOBIAN, "jacobian"), (GAMMA, "gamma"), (PHI_T, "phi_t")):
             row[column] = _address(kind, name) if row[column] else 0
         row[CURVATURE] = 0
     values = [
         value
-        for kind in classes
+        for kind in kinds
         for constraint, given in zip(packed.constraints, packed.parameters, strict=True)
         if type(constraint) is kind
         for value in given
@@ -143,6 +143,11 @@ def pack(scene):
     return Packed(system, scene.bodies, scene.constraints, parameters, coordinates, float(size), loads, {})
 
 
+def classes(packed):
+    """The classes of constraints, in the order of System.kinds."""
+    return list(dict.fromkeys(type(constraint) for constraint in packed.constraints))
+
+
 def user_functions(packed):
     """Yield whatever holds compiled functions of a user's, and those functions."""
     for given in packed.parameters:
@@ -160,8 +165,7 @@ def user_functions(packed):
 def with_curvatures(packed):
     """The system with the kernels of second derivatives, which only implicit methods load."""
     kinds = packed.system.kinds.copy()
-    classes = dict.fromkeys(type(constraint) for constraint in packed.constraints)
-    kinds[:, CURVATURE] = [_address(kind, "curvature") for kind in classes]
+    kinds[:, CURVATURE] = [_address(kind, "curvature") for kind in classes(packed)]
     return packed.system._replace(kinds=kinds)
 
 

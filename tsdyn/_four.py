@@ -7,6 +7,7 @@
     total(f)             their sum
     cross(f, g)          of the first three; the fourth is 0
     get(array, i), let(array, i, x)                           one number, i not counted from the end
+    fetch(array, i, n)                                        have array[i : i + n] brought into the cache
 
 Numba vectorises loops, and none of ours is long enough. Used with lengths of four throughout, so it is safe.
 """
@@ -16,7 +17,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, models, register_model
 
-from ._kernel import DEBUG
+from ._kernel import DEBUG, kernel
 
 _WIDTH = 4
 _f64, _i32 = ir.DoubleType(), ir.IntType(32)
@@ -183,7 +184,31 @@ def let(typing, array, index, value):
     return types.none(array, types.int64, types.float64), generate
 
 
+@intrinsic
+def _fetch(typing, array, index):
+    def generate(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, value=arguments[0]).data
+        byte = ir.IntType(8).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [byte, _i32, _i32, _i32])
+        prefetch = builder.module.declare_intrinsic("llvm.prefetch", (byte,), kind)
+        place = builder.bitcast(builder.gep(data, [arguments[1]]), byte)
+        builder.call(prefetch, [place, _i32(0), _i32(3), _i32(1)])
+        return context.get_dummy_value()
+
+    return types.none(array, types.int64), generate
+
+
+@kernel
+def fetch(array, index, count):
+    """Have array[index : index + count] brought into the cache, whether it is there or not."""
+    for i in range(index, index + count, 8):
+        _fetch(array, i)
+
+
 if DEBUG:
+
+    def fetch(array, index, count):
+        """Nothing."""
 
     def get(array, index):
         """array[index]."""

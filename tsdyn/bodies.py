@@ -115,6 +115,8 @@ class PointMass:
     def __setattr__(self, name, value):
         """Set an attribute that there is; a misspelt one is refused."""
         demand_known(self, name, ("scene", "index", "name", "values"))
+        if name == "name" and "name" in self.__dict__:
+            self.scene._names = None
         super().__setattr__(name, value)
 
     @property

@@ -14,6 +14,8 @@ from .jet import Jet
 from .markers import PARAMETERS, POINT, TURN
 from .motion import Motion
 
+AT_ONCE = 1 << 16  # numbers in an array: constraints and bodies are taken together up to that
+
 
 class ConstraintError(NamedTuple):
     """Maximum norms of the left-hand sides of Eqs. 1, 2 and 3 at every output, shapes (k,)."""
@@ -28,58 +30,101 @@ def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0):
 
     With time_rate=0 time stands still: the derivatives are those along (qd, qdd) alone.
     """
-    columns, starts = [], starts_of(packed.bodies)
-    for constraint, values, places in zip(packed.constraints, packed.parameters, packed.coordinates, strict=True):
-        x = [part for marker in marker_jets(starts, constraint, places, q, qd, qdd) for part in marker]
-        par = [entry for value in values for entry in _parameter(value, t, time_rate)]
-        out = [None] * constraint.rows
-        twin(type(constraint).phi)(x, par, Jet(t, time_rate), out)
-        columns += out
-    if not columns:
-        return (np.zeros((t.size, 0)),) * 3
-    levels = ([getattr(Jet.of(row), name) for row in columns] for name in ("x", "xd", "xdd"))
-    return tuple(np.stack([np.broadcast_to(row, t.shape) for row in level], axis=1) for level in levels)
+    levels = tuple(np.zeros((t.size, len(packed.system.segments))) for _ in range(3))
+    for rows, part in _groups(packed, t, q, qd, qdd, time_rate):
+        for level, values in zip(levels, part, strict=True):
+            level[:, rows] = values
+    return levels
 
 
 def constraint_error(packed, t, q, qd, qdd):
     """Maximum norms of `constraint_rows` over the rows."""
-    return ConstraintError(
-        *(np.abs(level).max(axis=1, initial=0.0) for level in constraint_rows(packed, t, q, qd, qdd))
-    )
+    worst = np.zeros((3, t.size))
+    for _, part in _groups(packed, t, q, qd, qdd, 1.0):
+        for level, values in zip(worst, part, strict=True):
+            np.maximum(level, np.abs(values).max(axis=1), out=level)
+    return ConstraintError(*worst)
 
 
-def _parameter(value, t, rate):
-    if not isinstance(value, Motion):
-        return [value]
-    f, fd, fdd = (np.array([function(time) for time in t], dtype=float) for function in value.functions)
+def _groups(packed, t, q, qd, qdd, time_rate):
+    """Yield rows of Phi (r,) and their three levels, (k, r) each: constraints of one form at a time."""
+    starts, groups, row = starts_of(packed), {}, 0
+    for constraint, values, places in zip(packed.constraints, packed.parameters, packed.coordinates, strict=True):
+        bodies = tuple(constraint.body_of(marker) for marker in constraint.markers)
+        form = (
+            type(constraint),
+            *(body.dimension for body in bodies),
+            *(isinstance(value, Motion) for value in values),
+        )
+        members = [starts.get(body, 0) for body in bodies], places, values, row
+        groups.setdefault(form, (constraint, []))[1].append(members)
+        row += constraint.rows
+    most = max(AT_ONCE // max(t.size, 1), 1)
+    for constraint, members in groups.values():
+        for first in range(0, len(members), most):
+            some = members[first : first + most]
+            try:
+                found = [_levels(constraint, some, t, q, qd, qdd, time_rate)]
+            except (TypeError, ValueError):  # a plug-in's phi that takes no arrays for its parameters
+                found = (_levels(constraint, [one], t, q, qd, qdd, time_rate) for one in some)
+            yield from found
+
+
+def _levels(constraint, members, t, q, qd, qdd, time_rate):
+    """The rows of constraints of the form of this one, and their levels, instances along the last axis."""
+    starts, places, values, rows = zip(*members, strict=True)
+    places, starts = np.array(places), np.array(starts)
+    x = []
+    for j, marker in enumerate(constraint.markers):
+        at, s = starts[:, j], places[:, j].T
+        x += _marker_jet(marker, constraint.body_of(marker).dimension, at, s, q, qd, qdd)
+    par = [entry for given in zip(*values, strict=True) for entry in _parameter(given, t, time_rate)]
+    out = [None] * constraint.rows
+    twin(type(constraint).phi)(x, par, Jet(t[:, None], time_rate), out)
+    shape = t.size, len(members)
+    out = [Jet.of(row) for row in out]
+    levels = [[np.broadcast_to(getattr(row, name), shape) for row in out] for name in ("x", "xd", "xdd")]
+    places = np.concatenate([np.array(rows) + i for i in range(constraint.rows)])
+    return places, [np.concatenate(level, axis=1) for level in levels]
+
+
+def _parameter(given, t, rate):
+    """One parameter of some instances, (instances,) or one number for all, or Jets (k, instances) of Motions."""
+    if not isinstance(given[0], Motion):
+        same = all(value == given[0] for value in given)
+        return [given[0] if same else np.array(given)]
+    columns = [[[function(time) for time in t] for function in value.functions] for value in given]
+    f, fd, fdd = np.array(columns, dtype=float).reshape(len(given), 3, t.size).transpose(1, 2, 0)
     return [Jet(f, rate * fd, rate * rate * fdd), Jet(fd, rate * fdd), Jet(fdd)]
 
 
-def starts_of(bodies):
+def starts_of(packed):
     """Where the coordinates of each body begin."""
-    return dict(zip(bodies, np.cumsum([0, *(b.dimension for b in bodies)]).tolist(), strict=False))
+    if "starts" not in packed.shared:
+        packed.shared["starts"] = dict(zip(packed.bodies, packed.system.bodies[:, 0].tolist(), strict=True))
+    return packed.shared["starts"]
 
 
 def marker_jets(starts, constraint, coordinates, q, qd, qdd):
     """Yield the coordinates of each marker of a constraint or force as Jets over the outputs; starts of `starts_of`."""
     for marker, s in zip(constraint.markers, coordinates, strict=True):
         body = constraint.body_of(marker)
-        if marker.code == TURN:
-            yield [Jet(0.0)] * 3
-            continue
-        if marker.code == PARAMETERS and body.dimension != 7:
-            yield [Jet(value) for value in IDENTITY]
-            continue
-        if body.dimension == 0:
-            yield [Jet(value) for value in s]
-            continue
-        at = starts[body]
-        r = [Jet(q[:, at + i], qd[:, at + i], qdd[:, at + i]) for i in range(body.dimension)]
-        if marker.code == PARAMETERS:
-            yield r[3:]
-            continue
-        x = _rotate(r[3:], s) if body.dimension == 7 else [Jet(0.0)] * 3
-        yield [a + b for a, b in zip(r[:3], x, strict=True)] if marker.code == POINT else x
+        yield _marker_jet(marker, body.dimension, starts.get(body, 0), s, q, qd, qdd)
+
+
+def _marker_jet(marker, dimension, at, s, q, qd, qdd):
+    """Coordinates of a marker on a body whose own begin at `at`; or of several, at and s[i] being arrays."""
+    if marker.code == TURN:
+        return [Jet(0.0)] * 3
+    if marker.code == PARAMETERS and dimension != 7:
+        return [Jet(value) for value in IDENTITY]
+    if dimension == 0:
+        return [Jet(value) for value in s]
+    r = [Jet(q[:, at + i], qd[:, at + i], qdd[:, at + i]) for i in range(dimension)]
+    if marker.code == PARAMETERS:
+        return r[3:]
+    x = _rotate(r[3:], s) if dimension == 7 else [Jet(0.0)] * 3
+    return [a + b for a, b in zip(r[:3], x, strict=True)] if marker.code == POINT else x
 
 
 def _rotate(p, s):
@@ -94,58 +139,63 @@ def _rotate(p, s):
 
 
 class Motions(NamedTuple):
-    """The motion of one body at every output."""
+    """The motion of some bodies of one kind at every output."""
 
-    mass: float
-    inertia: np.ndarray  # (3, 3)
-    r: np.ndarray  # (k, 3)
-    rd: np.ndarray  # (k, 3)
-    p: np.ndarray | None  # (k, 4)
-    omega: np.ndarray | None  # (k, 3), body frame
+    mass: np.ndarray  # (b,)
+    inertia: np.ndarray  # (b, 3, 3)
+    r: np.ndarray  # (k, b, 3)
+    rd: np.ndarray  # (k, b, 3)
+    p: np.ndarray | None  # (k, b, 4)
+    omega: np.ndarray | None  # (k, b, 3), body frame
 
 
 def body_motions(system, q, qd):
-    """Yield a `Motions` for each body; masses are those of the run."""
-    for (at, length), mass, J in zip(system.bodies, system.mass, system.inertia, strict=True):
-        p = omega = None
-        if length == 7:
-            p = q[:, at + 3 : at + 7]
-            omega = angular_velocity(p, qd[:, at + 3 : at + 7])
-        yield Motions(mass, J.reshape(3, 3), q[:, at : at + 3], qd[:, at : at + 3], p, omega)
+    """Yield a `Motions` for the point masses, and one for the rigid bodies, some at a time; masses are the run's."""
+    most = max(AT_ONCE // max(len(q), 1), 1)
+    for length in (3, 7):
+        bodies = np.flatnonzero(system.bodies[:, 1] == length)
+        for first in range(0, bodies.size, most):
+            some = bodies[first : first + most]
+            at = system.bodies[some, 0][:, None]
+            p = omega = None
+            if length == 7:
+                p, pd = (x[:, at + np.arange(3, 7)] for x in (q, qd))
+                omega = angular_velocity(p, pd)
+            r, rd = (x[:, at + np.arange(3)] for x in (q, qd))
+            yield Motions(system.mass[some], system.inertia[some].reshape(-1, 3, 3), r, rd, p, omega)
 
 
 def angular_velocity(p, pd):
-    """omega' = 2 G(p) pd, shapes (k, 4) -> (k, 3); of pdd it gives the angular acceleration, as 2 Gd pd = 0."""
-    return 2.0 * np.einsum("kij,kj->ki", transform_g(p), pd)
+    """omega' = 2 G(p) pd, shapes (..., 4) -> (..., 3); of pdd it gives the angular acceleration, as 2 Gd pd = 0."""
+    return 2.0 * np.einsum("...ij,...j->...i", transform_g(p), pd)
 
 
 def kinetic_energy(system, q, qd):
     """Kinetic energy (k,), J."""
     total = np.zeros(q.shape[0])
-    for body in body_motions(system, q, qd):
-        total += 0.5 * body.mass * (body.rd**2).sum(axis=1)
-        if body.omega is not None:
-            total += 0.5 * np.einsum("ki,ij,kj->k", body.omega, body.inertia, body.omega)
+    for bodies in body_motions(system, q, qd):
+        total += 0.5 * (bodies.rd**2).sum(axis=2) @ bodies.mass
+        if bodies.omega is not None:
+            total += 0.5 * np.einsum("kbi,bij,kbj->k", bodies.omega, bodies.inertia, bodies.omega)
     return total
 
 
 def potential_energy(system, q):
     """Potential energy of gravity (k,), J, zero at the ground's origin."""
-    return -sum(
-        mass * (q[:, at : at + 3] @ system.gravity) for (at, _), mass in zip(system.bodies, system.mass, strict=True)
-    )
+    return -(q[:, system.bodies[:, :1] + np.arange(3)] @ system.gravity) @ system.mass
 
 
 def linear_momentum(system, q, qd):
     """Linear momentum (k, 3), kg m/s, ground frame."""
-    return sum(body.mass * body.rd for body in body_motions(system, q, qd))
+    return sum(np.einsum("b,kbi->ki", bodies.mass, bodies.rd) for bodies in body_motions(system, q, qd))
 
 
 def angular_momentum(system, q, qd):
     """Angular momentum about the ground's origin (k, 3), kg m^2/s, ground frame."""
     total = np.zeros((q.shape[0], 3))
-    for body in body_motions(system, q, qd):
-        total += body.mass * np.cross(body.r, body.rd)
-        if body.omega is not None:
-            total += np.einsum("kij,jl,kl->ki", rotation_matrix(body.p), body.inertia, body.omega)
+    for bodies in body_motions(system, q, qd):
+        total += np.einsum("b,kbi->ki", bodies.mass, np.cross(bodies.r, bodies.rd))
+        if bodies.omega is not None:
+            own = np.einsum("bjl,kbl->kbj", bodies.inertia, bodies.omega)
+            total += np.einsum("kbij,kbj->ki", rotation_matrix(bodies.p), own)
     return total

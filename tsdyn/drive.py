@@ -9,7 +9,8 @@ from .errors import InconsistentState, SingularConfiguration, Status
 from .run_state import BEGUN, BLOCKS, CHART_ROWS, DENSE, HISTORY, ROWS, STEPS, STEPS_WANTED, STIFF, STORED, Record, T
 
 SLICE_SECONDS = 0.2  # how often a run comes back to Python: progress, interrupts
-FIRST_SLICE, LARGEST_SLICE, CHART_ROOM = 1024, 1 << 17, 64
+LARGEST_SLICE, CHART_ROOM = 1 << 17, 64
+FIRST_SLICE, FIRST_WORK = 1024, 1 << 17  # steps; coordinates stepped on, unless that is less than a step
 BLOCK_ROOM = 1 << 22  # floats of a slice's blocks
 
 
@@ -26,13 +27,16 @@ class Recorded(NamedTuple):
 def drive(memory, task, watch):
     """Drive a run; the Status, what there is to say about it, and what it `Recorded`.
 
+    A slice is short enough for Ctrl-C to be answered at once: the first by the memory's `weight`, which is the number
+    of coordinates where a step is O(N) and more where it is not, the others by the time that the last took.
     `task.choose(run)` is asked when the motion is found stiff; where it says so the run ends with Status.STIFF.
     """
     run, numbers, times, choose = memory.run, memory.run.numbers, task.times, task.choose
     t0, t1 = task.span
-    most, limit = FIRST_SLICE, int(numbers[STEPS_WANTED]) if task.max_steps is None else task.max_steps
+    limit = int(numbers[STEPS_WANTED]) if task.max_steps is None else task.max_steps
     per_step, dense = times.size == 0, numbers[DENSE] == STORED
     n, block = run.now.shape[1], run.block.size
+    most = min(max(FIRST_WORK // memory.weight, 1), FIRST_SLICE)
     width = 1 + 3 * n + run.remembered.size
     largest = max(BLOCK_ROOM // block, 1) if dense else LARGEST_SLICE
     chunks = {"out": [], "history": [], "blocks": []}
@@ -59,7 +63,7 @@ def drive(memory, task, watch):
                 kind = SingularConfiguration if singular else InconsistentState
                 raise kind(f"no step could be made from the start. {status.sentence} {status.remedy}")
             if seconds > 2 * SLICE_SECONDS:
-                most = max(most // 2, 1)
+                most = max(int(rows * SLICE_SECONDS / seconds), 1)
             elif seconds < SLICE_SECONDS / 2 and numbers[HISTORY] == rows:
                 most = min(2 * most, largest)
             if choose is not None and numbers[STIFF] and status == Status.SLICE_DONE:

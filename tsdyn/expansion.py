@@ -9,7 +9,7 @@
 zero for every k, factorised once a step.
 """
 
-from ._four import add, cross, fma, four, lanes, put, splat, sub, times
+from ._four import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times
 from ._kernel import kernel
 from .block_kernels import solve
 from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS
@@ -30,7 +30,11 @@ def begin(network, system, poses, orders, bodies, Z):
         put(Z, 8 * b, lanes(m * system.gravity[0], m * system.gravity[1], m * system.gravity[2]))
         if network.bodies[b, 1] == 7:
             put(bodies, at + S_OMEGA * orders, four(poses, p + OMEGA))
-            _turn_on(bodies, at, orders, 0)
+            put(bodies, at + 12, splat(0.0))
+            put(bodies, at + 16, splat(0.0))
+            put(bodies, at + 20, splat(0.0))
+            _turn(bodies, at, 1, four(poses, p + OMEGA))
+            _turn_ahead(bodies, at, orders, 1)
             put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, 0))
 
 
@@ -49,12 +53,31 @@ def _spin(network, b, bodies, at, orders, k):
 
 
 @kernel
-def _turn_on(bodies, at, orders, k):
-    """A_{k+1} of (1)."""
+def _fetch_next(bodies, at, orders, count, k):
+    """Have the series of the body at bodies[at] brought into the cache: the beginning of A, and where order k goes."""
+    fetch(bodies, at, count)
+    fetch(bodies, at + 12 * k, 12)
+    fetch(bodies, at + S_R * orders + 4 * k, 4)
+    fetch(bodies, at + S_OMEGA * orders + 4 * (k - 1), 4)
+
+
+@kernel
+def _turn(bodies, at, k, change):
+    """A_k += A_0 change~, the part of (1) that is linear in the last omega'."""
+    w0, w1, w2, o = splat(first(change)), splat(second(change)), splat(third(change)), at + 12 * k
+    a0, a1, a2 = four(bodies, at), four(bodies, at + 4), four(bodies, at + 8)
+    put(bodies, o, add(four(bodies, o), sub(times(a1, w2), times(a2, w1))))
+    put(bodies, o + 4, add(four(bodies, o + 4), sub(times(a2, w0), times(a0, w2))))
+    put(bodies, o + 8, add(four(bodies, o + 8), sub(times(a0, w1), times(a1, w0))))
+
+
+@kernel
+def _turn_ahead(bodies, at, orders, k):
+    """A_{k+1} of (1) but for omega'_k."""
     x, y, z = splat(0.0), splat(0.0), splat(0.0)
     u, v, w = splat(0.0), splat(0.0), splat(0.0)
-    o = at + S_OMEGA * orders + 4 * k
-    for c in range(at, at + 12 * (k + 1), 12):
+    o = at + S_OMEGA * orders + 4 * (k - 1)
+    for c in range(at + 12, at + 12 * (k + 1), 12):
         a0, a1, a2 = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8)
         w0, w1, w2 = splat(bodies[o]), splat(bodies[o + 1]), splat(bodies[o + 2])
         x, u = fma(a1, w2, x), fma(a2, w1, u)  # six sums, since each waits for its last
@@ -73,8 +96,8 @@ def run_loops(network, reals, mode, k, orders, bodies, values, places, b, Z):
     for i in range(network.kinds.shape[0]):
         kind = network.kinds[i]
         call_series(
-            places[i, 0], mode, k, orders, kind[N_COUNT], kind[N_REALS], network.table[kind[N_FIRST_INT] :],
-            reals[kind[N_FIRST_REAL] :], bodies, values[places[i, 1] :], b, Z,
+            places[i, 0], mode, k, orders, kind[N_COUNT], kind[N_REALS], places[i, 2],
+            network.table[kind[N_FIRST_INT] :], reals[kind[N_FIRST_REAL] :], bodies, values[places[i, 1] :], b, Z,
         )  # fmt: skip
 
 
@@ -84,47 +107,53 @@ def run_forces(reals, x, k, orders, poses, Z):
     for i in range(x.forces.shape[0]):
         kind = x.forces[i]
         call_series(
-            kind[0], 0, k, orders, kind[2], kind[3], x.table[kind[4] :], reals[kind[5] :], x.bodies,
-            x.loads[kind[1] :], poses, Z,
+            kind[0], 0, k, orders, kind[2], kind[3], kind[6], x.table[kind[4] :], reals[kind[5] :],
+            x.bodies, x.loads[kind[1] :], poses, Z,
         )  # fmt: skip
 
 
 @kernel
-def expand(network, system, k, orders, x, f):
+def expand(network, system, k, last, ahead, orders, x, f):
     """Order k of the forces and multipliers, k + 1 of omega', k + 2 of r and A; k in turn from zero, after `begin`.
 
-    On entry Z has the gyroscopic torques of order k, on exit those of k + 1; lam_k stays in b until then.
+    On entry Z has the gyroscopic torques of order k, and A_{k+2} what (1) has without omega'_{k+1}; on exit both are
+    of the next order, unless this is the last one. lam_k stays in b until then.
 
-    x is a `taylor.Expansion`, f a `workspace.Free`.
+    With `ahead`, a constant, each body has the next one's numbers brought into the cache: that pays where they are in
+    none near by. x is a `series_state.Expansion`, f a `free.Free`.
     """
     bodies, Z = x.bodies, f.Z
-    nb = network.bodies.shape[0]
+    nb, size = network.bodies.shape[0], orders * BODY_ROW
     run_loops(network, system.reals, ADVANCE, k, orders, bodies, x.constraints, x.places, f.b, Z)
     run_forces(system.reals, x, k, orders, f.poses, Z)
-    g, h = 1.0 / (k + 1), 1.0 / ((k + 1) * (k + 2))
+    g, h = splat(1.0 / (k + 1)), splat(1.0 / ((k + 1) * (k + 2)))
     for b in range(nb):
-        at = b * orders * BODY_ROW
+        at = b * size
+        if ahead:
+            _fetch_next(bodies, at + size, orders, 12, k + 2)
         weigh(network.inverse, b, Z, 8 * b, Z, 8 * b)
-        put(bodies, at + S_R * orders + 4 * (k + 2), times(four(Z, 8 * b), splat(h)))
+        put(bodies, at + S_R * orders + 4 * (k + 2), times(four(Z, 8 * b), h))
         if network.bodies[b, 1] == 7:
-            put(bodies, at + S_OMEGA * orders + 4 * (k + 1), times(four(Z, 8 * b + 4), splat(g)))
-            _turn_on(bodies, at, orders, k + 1)
+            put(bodies, at + S_OMEGA * orders + 4 * (k + 1), times(four(Z, 8 * b + 4), g))
+            _turn(bodies, at, k + 2, times(four(Z, 8 * b + 4), h))
     run_loops(network, system.reals, RESIDUAL, k, orders, bodies, x.constraints, x.places, f.b, Z)
     solve(network.pattern, f.S, f.b)
     for i in range(Z.size):
         Z[i] = 0.0
     scatter(network, f.Y, f.b, Z)
     for b in range(nb):
-        at = b * orders * BODY_ROW
+        at = b * size
+        if ahead:
+            _fetch_next(bodies, at + size, orders, 12 * (k + 3), k + 2)
+            fetch(bodies, at + size + S_OMEGA * orders, 4 * (k + 1))
+            fetch(bodies, at + size + S_SPIN * orders, 4 * (k + 2))
         o = at + S_R * orders + 4 * (k + 2)
-        put(bodies, o, fma(four(Z, 8 * b), splat(h), four(bodies, o)))
+        put(bodies, o, fma(four(Z, 8 * b), h, four(bodies, o)))
         put(Z, 8 * b, splat(0.0))
         if network.bodies[b, 1] == 7:
-            o = at + S_OMEGA * orders + 4 * (k + 1)
-            put(bodies, o, fma(four(Z, 8 * b + 4), splat(g), four(bodies, o)))
-            w0, w1, w2 = h * Z[8 * b + 4], h * Z[8 * b + 5], h * Z[8 * b + 6]  # A_0 of the change of omega'
-            a0, a1, a2, o = four(bodies, at), four(bodies, at + 4), four(bodies, at + 8), at + 12 * (k + 2)
-            put(bodies, o, add(four(bodies, o), sub(times(a1, splat(w2)), times(a2, splat(w1)))))
-            put(bodies, o + 4, add(four(bodies, o + 4), sub(times(a2, splat(w0)), times(a0, splat(w2)))))
-            put(bodies, o + 8, add(four(bodies, o + 8), sub(times(a0, splat(w1)), times(a1, splat(w0)))))
-            put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, k + 1))
+            change, o = four(Z, 8 * b + 4), at + S_OMEGA * orders + 4 * (k + 1)
+            put(bodies, o, fma(change, g, four(bodies, o)))
+            _turn(bodies, at, k + 2, times(change, h))
+            if not last:
+                put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, k + 1))
+                _turn_ahead(bodies, at, orders, k + 2)

@@ -10,18 +10,19 @@ from .body_loops import INTS, MASK
 from .errors import InvalidConstraint, InvalidForce
 from .force_pack import F_FIRST_REAL, F_REALS, members_of
 from .motion import Motion
-from .network import N_COUNT, N_FIRST_INT, is_thin
+from .network import N_COUNT, N_FIRST_INT, thin
 from .series_loops import BODY_ROW, GROUND, instance_width
 from .series_state import Expansion
 from .signal import Signal, Table
 
 SHOWN = 5  # in a message
+FAR = 1 << 15  # orders of all bodies, each some hundred bytes
 
 
 def refusal(packed):
     """Why a scene can't be run by Taylor series, naming each part that has none; empty where it can."""
     found = without_series(packed)
-    found += [f"{body.name}: a principal moment of inertia is zero" for body in packed.bodies if is_thin(body)]
+    found += [f"{packed.bodies[i].name}: a principal moment of inertia is zero" for i in np.flatnonzero(thin(packed))]
     if not found:
         return ""
     shown = found[:SHOWN] + ([f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else [])
@@ -65,17 +66,30 @@ def _given_by(item, kind):
     return "it has a function of time"
 
 
+def room(highest):
+    """Orders that there is room for, the highest being that of omega'."""
+    return (highest + 3) | 1  # odd: parts that are powers of two apart would share their places in the cache
+
+
+def is_far(network, highest):
+    """Whether the series are so long that each loop finds nothing in the caches near by."""
+    return len(network.bodies) * room(highest) > FAR
+
+
 def allocate_expansion(network, kinds, packed, highest):
     """Lay out the series of a run, room for orders up to the highest (of omega'); the loops are loaded now."""
-    orders = (highest + 2) | 1  # odd: parts that are powers of two apart would share their places in the cache
-    nb = len(network.bodies)
+    orders, nb = room(highest), len(network.bodies)
+    loop = "far_series" if is_far(network, highest) else "series"
     bodies = np.zeros((nb + 1, orders * BODY_ROW))
     bodies[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
-    places, total = np.zeros((len(kinds), 2), np.int64), 0
+    places, total = np.zeros((len(kinds), 3), np.int64), 0
     for i, kind in enumerate(kinds):
-        places[i] = address(kind.kernels, "series", kind.__name__, InvalidConstraint), total
-        width = instance_width(len(kind.markers), kind.rows, kind.slots, orders)
-        total += int(network.kinds[i, N_COUNT]) * width
+        first, count = network.kinds[i, N_FIRST_INT], int(network.kinds[i, N_COUNT])
+        masks = network.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
+        varies = bool((masks & ((1 << GROUND) - 1)).any())
+        width = instance_width(len(kind.markers), kind.rows, kind.slots, orders, varies)
+        places[i] = address(kind.kernels, loop, kind.__name__, InvalidConstraint), total, width
+        total += count * width
     forces, table, loads = _forces(packed, orders)
     return Expansion(
         order=np.array([highest, orders, highest, highest, highest]),
@@ -97,12 +111,13 @@ def _forces(packed, orders):
         members = members_of(row, packed.loads)
         kind = members[0].force
         series = address(kind.kernels, "series", kind.name, InvalidForce)
-        rows.append([series, total, len(members), row[F_REALS], len(table), row[F_FIRST_REAL]])
-        total += len(members) * force_series.instance_width(len(kind.markers), kind.slots, orders)
+        width = force_series.instance_width(len(kind.markers), kind.slots, orders)
+        rows.append([series, total, len(members), row[F_REALS], len(table), row[F_FIRST_REAL], width])
+        total += len(members) * width
         for load in members:
             pair = [index.get(id(body), nb) for body in (load.force.a, load.force.b)]
             table += [*pair, (pair[0] == nb) | (pair[1] == nb) << 1]
-    return np.array(rows, np.int64).reshape(-1, 6), np.array(table, np.int64), np.zeros(total + 4)
+    return np.array(rows, np.int64).reshape(-1, 7), np.array(table, np.int64), np.zeros(total + 4)
 
 
 def masks(network, packed, kinds):

@@ -82,14 +82,13 @@ CODES = OWNERS = STARTS = (0,)
 kernel_series = None
 
 
-def series(mode, k, orders, count, stride, table, reals, bodies, values, poses, Z):
+def series(mode, k, orders, count, stride, size, table, reals, bodies, values, poses, Z):
     """Order k of the forces, onto the bodies' Z; p_0 from the poses."""
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
     values, poses, Z = vector(values, ANY), vector(poses, ANY), vector(Z, ANY)
     x, xd, f = stack(ROOM), stack(ROOM), stack(ROOM)
     wide, body_size = 4 * orders, BODY_ROW * orders
     own_scratch = 2 * MARKERS * wide
-    size = own_scratch + 4 * ((SLOTS * orders + MARKERS + 3) // 4)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         first = i * size

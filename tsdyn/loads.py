@@ -30,29 +30,36 @@ def force_loads(system, t, q, qd, memory=None):
 def applied_loads(system, t, q, qd, memory=None):
     """Q_A (k, n): forces and gravity."""
     Q = force_loads(system, t, q, qd, memory)
-    for (at, _), mass in zip(system.bodies, system.mass, strict=True):
-        Q[:, at : at + 3] += mass * system.gravity
+    Q[:, _places(system, 0, 3)] += system.mass[:, None] * system.gravity
     return Q
 
 
 def velocity_forces(system, q, qd):
     """S (k, n): 8 Gd^T J' Gd p on p."""
-    S = np.zeros_like(q)
-    for (at, length), J in zip(system.bodies, system.inertia, strict=True):
-        if length == 7:
-            part = slice(at + 3, at + 7)
-            Gd = transform_g(qd[:, part])
-            S[:, part] = 8.0 * np.einsum("kji,jl,klm,km->ki", Gd, J.reshape(3, 3), Gd, q[:, part])
+    S, at = np.zeros_like(q), _places(system, 3, 7)
+    if at.size:
+        S[:, at] = 8.0 * _turned(qd[:, at], system, q[:, at])
     return S
 
 
 def inertial_forces(system, q, qdd):
     """M qdd (k, n): m rdd on r and 4 G^T J' G pdd on p."""
-    f = np.zeros_like(q)
-    for (at, length), mass, J in zip(system.bodies, system.mass, system.inertia, strict=True):
-        f[:, at : at + 3] = mass * qdd[:, at : at + 3]
-        if length == 7:
-            part = slice(at + 3, at + 7)
-            G = transform_g(q[:, part])
-            f[:, part] = 4.0 * np.einsum("kji,jl,klm,km->ki", G, J.reshape(3, 3), G, qdd[:, part])
+    f, at = np.zeros_like(q), _places(system, 0, 3)
+    f[:, at] = system.mass[:, None] * qdd[:, at]
+    at = _places(system, 3, 7)
+    if at.size:
+        f[:, at] = 4.0 * _turned(q[:, at], system, qdd[:, at])
     return f
+
+
+def _places(system, first, end):
+    """Where these coordinates of the bodies that have them stand, (b, end - first)."""
+    bodies = system.bodies[system.bodies[:, 1] >= end, :1]
+    return bodies + np.arange(first, end)
+
+
+def _turned(p, system, x):
+    """G(p)^T J' G(p) x of the rigid bodies; p, x (k, b, 4)."""
+    G, J = transform_g(p), system.inertia[system.bodies[:, 1] == 7].reshape(-1, 3, 3)
+    y = np.einsum("kbij,kbj->kbi", G, x)
+    return np.einsum("kbji,kbj->kbi", G, np.einsum("bij,kbj->kbi", J, y))

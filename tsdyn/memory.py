@@ -32,6 +32,8 @@ from .run_state import (
 from .system import System
 from .workspace import B_TOL, SIZE, U_TOL, Context, allocate, allocate_linear, basis_free_parts
 
+MATRICES = 500  # matrices of n coordinates cost as much a step as O(N) kernels do with n^3 / MATRICES more of them
+
 
 class Memory:
     """System, workspace and state of a run, and where kernels find them; one run at a time.
@@ -55,6 +57,7 @@ class Memory:
     def __init__(self, prepared, network, joint_rows, implicit, kept, nx, ny, tableau, scratch, width):
         n, m = prepared.n, prepared.m
         self.implicit = implicit
+        self.weight = n if joint_rows is not None else n + n**3 // MATRICES
         self.source, _ = prepared.system(implicit)
         system = System(*(array.copy() for array in self.source))
         self.network = network

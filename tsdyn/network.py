@@ -38,28 +38,29 @@ class Network(NamedTuple):
     normals: np.ndarray  # int64 (nb,): the row of Phi that normalises a body's p, or -1
 
 
-def is_thin(body):
-    """Whether its inertia has no inverse: about an axis it has none."""
-    if body.dimension == 3:
-        return False
-    principal = np.linalg.eigvalsh(body.values["inertia"])
-    return not principal[0] > THIN * principal[2]
+def thin(packed):
+    """Which bodies' inertias have no inverse: about an axis they have none; bool (nb,)."""
+    system, result = packed.system, np.zeros(len(packed.bodies), bool)
+    rigid = system.bodies[:, 1] == 7
+    principal = np.linalg.eigvalsh(system.inertia[rigid].reshape(-1, 3, 3))
+    result[rigid] = ~(principal[:, 0] > THIN * principal[:, 2])
+    return result
 
 
 def is_regular(packed):
     """Whether all inertias can be inverted; a body without inertia about an axis needs D^T M D."""
-    J = packed.system.inertia[packed.system.bodies[:, 1] == 7].reshape(-1, 3, 3)
-    principal = np.linalg.eigvalsh(J)
-    return bool((principal[:, 0] > THIN * principal[:, 2]).all())
+    return not thin(packed).any()
 
 
-def _inverse(J, mass):
-    """Of the inertia; of one that has none, with as much as lets it serve as a metric."""
+def _inverses(J, mass):
+    """Of inertias (k, 3, 3); of one that has none, with as much as lets it serve as a metric."""
     size, axes = np.linalg.eigh(J)
-    if not size[0] > THIN * size[2]:
-        size = np.maximum(size, 0.1 * size[2] if size[2] > 0.0 else mass)
-        return (axes / size) @ axes.T
-    return np.linalg.inv(J)
+    thin = ~(size[:, 0] > THIN * size[:, 2])
+    least = np.where(size[:, 2] > 0.0, 0.1 * size[:, 2], mass)
+    size = np.maximum(size, least[:, None])
+    result = (axes / size[:, None, :]) @ axes.transpose(0, 2, 1)
+    result[~thin] = np.linalg.inv(J[~thin])
+    return result
 
 
 def network_of(packed, *columns):
@@ -150,13 +151,12 @@ def build(packed):
 
     inverse, mass = np.zeros((nb + 1, WEIGHTS)), np.zeros((nb + 1, WEIGHTS))
     spins = np.zeros(nb, np.int64)
-    for i, length in enumerate(system.bodies[:, 1]):
-        inverse[i, W_MASS], mass[i, W_MASS] = 1.0 / system.mass[i], system.mass[i]
-        if length == 7:
-            J = system.inertia[i].reshape(3, 3)
-            inverse[i, W_ROTATION:].reshape(3, 4)[:, :3] = _inverse(J, system.mass[i])
-            mass[i, W_ROTATION:].reshape(3, 4)[:, :3] = J
-            spins[i] = (J[0, 0] * np.eye(3) != J).any()
+    inverse[:nb, W_MASS], mass[:nb, W_MASS] = 1.0 / system.mass, system.mass
+    rigid = np.flatnonzero(system.bodies[:, 1] == 7)
+    J = system.inertia[rigid].reshape(-1, 3, 3)
+    spins[rigid] = (J[:, :1, :1] * np.eye(3) != J).any(axis=(1, 2))
+    for weights, matrices in ((inverse, _inverses(J, system.mass[rigid])), (mass, J)):
+        weights[rigid, W_ROTATION:] = np.pad(matrices, ((0, 0), (0, 0), (0, 1))).reshape(-1, 12)
     network = Network(
         bodies=system.bodies,
         kinds=np.array(kinds, np.int64).reshape(-1, N_COLUMNS),

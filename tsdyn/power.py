@@ -59,7 +59,7 @@ def load_powers(packed, load, t, q, qd, memory):
 
 def marker_states(packed, load, q, qd):
     """x as Jets and xd as arrays, over the outputs."""
-    force, starts = load.force, starts_of(packed.bodies)
+    force, starts = load.force, starts_of(packed)
     x, xd = [], []
     jets = marker_jets(starts, force, load.coordinates, q, qd, np.zeros_like(qd))
     for marker, jet in zip(force.markers, jets, strict=True):

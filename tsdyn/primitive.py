@@ -140,12 +140,14 @@ def _compile(cls, functions):
         "reduced": (body_loops.reduced, "jacobian", body_loops.SIGNATURE),
         "bias": (body_loops.bias, "gamma", body_loops.SIGNATURE),
         "series": (series_loops.series, "series", series_loops.SIGNATURE),
+        "far_series": (series_loops.series, "series", series_loops.SIGNATURE),
     }
     result = {}
     for name, (template, whose, signature) in loops.items():
         if whose in functions:
             owner = getattr(functions[whose], "py_func", functions[whose])
             names = {**constants, **inner, "SLOTS": cls.slots, "kernel_value": inner[f"kernel_{whose}"]}
+            names["AHEAD"] = name == "far_series"
             copy = specialised(template, f"{cls.__qualname__}.{name}_loop", owner, **names)
             result[name] = Callback(copy, signature)
     owner = getattr(functions["gamma"], "py_func", functions["gamma"])

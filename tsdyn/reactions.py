@@ -1,6 +1,7 @@
 """Multipliers and the forces of constraints, from positions, velocities and accelerations."""
 
 import math
+from collections import Counter
 
 import numpy as np
 
@@ -14,7 +15,9 @@ from .markers import POINT
 from .network import REDUCED, network_of
 from .normal import gather, multiply_rows, scatter, weigh_rows
 from .poses import place_bodies
+from .primitive import INTS
 from .sparse_rows import WIDTH, with_short_rows
+from .system import COUNT, FIRST_INT, FIRST_REAL, REALS, classes
 from .workspace import load_parts, parts
 
 RANK_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
@@ -99,7 +102,7 @@ def reaction(solution, member, body):
     """
     packed = solution.packed
     system = with_short_rows(packed)
-    system = system._replace(reals=system.reals.copy())
+    system = system._replace(reals=system.reals.copy(), kinds=only(packed, member.parts))
     load = np.zeros((solution.t.size, system.bodies[body.index, 1]))
     rows = np.zeros((len(system.segments), WIDTH))
     halves = []  # where the body's numbers are in each row
@@ -109,6 +112,30 @@ def reaction(solution, member, body):
     first, halves = member.rows.start, np.array(halves, np.int64)
     constraint_loads(system, solution.t, solution.q, lam, first, halves, rows, load)
     return _at_first_point(solution, body, load, member.constraint, member.coordinates)
+
+
+def only(packed, parts):
+    """Of System.kinds what these primitives, a slice, need: a row each."""
+    if "within" not in packed.shared:
+        seen, within = Counter(), []
+        for constraint in packed.constraints:
+            within.append(seen[type(constraint)])
+            seen[type(constraint)] += 1
+        packed.shared["within"] = within
+    rows = dict(zip(classes(packed), with_short_rows(packed).kinds, strict=True))
+    kinds = np.array([rows[type(part)] for part in packed.constraints[parts]])
+    within = np.array(packed.shared["within"][parts])
+    kinds[:, FIRST_INT] += INTS * within
+    kinds[:, FIRST_REAL] += kinds[:, REALS] * within
+    kinds[:, COUNT] = 1
+    return kinds
+
+
+def loads_of(packed):
+    """The loads by the id of their force."""
+    if "loads" not in packed.shared:
+        packed.shared["loads"] = {id(load.force): load for load in packed.loads}
+    return packed.shared["loads"]
 
 
 def force_reaction(solution, load, body):

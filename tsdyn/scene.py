@@ -48,6 +48,7 @@ class Scene:
     def __init__(self, gravity=(0.0, 0.0, -9.81)):
         self.ground = Ground(self)
         self._bodies, self._added, self._forces, self._normalisations = [], [], [], {}
+        self._names = None  # of ground and bodies; None where one may have been renamed
         self.gravity = gravity
 
     def __setattr__(self, name, value):
@@ -139,13 +140,16 @@ class Scene:
         return self._admit(PointMass, name, {"mass": mass, "position": position, "velocity": velocity})
 
     def _admit(self, kind, name, values):
-        taken = {"ground", *(body.name for body in self._bodies)}
+        if self._names is None:
+            self._names = {"ground", *(body.name for body in self._bodies)}
+        taken = self._names
         free = (f"body{i}" for i in count(len(self._bodies) + 1))
         name = str(name) or next(name for name in free if name not in taken)
         if name in taken:
             raise InvalidBody(f"the scene has a body named {name!r} already; choose another name.")
         body = kind(self, len(self._bodies), name, **values)
         self._bodies.append(body)
+        taken.add(name)
         self.touch()
         return body
 
@@ -173,7 +177,7 @@ class Scene:
             item.parts  # noqa: B018  it says what is wrong with them
         if type(item) is EulerNormalization:
             return self._normalisations[item.a]
-        if any(item is other for other in members):
+        if item.added and any(item is other for other in members):
             raise item.error(f"{item.name}: it has been added to this scene before; add each {word} once.")
         item.added = True
         members.append(item)

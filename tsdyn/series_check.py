@@ -126,7 +126,7 @@ def random_motion(scene, rng):
 
 def along(scene, attachment, coordinates, q):
     """x and xd of an attachment's markers as Truncated series."""
-    starts, qd = starts_of(scene.bodies), _objects([c.rate for c in q])
+    starts, qd = starts_of(scene.packed), _objects([c.rate for c in q])
     x, xd = [], []
     for marker, s in zip(attachment.markers, coordinates, strict=True):
         body, place, rate = attachment.body_of(marker), _zeros(marker.size), _zeros(marker.size)

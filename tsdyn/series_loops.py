@@ -8,13 +8,14 @@ A primitive says how its Jacobian's series follows from that of x; the rest is t
     f_k             = - sum_j (Phi_x)_j^T lam_{k-j}      force on a marker                           (2)
     T_k             = s x sum_j A_j^T f_{k-j}            its torque about the centroid, body frame   (3)
 
-A series lies in memory order by order. That of a body is A (its columns, 4 floats each), omega', r, J' omega' (4 each);
-that of an instance x (4 a marker), Phi_x (4 a row and marker), f (4 a marker), lam (1 a row), then its own scratch. A
-marker whose columns of Phi_x are constant, as all of Spherical's, takes no part in (1) beyond order zero, nor in (2);
-that of the ground has no force.
+A series lies in memory order by order. That of a body is A (its columns, 4 floats each), omega', r, J' omega' (4 each).
+An instance begins with order zero of x (4 a marker) and Phi_x (4 a row and marker); then come the series f (4 a
+marker), lam (1 a row), x and Phi_x, and its own scratch. A marker whose columns of Phi_x are constant, as all of
+Spherical's, takes no part in (1) beyond order zero, nor in (2); that of the ground has no force. Where no instance of a
+kind has others, they end with f.
 """
 
-from ._four import add, cross, fma, four, lanes, put, splat, times, total
+from ._four import add, cross, fetch, fma, four, lanes, put, splat, times, total
 from ._kernel import ANY, caller, data_of, integers, kernel, matrix, stack, stack2, vector
 from .body_loops import INTS, MASK, ROW
 from .markers import POINT
@@ -22,15 +23,19 @@ from .poses import turned
 
 # where the parts of a body's series begin, times the number of orders; floats of an order of all of them
 S_OMEGA, S_R, S_SPIN, BODY_ROW = 12, 16, 20, 24
-SIGNATURE = "iiiiipppppp"  # mode, k, orders, count, reals per instance, table, reals, bodies, series, b, Z
+# mode, k, orders, count, reals and floats per instance, table, reals, bodies, series, b, Z
+SIGNATURE = "iiiiiipppppp"
 call_series = caller(SIGNATURE)
 ADVANCE, RESIDUAL = range(2)
 GROUND = 16  # bits of the mask: from 0 on the markers whose columns vary, from 16 on those that are on the ground
 
 
-def instance_width(markers, rows, slots, orders):
-    """Floats of an instance."""
-    return orders * (4 * (2 * markers + markers * rows) + 4 * ((rows + 3) // 4)) + 4 * ((slots * orders + 3) // 4)
+def instance_width(markers, rows, slots, orders, varies):
+    """Floats of an instance; whether any column of Phi_x of the kind varies, or it has scratch memory."""
+    width = 4 * markers * (1 + rows) + 4 * markers * orders
+    if varies or slots:
+        width += 4 * ((rows * orders + 3) // 4) + 4 * (markers + markers * rows) * orders
+    return width + 4 * ((slots * orders + 3) // 4)
 
 
 @kernel
@@ -56,14 +61,13 @@ def torque(bodies, at, k, forces, first):
 
 # The names in capitals and kernel_series are filled in by primitive._compile.
 ROWS = MARKERS = SIZE = ROOM = SLOTS = 1
+AHEAD = False  # whether each instance has the next one's numbers brought into the cache
 CODES = OWNERS = STARTS = (0,)
 kernel_series = None
 
 
-def series(mode, k, orders, count, stride, table, reals, bodies, values, b, Z):
+def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b, Z):
     """ADVANCE: lam_{k-1} from b, x_{k+1}, (Phi_x)_{k+1}, and f_k, but for lam_k, onto the bodies' Z.
-
-    Where all of Phi_x is constant it and x are left at order zero, which is all that is read of them.
 
     RESIDUAL: b = (k + 1)(k + 2) Phi_{k+2} as the bodies' series have it.
     """
@@ -71,23 +75,37 @@ def series(mode, k, orders, count, stride, table, reals, bodies, values, b, Z):
     values, b, Z = vector(values, ANY), vector(b, ANY), vector(Z, ANY)
     x, f = stack(ROOM), stack2(ROWS, SIZE)
     wide, body_size = 4 * orders, BODY_ROW * orders
-    J, F, L = MARKERS * wide, MARKERS * (ROWS + 1) * wide, MARKERS * (ROWS + 2) * wide
-    own_scratch = L + 4 * ((ROWS + 3) // 4) * orders
-    size = own_scratch + 4 * ((SLOTS * orders + 3) // 4)
+    F = 4 * MARKERS * (1 + ROWS)
+    L = F + MARKERS * wide
+    X = L + 4 * ((ROWS * orders + 3) // 4)
+    J, own_scratch = X + MARKERS * wide, X + MARKERS * (1 + ROWS) * wide
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         first, mask = i * size, own[MASK]
+        if AHEAD and i + 1 < count:
+            fetch(values, first + size, F)
+            for j in range(MARKERS):
+                body = table[(i + 1) * INTS + OWNERS[j]] * body_size
+                if mode == ADVANCE:
+                    fetch(bodies, body, 12 * (k + 1))
+                    fetch(values, first + size + F + j * wide, 4 * (k + 1))
+                else:
+                    fetch(bodies, body + 12 * (k + 2), 12)
+                    fetch(bodies, body + S_R * orders + 4 * (k + 2), 4)
+        varies = mask & ((1 << GROUND) - 1) != 0
         if mode == ADVANCE:
-            for r in range(ROWS if k > 0 else 0):
+            for r in range(ROWS if k > 0 and varies else 0):
                 values[first + L + r * orders + k - 1] = b[own[ROW] + r]
-            varies = mask & ((1 << GROUND) - 1) != 0
             for now in range(0 if k == 0 else k + 1, k + 2 if varies else 1):
+                places, gradients, step = first, first + 4 * MARKERS, 4
+                if now > 0:
+                    places, gradients, step = first + X + 4 * now, first + J + 4 * now, wide
                 for j in range(MARKERS):
                     body, s = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3]
                     place = turned(bodies, body + 12 * now, s[0], s[1], s[2])
                     if CODES[j] == POINT:
                         place = add(place, four(bodies, body + S_R * orders + 4 * now))
-                    put(values, first + j * wide + 4 * now, place)
+                    put(values, places + j * step, place)
                     put(x, STARTS[j], place)
                 for r in range(ROWS):
                     for c in range(SIZE):
@@ -97,7 +115,7 @@ def series(mode, k, orders, count, stride, table, reals, bodies, values, b, Z):
                 for j in range(MARKERS):
                     if now == 0 or mask >> j & 1:
                         for r in range(ROWS):
-                            c, at = STARTS[j], first + J + (r * MARKERS + j) * wide + 4 * now
+                            c, at = STARTS[j], gradients + (r * MARKERS + j) * step
                             put(values, at, lanes(f[r, c], f[r, c + 1], f[r, c + 2]))
             for j in range(MARKERS if k > 0 else 0):
                 if mask >> (GROUND + j) & 1:
@@ -105,9 +123,10 @@ def series(mode, k, orders, count, stride, table, reals, bodies, values, b, Z):
                 forces, force = first + F + j * wide, splat(0.0)
                 done = four(values, forces + 4 * k - 4) if k > 1 else splat(0.0)
                 for r in range(ROWS):
-                    at, multipliers = first + J + (r * MARKERS + j) * wide, first + L + r * orders + k
-                    done = fma(four(values, at), splat(-values[multipliers - 1]), done)
+                    at = first + 4 * (MARKERS + r * MARKERS + j)
+                    done = fma(four(values, at), splat(-b[own[ROW] + r]), done)
                     if mask >> j & 1:
+                        at, multipliers = first + J + (r * MARKERS + j) * wide, first + L + r * orders + k
                         for l in range(1, k + 1):
                             force = fma(four(values, at + 4 * l), splat(-values[multipliers - l]), force)
                 put(values, forces + 4 * k - 4, done)
@@ -123,14 +142,14 @@ def series(mode, k, orders, count, stride, table, reals, bodies, values, b, Z):
                 for j in range(MARKERS):
                     if mask >> (GROUND + j) & 1:
                         continue
-                    at, s = first + J + (r * MARKERS + j) * wide, real[3 * j : 3 * j + 3]
-                    body = own[OWNERS[j]] * body_size
+                    s, body = real[3 * j : 3 * j + 3], own[OWNERS[j]] * body_size
                     place = turned(bodies, body + 12 * (k + 2), s[0], s[1], s[2])
                     if CODES[j] == POINT:
                         place = add(place, four(bodies, body + S_R * orders + 4 * (k + 2)))
-                    highest = fma(four(values, at), place, highest)
+                    highest = fma(four(values, first + 4 * (MARKERS + r * MARKERS + j)), place, highest)
                     if mask >> j & 1:
-                        places, gradients = first + j * wide, at + 4 * (k + 2)
+                        places = first + X + j * wide
+                        gradients = first + J + (r * MARKERS + j) * wide + 4 * (k + 2)
                         for l in range(1, k + 2):
                             gradient = times(four(values, gradients - 4 * l), splat(float(l)))
                             lower = fma(gradient, four(values, places + 4 * l), lower)

@@ -66,7 +66,7 @@ class SeriesMemory:
     """
 
     def __init__(self, prepared, highest):
-        self.series, packed = prepared.series, prepared.packed
+        self.series, packed, self.weight = prepared.series, prepared.packed, prepared.n
         series, n, slots = self.series, prepared.n, packed.system.memory.size
         system = System(*(array.copy() for array in packed.system))
         self.work, free = plain_work(n), allocate_free(series.network, n)

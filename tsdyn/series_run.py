@@ -8,18 +8,20 @@ from .dense import Trajectory
 from .drive import drive
 from .errors import InvalidArgument
 from .events import Watch
+from .expansion_pack import is_far
 from .run_state import CHART_ROWS, FILLED, STORED, T
 from .series_dense import SeriesReader
 from .series_memory import SeriesMemory
 from .series_state import ORDERS
-from .series_steps import accelerate_here, expand_series, reach
+from .series_steps import accelerate_here, expand_far_series, expand_series, reach
 from .steps import counts
 from .task import Outcome
 
 
-def addresses(within):
+def addresses(within, far):
     """Those that the driver and readers are given; within: whether anything is asked for between the steps."""
-    return np.array([expand_series.address, reach.address, accelerate_here.address if within else 0], np.int64)
+    expand = expand_far_series if far else expand_series
+    return np.array([expand.address, reach.address, accelerate_here.address if within else 0], np.int64)
 
 
 def run_series(task):
@@ -37,7 +39,8 @@ def run_series(task):
         memory = SeriesMemory(prepared, order[2])
     dense = STORED if task.dense_output else FILLED if task.events is not None else 0
     memory.clear(task, order, dense)
-    memory.steps = addresses(bool(dense) or task.times.size > 0)
+    within = bool(dense) or task.times.size > 0
+    memory.steps = addresses(within, is_far(prepared.series.network, order[2]))
     memory.load()
     run, packed = memory.run, prepared.packed
     reading = None

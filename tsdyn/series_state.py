@@ -19,8 +19,9 @@ class Expansion(NamedTuple):
     order: np.ndarray  # int64 (5,): TOP of omega', one less than that of r and A; room for; the next step's; bounds
     bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
     constraints: np.ndarray  # each kind's instances; series_loops.series
-    places: np.ndarray  # int64 (kinds, 2): addresses of the loops; where a kind's series begin
-    forces: np.ndarray  # int64 (kinds, 6): address, first of loads, instances, reals each, first in table, in reals
+    places: np.ndarray  # int64 (kinds, 3): addresses of the loops; where a kind's series begin, floats of an instance
+    forces: np.ndarray  # int64 (kinds, 7): address, first of loads, instances, reals each, first in table, in reals;
+    # and floats of an instance
     table: np.ndarray  # int64: the bodies of each force
     loads: np.ndarray  # each kind of force's instances
 

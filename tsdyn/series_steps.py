@@ -23,12 +23,23 @@ call_expand, call_reach = caller("pi"), caller("pdd")
 @callback("pi")
 def expand_series(context, k):
     """Order k of everything, in turn; order zero begins the series at the poses, and gives qdd."""
+    return _expand(context, k, False)
+
+
+@callback("pi")
+def expand_far_series(context, k):
+    """The same for series that are too long for the caches near by."""
+    return _expand(context, k, True)
+
+
+@kernel
+def _expand(context, k, ahead):
     c = load_series(context)
     w, x, f = c.work, c.expansion, c.free
     orders = x.order[ORDERS]
     if k == 0:
         begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
-    expand(c.network, c.system, k, orders, x, f)
+    expand(c.network, c.system, k, k > 0 and k + 1 == x.order[TOP], ahead, orders, x, f)
     if k == 0:
         for b in range(c.network.bodies.shape[0]):
             at = b * orders * BODY_ROW

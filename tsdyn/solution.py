@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import diagnostics, power, reactions
-from .bodies import rotation_matrix
+from .bodies import PointMass, rotation_matrix
 from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
@@ -220,9 +220,9 @@ class Solution:
             In the ground frame; the torque is about the item's first point on that body (`point_a`), or the centroid
             where it has none.
         """
-        for load in self.packed.loads:
-            if item is load.force:
-                return reactions.force_reaction(self, load, self._acted(item, on))
+        load = reactions.loads_of(self.packed).get(id(item))
+        if load is not None:
+            return reactions.force_reaction(self, load, self._acted(item, on))
         member = self._member(item)
         return reactions.reaction(self, member, self._acted(item, on))
 
@@ -248,7 +248,7 @@ class Solution:
         raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
 
     def _span(self, body, part):
-        if body not in self.packed.bodies:
+        if not isinstance(body, PointMass) or self.packed.bodies[body.index : body.index + 1] != (body,):
             raise InvalidBody(f"{body!r} is not a body of this solution's scene.")
         at = int(self.system.bodies[body.index, 0])
         if part == "r":

@@ -67,14 +67,14 @@ def _found_again(process, *parts):
     if process == os.getpid():
         return packed
     system = packed.system
-    classes = dict.fromkeys(type(constraint) for constraint in packed.constraints)
-    for row, kind in zip(system.kinds, classes, strict=True):
+    kinds = classes(packed)
+    for row, kind in zip(system.kinds, kinds, strict=True):
         for column, name in ((PHI, "phi"), (JACOBIAN, "jacobian"), (GAMMA, "gamma"), (PHI_T, "phi_t")):
             row[column] = _address(kind, name) if row[column] else 0
         row[CURVATURE] = 0
     values = [
         value
-        for kind in classes
+        for kind in kinds
         for constraint, given in zip(packed.constraints, packed.parameters, strict=True)
         if type(constraint) is kind
         for value in given
@@ -165,15 +165,18 @@ def _members(constraints):
 
 def member_of(packed, constraint):
     """The `Member` that a constraint, or a joint's part, is; None where it is not of that scene."""
-    for member in packed.members:
-        if member.constraint is constraint:
-            return member
-    row = 0
-    for i, part in enumerate(packed.constraints):
-        if part is constraint:
-            return Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + part.rows))
-        row += part.rows
-    return None
+    if "members" not in packed.shared:
+        found, row = {}, 0
+        for i, part in enumerate(packed.constraints):
+            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + part.rows))
+            row += part.rows
+        packed.shared["members"] = found | {id(member.constraint): member for member in packed.members}
+    return packed.shared["members"].get(id(constraint))
+
+
+def classes(packed):
+    """The classes of constraints, in the order of System.kinds."""
+    return list(dict.fromkeys(type(constraint) for constraint in packed.constraints))
 
 
 def user_functions(packed):
@@ -193,8 +196,7 @@ def user_functions(packed):
 def with_curvatures(packed):
     """The system with the kernels of second derivatives, which only implicit methods load."""
     kinds = packed.system.kinds.copy()
-    classes = dict.fromkeys(type(constraint) for constraint in packed.constraints)
-    kinds[:, CURVATURE] = [_address(kind, "curvature") for kind in classes]
+    kinds[:, CURVATURE] = [_address(kind, "curvature") for kind in classes(packed)]
     return packed.system._replace(kinds=kinds)
 
 

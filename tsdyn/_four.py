@@ -2,7 +2,7 @@
 
     four(array, i)       the floats array[i : i + 4]          put(array, i, f)   write them there
     splat(x)             x four times                         lanes(a, b, c)     (a, b, c, 0)
-    fma(f, g, h)         f g + h, rounded once where the processor can
+    fma(f, g, h)         f g + h, rounded once where the processor can       larger(f, g)   of |f| and g, one by one
     add(f, g), sub(f, g), times(f, g)                         first(f), second(f), third(f)   one of them
     total(f)             their sum
     cross(f, g)          of the first three; the fourth is 0
@@ -118,6 +118,19 @@ def fma(typing, f, g, h):
         return builder.fadd(product, arguments[2], flags=("contract",))
 
     return FOUR(FOUR, FOUR, FOUR), generate
+
+
+@intrinsic
+def larger(typing, f, g):
+    """The larger of |f| and g, one by one."""
+
+    def generate(context, builder, signature, arguments):
+        bits = ir.VectorType(ir.IntType(64), _WIDTH)
+        all_but_sign = ir.Constant(bits, [(1 << 63) - 1] * _WIDTH)
+        size = builder.bitcast(builder.and_(builder.bitcast(arguments[0], bits), all_but_sign), _quad)
+        return builder.select(builder.fcmp_unordered(">", size, arguments[1]), size, arguments[1])
+
+    return FOUR(FOUR, FOUR), generate
 
 
 def _extract(place, what):
@@ -243,5 +256,9 @@ if DEBUG:
     def fma(f, g, h):
         """F g + h."""
         return f * g + h
+
+    def larger(f, g):
+        """The larger of |f| and g."""
+        return np.maximum(np.abs(f), g)
 
     first, second, third, fourth = (lambda f, i=i: f[i] for i in range(_WIDTH))

@@ -137,16 +137,20 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b
                 if CODES[j] == POINT:
                     put(Z, 8 * body, add(four(Z, 8 * body), force))
         else:
+            for j in range(MARKERS):
+                if mask >> (GROUND + j) & 1:
+                    continue
+                s, body = real[3 * j : 3 * j + 3], own[OWNERS[j]] * body_size
+                place = turned(bodies, body + 12 * (k + 2), s[0], s[1], s[2])
+                if CODES[j] == POINT:
+                    place = add(place, four(bodies, body + S_R * orders + 4 * (k + 2)))
+                put(x, STARTS[j], place)
             for r in range(ROWS):
                 highest, lower = splat(0.0), splat(0.0)
                 for j in range(MARKERS):
                     if mask >> (GROUND + j) & 1:
                         continue
-                    s, body = real[3 * j : 3 * j + 3], own[OWNERS[j]] * body_size
-                    place = turned(bodies, body + 12 * (k + 2), s[0], s[1], s[2])
-                    if CODES[j] == POINT:
-                        place = add(place, four(bodies, body + S_R * orders + 4 * (k + 2)))
-                    highest = fma(four(values, first + 4 * (MARKERS + r * MARKERS + j)), place, highest)
+                    highest = fma(four(values, first + 4 * (MARKERS + r * MARKERS + j)), four(x, STARTS[j]), highest)
                     if mask >> j & 1:
                         places = first + X + j * wide
                         gradients = first + J + (r * MARKERS + j) * wide + 4 * (k + 2)

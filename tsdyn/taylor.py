@@ -6,6 +6,7 @@ back on the manifold along W Phi_q^T.
 
 import math
 
+from ._four import first, four, larger, second, splat, third
 from ._kernel import entry, kernel
 from .assembly import remember, set_time
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
@@ -55,19 +56,21 @@ SMALL, SMALL_STEPS = 0.02, 40  # a step that turns and moves everything by less;
 
 
 @kernel
+def _most(f):
+    return max(first(f), max(second(f), third(f)))
+
+
+@kernel
 def _size(bodies, nb, orders, k, far, fast):
     """The largest coefficient k of A and of r over far, and k - 1 of omega' over fast."""
-    worst = 0.0
+    turn, shift, spin = splat(0.0), splat(0.0), splat(0.0)
     for b in range(nb):
         at = b * orders * BODY_ROW
-        turn, shift, spin = 0.0, 0.0, 0.0
-        for i in range(12):
-            turn = max(turn, abs(bodies[at + 12 * k + i]))
-        for i in range(3):
-            shift = max(shift, abs(bodies[at + S_R * orders + 4 * k + i]))
-            spin = max(spin, abs(bodies[at + S_OMEGA * orders + 4 * (k - 1) + i]))
-        worst = max(worst, max(turn, max(shift * far, spin * fast)))
-    return worst
+        for i in range(at + 12 * k, at + 12 * k + 12, 4):
+            turn = larger(four(bodies, i), turn)
+        shift = larger(four(bodies, at + S_R * orders + 4 * k), shift)
+        spin = larger(four(bodies, at + S_OMEGA * orders + 4 * (k - 1)), spin)
+    return max(_most(turn), max(_most(shift) * far, _most(spin) * fast))
 
 
 @kernel
@@ -92,12 +95,11 @@ def _step_length(c, r):
     x, nb = c.expansion, c.network.bodies.shape[0]
     top, orders = x.order[TOP], x.order[ORDERS]
     rtol, atol = r.clock[RTOL], r.clock[ATOL]
-    far, fast = 0.0, 0.0
+    far, fast = splat(0.0), splat(0.0)
     for b in range(nb):
         at = b * orders * BODY_ROW
-        for i in range(3):
-            far = max(far, abs(x.bodies[at + S_R * orders + i]))
-            fast = max(fast, abs(x.bodies[at + S_OMEGA * orders + i]))
+        far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
+    far, fast = _most(far), _most(fast)
     c.work.control[FLOOR] = ROUNDING * (c.work.control[SIZE] + far)
     tol = atol + rtol
     far, fast = tol / (atol + rtol * far), tol / (atol + rtol * fast)

@@ -96,6 +96,26 @@ def tree(levels):
     return {"gravity": GRAVITY, "bodies": bodies, "constraints": joints}
 
 
+def hub(rods):
+    """A heavy wheel on a spherical joint at its middle, and rods around it, released from horizontal."""
+    radius = max(1.0, rods / 30.0)  # m
+    body = {
+        "mass": float(rods),
+        "inertia": (np.array([0.3, 0.3, 0.5]) * rods * radius**2).tolist(),
+        "position": [0.0, 0.0, 0.0],
+        "orientation": [1.0, 0.0, 0.0, 0.0],
+        "velocity": [0.0, 0.0, 0.0],
+        "angular_velocity": [0.0, 0.0, 0.0],
+    }
+    bodies, joints = [body], [joint(0, 1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))]
+    for angle in 2.0 * np.pi * np.arange(rods) / rods:
+        out = np.array([np.cos(angle), np.sin(angle), 0.0])
+        at = radius * out
+        bodies.append(rod(at, out))
+        joints.append(joint(1, len(bodies), at.tolist(), NEAR))
+    return {"gravity": GRAVITY, "bodies": bodies, "constraints": joints}
+
+
 def loop(links):
     """Rods in a half circle in the horizontal plane, both ends hung from the ground: one closed loop."""
     turn = np.pi / links

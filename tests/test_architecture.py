@@ -24,7 +24,7 @@ LAYERS = """
 _cache errors _discovery jet truncated checks
 _kernel
 _four rotation linalg motion signal angle recurrences
-blocks block_steps block_kernels
+blocks block_steps block_kernels hubs
 markers bodies tableau friction
 poses
 attachment marker_forces frames curvature body_loops

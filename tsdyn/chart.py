@@ -62,6 +62,8 @@ def _normal_space(network, w, l):
             for c in range(4):
                 w.U[network.bodies[b, 0] + 3 + c, network.normals[b]] = l.base[8 * b + 4 + c]
     for e in range(network.row.size):
+        if network.row[e] < 0:
+            continue
         j, scale = network.row[e], 1.0 / diagonal[e]
         for side in range(2):
             b, y = network.sides[e, side], 16 * e + 8 * side

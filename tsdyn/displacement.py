@@ -8,9 +8,25 @@ N       = H(q) C Y0                         what Phi changes by, with -u
 import math
 
 from ._four import add, cross, first, fma, four, lanes, put, second, splat, sub, third, times, total
-from ._kernel import kernel
+from ._kernel import kernel, stack
 from .block_kernels import factor_lu
-from .normal import multiply_both
+from .network import (
+    H_BODY,
+    H_COLUMNS,
+    H_KIND,
+    H_LEFT,
+    H_RIGHT,
+    H_ROWS,
+    H_STRIDE,
+    H_TARGET,
+    ROWS,
+    ROWS_WELD,
+    W_MASS,
+    W_ROTATION,
+    WEIGHTS,
+    WELDS,
+)
+from .normal import inner, more, multiply_both
 from .poses import OMEGA, POSE, RD, R, orient
 from .workspace import FACTORIZATIONS
 
@@ -63,6 +79,48 @@ def turn_rates(network, l, rates, poses):
 
 
 @kernel
+def _multiply_parts_both(network, l, H, lower, upper):
+    """The products at the parts of hubs: X as in `factorise_normal`, and of the welds W0 before and C W0 after."""
+    t = stack(12)
+    for i in range(network.parts.shape[0]):
+        part, scale = network.parts[i], network.scales[i]
+        left, rows, right, columns = part[H_LEFT], part[H_ROWS], part[H_RIGHT], part[H_COLUMNS]
+        target, stride, kind, b = part[H_TARGET], part[H_STRIDE], part[H_KIND], part[H_BODY]
+        light, w = network.inverse[WEIGHTS * b + W_MASS], WEIGHTS * b + W_ROTATION
+        if kind != ROWS and network.bodies[b, 1] == 7:
+            for c in range(3):
+                put(t, 4 * c, _turn_by(l, b, four(network.inverse, w + 4 * c)))
+        for r in range(rows):
+            for c in range(columns):
+                at, h = target + r * stride + c, left + 16 * r
+                if kind == ROWS:
+                    other = right + 16 * c
+                    if left != right or c >= r:
+                        more(upper, at, scale * inner(H, h, l.X, other))
+                    if left != right or c > r:
+                        more(lower, at, scale * inner(H, other, l.X, h))
+                elif kind == WELDS:
+                    if r < 3 and r == c:
+                        more(upper, at, scale * light)
+                        more(lower, at, scale * light)
+                    elif r >= 3 and c >= 3:
+                        more(upper, at, scale * t[4 * (c - 3) + r - 3])
+                        more(lower, at, scale * t[4 * (r - 3) + c - 3])
+                else:
+                    turned = light * H[h + c]
+                    if c >= 3:
+                        o = 4 * (c - 3)
+                        turned = H[h + 4] * t[o] + H[h + 5] * t[o + 1] + H[h + 6] * t[o + 2]
+                    placed = l.X[h + c + c // 3]
+                    if kind == ROWS_WELD:
+                        more(upper, at, scale * turned)
+                        more(lower, at, scale * placed)
+                    else:
+                        more(upper, target + c * stride + r, scale * placed)
+                        more(lower, target + c * stride + r, scale * turned)
+
+
+@kernel
 def factorise_normal(network, w, f, l):
     """Factors of N = H C Y0, H being that of the present place; whether there are any."""
     for e in range(network.sides.shape[0]):
@@ -71,6 +129,8 @@ def factorise_normal(network, w, f, l):
             put(l.X, at, four(l.Y0, at))
             put(l.X, at + 4, _turn_by(l, network.sides[e, k], four(l.Y0, at + 4)))
     multiply_both(network, f.H, l.X, l.lower, l.upper)
+    if network.parts.shape[0] > 0:
+        _multiply_parts_both(network, l, f.H, l.lower, l.upper)
     w.counters[FACTORIZATIONS] += 1
     return factor_lu(network.pattern, l.lower, l.upper, PIVOT_LIMIT) < 0
 

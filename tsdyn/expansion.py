@@ -137,6 +137,8 @@ def expand(network, system, k, last, ahead, orders, x, f):
             put(bodies, at + S_OMEGA * orders + 4 * (k + 1), times(four(Z, 8 * b + 4), g))
             _turn(bodies, at, k + 2, times(four(Z, 8 * b + 4), h))
     run_loops(network, system.reals, RESIDUAL, k, orders, bodies, x.constraints, x.places, f.b, Z)
+    for i in range(network.welds.shape[0]):
+        f.b[network.welds[i, 0]] = 0.0
     solve(network.pattern, f.S, f.b)
     for i in range(Z.size):
         Z[i] = 0.0

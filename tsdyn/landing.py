@@ -36,6 +36,8 @@ def run_loops(network, reals, column, poses, t, out, H):
                 kind[column], kind[N_COUNT], kind[N_REALS], network.table[kind[N_FIRST_INT] :],
                 reals[kind[N_FIRST_REAL] :], poses, poses, t, out, H,
             )  # fmt: skip
+    for i in range(network.welds.shape[0]):
+        out[network.welds[i, 0]] = 0.0
 
 
 @kernel

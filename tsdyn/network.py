@@ -13,29 +13,36 @@ from .attachment import address
 from .blocks import Pattern, analyse
 from .body_loops import BODY, INTS, MASK, ROW
 from .errors import InvalidConstraint
+from .hubs import cut
 
 # columns of Network.kinds: addresses of the loops, then where a kind's instances are
 REDUCED, VALUES, BIAS, DRIFT, N_COUNT, N_REALS, N_FIRST_INT, N_FIRST_REAL, N_COLUMNS = range(9)
 # columns of Network.products
 P_LEFT, P_ROWS, P_RIGHT, P_COLUMNS, P_TARGET, P_STRIDE, P_SAME, P_WIDTH = range(8)  # SAME: with itself, both sides
+# columns of Network.parts; kinds of products
+H_LEFT, H_ROWS, H_RIGHT, H_COLUMNS, H_TARGET, H_STRIDE, H_KIND, H_BODY, H_WIDTH = range(9)
+ROWS, ROWS_WELD, WELD_ROWS, WELDS = range(4)
 W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
 THIN = 1e-12  # of the largest principal inertia: what is less is none
 
 
 class Network(NamedTuple):
-    """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H."""
+    """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H, which are zero for a weld's."""
 
     bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length 7 or 3
     kinds: np.ndarray  # int64 (kinds, N_COLUMNS)
     table: np.ndarray  # int64: body_loops.INTS for each instance
     sides: np.ndarray  # int64 (m, 2): the bodies of a row; nb is the ground
-    row: np.ndarray  # int64 (m,): its place among the rows of Phi
+    row: np.ndarray  # int64 (m,): its place among the rows of Phi; -1 for a weld's
     products: np.ndarray  # int64 (products, P_WIDTH): rows of sides that meet at a body, and where their product goes
     inverse: np.ndarray  # ((nb + 1) 16,): 1 / m and three zeros, columns of J'^-1; zero for the ground
     mass: np.ndarray  # ((nb + 1) 16,): m and three zeros, columns of J'
     spins: np.ndarray  # int64 (nb,): whether omega' x J' omega' is ever other than zero
     pattern: Pattern  # of S
     normals: np.ndarray  # int64 (nb,): the row of Phi that normalises a body's p, or -1
+    parts: np.ndarray  # int64 (products, H_WIDTH): the products at the parts of hubs, see hubs.py
+    scales: np.ndarray  # (products,): what they are multiplied by
+    welds: np.ndarray  # int64 (rows of welds, 2): which row, of which body
 
 
 def thin(packed):
@@ -78,7 +85,11 @@ def no_network():
     none, pattern = np.zeros(0, np.int64), analyse([], [])[1]
     pairs = np.zeros((0, 2), np.int64)
     kinds, products = np.zeros((0, N_COLUMNS), np.int64), np.zeros((0, P_WIDTH), np.int64)
-    return Network(pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none)
+    parts = np.zeros((0, H_WIDTH), np.int64)
+    return Network(
+        pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none, parts, np.zeros(0),
+        pairs,
+    )  # fmt: skip
 
 
 def build(packed):
@@ -101,37 +112,65 @@ def build(packed):
             sizes.append(0)
         inside.append((node, sizes[node]))
         sizes[node] += constraint.rows
-    cliques = [[] for _ in range(nb)]
+    degrees = np.where(system.bodies[:, 1] == 7, 6, 3).tolist()
+    parts = cut([tuple(body if body < nb else -1 for body in pair) for pair in nodes], sizes, degrees)
+    hubs, cliques = {part.body for part in parts}, [[] for _ in range(nb)]
     for pair, node in nodes.items():
-        for body in set(pair) - {nb}:
+        for body in set(pair) - hubs - {nb}:
             cliques[body].append(node)
+    cliques += [[*part.nodes, *(weld for weld, _ in part.welds)] for part in parts]
     starts, pattern, where = analyse(sizes, cliques)
 
     m = sum(sizes)
     firsts = [int(starts[node]) + offset for node, offset in inside]
-    sides, places = np.zeros((m, 2), np.int64), np.zeros(m, np.int64)
-    at_body, products = [[] for _ in range(nb)], []
+    sides, places = np.full((m, 2), nb, np.int64), np.full(m, -1, np.int64)
+    at_body, at_node, products = [[] for _ in range(nb)], [[] for _ in nodes], []
     for i, (constraint, pair, row) in enumerate(joints):
         e = np.arange(firsts[i], firsts[i] + constraint.rows)
         sides[e], places[e] = pair, np.arange(row, row + constraint.rows)
+        at_node[inside[i][0]].append(i)
         for side, body in enumerate(pair):
-            if body < nb:
+            if body < nb and body not in hubs:
                 at_body[body].append((i, side))
 
     def product(i, side, j, other):
         (node, r), (other_node, c) = inside[i], inside[j]
         target, stride, _ = where(node, other_node)
         left, right = 16 * firsts[i] + 8 * side, 16 * firsts[j] + 8 * other
-        rows, columns = joints[i][0].rows, joints[j][0].rows
-        products.append((left, rows, right, columns, target + r * stride + c, stride, int(i == j)))
+        return left, joints[i][0].rows, right, joints[j][0].rows, target + r * stride + c, stride
 
     for i in range(len(joints)):
-        product(i, 0, i, 0)
+        products.append((*product(i, 0, i, 0), 1))
     for found in at_body:
         for i, side in found:
             for j, other in found:
                 if firsts[i] < firsts[j]:
-                    product(i, side, j, other)
+                    products.append((*product(i, side, j, other), 0))
+
+    welded, scales, welds = [], [], []
+    for part in parts:
+        found = [(i, joints[i][1].index(part.body)) for node in part.nodes for i in at_node[node]]
+        for i, side in found:
+            for j, other in found:
+                if firsts[i] <= firsts[j]:
+                    welded.append((*product(i, side, j, other), ROWS, part.body))
+                    scales.append(part.scale - (i == j))  # the whole hub's is among the products
+        for weld, sign in part.welds:
+            count = sizes[weld]
+            for i, side in found:
+                node, r = inside[i]
+                target, stride, after = where(node, weld)
+                to, kind = (target + r, WELD_ROWS) if after else (target + r * stride, ROWS_WELD)
+                left = 16 * firsts[i] + 8 * side
+                welded.append((left, joints[i][0].rows, 0, count, to, stride, kind, part.body))
+                scales.append(sign * part.scale)
+            for other, other_sign in part.welds:
+                target, stride, after = where(weld, other)
+                if not after:
+                    welded.append((0, count, 0, count, target, stride, WELDS, part.body))
+                    scales.append(sign * other_sign * part.scale)
+            if sign > 0:
+                welds += [(int(starts[weld]) + r, part.body) for r in range(count)]
 
     index = {id(constraint): i for i, (constraint, _, _) in enumerate(joints)}
     classes = dict.fromkeys(type(constraint) for constraint in packed.constraints)
@@ -169,6 +208,9 @@ def build(packed):
         spins=spins,
         pattern=pattern,
         normals=normals,
+        parts=np.array(welded, np.int64).reshape(-1, H_WIDTH),
+        scales=np.array(scales, float),
+        welds=np.array(welds, np.int64).reshape(-1, 2),
     )
     return network, tuple(used)
 

@@ -6,6 +6,14 @@ Quantities of bodies are rows of eight floats, (linear, 0, angular in the body f
 from ._four import add, fma, four, get, let, put, splat, times, total
 from ._kernel import kernel
 from .network import (
+    H_BODY,
+    H_COLUMNS,
+    H_KIND,
+    H_LEFT,
+    H_RIGHT,
+    H_ROWS,
+    H_STRIDE,
+    H_TARGET,
     P_COLUMNS,
     P_LEFT,
     P_RIGHT,
@@ -13,9 +21,12 @@ from .network import (
     P_SAME,
     P_STRIDE,
     P_TARGET,
+    ROWS,
+    ROWS_WELD,
     W_MASS,
     W_ROTATION,
     WEIGHTS,
+    WELD_ROWS,
 )
 
 
@@ -40,7 +51,7 @@ def weigh_rows(network, H, Y):
 
 
 @kernel
-def _inner(H, h, Y, y):
+def inner(H, h, Y, y):
     """The product of two rows at one body."""
     return total(fma(four(H, h), four(Y, y), times(four(H, h + 4), four(Y, y + 4))))
 
@@ -54,7 +65,8 @@ def _inner_both(H, h, Y, y):
 
 
 @kernel
-def _more(values, at, x):
+def more(values, at, x):
+    """values[at] += x."""
     let(values, at, get(values, at) + x)
 
 
@@ -72,13 +84,38 @@ def multiply_rows(network, H, Y, values):
         if get(product, P_SAME) != 0:
             for r in range(rows):
                 for c in range(r, columns):
-                    _more(values, target + c, _inner_both(H, left + 16 * r, Y, right + 16 * c))
+                    more(values, target + c, _inner_both(H, left + 16 * r, Y, right + 16 * c))
                 target += stride
         else:
             for r in range(rows):
                 for c in range(columns):
-                    _more(values, target + c, _inner(H, left + 16 * r, Y, right + 16 * c))
+                    more(values, target + c, inner(H, left + 16 * r, Y, right + 16 * c))
                 target += stride
+    if network.parts.shape[0] > 0:
+        _multiply_parts(network, H, Y, values)
+
+
+@kernel
+def _multiply_parts(network, H, Y, values):
+    """The products at the parts of hubs."""
+    for i in range(network.parts.shape[0]):
+        part, scale = network.parts[i], network.scales[i]
+        left, rows, right, columns = part[H_LEFT], part[H_ROWS], part[H_RIGHT], part[H_COLUMNS]
+        target, stride, kind, weights = part[H_TARGET], part[H_STRIDE], part[H_KIND], WEIGHTS * part[H_BODY]
+        for r in range(rows):
+            for c in range(columns):
+                if kind == ROWS:
+                    if left != right or c >= r:
+                        more(values, target + r * stride + c, scale * inner(H, left + 16 * r, Y, right + 16 * c))
+                elif kind == ROWS_WELD:
+                    more(values, target + r * stride + c, scale * get(Y, left + 16 * r + c + c // 3))
+                elif kind == WELD_ROWS:
+                    more(values, target + c * stride + r, scale * get(Y, left + 16 * r + c + c // 3))
+                elif r < 3 and r == c:
+                    more(values, target + r * stride + c, scale * get(network.inverse, weights + W_MASS))
+                elif r >= 3 and c >= 3:
+                    w = get(network.inverse, weights + W_ROTATION + 4 * (c - 3) + r - 3)
+                    more(values, target + r * stride + c, scale * w)
 
 
 @kernel
@@ -95,16 +132,16 @@ def multiply_both(network, H, X, lower, upper):
         rows, columns = get(product, P_ROWS), get(product, P_COLUMNS)
         if get(product, P_SAME) != 0:
             for r in range(rows):
-                _more(upper, target + r, _inner_both(H, left + 16 * r, X, right + 16 * r))
+                more(upper, target + r, _inner_both(H, left + 16 * r, X, right + 16 * r))
                 for c in range(r + 1, columns):
-                    _more(upper, target + c, _inner_both(H, left + 16 * r, X, right + 16 * c))
-                    _more(lower, target + c, _inner_both(H, right + 16 * c, X, left + 16 * r))
+                    more(upper, target + c, _inner_both(H, left + 16 * r, X, right + 16 * c))
+                    more(lower, target + c, _inner_both(H, right + 16 * c, X, left + 16 * r))
                 target += stride
         else:
             for r in range(rows):
                 for c in range(columns):
-                    _more(upper, target + c, _inner(H, left + 16 * r, X, right + 16 * c))
-                    _more(lower, target + c, _inner(H, right + 16 * c, X, left + 16 * r))
+                    more(upper, target + c, inner(H, left + 16 * r, X, right + 16 * c))
+                    more(lower, target + c, inner(H, right + 16 * c, X, left + 16 * r))
                 target += stride
 
 

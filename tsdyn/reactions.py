@@ -61,7 +61,8 @@ def solve_multipliers(context, t, q, r, rows, out):
             solve(network.pattern, f.S, f.b)
             scatter(network, f.H, f.b, f.Z)
             for e in range(f.b.size):
-                out[k, network.row[e]] += f.b[e]
+                if network.row[e] >= 0:
+                    out[k, network.row[e]] += f.b[e]
         for i in range(out.shape[1]):  # what the joints leave of r
             for half in range(2):
                 at = s.segments[i, 2 * half]

@@ -18,6 +18,10 @@ from .rank import check_rank
 from .workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 
 LARGE = 1 << 24  # entries of Phi_q from which on no dense one is made
+DEPENDENT = (
+    "Phi_q has dependent rows.\nRemove the rows that say nothing new, or use a joint with fewer rows. Rows that are "
+    "independent elsewhere make this a singular configuration: start from another one."
+)
 
 
 @entry
@@ -94,20 +98,20 @@ def consistent(scene, system, q, qd, t, tol):
     free, work, rates = whole.free, whole.work, np.zeros(len(network.row))
     context, *_keep = resident(whole)
     at = network.bodies[network.bodies[:, 1] == 7, 0][:, None] + np.arange(3, 7)
-    rows = network.normals[network.normals >= 0]
+    rows, real = network.normals[network.normals >= 0], network.row >= 0
 
     def look():
         """Phi, Phi_q qd + Phi_t, and the row of H that depends on those before it."""
         dependent = _look(context, q, qd, t, rates)
         Phi, velocity = np.zeros(m), np.zeros(m)
-        Phi[network.row], velocity[network.row] = free.b, rates
+        Phi[network.row[real]], velocity[network.row[real]] = free.b[real], rates[real]
         p, pd = q[at], qd[at]
         Phi[rows], velocity[rows] = 0.5 * ((p * p).sum(axis=1) - 1.0), (p * pd).sum(axis=1)
         return Phi, velocity, dependent
 
     Phi, velocity, dependent = look()
     H = np.ones((m, 1))
-    H[network.row, 0] = free.H.reshape(-1, 16).sum(axis=1)
+    H[network.row[real], 0] = free.H.reshape(-1, 16)[real].sum(axis=1)
     demand_finite(scene, Phi, H, velocity)
     demand_small(scene, Phi, tol * (1.0 + np.abs(q).max()), "position", "Phi")
     if dependent >= 0:
@@ -132,14 +136,13 @@ def _refuse(scene, network, q, qd, t, free, dependent):
     if q.size * len(scene.system.segments) < LARGE:
         check_rank(scene, constraint_arrays(scene.system, q, qd, t)[1])
         return
+    if network.row[dependent] < 0:
+        hub = scene.bodies[dict(network.welds.tolist())[dependent]].name
+        raise RedundantConstraints(f"the constraints at {hub} depend on one another: {DEPENDENT}")
     name = scene.row_names()[network.row[dependent]]
     if not free.H[16 * dependent : 16 * dependent + 16].any():
         raise SingularConfiguration(
             f"the row of {name} in Phi_q is zero in this configuration: the constraint is singular here. "
             "Start from another configuration, or use a constraint that is regular here."
         )
-    raise RedundantConstraints(
-        f"{name} depends on other constraint rows: Phi_q has dependent rows.\nRemove the rows that say nothing new, or "
-        "use a joint with fewer rows. Rows that are independent elsewhere make this a singular configuration: start "
-        "from another one."
-    )
+    raise RedundantConstraints(f"{name} depends on other constraint rows: {DEPENDENT}")

@@ -1,0 +1,97 @@
+"""Bodies at which many constraints meet, cut into parts: their rows are all coupled, and would be one dense block.
+
+A hub becomes a tree of parts, welded together by as many rows as it has degrees of freedom, with its mass and inertia
+shared out among them. Few rows meet at a part, so few are coupled, and the whole is as sparse as a tree of bodies. It
+is the same system: parts that are welded move as one body does, so that with S = H W H^T of the parts, and zeros on the
+right for the welds, the multipliers are those of the hub in one piece. S of the parts is positive definite wherever the
+rows are independent, as for any mechanism; each level of the tree has an equal share of the mass, so that no digits are
+lost on the way up.
+
+Constraints are dealt out to the parts along a walk through the rest of the scene, so that those which are close to one
+another there meet at parts that are close.
+"""
+
+from typing import NamedTuple
+
+LARGEST = 42  # rows at a body that isn't cut
+LEAF, FAN = 18, 4  # rows at a part without parts below it; parts below one
+
+
+class Part(NamedTuple):
+    """A part of a hub."""
+
+    body: int
+    scale: float  # of the hub's mass over its own
+    nodes: list  # that meet there
+    welds: list  # pairs: the node of a weld, its sign on this part
+
+
+def cut(pairs, sizes, degrees):
+    """Cut the hubs of a graph.
+
+    Parameters
+    ----------
+    pairs : sequence of (int, int)
+        The bodies of each node (all rows between two bodies); one of them may be the ground, -1.
+    sizes : list of int
+        Rows of each node; those of the welds, which are nodes too, are appended.
+    degrees : sequence of int
+        Degrees of freedom of each body, 6 or 3.
+
+    Returns
+    -------
+    list of Part
+    """
+    at_body = {}
+    for node, pair in enumerate(pairs):
+        for body in pair:
+            if body >= 0:
+                at_body.setdefault(body, []).append(node)
+    hubs = {body for body, nodes in at_body.items() if sum(sizes[node] for node in nodes) > LARGEST}
+    if not hubs:
+        return []
+    place = _walk(pairs, at_body, hubs)
+    parts = []
+    for hub in sorted(hubs):
+        parts += _tree(hub, sorted(at_body[hub], key=place.__getitem__), sizes, degrees[hub])
+    return parts
+
+
+def _walk(pairs, at_body, hubs):
+    """When each node is met on a walk, breadth first, that doesn't pass hubs or the ground."""
+    place = {}
+    for first in range(len(pairs)):
+        queue = [first]
+        for node in queue:
+            if node in place:
+                continue
+            place[node] = len(place)
+            for body in pairs[node]:
+                if body >= 0 and body not in hubs:
+                    queue += [other for other in at_body[body] if other not in place]
+    return place
+
+
+def _tree(hub, nodes, sizes, degrees):
+    """The parts of one hub; sizes grows by the welds."""
+    leaves, rows = [[]], 0
+    for node in nodes:
+        if leaves[-1] and rows + sizes[node] > LEAF:
+            leaves.append([])
+            rows = 0
+        leaves[-1].append(node)
+        rows += sizes[node]
+    levels = [len(leaves)]
+    while levels[-1] > 1:
+        levels.append(-(-levels[-1] // FAN))
+    parts, below = [], []
+    for count in levels:
+        level = [Part(hub, float(len(levels) * count), [] if below else leaves[i], []) for i in range(count)]
+        for i, part in enumerate(below):
+            weld, above = len(sizes), level[i * count // len(below)]
+            sizes.append(degrees)
+            part.welds.append((weld, 1))
+            above.welds.append((weld, -1))
+        parts += level
+        below = level
+    return parts

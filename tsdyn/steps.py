@@ -30,6 +30,7 @@ def run_steps(task):
     """Run a `Task`; the `Outcome`."""
     prepared, method = task.prepared, task.method
     form = task.form.serving(method, prepared.packed)
+    task = task._replace(form=form)
     steps = None if method.step is None else step_count(*task.span, method.step)
     packed, n, m = prepared.packed, prepared.n, prepared.m
     nx, ny = form.sizes(n, m, len(packed.bodies))

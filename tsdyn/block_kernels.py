@@ -30,7 +30,8 @@ def factor(pattern, values, limit):
     Returns -1, or the row of the eliminated vector where elimination leaves less than `limit` of a diagonal entry.
     """
     if pattern.shape[0] == 1:
-        return eliminate(values, 1, 1, 1, values, limit)
+        values[1] = values[0]
+        return eliminate(values, 1, 1, 1, values[1:], limit)
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     _keep_diagonal(pattern, values)
     kept = values[pattern.shape[1] :]

@@ -143,6 +143,8 @@ def deep_hash(function):
             digest.update(f"{value.__name__} {getattr(value, '__version__', '')}".encode())
             if file.endswith(".py") and not _foreign(value):
                 digest.update(Path(file).read_bytes())
+        elif type(value).__module__.startswith("llvmlite"):  # its pickle changes when it has been used, its text may
+            digest.update(repr(type(value)).encode())
         else:
             try:
                 digest.update(pickle.dumps(value))

@@ -29,12 +29,12 @@ def factor(pattern, values, limit):
 
     Returns -1, or the row of the eliminated vector where elimination leaves less than `limit` of a diagonal entry.
     """
+    kept = values[pattern.shape[1] :]
     if pattern.shape[0] == 1:
-        values[1] = values[0]
-        return eliminate(values, 1, 1, 1, values[1:], limit)
+        kept[0] = values[0]
+        return eliminate(values, 1, 1, 1, kept, limit)
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     _keep_diagonal(pattern, values)
-    kept = values[pattern.shape[1] :]
     for j in range(heads.size):
         first, width, panel = starts[j], widths[j], values[heads[j] :]
         size = starts[j + 1] - first
@@ -73,11 +73,12 @@ def factor_lu(pattern, lower, upper, limit):
     Returns -1, or the row of the eliminated vector where elimination leaves less than `limit` of a diagonal entry's
     size, or a number that is not finite.
     """
+    kept = upper[pattern.shape[1] :]
     if pattern.shape[0] == 1:
-        return eliminate_lu(lower, upper, 1, 1, 1, upper, limit)
+        kept[0] = upper[0]
+        return eliminate_lu(lower, upper, 1, 1, 1, kept, limit)
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     _keep_diagonal(pattern, upper)
-    kept = upper[pattern.shape[1] :]
     for j in range(heads.size):
         first, width, below, above = starts[j], widths[j], lower[heads[j] :], upper[heads[j] :]
         size = starts[j + 1] - first

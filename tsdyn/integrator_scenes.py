@@ -42,7 +42,7 @@ def two_body_pendulum():
     """Two spheres on a joint and a rod, turning in space."""
     scene = Scene(gravity=(0.0, 0.0, -9.6))
     one = scene.add_body(75.0, (30.0, 30.0, 30.0), angular_velocity=(0.3, 0.0, 0.0))
-    two = scene.add_body(75.0, (30.0, 30.0, 30.0), position=(0.0, 0.0, -3.0), angular_velocity=(1.0, 5.0, 2.0))
+    two = scene.add_body(75.0, (30.0, 30.0, 30.0), position=(0.0, 0.0, -3.0), angular_velocity=(2.0, 5.0, 1.0))
     scene.add(Spherical(scene.ground, one))
     scene.add(Distance(one, two, point_a=(0.0, 0.0, -1.0), point_b=(0.0, 0.0, 1.0), length=1.0))
     return scene

@@ -1,6 +1,7 @@
 """What a step costs: the general machinery beside the same mathematics written by hand for the sliding top.
 
-The two run in turn in one process; quote the ratio. Run it: python -m benchmarks.step_cost
+The two run in turn in one process; quote the ratio. Then each phase of a step of the machinery, by `ts.profile`, on the
+top and on a chain. Run it: python -m benchmarks.step_cost
 """
 
 import time
@@ -9,9 +10,13 @@ import numpy as np
 
 import tsdyn as ts
 from benchmarks.by_hand import nystrom_top
-from examples import top
+from examples import pendulum_chain, top
 
 END, ROUNDS = 10.0, 9
+PHASES = {
+    "sliding top": (top.build, END, ts.integrators.Nystrom4(step=1e-3)),
+    "chain of 16": (lambda: pendulum_chain.build(16), 1.0, ts.integrators.DOP853(1e-8, 1e-8)),
+}
 
 
 def timed(run):
@@ -32,8 +37,19 @@ def contenders(steps, interval):
     }
 
 
+def phases(name):
+    """Print microseconds a step of each phase, and the share of the call."""
+    build, end, method = PHASES[name]
+    found = ts.profile(build(), (0.0, end), integrator=method, t_eval=(0.0, end), advice=False)
+    steps = found.solution.stats.steps
+    print(f"{name}, {method}: {found.seconds / steps * 1e6:.3f} us a step, {100 * found.accounted:.0f} % accounted for")
+    for phase in found.phases:
+        share = phase.seconds / found.seconds
+        print(f"  {f'{phase.group}: {phase.part}':50} {phase.seconds / steps * 1e6:7.3f} us  {100 * share:5.1f} %")
+
+
 def main():
-    """Print microseconds a step, medians of interleaved rounds, and ratios to the first contender."""
+    """Print microseconds a step, medians of interleaved rounds, and ratios to the first contender; then phases."""
     for steps, interval in ((2000, 15), (10000, 50), (64000, 200)):
         runs = contenders(steps, interval)
         for run in runs.values():
@@ -47,6 +63,8 @@ def main():
         for name, values in seconds.items():
             ratio = np.median(np.array(values) / first)
             print(f"  {name:20} {np.median(values) / steps * 1e6:7.3f} us a step   x {ratio:.2f}")
+    for name in PHASES:
+        phases(name)
 
 
 if __name__ == "__main__":

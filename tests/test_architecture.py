@@ -68,12 +68,15 @@ formulation run
 memory prepare task
 events drive work
 series_run steps solution
-series_check
+series_check timers
+timekeeper replay phases
 simulate choice force_check
-integrator_scenes integrator_checks agreement
-testing benchmark_report benchmark
+integrator_scenes integrator_checks agreement profile_report scene_file
+testing benchmark_report benchmark advice
+profiling
 tables plots
 benchmark_plot
+profile_plot
 cli __init__
 __main__
 """

@@ -86,14 +86,20 @@ __all__ = [
     "integrators",
     "kernel",
     "plots",
+    "profile",
     "simulate",
     "testing",
 ]
 
 
 def __getattr__(name):
-    if name == "plots":  # when asked for: it is of no use without matplotlib
+    """What is loaded when it is asked for: no run needs it."""
+    if name == "plots":
         from importlib import import_module
 
         return import_module(".plots", __name__)
+    if name == "profile":
+        from .profiling import profile
+
+        return profile
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

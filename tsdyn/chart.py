@@ -13,7 +13,7 @@ from .assembly import constraint_jacobian
 from .linalg import null_space
 from .local_chart import touch
 from .newton import OK, SINGULAR, invert_normal_matrix, normal_matrix, update_b
-from .workspace import RATE
+from .workspace import FACTORIZATIONS, KEPT, RATE
 
 RANK_LIMIT = 1e-8  # smallest singular value of Phi_q, rows scaled to length one, below which it has lost rank
 
@@ -119,9 +119,11 @@ def tangent_map(s, w, t):
     n, m, k = w.q.size, w.u.size, w.v.size
     constraint_jacobian(s, w.q, t, w.Phi_q)
     normal_matrix(s, w)
+    made = w.counters[FACTORIZATIONS]
     status = update_b(w)
     if status != OK:
         return status
+    w.counters[KEPT] += 1 if w.counters[FACTORIZATIONS] == made and m > 0 else 0
     for i in range(m):  # D is scratch for Phi_q V
         for j in range(k):
             w.D[i, j] = 0.0

@@ -1,7 +1,8 @@
-"""The command `tsdyn`, also `python -m tsdyn`: `tsdyn tables` measures the tables of Haug (2018)."""
+"""The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), and where a scene's time goes."""
 
 import argparse
 import sys
+import time
 
 from .errors import MissingDependency, TsdynError
 
@@ -38,6 +39,27 @@ def _parser():
     )
     figure.add_argument("--no-figure", action="store_true", help="print the tables only")
     tables.set_defaults(run=_tables)
+    profile = commands.add_parser(
+        "profile",
+        help="measure where the time of a run of a scene goes, and what to change",
+        description="Run a scene several times, print the time of each phase of a run, what was skipped, and what to "
+        "change. Options that are not given are those of ts.simulate.",
+    )
+    profile.add_argument(
+        "scene",
+        metavar="SCENE",
+        help="a Python file with a function build(), or a scene; file.py:name takes another one; or an example's name",
+    )
+    profile.add_argument("--t-start", type=float, default=0.0, metavar="S", help="start of the run (default 0)")
+    profile.add_argument("--t-end", type=float, default=10.0, metavar="S", help="end of the run (default 10)")
+    profile.add_argument("--method", metavar="NAME", help="an integrator, such as dop853")
+    profile.add_argument("--rtol", type=float, metavar="TOL", help="relative tolerance")
+    profile.add_argument("--atol", type=float, metavar="TOL", help="absolute tolerance")
+    profile.add_argument("--formulation", default="tangent", metavar="NAME", help="tangent, null-space or maggi-kane")
+    profile.add_argument("--outputs", type=int, metavar="N", help="so many output times instead of every step")
+    profile.add_argument("--no-advice", action="store_true", help="don't try other methods and tolerances")
+    profile.add_argument("--figure", metavar="PATH", help="where to draw it; the suffix says how")
+    profile.set_defaults(run=_profile)
     return parser
 
 
@@ -50,6 +72,28 @@ def _tables(parsed):
     if not parsed.no_figure:
         _draw(tables, parsed.figure)
     return 0 if all(table.within for table in tables) else 1
+
+
+def _profile(parsed):
+    import numpy as np
+
+    from .checks import whole
+    from .profiling import profile
+    from .scene_file import load_scene
+
+    began = time.perf_counter()
+    scene = load_scene(parsed.scene)
+    print(f"{scene!r}, built in {1e3 * (time.perf_counter() - began):.3g} ms", flush=True)
+    span, count = (parsed.t_start, parsed.t_end), whole(parsed.outputs, "--outputs")
+    found = profile(
+        scene, span, advice=not parsed.no_advice, integrator=parsed.method, rtol=parsed.rtol, atol=parsed.atol,
+        formulation=parsed.formulation, t_eval=None if count is None else np.linspace(*span, max(count, 2)),
+    )  # fmt: skip
+    print(found)
+    if parsed.figure:
+        found.plot(parsed.figure)
+        print(f"Figure: {parsed.figure}")
+    return 0
 
 
 def _draw(tables, path):

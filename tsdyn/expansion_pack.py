@@ -35,6 +35,11 @@ def refusal(packed):
 
 def without_series(packed):
     """The constraints and forces that have no series, each as `name: why`."""
+    return [f"{_label(item)}: {why}" for item, why in lacking(packed)]
+
+
+def lacking(packed):
+    """The constraints and forces that have no series, each with why."""
     found = []
     for constraint, given in zip(packed.constraints, packed.parameters, strict=True):
         if constraint.normalises:
@@ -50,7 +55,7 @@ def without_series(packed):
             found.append((load.force, _given_by(load.force, Signal)))
         elif "series" not in load.force.kernels:
             found.append((load.force, load.force.no_series or f"{load.force._kind()} has no kernel `series`"))
-    return [f"{_label(item)}: {why}" for item, why in found]
+    return found
 
 
 def _label(item):
@@ -123,8 +128,9 @@ def _forces(packed, orders):
 def masks(network, packed, kinds):
     """Write into the network's table which markers' columns vary along a motion, and which are on the ground.
 
-    Columns are constant where the primitive's own series says so for a random motion.
+    Columns are constant where the primitive's own series says so for a random motion; returns of how many markers.
     """
+    constant = 0
     for row, kind in zip(network.kinds, kinds, strict=True):
         members = [pair for pair in zip(packed.constraints, packed.parameters, strict=True) if type(pair[0]) is kind]
         motions, patterns, series = {}, {}, twin(kind.series)
@@ -134,7 +140,9 @@ def masks(network, packed, kinds):
                 if grounded not in motions:
                     motions[grounded] = _random_motion(grounded)
                 patterns[grounded, par] = _mask(kind, series, par, grounded, motions[grounded])
-            network.table[row[N_FIRST_INT] + i * INTS + MASK] = patterns[grounded, par]
+            mask = network.table[row[N_FIRST_INT] + i * INTS + MASK] = patterns[grounded, par]
+            constant += len(kind.markers) - (mask & ((1 << GROUND) - 1)).bit_count()
+    return constant
 
 
 def _random_motion(grounded):

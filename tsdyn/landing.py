@@ -16,7 +16,7 @@ from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS, REDUCED, VALUE
 from .normal import gather, multiply_rows, scatter, weigh_rows
 from .poses import OMEGA, POSE, RD, P, R, set_pose
 from .series_loops import BODY_ROW, S_OMEGA, S_R
-from .workspace import FACTORIZATIONS, FLOOR, NEWTON
+from .workspace import AT_ROUNDING, FACTORIZATIONS, FLOOR, NEWTON
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
@@ -83,6 +83,7 @@ def land(network, system, w, f, t):
             if worst > 100.0 * floor:
                 return NEWTON_FAILED
             if moved <= MOVED:
+                w.counters[AT_ROUNDING] += 1 if moved == 0.0 else 0
                 return OK
             renew = True
             continue

@@ -28,8 +28,9 @@ class Local(NamedTuple):
     numbers: np.ndarray  # (NUMBERS,)  below
 
 
-# the time last placed at; whether lower and upper hold factors; the count of placements at the last step's end
-TIME, FACTORED, END, NUMBERS = range(4)
+# the time last placed at; whether lower and upper hold factors, and by how much of N they are off at the place itself;
+# the count of placements at the last step's end
+TIME, FACTORED, OFF, END, NUMBERS = range(5)
 
 
 def allocate_local(network):

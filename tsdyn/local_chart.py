@@ -16,11 +16,11 @@ from .block_kernels import factor
 from .displacement import factorise_normal, turned_most
 from .landing import run_loops
 from .linalg import copy
-from .local import END, FACTORED, TIME
+from .local import END, FACTORED, OFF, TIME
 from .network import REDUCED
 from .normal import multiply_rows, weigh_rows
 from .poses import POSE, P, R, place_bodies
-from .workspace import CHARTS, CONDITION, CONTRACTION, FACTORIZATIONS, FLOOR, PLACEMENTS, SIZE
+from .workspace import CHARTS, CONDITION, CONTRACTION, FACTORIZATIONS, FLOOR, KEPT, PLACEMENTS, SIZE
 
 # reasons to leave a chart, as stored; REASONS names them
 STAY, BY_CONTRACTION, BY_TURN, BY_INTERVAL, BY_FAILURE, AT_START, BY_SERIES = range(7)
@@ -40,6 +40,7 @@ TURN_SHARE = 0.55  # a turn alone, which no constraint minds, may go on to |d| =
 CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a turn of 60 degrees
 ROUNDING = 1e-15  # relative to the numbers that enter Phi: below this a residual says nothing
 PIVOT_LIMIT = 1e-15  # of S0: less of a diagonal entry than this is rounding
+SAME = 1e-6  # of N: factors that are off by less tell the contraction as well as new ones
 
 
 @kernel
@@ -50,6 +51,7 @@ def touch(network, system, w, f, l, t):
         copy(f.H, l.H0)
         copy(f.Y, l.Y0)
         copy(f.S, l.S0)
+        w.counters[KEPT] += 1 if f.b.size > 0 else 0
     else:
         place_bodies(network.bodies, w.q, f.poses)
         run_loops(network, system.reals, REDUCED, f.poses, t, f.b, l.H0)
@@ -95,7 +97,9 @@ def turning(network, w, f, l):
     """Reason to leave the chart at the place that l.d and f.H belong to, or STAY; records contraction and condition."""
     turn, contraction = turned_most(l), 0.0
     if f.b.size > 0:
-        contraction = _contraction(network, l) if factorise_normal(network, w, f, l) else math.inf
+        known = l.numbers[FACTORED] > 0.0 and l.numbers[OFF] < SAME
+        w.counters[KEPT] += 1 if known else 0
+        contraction = _contraction(network, l) if known or factorise_normal(network, w, f, l) else math.inf
     l.numbers[FACTORED] = 0.0  # dense output, if there is any, would come between
     w.control[CONTRACTION] = max(contraction, TURN_SHARE * turn)
     w.control[CONDITION] = (1.0 + w.control[CONTRACTION]) / max(1.0 - w.control[CONTRACTION], 1e-300)

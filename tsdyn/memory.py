@@ -55,9 +55,9 @@ class Memory:
     """
 
     def __init__(self, prepared, network, joint_rows, implicit, kept, nx, ny, tableau, scratch, width):
-        n, m = prepared.n, prepared.m
-        self.implicit = implicit
-        self.weight = n if joint_rows is not None else n + n**3 // MATRICES
+        n, m, self.packed = prepared.n, prepared.m, prepared.packed
+        self.implicit, self.basis_free = implicit, joint_rows is not None
+        self.weight = n if self.basis_free else n + n**3 // MATRICES
         self.source, _ = prepared.system(implicit)
         system = System(*(array.copy() for array in self.source))
         self.network = network
@@ -67,14 +67,22 @@ class Memory:
         linear = allocate_linear(system, n, m, implicit, kept)
         if implicit:
             linear = linear._replace(now=self.run.now, before=self.run.before)
-        self.context = Context(system, self.work, linear, *basis_free_parts(network, n))
+        self.settle(Context(system, self.work, linear, *basis_free_parts(network, n)))
         self.addresses = np.zeros(12, np.int64)
         self._written = [self.work.q.base, self.work.counters, self.run.x.base, self.run.numbers]
         self._written += [linear.numbers.base, linear.pivots, linear.kernels, self.context.local.numbers]
-        self._context, *self._keep = resident(self.context)
-        self._run, *keep = resident(self.run)
-        self._keep += keep
+        self._run, *self._keep_run = resident(self.run)
         self.nbytes = sum(array.nbytes for array in (*self._written, self.context.free.S, self.context.free.poses))
+
+    def settle(self, context, header=()):
+        """Let the kernels find this context, behind the integers of a header."""
+        self.context = context
+        self._context, *self._keep = resident(context, header)
+
+    @property
+    def where(self):
+        """Addresses of the context and of the run."""
+        return self._context, self._run
 
     def clear(self, task):
         """As if it were new, for this task: whatever a run before has left behind is gone."""

@@ -2,6 +2,8 @@
 
 from functools import cached_property
 
+import numpy as np
+
 from .branch import demand_aligned
 from .expansion_pack import refusal
 from .force_pack import with_force_jacobians
@@ -42,6 +44,12 @@ class Prepared:
     def implicit(self):
         """The system with what implicit methods need, and how many floats they keep for forces."""
         return with_force_jacobians(self.packed._replace(system=with_curvatures(self.packed)))
+
+    @cached_property
+    def spheres(self):
+        """How many rigid bodies have no gyroscopic torque, whatever they do."""
+        J = self.packed.system.inertia[self.packed.system.bodies[:, 1] == 7].reshape(-1, 3, 3)
+        return int((J[:, :1, :1] * np.eye(3) == J).all(axis=(1, 2)).sum())
 
     @cached_property
     def refusal(self):

@@ -50,7 +50,7 @@ class Series:
         if found:
             raise InvalidArgument(found)
         network, self.kinds = graph.build(packed)
-        masks(network, packed, self.kinds)
+        self.constant_columns = masks(network, packed, self.kinds)
         self.network = graph.with_loops(network, self.kinds, graph.REDUCED, graph.VALUES, graph.BIAS)
         self.packed = packed
 
@@ -66,18 +66,27 @@ class SeriesMemory:
     """
 
     def __init__(self, prepared, highest):
-        self.series, packed, self.weight = prepared.series, prepared.packed, prepared.n
+        self.series, self.packed, self.weight = prepared.series, prepared.packed, prepared.n
+        packed = self.packed
         series, n, slots = self.series, prepared.n, packed.system.memory.size
         system = System(*(array.copy() for array in packed.system))
         self.work, free = plain_work(n), allocate_free(series.network, n)
         expansion = allocate_expansion(series.network, series.kinds, packed, highest)
         self.steps = np.zeros(STEPS, np.int64)
         self.run = lay_out(n, 0, 0, 0, 0, 0, B_DATA + 1 + n + expansion.bodies.size + slots, slots)
-        self.context = SeriesContext(system, self.work, series.network, free, expansion)
-        self._context, *self._keep = resident(self.context)
-        self._run, *keep = resident(self.run)
-        self._keep += keep
+        self.settle(SeriesContext(system, self.work, series.network, free, expansion))
+        self._run, *self._keep_run = resident(self.run)
         self.nbytes = 8 * (expansion.bodies.size + expansion.constraints.size + free.S.size + self.run.block.size)
+
+    def settle(self, context, header=()):
+        """Let the kernels find this context, behind the integers of a header."""
+        self.context = context
+        self._context, *self._keep = resident(context, header)
+
+    @property
+    def where(self):
+        """Addresses of the context and of the run."""
+        return self._context, self._run
 
     def clear(self, task, order, dense):
         """As if it were new, for this task; the order is the first step's, and the two bounds of the others'."""

@@ -24,8 +24,8 @@ def addresses(within, far):
     return np.array([expand.address, reach.address, accelerate_here.address if within else 0], np.int64)
 
 
-def run_series(task):
-    """Run a `Task`; the `Outcome`."""
+def run_series(task, observe=None):
+    """Run a `Task`; the `Outcome`. `observe` is given the memory before the run: one of its own."""
     prepared, method = task.prepared, task.method
     if task.form.name != "tangent":
         raise InvalidArgument(
@@ -34,19 +34,20 @@ def run_series(task):
         )
     order = method.orders()
     kind = "taylor", order[2]
-    memory = prepared.take(kind, lambda: SeriesMemory(prepared, order[2]))
-    if memory.series is not prepared.series:  # of the scene before it was changed
+    memory = None if observe else prepared.take(kind, lambda: SeriesMemory(prepared, order[2]))
+    if memory is None or memory.series is not prepared.series:  # of the scene before it was changed
         memory = SeriesMemory(prepared, order[2])
     dense = STORED if task.dense_output else FILLED if task.events is not None else 0
     memory.clear(task, order, dense)
-    within = bool(dense) or task.times.size > 0
-    memory.steps = addresses(within, is_far(prepared.series.network, order[2]))
+    memory.steps = addresses(task.within, is_far(prepared.series.network, order[2]))
     memory.load()
     run, packed = memory.run, prepared.packed
     reading = None
     if dense:
         orders = int(memory.context.expansion.order[ORDERS])
         reading = SeriesReader, packed.system, prepared.series.network, orders, packed.size, memory.steps
+    if observe is not None:
+        observe(memory)
     watch = None
     if task.events is not None:
         watch = Watch(task.events, packed, reading[0](*reading[1:]), task.span[0])
@@ -66,10 +67,11 @@ def run_series(task):
         float(run.clock[T]),
         last,
         run.remembered.copy(),
-        counts(run.numbers, memory.work.counters.tolist()),
+        counts(run.numbers, memory.work.counters.tolist(), packed, prepared.spheres, prepared.series.constant_columns),
         trajectory,
         None if watch is None else watch.found(prepared.n),
         began,
     )
-    prepared.give(kind, memory)
+    if observe is None:
+        prepared.give(kind, memory)
     return outcome

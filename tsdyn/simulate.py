@@ -20,7 +20,7 @@ from .state import remembered
 from .steps import run_steps
 from .task import Task
 
-DRIVERS = {"steps": run_steps, "series": run_series}  # by Integrator.driver; see tsdyn.task
+DRIVERS = {"steps": run_steps, "series": run_series}  # by Integrator.driver, if it isn't one itself; see tsdyn.task
 
 
 def simulate(
@@ -136,7 +136,7 @@ def simulate(
         kept, method, form, span, q, qd, remembered(state, kept.packed.system.memory.size), times, bool(dense_output),
         watched, constraint_tol, max_steps, chart_interval or 0, report, choose,
     )  # fmt: skip
-    outcome = DRIVERS[method.driver](task)
+    outcome = DRIVERS.get(method.driver, method.driver)(task)
     ended = time.perf_counter()
     if outcome.status == Status.STIFF:
         return simulate(

@@ -61,9 +61,11 @@ class Solution:
     stats : SimpleNamespace
         steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds; of
         implicit methods also jacobians, iteration_matrices, stage_iterations; stiff: whether an explicit adaptive
-        method has met its limit of stability for a while. Of the form without a basis, what was not needed:
-        solves_skipped, placements that lay on the constraints to rounding already, checks_skipped, those whose last
-        correction was known to suffice.
+        method has met its limit of stability for a while. What was not needed: solves_skipped, placements that lay on
+        the constraints to rounding already; checks_skipped, those whose last correction was known to suffice;
+        factorizations_skipped, for which older factors served or still contracted; gyroscopic_skipped, torques of
+        bodies whose inertia is a sphere's, and forces_skipped, of scenes without forces, one an evaluation;
+        columns_skipped, series of a marker's columns of Phi_q that are constant, one an order.
     """
 
     def __init__(self, scene, task, outcome, seconds):
@@ -135,6 +137,11 @@ class Solution:
         if not self.success:
             raise StepFailure(self.message, self)
         return self
+
+    @property
+    def reached(self):
+        """The time that the run has come to, s."""
+        return self._reached
 
     @property
     def state(self):

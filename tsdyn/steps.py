@@ -19,6 +19,7 @@ from .workspace import (
     FACTORIZATIONS,
     ITERATION_MATRICES,
     JACOBIANS,
+    KEPT,
     NEWTON,
     PLACEMENTS,
     STAGE_ITERATIONS,
@@ -26,8 +27,8 @@ from .workspace import (
 )
 
 
-def run_steps(task):
-    """Run a `Task`; the `Outcome`."""
+def run_steps(task, observe=None):
+    """Run a `Task`; the `Outcome`. `observe` is given the memory before the run: one of its own."""
     prepared, method = task.prepared, task.method
     form = task.form.serving(method, prepared.packed)
     task = task._replace(form=form)
@@ -40,17 +41,19 @@ def run_steps(task):
     _, kept = prepared.system(method.implicit)
     joint_rows = len(network.row) if form.basis_free else None
     kind = joint_rows, method.implicit, kept, nx, ny, tableau.size, scratch(nx, ny), interpolant.size(n, nx, ny)
-    memory = prepared.take((form.name, *kind), lambda: Memory(prepared, network, *kind))
-    if memory.network is not network:  # of the scene before it was changed
+    memory = None if observe else prepared.take((form.name, *kind), lambda: Memory(prepared, network, *kind))
+    if memory is None or memory.network is not network:  # of the scene before it was changed
         memory = Memory(prepared, network, *kind)
     memory.clear(task)
     dense = STORED if task.dense_output else FILLED if task.events is not None else 0
-    addresses = _addresses(method, form, step, interpolant, steps is None, dense or task.times.size)
+    addresses = _addresses(method, form, step, interpolant, steps is None, task.within)
     memory.give_method(task, tableau, steps, dense, addresses)
     run, control = memory.run, memory.work.control
     memory.load()
     sizes = n, m, len(packed.bodies), task.constraint_tol, packed.size, joint_rows, network, nx, ny
     reading = (Reader, packed.system, sizes, memory.addresses.copy()) if dense else None
+    if observe is not None:
+        observe(memory)
     watch = None
     if task.events is not None:
         watch = Watch(task.events, packed, reading[0](*reading[1:]), task.span[0])
@@ -73,16 +76,17 @@ def run_steps(task):
         float(run.clock[T]),
         last,
         run.remembered.copy(),
-        counts(run.numbers, memory.work.counters.tolist()),
+        counts(run.numbers, memory.work.counters.tolist(), packed, prepared.spheres if form.basis_free else 0),
         trajectory,
         None if watch is None else watch.found(n),
         began,
     )
-    prepared.give((form.name, *kind), memory)
+    if observe is None:
+        prepared.give((form.name, *kind), memory)
     return outcome
 
 
-def _addresses(method, form, step, interpolant, adaptive, dense):
+def _addresses(method, form, step, interpolant, adaptive, within):
     """Those that the driver and the reader are given, dense.A_PLACE ... A_SECOND."""
     errors = [kernel.address for kernel in method.errors] if adaptive else []
     return [
@@ -91,17 +95,18 @@ def _addresses(method, form, step, interpolant, adaptive, dense):
         *errors,
         *[0] * (2 - len(errors)),
         form.norm() if adaptive else 0,
-        *([interpolant.fill.address, interpolant.value.address] if dense else [0, 0]),
-        method.second.address if dense and method.implicit else 0,
+        *([interpolant.fill.address, interpolant.value.address] if within else [0, 0]),
+        method.second.address if within and method.implicit else 0,
     ]
 
 
-def counts(numbers, counters):
-    """What `Solution.stats` counts."""
+def counts(numbers, counters, packed, no_spin, constant_columns=0):
+    """What `Solution.stats` counts; of what each evaluation skips, no_spin bodies and so many columns of markers."""
+    evaluations = counters[EVALUATIONS]
     return {
         "steps": int(numbers[STEPS]),
         "rejected": int(numbers[REJECTED]),
-        "evaluations": counters[EVALUATIONS],
+        "evaluations": evaluations,
         "placements": counters[PLACEMENTS],
         "newton_iterations": counters[NEWTON],
         "b_iterations": counters[B_ITERATIONS],
@@ -113,4 +118,8 @@ def counts(numbers, counters):
         "stage_iterations": counters[STAGE_ITERATIONS],
         "solves_skipped": counters[AT_ROUNDING],
         "checks_skipped": counters[UNVERIFIED],
+        "factorizations_skipped": counters[KEPT] + counters[STAGE_ITERATIONS] - counters[ITERATION_MATRICES],
+        "gyroscopic_skipped": no_spin * evaluations,
+        "columns_skipped": constant_columns * evaluations,
+        "forces_skipped": 0 if packed.loads else evaluations,
     }

@@ -29,7 +29,7 @@ from .errors import Status
 from .free_accelerations import solve_accelerations
 from .landing import run_loops
 from .linalg import copy
-from .local import END, FACTORED, TIME
+from .local import END, FACTORED, OFF, TIME
 from .local_chart import CONTRACTION_LOST, touch, turning
 from .network import BIAS, DRIFT, REDUCED, VALUES
 from .normal import gather, multiply_rows, scatter, weigh_rows
@@ -41,6 +41,7 @@ from .workspace import (
     EVALUATIONS,
     FACTORIZATIONS,
     FLOOR,
+    KEPT,
     NEWTON,
     PLACEMENTS,
     RATE,
@@ -135,7 +136,7 @@ def _solve_positions(network, s, w, f, l, t, renewals):
         if l.numbers[FACTORED] == 0.0:
             if not factorise_normal(network, w, f, l):
                 return SINGULAR
-            l.numbers[FACTORED], rate = 1.0, 0.0
+            l.numbers[FACTORED], l.numbers[OFF], rate = 1.0, w.control[RATE] * worst, 0.0
         solve_lu(network.pattern, l.lower, l.upper, f.b)
         w.counters[NEWTON] += 1
         scatter(network, l.Y0, f.b, l.x)
@@ -147,7 +148,7 @@ def _solve_positions(network, s, w, f, l, t, renewals):
 
 
 @kernel
-def _solve_velocities(network, s, w, f, l, t):
+def solve_velocities(network, s, w, f, l, t):
     """rd and omega' of the poses from the rates l.y, freed of what would leave the manifold. Whether there are any.
 
     The factors are those of N at the start of the position solve, or, where it needed none, those of S as long as they
@@ -174,12 +175,13 @@ def _solve_velocities(network, s, w, f, l, t):
         if not worst < math.inf:
             return False
         if worst <= floor or (factored and worst > 0.5 * before and worst <= 100.0 * floor):
+            w.counters[KEPT] += 0 if factored else 1
             return True
         if not factored and worst > 0.1 * before:
             if not factorise_normal(network, w, f, l):
                 return False
             lower, upper, factored = l.lower, l.upper, True
-            l.numbers[FACTORED] = 1.0
+            l.numbers[FACTORED], l.numbers[OFF] = 1.0, 0.0
         solve_lu(network.pattern, lower, upper, f.b)
         scatter(network, l.Y0, f.b, l.y)
         before = worst
@@ -194,7 +196,7 @@ def accelerate(context, t, y, yd, unused):
     n = l.x.size - 8
     yd = vector(yd, n)
     copy(vector(y, n), l.y)
-    if not _solve_velocities(network, s, w, f, l, t):
+    if not solve_velocities(network, s, w, f, l, t):
         return NOT_FINITE
     if s.forces.shape[0] > 0:
         write_velocities(network.bodies, f.poses, w.qd)

@@ -1,6 +1,6 @@
 """A run as its driver sees it: what is asked of it, and what it hands back.
 
-A method names its driver by the attribute `driver`, a name in simulate.DRIVERS; a driver is a function of a `Task`
+A method has a driver, the attribute `driver`: a name in simulate.DRIVERS, or the driver itself, a function of a `Task`
 that returns an `Outcome`.
 """
 
@@ -29,6 +29,12 @@ class Task(NamedTuple):
     interval: int  # steps between charts that are forced; 0 for none
     report: object  # a function of the fraction done, None at the end
     choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
+
+    @property
+    def within(self):
+        """Whether anything is asked for between the ends of steps."""
+        inside = (self.times > self.span[0]) & (self.times < self.span[1])
+        return self.dense_output or self.events is not None or bool(inside.any())
 
 
 class Outcome(NamedTuple):

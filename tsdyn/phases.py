@@ -1,0 +1,147 @@
+"""The phases of a run, put together from what a `Timekeeper` has found and what parts of it cost alone."""
+
+from typing import NamedTuple
+
+from .timers import (
+    ACCELERATE,
+    CHART,
+    CHECK,
+    COMPLETE,
+    DRIVER,
+    EXPAND,
+    FACTORISE,
+    LINEARISE,
+    NORM,
+    PLACE,
+    REACH,
+    REDUCE,
+    ROWS,
+    SOFTEN,
+    SOLVE,
+    STEP,
+)
+
+
+class Phase(NamedTuple):
+    """A part of a call: what it belongs to, what it is, how often it ran, s altogether."""
+
+    group: str
+    part: str
+    calls: int
+    seconds: float
+
+    @property
+    def each(self):
+        """Seconds a call; nan for what isn't called."""
+        return self.seconds / self.calls if self.calls else float("nan")
+
+
+class _Times:
+    """Sums over entries."""
+
+    def __init__(self, entries, kinds):
+        self.entries, self.kinds = entries, kinds
+
+    def of(self, *roles, within=None):
+        """Calls and seconds of roles, alone."""
+        found = [e for e in self.entries if e.role in roles and within in (None, e.within)]
+        return sum(e.calls for e in found), sum(e.seconds for e in found)
+
+    def rows(self, group, *within):
+        """The phases of constraints and of forces that have run within roles."""
+        constraints, forces = [], {}
+        for e in self.entries:
+            if e.role == ROWS and e.within in within:
+                kind = self.kinds[e.kind]
+                (forces.setdefault(kind.label, []) if kind.force else constraints).append(e)
+        found = [("constraint rows", constraints), *((f"force: {label}", some) for label, some in forces.items())]
+        return [
+            Phase(group, part, sum(e.calls for e in some), sum(e.seconds for e in some)) for part, some in found if some
+        ]
+
+    def orders(self):
+        """Seconds of each order of series, its loops over constraints and forces with the share that all have."""
+        own = {e.order: (e.calls, e.seconds) for e in self.entries if e.role == EXPAND}
+        return [own[order] for order in sorted(own)]
+
+
+def of_steps(entries, kinds, prices, stats):
+    """The phases of a method that goes step by step."""
+    t = _Times(entries, kinds)
+    (placed, place), (evaluated, accelerate) = t.of(PLACE), t.of(ACCELERATE)
+    _, complete = t.of(COMPLETE)
+    of_place, of_evaluation = _Purse(place), _Purse(accelerate + complete)
+    free = "system" in prices
+    n_velocity, velocity = evaluated, of_evaluation.take(evaluated, prices["velocities"])
+    factored = []
+    if free and stats.factorizations:
+        n_normal = max(stats.factorizations - placed - stats.charts, 0)
+        factored = [
+            Phase("positions", "factors of Phi_q U", n_normal, of_place.take(n_normal, prices["normal"])),
+            Phase("accelerations", "factors of Phi_q W Phi_q^T", placed, of_place.take(placed, prices["system"])),
+        ]
+    elif not free:
+        factored = [Phase("accelerations", "D^T M D and its factors", placed, of_place.take(placed, prices["mass"]))]
+    found = [
+        *t.rows("positions", PLACE),
+        *factored,
+        Phase("positions", "corrections" if free else "corrections, B and D", placed, of_place.left),
+        Phase("velocities", "freed of what leaves the constraints" if free else "qd = D vd", n_velocity, velocity),
+        *t.rows("accelerations", ACCELERATE),
+        Phase("accelerations", "bodies and solves", evaluated, of_evaluation.left),
+        *t.rows("charts", CHART, CHECK),
+        Phase("charts", "made", *t.of(CHART)),
+        Phase("charts", "looked at", *t.of(CHECK)),
+        *t.rows("stage equations", LINEARISE, REDUCE),
+        Phase("stage equations", "Jacobians", *t.of(LINEARISE)),
+        Phase("stage equations", "iteration matrices", t.of(FACTORISE)[0], t.of(REDUCE, FACTORISE)[1]),
+        Phase("stage equations", "solves", *t.of(SOLVE)),
+        Phase("stage equations", "norms of corrections", *t.of(NORM, within=STEP)),
+        Phase("steps", "sums over stages", *t.of(STEP)),
+        *t.rows("steps", DRIVER),
+        Phase("steps", "error norms", t.of(NORM, within=DRIVER)[0], t.of(NORM, SOFTEN, within=DRIVER)[1]),
+        Phase("steps", "control and records", stats.steps + stats.rejected, t.of(DRIVER)[1]),
+    ]
+    return _sorted(found)
+
+
+def of_series(entries, kinds, prices, stats):
+    """The phases of a Taylor run."""
+    t = _Times(entries, kinds)
+    landings, landing = t.of(REACH)
+    purse = _Purse(landing)
+    found = [
+        *t.rows("coefficients", EXPAND),
+        Phase("coefficients", "bodies and solves", *t.of(EXPAND)),
+        *t.rows("landing", REACH),
+        Phase("landing", "factors", stats.factorizations, purse.take(stats.factorizations, prices["system"])),
+        Phase("landing", "series summed, corrections", landings, purse.left),
+        *t.rows("steps", DRIVER),
+        Phase("steps", "lengths and records", stats.steps + stats.rejected, t.of(DRIVER)[1]),
+    ]
+    return _sorted(found)
+
+
+def orders(entries):
+    """(calls, seconds) of each order of a Taylor run, from zero, without its loops over constraints and forces."""
+    return tuple(_Times(entries, ()).orders())
+
+
+class _Purse:
+    """Seconds, some of which are known to be spent on something."""
+
+    def __init__(self, seconds):
+        self.left = max(seconds, 0.0)
+
+    def take(self, calls, price):
+        """What so many calls take of it, no more than there is."""
+        spent = min(calls * price, self.left)
+        self.left -= spent
+        return spent
+
+
+def _sorted(found):
+    """Those that ran, group by group; a timer's own cost may have left less than nothing."""
+    groups = list(dict.fromkeys(phase.group for phase in found))
+    kept = [phase._replace(seconds=max(phase.seconds, 0.0)) for phase in found if phase.calls]
+    return sorted(kept, key=lambda phase: groups.index(phase.group))

@@ -15,7 +15,7 @@ from .agreement import poses
 from .errors import Status, TsdynError
 from .expansion_pack import lacking, without_series
 from .integrators import SDIRK54, Taylor
-from .network import is_regular, is_thin
+from .network import is_regular, thin
 from .prepare import prepared
 from .profile_report import duration
 
@@ -117,9 +117,10 @@ def _steps(profile):
 
 def _form(profile):
     packed = prepared(profile.scene).packed
-    if profile.solution.formulation == "tangent" and not profile.method.implicit and not is_regular(packed):
-        thin = _names([body.name for body in packed.bodies if is_thin(body)])
-        yield f"The scene is run with a basis, at the cost of matrices, since about an axis {thin} has no inertia."
+    bodies = [body.name for body, is_thin in zip(packed.bodies, thin(packed), strict=True) if is_thin]
+    if profile.solution.formulation == "tangent" and not profile.method.implicit and bodies:
+        names = _names(bodies)
+        yield f"The scene is run with a basis, at the cost of matrices, since about an axis {names} has no inertia."
 
 
 def _alternatives(profile, run, plain, options, limit):

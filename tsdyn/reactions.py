@@ -1,7 +1,6 @@
 """Multipliers and the forces of constraints, from positions, velocities and accelerations."""
 
 import math
-from collections import Counter
 
 import numpy as np
 
@@ -16,9 +15,9 @@ from .markers import POINT
 from .network import REDUCED, network_of
 from .normal import gather, multiply_rows, scatter, weigh_rows
 from .poses import place_bodies
-from .primitive import INTS
+from .primitive import BLOCK, INTS, ROW
 from .sparse_rows import WIDTH, with_short_rows
-from .system import COUNT, FIRST_INT, FIRST_REAL, REALS, classes
+from .system import COUNT, FIRST_INT, FIRST_REAL, REALS
 
 RANK_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
 
@@ -101,30 +100,47 @@ def reaction(solution, constraint):
     """
     packed = solution.packed
     body = constraint.a if constraint.a.dimension else constraint.b
-    index, first, within = places_of(packed)[constraint]
-    system = with_short_rows(packed)
-    kind = next(row for row, cls in zip(system.kinds, classes(packed), strict=True) if cls is type(constraint)).copy()
-    kind[FIRST_INT] += INTS * within
-    kind[FIRST_REAL] += kind[REALS] * within
-    kind[COUNT] = 1
-    system = system._replace(reals=system.reals.copy(), kinds=kind[None])
-    length = system.bodies[body.index, 1]
+    index, first, kind, within = places_of(packed)[constraint]
+    system = _alone(packed, first, kind, within)
+    length = packed.system.bodies[body.index, 1]
     half = 0 if body is constraint.a else WIDTH // 2
     load = np.zeros((solution.t.size, length))
-    rows = np.zeros((len(system.segments), WIDTH))
+    rows = np.zeros((constraint.rows, WIDTH))
     lam = np.ascontiguousarray(solution.multipliers[:, first : first + constraint.rows])
-    constraint_loads(system, solution.t, solution.q, lam, first, half, rows, load)
+    constraint_loads(system, solution.t, solution.q, lam, half, rows, load)
     return _at_first_point(solution, body, load, constraint, packed.coordinates[index])
 
 
+def _alone(packed, first, kind, within):
+    """The system of one constraint, with rows from `first` on, which are short; where it is as in `places_of`."""
+    system = with_short_rows(packed)
+    kind = system.kinds[kind].copy()
+    table, reals = kind[FIRST_INT] + INTS * within, kind[FIRST_REAL] + kind[REALS] * within
+    kind[[FIRST_INT, FIRST_REAL, COUNT]] = 0, 0, 1
+    own = system.table[table : table + INTS].copy()
+    own[ROW] = 0
+    own[[BLOCK, BLOCK + 1]] -= WIDTH * first
+    motions = system.motions[(system.motions[:, 3] >= reals) & (system.motions[:, 3] < reals + kind[REALS])]
+    motions[:, 3] -= reals
+    return system._replace(
+        kinds=kind[None],
+        table=own,
+        reals=system.reals[reals : reals + kind[REALS]].copy(),
+        motions=motions,
+        signals=system.signals[:0],
+        memory=system.memory[:0],
+    )
+
+
 def places_of(packed):
-    """Of each constraint, which one it is, its first row, and which one of its kind."""
+    """Of each constraint, which one it is, its first row, its kind, and which one of that it is."""
     if "places" not in packed.shared:
-        found, row, seen = {}, 0, Counter()
+        found, row, seen = {}, 0, {}
         for index, constraint in enumerate(packed.constraints):
-            found[constraint] = index, row, seen[type(constraint)]
+            kind = seen.setdefault(type(constraint), [len(seen), 0])
+            found[constraint] = index, row, *kind
             row += constraint.rows
-            seen[type(constraint)] += 1
+            kind[1] += 1
         packed.shared["places"] = found
     return packed.shared["places"]
 
@@ -162,11 +178,11 @@ def _at_first_point(solution, body, load, item, coordinates):
 
 
 @entry
-def constraint_loads(s, t, q, lam, first, half, rows, out):
-    """out (k, 7 or 3) = -Phi_q^T lam of one body; lam (k, rows of the constraint), which begin at first."""
+def constraint_loads(s, t, q, lam, half, rows, out):
+    """out (k, 7 or 3) = -Phi_q^T lam of one body; s has no other constraint, lam (k, rows of it)."""
     for k in range(t.size):
         set_time(s, t[k])
         constraint_jacobian(s, q[k], t[k], rows)
         for i in range(lam.shape[1]):
             for c in range(out.shape[1]):
-                out[k, c] -= rows[first + i, half + c] * lam[k, i]
+                out[k, c] -= rows[i, half + c] * lam[k, i]

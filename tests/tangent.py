@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tsdyn._kernel import address_of, caller, entry
+from tsdyn._kernel import caller, entry, resident
 from tsdyn.assembly import constraint_curvature, set_time
 from tsdyn.evaluate import mass_matrix
 from tsdyn.force_pack import with_force_jacobians
@@ -17,13 +17,12 @@ _call_vector, _call_number, _call_chart, _call_soften = caller("pp"), caller("pd
 
 
 @entry
-def _start(c, at, t, v, vd, vdd):
-    return _call_chart(at[4], address_of(c), t, v, vd, vdd, vdd)
+def _start(context, at, t, v, vd, vdd):
+    return _call_chart(at[4], context, t, v, vd, vdd, vdd)
 
 
 @entry
-def _accelerations(c, at, t, v, vd, vdd):
-    context = address_of(c)
+def _accelerations(context, at, t, v, vd, vdd):
     status = call_place(at[0], context, t, v)
     if status == 0:
         status = call_accelerate(at[1], context, t, vd, vdd, vdd)
@@ -33,23 +32,21 @@ def _accelerations(c, at, t, v, vd, vdd):
 
 
 @entry
-def _linearise(c, at, t, anew):
-    context, status = address_of(c), 0
+def _linearise(context, at, t, anew):
+    status = 0
     if anew:
         status = _call_number(at[5], context, t)
     return _call_number(at[6], context, t) if status == 0 else status
 
 
 @entry
-def _solve(c, at, g, rho):
-    context = address_of(c)
+def _solve(context, at, g, rho):
     status = _call_number(at[7], context, g)
     return _call_vector(at[8], context, rho) if status == 0 else status
 
 
 @entry
-def _soften(c, at, ex, g, ey):
-    context = address_of(c)
+def _soften(context, at, ex, g, ey):
     status = _call_number(at[7], context, g)
     return _call_soften(at[9], context, ex, g, ey) if status == 0 else status
 
@@ -75,20 +72,21 @@ class Tangent:
         form = formulation("null-space")
         parts = basis_free_parts(form.network(packed), n)
         self.context = Context(system, work, allocate_linear(system, n, m, True, kept), *parts)
+        self.address, *self._keep = resident(self.context)
         self.at = np.array([*form.addresses(), *form.implicit()[:5]], np.int64)
         self.k, self.t = n - m, t
         v, self.vd, vdd = np.zeros((3, self.k))
-        assert _start(self.context, self.at, t, v, self.vd, vdd) == 0
+        assert _start(self.address, self.at, t, v, self.vd, vdd) == 0
 
     def f(self, v, vd, t):
         """Accelerations vdd; the place is taken."""
         vdd = np.zeros(self.k)
-        assert _accelerations(self.context, self.at, t, v, vd, vdd) == 0
+        assert _accelerations(self.address, self.at, t, v, vd, vdd) == 0
         return vdd
 
     def jacobians(self, t, anew=True):
         """(f_v, f_vd) at the place last taken; without anew, from the stiffness and damping kept."""
-        assert _linearise(self.context, self.at, t, int(anew)) == 0
+        assert _linearise(self.address, self.at, t, int(anew)) == 0
         work, linear = self.context.work, self.context.linear
         A = work.D.T @ mass_matrix(self.context.system, work.q) @ work.D
         return np.linalg.solve(A, -linear.K_hat), np.linalg.solve(A, linear.C_hat)
@@ -96,13 +94,13 @@ class Tangent:
     def solved(self, g, rho):
         """P^-1 A rho, of the linearisation last made."""
         rho = rho.copy()
-        assert _solve(self.context, self.at, g, rho) == 0
+        assert _solve(self.address, self.at, g, rho) == 0
         return rho
 
     def softened(self, ex, g, ey):
         """(I - g J)^-1 (ex, ey)."""
         ex, ey = ex.copy(), ey.copy()
-        assert _soften(self.context, self.at, ex, g, ey) == 0
+        assert _soften(self.address, self.at, ex, g, ey) == 0
         return np.concatenate((ex, ey))
 
 

@@ -130,12 +130,13 @@ def mass_matrix(system, q):
 
 def mass_matrix_sparse(system, q):
     """The same as a SciPy sparse array."""
-    from scipy.sparse import block_diag, csr_array
+    from scipy.sparse import csr_array
 
-    blocks = []
-    for (at, length), mass, J in zip(system.bodies, system.mass, system.inertia, strict=True):
-        blocks.append(mass * np.eye(3))
-        if length == 7:
-            G = transform_g(q[at + 3 : at + 7])
-            blocks.append(4.0 * G.T @ J.reshape(3, 3) @ G)
-    return csr_array(block_diag(blocks, format="csr"))
+    r, rigid = system.bodies[:, :1] + np.arange(3), system.bodies[:, 1] == 7
+    p, J = system.bodies[rigid, :1] + np.arange(3, 7), system.inertia[rigid].reshape(-1, 3, 3)
+    G = transform_g(q[p])
+    blocks = 4.0 * G.swapaxes(1, 2) @ J @ G
+    i, j = np.broadcast_to(p[:, :, None], blocks.shape), np.broadcast_to(p[:, None], blocks.shape)
+    values = np.concatenate((np.repeat(system.mass, 3), blocks.ravel()))
+    places = [np.concatenate((r.ravel(), k.ravel())) for k in (i, j)]
+    return csr_array((values, places), (q.size, q.size))

@@ -1,7 +1,6 @@
 """Multipliers and the forces of constraints, from positions, velocities and accelerations."""
 
 import math
-from collections import Counter
 
 import numpy as np
 

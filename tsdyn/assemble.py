@@ -114,20 +114,12 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0):
         q, (Phi, Phi_q, Phi_t) = trial, trial_arrays
         size = np.linalg.norm(Phi)
     _demand_assembled(scene, Phi, tol * (1.0 + np.abs(q).max()), iterations)
-<<<<<<< HEAD
-    check_rank(scene, Phi_q)
-    demand_aligned(scene.packed, q)
-    for body, (at, length) in zip(scene.bodies, system.bodies, strict=True):
-        if length == 7:  # the angular velocity is the user's, in the body's frame, however the body has been turned
-            qd[at + 3 : at + 7] = 0.5 * transform_g(q[at + 3 : at + 7]).T @ body.angular_velocity
-    M, wanted = _metric(system, q), qd.copy()
-=======
     form.check_rank(scene, Phi_q)
+    demand_aligned(scene.packed, q)
     turning = np.array([body.angular_velocity for body in scene.bodies if body.dimension == 7]).reshape(-1, 3)
     # the angular velocity is the user's, in the body's frame, however the body has been turned
     qd[rigid] = 0.5 * np.einsum("bij,bi->bj", transform_g(q[rigid]), turning)
     wanted, everything = qd.copy(), (np.ones(len(Phi), bool), np.ones(q.size, bool))
->>>>>>> large
     for _ in range(2):
         residual = Phi_q @ qd + Phi_t
         if np.abs(residual).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max()):

@@ -1,6 +1,7 @@
 """Multipliers and the forces of constraints, from positions, velocities and accelerations."""
 
 import math
+from collections import Counter
 
 import numpy as np
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .agreement import poses
+from .choice import LARGEST_PILOT
 from .errors import Status, TsdynError
 from .expansion_pack import lacking, without_series
 from .integrators import SDIRK54, Taylor
@@ -137,7 +138,7 @@ def _alternatives(profile, run, plain, options, limit):
         found = attempt(integrator=None, **tolerances)
         if found and found.method != solution.method:
             yield f"Without a method named it is run by {found.method}, at {given}, {_quicker(found, limit)}."
-    if solution.stats.stiff and not method.implicit and adaptive:
+    if solution.stats.stiff and not method.implicit and adaptive and solution.q.shape[1] <= LARGEST_PILOT:
         found = attempt(integrator=SDIRK54(method.rtol, method.atol))
         if found:
             yield f"The motion is stiff: {found.method} is {_quicker(found, limit)}."

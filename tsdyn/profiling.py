@@ -145,6 +145,8 @@ def _rounds(scene, method, span, plain, sorts, seconds):
         watch, timed = Stopwatch(), Timekeeper()
         _timed(scene, span, {**plain, "integrator": _observed(method, watch)})
         solution, _ = _timed(scene, span, {**plain, "integrator": _observed(method, timed)})
+        watch.release()
+        timed.release()
         if keeper is None or timed.seconds < keeper.seconds:
             keeper, run = timed, solution
         times = {"driver": watch.seconds}

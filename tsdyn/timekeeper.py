@@ -92,6 +92,10 @@ class Stopwatch:
 
         memory.advance = timed
 
+    def release(self):
+        """After the run: the memory, which holds this, goes when nobody holds it."""
+        self.memory.__dict__.pop("advance", None)
+
     def begin(self):
         """Before an advance."""
 
@@ -194,17 +198,18 @@ class Timekeeper(Stopwatch):
         return np.concatenate(parts), np.array(firsts, np.int64)
 
     def entries(self, cost):
-        """What has run, a list of `Entry`, the driver first, freed of what timers cost (`timers.own_cost`)."""
+        """What has run, a list of `Entry`, the driver first, freed of what a timer costs (`timers.own_cost`)."""
+        half = 0.5 * cost
         slots = self.notes[SLOTS:].reshape(-1, 2)
         unit, found = self.seconds / slots[:, 1].sum(), []
         for i in np.flatnonzero(slots[:, 0]).tolist():
             calls = int(slots[i, 0])
-            found.append(Entry(*_what(i), calls, slots[i, 1] * unit - calls * cost[0]))
+            found.append(Entry(*_what(i), calls, slots[i, 1] * unit - calls * half))
         within = np.bincount([e.within for e in found], [e.calls for e in found], ROLES)
         calls = np.bincount([e.role for e in found], [e.calls for e in found], ROLES)
-        driver = Entry(DRIVER, DRIVER, -1, -1, -1, 1, slots[0, 1] * unit - within[DRIVER] * cost[1])
+        driver = Entry(DRIVER, DRIVER, -1, -1, -1, 1, slots[0, 1] * unit - within[DRIVER] * half)
         return [driver] + [
-            e._replace(seconds=e.seconds - within[e.role] * cost[1] * e.calls / calls[e.role]) for e in found
+            e._replace(seconds=e.seconds - within[e.role] * half * e.calls / calls[e.role]) for e in found
         ]
 
 

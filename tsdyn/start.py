@@ -18,7 +18,7 @@ from .poses import OMEGA, POSE, RD, move_bodies, place_bodies, write_positions, 
 from .rank import check_rank
 from .workspace import FLOOR, allocate
 
-LARGE = 1 << 24  # entries of Phi_q from which on no dense one is made
+LARGE = 1 << 22  # entries of Phi_q from which on no dense one is made
 DEPENDENT = (
     "Phi_q has dependent rows.\nRemove the rows that say nothing new, or use a joint with fewer rows. Rows that are "
     "independent elsewhere make this a singular configuration: start from another one."

@@ -1,13 +1,14 @@
-"""Cost against the number of bodies: open chains, trees, closed loops, nets of loops. A process each, for its memory.
+"""Cost against the number of bodies: open chains, trees, hubs, closed loops, nets of loops. A process each.
 
 Columns: building; the first steps, with loading of kernels and analysis; a whole warm run of 0.2 s of motion to 1e-6;
-microseconds an evaluation of the right-hand side, steps included and what a call costs at any rate left out, by the
-difference of the shortest runs to 1e-11 and to 1e-6; the same per body; d log evaluation / d log N; the largest memory
-of the process.
+microseconds an evaluation of the right-hand side per body, steps included and what a call costs at any rate left out,
+by the difference of the shortest runs to 1e-11 and to 1e-6; d log evaluation / d log N; the same two of DOP853; the
+largest memory of the process. An evaluation of the default method, Taylor, is an order of a step.
 
 Run it: python -m benchmarks scaling
 """
 
+import itertools
 import json
 import subprocess
 import sys
@@ -19,15 +20,18 @@ import numpy as np
 from benchmarks import mechanisms, provenance
 
 SPAN, TOL, TIGHT = (0.0, 0.2), 1e-6, 1e-11
+METHODS = None, "dop853"
 MAKE = {
     "chain": mechanisms.chain,
     "tree": mechanisms.tree,
+    "hub": mechanisms.hub,
     "loop": mechanisms.loop,
     "net": lambda n: mechanisms.net(n, n),
 }
 SIZES = {
     "chain": (1, 4, 16, 64, 256, 1024, 4096, 10000),
     "tree": (1, 3, 5, 7, 9, 11),
+    "hub": (4, 16, 64, 256, 1024, 4096),
     "loop": (4, 16, 64, 256, 1024, 4096),
     "net": (1, 2, 4, 8, 16, 32),
 }
@@ -44,6 +48,7 @@ class Size(NamedTuple):
     steps: int
     evaluations: int
     evaluation: float  # us
+    dop853: float  # us, an evaluation
     memory: float  # MB, largest of the process
 
 
@@ -59,17 +64,23 @@ def one(family, size, enough=1.0):
     marks.append(time.perf_counter())
     ts.simulate(scene, SPAN, rtol=TOL, atol=TOL, t_eval=SPAN, max_steps=2)
     marks.append(time.perf_counter())
-    seconds, found = {TOL: [], TIGHT: []}, {}
-    while len(seconds[TIGHT]) < 3 or sum(seconds[TIGHT]) < enough:
-        for tol in seconds:
+    seconds, found = {run: [] for run in itertools.product(METHODS, (TOL, TIGHT))}, {}
+    while len(seconds["dop853", TIGHT]) < 3 or sum(seconds["dop853", TIGHT]) < enough:
+        for method, tol in seconds:
             started = time.perf_counter()
-            found[tol] = ts.simulate(scene, SPAN, rtol=tol, atol=tol, t_eval=SPAN).raise_if_failed().stats
-            seconds[tol].append(time.perf_counter() - started)
+            solution = ts.simulate(scene, SPAN, integrator=method, rtol=tol, atol=tol, t_eval=SPAN).raise_if_failed()
+            seconds[method, tol].append(time.perf_counter() - started)
+            found[method, tol] = solution.stats
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    run = float(np.median(seconds[TOL]))
-    evaluation = 1e6 * (min(seconds[TIGHT]) - min(seconds[TOL])) / (found[TIGHT].evaluations - found[TOL].evaluations)
-    steps, evaluations = found[TOL].steps, found[TOL].evaluations
-    return Size(family, len(scene.bodies), *np.diff(marks).tolist(), run, steps, evaluations, evaluation, memory)
+
+    def evaluation(method):
+        runs = min(seconds[method, TIGHT]) - min(seconds[method, TOL])
+        return 1e6 * runs / (found[method, TIGHT].evaluations - found[method, TOL].evaluations)
+
+    stats, run = found[None, TOL], float(np.median(seconds[None, TOL]))
+    costs = [evaluation(method) for method in METHODS]
+    marks = np.diff(marks).tolist()
+    return Size(family, len(scene.bodies), *marks, run, stats.steps, stats.evaluations, *costs, memory)
 
 
 def families(names=tuple(MAKE), budget=10.0, largest=4096, report=print):
@@ -94,23 +105,23 @@ def _next(done, bodies):
     """Seconds that the next size may take, by the cost of an evaluation growing as it last did, or more than N does."""
     last = done[-1]
     slope = max(_slope(done[-2], last), 1.1) if len(done) > 1 else 1.1
-    return 10.0 * last.run * (bodies / last.bodies) ** min(slope, 3.2)
+    return 40.0 * last.run * (bodies / last.bodies) ** min(slope, 3.2)
 
 
-def _slope(a, b):
-    return float(np.log(b.evaluation / a.evaluation) / np.log(b.bodies / a.bodies))
+def _slope(a, b, cost="evaluation"):
+    return float(np.log(getattr(b, cost) / getattr(a, cost)) / np.log(b.bodies / a.bodies))
 
 
 def table(sizes):
     """The sizes as text."""
-    lines = ["family  bodies  build s  first s  run ms  steps  evaluation us  per body us  slope  memory MB"]
+    lines = ["family  bodies  build s  first s  run ms  steps  us / body  slope  DOP853's  slope  memory MB"]
     before = None
     for size in sizes:
-        slope = f"{_slope(before, size):.2f}" if before and before.family == size.family else ""
-        lines.append(
-            f"{size.family:6}{size.bodies:8}{size.built:9.2f}{size.first:9.2f}{1e3 * size.run:8.4g}{size.steps:7}"
-            f"{size.evaluation:15.4g}{size.evaluation / size.bodies:13.3f}{slope:>7}{size.memory:11.0f}"
-        )
+        line = f"{size.family:6}{size.bodies:8}{size.built:9.2f}{size.first:9.2f}{1e3 * size.run:8.4g}{size.steps:7}"
+        for cost in ("evaluation", "dop853"):
+            slope = f"{_slope(before, size, cost):.2f}" if before and before.family == size.family else ""
+            line += f"{getattr(size, cost) / size.bodies:{11 if cost == 'evaluation' else 10}.3f}{slope:>7}"
+        lines.append(f"{line}{size.memory:11.0f}")
         before = size
     return "\n".join(lines)
 

@@ -21,7 +21,7 @@ FILES = {
 }
 # lowest first; a module imports from lines above its own, or from its own line
 LAYERS = """
-_cache errors _discovery jet truncated checks
+_cache errors _discovery jet truncated checks aligned
 _kernel
 _four rotation linalg motion signal angle recurrences
 blocks block_steps block_kernels hubs

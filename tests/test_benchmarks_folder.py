@@ -43,10 +43,11 @@ def test_chains_are_those_of_the_reference_files(links):
     [
         (mechanisms.chain(3), 3, 9),
         (mechanisms.tree(4), 15, 45),
+        (mechanisms.hub(20), 21, 63),
         (mechanisms.loop(5), 5, 18),
         (mechanisms.net(2, 3), 17, 3 * (2 * 17 - 12 + 2)),
     ],
-    ids=["chain", "tree", "loop", "net"],
+    ids=["chain", "tree", "hub", "loop", "net"],
 )
 def test_mechanisms_are_consistent_and_of_full_rank(definition, bodies, rows):
     scene = mechanisms.build(definition)
@@ -198,7 +199,7 @@ def test_figures_are_drawn(tmp_path):
         Row(name, "tolerance", e, e, 1.0 / e, 1.0, 1) for name in ("tsdyn", "tsdyn, RK45", "x") for e in (0.1, 0.01)
     )
     figures.work_precision([Measured("one", 1e-15, "", rows), Measured("two", 1e-15, "", rows)], tmp_path / "a.png")
-    sizes = [Size("chain", n, 0.1, 0.1, 0.1 * n, 10, 100, 2.0 * n, 50.0) for n in (1, 2, 4)]
+    sizes = [Size("chain", n, 0.1, 0.1, 0.1 * n, 10, 100, 2.0 * n, 3.0 * n, 50.0) for n in (1, 2, 4)]
     figures.scaling(sizes, tmp_path / "b.png")
     for name in "ab":
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")

@@ -12,10 +12,13 @@ zero for every k, factorised once a step.
 from ._four import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times
 from ._kernel import kernel
 from .block_kernels import solve
+from .linalg import copy
 from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS
 from .normal import scatter, weigh
 from .poses import OMEGA, POSE, RD, R
 from .series_loops import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R, S_SPIN, call_series
+
+MANY = 100  # bodies: errors of a solution by elimination grow with their number
 
 
 @kernel
@@ -119,8 +122,8 @@ def expand(network, system, k, last, ahead, orders, x, f):
     On entry Z has the gyroscopic torques of order k, and A_{k+2} what (1) has without omega'_{k+1}; on exit both are
     of the next order, unless this is the last one. lam_k stays in b until then.
 
-    With `ahead`, a constant, each body has the next one's numbers brought into the cache: that pays where they are in
-    none near by. x is a `series_state.Expansion`, f a `free.Free`.
+    Of many bodies, lam_0 is refined once. With `ahead`, a constant, each body has the next one's numbers brought into
+    the cache: that pays where they are in none near by. x is a `series_state.Expansion`, f a `free.Free`.
     """
     bodies, Z = x.bodies, f.Z
     nb, size = network.bodies.shape[0], orders * BODY_ROW
@@ -136,26 +139,47 @@ def expand(network, system, k, last, ahead, orders, x, f):
         if network.bodies[b, 1] == 7:
             put(bodies, at + S_OMEGA * orders + 4 * (k + 1), times(four(Z, 8 * b + 4), g))
             _turn(bodies, at, k + 2, times(four(Z, 8 * b + 4), h))
-    run_loops(network, system.reals, RESIDUAL, k, orders, bodies, x.constraints, x.places, f.b, Z)
-    for i in range(network.welds.shape[0]):
-        f.b[network.welds[i, 0]] = 0.0
-    solve(network.pattern, f.S, f.b)
-    for i in range(Z.size):
-        Z[i] = 0.0
-    scatter(network, f.Y, f.b, Z)
+    refined = k == 0 and nb > MANY
+    if refined:
+        _solve(network, system, k, orders, x, f)
+        copy(f.b, f.gamma)
+        for b in range(nb):
+            _change(network, b, bodies, b * size, orders, k, g, h, Z)
+    _solve(network, system, k, orders, x, f)
+    if refined:
+        for e in range(f.b.size):
+            f.b[e] += f.gamma[e]
     for b in range(nb):
         at = b * size
         if ahead:
             _fetch_next(bodies, at + size, orders, 12 * (k + 3), k + 2)
             fetch(bodies, at + size + S_OMEGA * orders, 4 * (k + 1))
             fetch(bodies, at + size + S_SPIN * orders, 4 * (k + 2))
-        o = at + S_R * orders + 4 * (k + 2)
-        put(bodies, o, fma(four(Z, 8 * b), h, four(bodies, o)))
+        _change(network, b, bodies, at, orders, k, g, h, Z)
         put(Z, 8 * b, splat(0.0))
-        if network.bodies[b, 1] == 7:
-            change, o = four(Z, 8 * b + 4), at + S_OMEGA * orders + 4 * (k + 1)
-            put(bodies, o, fma(change, g, four(bodies, o)))
-            _turn(bodies, at, k + 2, times(change, h))
-            if not last:
-                put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, k + 1))
-                _turn_ahead(bodies, at, orders, k + 2)
+        if network.bodies[b, 1] == 7 and not last:
+            put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, k + 1))
+            _turn_ahead(bodies, at, orders, k + 2)
+
+
+@kernel
+def _solve(network, system, k, orders, x, f):
+    """b = lam_k, or what it lacks, and with it Z = -W H^T lam_k."""
+    run_loops(network, system.reals, RESIDUAL, k, orders, x.bodies, x.constraints, x.places, f.b, f.Z)
+    for i in range(network.welds.shape[0]):
+        f.b[network.welds[i, 0]] = 0.0
+    solve(network.pattern, f.S, f.b)
+    for i in range(f.Z.size):
+        f.Z[i] = 0.0
+    scatter(network, f.Y, f.b, f.Z)
+
+
+@kernel
+def _change(network, b, bodies, at, orders, k, g, h, Z):
+    """Add what Z makes of a body's r_{k+2}, omega'_{k+1} and A_{k+2}; g = 1 / (k + 1), h = g / (k + 2)."""
+    o = at + S_R * orders + 4 * (k + 2)
+    put(bodies, o, fma(four(Z, 8 * b), h, four(bodies, o)))
+    if network.bodies[b, 1] == 7:
+        change, o = four(Z, 8 * b + 4), at + S_OMEGA * orders + 4 * (k + 1)
+        put(bodies, o, fma(change, g, four(bodies, o)))
+        _turn(bodies, at, k + 2, times(change, h))

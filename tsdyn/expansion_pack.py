@@ -4,6 +4,7 @@ import numpy as np
 
 from . import force_series
 from ._kernel import twin
+from .aligned import zeros
 from .attachment import address
 from .bodies import Ground
 from .body_loops import INTS, MASK
@@ -85,8 +86,8 @@ def allocate_expansion(network, kinds, packed, highest):
     """Lay out the series of a run, room for orders up to the highest (of omega'); the loops are loaded now."""
     orders, nb = room(highest), len(network.bodies)
     loop = "far_series" if is_far(network, highest) else "series"
-    bodies = np.zeros((nb + 1, orders * BODY_ROW))
-    bodies[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
+    bodies = zeros((nb + 1) * orders * BODY_ROW)
+    bodies.reshape(nb + 1, -1)[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
     places, total = np.zeros((len(kinds), 3), np.int64), 0
     for i, kind in enumerate(kinds):
         first, count = network.kinds[i, N_FIRST_INT], int(network.kinds[i, N_COUNT])
@@ -98,8 +99,8 @@ def allocate_expansion(network, kinds, packed, highest):
     forces, table, loads = _forces(packed, orders)
     return Expansion(
         order=np.array([highest, orders, highest, highest, highest]),
-        bodies=bodies.ravel(),
-        constraints=np.zeros(total + 4),
+        bodies=bodies,
+        constraints=zeros(total + 4),
         places=places,
         forces=forces,
         table=table,
@@ -122,7 +123,7 @@ def _forces(packed, orders):
         for load in members:
             pair = [index.get(id(body), nb) for body in (load.force.a, load.force.b)]
             table += [*pair, (pair[0] == nb) | (pair[1] == nb) << 1]
-    return np.array(rows, np.int64).reshape(-1, 7), np.array(table, np.int64), np.zeros(total + 4)
+    return np.array(rows, np.int64).reshape(-1, 7), np.array(table, np.int64), zeros(total + 4)
 
 
 def masks(network, packed, kinds):

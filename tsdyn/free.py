@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .aligned import zeros
 from .poses import POSE
 
 
@@ -29,10 +30,9 @@ RESIDUAL, MOVED, SIZES = range(3)
 def allocate_free(network, n):
     """Lay it out; the ground's pose is set for good, and a point mass has that orientation."""
     nb, m = len(network.bodies), len(network.row)
-    poses = np.zeros((nb + 1, POSE))
-    poses[:, [0, 5, 10, 24]] = 1.0
-    zeros = np.zeros
+    poses = zeros((nb + 1) * POSE)
+    poses.reshape(-1, POSE)[:, [0, 5, 10, 24]] = 1.0
     return Free(
-        poses.ravel(), zeros(16 * m), zeros(16 * m), zeros(network.pattern.shape[2]), zeros(m), zeros(m),
+        poses, zeros(16 * m), zeros(16 * m), zeros(network.pattern.shape[2]), zeros(m), zeros(m),
         zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n), zeros(4), zeros(SIZES),
     )  # fmt: skip

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .aligned import zeros
+
 
 class Local(NamedTuple):
     """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
@@ -37,9 +39,9 @@ def allocate_local(network):
     """Lay it out; the ground doesn't move, nor does a point mass turn."""
     nb, m = len(network.bodies), len(network.row)
     size = network.pattern.shape[2]
-    base, d, zeros = np.zeros((nb + 1, 8)), np.zeros((nb + 1, 4)), np.zeros
-    base[:, 4] = 1.0
+    base = zeros(8 * (nb + 1))
+    base[4::8] = 1.0
     return Local(
-        base.ravel(), d.ravel(), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(16 * m), zeros(16 * m), zeros(size),
+        base, zeros(4 * (nb + 1)), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(16 * m), zeros(16 * m), zeros(size),
         zeros(16 * m), zeros(size), zeros(size), zeros(m), zeros(NUMBERS),
     )  # fmt: skip

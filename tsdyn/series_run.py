@@ -6,7 +6,7 @@ import numpy as np
 
 from .dense import Trajectory
 from .drive import drive
-from .errors import InvalidArgument
+from .errors import InvalidArgument, Status
 from .events import Watch
 from .expansion_pack import is_far
 from .run_state import CHART_ROWS, FILLED, STORED, T
@@ -72,6 +72,6 @@ def run_series(task, observe=None):
         None if watch is None else watch.found(prepared.n),
         began,
     )
-    if observe is None:
+    if observe is None and status != Status.NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give(kind, memory)
     return outcome

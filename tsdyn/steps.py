@@ -5,6 +5,7 @@ import time
 from .arguments import step_count
 from .dense import Reader, Trajectory
 from .drive import drive
+from .errors import Status
 from .events import Watch
 from .memory import Memory
 from .run_state import CHART_ROWS, FILLED, IN_CHART, REJECTED, STEPS, STIFF, STORED, T
@@ -81,7 +82,7 @@ def run_steps(task, observe=None):
         None if watch is None else watch.found(n),
         began,
     )
-    if observe is None:
+    if observe is None and status != Status.NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give((form.name, *kind), memory)
     return outcome
 

@@ -32,6 +32,8 @@ series_loops
 force_series
 network local
 free normal
+selection
+rows
 primitive
 joint
 framed_joint
@@ -51,7 +53,7 @@ integrator
 integrators.* constraints.__init__ forces.__init__ integrators.__init__
 arguments
 loads
-landing displacement free_accelerations
+landing displacement free_accelerations uniqueness
 local_chart
 newton evaluate diagnostics reactions power dense
 control

@@ -29,6 +29,7 @@ from .errors import InvalidConstraint
 
 DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
+RAISE = dis.opmap["RAISE_VARARGS"]
 _lock = threading.RLock()
 _table = [None]  # debug mode: what an address stands for; zero is no address
 ANY = 1 << 40  # the length of arrays whose length a kernel doesn't need
@@ -42,7 +43,7 @@ def kernel(function, allocates=False):
     """
     if allocates:
         options = {**_OPTIONS, "_nrt": True, "boundscheck": True}
-    elif any(step.opname == "RAISE_VARARGS" for step in dis.get_instructions(function)):
+    elif RAISE in function.__code__.co_code[::2]:  # every second byte is an operation
         raise InvalidConstraint(
             f"{function.__qualname__}: a kernel can't raise or assert; write nan where there is no value."
         )

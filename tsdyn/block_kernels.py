@@ -14,7 +14,8 @@ from .block_steps import eliminate, eliminate_lu, link, link_lu, subtract_produc
 
 
 @kernel
-def _keep_diagonal(pattern, values):
+def keep_diagonal(pattern, values):
+    """Copy the diagonal to where `factor` judges pivots by it."""
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     kept = values[pattern.shape[1] :]
     for j in range(heads.size):
@@ -34,7 +35,7 @@ def factor(pattern, values, limit):
         kept[0] = values[0]
         return eliminate(values, 1, 1, 1, kept, limit)
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
-    _keep_diagonal(pattern, values)
+    keep_diagonal(pattern, values)
     for j in range(heads.size):
         first, width, panel = starts[j], widths[j], values[heads[j] :]
         size = starts[j + 1] - first
@@ -52,7 +53,7 @@ def factor(pattern, values, limit):
                 out, right = u[3 * (width + 1) :], u[3:]
                 subtract_products(u, 3, width, right, right, out, width, size - k - 3, width - k - 3, True)
         for e in range(updates[j], updates[j + 1]):
-            at, rows, run, n, target, stride = _record(pattern, e)
+            at, rows, run, n, target, stride = record(pattern, e)
             for k in range(0, size, 3):
                 u, r = panel[k * (width + 1) :], panel[k * width :]
                 subtract_products(u, size - k, width, r[at:], r[run:], values[target:], stride, rows, n, at == run)
@@ -60,7 +61,7 @@ def factor(pattern, values, limit):
 
 
 @kernel
-def _record(pattern, e):
+def record(pattern, e):
     """Which products go where: columns of a panel and how many, twice; place and row length of what they change."""
     record = pattern.records[6 * e :]
     return record[0], record[1], record[2], record[3], record[4], record[5]
@@ -78,7 +79,7 @@ def factor_lu(pattern, lower, upper, limit):
         kept[0] = upper[0]
         return eliminate_lu(lower, upper, 1, 1, 1, kept, limit)
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
-    _keep_diagonal(pattern, upper)
+    keep_diagonal(pattern, upper)
     for j in range(heads.size):
         first, width, below, above = starts[j], widths[j], lower[heads[j] :], upper[heads[j] :]
         size = starts[j + 1] - first
@@ -99,7 +100,7 @@ def factor_lu(pattern, lower, upper, limit):
                     subtract_products(u, 3, width, left, right, out, width, size - k - 3, width - k - 3, True)
                     left, right, out = right, left, other
         for e in range(updates[j], updates[j + 1]):
-            at, rows, run, n, target, stride = _record(pattern, e)
+            at, rows, run, n, target, stride = record(pattern, e)
             left, right, out = below, above, upper[target:]
             for _ in range(2):
                 for k in range(0, size, 3):

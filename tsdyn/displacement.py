@@ -28,6 +28,7 @@ from .network import (
 )
 from .normal import inner, more, multiply_both
 from .poses import OMEGA, POSE, RD, R, orient
+from .selection import drop_diagonal
 from .workspace import FACTORIZATIONS
 
 FARTHEST = 0.9  # |d|^2: a body that has turned further is out of the chart's reach
@@ -131,6 +132,8 @@ def factorise_normal(network, w, f, l):
     multiply_both(network, f.H, l.X, l.lower, l.upper)
     if network.parts.shape[0] > 0:
         _multiply_parts_both(network, l, f.H, l.lower, l.upper)
+    drop_diagonal(network, f.dropped, l.lower)
+    drop_diagonal(network, f.dropped, l.upper)
     w.counters[FACTORIZATIONS] += 1
     return factor_lu(network.pattern, l.lower, l.upper, PIVOT_LIMIT) < 0
 

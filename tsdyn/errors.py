@@ -72,6 +72,7 @@ class Status(IntEnum):
     EVENT_FAILED = 11
     STAGE_FAILED = 12
     STIFF = 13
+    UNHELD = 14
 
     def __str__(self):
         return self.name.lower()
@@ -125,6 +126,10 @@ _SENTENCES = {
     Status.INTERRUPTED: ("The run was interrupted.", "Go on with simulate(scene, (t, t_end), state=solution.state)."),
     Status.EVENT: ("A terminal event ended the run.", ""),
     Status.EVENT_FAILED: ("An event function gave no number.", "Mend it, or return a finite float for every state."),
+    Status.UNHELD: (
+        "Constraint rows that followed from the others at the start hold no longer: together they can't be met here.",
+        "Remove one of the constraints that contradict each other, or correct their points and axes.",
+    ),
     Status.STIFF: ("The motion is stiff, and an implicit method is cheaper.", "Use SDIRK54."),
     Status.SLICE_DONE: ("A slice of the run is done.", ""),
 }

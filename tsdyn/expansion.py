@@ -16,6 +16,7 @@ from .linalg import copy
 from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS
 from .normal import scatter, weigh
 from .poses import OMEGA, POSE, RD, R
+from .selection import drop
 from .series_loops import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R, S_SPIN, call_series
 
 MANY = 100  # bodies: errors of a solution by elimination grow with their number
@@ -168,6 +169,7 @@ def _solve(network, system, k, orders, x, f):
     run_loops(network, system.reals, RESIDUAL, k, orders, x.bodies, x.constraints, x.places, f.b, f.Z)
     for i in range(network.welds.shape[0]):
         f.b[network.welds[i, 0]] = 0.0
+    drop(f.dropped, f.b)
     solve(network.pattern, f.S, f.b)
     for i in range(f.Z.size):
         f.Z[i] = 0.0

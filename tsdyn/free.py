@@ -21,10 +21,15 @@ class Free(NamedTuple):
     a: np.ndarray  # ((b + 1) * 8,)  accelerations of bodies; taylor
     Q: np.ndarray  # (n,)  applied forces
     p: np.ndarray  # (4,)  scratch
-    sizes: np.ndarray  # (SIZES,)  numbers about the last landing, below
+    sizes: np.ndarray  # (SIZES,)  numbers about the last landing and choice of rows, below
+    dropped: np.ndarray  # int64 (m + 1,)  how many rows are dropped, and which; selection.select
+    chosen: np.ndarray  # int64 (m + 1,), order (largest block,), block (its square,)  scratch of selection.select
+    order: np.ndarray
+    block: np.ndarray
 
 
-RESIDUAL, MOVED, SIZES = range(3)
+# of the landing; the largest |Phi| of dropped rows, and what elimination left of the weakest of the others, as a share
+RESIDUAL, MOVED, UNHELD, WEAKEST, SIZES = range(5)
 
 
 def allocate_free(network, n):
@@ -32,7 +37,26 @@ def allocate_free(network, n):
     nb, m = len(network.bodies), len(network.row)
     poses = zeros((nb + 1) * POSE)
     poses.reshape(-1, POSE)[:, [0, 5, 10, 24]] = 1.0
-    return Free(
+    free = Free(
         poses, zeros(16 * m), zeros(16 * m), zeros(network.pattern.shape[2]), zeros(m), zeros(m),
         zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n), zeros(4), zeros(SIZES),
+        *np.zeros((3, 1), np.int64), zeros(1),
     )  # fmt: skip
+    if network.dropped.size:
+        free = with_selection(network, free)
+    drop_as_at_first(network, free)
+    return free
+
+
+def with_selection(network, free):
+    """The same with the memory of selection.select, which no scene without redundant rows needs."""
+    m, widest = len(network.row), int(np.diff(network.pattern.starts).max())
+    dropped, chosen, order = (np.zeros(size, np.int64) for size in (m + 1, m + 1, widest))
+    return free._replace(dropped=dropped, chosen=chosen, order=order, block=zeros(widest**2))
+
+
+def drop_as_at_first(network, free):
+    """Drop the rows that were found redundant at the scene's first start."""
+    free.dropped[0] = network.dropped.size
+    free.dropped[1 : 1 + network.dropped.size] = network.dropped
+    free.sizes[WEAKEST] = 1.0

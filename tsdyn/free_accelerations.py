@@ -9,10 +9,10 @@ from ._four import cross, fma, four, put, splat, sub, times
 from ._kernel import kernel
 from .assembly import applied_forces
 from .block_kernels import solve
-from .landing import run_loops
 from .network import BIAS
 from .normal import gather, scatter, weigh
 from .poses import OMEGA, POSE, P, write_accelerations
+from .rows import run_loops
 
 
 @kernel
@@ -64,7 +64,7 @@ def solve_accelerations(network, system, w, f, t):
     if f.b.size == 0:
         return
     gather(network, f.H, f.Z, f.b)
-    run_loops(network, system.reals, BIAS, f.poses, t, f.gamma, f.H)
+    run_loops(network, system.reals, BIAS, f, t, f.gamma, f.H)
     for e in range(f.b.size):
         f.b[e] += f.gamma[e]
     solve(network.pattern, f.S, f.b)

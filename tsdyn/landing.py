@@ -8,18 +8,19 @@ import math
 
 from ._four import add, fma, four, put, splat
 from ._kernel import kernel
-from .block_kernels import factor, solve
-from .body_loops import call_body_loop
+from .block_kernels import solve
 from .errors import Status
 from .free import RESIDUAL
-from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS, REDUCED, VALUES
-from .normal import gather, multiply_rows, scatter, weigh_rows
+from .network import REDUCED, VALUES
+from .normal import gather, scatter
 from .poses import OMEGA, POSE, RD, P, R, set_pose
+from .rows import factorise_rows, held, run_loops
 from .series_loops import BODY_ROW, S_OMEGA, S_R
 from .workspace import AT_ROUNDING, FACTORIZATIONS, FLOOR, NEWTON
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
+UNHELD = int(Status.UNHELD)
 PIVOT_LIMIT = 1e-13  # of S: less of a diagonal entry than this is rounding
 SWEEPS = 12
 MOST_PARTS = 100.0  # of a step on which p is followed
@@ -27,27 +28,11 @@ MOVED = 1e-15  # corrections above this are more than rounding: S is made anew
 
 
 @kernel
-def run_loops(network, reals, column, poses, t, out, H):
-    """One of the loops of body_loops, for every kind that has it."""
-    for i in range(network.kinds.shape[0]):
-        kind = network.kinds[i]
-        if kind[column] != 0:
-            call_body_loop(
-                kind[column], kind[N_COUNT], kind[N_REALS], network.table[kind[N_FIRST_INT] :],
-                reals[kind[N_FIRST_REAL] :], poses, poses, t, out, H,
-            )  # fmt: skip
-    for i in range(network.welds.shape[0]):
-        out[network.welds[i, 0]] = 0.0
-
-
-@kernel
 def factorise(network, system, w, f, t):
     """b = Phi, and H, W H^T and the factors of S, at the present poses. Status."""
-    run_loops(network, system.reals, REDUCED, f.poses, t, f.b, f.H)
-    weigh_rows(network, f.H, f.Y)
-    multiply_rows(network, f.H, f.Y, f.S)
+    run_loops(network, system.reals, REDUCED, f, t, f.b, f.H)
     w.counters[FACTORIZATIONS] += 1
-    return OK if factor(network.pattern, f.S, PIVOT_LIMIT) < 0 else SINGULAR
+    return OK if factorise_rows(network, system.reals, f, t, f.b, f.H, f.Y, f.S, PIVOT_LIMIT) else SINGULAR
 
 
 @kernel
@@ -71,10 +56,10 @@ def land(network, system, w, f, t):
         if renew:
             status = factorise(network, system, w, f, t)
             if status != OK or f.sizes[RESIDUAL] >= 0.0:
-                return status
+                return UNHELD if status == OK and not held(f, floor) else status
             renew = False
         else:
-            run_loops(network, system.reals, VALUES, f.poses, t, f.b, f.H)
+            run_loops(network, system.reals, VALUES, f, t, f.b, f.H)
         worst = _largest(f.b)
         f.sizes[RESIDUAL] = max(f.sizes[RESIDUAL], worst)
         if not worst < math.inf:
@@ -84,7 +69,7 @@ def land(network, system, w, f, t):
                 return NEWTON_FAILED
             if moved <= MOVED:
                 w.counters[AT_ROUNDING] += 1 if moved == 0.0 else 0
-                return OK
+                return OK if held(f, floor) else UNHELD
             renew = True
             continue
         before = worst

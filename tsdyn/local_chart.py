@@ -12,14 +12,12 @@ import math
 
 from ._four import get
 from ._kernel import kernel
-from .block_kernels import factor
 from .displacement import factorise_normal, turned_most
-from .landing import run_loops
 from .linalg import copy
 from .local import END, FACTORED, OFF, TIME
 from .network import REDUCED
-from .normal import multiply_rows, weigh_rows
 from .poses import POSE, P, R, place_bodies
+from .rows import factorise_rows, run_loops, serve_still
 from .workspace import CHARTS, CONDITION, CONTRACTION, FACTORIZATIONS, FLOOR, KEPT, PLACEMENTS, SIZE
 
 # reasons to leave a chart, as stored; REASONS names them
@@ -47,19 +45,18 @@ SAME = 1e-6  # of N: factors that are off by less tell the contraction as well a
 def touch(network, system, w, f, l, t):
     """The chart at w.q: base, H0, Y0, the factors of S0. Whether the rows of H0 are independent."""
     regular = True
-    if l.numbers[END] > 0.0 and l.numbers[END] == w.counters[PLACEMENTS]:  # the place that was left last
+    last = l.numbers[END] > 0.0 and l.numbers[END] == w.counters[PLACEMENTS]
+    if last and serve_still(network, f, f.S):  # the place that was left last
         copy(f.H, l.H0)
         copy(f.Y, l.Y0)
         copy(f.S, l.S0)
         w.counters[KEPT] += 1 if f.b.size > 0 else 0
     else:
         place_bodies(network.bodies, w.q, f.poses)
-        run_loops(network, system.reals, REDUCED, f.poses, t, f.b, l.H0)
-        weigh_rows(network, l.H0, l.Y0)
-        multiply_rows(network, l.H0, l.Y0, l.S0)
+        run_loops(network, system.reals, REDUCED, f, t, f.b, l.H0)
         if f.b.size > 0:
             w.counters[FACTORIZATIONS] += 1
-            regular = factor(network.pattern, l.S0, PIVOT_LIMIT) < 0
+            regular = factorise_rows(network, system.reals, f, t, f.b, l.H0, l.Y0, l.S0, PIVOT_LIMIT)
     for b in range(network.bodies.shape[0]):
         at, o = b * POSE, 8 * b
         for c in range(3):

@@ -5,6 +5,7 @@ import numpy as np
 from ._kernel import resident
 from .dense import B_DATA, warm_size
 from .errors import Status
+from .free import drop_as_at_first
 from .implicit import prepare_implicit
 from .run import advance
 from .run_state import (
@@ -88,6 +89,7 @@ class Memory:
         """As if it were new, for this task: whatever a run before has left behind is gone."""
         for array in self._written:
             array.fill(0)
+        drop_as_at_first(self.network, self.context.free)
         system, work = self.context.system, self.work
         source, _ = task.prepared.system(self.implicit)
         if self.source is not source:

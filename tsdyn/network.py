@@ -23,6 +23,7 @@ P_LEFT, P_ROWS, P_RIGHT, P_COLUMNS, P_TARGET, P_STRIDE, P_SAME, P_WIDTH = range(
 H_LEFT, H_ROWS, H_RIGHT, H_COLUMNS, H_TARGET, H_STRIDE, H_KIND, H_BODY, H_WIDTH = range(9)
 ROWS, ROWS_WELD, WELD_ROWS, WELDS = range(4)
 W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
+DROPPED = "dropped"  # in Packed.shared: the rows of a network of its own that are redundant
 THIN = 1e-12  # of the largest principal inertia: what is less is none
 
 
@@ -43,6 +44,8 @@ class Network(NamedTuple):
     parts: np.ndarray  # int64 (products, H_WIDTH): the products at the parts of hubs, see hubs.py
     scales: np.ndarray  # (products,): what they are multiplied by
     welds: np.ndarray  # int64 (rows of welds, 2): which row, of which body
+    diagonal: np.ndarray  # int64 (m,): where the diagonal entry of a row is in a value array of the pattern
+    dropped: np.ndarray  # int64: rows that follow from the others, as chosen at the first start; see selection.py
 
 
 def thin(packed):
@@ -80,6 +83,19 @@ def network_of(packed, *columns):
     return kept[columns]
 
 
+def drop(packed, rows):
+    """Have the networks of a scene made anew, with these rows of them redundant, int64 (k,); None where none are.
+
+    Hubs are left whole then: elimination may end with the row of a weld, which can't be left out.
+    """
+    for key in [key for key in packed.shared if key == "network" or isinstance(key, tuple)]:
+        del packed.shared[key]
+    if rows is None:
+        del packed.shared[DROPPED]
+    else:
+        packed.shared[DROPPED] = rows
+
+
 def no_network():
     """The network of nothing, for its type."""
     none, pattern = np.zeros(0, np.int64), analyse([], [])[1]
@@ -88,7 +104,7 @@ def no_network():
     parts = np.zeros((0, H_WIDTH), np.int64)
     return Network(
         pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none, parts, np.zeros(0),
-        pairs,
+        pairs, none, none,
     )  # fmt: skip
 
 
@@ -113,7 +129,11 @@ def build(packed):
         inside.append((node, sizes[node]))
         sizes[node] += constraint.rows
     degrees = np.where(system.bodies[:, 1] == 7, 6, 3).tolist()
-    parts = cut([tuple(body if body < nb else -1 for body in pair) for pair in nodes], sizes, degrees)
+    parts = (
+        []
+        if DROPPED in packed.shared
+        else cut([tuple(body if body < nb else -1 for body in pair) for pair in nodes], sizes, degrees)
+    )
     hubs, cliques = {part.body for part in parts}, [[] for _ in range(nb)]
     for pair, node in nodes.items():
         for body in set(pair) - hubs - {nb}:
@@ -211,8 +231,17 @@ def build(packed):
         parts=np.array(welded, np.int64).reshape(-1, H_WIDTH),
         scales=np.array(scales, float),
         welds=np.array(welds, np.int64).reshape(-1, 2),
+        diagonal=_diagonal(pattern),
+        dropped=np.array(packed.shared.get(DROPPED, ()), np.int64),
     )
     return network, tuple(used)
+
+
+def _diagonal(pattern):
+    """Where the diagonal entries are, in the order of the eliminated vector."""
+    sizes = np.diff(pattern.starts)
+    within = np.arange(pattern.shape[0]) - np.repeat(pattern.starts[:-1], sizes)
+    return np.repeat(pattern.heads, sizes) + within * (np.repeat(pattern.widths, sizes) + 1)
 
 
 def with_loops(network, kinds, *columns):

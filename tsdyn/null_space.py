@@ -15,13 +15,13 @@ from ._kernel import callback, kernel, vector
 from .assembly import acceleration_bias, applied_forces, is_rheonomic, set_time, time_derivative
 from .chart import new_chart, tangent_map
 from .errors import Status
-from .landing import run_loops
 from .linalg import cholesky, cholesky_solve, transposed_times
 from .local import TIME
 from .local_chart import measure_turns, turning
 from .network import REDUCED
 from .newton import NOT_FINITE, OK, solve_positions, subtract_normal
 from .poses import place_bodies
+from .rows import run_loops
 from .stepping import ACCELERATE, NORM, PLACE
 from .workspace import EVALUATIONS, FACTORIZATIONS, PLACEMENTS, load
 
@@ -211,7 +211,7 @@ def look(c):
     w, f, l, network = c.work, c.free, c.local, c.network
     place_bodies(network.bodies, w.q, f.poses)
     measure_turns(network, w.q, l)
-    run_loops(network, c.system.reals, REDUCED, f.poses, l.numbers[TIME], f.b, f.H)
+    run_loops(network, c.system.reals, REDUCED, f, l.numbers[TIME], f.b, f.H)
     return turning(network, w, f, l)
 
 

@@ -15,6 +15,7 @@ from .diagnostics import constraint_rows, marker_jets, starts_of
 from .jet import Jet
 from .loads import force_loads
 from .markers import TURN
+from .reactions import particular
 from .signal import Signal
 
 
@@ -86,4 +87,4 @@ def driving_power(solution):
         return np.zeros(t.size)
     still = np.zeros_like(solution.q)
     Phi_t = constraint_rows(packed, t, solution.q, still, still)[1]
-    return (solution.multipliers * Phi_t).sum(axis=1)
+    return (particular(solution.multipliers) * Phi_t).sum(axis=1)

@@ -7,6 +7,7 @@ import numpy as np
 from .branch import demand_aligned
 from .expansion_pack import refusal
 from .force_pack import with_force_jacobians
+from .network import DROPPED
 from .series_memory import Series
 from .start import consistent
 from .system import with_curvatures
@@ -65,12 +66,16 @@ class Prepared:
         """The system for a method, and how many floats it keeps for forces."""
         return self.implicit if implicit else (self.packed.system, 0)
 
-    def start(self, scene, q, qd, t, tol):
+    def start(self, scene, q, qd, t, tol, redundant_allowed):
         """(q, qd) checked against the constraints and freed of rounding; looked at once for the same numbers."""
-        given = q.tobytes(), qd.tobytes(), t, tol
+        given = q.tobytes(), qd.tobytes(), t, tol, redundant_allowed
         known, start = self._start
         if known != given:
-            start = consistent(scene, self.packed.system, q, qd, t, tol)
+            before = self.packed.shared.get(DROPPED)
+            start = consistent(scene, self.packed.system, q, qd, t, tol, redundant_allowed)
+            if self.packed.shared.get(DROPPED) is not before:  # the rows that are dropped belong to a network
+                self.__dict__.pop("series", None)
+                self._spare.clear()
             demand_aligned(self.packed, start[0])
             self._start = given, start
         return start

@@ -86,13 +86,17 @@ def check_inertia(scene, system, q, Phi_q):
     )
 
 
-def weakest_row(scene, Phi_q):
-    """Name the row of Phi_q nearest to depending on the others; and the share of its smallest singular value."""
+def weakest_row(scene, Phi_q, redundant=0):
+    """Name the row of Phi_q nearest to depending on the others; and the share of its smallest singular value.
+
+    So many redundant rows, the nearest ones, are passed over.
+    """
     if not (Phi_q.size and np.isfinite(Phi_q).all()):
         return "", 1.0
     scaled = Phi_q / np.maximum(np.linalg.norm(Phi_q, axis=1), 1e-300)[:, None]
     size = np.linalg.svd(scaled, compute_uv=False)
-    return scene.row_names()[_pivots(scene, scaled)[-1]], size[-1] / size[0]
+    last = -1 - redundant
+    return scene.row_names()[_pivots(scene, scaled)[last]], size[last] / size[0]
 
 
 def _pivots(scene, rows):

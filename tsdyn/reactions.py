@@ -7,15 +7,15 @@ import numpy as np
 
 from ._kernel import entry, resident
 from .assembly import constraint_jacobian, set_time
-from .block_kernels import factor, solve
+from .block_kernels import solve
 from .bodies import rotation_matrix, transform_g
-from .landing import run_loops
 from .loads import applied_loads, force_loads, inertial_forces, velocity_forces
 from .markers import POINT
 from .network import REDUCED, network_of
-from .normal import gather, multiply_rows, scatter, weigh_rows
+from .normal import gather, scatter
 from .poses import place_bodies
 from .primitive import INTS
+from .rows import factorise_rows, run_loops
 from .sparse_rows import WIDTH, with_short_rows
 from .system import COUNT, FIRST_INT, FIRST_REAL, REALS, classes
 from .workspace import load_parts, parts
@@ -36,10 +36,8 @@ def solve_multipliers(context, t, q, r, rows, out):
     for k in range(t.size):
         set_time(s, t[k])
         place_bodies(bodies, q[k], f.poses)
-        run_loops(network, s.reals, REDUCED, f.poses, t[k], f.b, f.H)
-        weigh_rows(network, f.H, f.Y)
-        multiply_rows(network, f.H, f.Y, f.S)
-        regular = factor(network.pattern, f.S, RANK_LIMIT) < 0
+        run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
+        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, RANK_LIMIT)
         constraint_jacobian(s, q[k], t[k], rows)
         for b in range(bodies.shape[0]):
             i, o = bodies[b, 0], 8 * b
@@ -75,6 +73,8 @@ def solve_multipliers(context, t, q, r, rows, out):
                 for c in range(3, 7):
                     x += f.Q[bodies[b, 0] + c] * q[k, bodies[b, 0] + c]
                 out[k, i] = x
+        for i in range(f.dropped[0]):
+            out[k, network.row[f.dropped[1 + i]]] = math.nan
         if not regular:
             for i in range(out.shape[1]):
                 out[k, i] = math.nan
@@ -96,6 +96,14 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
     return out
 
 
+def particular(multipliers):
+    """Multipliers (k, m) with zeros where rows are dropped: they solve the same equations."""
+    dropped = np.isnan(multipliers)
+    if not dropped.any():
+        return multipliers
+    return np.where(dropped & ~dropped.all(axis=1, keepdims=True), 0.0, multipliers)
+
+
 def reaction(solution, member, body):
     """Force and torque (k, 3) that a constraint exerts on a body, torque about its first point on it, ground frame.
 
@@ -109,7 +117,7 @@ def reaction(solution, member, body):
     halves = []  # where the body's numbers are in each row
     for part in packed.constraints[member.parts]:
         halves += [0 if body is part.a else WIDTH // 2 if body is part.b else -1] * part.rows
-    lam = np.ascontiguousarray(solution.multipliers[:, member.rows])
+    lam = np.ascontiguousarray(particular(solution.multipliers)[:, member.rows])
     first, halves = member.rows.start, np.array(halves, np.int64)
     constraint_loads(system, solution.t, solution.q, lam, first, halves, rows, load)
     return _at_first_point(solution, body, load, member.constraint, member.coordinates)

@@ -3,13 +3,12 @@
 import time
 
 from ._kernel import entry, kernel
-from .block_kernels import factor
 from .displacement import factorise_normal
 from .landing import PIVOT_LIMIT
 from .linalg import copy
-from .normal import multiply_rows, weigh_rows
 from .null_space import reduced_mass, velocities
 from .run_state import T, load_run
+from .selection import factor_rows
 from .series_state import load_series
 from .tangent import solve_velocities
 from .workspace import load
@@ -22,9 +21,7 @@ ROUNDS = 5
 @kernel
 def _system(network, f):
     """W H^T, H W H^T and its factors."""
-    weigh_rows(network, f.H, f.Y)
-    multiply_rows(network, f.H, f.Y, f.S)
-    factor(network.pattern, f.S, PIVOT_LIMIT)
+    factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT)
 
 
 @entry

@@ -8,7 +8,7 @@ from .arguments import step_count
 from .dense import B_DATA
 from .errors import InvalidArgument, Status
 from .expansion_pack import allocate_expansion, masks
-from .free import allocate_free
+from .free import allocate_free, drop_as_at_first
 from .run_state import (
     ADAPTIVE,
     ATOL,
@@ -94,6 +94,7 @@ class SeriesMemory:
         system.reals[:] = task.prepared.packed.system.reals  # what forces remember is written there
         if system.memory.size:
             system.reals[system.memory] = task.remembered
+        drop_as_at_first(self.series.network, self.context.free)
         numbers.fill(0)
         clock.fill(0.0)
         work.counters.fill(0)

@@ -41,7 +41,7 @@ def _example():
     line, whole, table = np.zeros(1), np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
     expansion = Expansion(whole, line, line, table, table, whole, line)
     plain = plain_context()
-    return SeriesContext(plain.system, plain.work, plain.network, Free(*[line] * len(Free._fields)), expansion)
+    return SeriesContext(plain.system, plain.work, plain.network, plain.free, expansion)
 
 
 load_series = loader(_example())

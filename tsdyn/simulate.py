@@ -33,7 +33,7 @@ def simulate(
     formulation="tangent",
     constraint_tol=1e-12,
     initial_tol=1e-9,
-    redundancy="refuse",
+    redundancy="drop",
     t_eval=None,
     dense_output=False,
     events=None,
@@ -63,8 +63,10 @@ def simulate(
         u_tol and B_tol of Eqs. 28-29: bound on |Phi| (m) and on |Phi_q U B - I|.
     initial_tol : float
         Residuals of the start, relative to 1 + max |q| or 1 + max |qd|, up to which it is accepted and projected.
-    redundancy : {"refuse"}
-        What to do about dependent constraints.
+    redundancy : {"drop", "refuse"}
+        What to do about constraint rows that follow from the others: "drop" leaves them out of the equations where
+        they are sure to hold (independent rows are chosen anew where those that were chosen come close to depending on
+        one another), which explicit methods can in the form "tangent"; "refuse" raises RedundantConstraints.
     t_eval : array_like, s, optional
         Increasing output times within t_span, from dense output on the manifold, which never changes the steps;
         None gives every accepted step and both ends.
@@ -114,8 +116,8 @@ def simulate(
         )
     constraint_tol = positive(constraint_tol, "constraint_tol")
     initial_tol = positive(initial_tol, "initial_tol")
-    if redundancy != "refuse":
-        raise InvalidArgument(f"redundancy must be 'refuse', got {redundancy!r}; other policies don't exist yet.")
+    if redundancy not in ("drop", "refuse"):
+        raise InvalidArgument(f"redundancy must be 'drop' or 'refuse', got {redundancy!r}.")
     if not isinstance(dense_output, (bool, np.bool_)):
         raise InvalidArgument(f"dense_output must be True or False, got {dense_output!r}.")
     watched = prepare(events)
@@ -127,7 +129,8 @@ def simulate(
     for motion in kept.motions:
         motion.check(*span)
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
-    q, qd = kept.start(scene, q, qd, span[0], initial_tol)
+    dropping = redundancy == "drop" and form.basis_free and not method.implicit
+    q, qd = kept.start(scene, q, qd, span[0], initial_tol, dropping)
     choose = None
     if integrator is None:
         options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol}

@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import diagnostics, power, reactions
+from . import diagnostics, power, reactions, uniqueness
 from .bodies import PointMass, rotation_matrix
 from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
 from .local_chart import REASONS
+from .network import DROPPED
 from .rank import weakest_row
 from .state import RememberingState
 from .system import member_of
@@ -50,7 +51,8 @@ class Solution:
     q, qd, qdd : ndarray (k, n)
         7 coordinates a rigid body (r, then p) and 3 a point mass, in the order added.
     multipliers : ndarray (k, m)
-        M qdd + Phi_q^T lam = Q_A + S; rows in the order added, then the normalisations in body order.
+        M qdd + Phi_q^T lam = Q_A + S; rows in the order added, then the normalisations in body order. NaN for rows
+        that were left out as redundant, see `reaction_unique`.
     success : bool
         Whether the run reached the end of the interval, or a terminal event.
     status : Status
@@ -124,7 +126,7 @@ class Solution:
         if self.q.shape[1] > MOST:
             return ""
         _, Phi_q, _, _ = constraint_arrays(self.system, self._last[0], self._last[1], self._reached)
-        rows, share = weakest_row(scene, Phi_q)
+        rows, share = weakest_row(scene, Phi_q, len(self.packed.shared.get(DROPPED, ())))
         if not share < NEARLY_SINGULAR:
             return ""
         return (
@@ -232,6 +234,16 @@ class Solution:
             return reactions.force_reaction(self, load, self._acted(item, on))
         member = self._member(item)
         return reactions.reaction(self, member, self._acted(item, on))
+
+    def reaction_unique(self, item, on=None):
+        """Whether what `reaction` gives is the only answer, at each output: bool (k,).
+
+        Redundant constraints share their loads in many ways, all of which move the bodies alike; `reaction` is then
+        one of them, with the multipliers of dropped rows, NaN in `multipliers`, taken as zero.
+        """
+        if id(item) in reactions.loads_of(self.packed):
+            return np.ones(self.t.size, bool)
+        return uniqueness.unique(self, self._member(item).rows, self._acted(item, on))
 
     def rows(self, constraint):
         """Which columns of `multipliers` are those of a constraint, a slice."""

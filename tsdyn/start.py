@@ -7,17 +7,25 @@ from ._four import four, put
 from ._kernel import entry, kernel, resident
 from .assembly import set_time
 from .block_kernels import factor, solve
-from .errors import RedundantConstraints, SingularConfiguration
+from .errors import RedundantConstraints, SingularConfiguration, Status
 from .evaluate import constraint_arrays
+from .free import with_selection
 from .initial import ROUNDING, demand_finite, demand_small
-from .landing import PIVOT_LIMIT, land, run_loops
-from .network import BIAS, DRIFT, REDUCED, VALUES, is_regular, network_of
+from .landing import PIVOT_LIMIT, land, normalise
+from .network import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, is_regular, network_of
 from .normal import gather, multiply_rows, scatter, weigh_rows
-from .poses import OMEGA, POSE, RD, move_bodies, place_bodies, write_positions, write_velocities
+from .poses import OMEGA, POSE, RD, P, R, move_bodies, place_bodies, set_pose, write_positions, write_velocities
 from .rank import check_rank
+from .rows import run_loops
+from .selection import drop_rows, factor_rows, select
 from .workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 
 LARGE = 1 << 24  # entries of Phi_q from which on no dense one is made
+WANDER = 1e-2, 1e-3  # how far to look for what redundant rows are near by: turns, and shares of the scene's size
+NO_CHOICE = (
+    "Phi_q has dependent rows, and no choice among them is independent: a row of it may be zero here. Start from "
+    "another configuration."
+)
 DEPENDENT = (
     "Phi_q has dependent rows.\nRemove the rows that say nothing new, or use a joint with fewer rows. Rows that are "
     "independent elsewhere make this a singular configuration: start from another one."
@@ -32,11 +40,11 @@ def _look(context, q, qd, t, velocity):
     set_time(system, t)
     place_bodies(network.bodies, q, f.poses)
     move_bodies(network.bodies, q, qd, f.poses)
-    run_loops(network, system.reals, REDUCED, f.poses, t, f.b, f.H)
+    run_loops(network, system.reals, REDUCED, f, t, f.b, f.H)
     _rates(network, f)
     for e in range(f.gamma.size):
         f.gamma[e] = 0.0
-    run_loops(network, system.reals, DRIFT, f.poses, t, f.gamma, f.H)
+    run_loops(network, system.reals, DRIFT, f, t, f.gamma, f.H)
     gather(network, f.H, f.Z, velocity)
     for e in range(velocity.size):
         velocity[e] += f.gamma[e]
@@ -59,7 +67,7 @@ def _land(context, t):
     write_positions(network.bodies, f.poses, w.q)
     for e in range(f.gamma.size):
         f.gamma[e] = 0.0
-    run_loops(network, system.reals, DRIFT, f.poses, t, f.gamma, f.H)
+    run_loops(network, system.reals, DRIFT, f, t, f.gamma, f.H)
     _rates(network, f)
     for _ in range(2):
         gather(network, f.H, f.Z, f.b)
@@ -74,6 +82,50 @@ def _land(context, t):
     return 0
 
 
+@entry
+def _choose(context):
+    """Choose the rows to drop of those that `_look` has evaluated; how many they are."""
+    c = load_parts(context)
+    f = c.free
+    select(c.network, f, f.H, f.Y, f.S, -1)
+    drop_rows(f.dropped, f.H)
+    return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, PIVOT_LIMIT) else -1
+
+
+@entry
+def factor_again(context):
+    """The factors of what `_look` has evaluated, dropped rows left out."""
+    c = load_parts(context)
+    factor_rows(c.network, c.free, c.free.H, c.free.Y, c.free.S, PIVOT_LIMIT)
+
+
+@entry
+def _wander(context, t, way, far):
+    """Go from where `_choose` was a little way along the manifold, way (bodies, 8). Status of landing there."""
+    c = load_parts(context)
+    network, f = c.network, c.free
+    for i in range(f.Z.size):
+        f.Z[i] = way[i]
+    for _ in range(2):
+        gather(network, f.H, f.Z, f.b)
+        solve(network.pattern, f.S, f.b)
+        scatter(network, f.Y, f.b, f.Z)
+    for b in range(network.bodies.shape[0]):
+        at, o = b * POSE, 8 * b
+        for i in range(3):
+            f.poses[at + R + i] += far * f.Z[o + i]
+        if network.bodies[b, 1] == 7:
+            x, y, z = 0.5 * far * f.Z[o + 4], 0.5 * far * f.Z[o + 5], 0.5 * far * f.Z[o + 6]
+            e0, e1, e2, e3 = f.poses[at + P], f.poses[at + P + 1], f.poses[at + P + 2], f.poses[at + P + 3]
+            f.p[0] = e0 - e1 * x - e2 * y - e3 * z
+            f.p[1] = e1 + e0 * x - e3 * y + e2 * z
+            f.p[2] = e2 + e3 * x + e0 * y - e1 * z
+            f.p[3] = e3 - e2 * x + e1 * y + e0 * z
+            normalise(f.p)
+            set_pose(f.poses, at, f.p)
+    return land(network, c.system, c.work, f, t)
+
+
 @kernel
 def _rates(network, f):
     """Z = rd and omega' of the poses."""
@@ -82,67 +134,136 @@ def _rates(network, f):
         put(f.Z, 8 * b + 4, four(f.poses, b * POSE + OMEGA))
 
 
-def consistent(scene, system, q, qd, t, tol):
+def consistent(scene, system, q, qd, t, tol, allowed=False):
     """Check positions and velocities against the constraints, then remove what rounding is left. Returns (q, qd).
 
     As `initial.consistent`, which serves bodies without inertia and names what depends on what; positions and
-    velocities change by the least in the metric of kinetic energy.
+    velocities change by the least in the metric of kinetic energy. Where redundant rows are `allowed` and there are
+    some, the networks of the packed scene drop them from now on.
     """
     packed = scene.packed
     if not is_regular(packed):
         return initial.consistent(scene, system, q, qd, t, tol)
-    network = network_of(packed, REDUCED, VALUES, BIAS, DRIFT)
-    system = system._replace(reals=system.reals.copy())
-    n, m = q.size, len(system.segments)
-    whole = parts(system, network, n)
-    free, work, rates = whole.free, whole.work, np.zeros(len(network.row))
-    context, *_keep = resident(whole)
-    at = network.bodies[network.bodies[:, 1] == 7, 0][:, None] + np.arange(3, 7)
-    rows, real = network.normals[network.normals >= 0], network.row >= 0
-
-    def look():
-        """Phi, Phi_q qd + Phi_t, and the row of H that depends on those before it."""
-        dependent = _look(context, q, qd, t, rates)
-        Phi, velocity = np.zeros(m), np.zeros(m)
-        Phi[network.row[real]], velocity[network.row[real]] = free.b[real], rates[real]
-        p, pd = q[at], qd[at]
-        Phi[rows], velocity[rows] = 0.5 * ((p * p).sum(axis=1) - 1.0), (p * pd).sum(axis=1)
-        return Phi, velocity, dependent
-
-    Phi, velocity, dependent = look()
-    H = np.ones((m, 1))
-    H[network.row[real], 0] = free.H.reshape(-1, 16)[real].sum(axis=1)
-    demand_finite(scene, Phi, H, velocity)
-    demand_small(scene, Phi, tol * (1.0 + np.abs(q).max()), "position", "Phi")
+    start = _Start(scene, system, q, qd, t, tol)
+    dependent = start.check()
+    known = packed.shared.get(DROPPED)
     if dependent >= 0:
-        _refuse(scene, network, q, qd, t, free, dependent)
-    demand_small(scene, velocity, tol * (1.0 + np.abs(qd).max()), "velocity", "Phi_q qd + Phi_t")
-    far = np.abs(Phi).max(initial=0.0) > ROUNDING * (1.0 + np.abs(q).max())
-    if far:
-        q = q.copy()
-        q[at] /= np.linalg.norm(q[at], axis=1)[:, None]
-    fast = np.abs(velocity).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max())
-    if far or fast:
-        work.q[:], work.qd[:] = q, qd
-        work.control[U_TOL], work.control[SIZE] = tol, packed.size
-        work.control[FLOOR] = ROUNDING * (packed.size + np.abs(q).max())
-        if _land(context, t) == 0:
-            q, qd = work.q.copy(), work.qd.copy()
-    return q, qd
+        if not allowed:
+            _refuse(scene, start, dependent)
+        if known is None:
+            drop(packed, np.zeros(0, np.int64))
+            start = start.again()
+        rows = start.redundant_rows()
+        if known is None or len(known) != len(rows):
+            drop(packed, rows)
+            start = start.again()
+    elif known is not None:  # another start had too many rows
+        drop(packed, None)
+        start = start.again()
+    return start.landed()
 
 
-def _refuse(scene, network, q, qd, t, free, dependent):
+class _Start:
+    """The memory in which a start is looked at."""
+
+    def __init__(self, scene, system, q, qd, t, tol):
+        self.given = scene, system, q, qd, t, tol
+        self.scene, self.packed, self.q, self.qd, self.t, self.tol = scene, scene.packed, q, qd, t, tol
+        self.network = network_of(self.packed, REDUCED, VALUES, BIAS, DRIFT)
+        system = system._replace(reals=system.reals.copy())
+        self.m = len(system.segments)
+        whole = parts(system, self.network, q.size)
+        if DROPPED in self.packed.shared:
+            whole = whole._replace(free=with_selection(self.network, whole.free))
+        self.free, self.work, self.rates = whole.free, whole.work, np.zeros(len(self.network.row))
+        self.context, *self._keep = resident(whole)
+        rigid = self.network.bodies[self.network.bodies[:, 1] == 7, 0]
+        self.at = rigid[:, None] + np.arange(3, 7)
+        self.far = self.fast = False
+        work = self.work
+        work.control[U_TOL], work.control[SIZE] = tol, self.packed.size
+        work.control[FLOOR] = ROUNDING * (self.packed.size + np.abs(q).max())
+
+    def again(self):
+        """The same on the network as it is made now."""
+        other = _Start(*self.given)
+        other.check()
+        return other
+
+    def check(self):
+        """Refuse what is off; the row of H that depends on those before it, or -1."""
+        scene, network, free, q, qd = self.scene, self.network, self.free, self.q, self.qd
+        dropped, free.dropped[0] = free.dropped[0], 0
+        dependent = _look(self.context, q, qd, self.t, self.rates)
+        free.dropped[0] = dropped
+        rows, real = network.normals[network.normals >= 0], network.row >= 0
+        Phi, velocity = np.zeros(self.m), np.zeros(self.m)
+        Phi[network.row[real]], velocity[network.row[real]] = free.b[real], self.rates[real]
+        p, pd = q[self.at], qd[self.at]
+        Phi[rows], velocity[rows] = 0.5 * ((p * p).sum(axis=1) - 1.0), (p * pd).sum(axis=1)
+        H = np.ones((self.m, 1))
+        H[network.row[real], 0] = free.H.reshape(-1, 16)[real].sum(axis=1)
+        demand_finite(scene, Phi, H, velocity)
+        demand_small(scene, Phi, self.tol * (1.0 + np.abs(q).max()), "position", "Phi")
+        demand_small(scene, velocity, self.tol * (1.0 + np.abs(qd).max()), "velocity", "Phi_q qd + Phi_t")
+        self.far = np.abs(Phi).max(initial=0.0) > ROUNDING * (1.0 + np.abs(q).max())
+        self.fast = np.abs(velocity).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max())
+        return dependent
+
+    def redundant_rows(self):
+        """The rows that follow from others, here and near by; a singular configuration is refused."""
+        names, row, H = self.scene.row_names(), self.network.row, self.free.H.reshape(-1, 16)
+        gone = np.flatnonzero(~H.any(axis=1))
+        if gone.size:
+            _refuse_vanished(names[row[gone[0]]])
+        if _choose(self.context) < 0:
+            raise SingularConfiguration(NO_CHOICE)
+        rows = self.free.dropped[1 : 1 + self.free.dropped[0]].copy()
+        way = np.random.default_rng(0).normal(size=(len(self.network.bodies) + 1, 8))
+        way[:, :3] *= max(self.packed.size, 1e-3)
+        way[-1] = way[:, 3] = way[:, 7] = 0.0
+        for far in WANDER:
+            if _wander(self.context, self.t, way.ravel(), far) == Status.SUCCESS:
+                return rows
+            _look(self.context, self.q, self.qd, self.t, self.rates)  # with the rows dropped, back at the start
+            factor_again(self.context)
+        which = ", ".join(names[i] for i in sorted(row[rows])[:8])
+        raise SingularConfiguration(
+            f"Phi_q has lost rank in this configuration, and has not near by: {which} depend"
+            f"{'s' if rows.size == 1 else ''} on other rows here alone, so how the motion goes on is not determined. "
+            "Start from another configuration."
+        )
+
+    def landed(self):
+        """Positions and velocities on the manifold, where they are not to rounding."""
+        q, qd, at = self.q, self.qd, self.at
+        if self.far:
+            q = q.copy()
+            q[at] /= np.linalg.norm(q[at], axis=1)[:, None]
+        if self.far or self.fast:
+            self.work.q[:], self.work.qd[:] = q, qd
+            if _land(self.context, self.t) == 0:
+                q, qd = self.work.q.copy(), self.work.qd.copy()
+        return q, qd
+
+
+def _refuse(scene, start, dependent):
     """Say which rows are dependent; return where a closer look finds none."""
+    network, free, q = start.network, start.free, start.q
     if q.size * len(scene.system.segments) < LARGE:
-        check_rank(scene, constraint_arrays(scene.system, q, qd, t)[1])
+        check_rank(scene, constraint_arrays(scene.system, q, start.qd, start.t)[1])
         return
     if network.row[dependent] < 0:
         hub = scene.bodies[dict(network.welds.tolist())[dependent]].name
         raise RedundantConstraints(f"the constraints at {hub} depend on one another: {DEPENDENT}")
     name = scene.row_names()[network.row[dependent]]
     if not free.H[16 * dependent : 16 * dependent + 16].any():
-        raise SingularConfiguration(
-            f"the row of {name} in Phi_q is zero in this configuration: the constraint is singular here. "
-            "Start from another configuration, or use a constraint that is regular here."
-        )
+        _refuse_vanished(name)
     raise RedundantConstraints(f"{name} depends on other constraint rows: {DEPENDENT}")
+
+
+def _refuse_vanished(name):
+    raise SingularConfiguration(
+        f"the row of {name} in Phi_q is zero in this configuration: the constraint is singular here. "
+        "Start from another configuration, or use a constraint that is regular here."
+    )

@@ -58,12 +58,13 @@ class Packed(NamedTuple):
 
     def __reduce__(self):
         """In another process the kernels have other addresses."""
-        return _found_again, (os.getpid(), *self[:-1])
+        kept = {name: self.shared[name] for name in ("dropped",) if name in self.shared}
+        return _found_again, (os.getpid(), kept, *self[:-1])
 
 
-def _found_again(process, *parts):
+def _found_again(process, kept, *parts):
     """A `Packed` from a pickle, its addresses those of this process."""
-    packed = Packed(*parts, {})
+    packed = Packed(*parts, kept)
     if process == os.getpid():
         return packed
     system = packed.system

@@ -15,7 +15,7 @@ import math
 
 from ._kernel import callback, kernel, vector
 from .assembly import is_rheonomic, set_time
-from .block_kernels import factor, solve, solve_lu
+from .block_kernels import solve, solve_lu
 from .displacement import (
     displace,
     factorise_normal,
@@ -27,13 +27,14 @@ from .displacement import (
 )
 from .errors import Status
 from .free_accelerations import solve_accelerations
-from .landing import run_loops
 from .linalg import copy
 from .local import END, FACTORED, OFF, TIME
 from .local_chart import CONTRACTION_LOST, touch, turning
 from .network import BIAS, DRIFT, REDUCED, VALUES
-from .normal import gather, multiply_rows, scatter, weigh_rows
+from .normal import gather, scatter
 from .poses import write_accelerations, write_positions, write_velocities
+from .rows import held, run_loops
+from .selection import factor_rows
 from .stepping import ACCELERATE, NORM, PLACE
 from .workspace import (
     AT_ROUNDING,
@@ -53,7 +54,7 @@ from .workspace import (
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
-CHART_LOST = int(Status.CHART_LOST)
+CHART_LOST, UNHELD = int(Status.CHART_LOST), int(Status.UNHELD)
 COLUMNS = REDUCED, VALUES, BIAS, DRIFT  # the loops of a network that are called
 SWEEPS, RENEWALS = 24, 4
 PIVOT_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
@@ -83,10 +84,8 @@ def place(context, t, x):
     if status != OK:
         return status
     if f.b.size > 0:
-        weigh_rows(network, f.H, f.Y)
-        multiply_rows(network, f.H, f.Y, f.S)
         w.counters[FACTORIZATIONS] += 1
-        if factor(network.pattern, f.S, PIVOT_LIMIT) >= 0:
+        if not factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT):
             return SINGULAR
     if s.forces.shape[0] > 0:
         write_positions(network.bodies, f.poses, w.q)
@@ -110,7 +109,7 @@ def _solve_positions(network, s, w, f, l, t, renewals):
             return CHART_LOST
         if f.b.size == 0:
             return OK
-        run_loops(network, s.reals, column, f.poses, t, f.b, f.H)
+        run_loops(network, s.reals, column, f, t, f.b, f.H)
         worst = largest(f.b)
         if not worst < math.inf:
             return NOT_FINITE
@@ -156,7 +155,7 @@ def solve_velocities(network, s, w, f, l, t):
     """
     rheonomic = is_rheonomic(s)
     if rheonomic:
-        run_loops(network, s.reals, DRIFT, f.poses, t, l.drift, f.H)
+        run_loops(network, s.reals, DRIFT, f, t, l.drift, f.H)
     factored = l.numbers[FACTORED] > 0.0
     lower, upper = l.lower if factored else f.S, l.upper if factored else f.S
     floor, before = 0.0, math.inf
@@ -257,7 +256,9 @@ def start_chart(context, t, x, y, yd, unused):
         if network.bodies[b, 1] == 7:
             _spin(w.q, w.qd, i + 3, y, o + 4)
             _spin(w.q, w.qdd, i + 3, yd, o + 4)
-    return OK if regular else SINGULAR
+    if not regular:
+        return SINGULAR
+    return OK if held(f, w.control[FLOOR]) else UNHELD
 
 
 @kernel

@@ -1,0 +1,73 @@
+"""The rows of H at the poses, with those left out that are dropped, and S from them."""
+
+from ._kernel import kernel
+from .body_loops import call_body_loop
+from .free import UNHELD, WEAKEST
+from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS, REDUCED
+from .selection import WORSE, drop, drop_rows, factor_rows, select, weakest
+
+HELD = 1e6  # times rounding: what dropped rows may be off by, as a start may
+
+
+@kernel
+def run_loops(network, reals, column, f, t, out, H):
+    """One of the loops of body_loops, for every kind that has it; zeros for welds and dropped rows."""
+    for i in range(network.kinds.shape[0]):
+        kind = network.kinds[i]
+        if kind[column] != 0:
+            call_body_loop(
+                kind[column], kind[N_COUNT], kind[N_REALS], network.table[kind[N_FIRST_INT] :],
+                reals[kind[N_FIRST_REAL] :], f.poses, f.poses, t, out, H,
+            )  # fmt: skip
+    for i in range(network.welds.shape[0]):
+        out[network.welds[i, 0]] = 0.0
+    if f.dropped[0] > 0:
+        if column == REDUCED:
+            _remember_unheld(f, out)
+            drop_rows(f.dropped, H)
+        drop(f.dropped, out)
+
+
+@kernel
+def _remember_unheld(f, Phi):
+    """The largest |Phi| of the dropped rows."""
+    worst = 0.0
+    for i in range(f.dropped[0]):
+        size = abs(Phi[f.dropped[1 + i]])
+        if not size <= worst:
+            worst = size
+    f.sizes[UNHELD] = worst
+
+
+@kernel
+def serve_still(network, f, S):
+    """Whether the rows that were chosen are about as independent as they were then, by the factors of S."""
+    return f.dropped[0] == 0 or weakest(network, S) >= WORSE * f.sizes[WEAKEST]
+
+
+@kernel
+def held(f, floor):
+    """Whether the dropped rows hold at a place on the manifold, by the last H taken there."""
+    return f.dropped[0] == 0 or f.sizes[UNHELD] <= HELD * floor
+
+
+@kernel
+def factorise_rows(network, reals, f, t, b, H, Y, S, limit):
+    """Y = W H^T and the factors of S of the present H; of redundant rows others are chosen where these serve no more.
+
+    Whether there are any. Then b and H are those of the new choice.
+    """
+    regular = factor_rows(network, f, H, Y, S, limit)
+    count = f.dropped[0]
+    if count == 0 or (regular and serve_still(network, f, S)):
+        return regular
+    f.dropped[0] = 0
+    run_loops(network, reals, REDUCED, f, t, b, H)
+    found = select(network, f, H, Y, S, count)
+    f.dropped[0] = count
+    drop_rows(f.dropped, H)
+    drop(f.dropped, b)
+    regular = factor_rows(network, f, H, Y, S, limit)
+    if found and regular:
+        f.sizes[WEAKEST] = weakest(network, S)
+    return regular

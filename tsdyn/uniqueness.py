@@ -1,0 +1,84 @@
+"""Which reactions are unique among redundant constraints: those that no self-stress has a part in.
+
+Where a row h of H follows from the kept ones, H^T z = 0 for z = 1 in its place and -(H W H^T)^-1 H W h^T in theirs: any
+multiple of z may be added to the multipliers, and nothing moves otherwise. A constraint's reaction is unique where all
+such z leave its load on the body zero.
+"""
+
+import math
+
+import numpy as np
+
+from ._kernel import entry, kernel, resident
+from .assembly import set_time
+from .block_kernels import solve
+from .network import REDUCED, network_of
+from .normal import gather, weigh
+from .poses import place_bodies
+from .rows import factorise_rows, run_loops
+from .selection import LEAST
+from .workspace import load_parts, parts
+
+NEXT_TO_NOTHING = 1e-7  # of the rows' own size
+
+
+@kernel
+def _stress(network, f, whole, dropped):
+    """b = z but for the dropped row itself, of H whole."""
+    for i in range(f.Z.size):
+        f.Z[i] = 0.0
+    for side in range(2):
+        body = network.sides[dropped, side]
+        if body < network.bodies.shape[0]:
+            weigh(network.inverse, body, whole, 16 * dropped + 8 * side, f.Z, 8 * body)
+    gather(network, f.H, f.Z, f.b)
+    solve(network.pattern, f.S, f.b)
+    for e in range(f.b.size):
+        f.b[e] = -f.b[e]
+
+
+@entry
+def free_loads(context, t, q, rows, sides, whole, out):
+    """out (k,): the largest load that a self-stress of size one has these rows put on a body, by their own size."""
+    c = load_parts(context)
+    network, s, f = c.network, c.system, c.free
+    for k in range(t.size):
+        set_time(s, t[k])
+        place_bodies(network.bodies, q[k], f.poses)
+        run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
+        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, LEAST)
+        count = f.dropped[0]
+        f.dropped[0] = 0
+        run_loops(network, s.reals, REDUCED, f, t[k], f.b, whole)
+        f.dropped[0] = count
+        out[k] = 0.0 if regular else math.inf
+        for d in range(count):
+            dropped = f.dropped[1 + d]
+            _stress(network, f, whole, dropped)
+            f.b[dropped] = 1.0
+            largest, size = 1.0, 0.0
+            for e in range(f.b.size):
+                largest = max(largest, abs(f.b[e]))
+            for c in range(8):
+                load = 0.0
+                for i in range(rows.size):
+                    h = whole[16 * rows[i] + 8 * sides[i] + c]
+                    size = max(size, abs(h))
+                    load += f.b[rows[i]] * h
+                f.Z[c] = load
+            for c in range(8):
+                out[k] = max(out[k], abs(f.Z[c]) / max(largest * size, 1e-300))
+
+
+def unique(solution, rows, body):
+    """Whether the reaction of these rows, a slice, on a body is unique; bool (k,)."""
+    network = network_of(solution.packed, REDUCED)
+    if not network.dropped.size:
+        return np.ones(solution.t.size, bool)
+    wanted = np.flatnonzero((network.row >= rows.start) & (network.row < rows.stop))
+    sides = np.where(network.sides[wanted, 0] == body.index, 0, 1)
+    system = solution.system._replace(reals=solution.system.reals.copy())
+    context, *_keep = resident(parts(system, network, solution.q.shape[1]))
+    out = np.zeros(solution.t.size)
+    free_loads(context, solution.t, solution.q, wanted, sides, np.zeros(16 * len(network.row)), out)
+    return out < NEXT_TO_NOTHING

@@ -28,8 +28,9 @@ class Free(NamedTuple):
     block: np.ndarray
 
 
-# of the landing; the largest |Phi| of dropped rows, and what elimination left of the weakest of the others, as a share
-RESIDUAL, MOVED, UNHELD, WEAKEST, SIZES = range(5)
+# of the landing; the largest |Phi| of dropped rows; what elimination left of the weakest of the others, as a share:
+# when they were chosen, at a step's start, and at most at any; the length of the last step from no singular place
+RESIDUAL, MOVED, UNHELD, WEAKEST, SHARE, LARGEST_SHARE, STRIDE, SIZES = range(8)
 
 
 def allocate_free(network, n):
@@ -60,3 +61,4 @@ def drop_as_at_first(network, free):
     free.dropped[0] = network.dropped.size
     free.dropped[1 : 1 + network.dropped.size] = network.dropped
     free.sizes[WEAKEST] = 1.0
+    free.sizes[SHARE] = free.sizes[LARGEST_SHARE] = free.sizes[STRIDE] = 0.0

@@ -11,7 +11,7 @@ from ._kernel import entry, kernel
 from .assembly import remember, set_time
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
 from .errors import Status
-from .free import RESIDUAL
+from .free import LARGEST_SHARE, RESIDUAL, SHARE, STRIDE
 from .linalg import copy
 from .local_chart import AT_START, BY_SERIES, ROUNDING
 from .outputs import record, store_now
@@ -40,6 +40,7 @@ from .run_state import (
     T,
     load_run,
 )
+from .selection import weakest
 from .series_loops import BODY_ROW, S_OMEGA, S_R
 from .series_state import HIGHEST, LOWEST, NEXT, ORDERS, TOP, load_series
 from .series_steps import EXPAND, REACH, call_expand, call_reach, state_within
@@ -50,6 +51,10 @@ NOT_FINITE = int(Status.NOT_FINITE)
 MISSED = 100.0  # times the tolerance: a landing further away than this is no truncation error
 
 
+NEAR = 0.02  # of the shares of pivots: less of it is next to a singular configuration
+AVOID, AVOIDING = 0.7, 5  # a step that ends there is made shorter by this factor, so many times
+SHORT = 0.3  # of the last step from elsewhere: less is short for one that begins there
+LEAST_ORDER, PASSING = 5, 1e-10  # of the series of such a step; the tolerance that it is to meet at most
 STEP_COST = 3  # of a step's landing, in orders
 MOST_TURN = 1.0  # rad in a step, where turns are counted
 SMALL, SMALL_STEPS = 0.02, 40  # a step that turns and moves everything by less; so many of them, and it may be stiff
@@ -90,25 +95,69 @@ def _radius(bodies, nb, orders, top, far, fast):
 
 
 @kernel
-def _step_length(c, r):
-    """h = rho tol^(1 / (top + 2)); and the order of the next step, that with the longer step for the work."""
-    x, nb = c.expansion, c.network.bodies.shape[0]
-    top, orders = x.order[TOP], x.order[ORDERS]
+def _weights(c, r):
+    """What coefficients of r and omega' are multiplied by to be compared with those of A; sets the floor of Phi."""
+    x, orders = c.expansion, c.expansion.order[ORDERS]
     rtol, atol = r.clock[RTOL], r.clock[ATOL]
     far, fast = splat(0.0), splat(0.0)
-    for b in range(nb):
+    for b in range(c.network.bodies.shape[0]):
         at = b * orders * BODY_ROW
         far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
     far, fast = _most(far), _most(fast)
     c.work.control[FLOOR] = ROUNDING * (c.work.control[SIZE] + far)
     tol = atol + rtol
-    far, fast = tol / (atol + rtol * far), tol / (atol + rtol * fast)
+    return tol / (atol + rtol * far), tol / (atol + rtol * fast)
+
+
+@kernel
+def _step_length(c, r):
+    """h = rho tol^(1 / (top + 2)); and the order of the next step, that with the longer step for the work."""
+    x, nb = c.expansion, c.network.bodies.shape[0]
+    top, orders = x.order[TOP], x.order[ORDERS]
+    tol = r.clock[ATOL] + r.clock[RTOL]
+    far, fast = _weights(c, r)
     h = _radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2))
     if x.order[HIGHEST] > x.order[LOWEST]:
         lower = _radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top)
         change = 1 if h * (top + STEP_COST - 2) > lower * (top + STEP_COST) else -1
         x.order[NEXT] = min(max(top + change, x.order[LOWEST]), x.order[HIGHEST])
     return h
+
+
+@kernel
+def _mind_singular(c):
+    """After a step: note how near Phi_q is to losing rank."""
+    f = c.free
+    f.sizes[SHARE] = weakest(c.network, f.S)
+    f.sizes[LARGEST_SHARE] = max(f.sizes[SHARE], f.sizes[LARGEST_SHARE])
+
+
+@kernel
+def _longest(c, r, h):
+    """From near a singular configuration: the longest step of any order, which becomes the step's.
+
+    A motion may pass such a place smoothly while rounding of lam grows from order to order as if it ended there, so
+    that high orders, and tight tolerances, see no further than to it.
+    """
+    x, nb, top = c.expansion, c.network.bodies.shape[0], c.expansion.order[TOP]
+    sizes = c.free.sizes
+    if sizes[SHARE] >= NEAR * sizes[LARGEST_SHARE]:
+        sizes[STRIDE] = h
+    if h >= SHORT * sizes[STRIDE]:
+        return h
+    tol, best = max(r.clock[ATOL] + r.clock[RTOL], PASSING), top
+    for k in range(top, LEAST_ORDER, -1):
+        longer = _radius(x.bodies, nb, x.order[ORDERS], k, *_weights(c, r)) * tol ** (1.0 / (k + 2))
+        if longer > h:
+            h, best = longer, k
+    x.order[TOP] = best
+    return h
+
+
+@kernel
+def _is_near(c):
+    """Whether a step has come, from well off, next to a singular configuration: a bad place to go on from."""
+    return weakest(c.network, c.free.S) < NEAR * c.free.sizes[SHARE]
 
 
 @kernel
@@ -128,6 +177,7 @@ def _store_block(c, r, log, t0, h, t1):
 def _accept(context, c, r, log, steps, t):
     """The poses as they are now are the state at t. Status."""
     w = c.work
+    _mind_singular(c)
     remember(c.system, w.q, w.qd, t, r.remembered)
     call_expand(steps[EXPAND], context, 0)
     total = 0.0
@@ -238,7 +288,7 @@ def advance_series(context, run, log, steps, most):
         for k in range(1, x.order[TOP]):
             call_expand(steps[EXPAND], context, k)
         w.counters[EVALUATIONS] += x.order[TOP]
-        h, t1, last = min(_step_length(c, r), r.clock[MAX_STEP]), t0, False
+        h, t1, last, shorter = min(_longest(c, r, _step_length(c, r)), r.clock[MAX_STEP]), t0, False, 0
         if not adaptive:
             h = r.clock[H]
         if c.system.memory.size > 0:  # what counts turns must see each of them
@@ -257,15 +307,17 @@ def advance_series(context, run, log, steps, most):
             row = log.history[r.numbers[HISTORY]]
             row[0], row[1], row[2] = t0, t1 - t0, 0.0
             status = call_reach(steps[REACH], context, t1, t1 - t0)
-            if status == 0 and (not adaptive or f.sizes[RESIDUAL] <= missed + MISSED * w.control[FLOOR]):
+            landed = status == 0 and (not adaptive or f.sizes[RESIDUAL] <= missed + MISSED * w.control[FLOOR])
+            if landed and (not adaptive or shorter == AVOIDING or last or not _is_near(c)):
                 break
             if not adaptive:
                 return status
+            shorter += 1 if landed else 0
             _go_to_start(c, r)
             r.numbers[REJECTED] += 1  # the same series serves a shorter step
             if r.numbers[HISTORY] + 1 < log.history.shape[0]:
                 r.numbers[HISTORY] += 1
-            h *= 0.5
+            h *= AVOID if landed else 0.5
         row[2] = 1.0
         r.numbers[HISTORY] += 1
         if adaptive:

@@ -9,11 +9,14 @@ import pytest
 import tsdyn as ts
 from examples import (
     bead_on_surface,
+    door,
     drive_train,
     driven_pivot,
+    four_bar,
     hooke_joint,
     pendulum_chain,
     plug_in_integrator,
+    sarrus,
     slider_crank,
     top,
     two_body_pendulum,
@@ -28,7 +31,13 @@ RUNS = {
     "bead_on_surface": (bead_on_surface, bead_on_surface.build, 5.0, 1e-3),
     "driven_pivot": (driven_pivot, driven_pivot.build, 3.0, 2e-4),
 }
-MECHANISMS = {"slider_crank": (slider_crank, 2.0), "hooke_joint": (hooke_joint, 3.0)}
+MECHANISMS = {
+    "slider_crank": (slider_crank, 2.0),
+    "hooke_joint": (hooke_joint, 3.0),
+    "four_bar": (four_bar, 2.0),
+    "door": (door, 10.0),
+    "sarrus": (sarrus, 3.0),
+}
 
 
 @pytest.mark.parametrize(("module", "build", "end", "step"), RUNS.values(), ids=RUNS.keys())
@@ -60,6 +69,9 @@ def test_mechanism(module, end):
         plug_in_integrator,
         slider_crank,
         hooke_joint,
+        four_bar,
+        door,
+        sarrus,
     ],
 )
 def test_main_reports(module, capsys, monkeypatch):

@@ -160,7 +160,7 @@ def test_kernels_of_other_kinds_and_methods_are_never_loaded(alone):
 
 def test_accelerations_between_the_steps_are_loaded_where_an_output_asks(alone):
     assert "accelerate_here" not in alone["found"][1]
-    assert set(alone["within"][1]) - set(alone["found"][1]) == {"accelerate_here"}
+    assert set(alone["within"][1]) - set(alone["found"][1]) == {"accelerate_here", "pass_singular"}
 
 
 def test_a_method_loads_its_own_step_and_nothing_between_the_steps(alone):

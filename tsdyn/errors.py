@@ -103,7 +103,8 @@ _SENTENCES = {
     ),
     Status.SINGULAR: (
         "The constraint Jacobian Phi_q has lost rank: this is a singular configuration.",
-        "Start elsewhere, or remove the constraint that has become dependent.",
+        "Taylor, the default method, passes such a place where the motion is smooth; else start elsewhere, or remove "
+        "the constraint that has become dependent.",
     ),
     Status.MASS_SINGULAR: (
         "The reduced mass matrix D^T M D is not positive definite: a direction that the constraints leave free "

@@ -36,24 +36,16 @@ RESIDUAL, MOVED, UNHELD, WEAKEST, SHARE, LARGEST_SHARE, STRIDE, SIZES = range(8)
 def allocate_free(network, n):
     """Lay it out; the ground's pose is set for good, and a point mass has that orientation."""
     nb, m = len(network.bodies), len(network.row)
+    widest = int(np.diff(network.pattern.starts).max(initial=0))
     poses = zeros((nb + 1) * POSE)
     poses.reshape(-1, POSE)[:, [0, 5, 10, 24]] = 1.0
     free = Free(
         poses, zeros(16 * m), zeros(16 * m), zeros(network.pattern.shape[2]), zeros(m), zeros(m),
         zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n), zeros(4), zeros(SIZES),
-        *np.zeros((3, 1), np.int64), zeros(1),
+        *(np.zeros(size, np.int64) for size in (m + 1, m + 1, widest)), zeros(widest**2),
     )  # fmt: skip
-    if network.dropped.size:
-        free = with_selection(network, free)
     drop_as_at_first(network, free)
     return free
-
-
-def with_selection(network, free):
-    """The same with the memory of selection.select, which no scene without redundant rows needs."""
-    m, widest = len(network.row), int(np.diff(network.pattern.starts).max())
-    dropped, chosen, order = (np.zeros(size, np.int64) for size in (m + 1, m + 1, widest))
-    return free._replace(dropped=dropped, chosen=chosen, order=order, block=zeros(widest**2))
 
 
 def drop_as_at_first(network, free):

@@ -91,7 +91,7 @@ def drop(packed, rows):
     for key in [key for key in packed.shared if key == "network" or isinstance(key, tuple)]:
         del packed.shared[key]
     if rows is None:
-        del packed.shared[DROPPED]
+        packed.shared.pop(DROPPED, None)
     else:
         packed.shared[DROPPED] = rows
 

@@ -4,7 +4,7 @@ from ._kernel import kernel
 from .body_loops import call_body_loop
 from .free import UNHELD, WEAKEST
 from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS, REDUCED
-from .selection import WORSE, drop, drop_rows, factor_rows, select, weakest
+from .selection import LEAST, WORSE, drop, drop_rows, factor_rows, select, weakest
 
 HELD = 1e6  # times rounding: what dropped rows may be off by, as a start may
 
@@ -63,7 +63,7 @@ def factorise_rows(network, reals, f, t, b, H, Y, S, limit):
         return regular
     f.dropped[0] = 0
     run_loops(network, reals, REDUCED, f, t, b, H)
-    found = select(network, f, H, Y, S, count)
+    found = select(network, f, H, Y, S, count, LEAST)
     f.dropped[0] = count
     drop_rows(f.dropped, H)
     drop(f.dropped, b)

@@ -16,7 +16,7 @@ from .normal import multiply_rows, weigh_rows
 
 LEAST = 1e-13  # of a diagonal entry: what elimination leaves of a row that is kept is more
 FIRST, FINER = 1e-3, 1e-2  # the share below which rows are dropped, at first; how it falls while those are too many
-WORSE = 0.03  # of what the weakest row had when it was chosen: below it the choice is made anew
+WORSE = 0.1  # of what the weakest row had when it was chosen: below it the choice is made anew
 
 
 @kernel
@@ -124,12 +124,12 @@ def _eliminate_choosing(network, values, share, dropped, A, order):
 
 
 @kernel
-def select(network, f, H, Y, S, wanted):
-    """Choose `wanted` rows to drop of H, that of all rows; where wanted < 0, all that depend on others.
+def select(network, f, H, Y, S, wanted, least):
+    """Choose `wanted` rows to drop of H, that of all rows; where wanted < 0, all that are left less than a least share.
 
     Whether there are so many; f.dropped then has them, in order of elimination. Y and S are scratch.
     """
-    share = FIRST if wanted >= 0 else LEAST
+    share = FIRST if wanted >= 0 else least
     while True:
         weigh_rows(network, H, Y)
         multiply_rows(network, H, Y, S)
@@ -140,7 +140,7 @@ def select(network, f, H, Y, S, wanted):
                 f.dropped[i] = f.chosen[i]
             return True
         share *= FINER
-        if count < wanted or share < LEAST:
+        if count < wanted or share < least:
             return False
 
 

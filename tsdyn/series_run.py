@@ -13,7 +13,7 @@ from .run_state import CHART_ROWS, FILLED, STORED, T
 from .series_dense import SeriesReader
 from .series_memory import SeriesMemory
 from .series_state import ORDERS
-from .series_steps import accelerate_here, expand_far_series, expand_series, reach
+from .series_steps import accelerate_here, expand_far_series, expand_series, pass_singular, reach
 from .steps import counts
 from .task import Outcome
 
@@ -21,7 +21,8 @@ from .task import Outcome
 def addresses(within, far):
     """Those that the driver and readers are given; within: whether anything is asked for between the steps."""
     expand = expand_far_series if far else expand_series
-    return np.array([expand.address, reach.address, accelerate_here.address if within else 0], np.int64)
+    between = (accelerate_here.address, pass_singular.address) if within else (0, 0)
+    return np.array([expand.address, reach.address, *between], np.int64)
 
 
 def run_series(task, observe=None):

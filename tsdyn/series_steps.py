@@ -5,18 +5,23 @@ They get the address of a `SeriesContext`.
 
 import math
 
-from ._four import four, put, splat, times
+from ._four import fma, four, put, splat, times
 from ._kernel import callback, caller, kernel
 from .errors import Status
 from .expansion import begin, expand
 from .free_accelerations import accelerate_bodies
 from .landing import land, land_velocities, sum_series
+from .network import REDUCED
 from .poses import write_accelerations, write_positions, write_velocities
+from .rows import run_loops
+from .selection import select, weakest
 from .series_loops import BODY_ROW, S_OMEGA, S_R
 from .series_state import ORDERS, TOP, load_series
 
-NOT_FINITE = int(Status.NOT_FINITE)
-EXPAND, REACH, WITHIN, STEPS = range(4)  # of the addresses that the driver is given
+NOT_FINITE, SINGULAR = int(Status.NOT_FINITE), int(Status.SINGULAR)
+NEXT_TO_SINGULAR = 1e-8  # as a share of pivots: accelerations by elimination have lost as many digits
+GONE = 1e-12  # rows with less are left out
+EXPAND, REACH, WITHIN, PASS, STEPS = range(5)  # of the addresses that the driver is given
 call_expand, call_reach = caller("pi"), caller("pdd")
 
 
@@ -77,8 +82,44 @@ def accelerate_here(context, t, h):
     return 0
 
 
+@callback("pdd")
+def pass_singular(context, t, h):
+    """The state at t next to a singular configuration, between the steps: qdd is that of the series. Status.
+
+    Rows that come near to depending on the others there are left to the series, which is right to the tolerance.
+    """
+    c = load_series(context)
+    w, x, f, network = c.work, c.expansion, c.free, c.network
+    count, orders, top = f.dropped[0], x.order[ORDERS], x.order[TOP]
+    sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
+    status = land(network, c.system, w, f, t)
+    if status == SINGULAR:
+        sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
+        f.dropped[0] = 0
+        run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)
+        if select(network, f, f.H, f.Y, f.S, -1, GONE):
+            status = land(network, c.system, w, f, t)
+    if status == 0:
+        land_velocities(network, f)
+        for b in range(network.bodies.shape[0]):
+            at, r, omega = b * orders * BODY_ROW, splat(0.0), splat(0.0)
+            for k in range(top, 0, -1):
+                r = fma(r, splat(h), times(four(x.bodies, at + S_R * orders + 4 * (k + 1)), splat((k + 1.0) * k)))
+                omega = fma(omega, splat(h), times(four(x.bodies, at + S_OMEGA * orders + 4 * k), splat(float(k))))
+            put(f.Z, 8 * b, r)
+            put(f.Z, 8 * b + 4, omega)
+        write_positions(network.bodies, f.poses, w.q)
+        write_velocities(network.bodies, f.poses, w.qd)
+        write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
+    f.dropped[0] = count
+    return status
+
+
 @kernel
 def state_within(context, steps, t, h):
     """q, qd, qdd at t, h after the series' origin. Status."""
     status = call_reach(steps[REACH], context, t, h)
+    f = load_series(context).free
+    if status == SINGULAR or (status == 0 and weakest(load_series(context).network, f.S) < NEXT_TO_SINGULAR):
+        return call_reach(steps[PASS], context, t, h)
     return call_reach(steps[WITHIN], context, t, h) if status == 0 else status

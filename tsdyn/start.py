@@ -1,5 +1,7 @@
 """Initial conditions of scenes of any size: as in initial.py, by the network instead of matrices, at a cost of O(N)."""
 
+import itertools
+
 import numpy as np
 
 from . import initial
@@ -9,7 +11,6 @@ from .assembly import set_time
 from .block_kernels import factor, solve
 from .errors import RedundantConstraints, SingularConfiguration, Status
 from .evaluate import constraint_arrays
-from .free import with_selection
 from .initial import ROUNDING, demand_finite, demand_small
 from .landing import PIVOT_LIMIT, land, normalise
 from .network import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, is_regular, network_of
@@ -20,7 +21,10 @@ from .rows import run_loops
 from .selection import drop_rows, factor_rows, select
 from .workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 
+SUSPECT = 1e-10  # of a diagonal entry: what long elimination may leave, by rounding, of a row that follows from others
+REGULAR, DOUBTFUL = -1, -2  # in place of a row that depends on others
 LARGE = 1 << 24  # entries of Phi_q from which on no dense one is made
+SHARES = 1e-3, 1e-6, 1e-9, 1e-12  # below which rows are taken for redundant, if they then hold near by, too
 WANDER = 1e-2, 1e-3  # how far to look for what redundant rows are near by: turns, and shares of the scene's size
 NO_CHOICE = (
     "Phi_q has dependent rows, and no choice among them is independent: a row of it may be zero here. Start from "
@@ -83,20 +87,13 @@ def _land(context, t):
 
 
 @entry
-def _choose(context):
-    """Choose the rows to drop of those that `_look` has evaluated; how many they are."""
+def _choose(context, share):
+    """Choose the rows to drop of those that `_look` has evaluated, those left less than a share; how many they are."""
     c = load_parts(context)
     f = c.free
-    select(c.network, f, f.H, f.Y, f.S, -1)
+    select(c.network, f, f.H, f.Y, f.S, -1, share)
     drop_rows(f.dropped, f.H)
     return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, PIVOT_LIMIT) else -1
-
-
-@entry
-def factor_again(context):
-    """The factors of what `_look` has evaluated, dropped rows left out."""
-    c = load_parts(context)
-    factor_rows(c.network, c.free, c.free.H, c.free.Y, c.free.S, PIVOT_LIMIT)
 
 
 @entry
@@ -147,18 +144,27 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     start = _Start(scene, system, q, qd, t, tol)
     dependent = start.check()
     known = packed.shared.get(DROPPED)
-    if dependent >= 0:
-        if not allowed:
-            _refuse(scene, start, dependent)
-        if known is None:
-            drop(packed, np.zeros(0, np.int64))
+    if dependent == REGULAR:
+        if known is not None:  # another start had too many rows
+            drop(packed, None)
             start = start.again()
+        return start.landed()
+    if dependent >= 0 and not allowed:
+        _refuse(scene, start, dependent)
+    if known is None:
+        drop(packed, np.zeros(0, np.int64))
+        start = start.again()
+    try:
         rows = start.redundant_rows()
-        if known is None or len(known) != len(rows):
-            drop(packed, rows)
-            start = start.again()
-    elif known is not None:  # another start had too many rows
-        drop(packed, None)
+    except SingularConfiguration:
+        if dependent >= 0:
+            raise
+        rows = ()
+    if len(rows) and not allowed:
+        drop(packed, known)
+        _refuse(scene, start, int(rows[0]))
+    if known is None or len(known) != len(rows):
+        drop(packed, rows if len(rows) else None)
         start = start.again()
     return start.landed()
 
@@ -173,8 +179,6 @@ class _Start:
         system = system._replace(reals=system.reals.copy())
         self.m = len(system.segments)
         whole = parts(system, self.network, q.size)
-        if DROPPED in self.packed.shared:
-            whole = whole._replace(free=with_selection(self.network, whole.free))
         self.free, self.work, self.rates = whole.free, whole.work, np.zeros(len(self.network.row))
         self.context, *self._keep = resident(whole)
         rigid = self.network.bodies[self.network.bodies[:, 1] == 7, 0]
@@ -191,7 +195,7 @@ class _Start:
         return other
 
     def check(self):
-        """Refuse what is off; the row of H that depends on those before it, or -1."""
+        """Refuse what is off; the row of H that depends on those before it, REGULAR or DOUBTFUL."""
         scene, network, free, q, qd = self.scene, self.network, self.free, self.q, self.qd
         dropped, free.dropped[0] = free.dropped[0], 0
         dependent = _look(self.context, q, qd, self.t, self.rates)
@@ -216,22 +220,24 @@ class _Start:
         gone = np.flatnonzero(~H.any(axis=1))
         if gone.size:
             _refuse_vanished(names[row[gone[0]]])
-        if _choose(self.context) < 0:
-            raise SingularConfiguration(NO_CHOICE)
-        rows = self.free.dropped[1 : 1 + self.free.dropped[0]].copy()
         way = np.random.default_rng(0).normal(size=(len(self.network.bodies) + 1, 8))
         way[:, :3] *= max(self.packed.size, 1e-3)
         way[-1] = way[:, 3] = way[:, 7] = 0.0
-        for far in WANDER:
+        for share, far in itertools.product(SHARES, WANDER):
+            self.free.dropped[0] = 0
+            _look(self.context, self.q, self.qd, self.t, self.rates)
+            if _choose(self.context, share) < 0:
+                raise SingularConfiguration(NO_CHOICE)
+            rows = self.free.dropped[1 : 1 + self.free.dropped[0]].copy()
             if _wander(self.context, self.t, way.ravel(), far) == Status.SUCCESS:
                 return rows
-            _look(self.context, self.q, self.qd, self.t, self.rates)  # with the rows dropped, back at the start
-            factor_again(self.context)
         which = ", ".join(names[i] for i in sorted(row[rows])[:8])
+        free = int(np.where(self.network.bodies[:, 1] == 7, 6, 3).sum()) - row.size + rows.size
         raise SingularConfiguration(
-            f"Phi_q has lost rank in this configuration, and has not near by: {which} depend"
-            f"{'s' if rows.size == 1 else ''} on other rows here alone, so how the motion goes on is not determined. "
-            "Start from another configuration."
+            f"Phi_q has lost rank in this configuration, and has not near by: of {row.size} rows of the joints "
+            f"{row.size - rows.size} are independent here ({which} follow{'s' if rows.size == 1 else ''} from the "
+            f"others), so {free} directions are free at this point and fewer next to it. Branches of the motion meet "
+            "here, and which it takes is not determined: start from another configuration, on the branch that you mean."
         )
 
     def landed(self):

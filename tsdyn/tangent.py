@@ -29,7 +29,7 @@ from .errors import Status
 from .free_accelerations import solve_accelerations
 from .linalg import copy
 from .local import END, FACTORED, OFF, TIME
-from .local_chart import CONTRACTION_LOST, touch, turning
+from .local_chart import BY_FAILURE, CONTRACTION_LOST, touch, turning
 from .network import BIAS, DRIFT, REDUCED, VALUES
 from .normal import gather, scatter
 from .poses import write_accelerations, write_positions, write_velocities
@@ -229,9 +229,11 @@ def complete(context, yd):
 def check(context):
     """Reason to leave the chart, or zero."""
     c = load(context)
-    w, l = c.work, c.local
-    reason = turning(c.network, w, c.free, l)
+    w, f, l = c.work, c.free, c.local
+    reason = turning(c.network, w, f, l)
     l.numbers[END] = w.counters[PLACEMENTS] if w.control[CONTRACTION] < CONTRACTION_LOST else 0.0
+    if not held(f, w.control[FLOOR]):
+        return BY_FAILURE  # the next chart can't be made, and says why
     return reason
 
 

@@ -23,7 +23,7 @@ class Free(NamedTuple):
     p: np.ndarray  # (4,)  scratch
     sizes: np.ndarray  # (SIZES,)  numbers about the last landing and choice of rows, below
     dropped: np.ndarray  # int64 (m + 1,)  how many rows are dropped, and which; selection.select
-    chosen: np.ndarray  # int64 (m + 1,), order (largest block,), block (its square,)  scratch of selection.select
+    chosen: np.ndarray  # int64 (m + 1,), order (m,), block (largest block, or m, squared)  scratch of selection.select
     order: np.ndarray
     block: np.ndarray
 
@@ -33,16 +33,23 @@ class Free(NamedTuple):
 RESIDUAL, MOVED, UNHELD, WEAKEST, SHARE, LARGEST_SHARE, STRIDE, SIZES = range(8)
 
 
-def allocate_free(network, n):
-    """Lay it out; the ground's pose is set for good, and a point mass has that orientation."""
+MOST_ROWS = 700  # of which all are compared when independent ones are chosen
+
+
+def allocate_free(network, n, redundant=False):
+    """Lay it out; the ground's pose is set for good, and a point mass has that orientation.
+
+    Where rows are `redundant`, there is room to choose among all at once, if they aren't too many.
+    """
     nb, m = len(network.bodies), len(network.row)
+    choosing = (redundant or network.dropped.size > 0) and m <= MOST_ROWS
     widest = int(np.diff(network.pattern.starts).max(initial=0))
     poses = zeros((nb + 1) * POSE)
     poses.reshape(-1, POSE)[:, [0, 5, 10, 24]] = 1.0
     free = Free(
         poses, zeros(16 * m), zeros(16 * m), zeros(network.pattern.shape[2]), zeros(m), zeros(m),
         zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n), zeros(4), zeros(SIZES),
-        *(np.zeros(size, np.int64) for size in (m + 1, m + 1, widest)), zeros(widest**2),
+        *(np.zeros(size, np.int64) for size in (m + 1, m + 1, m)), zeros(max(widest, m if choosing else 0) ** 2),
     )  # fmt: skip
     drop_as_at_first(network, free)
     return free

@@ -4,15 +4,18 @@ Rows that depend on the others hold by themselves wherever those do. Such a row 
 sides are zero and its diagonal entry of S and N is one, so that its multiplier is zero and every pattern stays as it
 is. Which rows are dropped is chosen anew where those that were kept have come close to depending on one another.
 
-Elimination goes by blocks; within a block the row that is left the largest share of its diagonal entry goes first
-(Cholesky with diagonal pivoting), and rows that are left less than a share are dropped.
+The row that elimination has left the largest share of its diagonal entry goes first (Cholesky with diagonal pivoting),
+and rows that are left less than a share are dropped. With many rows that holds within the blocks of the pattern, whose
+order is that of little fill: a choice that is independent, but further from the best.
 """
+
+import math
 
 from ._four import put, splat
 from ._kernel import kernel
 from .block_kernels import factor, keep_diagonal, record
 from .block_steps import eliminate, subtract_products
-from .normal import multiply_rows, weigh_rows
+from .normal import inner, multiply_rows, weigh_rows
 
 LEAST = 1e-13  # of a diagonal entry: what elimination leaves of a row that is kept is more
 FIRST, FINER = 1e-3, 1e-2  # the share below which rows are dropped, at first; how it falls while those are too many
@@ -52,6 +55,48 @@ def weakest(network, values):
         if not share * least < 1.0:
             least = 1.0 / share
     return least
+
+
+@kernel
+def _choose_of_all(network, H, Y, wanted, least, dropped, A, order):
+    """Choose among all rows at once, A (m, m) scratch; how many are dropped, those that are left less than `least`."""
+    m = network.row.size
+    for i in range(m):
+        order[i] = i
+        for j in range(i + 1):
+            x = 0.0
+            for k in range(2):
+                for l in range(2):
+                    body = network.sides[i, k]
+                    if body == network.sides[j, l] and body < network.bodies.shape[0]:
+                        x += inner(H, 16 * i + 8 * k, Y, 16 * j + 8 * l)
+            A[i * m + j] = x
+    for i in range(m):
+        for j in range(i):
+            size = A[i * m + i] * A[j * m + j]
+            A[i * m + j] = A[j * m + i] = A[i * m + j] / math.sqrt(size) if size > 0.0 else 0.0
+    for i in range(m):
+        A[i * m + i] = 1.0 if A[i * m + i] > 0.0 else 0.0
+    rank = m
+    for k in range(m):
+        best, pivot = -1.0, k
+        for i in range(k, m):
+            if A[order[i] * m + order[i]] > best:
+                best, pivot = A[order[i] * m + order[i]], i
+        if m - k <= wanted or not best > least:
+            rank = k
+            break
+        order[k], order[pivot] = order[pivot], order[k]
+        own = A[order[k] * m :]
+        for i in range(k + 1, m):
+            other = A[order[i] * m :]
+            f = other[order[k]] / best
+            if f != 0.0:
+                for j in range(k + 1, m):
+                    other[order[j]] -= f * own[order[j]]
+    for i in range(rank, m):
+        dropped[1 + i - rank] = order[i]
+    return m - rank
 
 
 @kernel
@@ -124,20 +169,33 @@ def _eliminate_choosing(network, values, share, dropped, A, order):
 
 
 @kernel
+def _settle(f, count, wanted):
+    """Drop the rows that were chosen, if they are as many as wanted."""
+    if count < 0 or (wanted >= 0 and count != wanted):
+        return False
+    f.dropped[0] = count
+    for i in range(1, count + 1):
+        f.dropped[i] = f.chosen[i]
+    return True
+
+
+@kernel
 def select(network, f, H, Y, S, wanted, least):
     """Choose `wanted` rows to drop of H, that of all rows; where wanted < 0, all that are left less than a least share.
 
     Whether there are so many; f.dropped then has them, in order of elimination. Y and S are scratch.
     """
+    m, count = network.row.size, -1
+    if f.block.size >= m * m and network.welds.shape[0] == 0:
+        weigh_rows(network, H, Y)
+        count = _choose_of_all(network, H, Y, wanted, LEAST if wanted >= 0 else least, f.chosen, f.block, f.order)
+        return _settle(f, count, wanted)
     share = FIRST if wanted >= 0 else least
     while True:
         weigh_rows(network, H, Y)
         multiply_rows(network, H, Y, S)
         count = _eliminate_choosing(network, S, share, f.chosen, f.block, f.order)
-        if count == wanted or (wanted < 0 and count >= 0):
-            f.dropped[0] = count
-            for i in range(1, count + 1):
-                f.dropped[i] = f.chosen[i]
+        if _settle(f, count, wanted):
             return True
         share *= FINER
         if count < wanted or share < least:

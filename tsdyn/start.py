@@ -11,6 +11,7 @@ from .assembly import set_time
 from .block_kernels import factor, solve
 from .errors import RedundantConstraints, SingularConfiguration, Status
 from .evaluate import constraint_arrays
+from .free import allocate_free
 from .initial import ROUNDING, demand_finite, demand_small
 from .landing import PIVOT_LIMIT, land, normalise
 from .network import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, is_regular, network_of
@@ -179,6 +180,8 @@ class _Start:
         system = system._replace(reals=system.reals.copy())
         self.m = len(system.segments)
         whole = parts(system, self.network, q.size)
+        if DROPPED in self.packed.shared:
+            whole = whole._replace(free=allocate_free(self.network, q.size, redundant=True))
         self.free, self.work, self.rates = whole.free, whole.work, np.zeros(len(self.network.row))
         self.context, *self._keep = resident(whole)
         rigid = self.network.bodies[self.network.bodies[:, 1] == 7, 0]

@@ -55,7 +55,7 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
     t : float, s
         The time at which constraints that depend on time are met.
     folds : "keep" or "free"
-        Whether the links of closed loops must fold the way they are drawn, where that is clear: by 0.1 rad or more, by
+        Whether the links of closed loops must fold the way they are drawn, where that is clear: by 0.2 rad or more, by
         the directions of the links and by the places of their joints. "free" takes the nearest configuration, whatever
         its branch; the report says what is folded over.
 

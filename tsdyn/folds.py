@@ -3,7 +3,7 @@
 Round a loop of constraints, at each joint j that has an axis n, the links to the joints before and after it make an
 angle, and
 
-    theta = arcsin( n.(u x v) / |u| |v| )      u, v: from j to the joint before and after, across n
+    theta = arcsin( n.(u x v) / |u| |v| )      u, v: from j to the joints before and after
 
 is how far they are from being in line, with a sign. A mirrored assembly has another sign somewhere. At a ball joint n is
 the axis of the joint before, or after; a slide is a joint infinitely far away, across its direction. The sign of a sketch
@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-CLEAR = 0.1  # rad, in a sketch
-FLAT = 0.1  # a link this little across the axis, as a share of its length, has no fold
+CLEAR = 0.2  # rad, in a sketch; below that what is nearest tells more
+FLAT = 0.1  # a slide this little across the axis, as a share, makes no fold
 
 
 class Fold(NamedTuple):
@@ -60,19 +60,15 @@ class Folds:
 
 
 def _angle(fold, R, r, by_places):
-    """From straight, rad, -pi/2 to pi/2; 0 where a link is along the axis."""
+    """From straight, rad, -pi/2 to pi/2."""
     a, b = fold.bodies
     n = R[fold.axis[0]] @ fold.axis[1]
     u, v = R[a] @ fold.u, R[b] @ fold.v
     if by_places:
         before, at, after = (None if sides is None else _place(sides, R, r) for sides in fold.places)
         u, v = (u if before is None else before - at), (v if after is None else after - at)
-    lengths = np.linalg.norm(u), np.linalg.norm(v)
-    u, v = u - (n @ u) * n, v - (n @ v) * n
-    across = np.linalg.norm(u), np.linalg.norm(v)
-    if across[0] <= FLAT * lengths[0] or across[1] <= FLAT * lengths[1]:
-        return 0.0
-    return float(np.arcsin(np.clip(n @ np.cross(u, v) / (across[0] * across[1]), -1.0, 1.0)))
+    size = np.linalg.norm(u) * np.linalg.norm(v)
+    return float(np.arcsin(np.clip(n @ np.cross(u, v) / size, -1.0, 1.0))) if size > 0.0 else 0.0
 
 
 def _place(sides, R, r):

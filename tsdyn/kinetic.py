@@ -111,10 +111,18 @@ class Metric:
         qd[self.p] = 0.5 * np.einsum("bij,bi->bj", transform_g(q[self.p]), w)
         return qd
 
+    def reach(self, q):
+        """A length of the scene's, m: of its joints from the centroids, or of its bodies from each other."""
+        return float(self.packed.size) or float(np.ptp(q[self.r], axis=0).max()) or 1.0
+
+    def extent(self, x):
+        """The largest displacement, m, and turn, rad, of a change (size,) of all coordinates."""
+        moved = np.linalg.norm(x[self.move] / self.root, axis=1).max(initial=0.0)
+        return float(moved), self.largest_turn(x[self.columns])
+
     def shaken(self, q, rng, size):
         """The configuration with its free bodies moved by `size` of the scene's and turned by `size` rad, at random."""
-        reach = max(self.packed.size, np.ptp(q[self.r], axis=0).max() / max(len(self.r), 1)) or 1.0
-        x = self.speeds(reach * rng.normal(size=self.r.shape), rng.normal(size=(len(self.p), 3)))
+        x = self.speeds(self.reach(q) * rng.normal(size=self.r.shape), rng.normal(size=(len(self.p), 3)))
         return self.moved(q, size * x[self.columns])
 
     def rotations(self, q):
@@ -179,3 +187,14 @@ def row_lengths(A):
     squares = (A * A).sum(axis=1) if isinstance(A, np.ndarray) else A.multiply(A).sum(axis=1)
     lengths = np.sqrt(np.asarray(squares).ravel())
     return np.where(lengths > 1e-12 * lengths.max(initial=0.0), lengths, 0.0)
+
+
+def unit_tangents(metric, q, rng):
+    """A random direction that the constraints leave, in which the scene moves by its size, or turns by 1 rad; or None."""
+    _, A = metric.linear(q)
+    reach = metric.reach(q)
+    wish = metric.speeds(reach * rng.normal(size=metric.r.shape), rng.normal(size=(len(metric.p), 3)))
+    wish = wish + least_step(A, A @ wish, 1e-7)
+    shift, turn = metric.extent(wish)
+    size = max(shift / reach, turn)
+    return wish / size if size > 1e-9 else None

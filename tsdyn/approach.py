@@ -79,10 +79,13 @@ def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
         soft = np.full(residual.size, softness)
         if relative is not None:
             extra, B = relative.rows(q)
-            residual, soft = np.concatenate((residual, extra)), np.concatenate((soft, np.full(extra.size, kept.softness)))
+            residual, soft = (
+                np.concatenate((residual, extra)),
+                np.concatenate((soft, np.full(extra.size, kept.softness))),
+            )
             A = _stacked(A, B)
-        wish = metric.towards(q, sketch)
-        return residual, A, wish, soft, wish @ wish + residual @ (residual / soft)
+        far, wish = metric.towards(q, sketch)
+        return residual, A, wish, soft, far + 0.5 * residual @ (residual / soft)
 
     for softness, most in stages:
         lengths = row_lengths(metric.linear(q, rows)[1])
@@ -131,11 +134,6 @@ def close(metric, q, rows=None):
             break
         q, (Phi, A) = trial, arrays
     return q, Phi, steps
-
-
-def distance(metric, q, sketch):
-    """Between two configurations, sqrt(kg) m."""
-    return float(np.linalg.norm(metric.towards(q, sketch)))
 
 
 class _Relative:

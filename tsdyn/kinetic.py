@@ -49,7 +49,9 @@ class Metric:
 
     def arrays(self, q):
         """Phi (m,), Phi_q (m, n), Phi_t (m,), all rows."""
-        Phi, rows, Phi_t, _ = constraint_arrays(self.system, q, np.zeros(q.size), self.t, WIDTH if self.sparse else None)
+        Phi, rows, Phi_t, _ = constraint_arrays(
+            self.system, q, np.zeros(q.size), self.t, WIDTH if self.sparse else None
+        )
         return Phi, as_csr(self.packed, rows) if self.sparse else rows, Phi_t
 
     def linear(self, q, rows=None):
@@ -74,11 +76,21 @@ class Metric:
         return Phi_q @ csr_array((values, places), (self.n, self.size))
 
     def towards(self, q, target):
-        """The change of the free coordinates that leads from q to a target, along straight lines and about fixed axes."""
-        x = np.zeros(self.size)
-        x[self.move] = self.root * (target[self.r] - q[self.r])
-        x[self.turn] = np.einsum("bij,bj->bi", self.fall, rotation_vectors(q[self.p], target[self.p]))
-        return x[self.columns]
+        """Half the squared distance of q from a target, and minus its gradient by the free coordinates.
+
+        The distance is that of straight lines and of turns v about fixed axes: |v|^2 = v.J' v. A turn d of the body
+        changes v by -W d, W = I - v~/2 + c v~ v~, c = (1 - a/2 cot(a/2)) / a^2, a = |v|.
+        """
+        x, v = np.zeros(self.size), rotation_vectors(q[self.p], target[self.p])
+        shift, turn = self.root * (target[self.r] - q[self.r]), np.einsum("bij,bj->bi", self.fall, v)
+        Jv, a = np.einsum("bji,bj->bi", self.fall, turn), np.linalg.norm(v, axis=1)[:, None]
+        small = a < 1e-3
+        a = np.where(small, 1.0, a)
+        c = np.where(small, 1.0 / 12.0, (1.0 - a / 2.0 / np.tan(a / 2.0)) / a**2)
+        across = np.cross(v, Jv)
+        x[self.move] = shift
+        x[self.turn] = np.einsum("bji,bj->bi", self.rise, Jv + 0.5 * across + c * np.cross(v, across))
+        return 0.5 * float((shift * shift).sum() + (turn * turn).sum()), x[self.columns]
 
     def moved(self, q, x):
         """The configuration after a change of the free coordinates."""
@@ -189,8 +201,8 @@ def row_lengths(A):
     return np.where(lengths > 1e-12 * lengths.max(initial=0.0), lengths, 0.0)
 
 
-def unit_tangents(metric, q, rng):
-    """A random direction that the constraints leave, in which the scene moves by its size, or turns by 1 rad; or None."""
+def unit_tangent(metric, q, rng):
+    """A random direction that the constraints leave, moving the scene by its size or turning it by 1 rad; or None."""
     _, A = metric.linear(q)
     reach = metric.reach(q)
     wish = metric.speeds(reach * rng.normal(size=metric.r.shape), rng.normal(size=(len(metric.p), 3)))

@@ -12,7 +12,7 @@ from .checks import finite_vector, number
 from .dependence import divide, partners, put_aside, rank_of
 from .errors import InvalidArgument
 from .initial import demand_finite, demand_small
-from .kinetic import Metric, unit_tangents
+from .kinetic import Metric, unit_tangent
 
 CONSISTENT = 1e-9  # of 1 + max |q|
 ASIDE = 0.02  # of the scene's size, and rad: how far the neighbours are at which the rank is compared
@@ -81,8 +81,9 @@ class Mobility:
                 whole = len(rows) == rows[0].constraint.rows
                 title = rows[0].constraint.title
                 said = f"all of {title}" if whole and len(rows) > 1 else ", ".join(row.name for row in rows)
-                on = list(dict.fromkeys(name for row in rows for name in row.depends_on))
-                yield said + ending, on
+                on = dict.fromkeys(name for row in rows for name in row.depends_on)
+                heads = list(dict.fromkeys(map(_head, on)))
+                yield said + ending, sorted(on, key=lambda name: heads.index(_head(name)))
 
     def __repr__(self):
         more = ", singular here" if self.singular else ""
@@ -130,8 +131,8 @@ def mobility(scene, q=None, t=0.0):
 
     Notes
     -----
-    The rank is that of Phi_q with rows of unit length in the metric of kinetic energy: singular values above 1e-7 of the
-    largest. A row is called redundant if it depends on those of its joint and of joints added before it, so they
+    The rank is that of Phi_q with rows of unit length in the metric of kinetic energy: singular values above 1e-7 of
+    the largest. A row is called redundant if it depends on those of its joint and of joints added before it, so they
     gather in few joints. Whether a configuration is singular is told by consistent ones beside it. Above 1000
     coordinates, what hangs in open chains is put aside first and costs O(N); closed loops cost the cube of their rows.
     """
@@ -157,7 +158,10 @@ def mobility(scene, q=None, t=0.0):
     rest = [np.array([row for row in group if row not in set(redundant)], int) for group in groups]
     kept, dependent = divide(A, [group for group in rest if group.size]) if generic > here else (None, [])
     always = sorted(set(range(len(rows))) - set(redundant))
-    names, owners = scene.row_names(), [member.constraint for member in packed.members for _ in range(member.constraint.rows)]
+    names, owners = (
+        scene.row_names(),
+        [member.constraint for member in packed.members for _ in range(member.constraint.rows)],
+    )
 
     def told(found, among, matrix):
         for row, others in zip(found, partners(matrix, among, found), strict=True):
@@ -188,8 +192,8 @@ def _core(metric, q, rows):
         rows = put_aside(A, owners)
         if len(rows) > MOST_ROWS:
             raise InvalidArgument(
-                f"mobility: the closed loops of this scene have {len(rows)} constraint rows; it is worked out for up to "
-                f"{MOST_ROWS}. Ask for a smaller scene of the same kind."
+                f"mobility: the closed loops of this scene have {len(rows)} constraint rows; it is worked out for up "
+                f"to {MOST_ROWS}. Ask for a smaller scene of the same kind."
             )
     left = A[rows]
     used = np.unique(left.indices) if len(rows) else np.zeros(0, int)
@@ -200,7 +204,7 @@ def _neighbours(metric, q, A):
     """Consistent configurations beside q, along directions that the constraints leave, at random."""
     rng = np.random.default_rng(0)
     for _ in range(TRIES):
-        step = unit_tangents(metric, q, rng)
+        step = unit_tangent(metric, q, rng)
         if step is None:
             return
         other, Phi, _ = close(metric, metric.moved(q, ASIDE * step))
@@ -219,10 +223,16 @@ def _listed(names):
     """Names of rows, those of one constraint together."""
     if not names:
         return "nothing else: it vanishes"
-    heads = Counter(name.rpartition(" ")[0] if name.endswith("]") or " " in name else name for name in names)
+    heads = Counter(map(_head, names))
     if len(names) > 8:
         return ", ".join(f"{head} ({count})" if count > 1 else head for head, count in heads.items())
     return ", ".join(names)
+
+
+def _head(name):
+    """A row's name without its label."""
+    head, _, label = name.rpartition(" ")
+    return name.partition("[")[0] if "'" in label or not head else head
 
 
 def _single(said):

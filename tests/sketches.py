@@ -1,8 +1,8 @@
 """Mechanisms as they are when assembled, sketches of them that are off, and the determinants that tell their branches.
 
-A `Mechanism` builds itself at a random configuration. Its `branch` is signed angles (rad) or the like: where one is zero
-the mechanism is at a dead centre, and a configuration of other signs is another branch. Links lie along their body's x
-axis; the pins of planar mechanisms are along z.
+A `Mechanism` builds itself at a random configuration. Its `branch` is signed angles (rad) or the like: where one is
+zero the mechanism is at a dead centre, and a configuration of other signs is another branch. Links lie along their
+body's x axis; the pins of planar mechanisms are along z.
 """
 
 from dataclasses import dataclass, field

@@ -362,7 +362,7 @@ def test_a_row_that_vanishes_where_it_is_met_is_refused():
     bead = scene.add_point_mass(1.0, name="bead")
     motion = (lambda t: 1.0 - t, lambda t: -1.0 + 0.0 * t, lambda t: 0.0 * t)
     scene.add(C.Distance(bead, scene.ground, length=motion, name="winch"))
-    with pytest.raises(ts.SingularConfiguration, match="winch.*singular here"):
+    with pytest.raises(ts.SingularConfiguration, match=r"winch.*singular here"):
         scene.assemble(t=1.0)
 
 

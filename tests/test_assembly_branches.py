@@ -96,14 +96,15 @@ def test_a_frame_has_two_branches_and_the_sketch_says_which():
 
 
 def bent_over():
-    """Two bars over a base; the sketch has the elbow below it, by directions and places alike, and a stay forbids that."""
+    """Two bars on a base; the sketch has the elbow below it, by directions and places alike; a shelf forbids that."""
     m = Builder()
     a, d, b = np.zeros(3), np.array([2.0, 0.0, 0.0]), np.array([1.0, -0.6, 0.0])
     one, two = m.link("left", a, b), m.link("right", d, b)
     m.pin(None, one, a, name="A"), m.pin(one, two, b, name="B"), m.pin(two, None, d, name="D")
     size = float(np.linalg.norm(b))
     above = np.array([1.0, 0.6, 0.0])
-    m.scene.add(C.PlaneContact(one, m.scene.ground, point_a=(size / 2, 0, 0), point_b=above, normal_b=(0, 1, 0), name="shelf"))
+    shelf = {"point_a": (size / 2, 0, 0), "point_b": above, "normal_b": (0, 1, 0), "name": "shelf"}
+    m.scene.add(C.PlaneContact(one, m.scene.ground, **shelf))
     return m.scene
 
 

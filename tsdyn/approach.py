@@ -3,7 +3,8 @@
 Each body hangs on a spring at its place in the sketch, by the metric of kinetic energy, and each constraint is a spring
 of stiffness 1 / s. The equilibrium is followed from s = 1, where the sketch is hardly strained, to s = 1e-8, where
 the constraints are met but for that: so bodies give way together, and links fold the way they are drawn. Dependent rows
-need no care, for springs may share a load. What is left is taken away by Gauss-Newton steps of least change.
+need no care, for springs may share a load. What is left is taken away by Gauss-Newton steps of least change, and by
+steps along the constraints to where the distance is least.
 """
 
 from typing import NamedTuple
@@ -13,9 +14,10 @@ import numpy as np
 from .kinetic import least_step, row_lengths, soft_step
 
 STAGES = ((1.0, 4), (0.3, 4), (0.1, 4), (0.03, 4), (0.01, 4), (1e-3, 5), (1e-4, 5), (1e-6, 5), (1e-8, 40))
-NEAR = 0.01  # m sqrt(kg), or so: a sketch that is nearer than this share of its size takes the last stage only
+NEAR = 0.02  # of a link, or so: a sketch that is off by less takes the last stage only
 MOST_TURN = 0.5  # rad a step
-MOST_CLOSING = 60
+MOST_CLOSING, MOST_SETTLING = 60, 60
+SETTLED = 1e-11  # what is left of the slope, of the distance
 ROUNDING = 1e-15
 DEPENDENT = 1e-6  # singular values of unit rows that small are left alone while the constraints aren't met
 SHAKES = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.0)
@@ -43,6 +45,10 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
     Where the way from the sketch ends elsewhere, other starts are tried: `also`, and the sketch shaken at random.
     """
     rng, best, total = np.random.default_rng(0), None, 0
+    shakes = shakes[:2] if metric.sparse else shakes
+    Phi = metric.linear(sketch, rows)[0]
+    if np.abs(Phi).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(sketch).max()):
+        return Found(sketch, Phi, 0, True)
     for attempt in range(2 + len(also) + len(shakes)):
         if attempt == 0:
             q, count = relax(metric, sketch, sketch, rows)
@@ -57,9 +63,41 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
         met = bool(np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max()))
         if best is None or met or np.linalg.norm(Phi) < np.linalg.norm(best.Phi):
             best = Found(q, Phi, total, met)
-        if met or not metric.columns.size:
+        if met or (attempt == 1 and stuck(metric, q, Phi, rows).size):
             break
+    if best.met:
+        q, Phi, more = settle(metric, sketch, best.q, rows)
+        if np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max()):
+            best = best._replace(q=q, Phi=Phi)
+        total += more
     return best._replace(iterations=total)
+
+
+def settle(metric, sketch, q, rows=None):
+    """Go on along the constraints to where the distance from the sketch has no slope. Returns q, Phi, how many steps."""
+    steps, last = 0, np.inf
+    Phi, A = metric.linear(q, rows)
+    while steps < MOST_SETTLING and metric.columns.size:
+        wish = metric.towards(q, sketch)[1]
+        step = wish + least_step(A, A @ wish, DEPENDENT)
+        size = np.linalg.norm(step)
+        if size <= SETTLED * np.linalg.norm(wish) or size >= 0.9 * last:
+            break
+        turn = metric.largest_turn(step)
+        trial, residual, more = close(metric, metric.moved(q, min(1.0, 0.2 / max(turn, 1e-300)) * step), rows)
+        steps += 1 + more
+        allowed = 10.0 * np.abs(Phi).max(initial=0.0) + ROUNDING * (1.0 + np.abs(q).max())
+        if np.abs(residual).max(initial=0.0) > allowed:
+            break
+        last, q = size, trial
+        Phi, A = metric.linear(q, rows)
+    return q, Phi, steps
+
+
+def stuck(metric, q, Phi, rows=None):
+    """Rows that are not met and whose derivative vanishes."""
+    size = np.abs(Phi)
+    return np.flatnonzero((row_lengths(metric.linear(q, rows)[1]) == 0.0) & (size > 1e-6 * size.max(initial=0.0)))
 
 
 def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
@@ -69,7 +107,7 @@ def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
         return q, 0
     steps, relative = 0, None if kept is None else _Relative(metric, sketch, kept)
     lengths = row_lengths(A)
-    if kept is None and q is sketch and _strain(Phi, lengths) < NEAR * np.abs(sketch).max():
+    if kept is None and q is sketch and _strain(Phi, lengths) < NEAR * metric.reach(q) * metric.root.min():
         stages = stages[-1:]
 
     def strained(q):

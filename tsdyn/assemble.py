@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .approach import STAGES, Found, Kept, close, nearest, relax
+from .approach import STAGES, Found, Kept, close, nearest, relax, settle, stuck
 from .branch import demand_aligned
 from .checks import number, positive
 from .conflict import refuse
@@ -101,14 +101,14 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
     A = metric.reduced(q, Phi_q[metric.own])
     _demand_regular(scene, metric, A)
     demand_aligned(packed, q)
-    qd_sketch_turned, qd = _velocities(scene, metric, q, qd, A, Phi_t[metric.own])
+    given, qd = _velocities(scene, metric, q, qd, A, Phi_t[metric.own])
     residual = Phi_q @ qd + Phi_t
     _demand_compatible(scene, residual, max(tol, 1e-9) * (1.0 + np.abs(qd).max()))
     scene.place(q, qd)
     return AssemblyReport(
         moved=float(np.abs(q - sketch).max()),
         residual=float(np.abs(Phi).max(initial=0.0)),
-        velocity_changed=float(np.abs(qd - qd_sketch_turned).max()),
+        velocity_changed=float(np.abs(qd - given).max()),
         velocity_residual=float(np.abs(residual).max(initial=0.0)),
         iterations=found.iterations,
         folded=tuple(dict.fromkeys(links.folds[k].title for k in links.turned(metric, q, drawn))),
@@ -132,8 +132,7 @@ def _held(scene, fixed):
 def _unfolded(scene, metric, sketch, found, links, drawn, tol):
     """The configuration found, or one beside it that folds the links as the sketch does."""
     turned = links.turned(metric, found.q, drawn)
-    kept, total = set(), found.iterations
-    first = turned
+    kept, total, first = set(), found.iterations, turned
     for softness in STIFFER:
         if not turned.size:
             return found
@@ -147,22 +146,22 @@ def _unfolded(scene, metric, sketch, found, links, drawn, tol):
         if not met:
             turned = first
         elif not turned.size:
-            freed, steps = relax(metric, sketch, q, stages=STAGES[-1:])
-            freed, Phi_freed, more = close(metric, freed)
-            total += steps + more
-            if np.abs(Phi_freed).max() <= tol * (1.0 + np.abs(q).max()) and not links.turned(metric, freed, drawn).size:
+            freed, Phi_freed, more = settle(metric, sketch, q)
+            total += more
+            fits = np.abs(Phi_freed).max() <= tol * (1.0 + np.abs(freed).max())
+            if fits and not links.turned(metric, freed, drawn).size:
                 q, Phi = freed, Phi_freed
             return Found(q, Phi, total, True)
     stories = [
-        f"  {links.folds[k].title}: {np.degrees(links.angle(metric, sketch, k)):.0f} degrees from straight in the sketch, "
-        f"{np.degrees(links.angle(metric, found.q, k)):.0f} when assembled"
+        f"  {links.folds[k].title}: {np.degrees(links.angle(metric, sketch, k)):.0f} degrees from straight in the "
+        f"sketch, {np.degrees(links.angle(metric, found.q, k)):.0f} when assembled"
         for k in first[:8]
     ]
     raise InconsistentState(
         "the configurations found fold links to the other side than the sketch does, which is another branch:\n"
         + "\n".join(stories)
-        + '\nDraw the links there further from straight, or on the other side; or pass folds="free" to take the nearest '
-        "configuration whatever its branch."
+        + '\nDraw the links there further from straight, or on the other side; or pass folds="free" to take the '
+        "nearest configuration whatever its branch."
     )
 
 
@@ -185,13 +184,11 @@ def _velocities(scene, metric, q, qd, A, Phi_t):
 
 def _demand_direction(scene, metric, found):
     """Refuse a constraint whose derivative vanishes where it isn't met: nothing says which way to go."""
-    lengths = row_lengths(metric.linear(found.q)[1])
-    size = np.abs(found.Phi)
-    stuck = np.flatnonzero((lengths == 0.0) & (size > 1e-6 * size.max()))
-    if stuck.size and metric.columns.size == metric.size:
-        name = scene.row_names()[metric.own[stuck[0]]]
+    still = stuck(metric, found.q, found.Phi)
+    if still.size and metric.columns.size == metric.size:
+        name = scene.row_names()[metric.own[still[0]]]
         raise InconsistentState(
-            f"{name}: Phi = {found.Phi[stuck[0]]:.3g}, and its derivative vanishes, so nothing says which way to go. "
+            f"{name}: Phi = {found.Phi[still[0]]:.3g}, and its derivative vanishes, so nothing says which way to go. "
             "Move its bodies a little towards where they should be."
         )
 

@@ -44,8 +44,8 @@ def refuse(scene, metric, sketch, found, tol, held=()):
         story = "These are left over"
     where = f" with {', '.join(body.name for body in held)} held fixed" if len(held) else ""
     error = InconsistentState(
-        f"no configuration that meets all constraints{where} was found in {found.iterations} iterations from the sketch "
-        f"and from others near it. {story}:\n"
+        f"no configuration that meets all constraints{where} was found in {found.iterations} iterations from the "
+        f"sketch and from others near it. {story}:\n"
         + "\n".join(lines)
         + "\nChange a length, point or axis of one of them, or drop one"
         + ("; or hold fewer bodies." if len(held) else ". If they do fit, bring the bodies nearer to where they do.")

@@ -59,8 +59,8 @@ def partners(A, kept, redundant):
 def put_aside(A, owners):
     """Rows of a sparse A that are independent of all others for sure: those of bodies that all their rows hold firmly.
 
-    owners (x,) is the body of each column. A body whose rows, restricted to its columns, are independent takes them away
-    with it, as the links of an open chain do from the end. Returns the rows that are left.
+    owners (x,) is the body of each column. A body whose rows, restricted to its columns, are independent takes them
+    away with it, as the links of an open chain do from the end. Returns the rows that are left.
     """
     from scipy.sparse import csr_array
 

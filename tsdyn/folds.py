@@ -5,9 +5,9 @@ angle, and
 
     theta = arcsin( n.(u x v) / |u| |v| )      u, v: from j to the joints before and after
 
-is how far they are from being in line, with a sign. A mirrored assembly has another sign somewhere. At a ball joint n is
-the axis of the joint before, or after; a slide is a joint infinitely far away, across its direction. The sign of a sketch
-counts where its links and its joints' places both say the same, clearly.
+is how far they are from being in line, with a sign. A mirrored assembly has another sign somewhere. At a ball joint n
+is the axis of the joint before, or after; a slide is a joint infinitely far away, across its direction. The sign of a
+sketch counts where its links and its joints' places both say the same, clearly.
 """
 
 from typing import NamedTuple

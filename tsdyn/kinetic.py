@@ -1,4 +1,4 @@
-"""Changes of a configuration in coordinates x whose metric is the kinetic energy's: six a rigid body, three a point mass.
+"""Changes of a configuration in coordinates x that measure kinetic energy: six a rigid body, three a point mass.
 
     r + x_r / sqrt(m),    p (x) exp(w' / 2),  w' = L^-T x_w,  J' = L L^T        so  2 T = |xd|^2
     Phi + A x = 0                                                               A = Phi_q q_x
@@ -180,7 +180,7 @@ def soft_step(A, residual, wish, softness):
 
 
 def least_step(A, residual, rcond=1e-10):
-    """The smallest x with residual + A x = 0, by least squares; singular values of unit rows below rcond count as none."""
+    """The smallest x with residual + A x = 0, by least squares; rcond: singular values of unit rows that are none."""
     lengths = row_lengths(A)
     some = lengths > 0.0
     if not some.any():

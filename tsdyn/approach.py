@@ -74,7 +74,7 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
 
 
 def settle(metric, sketch, q, rows=None):
-    """Go on along the constraints to where the distance from the sketch has no slope. Returns q, Phi, how many steps."""
+    """Go along the constraints to where the distance from the sketch has no slope. Returns q, Phi, how many steps."""
     steps, last = 0, np.inf
     Phi, A = metric.linear(q, rows)
     while steps < MOST_SETTLING and metric.columns.size:

@@ -32,7 +32,8 @@ class AssemblyReport:
         Largest |Phi_q qd + Phi_t| left.
     iterations : int
     folded : tuple of str
-        Joints whose links are folded to the other side than in the sketch; empty unless `folds="free"`.
+        Joints of closed loops whose links are folded to the other side than the sketch shows, by 0.1 rad or more: by
+        less than is sure (see `folds` of `assemble`), or because of `folds="free"`.
     """
 
     moved: float
@@ -57,7 +58,7 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
     folds : "keep" or "free"
         Whether the links of closed loops must fold the way they are drawn, where that is clear: by 0.2 rad or more, by
         the directions of the links and by the places of their joints. "free" takes the nearest configuration, whatever
-        its branch; the report says what is folded over.
+        its branch. Whatever is folded over is in the report.
 
     Returns
     -------
@@ -104,6 +105,7 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
     given, qd = _velocities(scene, metric, q, qd, A, Phi_t[metric.own])
     residual = Phi_q @ qd + Phi_t
     _demand_compatible(scene, residual, max(tol, 1e-9) * (1.0 + np.abs(qd).max()))
+    over = links.turned(metric, q, links.shown(metric, sketch))
     scene.place(q, qd)
     return AssemblyReport(
         moved=float(np.abs(q - sketch).max()),
@@ -111,7 +113,7 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
         velocity_changed=float(np.abs(qd - given).max()),
         velocity_residual=float(np.abs(residual).max(initial=0.0)),
         iterations=found.iterations,
-        folded=tuple(dict.fromkeys(links.folds[k].title for k in links.turned(metric, q, drawn))),
+        folded=tuple(dict.fromkeys(links.folds[k].title for k in over)),
     )
 
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 CLEAR = 0.2  # rad, in a sketch; below that what is nearest tells more
+SHOWN = 0.1  # rad, by the links' directions: what is reported where it comes out on the other side
 FLAT = 0.1  # a slide this little across the axis, as a share, makes no fold
 
 
@@ -42,6 +43,11 @@ class Folds:
         links, places = self._angles(metric, q, False), self._angles(metric, q, True)
         clear = (np.abs(links) >= CLEAR) & (np.abs(places) >= CLEAR) & (links * places > 0.0)
         return np.where(clear, np.sign(links), 0.0)
+
+    def shown(self, metric, q):
+        """The signs (k,) that the links' directions say by themselves, 0 where they are nearly in line."""
+        links = self._angles(metric, q, False)
+        return np.where(np.abs(links) >= SHOWN, np.sign(links), 0.0)
 
     def turned(self, metric, q, drawn):
         """Numbers of the folds that a configuration has to the other side."""

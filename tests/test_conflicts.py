@@ -148,6 +148,19 @@ def test_many_suspects():
     assert "and 3 more" in message
 
 
+def test_a_rod_whose_ends_a_ball_holds_together():
+    """At the least that is left over the rod has no length, nor a derivative; it isn't the rod alone."""
+    m, points = Builder(), [0.5 * i * polar(0.0) for i in range(6)]
+    links = [m.link(f"link {i}", points[i], points[i + 1]) for i in range(5)]
+    for i in range(5):
+        m.ball(links[i - 1] if i else None, links[i], points[i], f"ball {i}")
+    ends = {"point_a": (0.25, 0, 0), "point_b": (-0.25, 0, 0)}
+    m.scene.add(C.Distance(links[2], links[3], **ends, length=0.3, name="rod"))
+    links[3].position = np.add(links[3].position, (0.0, 0.02, 0.01))
+    _, names = refused(m.scene)
+    assert names == {"ball 3", "rod"}
+
+
 def test_rates_that_contradict_are_named():
     """Two rods of one length that say the same now; one of them is about to shorten."""
     scene = ts.Scene()

@@ -20,6 +20,7 @@ MOST_CLOSING, MOST_SETTLING = 60, 60
 SETTLED = 1e-11  # what is left of the slope, of the distance
 ROUNDING = 1e-15
 DEPENDENT = 1e-6  # singular values of unit rows that small are left alone while the constraints aren't met
+MANY = 200  # coordinates from which on fewer starts are tried
 SHAKES = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.0)
 
 
@@ -45,7 +46,7 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
     Where the way from the sketch ends elsewhere, other starts are tried: `also`, and the sketch shaken at random.
     """
     rng, best, total = np.random.default_rng(0), None, 0
-    shakes = shakes[:2] if metric.sparse else shakes
+    shakes = shakes[:2] if metric.n > MANY else shakes
     Phi = metric.linear(sketch, rows)[0]
     if np.abs(Phi).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(sketch).max()):
         return Found(sketch, Phi, 0, True)

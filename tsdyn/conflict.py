@@ -27,9 +27,14 @@ def refuse(scene, metric, sketch, found, tol, held=()):
     sizes = np.array([left[member.rows].max() for member in members])
     suspects = [member for member, size in zip(members, sizes, strict=True) if size > LEFT_OVER * sizes.max()]
     trial = _Trial(metric, sketch, found.q, tol)
-    if len(suspects) <= MOST and trial.met(suspects) and len(members) <= MOST:
-        suspects = members  # what was found is no stationary point
-    conflicting, minimal = smallest(suspects, trial) if len(suspects) <= MOST else (suspects, False)
+    told = False
+    while len(suspects) <= MOST and not told:
+        told = not trial.met(suspects)
+        wider = suspects if told else _wider(suspects, members)
+        if not told and len(wider) == len(suspects):
+            break
+        suspects = wider
+    conflicting, minimal = smallest(suspects, trial) if told else (suspects, False)
     names, lines = scene.row_names(), []
     for member in sorted(conflicting, key=lambda member: -left[member.rows].max())[:8]:
         row = member.rows.start + int(np.argmax(left[member.rows]))
@@ -52,6 +57,13 @@ def refuse(scene, metric, sketch, found, tol, held=()):
     )
     error.constraints = tuple(member.constraint for member in conflicting)
     raise error
+
+
+def _wider(suspects, members):
+    """Those that share a body with these: where a derivative vanishes, more are needed for a conflict."""
+    bodies = {id(body) for member in suspects for body in (member.constraint.a, member.constraint.b)}
+    bodies -= {id(None), id(suspects[0].constraint.scene.ground)}
+    return [member for member in members if bodies & {id(member.constraint.a), id(member.constraint.b)}]
 
 
 def smallest(suspects, trial):

@@ -58,7 +58,9 @@ local_chart
 newton evaluate diagnostics reactions power dense
 control
 chart rank
-branch initial start
+branch initial start kinetic
+approach folds dependence
+conflict mobility
 assemble
 null_space tangent scene
 maggi_kane linearise

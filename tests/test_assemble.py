@@ -327,19 +327,10 @@ def steep():
     return scene, ("lean",)
 
 
-def doubled():
-    scene = ts.Scene()
-    bead = scene.add_point_mass(1.0, (1.0, 0.0, 0.3), (1.0, 2.0, 3.0), name="bead")
-    for name in ("one", "two"):
-        scene.add(C.Distance(bead, scene.ground, length=1.0, name=name))
-    return scene, ("one", "two")
-
-
 REFUSED = {
     "too far": (too_far, ts.InconsistentState),
     "no direction": (folded, ts.InconsistentState),
     "two cosines": (steep, ts.InconsistentState),
-    "dependent": (doubled, ts.RedundantConstraints),
 }
 
 
@@ -351,6 +342,28 @@ def test_what_cannot_be_met_is_named_and_nothing_changes(build, error):
         scene.assemble()
     assert all(name in str(caught.value) for name in names), str(caught.value)
     assert_same(before, snapshot(scene))
+
+
+def test_rows_that_say_the_same_are_no_hindrance():
+    scene = ts.Scene()
+    bead = scene.add_point_mass(1.0, (1.0, 0.0, 0.3), (1.0, 2.0, 3.0), name="bead")
+    for name in ("one", "two"):
+        scene.add(C.Distance(bead, scene.ground, length=1.0, name=name))
+    report = scene.assemble()
+    assert max(report.residual, report.velocity_residual) <= 1e-15
+    outward = np.array([1.0, 0.0, 0.3]) / math.hypot(1.0, 0.3)
+    np.testing.assert_allclose(bead.position, outward, atol=1e-8)
+    assert bead.velocity @ bead.position == pytest.approx(0.0, abs=1e-15)
+    assert bead.velocity[1] == 2.0
+
+
+def test_a_row_that_vanishes_where_it_is_met_is_refused():
+    scene = ts.Scene()
+    bead = scene.add_point_mass(1.0, name="bead")
+    motion = (lambda t: 1.0 - t, lambda t: -1.0 + 0.0 * t, lambda t: 0.0 * t)
+    scene.add(C.Distance(bead, scene.ground, length=motion, name="winch"))
+    with pytest.raises(ts.SingularConfiguration, match=r"winch.*singular here"):
+        scene.assemble(t=1.0)
 
 
 @pytest.mark.parametrize("part", [0, 1], ids=["f", "fd"])

@@ -10,9 +10,10 @@ from test_constraints_hold import check
 
 import tsdyn as ts
 from benchmarks import mechanisms
-from tsdyn import assemble, expansion_pack, hubs, start
+from tsdyn import expansion_pack, hubs, kinetic, start
 from tsdyn.diagnostics import constraint_rows
 from tsdyn.errors import RedundantConstraints, Status
+from tsdyn.evaluate import constraint_arrays
 from tsdyn.prepare import prepared
 
 C = ts.constraints
@@ -219,7 +220,7 @@ def test_errors_of_many_constraints_at_once(rng):
     Phi, rates, accelerations = constraint_rows(scene.packed, t, q, qd, np.zeros((2, n)))
     for i in range(2):
         arrays = scene.packed.system, q[i], qd[i], t[i]
-        expected = assemble.constraint_arrays(*arrays)
+        expected = constraint_arrays(*arrays)
         size = 1e-13 * (1 + np.abs(expected[1]).max() ** 2) * n
         np.testing.assert_allclose(Phi[i], expected[0], rtol=0, atol=size)
         np.testing.assert_allclose(rates[i], expected[1] @ qd[i] + expected[2], rtol=0, atol=size)
@@ -261,9 +262,9 @@ def moved(scene, rng):
 def test_assembly_with_sparse_matrices(rng, monkeypatch):
     scene = moved(mechanisms.build(mechanisms.loop(12)), rng)
     before, fixed, found = scene.start, scene.bodies[3:4], []
-    for large in (assemble.LARGE, 0):
+    for large in (kinetic.LARGE, 0):
         scene.place(*before)
-        monkeypatch.setattr(assemble, "LARGE", large)
+        monkeypatch.setattr(kinetic, "LARGE", large)
         report = scene.assemble(fixed=fixed)
         found.append((*scene.start, report.moved, report.residual, report.velocity_residual))
     for dense, sparse in zip(*found, strict=True):

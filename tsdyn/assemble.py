@@ -4,18 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .bodies import transform_g
+from .approach import STAGES, Found, Kept, close, nearest, relax, settle, stuck
 from .branch import demand_aligned
 from .checks import number, positive
-from .errors import InconsistentState, InvalidArgument, InvalidBody
-from .evaluate import LARGE, constraint_arrays, mass_matrix, mass_matrix_sparse
+from .conflict import refuse
+from .errors import InconsistentState, InvalidArgument, InvalidBody, SingularConfiguration
+from .folds import Folds
 from .initial import ROUNDING, demand_finite
-from .rank import check_rank
-from .sparse_rows import WIDTH, as_csr, with_short_rows
-from .start import consistent
+from .kinetic import Metric, least_step, row_lengths
 
-MOST_ITERATIONS = 100
-NEXT_TO_NOTHING = 1e-13  # of rows of length one
+STIFFER = (0.1, 0.01, 0.001)  # softness of what keeps a fold, from try to try
 
 
 @dataclass(frozen=True)
@@ -33,6 +31,9 @@ class AssemblyReport:
     velocity_residual : float
         Largest |Phi_q qd + Phi_t| left.
     iterations : int
+    folded : tuple of str
+        Joints of closed loops whose links are folded to the other side than the sketch shows, by 0.1 rad or more: by
+        less than is sure (see `folds` of `assemble`), or because of `folds="free"`.
     """
 
     moved: float
@@ -40,9 +41,10 @@ class AssemblyReport:
     velocity_changed: float
     velocity_residual: float
     iterations: int
+    folded: tuple = ()
 
 
-def assemble(scene, tol=1e-12, fixed=(), t=0.0):
+def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
     """Move the bodies to the nearest consistent positions, then to the nearest consistent velocities.
 
     Parameters
@@ -53,6 +55,10 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0):
         Bodies whose pose (not velocity) must stay as it is.
     t : float, s
         The time at which constraints that depend on time are met.
+    folds : "keep" or "free"
+        Whether the links of closed loops must fold the way they are drawn, where that is clear: by 0.2 rad or more, by
+        the directions of the links and by the places of their joints. "free" takes the nearest configuration, whatever
+        its branch. Whatever is folded over is in the report.
 
     Returns
     -------
@@ -62,177 +68,150 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0):
     Raises
     ------
     InconsistentState
-        If the constraints can't be met, which names the rows that are left over, or if what was found is a mirrored
-        joint. The bodies are as before.
-    SingularConfiguration, RedundantConstraints
-        If rows of Phi_q vanish or depend on each other at the configuration found.
+        If the constraints can't be met, which names the smallest set of them that conflicts (`.constraints` of the
+        error), or if what was found is a mirrored joint or another branch than the sketch's. The bodies are as before.
+    SingularConfiguration
+        If a row of Phi_q vanishes at the configuration found.
 
     Notes
     -----
-    Gauss-Newton steps, smallest in the kinetic-energy metric, with rotations of at most half a radian a step and
-    halved until |Phi| falls; the velocity correction is the smallest in kinetic energy.
+    Bodies hang on springs at their places in the sketch, in the metric of kinetic energy, and constraints are springs
+    that stiffen until they hold; then Gauss-Newton steps. Redundant rows are welcome. The velocity correction is the
+    smallest in kinetic energy.
     """
     tol = positive(tol, "tol")
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
-    system = scene.system
-    q_start, qd = scene.start
-    q = q_start.copy()
-    held = np.zeros(q.size, bool)
-    if isinstance(fixed, str) or not hasattr(fixed, "__iter__"):
-        raise InvalidBody(f"fixed must be a sequence of bodies, such as (body,), got {fixed!r}.")
-    for body in fixed:
-        if body not in scene.bodies:
-            raise InvalidBody(f"fixed: {body!r} is not a body of this scene.")
-        at = int(system.bodies[body.index, 0])
-        held[at : at + body.dimension] = True
-    free, rigid = ~held, system.bodies[system.bodies[:, 1] == 7, :1] + np.arange(3, 7)
-    form = _Sparse(scene.packed) if q.size > LARGE else _Dense(system)
-    Phi, Phi_q, Phi_t = form.arrays(q, qd, t)
-    demand_finite(scene, Phi, Phi_q, Phi_t)
-    moved_rows = form.moved_by(Phi_q, free)
-    iterations, size = 0, np.linalg.norm(Phi)
-    while iterations < MOST_ITERATIONS:
-        iterations += 1
-        if not Phi.size or np.abs(Phi).max() <= 1e-15 * (1.0 + np.abs(q).max()):
-            break
-        step = np.zeros(q.size)
-        step[free] = form.smallest(q, Phi_q, -Phi[moved_rows], moved_rows, free)
-        turn = 2.0 * np.linalg.norm(step[rigid], axis=1).max(initial=0.0)
-        factor = min(1.0, 0.5 / turn) if turn > 0.0 else 1.0
-        improved = False
-        for _ in range(12):
-            trial = q + factor * step
-            trial[rigid] /= np.linalg.norm(trial[rigid], axis=1)[:, None]
-            trial_arrays = form.arrays(trial, qd, t)
-            if np.linalg.norm(trial_arrays[0]) < size:
-                improved = True
-                break
-            factor /= 2.0
-        if not improved:
-            break
-        q, (Phi, Phi_q, Phi_t) = trial, trial_arrays
-        size = np.linalg.norm(Phi)
-    _demand_assembled(scene, Phi, tol * (1.0 + np.abs(q).max()), iterations)
-    form.check_rank(scene, Phi_q)
-    demand_aligned(scene.packed, q)
-    turning = np.array([body.angular_velocity for body in scene.bodies if body.dimension == 7]).reshape(-1, 3)
-    # the angular velocity is the user's, in the body's frame, however the body has been turned
-    qd[rigid] = 0.5 * np.einsum("bij,bi->bj", transform_g(q[rigid]), turning)
-    wanted, everything = qd.copy(), (np.ones(len(Phi), bool), np.ones(q.size, bool))
-    for _ in range(2):
-        residual = Phi_q @ qd + Phi_t
-        if np.abs(residual).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max()):
-            qd = qd + form.smallest(q, Phi_q, -residual, *everything)
-    form.check_whole(scene, q, qd, t, tol)
+    if folds not in ("keep", "free"):
+        raise InvalidArgument(f'folds must be "keep" or "free", got {folds!r}.')
+    packed, (sketch, qd) = scene.packed, scene.start
+    held = _held(scene, fixed)
+    metric = Metric(packed, held, float(t))
+    demand_finite(scene, *metric.arrays(sketch))
+    found = nearest(metric, sketch, tol)
+    if not found.met:
+        _demand_direction(scene, metric, found)
+        refuse(scene, metric, sketch, found, tol, fixed)
+    links = Folds(packed)
+    drawn = links.drawn(metric, sketch)
+    if folds == "keep":
+        found = _unfolded(scene, metric, sketch, found, links, drawn, tol)
+    q = found.q
+    metric = Metric(packed, None, float(t))
+    Phi, Phi_q, Phi_t = metric.arrays(q)
+    A = metric.reduced(q, Phi_q[metric.own])
+    _demand_regular(scene, metric, A)
+    demand_aligned(packed, q)
+    given, qd = _velocities(scene, metric, q, qd, A, Phi_t[metric.own])
+    residual = Phi_q @ qd + Phi_t
+    _demand_compatible(scene, residual, max(tol, 1e-9) * (1.0 + np.abs(qd).max()))
+    over = links.turned(metric, q, links.shown(metric, sketch))
     scene.place(q, qd)
     return AssemblyReport(
-        moved=float(np.abs(q - q_start).max()),
+        moved=float(np.abs(q - sketch).max()),
         residual=float(np.abs(Phi).max(initial=0.0)),
-        velocity_changed=float(np.abs(qd - wanted).max()),
-        velocity_residual=float(np.abs(Phi_q @ qd + Phi_t).max(initial=0.0)),
-        iterations=iterations,
+        velocity_changed=float(np.abs(qd - given).max()),
+        velocity_residual=float(np.abs(residual).max(initial=0.0)),
+        iterations=found.iterations,
+        folded=tuple(dict.fromkeys(links.folds[k].title for k in over)),
     )
 
 
-class _Dense:
-    """Constraints and the metric as matrices."""
-
-    def __init__(self, system):
-        self.system = system
-
-    def arrays(self, q, qd, t):
-        """Phi, Phi_q and Phi_t."""
-        return constraint_arrays(self.system, q, qd, t)[:3]
-
-    def moved_by(self, Phi_q, free):
-        """Which rows the free coordinates have a part in."""
-        return np.abs(Phi_q[:, free]).max(axis=1, initial=0.0) > 0.0
-
-    def smallest(self, q, Phi_q, residual, rows, free):
-        """The change of the free coordinates, smallest in kinetic energy, with Phi_q dq = residual by least squares."""
-        L = np.linalg.cholesky(self.metric(q)[np.ix_(free, free)])
-        scaled = np.linalg.solve(L, Phi_q[np.ix_(rows, free)].T).T
-        return np.linalg.solve(L.T, np.linalg.lstsq(scaled, residual, rcond=1e-12)[0])
-
-    def metric(self, q):
-        """M with the direction of p, and axes without inertia, made regular."""
-        M = mass_matrix(self.system, q)
-        for at, block in zip(*_regular(self.system, q), strict=True):
-            M[at[:, None], at] += block
-        return M
-
-    def check_rank(self, scene, Phi_q):
-        """Refuse dependent rows."""
-        check_rank(scene, Phi_q)
-
-    def check_whole(self, scene, q, qd, t, tol):
-        """Nothing more to refuse."""
+def _held(scene, fixed):
+    """Which coordinates stay, (n,)."""
+    if isinstance(fixed, str) or not hasattr(fixed, "__iter__"):
+        raise InvalidBody(f"fixed must be a sequence of bodies, such as (body,), got {fixed!r}.")
+    bodies = scene.system.bodies
+    held = np.zeros(int(bodies[:, 1].sum()), bool)
+    for body in fixed:
+        if body not in scene.bodies:
+            raise InvalidBody(f"fixed: {body!r} is not a body of this scene.")
+        at = int(bodies[body.index, 0])
+        held[at : at + body.dimension] = True
+    return held
 
 
-class _Sparse:
-    """The same at a cost of O(N)."""
+def _unfolded(scene, metric, sketch, found, links, drawn, tol):
+    """The configuration found, or one beside it that folds the links as the sketch does."""
+    turned = links.turned(metric, found.q, drawn)
+    kept, total, first = set(), found.iterations, turned
+    for softness in STIFFER:
+        if not turned.size:
+            return found
+        kept |= set(turned.tolist())
+        pairs = np.array(list(dict.fromkeys(tuple(sorted(links.folds[k].bodies)) for k in sorted(kept))))
+        q, steps = relax(metric, sketch, sketch, kept=Kept(pairs, softness), stages=STAGES)
+        q, Phi, more = close(metric, q)
+        total += steps + more
+        met = bool(np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max()))
+        turned = links.turned(metric, q, drawn)
+        if not met:
+            turned = first
+        elif not turned.size:
+            freed, Phi_freed, more = settle(metric, sketch, q)
+            total += more
+            fits = np.abs(Phi_freed).max() <= tol * (1.0 + np.abs(freed).max())
+            if fits and not links.turned(metric, freed, drawn).size:
+                q, Phi = freed, Phi_freed
+            return Found(q, Phi, total, True)
+    stories = [
+        f"  {links.folds[k].title}: {np.degrees(links.angle(metric, sketch, k)):.0f} degrees from straight in the "
+        f"sketch, {np.degrees(links.angle(metric, found.q, k)):.0f} when assembled"
+        for k in first[:8]
+    ]
+    raise InconsistentState(
+        "the configurations found fold links to the other side than the sketch does, which is another branch:\n"
+        + "\n".join(stories)
+        + '\nDraw the links there further from straight, or on the other side; or pass folds="free" to take the '
+        "nearest configuration whatever its branch."
+    )
 
-    def __init__(self, packed):
-        self.packed, self.system = packed, with_short_rows(packed)
 
-    def arrays(self, q, qd, t):
-        Phi, rows, Phi_t, _ = constraint_arrays(self.system, q, qd, t, WIDTH)
-        return Phi, as_csr(self.packed, rows), Phi_t
+def _velocities(scene, metric, q, qd, A, Phi_t):
+    """qd with the angular velocities that the user set, however bodies have been turned, and the nearest that fits."""
+    rigid = [body for body in scene.bodies if body.dimension == 7]
+    turning = np.array([body.angular_velocity for body in rigid]).reshape(-1, 3)
+    x = metric.speeds(qd[metric.r], turning)
+    given = qd.copy()
+    given[metric.p] = metric.rates(q, x)[metric.p]
+    fitted = given
+    for _ in range(3):
+        residual = A @ x + Phi_t
+        if np.abs(residual).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(fitted).max()):
+            break
+        x = x + least_step(A, residual)
+        fitted = metric.rates(q, x)
+    return given, fitted
 
-    def moved_by(self, Phi_q, free):
-        return abs(Phi_q[:, free]).max(axis=1).toarray().ravel() > 0.0
 
-    def smallest(self, q, Phi_q, residual, rows, free):
-        """By [M, A^T; A, -d] (dq, lam) = (0, residual), d being next to nothing, and enough for dependent rows."""
-        from scipy.sparse import block_array, diags_array
-        from scipy.sparse.linalg import splu
-
-        M, A = self.metric(q)[free][:, free], Phi_q[rows][:, free]
-        weights = 1.0 / np.sqrt(M.diagonal())
-        A, M = A @ diags_array(weights), diags_array(weights) @ M @ diags_array(weights)
-        lengths = np.sqrt((A * A).sum(axis=1))
-        A = diags_array(1.0 / lengths) @ A
-        factors = splu(
-            block_array([[M, A.T], [A, -diags_array(np.full(len(residual), NEXT_TO_NOTHING))]], format="csc")
+def _demand_direction(scene, metric, found):
+    """Refuse a constraint whose derivative vanishes where it isn't met: nothing says which way to go."""
+    still = stuck(metric, found.q, found.Phi)
+    if still.size and metric.columns.size == metric.size:
+        name = scene.row_names()[metric.own[still[0]]]
+        raise InconsistentState(
+            f"{name}: Phi = {found.Phi[still[0]]:.3g}, and its derivative vanishes, so nothing says which way to go. "
+            "Move its bodies a little towards where they should be."
         )
-        found = factors.solve(np.concatenate((np.zeros(len(weights)), residual / lengths)))
-        return weights * found[: len(weights)]
 
-    def metric(self, q):
-        from scipy.sparse import csr_array
 
-        places, blocks = _regular(self.system, q)
-        i, j = np.broadcast_to(places[:, :, None], blocks.shape), np.broadcast_to(places[:, None], blocks.shape)
-        return mass_matrix_sparse(self.system, q) + csr_array(
-            (blocks.ravel(), (i.ravel(), j.ravel())), (q.size, q.size)
+def _demand_regular(scene, metric, A):
+    """Refuse rows that vanish."""
+    zero = np.flatnonzero(row_lengths(A) == 0.0)
+    if zero.size:
+        raise SingularConfiguration(
+            f"the row of {scene.row_names()[metric.own[zero[0]]]} in Phi_q is zero in this configuration: the "
+            "constraint is singular here. Start from another configuration, or use a constraint that is regular here."
         )
 
-    def check_rank(self, scene, Phi_q):
-        """With the velocities, below."""
 
-    def check_whole(self, scene, q, qd, t, tol):
-        """Refuse dependent rows as a run does."""
-        consistent(scene, scene.system, q, qd, t, max(tol, 1e-9))
-
-
-def _regular(system, q):
-    """Where each rigid body's p is, (b, 4), and what makes its part of M regular, (b, 4, 4)."""
-    rigid = system.bodies[:, 1] == 7
-    at, J = system.bodies[rigid, :1] + np.arange(3, 7), system.inertia[rigid].reshape(-1, 3, 3)
-    size = np.trace(J, axis1=1, axis2=2) / 3.0
-    thin = np.linalg.eigvalsh(J)[:, 0] < 1e-6 * size
-    p = q[at]
-    blocks = 4.0 * size[:, None, None] * p[:, :, None] * p[:, None, :]
-    return at, blocks + (1e-6 * size * thin)[:, None, None] * np.eye(4)
-
-
-def _demand_assembled(scene, Phi, tol, iterations):
-    bad = np.flatnonzero(~(np.abs(Phi) <= tol))
+def _demand_compatible(scene, residual, tol):
+    """Refuse velocities that can't be met, by name: of redundant rows that depend on time differently."""
+    bad = np.flatnonzero(~(np.abs(residual) <= tol))
     if bad.size:
         names = scene.row_names()
-        rows = ", ".join(f"{names[i]} ({Phi[i]:.3g})" for i in sorted(bad, key=lambda i: -abs(Phi[i]))[:8])
+        rows = ", ".join(f"{names[i]} ({residual[i]:.3g})" for i in sorted(bad, key=lambda i: -abs(residual[i]))[:8])
         raise InconsistentState(
-            f"no configuration that meets all constraints was found in {iterations} iterations; left over: {rows}. "
-            "Bring the bodies nearer to an assembled pose, or drop a constraint that contradicts the others."
+            f"no velocities meet all constraints in the configuration found; Phi_q qd + Phi_t left over: {rows}. "
+            "Rows that say the same must also move the same: give their motions equal rates, or drop one."
         )

@@ -14,6 +14,7 @@ from .errors import InvalidArgument, InvalidBody, InvalidConstraint
 from .evaluate import evaluate
 from .force import Force
 from .joint import Joint
+from .mobility import mobility
 from .motion import Motion
 from .primitive import Primitive
 from .signal import Signal
@@ -253,6 +254,7 @@ class Scene:
 
     evaluate = evaluate
     assemble = assemble
+    mobility = mobility
 
     def __repr__(self):
         rows = sum(constraint.rows for constraint in self.constraints)

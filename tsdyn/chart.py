@@ -12,7 +12,7 @@ from ._kernel import kernel
 from .assembly import constraint_jacobian
 from .linalg import null_space
 from .local_chart import touch
-from .newton import OK, SINGULAR, invert_normal_matrix, normal_matrix, update_b
+from .newton import OK, SINGULAR, invert_normal_matrix, leave_rows_out, normal_matrix, update_b
 from .workspace import FACTORIZATIONS, KEPT, RATE
 
 RANK_LIMIT = 1e-8  # smallest singular value of Phi_q, rows scaled to length one, below which it has lost rank
@@ -23,22 +23,29 @@ def new_chart(s, w, f, l, network, t):
     """Make a chart at the present q: q0, U, V by SVD, B, L; u = 0, v = 0. Status."""
     n, m, k = w.q.size, w.u.size, w.v.size
     regular = touch(network, s, w, f, l, t)
+    w.left_out[0] = f.dropped[0]
+    for i in range(f.dropped[0]):
+        w.left_out[1 + i] = network.row[f.dropped[1 + i]]
     constraint_jacobian(s, w.q, t, w.Phi_q)
+    leave_rows_out(w)
+    kept = 0
     for i in range(n):
         w.q0[i] = w.q[i]
     for i in range(m):
         x = 0.0
         for c in range(n):
             x += w.Phi_q[i, c] * w.Phi_q[i, c]
-        if not x > 0.0:
-            return SINGULAR
-        x = 1.0 / math.sqrt(x)
-        for c in range(n):
-            w.householder[c, i] = w.Phi_q[i, c] * x
         w.u[i] = 0.0
+        if x > 0.0:
+            x = 1.0 / math.sqrt(x)
+            for c in range(n):
+                w.householder[c, kept] = w.Phi_q[i, c] * x
+            kept += 1
+    if kept != n - k:
+        return SINGULAR
     for j in range(k):
         w.v[j] = 0.0
-    low, high = null_space(w.householder, n, m, w.V, w.R, w.z)
+    low, high = null_space(w.householder, n, kept, w.V, w.R, w.z)
     if m > 0 and not (regular and low > RANK_LIMIT * high):
         return SINGULAR
     _normal_space(network, w, l)
@@ -84,12 +91,12 @@ def _normal_space(network, w, l):
 
 @kernel
 def _left_inverse(w):
-    """L = V - Phi_q^T B^T U^T V at q0; T and D are scratch, T zero at the end, as it is at q0."""
+    """L = V - Phi_q^T B^T U^T V at q0; T and X are scratch, T zero at the end, as it is at q0."""
     n, m, k = w.q.size, w.u.size, w.v.size
     for i in range(m):
         for j in range(k):
             w.T[i, j] = 0.0
-            w.D[i, j] = 0.0
+            w.X[i, j] = 0.0
         for c in range(n):
             f = w.U[c, i]
             if f != 0.0:
@@ -99,7 +106,7 @@ def _left_inverse(w):
         for c in range(m):
             f = w.B[c, i]
             for j in range(k):
-                w.D[i, j] += f * w.T[c, j]
+                w.X[i, j] += f * w.T[c, j]
     for i in range(n):
         for j in range(k):
             w.L[i, j] = w.V[i, j]
@@ -107,7 +114,7 @@ def _left_inverse(w):
             f = w.Phi_q[c, i]
             if f != 0.0:
                 for j in range(k):
-                    w.L[i, j] -= f * w.D[c, j]
+                    w.L[i, j] -= f * w.X[c, j]
     for i in range(m):
         for j in range(k):
             w.T[i, j] = 0.0
@@ -118,28 +125,29 @@ def tangent_map(s, w, t):
     """Phi_q, N, B, T = B Phi_q V and D = V - U T at the present q, Eqs. 7, 9, 28. Status."""
     n, m, k = w.q.size, w.u.size, w.v.size
     constraint_jacobian(s, w.q, t, w.Phi_q)
+    leave_rows_out(w)
     normal_matrix(s, w)
     made = w.counters[FACTORIZATIONS]
     status = update_b(w)
     if status != OK:
         return status
     w.counters[KEPT] += 1 if w.counters[FACTORIZATIONS] == made and m > 0 else 0
-    for i in range(m):  # D is scratch for Phi_q V
+    for i in range(m):
         for j in range(k):
-            w.D[i, j] = 0.0
+            w.X[i, j] = 0.0
         for part in range(0, 4, 2):
             begin = s.segments[i, part]
             for c in range(begin, begin + s.segments[i, part + 1]):
                 f = w.Phi_q[i, c]
                 for j in range(k):
-                    w.D[i, j] += f * w.V[c, j]
+                    w.X[i, j] += f * w.V[c, j]
     for i in range(m):
         for j in range(k):
             w.T[i, j] = 0.0
         for c in range(m):
             f = w.B[i, c]
             for j in range(k):
-                w.T[i, j] += f * w.D[c, j]
+                w.T[i, j] += f * w.X[c, j]
     for i in range(n):
         for j in range(k):
             w.D[i, j] = w.V[i, j]

@@ -148,7 +148,7 @@ class Reader:
 
     def __init__(self, system, sizes, addresses):
         *sizes, network, nx, ny = sizes
-        work = allocate(*sizes)
+        work = allocate(*sizes, redundant=len(network.dropped))
         system = system._replace(reals=system.reals.copy())  # the motions' places are written to
         linear = allocate_linear(system, sizes[0], sizes[1], False)
         context = Context(system, work, linear, *basis_free_parts(network, sizes[0]))

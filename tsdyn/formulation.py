@@ -27,11 +27,11 @@ class Formulation:
         """The scene's network with the loops that the kernels call."""
         return network_of(packed, *(self.kernels.COLUMNS if self.basis_free else (REDUCED,)))
 
-    def sizes(self, n, m, bodies):
-        """Lengths of x and y."""
+    def sizes(self, n, rank, bodies):
+        """Lengths of x and y; rank is that of Phi_q."""
         if self.basis_free:
             return 8 * bodies, 8 * bodies
-        return n if self.first_order else n - m, n - m
+        return n if self.first_order else n - rank, n - rank
 
     def addresses(self):
         """Addresses in the order that the driver expects; loads or compiles them."""

@@ -61,11 +61,11 @@ class Memory:
         self.weight = n if self.basis_free else n + n**3 // MATRICES
         self.source, _ = prepared.system(implicit)
         system = System(*(array.copy() for array in self.source))
-        self.network = network
-        self.work = allocate(n, m, len(prepared.packed.bodies), 0.0, joint_rows=joint_rows)
+        self.network, redundant = network, len(network.dropped)
+        self.work = allocate(n, m, len(prepared.packed.bodies), 0.0, joint_rows=joint_rows, redundant=redundant)
         slots = system.memory.size
         self.run = lay_out(n, nx, ny, tableau, scratch, warm_size(self.work), B_DATA + width + slots, slots)
-        linear = allocate_linear(system, n, m, implicit, kept)
+        linear = allocate_linear(system, n, m, implicit, kept, redundant)
         if implicit:
             linear = linear._replace(now=self.run.now, before=self.run.before)
         self.settle(Context(system, self.work, linear, *basis_free_parts(network, n)))

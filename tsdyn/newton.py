@@ -42,6 +42,7 @@ def solve_positions(s, w, t, v):
     for _ in range(SWEEPS):
         _step_off(w, n, m)
         constraints(s, w.q, t, w.Phi)
+        leave_out(w, w.Phi)
         w.counters[NEWTON] += 1
         worst = 0.0
         for i in range(m):
@@ -71,6 +72,21 @@ def solve_positions(s, w, t, v):
 
 
 @kernel
+def leave_out(w, f):
+    """Zero what belongs to redundant rows of Phi."""
+    for i in range(w.left_out[0]):
+        f[w.left_out[1 + i]] = 0.0
+
+
+@kernel
+def leave_rows_out(w):
+    """Zero the redundant rows of Phi_q."""
+    for i in range(w.left_out[0]):
+        for j in range(w.q.size):
+            w.Phi_q[w.left_out[1 + i], j] = 0.0
+
+
+@kernel
 def _step_off(w, n, m):
     """q = base - U u."""
     for i in range(n):
@@ -94,6 +110,7 @@ def subtract_normal(w, out):
 def factorise_b(s, w, t):
     """B = (Phi_q U)^-1 at the present q, from nothing; False where it is singular."""
     constraint_jacobian(s, w.q, t, w.Phi_q)
+    leave_rows_out(w)
     normal_matrix(s, w)
     return invert_normal_matrix(w)
 
@@ -123,6 +140,9 @@ def normal_matrix(s, w):
             for c in range(middle, last):
                 x += w.Phi_q[i, c] * w.U[c, j]
             w.N[i, j] = x
+    for i in range(w.left_out[0]):
+        row = w.left_out[1 + i]
+        w.N[row, row] = 1.0
 
 
 @kernel
@@ -162,9 +182,9 @@ def update_b(w):
                 x = 0.0
                 for c in range(m):
                     x += w.B[i, c] * w.R[c, j]
-                w.h[j] = x
+                w.z[j] = x
             for j in range(m):
-                w.B[i, j] -= w.h[j]
+                w.B[i, j] -= w.z[j]
         if worst * worst <= tol or worst > 0.5 * before:  # squared next time; or rounding is all that is left
             return OK if worst < 0.5 else SINGULAR
         before = worst

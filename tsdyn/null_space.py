@@ -19,14 +19,14 @@ from .linalg import cholesky, cholesky_solve, transposed_times
 from .local import TIME
 from .local_chart import measure_turns, turning
 from .network import REDUCED
-from .newton import NOT_FINITE, OK, solve_positions, subtract_normal
+from .newton import NOT_FINITE, OK, leave_out, solve_positions, subtract_normal
 from .poses import place_bodies
-from .rows import run_loops
+from .rows import held, run_loops
 from .stepping import ACCELERATE, NORM, PLACE
-from .workspace import EVALUATIONS, FACTORIZATIONS, PLACEMENTS, load
+from .workspace import EVALUATIONS, FACTORIZATIONS, FLOOR, PLACEMENTS, load
 
 PIVOT_LIMIT = 1e-14  # of D^T M D: less than this is rounding
-MASS_SINGULAR = int(Status.MASS_SINGULAR)
+MASS_SINGULAR, UNHELD = int(Status.MASS_SINGULAR), int(Status.UNHELD)
 
 
 @kernel
@@ -74,6 +74,7 @@ def velocities(s, w, t, vd):
         w.qd[i] = x
     if is_rheonomic(s):
         time_derivative(s, w.q, t, w.Phi_t)
+        leave_out(w, w.Phi_t)
         _correct(w, w.Phi_t, w.qd)
 
 
@@ -94,6 +95,7 @@ def reduced_acceleration(s, w, t, vdd):
     """vdd of Eq. 26 at the present q and qd. Status."""
     n, k = w.q.size, vdd.size
     acceleration_bias(s, w.q, w.qd, t, w.gamma)
+    leave_out(w, w.gamma)
     for i in range(n):
         w.h[i] = 0.0
     _correct(w, w.gamma, w.h)  # h = -U B gamma, what qdd is at vdd = 0
@@ -251,7 +253,7 @@ def start_chart(context, t, v, vd, vdd, unused):
     for j in range(k):
         v[j] = 0.0
     project(w, vector(vd, k), vector(vdd, k))
-    return status
+    return UNHELD if status == OK and not held(c.free, w.control[FLOOR]) else status
 
 
 @kernel

@@ -66,7 +66,8 @@ def simulate(
     redundancy : {"drop", "refuse"}
         What to do about constraint rows that follow from the others: "drop" leaves them out of the equations where
         they are sure to hold (independent rows are chosen anew where those that were chosen come close to depending on
-        one another), which explicit methods can in the form "tangent"; "refuse" raises RedundantConstraints.
+        one another); "refuse" raises RedundantConstraints, as always in scenes with a body that has no inertia about
+        an axis.
     t_eval : array_like, s, optional
         Increasing output times within t_span, from dense output on the manifold, which never changes the steps;
         None gives every accepted step and both ends.
@@ -129,8 +130,7 @@ def simulate(
     for motion in kept.motions:
         motion.check(*span)
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
-    dropping = redundancy == "drop" and form.basis_free and not method.implicit
-    q, qd = kept.start(scene, q, qd, span[0], initial_tol, dropping)
+    q, qd = kept.start(scene, q, qd, span[0], initial_tol, redundancy == "drop")
     choose = None
     if integrator is None:
         options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol}

@@ -35,8 +35,8 @@ def run_steps(task, observe=None):
     task = task._replace(form=form)
     steps = None if method.step is None else step_count(*task.span, method.step)
     packed, n, m = prepared.packed, prepared.n, prepared.m
-    nx, ny = form.sizes(n, m, len(packed.bodies))
     network = form.network(packed)
+    nx, ny = form.sizes(n, m - len(network.dropped), len(packed.bodies))
     step, tableau, scratch = method.kernel(form.first_order)
     interpolant = method.interpolant(form.first_order)
     _, kept = prepared.system(method.implicit)

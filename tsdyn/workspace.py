@@ -13,7 +13,10 @@ from .system import System
 
 
 class Work(NamedTuple):
-    """n coordinates, m constraints, k = n - m degrees of freedom, b bodies; "computed by" names the kernel."""
+    """n coordinates, m constraints, k = n - m + d degrees of freedom, d redundant rows left out, b bodies.
+
+    "computed by" names the kernel. What belongs to a row that is left out is zero, on the diagonal of N and B one.
+    """
 
     q: np.ndarray  # (n,)    positions; computed by newton.solve_positions
     qd: np.ndarray  # (n,)   velocities; computed by null_space.velocities
@@ -21,7 +24,7 @@ class Work(NamedTuple):
     Phi: np.ndarray  # (m,)  constraints at q; newton.solve_positions, and scratch of null_space.complete
     Phi_t: np.ndarray  # (m,)  their time derivative; null_space.velocities
     gamma: np.ndarray  # (m,)  acceleration bias; null_space.reduced_acceleration
-    z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; newton.solve_positions, null_space
+    z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; newton.solve_positions, null_space; scratch elsewhere
     Phi_q: np.ndarray  # (m, n)  Jacobian at q; chart.tangent_map, new_chart
     q0: np.ndarray  # (n,)   where the chart touches; chart.new_chart
     U: np.ndarray  # (n, m)  spans W0 Phi_q(q0)^T, in place of Eq. 5; chart.new_chart
@@ -34,14 +37,16 @@ class Work(NamedTuple):
     base: np.ndarray  # (n,)   q0 + V v; newton.solve_positions
     N: np.ndarray  # (m, m)  Phi_q U; chart.tangent_map
     R: np.ndarray  # (m, m)  residual of Eq. 28, and scratch of factorisations; newton.update_b
+    X: np.ndarray  # (m, k)  Phi_q V, or U^T V; chart.tangent_map, new_chart
     D: np.ndarray  # (n, k)  (I - U B Phi_q) V, Eq. 9; chart.tangent_map
     E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.reduced_mass
     A: np.ndarray  # (k, k)  D^T M D, then its Cholesky factor; null_space.reduced_mass
     Q: np.ndarray  # (n,)    applied forces without gravity; null_space.reduced_acceleration
-    h: np.ndarray  # (n,)    -U B gamma, and scratch of newton.update_b; null_space.reduced_acceleration
+    h: np.ndarray  # (n,)    -U B gamma; null_space.reduced_acceleration
     householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; linalg.null_space
     control: np.ndarray  # (CONTROLS,)  tolerances and criteria, below
     counters: np.ndarray  # int64 (COUNTERS,)  what was done how often, below
+    left_out: np.ndarray  # int64 (d + 1,)  how many rows of Phi are redundant and left out, and which; chart.new_chart
 
 
 U_TOL, B_TOL, SIZE, FLOOR, RATE, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(9)
@@ -117,15 +122,15 @@ def carve(shapes):
     return arrays
 
 
-def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None):
+def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=0):
     """Lay out the scratch memory of a formulation; size is that of the numbers in the constraints.
 
     With joint_rows, how many rows are no normalisations, that of the form without a basis: no matrices.
     """
     shapes = {**dict.fromkeys(("q", "qd", "qdd"), (n,)), "u": (m if joint_rows is None else joint_rows,)}
     if joint_rows is not None:
-        n = m = bodies = 0
-    k = n - m
+        n = m = bodies = redundant = 0
+    k = n - m + redundant
     shapes |= {
         **dict.fromkeys(("q0", "base", "Q", "h"), (n,)),
         **dict.fromkeys(("Phi", "Phi_t", "gamma", "z"), (m,)),
@@ -133,21 +138,21 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None):
         **dict.fromkeys(("U", "householder"), (n, m)),
         **dict.fromkeys(("V", "L", "D"), (n, k)),
         "Phi_q": (m, n),
-        "T": (m, k),
+        **dict.fromkeys(("T", "X"), (m, k)),
         "v": (k,),
         "E": (3 * bodies, k),
         "A": (k, k),
         "control": (CONTROLS,),
     }
-    work = Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64))
+    work = Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), left_out=np.zeros(redundant + 1, np.int64))
     work.control[U_TOL] = work.control[B_TOL] = constraint_tol
     work.control[SIZE] = size
     return work
 
 
-def allocate_linear(system, n, m, wanted, kept=0):
+def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
     """Lay out the memory of implicit methods, `kept` floats of it for forces; of no size where it is not wanted."""
-    k, l = n - m, sum(6 if length == 7 else 3 for length in system.bodies[:, -1])
+    k, l = n - m + redundant, sum(6 if length == 7 else 3 for length in system.bodies[:, -1])
     if not wanted:
         n = m = k = l = 0
     shapes = {
@@ -187,9 +192,10 @@ load = loader(plain_context())
 
 def plain_work(n):
     """A `Work` for n coordinates that has no matrices."""
-    shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name != "counters"}
+    whole = ("counters", "left_out")
+    shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name not in whole}
     shapes |= {"q": (n,), "qd": (n,), "qdd": (n,), "control": (CONTROLS,)}
-    return Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64))
+    return Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), left_out=np.zeros(1, np.int64))
 
 
 def parts(system, network, n):

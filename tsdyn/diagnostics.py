@@ -93,8 +93,7 @@ def _parameter(given, t, rate):
     if not isinstance(given[0], Motion):
         same = all(value == given[0] for value in given)
         return [given[0] if same else np.array(given)]
-    columns = [[[function(time) for time in t] for function in value.functions] for value in given]
-    f, fd, fdd = np.array(columns, dtype=float).reshape(len(given), 3, t.size).transpose(1, 2, 0)
+    f, fd, fdd = np.array([value.over(t) for value in given]).reshape(len(given), 3, t.size).transpose(1, 2, 0)
     return [Jet(f, rate * fd, rate * rate * fdd), Jet(fd, rate * fdd), Jet(fdd)]
 
 

@@ -71,7 +71,7 @@ class Prepared:
         known, start = self._start
         if known != given:
             start = consistent(scene, self.packed.system, q, qd, t, tol)
-            demand_aligned(self.packed, start[0])
+            demand_aligned(self.packed, start[0], t)
             self._start = given, start
         return start
 

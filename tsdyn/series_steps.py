@@ -7,6 +7,8 @@ import math
 
 from ._four import four, put, splat, times
 from ._kernel import callback, caller, kernel
+from .assembly import set_time
+from .driven import expand_motions, land_driven_velocities
 from .errors import Status
 from .expansion import begin, expand
 from .free_accelerations import accelerate_bodies
@@ -38,6 +40,7 @@ def _expand(context, k, ahead):
     w, x, f = c.work, c.expansion, c.free
     orders = x.order[ORDERS]
     if k == 0:
+        expand_motions(c.system, x)
         begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
     expand(c.network, c.system, k, k > 0 and k + 1 == x.order[TOP], ahead, orders, x, f)
     if k == 0:
@@ -54,11 +57,17 @@ def reach(context, t, h):
     """The state at t, h after the series' origin, on the manifold, but for qdd; h < 0 takes the poses. Status."""
     c = load_series(context)
     w, x, f = c.work, c.expansion, c.free
+    driven = c.system.motions.shape[0] > 0
+    if driven and not set_time(c.system, t):
+        return NOT_FINITE
     if h >= 0.0:
         sum_series(c.network, x.bodies, x.order[ORDERS], x.order[TOP], h, f.poses, f.p)
     status = land(c.network, c.system, w, f, t)
     if status == 0:
-        land_velocities(c.network, f)
+        if driven:
+            land_driven_velocities(c.network, c.system, f, t)
+        else:
+            land_velocities(c.network, f)
         write_positions(c.network.bodies, f.poses, w.q)
         write_velocities(c.network.bodies, f.poses, w.qd)
         total = 0.0

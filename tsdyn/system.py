@@ -26,7 +26,8 @@ class System(NamedTuple):
     kinds: np.ndarray  # int64 (kinds, 9): addresses and extents, columns above
     table: np.ndarray  # int64: for each instance the places in q and Phi_q, primitive.INTS numbers
     reals: np.ndarray  # float64: for each instance marker coordinates, then parameters
-    motions: np.ndarray  # int64 (motions, 4): addresses of f, fd, fdd; place of the first in reals
+    motions: np.ndarray  # int64 (motions, 5): addresses of f, fd, fdd, or of what runs a program, 0, 0; the place of
+    # the first in reals; where the program begins there
     rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
     segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
     forces: np.ndarray  # int64 (kinds, 9): addresses and extents, columns in force_pack
@@ -106,7 +107,7 @@ def pack(scene):
         spans = [where.get(id(body), (0, 0)) for body in (constraint.a, constraint.b)]
         segments += [[*spans[0], *spans[1]]] * constraint.rows
 
-    kinds, table, reals, motions = [], [], [], []
+    kinds, table, reals, motions, programs = [], [], [], [], []
     for kind, members in groups.items():
         first = len(table), len(reals)
         strides = set()
@@ -116,7 +117,8 @@ def pack(scene):
             reals += np.concatenate(constraint.coordinates).tolist()
             for value in parameters[constraint]:
                 if isinstance(value, Motion):
-                    motions.append((*value.addresses, len(reals)))
+                    motions.append([*value.addresses, len(reals), 0])
+                    programs.append(value)
                     reals += value.value(0.0)
                 else:
                     reals.append(float(value))
@@ -132,6 +134,10 @@ def pack(scene):
         kinds.append([*addresses, len(members), stride, *first, 0])
 
     forces, signals, memory, loads = pack_forces(scene.forces, where, table, reals)
+    for row, motion in zip(motions, programs, strict=True):
+        if motion.smooth is not None:
+            row[4] = len(reals)
+            reals += motion.smooth.program()
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
@@ -141,7 +147,7 @@ def pack(scene):
         kinds=np.array(kinds, np.int64).reshape(-1, COLUMNS),
         table=np.array(table, np.int64),
         reals=np.array(reals),
-        motions=np.array(motions, np.int64).reshape(-1, 4),
+        motions=np.array(motions, np.int64).reshape(-1, 5),
         rheonomic=np.array([any(kind[PHI_T] for kind in kinds)], np.int64),
         segments=np.array(segments, np.int64).reshape(-1, 4),
         forces=np.array(forces, np.int64).reshape(-1, FORCE_COLUMNS),
@@ -183,8 +189,8 @@ def user_functions(packed):
     """Yield whatever holds compiled functions of a user's, and those functions."""
     for given in packed.parameters:
         for value in given:
-            if isinstance(value, Motion):
-                yield value, value.functions
+            if isinstance(value, Motion) and value.given:
+                yield value, value.given
     for load in packed.loads:
         for value in load.parameters:
             if isinstance(value, Signal) and not isinstance(value.source, Table):

@@ -101,9 +101,12 @@ def applied_forces(s, q, qd, t, Q):
 
 @kernel
 def remember(s, q, qd, t, out):
-    """Let the forces that do remember this accepted point; out (slots,) is what they remember."""
+    """Let the forces and constraints that do remember this accepted point; out (slots,) is what they remember."""
     if s.memory.size > 0:
         _run_forces(s, F_REMEMBER, q, qd, t, out)
+        for i in range(s.counters.shape[0]):
+            address, count, stride, table, reals = s.counters[i]
+            call_kind(address, count, stride, s.table[table:], s.reals[reals:], q, qd, t, out)
         for i in range(s.memory.size):
             out[i] = s.reals[s.memory[i]]
 

@@ -65,12 +65,16 @@ class Prepared:
         """The system for a method, and how many floats it keeps for forces."""
         return self.implicit if implicit else (self.packed.system, 0)
 
-    def start(self, scene, q, qd, t, tol):
+    def start(self, scene, q, qd, t, tol, remembered):
         """(q, qd) checked against the constraints and freed of rounding; looked at once for the same numbers."""
-        given = q.tobytes(), qd.tobytes(), t, tol
+        given = q.tobytes(), qd.tobytes(), t, tol, remembered.tobytes()
         known, start = self._start
         if known != given:
-            start = consistent(scene, self.packed.system, q, qd, t, tol)
+            system = self.packed.system
+            if remembered.size:
+                system = system._replace(reals=system.reals.copy())
+                system.reals[system.memory] = remembered
+            start = consistent(scene, system, q, qd, t, tol)
             demand_aligned(self.packed, start[0], t)
             self._start = given, start
         return start

@@ -8,6 +8,7 @@ A primitive works on marker coordinates x (3-vectors in the ground frame) and ne
     phi_t(x, par, t, out)        out[rows]          Phi_t; only for a primitive that depends on time
     series(x, par, k, s, out)    out[rows, len(x)]  optional: coefficient k of Phi_x, zero on entry; see recurrences.py
     series_t(x, par, k, s, out)  out[rows]          and of Phi_t, where it has what is `prescribed`; after `series`
+    remember(x, par, t)          optional, with memory = 1: what the last of par is after each accepted step
 
 x is the concatenation of the primitive's markers, par the floats that `parameters()` returns; a motion among them takes
 three places, its value, rate and acceleration at t. The loops below apply the chain rule x(q) (Haug 2018, Eqs. 2-3).
@@ -32,7 +33,7 @@ call_kind = caller(SIGNATURE)
 
 _registry = {}
 _KERNELS = {"phi": 4, "jacobian": 4, "gamma": 5}  # and their numbers of arguments
-_OPTIONAL = {"phi_t": 4, "series": 5, "series_t": 5}
+_OPTIONAL = {"phi_t": 4, "series": 5, "series_t": 5, "remember": 3}
 
 
 class Primitive(Attachment):
@@ -52,6 +53,8 @@ class Primitive(Attachment):
     prescribed : str or tuple of str, optional
         The attributes that are numbers or Motions, where nothing else makes it depend on time. With `series_t` they
         come first in `parameters()`, and their series are the rows of scratch memory from `slots` on.
+    memory : int
+        1 for a primitive that keeps a number from step to step, the last of par: an angle that counts turns.
     a, b : Body or ground
         The bodies; b is None for a primitive that has markers on a only.
     name : str
@@ -60,6 +63,7 @@ class Primitive(Attachment):
 
     rows = 0
     slots = 0
+    memory = 0
     normalises = False  # whether it does no more than keep the length of p
     prescribed = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
@@ -79,6 +83,8 @@ class Primitive(Attachment):
             cls.quantities() and getattr(cls, "series", None) and getattr(cls, "phi_t", None)
         ):
             raise InvalidConstraint(f"{where}: series_t needs `prescribed`, and the kernels phi_t and series.")
+        if cls.memory not in (0, 1) or (cls.memory == 1) != (getattr(cls, "remember", None) is not None):
+            raise InvalidConstraint(f"{where}: memory = 1 needs a kernel remember, and remember needs memory = 1.")
         functions = {}
         for name, arguments in {**_KERNELS, **_OPTIONAL}.items():
             if getattr(cls, name, None) is None and name in _OPTIONAL:
@@ -147,6 +153,7 @@ def _compile(cls, functions):
         "phi_t": (_values, "phi_t", SIGNATURE),
         "jacobian": (_jacobian, "jacobian", SIGNATURE),
         "gamma": (_gamma, "gamma", SIGNATURE),
+        "remember": (_remembers, "remember", SIGNATURE),
         "values": (body_loops.values, "phi", body_loops.SIGNATURE),
         "drift": (body_loops.values, "phi_t", body_loops.SIGNATURE),
         "reduced": (body_loops.reduced, "jacobian", body_loops.SIGNATURE),
@@ -190,6 +197,18 @@ def _values(count, stride, table, reals, q, qd, t, out):
         kernel_value(x, real[3 * MARKERS :], t, f)
         for r in range(ROWS):
             out[own[ROW] + r] = f[r]
+    return 0
+
+
+def _remembers(count, stride, table, reals, q, qd, t, out):
+    table, reals, q = integers(table, ANY), vector(reals, ANY), vector(q, ANY)
+    x = stack(SIZE)
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        for j in range(MARKERS):
+            k = OWNERS[j]
+            position(CODES[j], own[DIMENSION + k], own[AT + k], q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
+        real[stride - 1] = kernel_value(x, real[3 * MARKERS :], t)
     return 0
 
 

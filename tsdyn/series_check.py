@@ -85,7 +85,7 @@ def check_constraint_series(scene, constraint, name, rng):
 def _check_rows(scene, primitive, name, q, t):
     """Check the Python `series` of a primitive along a motion q; return Phi (rows,) as Truncated series."""
     kind, given = type(primitive), primitive.parameters()
-    par = [entry for value in given for entry in _entries(value, t)]
+    par = [entry for value in given for entry in _entries(value, t)] + [0.0] * kind.memory
     numbers = [entry.c[0] if isinstance(entry, Truncated) else entry for entry in par]
     rows = [_series(par[3 * i]).c for i in range(len(kind.quantities()) if "series_t" in kind.kernels else 0)]
     x, _ = along(scene, primitive, primitive.coordinates, q)

@@ -31,7 +31,7 @@ def refusal(packed):
     return (
         f"Taylor needs the series of every constraint and force, and these have none: {'; '.join(shown)}. All other "
         "methods serve: DOP853 is the nearest to it, SDIRK54 is for stiff scenes. A plug-in may be given a kernel "
-        "`series` (docs/plug-ins.md)."
+        "`series` (docs/plug-ins.md); a length, value or angle has one where it is one of ts.motions."
     )
 
 
@@ -48,7 +48,7 @@ def lacking(packed):
             continue
         if any(isinstance(value, Motion) and not value.has_series for value in given):
             found.append((constraint, _given_by(constraint, Motion)))
-        elif "series_t" not in constraint.kernels and (
+        elif "driven_series" not in constraint.kernels and (
             constraint.rheonomic or any(isinstance(value, Motion) for value in given)
         ):
             found.append((constraint, "it depends on time"))

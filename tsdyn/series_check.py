@@ -62,7 +62,7 @@ def check_constraint_series(scene, constraint, name, rng):
     if any("series" not in part.kernels for part in parts):
         return
     moved = [part for part in parts if any(isinstance(value, Motion) for value in part.parameters())]
-    if any("series_t" not in part.kernels for part in moved):
+    if any("driven_series" not in part.kernels for part in moved):
         return
     if any(isinstance(p, Motion) and p.smooth is None for part in moved for p in part.parameters()):
         return
@@ -87,7 +87,7 @@ def _check_rows(scene, primitive, name, q, t):
     kind, given = type(primitive), primitive.parameters()
     par = [entry for value in given for entry in _entries(value, t)] + [0.0] * kind.memory
     numbers = [entry.c[0] if isinstance(entry, Truncated) else entry for entry in par]
-    rows = [_series(par[3 * i]).c for i in range(len(kind.quantities()) if "series_t" in kind.kernels else 0)]
+    rows = [_series(par[3 * i]).c for i in range(len(kind.quantities()) if "driven_series" in kind.kernels else 0)]
     x, _ = along(scene, primitive, primitive.coordinates, q)
     Phi, Phi_x = _zeros(kind.rows), _zeros((kind.rows, len(x)))
     _run(kind, "phi", name, x, par, t, Phi)

@@ -54,7 +54,7 @@ loads
 landing displacement free_accelerations
 local_chart
 newton evaluate diagnostics reactions power dense
-control
+control turning
 chart rank
 branch initial start
 assemble

@@ -11,9 +11,11 @@ from examples import (
     bead_on_surface,
     drive_train,
     driven_pivot,
+    geared_pair,
     hooke_joint,
     pendulum_chain,
     plug_in_integrator,
+    screw_press,
     slider_crank,
     top,
     two_body_pendulum,
@@ -28,7 +30,12 @@ RUNS = {
     "bead_on_surface": (bead_on_surface, bead_on_surface.build, 5.0, 1e-3),
     "driven_pivot": (driven_pivot, driven_pivot.build, 3.0, 2e-4),
 }
-MECHANISMS = {"slider_crank": (slider_crank, 2.0), "hooke_joint": (hooke_joint, 3.0)}
+MECHANISMS = {
+    "slider_crank": (slider_crank, 2.0),
+    "hooke_joint": (hooke_joint, 3.0),
+    "screw_press": (screw_press, 1.5),
+    "geared_pair": (geared_pair, 1.5),
+}
 
 
 @pytest.mark.parametrize(("module", "build", "end", "step"), RUNS.values(), ids=RUNS.keys())
@@ -48,6 +55,15 @@ def test_mechanism(module, end):
         module.check(rough)
 
 
+def test_a_rheonomic_pendulum():
+    """As a plug-in and built in: to 1e-9 by DOP853 at 1e-11; by Taylor what is built in."""
+    method = ts.integrators.DOP853(rtol=1e-11, atol=1e-11)
+    for build in (driven_pivot.build, driven_pivot.build_driven):
+        driven_pivot.check(ts.simulate(build(), (0.0, 1.0), integrator=method), tol=1e-9)
+    solution = ts.simulate(driven_pivot.build_driven(), (0.0, 1.0), integrator=ts.integrators.Taylor(tol=1e-15))
+    driven_pivot.check(solution, tol=1e-9)
+
+
 @pytest.mark.parametrize(
     "module",
     [
@@ -60,6 +76,8 @@ def test_mechanism(module, end):
         plug_in_integrator,
         slider_crank,
         hooke_joint,
+        screw_press,
+        geared_pair,
     ],
 )
 def test_main_reports(module, capsys, monkeypatch):
@@ -71,9 +89,10 @@ def test_main_reports(module, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("build", "end"),
     [(build, end) for _, build, end, _ in RUNS.values()]
+    + [(driven_pivot.build_driven, 3.0)]
     + [(drive_train.build, 4.0), (plug_in_integrator.build, 2.0)]
     + [(module.build, end) for module, end in MECHANISMS.values()],
-    ids=[*RUNS, "drive_train", "plug_in_integrator", *MECHANISMS],
+    ids=[*RUNS, "driven_pivot, built in", "drive_train", "plug_in_integrator", *MECHANISMS],
 )
 def test_energy_less_work_is_constant(build, end):
     """To the tolerance, relative to what the energy's parts are."""

@@ -31,7 +31,7 @@ DRIVEN = {
     ),
     "RotationMotor": lambda a, b, f: C.RotationMotor(a, b, axis_a=(1, 2, 3), axis_b=(0.3, 0.2, 1), angle=f),
     "TranslationMotor": lambda a, b, f: C.TranslationMotor(a, b, axis_a=(1, 2, 3), point_b=(0, 1, 2), displacement=f),
-    "PointDriver": lambda a, b, f: C.PointDriver(a, b, point_a=(0, 1, 0), point_b=(1, 0, 2), path=(f, 0.3, 2.0 * f)),
+    "PointDriver": lambda a, b, f: C.PointDriver(a, b, point_a=(0, 1, 0), point_b=(1, 0, 2), path=(f, 0.3, f)),
 }
 GIVEN = {
     "motion": 0.5 + 0.3 * np.sin(2.0 * ts.motions.time) * ts.motions.Exponential(1.0, -0.3),

@@ -94,6 +94,7 @@ class Motion:
 
     def value(self, t):
         """Return (f, fd, fdd) at t, by the plain Python functions."""
+        t = t if self.smooth is None else np.float64(t)  # so that nothing raises
         try:
             with np.errstate(all="ignore"):
                 result = tuple(float(f(t)) for f in self.functions)

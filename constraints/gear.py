@@ -38,7 +38,8 @@ class Gear(Primitive):
     axis_a : array_like (3,)
         The axis, in the frame of a; scaled to unit length.
     reference_a, reference_b : array_like (3,), optional
-        Directions across the axis in the bodies' own frames, from which the turns are counted; any will do.
+        Directions across the axis in the bodies' own frames, whose angles from the line of centres are counted; by
+        default both are along it now.
     ratio : float
         Turn of b over turn of a, both against the carrier: -radius_a / radius_b of wheels that mesh on the outside,
         positive for one inside the other. Not zero.
@@ -54,7 +55,7 @@ class Gear(Primitive):
     Notes
     -----
     `Gear.at(a, b, point_a=, point_b=, axis=, ratio=)` takes the centres and the axis in the ground frame. At a start
-    the angles of a lies in (-pi, pi], unless it goes on from the state of another run.
+    theta_a lies in (-pi, pi], unless it goes on from the state of another run.
     """
 
     rows = 1
@@ -90,11 +91,14 @@ class Gear(Primitive):
         self.check()
 
     def _places(self, given):
-        """Fill in the references that were left out: as they stand, across the axis."""
+        """Fill in the references that were left out: along the line of centres, far from where angles jump."""
         axis, one, other, *points = given
         if one is None or other is None:
             u = rotation_matrix(self.a.orientation) @ self._place(self.markers[0], axis)
-            f = across(u)[0]
+            ends = [self._place(*pair) for pair in zip(self.markers[3:], points, strict=True)]
+            l = place(self.b, ends[1]) - place(self.a, ends[0])
+            sound = np.linalg.norm(np.cross(u, l)) > PARALLEL * np.linalg.norm(l)
+            f = beside(u, l)[0] if sound else across(u)[0]
             one = rotation_matrix(self.a.orientation).T @ f if one is None else one
             other = rotation_matrix(self.b.orientation).T @ f if other is None else other
         return super()._places([axis, one, other, *points])
@@ -199,9 +203,16 @@ class Gear(Primitive):
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random instance."""
-        places = {marker.argument: rng.normal(size=3) for marker in cls.markers}
-        return cls(a, b, **places, ratio=rng.uniform(0.5, 2.0))
+        """A random instance, its references and line of centres nearly across the axis."""
+        A, B = (rotation_matrix(body.orientation) for body in (a, b))
+        u, point = rng.normal(size=(2, 3))
+        f, g = across(A @ u)
+        end = place(a, point) + 1.5 * f + 0.3 * rng.normal(size=3) - b.position
+        one, other = (np.cos(c) * f + np.sin(c) * g + 0.2 * rng.normal(size=3) for c in rng.normal(size=2))
+        return cls(
+            a, b, axis_a=u, reference_a=A.T @ one, reference_b=B.T @ other, point_a=point, point_b=B.T @ end,
+            ratio=rng.uniform(0.5, 2.0),
+        )  # fmt: skip
 
 
 @kernel

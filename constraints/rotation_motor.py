@@ -90,10 +90,13 @@ class RotationMotor(FramedJoint):
 
 def geometry(joint):
     """The two bodies of a joint, or an error where it has no axis on both."""
-    if not all(isinstance(getattr(joint, name, None), np.ndarray) for name in ("axis_a", "axis_b")):
+    given = [getattr(joint, name, np.zeros(3)) for name in ("axis_a", "axis_b")]
+    pairs = [[u, v] for (_, u), (_, v) in getattr(joint, "opposed", ()) if not callable(u)]
+    known = any(np.allclose(pair, given, rtol=0.0, atol=1e-12) for pair in pairs)
+    if not known:
         raise InvalidConstraint(
             f"{joint!r} has no axis that a motor could drive; give a Revolute, Cylindrical, Translational or another "
-            "joint with axis_a and axis_b."
+            "joint that keeps axis_a along axis_b."
         )
     return joint.a, joint.b
 

@@ -818,7 +818,7 @@ def lifted(motion):
 MOTIONS = [
     *(
         case(f"not callable, {i}", lifted(m), ts.InvalidConstraint, "lift", "value", "(f, fd, fdd)")
-        for i, m in enumerate([(zero, 3.0, zero), (zero, zero), zero, (zero, None, zero), (zero,) * 4, "sin"])
+        for i, m in enumerate([(zero, 3.0, zero), (zero, zero), branch, (zero, None, zero), (zero,) * 4, "sin"])
     ),
     case("Motion of numbers", lambda w: ts.Motion(1.0, 2.0, 3.0), ts.InvalidConstraint, "(f, fd, fdd)"),
     case("nan at first", lifted((lambda t: NAN, zero, zero)), ts.InvalidConstraint, "lift", "not finite", "t = 0"),

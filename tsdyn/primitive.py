@@ -79,16 +79,16 @@ class Primitive(Attachment):
         check_slots(cls, where, InvalidConstraint)
         if getattr(cls, "series", None) is not None and any(m.code == PARAMETERS for m in markers):
             raise InvalidConstraint(f"{where}: series are for primitives on Points and Vectors only.")
-        if getattr(cls, "series_t", None) is not None and not (
-            cls.quantities() and getattr(cls, "series", None) and getattr(cls, "phi_t", None)
-        ):
-            raise InvalidConstraint(f"{where}: series_t needs `prescribed`, and the kernels phi_t and series.")
+        if getattr(cls, "series_t", None) is not None and not cls.quantities():
+            raise InvalidConstraint(f"{where}: series_t is of what is `prescribed`; name its attributes there.")
         if cls.memory not in (0, 1) or (cls.memory == 1) != (getattr(cls, "remember", None) is not None):
             raise InvalidConstraint(f"{where}: memory = 1 needs a kernel remember, and remember needs memory = 1.")
         functions = {}
         for name, arguments in {**_KERNELS, **_OPTIONAL}.items():
             if getattr(cls, name, None) is None and name in _OPTIONAL:
                 continue
+            if name == "series_t" and not {"phi_t", "series"} <= functions.keys():
+                continue  # of a subclass that has dropped one of them
             functions[name] = static_kernel(cls, name, arguments, where, InvalidConstraint)
         cls.kernels = MappingProxyType(_compile(cls, functions))
         _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls

@@ -23,7 +23,7 @@ def work(solution, trajectory):
 
 
 def _integrals(solution, trajectory, a, b, depth):
-    """The work from each a to its b; what is driven may swing often within a step, so pieces are cut until halves agree."""
+    """The work from each a to its b; what is driven may swing often in a step, so pieces are cut until halves agree."""
     done, size = _quadrature(solution, trajectory, a, b)
     if not solution.system.rheonomic[0] or depth == DEEPEST or not a.size:
         return done

@@ -417,3 +417,53 @@ def test_taylor_names_the_motor_with_a_function_of_a_user():
     scene, *_ = rotor(lambda t: 2.0 * t)
     with pytest.raises(ts.InvalidArgument, match=r"RotationMotor 'motor' turn.*its angle is a function of time"):
         ts.simulate(scene, (0.0, 1.0), integrator="taylor", initial_tol=10.0)
+
+
+def test_a_constant_angle_that_is_driven():
+    """A cone whose angle opens, about a line that turns freely."""
+    angle = M.Sine(0.3, 2.0, 0.0, 1.0)
+    scene = ts.Scene(gravity=(0, 0, 0))
+    body = scene.add_body(1.0, (1.0, 1.1, 1.2), angular_velocity=(0.0, 0.6, 0.2))
+    scene.add(C.Spherical(scene.ground, body))
+    scene.add(C.ConstantAngle(scene.ground, body, axis_a=Z, axis_b=(np.sin(1.0), 0, np.cos(1.0)), angle=angle))
+    scene.assemble()
+    for options in (METHODS["taylor"], METHODS["dop853"]):
+        solution = ts.simulate(scene, (0.0, 1.0), **options)
+        held(solution)
+        line = solution.rotation(body) @ (np.sin(1.0), 0, np.cos(1.0))
+        np.testing.assert_allclose(np.arccos(line[:, 2]), angle(solution.t), atol=1e-12)
+
+
+# motions as loads
+
+
+def pushed(load, torque):
+    scene = ts.Scene()
+    body = scene.add_body(1.0, (1.0, 1.1, 1.2), name="body")
+    scene.add(ts.forces.Spring(body, scene.ground, point_a=(0.1, 0, 0), point_b=(1, 1, 1), actuator=load, name="left"))
+    scene.add(ts.forces.Torque(body, torque=torque))
+    return scene
+
+
+def test_loads_may_be_motions():
+    """As functions of a user's, without compiling any; Taylor has no series of loads."""
+    wave = M.Sine(2.0, 3.0, 0.1)
+    one = pushed(wave, (wave, 0.3, 2.0 * M.time))
+    other = pushed(lambda t: 2.0 * np.sin(3.0 * t + 0.1), lambda t: (2.0 * np.sin(3.0 * t + 0.1), 0.3, 2.0 * t))
+    first, second = (
+        ts.simulate(scene, (0.0, 1.0), rtol=1e-9, atol=1e-9, dense_output=True).raise_if_failed()
+        for scene in (one, other)
+    )
+    assert first.method == second.method
+    assert first.method.startswith("DOP853")
+    np.testing.assert_allclose(first.q, second.q, atol=1e-12)
+    np.testing.assert_allclose(first.power, second.power, atol=1e-11)
+    assert np.ptp(first.energy - first.work) < 1e-8
+    with pytest.raises(ts.InvalidArgument, match="'left': its actuator is a function of time"):
+        ts.simulate(one, (0.0, 1.0), integrator="taylor")
+
+
+@pytest.mark.parametrize("torque", [(M.time, 0.0), (M.time, "x", 0.0), (M.time, 0.0, math.nan), M.time], ids=str)
+def test_bad_motions_as_loads(torque):
+    with pytest.raises(ts.InvalidForce, match=r"torque must be 3 of ts.motions or finite numbers"):
+        pushed(1.0, torque)

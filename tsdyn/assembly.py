@@ -32,7 +32,9 @@ def set_time(s, t):
             total += abs(s.reals[place + j])
     for i in range(s.signals.shape[0]):
         address, place, width, first, knots = s.signals[i]
-        if address != 0:
+        if knots < 0:
+            call_smooth(address, s.reals[first:], t, 1, s.reals[place:])
+        elif address != 0:
             call_signal(address, t, s.reals[place:])
         else:
             spline(t, s.reals[first:], knots, width, s.reals[place:])

@@ -7,6 +7,7 @@ import pytest
 from scenes import EPS
 
 import tsdyn as ts
+from tsdyn import expansion_pack
 
 C, M = ts.constraints, ts.motions
 X, Y, Z = np.eye(3)
@@ -346,6 +347,15 @@ def test_all_methods_agree():
     for name, q in ends.items():
         np.testing.assert_allclose(q, ends["taylor"], atol=1e-6 if name == "sdirk54" else 1e-8, err_msg=name)
     assert ts.simulate(scene, (0.0, 0.1)).method.startswith("Taylor")
+
+
+def test_series_of_many_bodies_are_the_same(monkeypatch):
+    """The loops that bring numbers into the cache ahead."""
+    ends = []
+    for limit in (expansion_pack.FAR, 0):
+        monkeypatch.setattr(expansion_pack, "FAR", limit)
+        ends.append(ts.simulate(everything(), (0.0, 0.3), **METHODS["taylor"]).raise_if_failed().q[-1])
+    np.testing.assert_array_equal(*ends)
 
 
 def test_both_forms_agree_to_rounding():

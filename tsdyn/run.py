@@ -47,6 +47,7 @@ from .run_state import (
     NEXT_EVAL,
     REJECTED,
     REJECTED_LAST,
+    SHARE,
     STAGE_AT,
     STEPS,
     STEPS_WANTED,
@@ -58,7 +59,7 @@ from .run_state import (
     load_run,
 )
 from .stepping import call_step
-from .turning import longest_step, too_far
+from .turning import GAIN, longest_step, too_far
 from .workspace import CONDITION, CONTRACTION, load
 
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
@@ -207,7 +208,7 @@ def advance(context, run, log, at, most):
             return 0
         if adaptive:
             if driven:
-                r.clock[H] = min(r.clock[H], longest_step(c.system.bodies, r.now))
+                r.clock[H] = min(r.clock[H], r.clock[SHARE] * longest_step(c.system.bodies, r.now))
             t1 = t0 + r.clock[H]
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 return NOT_FINITE if r.numbers[FAILED] == NOT_FINITE else STEP_COLLAPSED
@@ -264,6 +265,8 @@ def advance(context, run, log, at, most):
                     return status
                 r.numbers[FAILED] = status
                 r.clock[H] = 0.25 * h
+                if driven:  # nothing else keeps the next step from being as long
+                    r.clock[SHARE] *= 0.5
             retry = _begin_chart(context, w, r, log, at, BY_FAILURE)
             if retry != 0:
                 return retry
@@ -274,6 +277,7 @@ def advance(context, run, log, at, most):
             continue
         row[2] = 1.0
         r.numbers[FAILED] = 0
+        r.clock[SHARE] = min(GAIN * r.clock[SHARE], 1.0)
         leave = False
         if r.numbers[LAST_STAGE] > 0 and watch_stiffness(r, h):
             leave = r.numbers[LEAVE_WHEN_STIFF] == 1

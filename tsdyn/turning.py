@@ -10,6 +10,7 @@ from ._kernel import kernel
 
 MOST = 1.0  # rad in a step, as its start has it
 TOO_FAR = 2.5  # rad, as both ends have it
+GAIN = 1.05  # of the share of MOST that is tried, from step to step, where a chart has failed at all of it
 
 
 @kernel

@@ -14,6 +14,7 @@ from ..checks import number
 from ..errors import InvalidConstraint
 from ..joint import Joint
 from ..markers import Vector
+from ..motions import Smooth
 from .dot1 import Dot1
 
 
@@ -26,7 +27,7 @@ class ConstantAngle(Joint):
         Two different bodies of one scene.
     axis_a, axis_b : array_like (3,)
         The directions in the bodies' own frames; scaled to unit length.
-    angle : float, rad; optional
+    angle : float or one of ts.motions, rad; optional
         The angle kept, between 0 and pi (exclusive: there the row is singular); None takes that of the bodies as they
         stand now.
     name : str, optional
@@ -53,7 +54,7 @@ class ConstantAngle(Joint):
 
     def check(self):
         """An angle at which the row is regular."""
-        angle = number(self.angle)
+        angle = number(self.angle(0.0) if isinstance(self.angle, Smooth) else self.angle)
         if not (0.0 < angle < math.pi and abs(math.cos(angle)) < 1.0):
             raise InvalidConstraint(
                 f"{self.name}: angle must lie between 0 and pi rad, got {self.angle!r}; to keep two directions "
@@ -62,5 +63,5 @@ class ConstantAngle(Joint):
 
     def compose(self):
         """Eq. (1)."""
-        cosine = math.cos(self.angle)
+        cosine = np.cos(self.angle) if isinstance(self.angle, Smooth) else math.cos(self.angle)
         yield "angle", Dot1(self.a, self.b, axis_a=self.axis_a, axis_b=self.axis_b, value=cosine)

@@ -16,6 +16,7 @@ from ..errors import InvalidConstraint
 from ..markers import Point
 from ..motion import Motion
 from ..primitive import Primitive
+from ..recurrences import square
 
 
 class Distance(Primitive):
@@ -87,6 +88,11 @@ class Distance(Primitive):
         """Eq. (4)."""
         d0, d1, d2 = xd[0] - xd[3], xd[1] - xd[4], xd[2] - xd[5]
         out[0] = (d0 * d0 + d1 * d1 + d2 * d2 - par[1] * par[1] - par[0] * par[2]) / par[3]
+
+    @staticmethod
+    def series_t(x, par, k, s, out):
+        """Of Eq. (3), (L^2)' / 2; L is in row 0."""
+        out[0] = -0.5 * (k + 1.0) * square(s[0], k + 1) / par[3]
 
     @staticmethod
     def series(x, par, k, s, out):

@@ -71,6 +71,11 @@ class Dot2(Primitive):
         out[0] = 2.0 * (xd[0] * (xd[6] - xd[3]) + xd[1] * (xd[7] - xd[4]) + xd[2] * (xd[8] - xd[5])) - par[2]
 
     @staticmethod
+    def series_t(x, par, k, s, out):
+        """Of Eq. (3); c is in row 0."""
+        out[0] = -(k + 1.0) * s[0, k + 1]
+
+    @staticmethod
     def series(x, par, k, s, out):
         """Of Eq. (2)."""
         for i in range(3):

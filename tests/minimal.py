@@ -15,6 +15,7 @@ import tsdyn as ts
 C = ts.constraints
 X, Y, Z = np.eye(3)
 TILT = 0.7  # rad, of ConstantAngle
+LEAD = 0.2  # m/rad, of Screw
 CONE = np.array([np.sin(TILT), 0.0, np.cos(TILT)])
 
 
@@ -30,7 +31,8 @@ class Link(NamedTuple):
     turn: np.ndarray  # (3, 3) of the body's own frame in the frame reached
 
 
-# relative coordinates of each joint, from its first body to its second: ("turn" or "slide", axis in the joint's frame);
+# relative coordinates of each joint, from its first body to its second: (what, axis in the joint's frame), what being
+# "turn", "slide" or "screw", which is both;
 # then the joint itself from the ground-frame geometry at x = 0: point P, columns Q of its frame
 SLIDES = [("slide", X), ("slide", Y), ("slide", Z)]
 TURNS = [("turn", X), ("turn", Y), ("turn", Z)]
@@ -40,6 +42,7 @@ JOINTS = {
         [("slide", Z), ("turn", Z)],
         lambda a, b, P, Q, **o: C.Cylindrical.at(a, b, point=P, axis=Q[:, 2], **o),
     ),
+    "Screw": ([("screw", Z)], lambda a, b, P, Q, **o: C.Screw.at(a, b, point=P, axis=Q[:, 2], lead=LEAD, **o)),
     "Translational": ([("slide", Z)], lambda a, b, P, Q, **o: C.Translational.at(a, b, point=P, axis=Q[:, 2], **o)),
     "Universal": (
         [("turn", X), ("turn", Y)],
@@ -116,7 +119,12 @@ def poses(links, x, xd):
         for what, axis in JOINTS[link.kind][0]:
             local = link.frame @ axis
             u = A @ local
-            if what == "turn":
+            if what == "screw":
+                travel = LEAD * x[k]
+                r, v, a, Jv = shifted(u * travel)
+                v, a = v + u * LEAD * xd[k], a + 2.0 * np.cross(w, u) * LEAD * xd[k]
+                Jv[:, k] += LEAD * u
+            if what != "slide":
                 alpha = alpha + np.cross(w, u) * xd[k]
                 w = w + u * xd[k]
                 Jw = Jw.copy()

@@ -23,7 +23,7 @@ FILES = {
 LAYERS = """
 _cache errors _discovery jet truncated checks aligned
 _kernel
-_four rotation linalg motion signal angle recurrences
+_four rotation linalg motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
 markers bodies tableau friction
 poses
@@ -56,14 +56,14 @@ loads
 landing displacement free_accelerations uniqueness
 local_chart
 newton evaluate diagnostics reactions power dense
-control
+control turning
 chart rank
 branch initial start kinetic
 approach folds dependence
 conflict mobility
 assemble
 null_space tangent scene
-maggi_kane linearise
+maggi_kane linearise driven
 series_steps
 taylor expansion_pack
 series_memory

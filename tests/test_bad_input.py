@@ -154,13 +154,29 @@ KINDS = {
     "ConstantAngle": {"axis_a": (1, 0, 0), "axis_b": (0, 1, 0)},
     "PointOnLine": {"axis_b": (1, 0, 0)},
     "Fixed": {},
+    "RotationMotor": {"axis_a": (1, 0, 0), "axis_b": (1, 0, 0), "angle": 0.5},
+    "TranslationMotor": {"axis_a": (1, 0, 0)},
+    "PointDriver": {"path": (0.0, 0.0, 0.0)},
+    "AngleDriver": {"reference_a": (1, 0, 0), "across_a": (0, 1, 0), "reference_b": (1, 0, 0)},
+    "Thread": {
+        "reference_a": (1, 0, 0),
+        "across_a": (0, 1, 0),
+        "axis_a": (0, 0, 1),
+        "reference_b": (1, 0, 0),
+        "lead": 0.1,
+    },
+    "Screw": {"axis_a": (1, 0, 0), "axis_b": (1, 0, 0), "lead": 0.1},
+    "RackAndPinion": {"axis_a": (1, 0, 0), "axis_b": (1, 0, 0), "direction_a": (0, 1, 0), "radius": 0.1},
+    "Gear": {"axis_a": (0, 0, 1), "ratio": -1.0},
 }
 ALL = [kind.__name__ for kind in (*C.registered(), *C.registered_joints()) if kind.__module__.startswith("tsdyn.")]
-POINTLESS = ("Dot1", "Parallel", "ConstantAngle")
+POINTLESS = ("Dot1", "Parallel", "ConstantAngle", "AngleDriver")
 POINTS = [(kind, f"point_{x}") for kind in KINDS if kind not in POINTLESS for x in "ab"]
-AXES = [(kind, name) for kind, arguments in KINDS.items() for name in arguments if name.startswith(("axis", "normal"))]
+DIRECTIONS = ("axis", "normal", "across", "reference", "direction")
+AXES = [(kind, name) for kind, arguments in KINDS.items() for name in arguments if name.startswith(DIRECTIONS)]
 OPTIONAL = [("Fixed", "axis_a"), ("Fixed", "axis_b")]
-OPTIONAL += [(kind, f"reference_{x}") for kind in ("Fixed", "Translational") for x in "ab"]
+OPTIONAL += [(kind, f"reference_{x}") for kind in ("Fixed", "Translational", "RotationMotor", "Screw") for x in "ab"]
+OPTIONAL += [("Gear", "reference_a"), ("Gear", "reference_b"), ("RackAndPinion", "reference_b")]
 PAIRS = [
     ("itself", lambda w: (w.rod, w.rod), ("rod", "itself")),
     ("both ground", lambda w: (w.ground, w.ground), ("ground",)),
@@ -181,6 +197,14 @@ def made(kind, pair=lambda w: (w.rod, w.ground), **arguments):
 def placed(kind, pair=lambda w: (w.rod, w.ground), **arguments):
     given = {"ConstantAngle": {"axis_a": (1, 0, 0), "axis_b": (0, 1, 0)}, "Parallel": {"axis": (1, 0, 0)}}
     given |= {"Spherical": {"point": (0, 0, 0)}, "Universal": {"point": (0, 0, 0), "axis": (0, 1, 0)}}
+    given |= {
+        "PointDriver": {"point": (0, 0, 0), "path": (0, 0, 0)},
+        "AngleDriver": {"reference": (1, 0, 0), "across": (0, 1, 0)},
+        "Thread": {"point": (0, 0, 0), "axis": (0, 0, 1), "reference": (1, 0, 0), "across": (0, 1, 0), "lead": 1.0},
+        "Screw": {"point": (0, 0, 0), "axis": (1, 0, 0), "lead": 1.0},
+        "RackAndPinion": {"point": (0, 0, 0), "axis": (1, 0, 0), "direction": (0, 1, 0), "radius": 1.0},
+        "Gear": {"point_a": (1, 0, 0), "point_b": (0, 0, 0), "axis": (0, 0, 1), "ratio": 2.0},
+    }
     given = given.get(kind, {"point": (0, 0, 0), "axis": (1, 0, 0)})
     return lambda w: getattr(C, kind).at(*pair(w), **{"name": "joint", **given, **arguments})
 
@@ -193,8 +217,21 @@ def one(t):
     return 1.0
 
 
-NO_LENGTH = (0.0, -1.0, NAN, INF, "2", "x", 1j, [1.0], (1.0, 2.0, 3.0), one, (one, zero), 10**400)
-NO_VALUE = (NAN, INF, None, "0.5", "x", 1j, (1.0, 2.0, 3.0), zero, (zero, zero))
+def branch(t):
+    return 1.0 if t < 2.0 else 2.0
+
+
+NO_LENGTH = (0.0, -1.0, NAN, INF, "2", "x", 1j, [1.0], (1.0, 2.0, 3.0), zero, branch, (one, zero), 10**400)
+NO_VALUE = (NAN, INF, None, "0.5", "x", 1j, (1.0, 2.0, 3.0), branch, (zero, zero))
+
+
+def broken_later(w, kind, name):
+    """Set an attribute of a constraint that is in its scene to zero."""
+    constraint = w.scene.add(made(kind)(w))
+    setattr(constraint, name, 0.0)
+
+
+NO_TRAVEL = (0.0, NAN, INF, None, "1", 1j, [1.0], one)
 ON_BEAD = [
     ("Spherical", (lambda w: (w.bead, w.ground)), {"point_a": (1, 0, 0)}, ts.InvalidConstraint, "point_a"),
     ("Distance", (lambda w: (w.rod, w.bead)), {"point_b": (1, 0, 0)}, ts.InvalidConstraint, "point_b"),
@@ -251,6 +288,77 @@ CONSTRAINTS = [
     *(
         case(f"ConstantAngle: angle {text(v)}", made("ConstantAngle", angle=v), ts.InvalidConstraint, "joint", "angle")
         for v in (0.0, math.pi, -1.0, 4.0, 1e-12, NAN, INF, "1", 1j, [1.0], (one, zero, zero))
+    ),
+    *(
+        case(f"{kind}: {name} {text(v)}", made(kind, **{name: v}), ts.InvalidConstraint, "joint", name)
+        for kind, name in (
+            ("AngleDriver", "angle"),
+            ("RotationMotor", "angle"),
+            ("TranslationMotor", "displacement"),
+        )
+        for v in NO_VALUE
+    ),
+    *(
+        case(f"PointDriver: path {text(v)}", made("PointDriver", path=v), ts.InvalidConstraint, "joint", "path")
+        for v in (
+            None,
+            1.0,
+            one,
+            (0.0, 0.0),
+            "abc",
+            (0.0, 0.0, NAN),
+            (0.0, branch, 0.0),
+            [0.0] * 4,
+            (0, 0, (one, zero)),
+        )
+    ),
+    *(
+        case(f"{kind}: {name} {text(v)}", made(kind, **{name: v}), ts.InvalidConstraint, "joint", name)
+        for kind, name in (("Thread", "lead"), ("Screw", "lead"), ("RackAndPinion", "radius"), ("Gear", "ratio"))
+        for v in NO_TRAVEL
+    ),
+    case("Screw without a lead", made("Screw", lead=0.0), ts.InvalidConstraint, "joint", "lead", "Revolute"),
+    *(
+        case(f"Gear: offset {text(v)}", made("Gear", offset=v), ts.InvalidConstraint, "joint", "offset")
+        for v in (NAN, INF, "1", 1j, [1.0])
+    ),
+    case("Gear: centres on the axis", made("Gear", axis_a=(1, 0, 0)), ts.InvalidConstraint, "joint", "line of centres"),
+    *(
+        case(f"Gear: {name} along the axis", made("Gear", **{name: (0, 0, 2)}), ts.InvalidConstraint, "joint", name)
+        for name in ("reference_a", "reference_b")
+    ),
+    *(
+        case(f"{kind}: {name} along the axis", made(kind, **{name: (2, 0, 0)}), ts.InvalidConstraint, "joint", name)
+        for kind in ("RotationMotor", "Screw", "RackAndPinion")
+        for name in ("reference_a", "reference_b")
+        if (kind, name) != ("RackAndPinion", "reference_a")
+    ),
+    case(
+        "RackAndPinion: along the axis",
+        made("RackAndPinion", direction_a=(1, 1, 0)),
+        ts.InvalidConstraint,
+        "joint",
+        "direction_a",
+        "45 degrees",
+    ),
+    *(
+        case(f"{kind}.of {what}", lambda w, k=kind, n=name, j=joint: getattr(C, k).of(j(w), **{n: 0.0}), *rest)
+        for kind, name in (("RotationMotor", "angle"), ("TranslationMotor", "displacement"))
+        for what, joint in (("Spherical", lambda w: w.pivot), ("a body", lambda w: w.rod), ("None", lambda w: None))
+        for rest in [(ts.InvalidConstraint, "no axis", "Revolute")]
+    ),
+    *(
+        case(f"set {kind}.{name}", lambda w, k=kind, n=name: setattr(made(k)(w), n, "x"), ts.InvalidConstraint, name)
+        for kind, name in (
+            ("RotationMotor", "angle"),
+            ("TranslationMotor", "displacement"),
+            ("PointDriver", "path"),
+        )
+    ),
+    *(
+        case(f"set {kind}.{name} in a scene", lambda w, k=kind, n=name: broken_later(w, k, n), *rest)
+        for kind, name in (("Screw", "lead"), ("RackAndPinion", "radius"), ("Gear", "ratio"), ("Thread", "lead"))
+        for rest in [(ts.InvalidConstraint, name, "joint")]
     ),
     case(
         "ConstantAngle of parallel axes",
@@ -710,7 +818,7 @@ def lifted(motion):
 MOTIONS = [
     *(
         case(f"not callable, {i}", lifted(m), ts.InvalidConstraint, "lift", "value", "(f, fd, fdd)")
-        for i, m in enumerate([(zero, 3.0, zero), (zero, zero), zero, (zero, None, zero), (zero,) * 4, "sin"])
+        for i, m in enumerate([(zero, 3.0, zero), (zero, zero), branch, (zero, None, zero), (zero,) * 4, "sin"])
     ),
     case("Motion of numbers", lambda w: ts.Motion(1.0, 2.0, 3.0), ts.InvalidConstraint, "(f, fd, fdd)"),
     case("nan at first", lifted((lambda t: NAN, zero, zero)), ts.InvalidConstraint, "lift", "not finite", "t = 0"),

@@ -359,3 +359,61 @@ report(q=end.q.tolist(), debug=_kernel.DEBUG)
     assert (compiled["debug"], plain["debug"]) == (False, True)
     assert plain["misses"] == plain["hits"] == 0
     assert [pytest.approx(row, abs=1e-15) for row in compiled["q"]] == plain["q"]
+
+
+DRIVEN = (
+    REPORT
+    + """
+import numpy as np
+import tsdyn as ts
+C, M = ts.constraints, ts.motions
+def scene(angle, travel):
+    scene = ts.Scene()
+    wheel = scene.add_body(1.0, (1.0, 1.0, 1.0))
+    hinge = scene.add(C.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1)))
+    scene.add(C.RotationMotor.of(hinge, angle=angle))
+    other = scene.add_body(1.0, (1.0, 1.0, 1.0), position=(2.0, 0.0, 0.0))
+    scene.add(C.Revolute.at(scene.ground, other, point=(2, 0, 0), axis=(0, 0, 1)))
+    scene.add(C.Gear.at(wheel, other, point_a=(0, 0, 0), point_b=(2, 0, 0), axis=(0, 0, 1), ratio=-0.7))
+    nut = scene.add_body(1.0, (1.0, 1.0, 1.0))
+    scene.add(C.Screw.at(scene.ground, nut, point=(0, 0, 0), axis=(1, 0, 0), lead=0.1))
+    bead = scene.add_point_mass(1.0)
+    scene.add(C.PointDriver(scene.ground, bead, path=(travel, 0.0, travel)))
+    return scene
+ends = []
+for angle, travel in ((M.Sine(1.0, 2.0), M.Polynomial((0, 0, 1))), MORE):
+    for method in ("taylor", "dop853"):
+        ends.append(ts.simulate(scene(angle, travel), (0.0, 0.1), integrator=method, initial_tol=10.0).q[-1].tolist())
+alone = scene(lambda t: t + 0.1 * np.sin(t), lambda t: t * t)
+ends.append(ts.simulate(alone, (0.0, 0.1), integrator="dop853", initial_tol=10.0).q[-1].tolist())
+report(q=ends)
+"""
+)
+
+
+def test_new_motions_compile_nothing(warm):
+    """Whatever is prescribed is numbers for kernels that are there."""
+    few, more = "(M.Ramp(), M.Ramp())", "(np.tanh(M.Ramp(0.0, 3.0)), M.Exponential(1.0, 2.0) * M.Sine(1.0, 3.0))"
+    first, _ = run(DRIVEN.replace("MORE", few), warm)
+    second, errors = run(DRIVEN.replace("MORE", more), warm)
+    assert second["misses"] == 0
+    assert "compiling" not in errors
+    assert second["q"][0] == first["q"][0]
+
+
+def test_a_scene_without_motions_loads_none_of_it():
+    code = (
+        REPORT
+        + """
+from examples import slider_crank
+from tsdyn.motion_program import run_program
+for method in ("taylor", "dop853"):
+    tsdyn.simulate(slider_crank.build(), (0.0, 0.01), integrator=method)
+kinds = [kind.kernels for kind in tsdyn.constraints.registered()]
+loaded = [name for kernels in kinds for name, kernel in kernels.items() if kernel._address is not None]
+report(program=run_program._address is not None, loaded=loaded)
+"""
+    )
+    found, _ = run(code, {})
+    assert not found["program"]
+    assert not {"driven_series", "far_driven_series", "remember", "drift", "phi_t"} & set(found["loaded"])

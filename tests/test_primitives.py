@@ -8,6 +8,7 @@ import pytest
 import tsdyn as ts
 from examples.bead_on_surface import OnEllipsoid
 from examples.driven_pivot import DrivenPivot
+from tsdyn.series_check import check_constraint_series
 
 C = ts.constraints
 BUILT_IN = [kind for kind in C.registered() if kind.__module__.startswith("tsdyn.")]
@@ -21,10 +22,36 @@ RHEONOMIC = {
     "Dot1": lambda a, b: C.Dot1(a, b, axis_a=(1, 2, 3), axis_b=(0.3, 0.2, 1), value=WAVE),
     "Dot2": lambda a, b: C.Dot2(a, b, axis_a=(1, 2, 3), point_a=(0, 1, 0), point_b=(0.3, 0.2, 1), value=WAVE),
 }
+DRIVEN = {
+    "Distance": lambda a, b, f: C.Distance(a, b, point_a=(1, 2, 3), point_b=(0.3, 0.2, 1), length=f),
+    "Dot1": lambda a, b, f: C.Dot1(a, b, axis_a=(1, 2, 3), axis_b=(0.3, 0.2, 1), value=f),
+    "Dot2": lambda a, b, f: C.Dot2(a, b, axis_a=(1, 2, 3), point_a=(0, 1, 0), point_b=(0.3, 0.2, 1), value=f),
+    "AngleDriver": lambda a, b, f: C.AngleDriver(
+        a, b, reference_a=(1, 2, 3), across_a=(0, 1, 1), reference_b=(2, 0, 1), angle=f
+    ),
+    "RotationMotor": lambda a, b, f: C.RotationMotor(a, b, axis_a=(1, 2, 3), axis_b=(0.3, 0.2, 1), angle=f),
+    "TranslationMotor": lambda a, b, f: C.TranslationMotor(a, b, axis_a=(1, 2, 3), point_b=(0, 1, 2), displacement=f),
+    "PointDriver": lambda a, b, f: C.PointDriver(a, b, point_a=(0, 1, 0), point_b=(1, 0, 2), path=(f, 0.3, f)),
+}
+GIVEN = {
+    "motion": 0.5 + 0.3 * np.sin(2.0 * ts.motions.time) * ts.motions.Exponential(1.0, -0.3),
+    "function": lambda t: 0.5 + 0.3 * np.sin(2.0 * t) * np.exp(-0.3 * t),
+    "three functions": WAVE,
+}
 
 
 def test_every_primitive_is_registered():
-    names = {"Distance", "Dot1", "Dot2", "EulerNormalization", "PlaneContact", "Spherical"}
+    names = {
+        "AngleDriver",
+        "Distance",
+        "Dot1",
+        "Dot2",
+        "EulerNormalization",
+        "Gear",
+        "PlaneContact",
+        "Spherical",
+        "Thread",
+    }
     assert {kind.__name__ for kind in BUILT_IN} >= names
 
 
@@ -37,6 +64,31 @@ def test_kernels_are_the_derivatives_of_phi(kind, seed):
 @pytest.mark.parametrize("make", RHEONOMIC.values(), ids=RHEONOMIC.keys())
 def test_kernels_with_a_motion(make):
     ts.testing.check_primitive(make)
+
+
+@pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
+@pytest.mark.parametrize("make", DRIVEN.values(), ids=DRIVEN)
+def test_kernels_and_series_of_what_is_driven(make, given):
+    """phi, jacobian, phi_t and gamma; of a motion the coefficients of Phi_x, Phi_t and Phi, too."""
+    ts.testing.check_primitive(lambda a, b: make(a, b, given), states=2)
+
+
+@pytest.mark.parametrize("kind", [C.Distance, C.Dot1, C.Dot2, C.AngleDriver], ids=lambda kind: kind.__name__)
+def test_checker_names_a_broken_series_of_phi_t(kind):
+    good = kind.series_t
+
+    def spoil(x, par, k, s, out):
+        good(x, par, k, s, out)
+        if k == 3:
+            out[0] += 1e-6
+
+    Broken = type(kind.__name__, (kind,), {"series_t": staticmethod(spoil)})
+    scene, rng = ts.Scene(), np.random.default_rng(2)
+    a, b = (scene.add_body(1.0, (1, 1, 1), position=rng.normal(size=3), orientation=unit(rng)) for _ in range(2))
+    constraint = DRIVEN[kind.__name__](a, b, GIVEN["motion"])
+    constraint.__class__ = Broken
+    with pytest.raises(ts.testing.CheckFailed, match=r"coefficient 3 of phi_t\[0\]"):
+        check_constraint_series(scene, constraint, "it", rng)
 
 
 def broken(kind, name, entry):

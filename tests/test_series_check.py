@@ -93,7 +93,9 @@ def pair():
     return scene, *scene.bodies, rng
 
 
-@pytest.mark.parametrize("kind", [C.Spherical, C.Distance, C.Dot1, C.Dot2, C.PlaneContact, Rod])
+@pytest.mark.parametrize(
+    "kind", [C.Spherical, C.Distance, C.Dot1, C.Dot2, C.PlaneContact, C.AngleDriver, C.Thread, C.Gear, Rod]
+)
 def test_checker_names_the_coefficient_of_a_constraint(kind):
     wrong, place = broken(kind)
     scene, a, b, rng = pair()

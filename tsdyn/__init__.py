@@ -6,7 +6,7 @@ _here = _Path(__file__).parent
 if not (_here / "constraints").is_dir():  # a checkout: they stand beside this folder
     __path__.append(str(_here.parent))
 
-from . import constraints, forces, integrators, testing  # noqa: E402
+from . import constraints, forces, integrators, motions, testing  # noqa: E402
 from ._kernel import kernel  # noqa: E402
 from .benchmark import benchmark  # noqa: E402
 from .bodies import Body, PointMass  # noqa: E402
@@ -85,6 +85,7 @@ __all__ = [
     "forces",
     "integrators",
     "kernel",
+    "motions",
     "plots",
     "profile",
     "simulate",

@@ -7,6 +7,7 @@ from .curvature import SIGNATURE as CURVATURE_SIGNATURE
 from .force_loops import JACOBIAN as FORCE_JACOBIAN_SIGNATURE
 from .force_pack import F_COUNT, F_FIRST_INT, F_FIRST_REAL, F_KEPT, F_REALS, F_REMEMBER, FORCE, FORCE_JACOBIAN
 from .motion import call_motion
+from .motion_program import call_smooth
 from .primitive import call_kind
 from .signal import call_signal, spline
 from .system import COUNT, CURVATURE, FIRST_INT, FIRST_REAL, GAMMA, JACOBIAN, PHI, PHI_T, REALS
@@ -22,12 +23,18 @@ def set_time(s, t):
     total = 0.0
     for i in range(s.motions.shape[0]):
         place = s.motions[i, 3]
+        if s.motions[i, 1] == 0:
+            call_smooth(s.motions[i, 0], s.reals[s.motions[i, 4] :], t, 3, s.reals[place:])
+            s.reals[place + 2] *= 2.0
         for j in range(3):
-            s.reals[place + j] = call_motion(s.motions[i, j], t)
+            if s.motions[i, 1] != 0:
+                s.reals[place + j] = call_motion(s.motions[i, j], t)
             total += abs(s.reals[place + j])
     for i in range(s.signals.shape[0]):
         address, place, width, first, knots = s.signals[i]
-        if address != 0:
+        if knots < 0:
+            call_smooth(address, s.reals[first:], t, 1, s.reals[place:])
+        elif address != 0:
             call_signal(address, t, s.reals[place:])
         else:
             spline(t, s.reals[first:], knots, width, s.reals[place:])
@@ -96,9 +103,12 @@ def applied_forces(s, q, qd, t, Q):
 
 @kernel
 def remember(s, q, qd, t, out):
-    """Let the forces that do remember this accepted point; out (slots,) is what they remember."""
+    """Let the forces and constraints that do remember this accepted point; out (slots,) is what they remember."""
     if s.memory.size > 0:
         _run_forces(s, F_REMEMBER, q, qd, t, out)
+        for i in range(s.counters.shape[0]):
+            address, count, stride, table, reals = s.counters[i]
+            call_kind(address, count, stride, s.table[table:], s.reals[reals:], q, qd, t, out)
         for i in range(s.memory.size):
             out[i] = s.reals[s.memory[i]]
 

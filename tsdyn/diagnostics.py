@@ -25,31 +25,35 @@ class ConstraintError(NamedTuple):
     acceleration: np.ndarray
 
 
-def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0):
+def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0, memory=None):
     """Phi and its first two time derivatives along a trajectory of a packed scene: three arrays (k, m).
 
-    With time_rate=0 time stands still: the derivatives are those along (qd, qdd) alone.
+    With time_rate=0 time stands still: the derivatives are those along (qd, qdd) alone. memory (k, slots) is what
+    constraints remember.
     """
     levels = tuple(np.zeros((t.size, len(packed.system.segments))) for _ in range(3))
-    for rows, part in _groups(packed, t, q, qd, qdd, time_rate):
+    for rows, part in _groups(packed, t, q, qd, qdd, time_rate, memory):
         for level, values in zip(levels, part, strict=True):
             level[:, rows] = values
     return levels
 
 
-def constraint_error(packed, t, q, qd, qdd):
+def constraint_error(packed, t, q, qd, qdd, memory=None):
     """Maximum norms of `constraint_rows` over the rows."""
     worst = np.zeros((3, t.size))
-    for _, part in _groups(packed, t, q, qd, qdd, 1.0):
+    for _, part in _groups(packed, t, q, qd, qdd, 1.0, memory):
         for level, values in zip(worst, part, strict=True):
             np.maximum(level, np.abs(values).max(axis=1), out=level)
     return ConstraintError(*worst)
 
 
-def _groups(packed, t, q, qd, qdd, time_rate):
+def _groups(packed, t, q, qd, qdd, time_rate, memory):
     """Yield rows of Phi (r,) and their three levels, (k, r) each: constraints of one form at a time."""
     starts, groups, row = starts_of(packed), {}, 0
-    for constraint, values, places in zip(packed.constraints, packed.parameters, packed.coordinates, strict=True):
+    lists = packed.constraints, packed.parameters, packed.coordinates, packed.slots
+    for constraint, values, places, slot in zip(*lists, strict=True):
+        if slot >= 0:
+            values = *values, np.zeros(t.size) if memory is None else memory[:, slot]
         bodies = tuple(constraint.body_of(marker) for marker in constraint.markers)
         form = (
             type(constraint),
@@ -90,11 +94,12 @@ def _levels(constraint, members, t, q, qd, qdd, time_rate):
 
 def _parameter(given, t, rate):
     """One parameter of some instances, (instances,) or one number for all, or Jets (k, instances) of Motions."""
+    if isinstance(given[0], np.ndarray):  # what each remembers
+        return [np.transpose(given)]
     if not isinstance(given[0], Motion):
         same = all(value == given[0] for value in given)
         return [given[0] if same else np.array(given)]
-    columns = [[[function(time) for time in t] for function in value.functions] for value in given]
-    f, fd, fdd = np.array(columns, dtype=float).reshape(len(given), 3, t.size).transpose(1, 2, 0)
+    f, fd, fdd = np.array([value.over(t) for value in given]).reshape(len(given), 3, t.size).transpose(1, 2, 0)
     return [Jet(f, rate * fd, rate * rate * fdd), Jet(fd, rate * fdd), Jet(fdd)]
 
 

@@ -11,10 +11,11 @@ from .body_loops import INTS, MASK
 from .errors import InvalidConstraint, InvalidForce
 from .force_pack import F_FIRST_REAL, F_REALS, members_of
 from .motion import Motion
-from .network import N_COUNT, N_FIRST_INT, thin
-from .series_loops import BODY_ROW, GROUND, instance_width
+from .network import DRIFT, N_COUNT, N_FIRST_INT, thin
+from .series_loops import BODY_ROW, GROUND, instance_width, scratch_at
 from .series_state import Expansion
 from .signal import Signal, Table
+from .system import classes
 
 SHOWN = 5  # in a message
 FAR = 1 << 15  # orders of all bodies, each some hundred bytes
@@ -30,7 +31,7 @@ def refusal(packed):
     return (
         f"Taylor needs the series of every constraint and force, and these have none: {'; '.join(shown)}. All other "
         "methods serve: DOP853 is the nearest to it, SDIRK54 is for stiff scenes. A plug-in may be given a kernel "
-        "`series` (docs/plug-ins.md)."
+        "`series` (docs/plug-ins.md); a length, value or angle has one where it is one of ts.motions."
     )
 
 
@@ -45,9 +46,11 @@ def lacking(packed):
     for constraint, given in zip(packed.constraints, packed.parameters, strict=True):
         if constraint.normalises:
             continue
-        if any(isinstance(value, Motion) for value in given):
+        if any(isinstance(value, Motion) and not value.has_series for value in given):
             found.append((constraint, _given_by(constraint, Motion)))
-        elif constraint.rheonomic:
+        elif "driven_series" not in constraint.kernels and (
+            constraint.rheonomic or any(isinstance(value, Motion) for value in given)
+        ):
             found.append((constraint, "it depends on time"))
         elif "series" not in constraint.kernels:
             found.append((constraint, f"{constraint._kind()} has no kernel `series`"))
@@ -66,7 +69,7 @@ def _label(item):
 def _given_by(item, kind):
     """Which attribute is a function of time, or a table."""
     for name, value in vars(item).items():
-        if isinstance(value, kind):
+        if isinstance(value, kind) and not getattr(value, "has_series", False):
             table = isinstance(getattr(value, "source", None), Table)
             return f"its {name} is {'a table' if table else 'a function of time'}"
     return "it has a function of time"
@@ -85,7 +88,7 @@ def is_far(network, highest):
 def allocate_expansion(network, kinds, packed, highest):
     """Lay out the series of a run, room for orders up to the highest (of omega'); the loops are loaded now."""
     orders, nb = room(highest), len(network.bodies)
-    loop = "far_series" if is_far(network, highest) else "series"
+    loops = ("far_series", "far_driven_series") if is_far(network, highest) else ("series", "driven_series")
     bodies = zeros((nb + 1) * orders * BODY_ROW)
     bodies.reshape(nb + 1, -1)[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
     places, total = np.zeros((len(kinds), 3), np.int64), 0
@@ -93,19 +96,48 @@ def allocate_expansion(network, kinds, packed, highest):
         first, count = network.kinds[i, N_FIRST_INT], int(network.kinds[i, N_COUNT])
         masks = network.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
         varies = bool((masks & ((1 << GROUND) - 1)).any())
-        width = instance_width(len(kind.markers), kind.rows, kind.slots, orders, varies)
-        places[i] = address(kind.kernels, loop, kind.__name__, InvalidConstraint), total, width
+        driven = bool(network.kinds[i, DRIFT])
+        slots = kind.slots + (len(kind.quantities()) if driven else 0)
+        width = instance_width(len(kind.markers), kind.rows, slots, orders, varies, driven)
+        places[i] = address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint), total, width
         total += count * width
     forces, table, loads = _forces(packed, orders)
+    constraints = zeros(total + 4)
     return Expansion(
         order=np.array([highest, orders, highest, highest, highest]),
         bodies=bodies,
-        constraints=zeros(total + 4),
+        constraints=constraints,
         places=places,
         forces=forces,
         table=table,
         loads=loads,
+        motions=_motions(network, kinds, packed, orders, places, constraints),
     )
+
+
+def _motions(network, kinds, packed, orders, places, constraints):
+    """Expansion.motions; what is prescribed and constant is written now."""
+    place = {kind: i for i, kind in enumerate(kinds)}
+    motions, rows = iter(packed.system.motions), []
+    for kind in classes(packed):
+        i = place.get(kind)
+        driven = i is not None and network.kinds[i, DRIFT] != 0
+        at = 0
+        for constraint, given in zip(packed.constraints, packed.parameters, strict=True):
+            if type(constraint) is not kind or not driven:
+                continue
+            first = places[i, 1] + at * places[i, 2] + scratch_at(len(kind.markers), kind.rows, orders, True)
+            at, entry = at + 1, 0
+            for j in range(len(kind.quantities())):
+                row = first + (kind.slots + j) * orders
+                moves = isinstance(given[entry], Motion)
+                if moves:
+                    address_, _, _, _, program = next(motions)
+                    rows.append([address_, program, row])
+                else:
+                    constraints[row] = given[entry]
+                entry += 1 if moves else 3
+    return np.array(rows, np.int64).reshape(-1, 3)
 
 
 def _forces(packed, orders):
@@ -137,11 +169,12 @@ def masks(network, packed, kinds):
         motions, patterns, series = {}, {}, twin(kind.series)
         for i, (constraint, par) in enumerate(members):
             grounded = tuple(isinstance(constraint.body_of(marker), Ground) for marker in kind.markers)
-            if (grounded, par) not in patterns:
+            key = grounded, tuple(Motion.numbers(par))
+            if key not in patterns:
                 if grounded not in motions:
                     motions[grounded] = _random_motion(grounded)
-                patterns[grounded, par] = _mask(kind, series, par, grounded, motions[grounded])
-            mask = network.table[row[N_FIRST_INT] + i * INTS + MASK] = patterns[grounded, par]
+                patterns[key] = _mask(kind, series, key[1], grounded, motions[grounded])
+            mask = network.table[row[N_FIRST_INT] + i * INTS + MASK] = patterns[key]
             constant += len(kind.markers) - (mask & ((1 << GROUND) - 1)).bit_count()
     return constant
 
@@ -154,7 +187,9 @@ def _random_motion(grounded):
 
 
 def _mask(kind, series, par, grounded, motion):
-    scratch, varies = np.zeros((kind.slots, len(motion))), np.zeros(len(motion[0]), bool)
+    prescribed = np.random.default_rng(1).normal(size=(len(kind.quantities()), len(motion)))
+    scratch = np.concatenate((np.zeros((kind.slots, len(motion))), prescribed))
+    varies = np.zeros(len(motion[0]), bool)
     for k, x in enumerate(motion):
         out = np.zeros((kind.rows, len(x)))
         series(x, par, k, scratch, out)

@@ -13,6 +13,7 @@ from .signal import Signal, Table
 FORCE, FORCE_JACOBIAN, F_COUNT, F_REALS, F_FIRST_INT, F_FIRST_REAL, F_REMEMBER, F_KEPT, FORCE_COLUMNS = range(9)
 # columns of System.signals: the function's address, zero for a table; its places in reals; a table's numbers in reals
 S_ADDRESS, S_PLACE, S_WIDTH, S_FIRST, S_KNOTS = range(5)
+PROGRAM = -1  # of knots: the numbers are a motion's program
 
 
 class Load(NamedTuple):
@@ -37,7 +38,7 @@ def pack_forces(forces, where, table, reals):
     for force in forces:
         groups.setdefault(id(force.kernels), []).append(force)  # user functions have kernels of their own
     rows, signals, memory, loads = [], [], [], {}
-    tables = {}
+    tables, programs = {}, []
     for members in groups.values():
         kernels = members[0].kernels
         force_address = _address(members[0], "force")
@@ -52,7 +53,11 @@ def pack_forces(forces, where, table, reals):
                 if not isinstance(value, Signal):
                     reals.append(float(value))
                     continue
-                signals.append([value.address, len(reals), value.width, 0, 0])
+                for i, motion in enumerate(value.smooth):
+                    signals.append([value.address, len(reals) + i, 1, 0, PROGRAM])
+                    programs.append((signals[-1], motion))
+                if not value.smooth:
+                    signals.append([value.address, len(reals), value.width, 0, 0])
                 if isinstance(value.source, Table):
                     tables.setdefault(id(value.source), (value.source, []))[1].append(signals[-1])
                 reals += [np.nan] * value.width  # until the time is set
@@ -73,6 +78,9 @@ def pack_forces(forces, where, table, reals):
         for signal in users:
             signal[S_FIRST], signal[S_KNOTS] = len(reals), source.times.size
         reals += source.numbers()
+    for signal, motion in programs:
+        signal[S_FIRST] = len(reals)
+        reals += motion.program()
     return rows, signals, memory, tuple(loads[id(force)] for force in forces)
 
 
@@ -98,7 +106,7 @@ def find_forces(system, loads):
             one[[FORCE, FORCE_JACOBIAN, F_REMEMBER]] = row[[FORCE, FORCE_JACOBIAN, F_REMEMBER]]
             rows[id(load)] = load._replace(row=one)
             for value in load.parameters:
-                if isinstance(value, Signal):
+                for _ in range(max(len(value.smooth), 1) if isinstance(value, Signal) else 0):
                     next(signals)[S_ADDRESS] = value.address
     return tuple(rows[id(load)] for load in loads)
 

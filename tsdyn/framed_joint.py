@@ -65,6 +65,12 @@ class FramedJoint(Joint):
         return (self.axis_a, self.axis_b), (f_a, f_b)
 
 
+def turned_about(axis, direction, angle):
+    """A direction turned about a unit axis by an angle, right hand."""
+    along = (axis @ direction) * axis
+    return along + np.cos(angle) * (direction - along) + np.sin(angle) * np.cross(axis, direction)
+
+
 def beside(axis, reference):
     """f, g (3,): the reference made perpendicular to the axis, and across both."""
     f = reference - (axis @ reference) * axis

@@ -77,8 +77,7 @@ class Joint(Attachment):
         for pair in self.compose():
             label, part = pair if isinstance(pair, tuple) and len(pair) == 2 else (None, None)
             self._demand_fit(part, pair)
-            if isinstance(part, Joint):
-                aligned += part._composition.aligned
+            aligned += getattr(part, "opposed", ())
             parts += part.parts
             labels += [str(label)] * part.rows
         total, seen = Counter(labels), Counter()

@@ -20,6 +20,7 @@ from .run_state import (
     LEAVE_WHEN_STIFF,
     MAX_STEP,
     RTOL,
+    SHARE,
     STABLE,
     STAGE_AT,
     STEPS_WANTED,
@@ -118,6 +119,7 @@ class Memory:
         if steps is None:
             numbers[ADAPTIVE], numbers[STEPS_WANTED] = 1, 2**62
             clock[RTOL], clock[ATOL] = method.step_tolerances()
+            clock[SHARE] = 1.0
             clock[EXPONENT], clock[ERROR_BEFORE] = 1.0 / (method.embedded_order + 1), 1.0
             clock[MAX_STEP] = longest = method.max_step or np.inf
             clock[H] = min(method.first_step or 0.0, longest)  # 0: of the driver's own choice

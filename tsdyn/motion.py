@@ -1,4 +1,4 @@
-"""A prescribed function of time with its two derivatives, compiled, cached and reached by address."""
+"""A prescribed function of time with its two derivatives: compiled and reached by address, or a program of numbers."""
 
 import math
 from types import FunctionType
@@ -6,53 +6,81 @@ from types import FunctionType
 import numpy as np
 from numba.core.errors import NumbaError
 
+from . import motions
 from ._kernel import Callback, caller, kernel, specialised
 from .checks import number
 from .errors import InvalidConstraint
+from .motion_program import run_program
+from .motions import Smooth
 
 SIGNATURE = "d"
 call_motion = caller(SIGNATURE, "d")
 
 
 class Motion:
-    """f(t), fd(t), fdd(t): a length, an angle's cosine or another quantity that the user prescribes.
+    """f(t), fd(t), fdd(t): a length, an angle or another quantity that the user prescribes.
 
     Parameters
     ----------
     f, fd, fdd : callable
         Plain functions of one float, the time in s, that Numba can compile; fd and fdd are the exact first and second
-        derivatives of f. The compiled code is cached on disk by all the code and constants it depends on.
+        derivatives of f. The compiled code is cached on disk by all the code and constants it depends on. Without fd
+        and fdd they are derived from f, which then is arithmetic and functions that `ts.motions` knows; or f is one of
+        `ts.motions`, for which nothing is compiled and Taylor has the series.
     what : str
         What error messages call it.
     """
 
-    def __init__(self, f, fd, fdd, what="motion"):
-        self.functions, self.what = (f, fd, fdd), what
-        for function in self.functions:
-            if not callable(function):
-                raise InvalidConstraint(f"{what}: a motion is three functions of time (f, fd, fdd), got {function!r}.")
-            plain = getattr(function, "py_func", function)
-            if not isinstance(plain, FunctionType) or plain.__code__.co_argcount != 1:
-                raise InvalidConstraint(
-                    f"{what}: {function!r} is no plain Python function of one argument, the time; "
-                    "wrap it in one: lambda t: ..."
-                )
+    def __init__(self, f, fd=None, fdd=None, what="motion"):
+        self.what, self.smooth, self.given = what, None, (f, fd, fdd)
+        if isinstance(f, Smooth) and fd is fdd is None:
+            self.given, self.smooth = (), f
+        elif fd is fdd is None:
+            self.given = (_plain_function(f, what),)
+            self.smooth = _derived(f, what)
+        for function in self.given:
+            _plain_function(function, what)
         self._callbacks = None
         self.value(0.0)
 
+    @property
+    def functions(self):
+        """f, fd and fdd, for Python."""
+        smooth = self.smooth
+        return self.given if smooth is None else (smooth, smooth.rate, smooth.acceleration)
+
+    @property
+    def has_series(self):
+        """Whether it is one of `ts.motions`: of a user's own function no series is taken."""
+        return not self.given
+
+    @classmethod
+    def always(cls, value, what):
+        """Return a Motion, of a number too."""
+        value = cls.wrap(value, what)
+        return value if isinstance(value, Motion) else cls(motions.Constant(value), what=what)
+
     @classmethod
     def wrap(cls, value, what):
-        """Return a Motion for a triple of functions or a Motion, a finite float for a number."""
+        """Return a Motion for functions, one of `ts.motions` or a Motion; a finite float for a number."""
         if isinstance(value, Motion):
-            return cls(*value.functions, what=what)
+            return cls(*(value.given or (value.smooth,)), what=what)
         if isinstance(value, (tuple, list)) and len(value) == 3 and all(callable(f) for f in value):
             return cls(*value, what=what)
+        if callable(value):
+            return cls(value, what=what)
         result = number(value)
         if not math.isfinite(result):
             raise InvalidConstraint(
-                f"{what} must be a finite number or three functions of time (f, fd, fdd), got {value!r}."
+                f"{what} must be a finite number, one of ts.motions, a function of time f or three functions of time "
+                f"(f, fd, fdd), got {value!r}."
             )
         return result
+
+    @staticmethod
+    def numbers(given, t=0.0):
+        """Parameters as kernels have them: a Motion is its value, rate and acceleration at t."""
+        return [x for value in given for x in (value.value(t) if isinstance(value, Motion) else (value,))]
 
     @staticmethod
     def places(value):
@@ -66,6 +94,7 @@ class Motion:
 
     def value(self, t):
         """Return (f, fd, fdd) at t, by the plain Python functions."""
+        t = t if self.smooth is None else np.float64(t)  # so that nothing raises
         try:
             with np.errstate(all="ignore"):
                 result = tuple(float(f(t)) for f in self.functions)
@@ -80,6 +109,8 @@ class Motion:
 
         Several quotients are tried at each time, and most times must fail: a kink or a short wave is no error.
         """
+        if self.smooth is not None:
+            return  # they are
         times = t0 + (t1 - t0) * np.array([0.11, 0.29, 0.53, 0.71, 0.89])
         for i, names in ((0, ("f", "fd")), (1, ("fd", "fdd"))):
             given, values = self._at(i + 1, times), self._at(i, times)
@@ -97,6 +128,12 @@ class Motion:
                     f"{given[0]:g}, and a difference quotient of {names[0]} does not. Correct the derivatives."
                 )
 
+    def over(self, times):
+        """f, fd and fdd at times (k,), shape (3, k)."""
+        if self.smooth is not None:
+            return np.array([function(times) for function in self.functions])
+        return np.array([[function(t) for t in times] for function in self.functions], dtype=float)
+
     def _at(self, i, times):
         try:
             with np.errstate(all="ignore"):
@@ -107,21 +144,76 @@ class Motion:
             ) from error
 
     def forget(self):
-        """Drop the compiled functions; they are made again when asked for."""
+        """Drop what was compiled or derived; it is made again when asked for."""
         self._callbacks = None
+        if self.given and self.smooth is not None:
+            self.smooth = _derived(self.given[0], self.what)
 
     @property
     def addresses(self):
-        """The addresses of the three compiled functions."""
+        """The addresses of the three compiled functions; of a program, what runs it and two zeros."""
+        if self.smooth is not None:
+            return run_program.address, 0, 0
         try:
             if self._callbacks is None:
-                self._callbacks = tuple(_callback(function) for function in self.functions)
+                self._callbacks = tuple(_callback(function) for function in self.given)
             return tuple(callback.address for callback in self._callbacks)
         except NumbaError as error:
             raise InvalidConstraint(
                 f"{self.what}: Numba can't compile the motion; use plain arithmetic, NumPy functions and constants "
                 f"in it.\n{error}"
             ) from error
+
+
+def _plain_function(function, what):
+    """A user's function, or an error where it is none of one argument."""
+    if not callable(function):
+        raise InvalidConstraint(f"{what}: a motion is three functions of time (f, fd, fdd), got {function!r}.")
+    plain = getattr(function, "py_func", function)
+    if not isinstance(plain, FunctionType) or plain.__code__.co_argcount != 1:
+        raise InvalidConstraint(
+            f"{what}: {function!r} is no plain Python function of one argument, the time; wrap it in one: lambda t: ..."
+        )
+    return function
+
+
+def _derived(f, what):
+    """A user's function as a `Smooth`, by running it once on the time as a motion; its `math` is NumPy there."""
+    plain = getattr(f, "py_func", f)
+    known = {name: _of_motions(value) for name, value in plain.__globals__.items()}
+    twin = FunctionType(plain.__code__, known, plain.__name__, plain.__defaults__, plain.__closure__)
+    try:
+        result = twin(motions.time)
+    except Exception as error:
+        raise InvalidConstraint(
+            f"{what}: its derivatives can't be derived from f alone ({type(error).__name__}: {error}). Give three "
+            "functions of time (f, fd, fdd), or write f with arithmetic and "
+            f"{', '.join(motions.FUNCTIONS)} of NumPy, without branches."
+        ) from error
+    if isinstance(result, Smooth):
+        return result
+    if not math.isfinite(number(result)):
+        raise InvalidConstraint(f"{what}: the function must return a number, it gave {result!r} of the time.")
+    return motions.Constant(number(result))
+
+
+def _of_motions(value):
+    """What a global of a user's function stands for where it is run on a motion."""
+    if value is math:
+        return _Math
+    name = getattr(value, "__name__", "")
+    return getattr(np, _NUMPY.get(name, name), value) if value is getattr(math, name, _Math) else value
+
+
+_NUMPY = {"atan": "arctan", "fabs": "abs", "pow": "power"}
+
+
+class _Math:
+    """The module `math` with NumPy's functions, which know motions."""
+
+    pi, e, tau = math.pi, math.e, math.tau
+    sin, cos, tan, exp, log, sqrt = np.sin, np.cos, np.tan, np.exp, np.log, np.sqrt
+    sinh, cosh, tanh, atan, pow = np.sinh, np.cosh, np.tanh, np.arctan, np.power
 
 
 def _guarded(t):

@@ -66,17 +66,20 @@ class Prepared:
         """The system for a method, and how many floats it keeps for forces."""
         return self.implicit if implicit else (self.packed.system, 0)
 
-    def start(self, scene, q, qd, t, tol, redundant_allowed):
+    def start(self, scene, q, qd, t, tol, remembered, redundant_allowed):
         """(q, qd) checked against the constraints and freed of rounding; looked at once for the same numbers."""
-        given = q.tobytes(), qd.tobytes(), t, tol, redundant_allowed
+        given = q.tobytes(), qd.tobytes(), t, tol, remembered.tobytes(), redundant_allowed
         known, start = self._start
         if known != given:
-            before = self.packed.shared.get(DROPPED)
-            start = consistent(scene, self.packed.system, q, qd, t, tol, redundant_allowed)
+            system, before = self.packed.system, self.packed.shared.get(DROPPED)
+            if remembered.size:
+                system = system._replace(reals=system.reals.copy())
+                system.reals[system.memory] = remembered
+            start = consistent(scene, system, q, qd, t, tol, redundant_allowed)
             if self.packed.shared.get(DROPPED) is not before:  # the rows that are dropped belong to a network
                 self.__dict__.pop("series", None)
                 self._spare.clear()
-            demand_aligned(self.packed, start[0])
+            demand_aligned(self.packed, start[0], t)
             self._start = given, start
         return start
 

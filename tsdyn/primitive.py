@@ -7,6 +7,8 @@ A primitive works on marker coordinates x (3-vectors in the ground frame) and ne
     gamma(x, xd, par, t, out)    out[rows]          (Phi_x xd)_x xd + 2 Phi_xt xd + Phi_tt
     phi_t(x, par, t, out)        out[rows]          Phi_t; only for a primitive that depends on time
     series(x, par, k, s, out)    out[rows, len(x)]  optional: coefficient k of Phi_x, zero on entry; see recurrences.py
+    series_t(x, par, k, s, out)  out[rows]          and of Phi_t, where it has what is `prescribed`; after `series`
+    remember(x, par, t)          optional, with memory = 1: what the last of par is after each accepted step
 
 x is the concatenation of the primitive's markers, par the floats that `parameters()` returns; a motion among them takes
 three places, its value, rate and acceleration at t. The loops below apply the chain rule x(q) (Haug 2018, Eqs. 2-3).
@@ -31,7 +33,7 @@ call_kind = caller(SIGNATURE)
 
 _registry = {}
 _KERNELS = {"phi": 4, "jacobian": 4, "gamma": 5}  # and their numbers of arguments
-_OPTIONAL = {"phi_t": 4, "series": 5}
+_OPTIONAL = {"phi_t": 4, "series": 5, "series_t": 5, "remember": 3}
 
 
 class Primitive(Attachment):
@@ -48,8 +50,11 @@ class Primitive(Attachment):
         What x is made of, each on body "a" or "b".
     slots : int
         Rows of scratch memory that `series` uses.
-    prescribed : str, optional
-        The attribute that is a number or a Motion, where nothing else makes it depend on time.
+    prescribed : str or tuple of str, optional
+        The attributes that are numbers or Motions, where nothing else makes it depend on time. With `series_t` they
+        come first in `parameters()`, and their series are the rows of scratch memory from `slots` on.
+    memory : int
+        1 for a primitive that keeps a number from step to step, the last of par: an angle that counts turns.
     a, b : Body or ground
         The bodies; b is None for a primitive that has markers on a only.
     name : str
@@ -58,6 +63,7 @@ class Primitive(Attachment):
 
     rows = 0
     slots = 0
+    memory = 0
     normalises = False  # whether it does no more than keep the length of p
     prescribed = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
@@ -73,10 +79,16 @@ class Primitive(Attachment):
         check_slots(cls, where, InvalidConstraint)
         if getattr(cls, "series", None) is not None and any(m.code == PARAMETERS for m in markers):
             raise InvalidConstraint(f"{where}: series are for primitives on Points and Vectors only.")
+        if getattr(cls, "series_t", None) is not None and not cls.quantities():
+            raise InvalidConstraint(f"{where}: series_t is of what is `prescribed`; name its attributes there.")
+        if cls.memory not in (0, 1) or (cls.memory == 1) != (getattr(cls, "remember", None) is not None):
+            raise InvalidConstraint(f"{where}: memory = 1 needs a kernel remember, and remember needs memory = 1.")
         functions = {}
         for name, arguments in {**_KERNELS, **_OPTIONAL}.items():
             if getattr(cls, name, None) is None and name in _OPTIONAL:
                 continue
+            if name == "series_t" and not {"phi_t", "series"} <= functions.keys():
+                continue  # of a subclass that has dropped one of them
             functions[name] = static_kernel(cls, name, arguments, where, InvalidConstraint)
         cls.kernels = MappingProxyType(_compile(cls, functions))
         _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
@@ -91,7 +103,7 @@ class Primitive(Attachment):
 
     def __setattr__(self, name, value):
         """Set an attribute, checked; a prescribed one may be a number or three functions of time."""
-        if name == self.prescribed:
+        if name in self.quantities():
             value = Motion.wrap(value, f"{self.name}: {name}")
         super().__setattr__(name, value)
 
@@ -108,8 +120,14 @@ class Primitive(Attachment):
     @property
     def rheonomic(self):
         """Whether it depends on time."""
-        moves = not self.prescribed or isinstance(getattr(self, self.prescribed), Motion)
+        names = self.quantities()
+        moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
         return moves and "phi_t" in self.kernels
+
+    @classmethod
+    def quantities(cls):
+        """The names of what is prescribed."""
+        return (cls.prescribed,) * bool(cls.prescribed) if isinstance(cls.prescribed, str) else cls.prescribed
 
     @classmethod
     def example(cls, rng, a, b):
@@ -135,19 +153,24 @@ def _compile(cls, functions):
         "phi_t": (_values, "phi_t", SIGNATURE),
         "jacobian": (_jacobian, "jacobian", SIGNATURE),
         "gamma": (_gamma, "gamma", SIGNATURE),
+        "remember": (_remembers, "remember", SIGNATURE),
         "values": (body_loops.values, "phi", body_loops.SIGNATURE),
         "drift": (body_loops.values, "phi_t", body_loops.SIGNATURE),
         "reduced": (body_loops.reduced, "jacobian", body_loops.SIGNATURE),
         "bias": (body_loops.bias, "gamma", body_loops.SIGNATURE),
         "series": (series_loops.series, "series", series_loops.SIGNATURE),
         "far_series": (series_loops.series, "series", series_loops.SIGNATURE),
+        "driven_series": (series_loops.series, "series_t", series_loops.SIGNATURE),
+        "far_driven_series": (series_loops.series, "series_t", series_loops.SIGNATURE),
     }
     result = {}
     for name, (template, whose, signature) in loops.items():
         if whose in functions:
             owner = getattr(functions[whose], "py_func", functions[whose])
             names = {**constants, **inner, "SLOTS": cls.slots, "kernel_value": inner[f"kernel_{whose}"]}
-            names["AHEAD"] = name == "far_series"
+            names["AHEAD"], names["DRIVEN"] = name.startswith("far"), whose == "series_t"
+            names.setdefault("kernel_series_t", names.get("kernel_series"))
+            names["SLOTS"] += len(cls.quantities()) if names["DRIVEN"] else 0
             copy = specialised(template, f"{cls.__qualname__}.{name}_loop", owner, **names)
             result[name] = Callback(copy, signature)
     owner = getattr(functions["gamma"], "py_func", functions["gamma"])
@@ -174,6 +197,18 @@ def _values(count, stride, table, reals, q, qd, t, out):
         kernel_value(x, real[3 * MARKERS :], t, f)
         for r in range(ROWS):
             out[own[ROW] + r] = f[r]
+    return 0
+
+
+def _remembers(count, stride, table, reals, q, qd, t, out):
+    table, reals, q = integers(table, ANY), vector(reals, ANY), vector(q, ANY)
+    x = stack(SIZE)
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        for j in range(MARKERS):
+            k = OWNERS[j]
+            position(CODES[j], own[DIMENSION + k], own[AT + k], q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
+        real[stride - 1] = kernel_value(x, real[3 * MARKERS :], t)
     return 0
 
 

@@ -19,6 +19,7 @@ from .profile_report import Profile
 from .replay import prices
 from .scene import Scene
 from .simulate import DRIVERS, simulate
+from .state import remembered
 from .timekeeper import Stopwatch, Timekeeper
 from .timers import own_cost
 
@@ -186,6 +187,7 @@ def _once(scene, method, options, start):
     state = options.get("state")
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
     began = clock()
-    kept.start(scene, q, qd, start, options.get("initial_tol", 1e-9))
+    memory = remembered(state, kept.packed.system.memory.size)
+    kept.start(scene, q, qd, start, options.get("initial_tol", 1e-9), memory)
     seconds["check of the start"] = clock() - began
     return seconds

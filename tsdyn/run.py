@@ -1,7 +1,7 @@
 """The driver: steps, outputs, charts. One kernel for every scene, method and formulation; it calls them by address."""
 
 from ._kernel import caller, entry, kernel
-from .assembly import remember, set_time
+from .assembly import is_rheonomic, remember, set_time
 from .control import accept, first_step, watch_stiffness
 from .dense import (
     A_ACCELERATE,
@@ -47,6 +47,7 @@ from .run_state import (
     NEXT_EVAL,
     REJECTED,
     REJECTED_LAST,
+    SHARE,
     STAGE_AT,
     STEPS,
     STEPS_WANTED,
@@ -58,6 +59,7 @@ from .run_state import (
     load_run,
 )
 from .stepping import call_step
+from .turning import GAIN, longest_step, too_far
 from .workspace import CONDITION, CONTRACTION, load
 
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
@@ -188,6 +190,7 @@ def advance(context, run, log, at, most):
     w = c.work
     nx, ny = r.x.size, r.y.size
     adaptive, implicit = r.numbers[ADAPTIVE] == 1, r.numbers[STAGE_AT] > 0
+    driven = is_rheonomic(c.system)
     if r.numbers[BEGUN] == 0 and most != 0:
         set_time(c.system, r.clock[T])
         remember(c.system, w.q, w.qd, r.clock[T], r.remembered)
@@ -204,6 +207,8 @@ def advance(context, run, log, at, most):
         if t0 >= r.clock[T_END]:
             return 0
         if adaptive:
+            if driven:
+                r.clock[H] = min(r.clock[H], r.clock[SHARE] * longest_step(c.system.bodies, r.now))
             t1 = t0 + r.clock[H]
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 return NOT_FINITE if r.numbers[FAILED] == NOT_FINITE else STEP_COLLAPSED
@@ -250,7 +255,7 @@ def advance(context, run, log, at, most):
         reason = 0
         if status == 0:
             reason = call_check(at[A_CHECK], context)
-            if not w.control[CONTRACTION] < CONTRACTION_LOST:
+            if not w.control[CONTRACTION] < CONTRACTION_LOST or (driven and too_far(c.system.bodies, r.now, w.qd, h)):
                 status = CHART_LOST
         if status != 0:  # back to the start of the step, on a new chart if this one has been used
             restore_now(w, r)
@@ -260,6 +265,8 @@ def advance(context, run, log, at, most):
                     return status
                 r.numbers[FAILED] = status
                 r.clock[H] = 0.25 * h
+                if driven:  # nothing else keeps the next step from being as long
+                    r.clock[SHARE] *= 0.5
             retry = _begin_chart(context, w, r, log, at, BY_FAILURE)
             if retry != 0:
                 return retry
@@ -270,6 +277,7 @@ def advance(context, run, log, at, most):
             continue
         row[2] = 1.0
         r.numbers[FAILED] = 0
+        r.clock[SHARE] = min(GAIN * r.clock[SHARE], 1.0)
         leave = False
         if r.numbers[LAST_STAGE] > 0 and watch_stiffness(r, h):
             leave = r.numbers[LEAVE_WHEN_STIFF] == 1

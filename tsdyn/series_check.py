@@ -8,7 +8,9 @@ loops.
 import numpy as np
 
 from ._kernel import entry, twin
+from .assembly import set_time
 from .diagnostics import starts_of
+from .driven import expand_motions
 from .errors import CheckFailed
 from .expansion import run_forces, run_loops
 from .expansion_pack import allocate_expansion, masks
@@ -40,6 +42,13 @@ def constraint_coefficients(network, reals, x, k, b, Z):
 
 
 @entry
+def begin_motions(system, x, t):
+    """The series of all motions about t, x being an Expansion."""
+    set_time(system, t)
+    expand_motions(system, x)
+
+
+@entry
 def force_coefficients(reals, x, k, poses, Z):
     """Z ((b + 1) 8,) = order k of the forces and body torques; k in turn from zero."""
     for i in range(Z.size):
@@ -50,7 +59,12 @@ def force_coefficients(reals, x, k, poses, Z):
 def check_constraint_series(scene, constraint, name, rng):
     """Check the `series` of a primitive, or of a joint's parts, if it has one that a run would use."""
     parts = constraint.parts
-    if any("series" not in part.kernels or any(isinstance(p, Motion) for p in part.parameters()) for part in parts):
+    if any("series" not in part.kernels for part in parts):
+        return
+    moved = [part for part in parts if any(isinstance(value, Motion) for value in part.parameters())]
+    if any("driven_series" not in part.kernels for part in moved):
+        return
+    if any(isinstance(p, Motion) and p.smooth is None for part in moved for p in part.parameters()):
         return
     q, t = random_motion(scene, rng), _time(rng)
     Phi = np.concatenate([_check_rows(scene, part, name, q, t) for part in parts])
@@ -60,6 +74,7 @@ def check_constraint_series(scene, constraint, name, rng):
     masks(network, packed, kinds)
     expansion = allocate_expansion(network, kinds, packed, ORDER)
     write_bodies(scene, q, expansion)
+    begin_motions(packed.system._replace(reals=packed.system.reals.copy()), expansion, t.c[0])
     b, Z = np.zeros(m), np.zeros(8 * (len(scene.bodies) + 1))
     for k in range(ORDER - 1):
         constraint_coefficients(network, packed.system.reals, expansion, k, b, Z)
@@ -69,16 +84,34 @@ def check_constraint_series(scene, constraint, name, rng):
 
 def _check_rows(scene, primitive, name, q, t):
     """Check the Python `series` of a primitive along a motion q; return Phi (rows,) as Truncated series."""
-    kind, par = type(primitive), list(primitive.parameters())
+    kind, given = type(primitive), primitive.parameters()
+    par = [entry for value in given for entry in _entries(value, t)] + [0.0] * kind.memory
+    numbers = [entry.c[0] if isinstance(entry, Truncated) else entry for entry in par]
+    rows = [_series(par[3 * i]).c for i in range(len(kind.quantities()) if "driven_series" in kind.kernels else 0)]
     x, _ = along(scene, primitive, primitive.coordinates, q)
     Phi, Phi_x = _zeros(kind.rows), _zeros((kind.rows, len(x)))
     _run(kind, "phi", name, x, par, t, Phi)
     _run(kind, "jacobian", name, x, par, t, Phi_x)
     columns = _labels(kind)
     labels = [[f"jacobian[{i}, {j}] (d phi[{i}] / d {c})" for j, c in enumerate(columns)] for i in range(kind.rows)]
-    for k, f in _coefficients(kind, name, (x,), par, (kind.rows, len(x))):
+    Phi_t = _zeros(kind.rows)
+    if rows:
+        _run(kind, "phi_t", name, x, par, t, Phi_t)
+    for k, f, scratch in _coefficients(kind, name, (x,), numbers, (kind.rows, len(x)), rows):
         _compare(name, k, labels, f, Phi_x)
+        if rows:
+            drift = np.zeros(kind.rows)
+            twin(kind.series_t)(np.array([c.c[k] for c in x]), numbers, k, scratch, drift)
+            _compare(name, k, [f"phi_t[{i}], by series_t," for i in range(kind.rows)], drift, Phi_t)
     return Phi
+
+
+def _entries(value, t):
+    """A parameter as phi has it: a Motion is its series, and those of its rate and acceleration."""
+    if not isinstance(value, Motion):
+        return (value,)
+    f = t.of(value.smooth(t))
+    return f, f.rate, f.rate.rate
 
 
 def check_force_series(scene, force, name, rng):
@@ -93,7 +126,7 @@ def check_force_series(scene, force, name, rng):
     f = _zeros(len(x))
     _run(kind, "law", name, x, xd, par, _time(rng), f)
     labels = [f"out[{j}] (conjugate to {c})" for j, c in enumerate(_labels(kind))]
-    for k, out in _coefficients(kind, name, (x, xd), par, (len(x),)):
+    for k, out, _ in _coefficients(kind, name, (x, xd), par, (len(x),)):
         _compare(name, k, labels, out, f)
 
     network, kinds = build(packed)
@@ -195,9 +228,11 @@ def _carried_back(scene, load, q, f):
     return total.ravel()
 
 
-def _coefficients(kind, name, coordinates, par, shape):
-    """Yield k and what the Python `series` writes, on scratch memory that holds nothing yet."""
-    scratch, series = np.full((kind.slots, ORDER + 2), np.nan), twin(kind.series)
+def _coefficients(kind, name, coordinates, par, shape, rows=()):
+    """Yield k, what the Python `series` writes, and its scratch, which holds nothing yet but the rows prescribed."""
+    scratch, series = np.full((kind.slots + len(rows), ORDER + 2), np.nan), twin(kind.series)
+    for i, row in enumerate(rows):
+        scratch[kind.slots + i] = row
     for k in range(ORDER + 1):
         out = np.zeros(shape)
         try:
@@ -207,7 +242,7 @@ def _coefficients(kind, name, coordinates, par, shape):
                 f"{name}: series writes outside its arrays ({error}); scratch has slots = {kind.slots} rows, and a "
                 "coefficient up to k in each."
             ) from error
-        yield k, out
+        yield k, out, scratch
 
 
 def _run(kind, what, name, *arguments):

@@ -66,7 +66,7 @@ class SeriesReader:
         bodies = np.zeros((len(network.bodies) + 1) * 24 * orders)
         order = np.zeros(5, np.int64)
         order[ORDERS] = orders
-        expansion = Expansion(order, bodies, none, table, table, whole, none)
+        expansion = Expansion(order, bodies, none, table, table, whole, none, table)
         context = SeriesContext(system, work, network, allocate_free(network, n), expansion)
         self.steps = steps
         self.n, (self.context, *self._keep) = n, resident(context)

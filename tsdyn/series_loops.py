@@ -13,6 +13,9 @@ An instance begins with order zero of x (4 a marker) and Phi_x (4 a row and mark
 marker), lam (1 a row), x and Phi_x, and its own scratch. A marker whose columns of Phi_x are constant, as all of
 Spherical's, takes no part in (1) beyond order zero, nor in (2); that of the ground has no force. Where no instance of a
 kind has others, they end with f.
+
+What is prescribed (a length that is a motion) adds its own part to (1): the coefficients of Phi_t, by the kernel
+`series_t`. The motions' own series are the last rows of the scratch, written there when a step begins.
 """
 
 from ._four import add, cross, fetch, fma, four, lanes, put, splat, times, total
@@ -30,12 +33,18 @@ ADVANCE, RESIDUAL = range(2)
 GROUND = 16  # bits of the mask: from 0 on the markers whose columns vary, from 16 on those that are on the ground
 
 
-def instance_width(markers, rows, slots, orders, varies):
+def instance_width(markers, rows, slots, orders, varies, driven=False):
     """Floats of an instance; whether any column of Phi_x of the kind varies, or it has scratch memory."""
+    if not (varies or slots or driven):
+        return scratch_at(markers, rows, orders, False)
+    room = slots * orders + (rows if driven else 0)
+    return scratch_at(markers, rows, orders, True) + 4 * ((room + 3) // 4)
+
+
+def scratch_at(markers, rows, orders, varies):
+    """Where the scratch of an instance begins."""
     width = 4 * markers * (1 + rows) + 4 * markers * orders
-    if varies or slots:
-        width += 4 * ((rows * orders + 3) // 4) + 4 * (markers + markers * rows) * orders
-    return width + 4 * ((slots * orders + 3) // 4)
+    return width + (4 * ((rows * orders + 3) // 4) + 4 * (markers + markers * rows) * orders if varies else 0)
 
 
 @kernel
@@ -62,8 +71,9 @@ def torque(bodies, at, k, forces, first):
 # The names in capitals and kernel_series are filled in by primitive._compile.
 ROWS = MARKERS = SIZE = ROOM = SLOTS = 1
 AHEAD = False  # whether each instance has the next one's numbers brought into the cache
+DRIVEN = False  # whether it depends on time
 CODES = OWNERS = STARTS = (0,)
-kernel_series = None
+kernel_series = kernel_series_t = None
 
 
 def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b, Z):
@@ -73,7 +83,7 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b
     """
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
     values, b, Z = vector(values, ANY), vector(b, ANY), vector(Z, ANY)
-    x, f = stack(ROOM), stack2(ROWS, SIZE)
+    x, f, g = stack(ROOM), stack2(ROWS, SIZE), stack(ROWS)
     wide, body_size = 4 * orders, BODY_ROW * orders
     F = 4 * MARKERS * (1 + ROWS)
     L = F + MARKERS * wide
@@ -96,7 +106,7 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b
         if mode == ADVANCE:
             for r in range(ROWS if k > 0 and varies else 0):
                 values[first + L + r * orders + k - 1] = b[own[ROW] + r]
-            for now in range(0 if k == 0 else k + 1, k + 2 if varies else 1):
+            for now in range(0 if k == 0 else k + 1, k + 2 if varies or DRIVEN else 1):
                 places, gradients, step = first, first + 4 * MARKERS, 4
                 if now > 0:
                     places, gradients, step = first + X + 4 * now, first + J + 4 * now, wide
@@ -112,6 +122,10 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b
                         f[r, c] = 0.0
                 scratch = matrix(data_of(values[first + own_scratch :]), SLOTS, orders)
                 kernel_series(x, real[3 * MARKERS :], now, scratch, f)
+                if DRIVEN:
+                    kernel_series_t(x, real[3 * MARKERS :], now, scratch, g)
+                    for r in range(ROWS):
+                        values[first + own_scratch + SLOTS * orders + r] = g[r]
                 for j in range(MARKERS):
                     if now == 0 or mask >> j & 1:
                         for r in range(ROWS):
@@ -157,5 +171,6 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b
                         for l in range(1, k + 2):
                             gradient = times(four(values, gradients - 4 * l), splat(float(l)))
                             lower = fma(gradient, four(values, places + 4 * l), lower)
-                b[own[ROW] + r] = (k + 1.0) * ((k + 2.0) * total(highest) + total(lower))
+                drift = values[first + own_scratch + SLOTS * orders + r] if DRIVEN else 0.0
+                b[own[ROW] + r] = (k + 1.0) * ((k + 2.0) * total(highest) + total(lower) + drift)
     return 0

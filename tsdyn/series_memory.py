@@ -51,7 +51,7 @@ class Series:
             raise InvalidArgument(found)
         network, self.kinds = graph.build(packed)
         self.constant_columns = masks(network, packed, self.kinds)
-        self.network = graph.with_loops(network, self.kinds, graph.REDUCED, graph.VALUES, graph.BIAS)
+        self.network = graph.with_loops(network, self.kinds, graph.REDUCED, graph.VALUES, graph.BIAS, graph.DRIFT)
         self.packed = packed
 
 

@@ -24,6 +24,7 @@ class Expansion(NamedTuple):
     # and floats of an instance
     table: np.ndarray  # int64: the bodies of each force
     loads: np.ndarray  # each kind of force's instances
+    motions: np.ndarray  # int64 (motions, 3): what runs a motion's program; its place in reals; and in constraints
 
 
 class SeriesContext(NamedTuple):
@@ -39,7 +40,7 @@ class SeriesContext(NamedTuple):
 def _example():
     """One of the right types."""
     line, whole, table = np.zeros(1), np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    expansion = Expansion(whole, line, line, table, table, whole, line)
+    expansion = Expansion(whole, line, line, table, table, whole, line, table)
     plain = plain_context()
     return SeriesContext(plain.system, plain.work, plain.network, plain.free, expansion)
 

@@ -7,6 +7,8 @@ import math
 
 from ._four import fma, four, put, splat, times
 from ._kernel import callback, caller, kernel
+from .assembly import set_time
+from .driven import expand_motions, land_driven_velocities
 from .errors import Status
 from .expansion import begin, expand
 from .free_accelerations import accelerate_bodies
@@ -43,6 +45,7 @@ def _expand(context, k, ahead):
     w, x, f = c.work, c.expansion, c.free
     orders = x.order[ORDERS]
     if k == 0:
+        expand_motions(c.system, x)
         begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
     expand(c.network, c.system, k, k > 0 and k + 1 == x.order[TOP], ahead, orders, x, f)
     if k == 0:
@@ -54,16 +57,32 @@ def _expand(context, k, ahead):
     return 0
 
 
+@kernel
+def is_driven(system):
+    """Whether a scene that Taylor serves depends on time."""
+    return system.motions.shape[0] > 0
+
+
+@kernel
+def _land_rates(c, t):
+    if is_driven(c.system):
+        land_driven_velocities(c.network, c.system, c.free, t)
+    else:
+        land_velocities(c.network, c.free)
+
+
 @callback("pdd")
 def reach(context, t, h):
     """The state at t, h after the series' origin, on the manifold, but for qdd; h < 0 takes the poses. Status."""
     c = load_series(context)
     w, x, f = c.work, c.expansion, c.free
+    if is_driven(c.system) and not set_time(c.system, t):
+        return NOT_FINITE
     if h >= 0.0:
         sum_series(c.network, x.bodies, x.order[ORDERS], x.order[TOP], h, f.poses, f.p)
     status = land(c.network, c.system, w, f, t)
     if status == 0:
-        land_velocities(c.network, f)
+        _land_rates(c, t)
         write_positions(c.network.bodies, f.poses, w.q)
         write_velocities(c.network.bodies, f.poses, w.qd)
         total = 0.0
@@ -100,7 +119,7 @@ def pass_singular(context, t, h):
         if select(network, f, f.H, f.Y, f.S, -1, GONE):
             status = land(network, c.system, w, f, t)
     if status == 0:
-        land_velocities(network, f)
+        _land_rates(c, t)
         for b in range(network.bodies.shape[0]):
             at, r, omega = b * orders * BODY_ROW, splat(0.0), splat(0.0)
             for k in range(top, 0, -1):

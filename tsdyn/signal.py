@@ -1,4 +1,4 @@
-"""A load as a function of time: a plain function of t, or a table of values, evaluated once at each time of a run."""
+"""A load as a function of time: a plain function of t, smooth motions, or a table, evaluated once a time of a run."""
 
 import math
 from types import FunctionType
@@ -9,6 +9,8 @@ from numba.core.errors import NumbaError
 from ._kernel import Callback, caller, kernel, specialised, vector
 from .checks import floats, number
 from .errors import InvalidArgument
+from .motion_program import run_program
+from .motions import Constant, Smooth
 
 SIGNATURE = "dp"  # t, where the values go
 call_signal = caller(SIGNATURE)
@@ -64,9 +66,10 @@ class Signal:
 
     Parameters
     ----------
-    source : callable or Table
+    source : callable, Table, or tuple of Smooth
         A plain function of one float, the time in s, that Numba can compile and that returns a number (a tuple of
-        three for width 3), or a Table. Compiled code is cached on disk by all the code and constants it depends on.
+        three for width 3); compiled code is cached on disk by all the code and constants it depends on. Or a Table; or
+        as many of `ts.motions`, for which nothing is compiled.
     width : int
     what : str
         What error messages call it.
@@ -77,6 +80,9 @@ class Signal:
     def __init__(self, source, width, what, error):
         self.source, self.width, self.what, self.error = source, width, what, error
         self._callback = None
+        if self.smooth:
+            self.value(0.0)
+            return
         if isinstance(source, Table):
             if source.values[0].size != width:
                 raise error(f"{what}: the table has {source.values[0].size} values a time and must have {width}.")
@@ -94,6 +100,14 @@ class Signal:
         """Return a Signal for a function, Table or Signal; a finite float or an array (3,) for numbers."""
         if isinstance(value, Signal):
             value = value.source
+        if isinstance(value, Smooth):
+            value = (value,)
+        if isinstance(value, (tuple, list)) and any(isinstance(part, Smooth) for part in value):
+            parts = [part if isinstance(part, Smooth) else number(part) for part in value]
+            if len(parts) == width and all(isinstance(part, Smooth) or math.isfinite(part) for part in parts):
+                parts = tuple(part if isinstance(part, Smooth) else Constant(part) for part in parts)
+                return cls(parts, width, what, error)
+            raise error(f"{what} must be {width} of ts.motions or finite numbers, got {value!r}.")
         if callable(value):
             return cls(value, width, what, error)
         result = number(value) if width == 1 else floats(value)
@@ -103,6 +117,11 @@ class Signal:
         if width == 3:
             result.setflags(write=False)
         return result
+
+    @property
+    def smooth(self):
+        """The motions that it is made of; empty for a function or a table."""
+        return self.source if isinstance(self.source, tuple) else ()
 
     @staticmethod
     def places(value):
@@ -118,13 +137,13 @@ class Signal:
         """The values at t, an array (width,), by the plain Python function."""
         try:
             with np.errstate(all="ignore"):
-                result = floats(self.source(t))
+                result = floats([f(np.float64(t)) for f in self.smooth] if self.smooth else self.source(t))
         except Exception as error:
             raise self.error(f"{self.what}: the function can't be evaluated at t = {t:g}: {error!r}") from error
         if result.shape not in ((self.width,), ()) or (result.shape == () and self.width != 1):
             raise self.error(
                 f"{self.what}: the function must return {'a number' if self.width == 1 else 'three numbers'}, it "
-                f"gave {self.source(t)!r} at t = {t:g}."
+                f"gave {result!r} at t = {t:g}."
             )
         result = np.atleast_1d(result)
         if not np.isfinite(result).all() and not isinstance(self.source, Table):
@@ -135,6 +154,8 @@ class Signal:
         """The values at times t (k,): `width` arrays (k,)."""
         if isinstance(self.source, Table):
             values = np.asarray(self.source(t)).reshape(t.size, self.width)
+        elif self.smooth:
+            return [f(t) for f in self.smooth]
         else:
             with np.errstate(all="ignore"):
                 values = np.array([self.source(time) for time in t], dtype=float).reshape(t.size, self.width)
@@ -156,7 +177,9 @@ class Signal:
 
     @property
     def address(self):
-        """The address of the compiled function; zero for a table."""
+        """The address of the compiled function, or of what runs motions; zero for a table."""
+        if self.smooth:
+            return run_program.address
         if isinstance(self.source, Table):
             return 0
         try:

@@ -130,13 +130,14 @@ def simulate(
     for motion in kept.motions:
         motion.check(*span)
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
-    q, qd = kept.start(scene, q, qd, span[0], initial_tol, redundancy == "drop")
+    memory = remembered(state, kept.packed.system.memory.size)
+    q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
     choose = None
     if integrator is None:
         options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol}
         choose = choice.chooser(simulate, scene, method, span[1], options)
     task = Task(
-        kept, method, form, span, q, qd, remembered(state, kept.packed.system.memory.size), times, bool(dense_output),
+        kept, method, form, span, q, qd, memory, times, bool(dense_output),
         watched, constraint_tol, max_steps, chart_interval or 0, report, choose,
     )  # fmt: skip
     outcome = DRIVERS.get(method.driver, method.driver)(task)

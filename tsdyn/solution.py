@@ -212,7 +212,7 @@ class Solution:
     @cached_property
     def constraint_error(self):
         """Maximum norms of Eqs. 1-3 at every output, recomputed by code that is not the solver's."""
-        return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd)
+        return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
 
     def reaction(self, item, on=None):
         """Force (N) and torque (N m) that a constraint, a joint as a whole, or a force exerts: (k, 3) each.

@@ -32,11 +32,11 @@ class RememberingState(State):
 
 
 def remembered(state, slots):
-    """What forces remember in a state given to `simulate`: zeros where it doesn't say."""
+    """What forces and constraints remember in a state given to `simulate`: zeros where it doesn't say."""
     memory = getattr(state, "memory", None)
     if memory is None and state is not None and slots:
         raise InvalidArgument(
-            "the scene's forces count turns and this state doesn't say how many: give solution.state, what "
+            "parts of the scene count turns and this state doesn't say how many: give solution.state, what "
             "solution.at(t) returns or what an event function is given, as they are or changed by _replace."
         )
     if memory is None:

@@ -26,12 +26,14 @@ class System(NamedTuple):
     kinds: np.ndarray  # int64 (kinds, 9): addresses and extents, columns above
     table: np.ndarray  # int64: for each instance the places in q and Phi_q, primitive.INTS numbers
     reals: np.ndarray  # float64: for each instance marker coordinates, then parameters
-    motions: np.ndarray  # int64 (motions, 4): addresses of f, fd, fdd; place of the first in reals
+    motions: np.ndarray  # int64 (motions, 5): addresses of f, fd, fdd, or of what runs a program, 0, 0; the place of
+    # the first in reals; where the program begins there
     rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
     segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
     forces: np.ndarray  # int64 (kinds, 9): addresses and extents, columns in force_pack
     signals: np.ndarray  # int64 (signals, 5): functions of time and tables that loads are given, force_pack
-    memory: np.ndarray  # int64 (slots,): places in reals of what forces remember from step to step
+    memory: np.ndarray  # int64 (slots,): places in reals of what forces, then constraints remember from step to step
+    counters: np.ndarray  # int64 (kinds, 5): loops of constraints that remember: address, count, reals, places of both
 
 
 class Member(NamedTuple):
@@ -54,6 +56,7 @@ class Packed(NamedTuple):
     size: float  # largest number among the coordinates
     loads: tuple  # a force_pack.Load for each force, in the order added
     members: tuple  # a Member for each constraint of the scene, in the order of their rows
+    slots: tuple  # of System.memory, for each constraint; -1 for none
     shared: dict  # what has been made of it, by name, for others to use
 
     def __reduce__(self):
@@ -73,6 +76,9 @@ def _found_again(process, kept, *parts):
         for column, name in ((PHI, "phi"), (JACOBIAN, "jacobian"), (GAMMA, "gamma"), (PHI_T, "phi_t")):
             row[column] = _address(kind, name) if row[column] else 0
         row[CURVATURE] = 0
+    remembering = [kind for kind in kinds if kind.memory]
+    for row, kind in zip(system.counters, remembering, strict=True):
+        row[0] = _address(kind, "remember")
     values = [
         value
         for kind in kinds
@@ -107,7 +113,8 @@ def pack(scene):
         spans = [where.get(id(body), (0, 0)) for body in (constraint.a, constraint.b)]
         segments += [[*spans[0], *spans[1]]] * constraint.rows
 
-    kinds, table, reals, motions = [], [], [], []
+    kinds, table, reals, motions, programs = [], [], [], [], []
+    counters, kept = [], {}
     for kind, members in groups.items():
         first = len(table), len(reals)
         strides = set()
@@ -117,10 +124,14 @@ def pack(scene):
             reals += np.concatenate(constraint.coordinates).tolist()
             for value in parameters[constraint]:
                 if isinstance(value, Motion):
-                    motions.append((*value.addresses, len(reals)))
+                    motions.append([*value.addresses, len(reals), 0])
+                    programs.append(value)
                     reals += value.value(0.0)
                 else:
                     reals.append(float(value))
+            if kind.memory:
+                kept[constraint] = len(reals)
+                reals.append(0.0)
             stride = len(reals) - begin
             if strides - {stride}:
                 raise InvalidConstraint(
@@ -131,8 +142,14 @@ def pack(scene):
         moving = any(constraint.rheonomic for constraint, _ in members)
         addresses.append(_address(kind, "phi_t") if moving else 0)
         kinds.append([*addresses, len(members), stride, *first, 0])
+        if kind.memory:
+            counters.append([_address(kind, "remember"), len(members), stride, *first])
 
     forces, signals, memory, loads = pack_forces(scene.forces, where, table, reals)
+    for row, motion in zip(motions, programs, strict=True):
+        if motion.smooth is not None:
+            row[4] = len(reals)
+            reals += motion.smooth.program()
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
@@ -142,18 +159,21 @@ def pack(scene):
         kinds=np.array(kinds, np.int64).reshape(-1, COLUMNS),
         table=np.array(table, np.int64),
         reals=np.array(reals),
-        motions=np.array(motions, np.int64).reshape(-1, 4),
+        motions=np.array(motions, np.int64).reshape(-1, 5),
         rheonomic=np.array([any(kind[PHI_T] for kind in kinds)], np.int64),
         segments=np.array(segments, np.int64).reshape(-1, 4),
         forces=np.array(forces, np.int64).reshape(-1, FORCE_COLUMNS),
         signals=np.array(signals, np.int64).reshape(-1, 5),
-        memory=np.array(memory, np.int64),
+        memory=np.array([*memory, *kept.values()], np.int64),
+        counters=np.array(counters, np.int64).reshape(-1, 5),
     )
     coordinates = tuple(constraint.coordinates for constraint in primitives)
     size = max((np.abs(s).max() for each in coordinates for s in each), default=0.0)
     parameters = tuple(parameters.values())
     members = tuple(_members(scene.constraints))
-    return Packed(system, scene.bodies, primitives, parameters, coordinates, float(size), loads, members, {})
+    order = {constraint: len(memory) + i for i, constraint in enumerate(kept)}
+    slots = tuple(order.get(constraint, -1) for constraint in primitives)
+    return Packed(system, scene.bodies, primitives, parameters, coordinates, float(size), loads, members, slots, {})
 
 
 def _members(constraints):
@@ -184,11 +204,11 @@ def user_functions(packed):
     """Yield whatever holds compiled functions of a user's, and those functions."""
     for given in packed.parameters:
         for value in given:
-            if isinstance(value, Motion):
-                yield value, value.functions
+            if isinstance(value, Motion) and value.given:
+                yield value, value.given
     for load in packed.loads:
         for value in load.parameters:
-            if isinstance(value, Signal) and not isinstance(value.source, Table):
+            if isinstance(value, Signal) and not isinstance(value.source, (Table, tuple)):
                 yield value, (value.source,)
         if hasattr(load.force, "function_of_state"):
             yield load.force, (load.force.function_of_state,)

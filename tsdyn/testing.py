@@ -150,7 +150,7 @@ def _python(function, constraint, name):
     plain = twin(function)
 
     def call(x, t, out, *xd):
-        par = [part for value in constraint.parameters() for part in _parts(value, t)]
+        par = [part for value in constraint.parameters() for part in _parts(value, t)] + [0.0] * constraint.memory
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error", np.exceptions.ComplexWarning)

@@ -9,19 +9,40 @@ from .reactions import multipliers
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 AT_ONCE = 2000  # pieces of the interval
+AGREE, DEEPEST = 1e-11, 8  # of a piece's two halves with the whole; how often it is cut
 
 
 def work(solution, trajectory):
     """Work (k,), J, since the start: of applied and driving forces, less what dampers and friction have taken."""
     edges = np.unique(np.concatenate([[trajectory.start], trajectory.edges, solution.t]))
-    done = np.zeros(edges.size)
+    pieces = np.zeros(0)
     for first in range(0, edges.size - 1, AT_ONCE):
         some = edges[first : first + AT_ONCE + 1]
-        middle, half = 0.5 * (some[1:] + some[:-1]), 0.5 * np.diff(some)
-        t = (middle[:, None] + half[:, None] * NODES).ravel()
-        power = _power(solution, trajectory, t).reshape(-1, NODES.size)
-        done[first + 1 : first + some.size] = half * (power @ WEIGHTS)
-    return np.cumsum(done)[np.searchsorted(edges, solution.t)]
+        pieces = np.append(pieces, _integrals(solution, trajectory, some[:-1], some[1:], 0))
+    return np.append(0.0, np.cumsum(pieces))[np.searchsorted(edges, solution.t)]
+
+
+def _integrals(solution, trajectory, a, b, depth):
+    """The work from each a to its b; what is driven may swing often in a step, so pieces are cut until halves agree."""
+    done, size = _quadrature(solution, trajectory, a, b)
+    if not solution.system.rheonomic[0] or depth == DEEPEST or not a.size:
+        return done
+    middle = 0.5 * (a + b)
+    halves = sum(_quadrature(solution, trajectory, *ends)[0] for ends in ((a, middle), (middle, b)))
+    off = np.flatnonzero(np.abs(halves - done) > AGREE * size)
+    parts = ((a[off], middle[off]), (middle[off], b[off]))
+    halves[off] = sum(_integrals(solution, trajectory, *ends, depth + 1) for ends in parts)
+    return halves
+
+
+def _quadrature(solution, trajectory, a, b):
+    """Integrals (k,) of the power and of its size, five nodes each."""
+    if not a.size:
+        return np.zeros(0), np.zeros(0)
+    middle, half = 0.5 * (b + a), 0.5 * (b - a)
+    t = (middle[:, None] + half[:, None] * NODES).ravel()
+    power = _power(solution, trajectory, t).reshape(-1, NODES.size)
+    return half * (power @ WEIGHTS), half * (np.abs(power) @ WEIGHTS)
 
 
 def _power(solution, trajectory, t):

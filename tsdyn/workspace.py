@@ -181,7 +181,7 @@ def plain_context():
     """A context of the right types."""
     one, two = np.zeros(1), np.zeros((1, 1))
     ones, twos = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    system = System(twos, one, two, one, twos, ones, one, twos, ones, twos, twos, twos, ones)
+    system = System(twos, one, two, one, twos, ones, one, twos, ones, twos, twos, twos, ones, twos)
     return Context(
         system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False), *basis_free_parts(no_network(), 2)
     )

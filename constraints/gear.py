@@ -1,0 +1,245 @@
+"""Gear pair: two wheels on parallel axes turn in a fixed ratio, against the line of their centres.
+
+    l = x_b - x_a;  for w = f of a, and w = h of b:  X = l.w,  Y = u.(l x w),  S = X^2 + Y^2
+    theta = atan2(Y, X)                                              (1)  from the line of centres to w, about u
+    Phi   = theta_b - ratio theta_a - offset                         (2)  [rad], theta counted over turns
+    theta_u = X (l x w) / S,  theta_w = (X (u x l) - Y l) / S,  theta_l = (X (w x u) - Y w) / S       (3)
+    thetadd = (X Ydd - Y Xdd) / S - 2 (X Xd + Y Yd) (X Yd - Y Xd) / S^2                               (4)
+              with Xdd = 2 ld.wd, Ydd = 2 (ud.(ld x w) + ud.(l x wd) + u.(ld x wd))
+
+The line of centres turns with whatever carries the wheels, so a planet gear needs nothing more. Turns are counted from
+the last accepted step, so a step must turn less than half a turn. Singular where l, f or h is along the axis.
+"""
+
+import numpy as np
+
+from .._kernel import kernel
+from ..angle import angle_near
+from ..bodies import rotation_matrix
+from ..checks import number
+from ..errors import InvalidConstraint
+from ..framed_joint import PARALLEL, beside
+from ..joint import across
+from ..markers import Point, Vector
+from ..primitive import Primitive
+from ..recurrences import cross, dot, quotient, scaled, square
+from .thread import place
+
+
+class Gear(Primitive):
+    """Let two wheels turn in a fixed ratio, measured against the line between their centres.
+
+    Parameters
+    ----------
+    a, b : Body
+        The wheels, on parallel axes that joints to the ground or to a common carrier hold.
+    point_a, point_b : array_like (3,), m
+        Their centres, in the bodies' own frames.
+    axis_a : array_like (3,)
+        The axis, in the frame of a; scaled to unit length.
+    reference_a, reference_b : array_like (3,), optional
+        Directions across the axis in the bodies' own frames, whose angles from the line of centres are counted; by
+        default both are along it now.
+    ratio : float
+        Turn of b over turn of a, both against the carrier: -radius_a / radius_b of wheels that mesh on the outside,
+        positive for one inside the other. Not zero.
+    offset : float, rad; optional
+        theta_b - ratio theta_a; None takes that of the bodies as they stand now.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If the ratio is zero, a reference or the line of centres is along the axis, or a point or body is wrong.
+
+    Notes
+    -----
+    `Gear.at(a, b, point_a=, point_b=, axis=, ratio=)` takes the centres and the axis in the ground frame. At a start
+    theta_a lies in (-pi, pi], unless it goes on from the state of another run.
+    """
+
+    rows = 1
+    markers = (Vector("a"), Vector("a", "reference_a"), Vector("b", "reference_b"), Point("a"), Point("b"))
+    slots = 37
+    memory = 1
+
+    def __init__(
+        self,
+        a,
+        b,
+        *,
+        axis_a=None,
+        reference_a=None,
+        reference_b=None,
+        point_a=(0.0, 0.0, 0.0),
+        point_b=(0.0, 0.0, 0.0),
+        ratio=None,
+        offset=None,
+        name="",
+    ):
+        super().__init__(a, b, (axis_a, reference_a, reference_b, point_a, point_b), name)
+        self.ratio = ratio
+        u, f, h, l = self._now()
+        for word, v in (("reference_a", f), ("reference_b", h), ("the line of centres", l)):
+            if not np.linalg.norm(np.cross(u, v)) > PARALLEL * np.linalg.norm(v):
+                raise InvalidConstraint(f"{self.name}: {word} is along the axis at the start; it must be across it.")
+        if offset is None:
+            self.check()
+            one, other = (np.arctan2(u @ np.cross(l, w), l @ w) for w in (f, h))
+            offset = float(other - number(ratio) * one)
+        self.offset = offset
+        self.check()
+
+    def _places(self, given):
+        """Fill in the references that were left out: along the line of centres, far from where angles jump."""
+        axis, one, other, *points = given
+        if one is None or other is None:
+            u = rotation_matrix(self.a.orientation) @ self._place(self.markers[0], axis)
+            ends = [self._place(*pair) for pair in zip(self.markers[3:], points, strict=True)]
+            l = place(self.b, ends[1]) - place(self.a, ends[0])
+            sound = np.linalg.norm(np.cross(u, l)) > PARALLEL * np.linalg.norm(l)
+            f = beside(u, l)[0] if sound else across(u)[0]
+            one = rotation_matrix(self.a.orientation).T @ f if one is None else one
+            other = rotation_matrix(self.b.orientation).T @ f if other is None else other
+        return super()._places([axis, one, other, *points])
+
+    def _now(self):
+        """u, f, h and l as the bodies stand now, ground frame."""
+        A, B = (rotation_matrix(body.orientation) for body in (self.a, self.b))
+        u, f = A @ self.axis_a, A @ self.reference_a
+        return u, beside(u, f)[0] if np.linalg.norm(np.cross(u, f)) > 0 else f, B @ self.reference_b, self._line()
+
+    def _line(self):
+        return place(self.b, self.point_b) - place(self.a, self.point_a)
+
+    def check(self):
+        """A ratio and an offset."""
+        ratio = number(self.ratio)
+        if not (np.isfinite(ratio) and ratio != 0.0):
+            raise InvalidConstraint(
+                f"{self.name}: ratio is the turn of b over that of a and must be a finite number other than zero, got "
+                f"{self.ratio!r}; it is negative where the wheels turn opposite ways."
+            )
+        if "offset" in self.__dict__ and not np.isfinite(number(self.offset)):
+            raise InvalidConstraint(f"{self.name}: offset must be a finite angle in rad, got {self.offset!r}.")
+
+    def parameters(self):
+        """(ratio, offset); what is remembered is theta_a."""
+        return number(self.ratio), number(self.offset)
+
+    @staticmethod
+    def phi(x, par, t, out):
+        """Eq. (2)."""
+        u, f, h, l = _parts(x)
+        one = angle_near(_dot(u, _cross(l, f)), _dot(l, f), par[2])
+        goal = par[0] * one + par[1]
+        out[0] = angle_near(_dot(u, _cross(l, h)), _dot(l, h), goal.real) - goal
+
+    @staticmethod
+    def jacobian(x, par, t, out):
+        """By Eq. (3)."""
+        u, f, h, l = _parts(x)
+        sides = _cross(u, l)
+        for j in range(2):
+            factor = -par[0] if j == 0 else 1.0
+            w = f if j == 0 else h
+            turned = _cross(l, w)
+            X, Y = _dot(l, w), _dot(u, turned)
+            S = X * X + Y * Y
+            X, Y = factor * X / S, factor * Y / S
+            wide = _cross(w, u)
+            for i in range(3):
+                out[0, i] += X * turned[i]
+                out[0, 3 + 3 * j + i] = X * sides[i] - Y * l[i]
+                out[0, 12 + i] += X * wide[i] - Y * w[i]
+        for i in range(3):
+            out[0, 9 + i] = -out[0, 12 + i]
+
+    @staticmethod
+    def gamma(x, xd, par, t, out):
+        """By Eq. (4)."""
+        u, f, h, l = _parts(x)
+        ud, fd, hd, ld = _parts(xd)
+        out[0] = _second(u, h, l, ud, hd, ld) - par[0] * _second(u, f, l, ud, fd, ld)
+
+    @staticmethod
+    def remember(x, par, t):
+        """theta_a."""
+        u, f, _, l = _parts(x)
+        return angle_near(_dot(u, _cross(l, f)), _dot(l, f), par[2])
+
+    @staticmethod
+    def series(x, par, k, s, out):
+        """Of Eq. (3); rows of u, f, h, l, then l x w, X, Y, S, X / S, Y / S and w x u for both, and u x l."""
+        for i in range(9):
+            s[i, k] = x[i]
+        for i in range(3):
+            s[9 + i, k] = x[12 + i] - x[9 + i]
+        s[34, k], s[35, k], s[36, k] = cross(s, 0, 9, k)
+        for j in range(2):
+            w, at, factor = 3 + 3 * j, 12 + 11 * j, -par[0] if j == 0 else 1.0
+            s[at, k], s[at + 1, k], s[at + 2, k] = cross(s, 9, w, k)
+            s[at + 3, k], s[at + 4, k] = dot(s, 9, w, k), dot(s, 0, at, k)
+            s[at + 5, k] = square(s[at + 3], k) + square(s[at + 4], k)
+            s[at + 6, k] = quotient(s[at + 3], s[at + 5], s[at + 6], k)
+            s[at + 7, k] = quotient(s[at + 4], s[at + 5], s[at + 7], k)
+            s[at + 8, k], s[at + 9, k], s[at + 10, k] = cross(s, w, 0, k)
+            a0, a1, a2 = scaled(s, at, at + 6, k)
+            out[0, 0] += factor * a0
+            out[0, 1] += factor * a1
+            out[0, 2] += factor * a2
+            a0, a1, a2 = scaled(s, 34, at + 6, k)
+            b0, b1, b2 = scaled(s, 9, at + 7, k)
+            out[0, w] = factor * (a0 - b0)
+            out[0, w + 1] = factor * (a1 - b1)
+            out[0, w + 2] = factor * (a2 - b2)
+            a0, a1, a2 = scaled(s, at + 8, at + 6, k)
+            b0, b1, b2 = scaled(s, w, at + 7, k)
+            out[0, 12] += factor * (a0 - b0)
+            out[0, 13] += factor * (a1 - b1)
+            out[0, 14] += factor * (a2 - b2)
+        for i in range(3):
+            out[0, 9 + i] = -out[0, 12 + i]
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A random instance, its references and line of centres nearly across the axis."""
+        A, B = (rotation_matrix(body.orientation) for body in (a, b))
+        u, point = rng.normal(size=(2, 3))
+        f, g = across(A @ u)
+        end = place(a, point) + 1.5 * f + 0.3 * rng.normal(size=3) - b.position
+        one, other = (np.cos(c) * f + np.sin(c) * g + 0.2 * rng.normal(size=3) for c in rng.normal(size=2))
+        return cls(
+            a, b, axis_a=u, reference_a=A.T @ one, reference_b=B.T @ other, point_a=point, point_b=B.T @ end,
+            ratio=rng.uniform(0.5, 2.0),
+        )  # fmt: skip
+
+
+@kernel
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def _cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def _parts(x):
+    """u, f, h and l of the markers, or of their rates."""
+    line = x[12] - x[9], x[13] - x[10], x[14] - x[11]
+    return (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), line
+
+
+@kernel
+def _second(u, w, l, ud, wd, ld):
+    """Eq. (4)."""
+    turned = _cross(l, w)
+    X, Y = _dot(l, w), _dot(u, turned)
+    Xd, Xdd = _dot(ld, w) + _dot(l, wd), 2.0 * _dot(ld, wd)
+    one, two = _cross(ld, w), _cross(l, wd)
+    Yd = _dot(ud, turned) + _dot(u, one) + _dot(u, two)
+    Ydd = 2.0 * (_dot(ud, one) + _dot(ud, two) + _dot(u, _cross(ld, wd)))
+    S = X * X + Y * Y
+    return (X * Ydd - Y * Xdd) / S - 2.0 * (X * Xd + Y * Yd) * (X * Yd - Y * Xd) / (S * S)

@@ -1,0 +1,72 @@
+"""Point driver: a point of a body follows a path, given in the frame of another.
+
+    e_i.(x_b - x_a) = path_i(t)     (1)  three rows, Dot2; e_i are the axes of body a's frame
+
+Never singular.
+"""
+
+import numpy as np
+
+from ..errors import InvalidConstraint
+from ..joint import Joint
+from ..markers import Point
+from ..motion import Motion
+from .dot2 import Dot2
+
+
+class PointDriver(Joint):
+    """Lead a point of b along a path in the frame of a; its three rotations stay free.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene; the path is in the frame of a, often the ground.
+    point_a : array_like (3,), m
+        Where the path is measured from, in the frame of a.
+    point_b : array_like (3,), m
+        The point that is led, in the frame of b.
+    path : sequence of three, m
+        The coordinates along the axes of a: one of ts.motions, a function f of time or three (f, fd, fdd), or a float.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If the path is not three motions or numbers, or a point or body is wrong.
+
+    Notes
+    -----
+    Three rows: path[0] to path[2]. The force that leads b is that of `solution.reaction(driver, on=b)`.
+    """
+
+    markers = (Point("a"), Point("b"))
+
+    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), path=None, name=""):
+        super().__init__(a, b, (point_a, point_b), name)
+        self.path = path
+        self.check()
+
+    def __setattr__(self, name, value):
+        """Set an attribute, checked."""
+        if name == "path":
+            if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 3:
+                raise InvalidConstraint(
+                    f"{self.name}: path must be three motions or numbers, the coordinates along the axes of a, got "
+                    f"{value!r}."
+                )
+            value = tuple(Motion.wrap(part, f"{self.name}: path[{i}]") for i, part in enumerate(value))
+        super().__setattr__(name, value)
+
+    def compose(self):
+        """Eq. (1)."""
+        for axis, value in zip(np.eye(3), self.path, strict=True):
+            yield (
+                "path",
+                Dot2(self.a, self.b, axis_a=axis, point_a=self.point_a, point_b=self.point_b, value=value),
+            )
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A random instance that stands still."""
+        one, two, path = rng.normal(size=(3, 3))
+        return cls(a, b, point_a=one, point_b=two, path=path)

@@ -1,0 +1,99 @@
+"""Screw joint: a common axis, and a turn about it for every travel along it.
+
+    f_a.b = 0,  g_a.b = 0                           (1)  two rows, Parallel
+    f_a.(x_b - x_a) = 0,  g_a.(x_b - x_a) = 0       (2)  two rows, PointOnLine: x_b on the axis of a
+    lead sin(theta - a.(x_b - x_a) / lead) = 0      (3)  Thread; theta from f_a to f_b about the axis
+
+f_a and f_b are the references made perpendicular to the axes. (1) holds with the axes opposed, too: a start there is
+refused. (3) is periodic as the thread is, and counts no turns. Never singular.
+"""
+
+from ..framed_joint import FramedJoint
+from .cylindrical import Cylindrical
+from .rotation_motor import axes, set_apart
+from .thread import Thread, demand_lead, travel
+
+
+class Screw(FramedJoint):
+    """Let one body turn about an axis of another and move along it in proportion: a screw in its nut.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene.
+    point_a, point_b : array_like (3,), m
+        A point of the axis on each body, in its own frame.
+    axis_a, axis_b : array_like (3,)
+        The axis, in the bodies' own frames; scaled to unit length.
+    reference_a, reference_b : array_like (3,), optional
+        Directions beside the axis, in the bodies' own frames, which point the same way where the points coincide; what
+        is left out follows from the bodies as they stand now.
+    lead : float, m/rad
+        Travel of b along the axis over its turn about it (right hand), against a. Negative for a left-handed thread.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If the lead is zero, an axis is missing or zero, a reference is parallel to its axis, or a point or body is
+        wrong.
+
+    Notes
+    -----
+    Rows: axis[0], axis[1], line[0], line[1], thread. `Screw.at(a, b, point=, axis=, lead=)` takes a point and the
+    direction of the axis in the ground frame. A thread of one pitch p in m has lead = p / (2 pi).
+    """
+
+    def __init__(
+        self,
+        a,
+        b,
+        *,
+        point_a=(0.0, 0.0, 0.0),
+        point_b=(0.0, 0.0, 0.0),
+        axis_a=None,
+        axis_b=None,
+        reference_a=None,
+        reference_b=None,
+        lead=None,
+        name="",
+    ):
+        super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
+        self.lead = demand_lead(self, "lead", lead)
+        turn = travel(a, b, self.axis_a, self.point_a, self.point_b) / self.lead
+        set_apart(self, reference_a is None, reference_b is None, turn)
+        self.check()
+
+    def check(self):
+        """A lead, and references across their axes."""
+        demand_lead(self, "lead", self.lead)
+        super().check()
+
+    def compose(self):
+        """Eqs. (1) to (3)."""
+        (f, g), (h, _) = self.frames
+        yield from Cylindrical(self.a, self.b, **axes(self)).compose()
+        yield (
+            "thread",
+            Thread(
+                self.a,
+                self.b,
+                reference_a=f,
+                across_a=g,
+                axis_a=self.axis_a,
+                reference_b=h,
+                point_a=self.point_a,
+                point_b=self.point_b,
+                lead=self.lead,
+            ),
+        )
+
+    def aligned(self):
+        """Nothing more than Parallel says."""
+        return ()
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A random instance; it need not hold."""
+        places = {marker.argument: rng.normal(size=3) for marker in cls.markers}
+        return cls(a, b, **places, lead=rng.uniform(0.5, 2.0))

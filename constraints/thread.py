@@ -1,0 +1,188 @@
+"""A turn in proportion to a travel: the thread of a screw, or the teeth of a rack.
+
+    E = f.h,  F = g.h,  d = x_b - x_a         f, g, e of body a, h of body b: E = cos(theta), F = sin(theta)
+    s     = e.d / L                                                 (1)  L is the lead, m/rad
+    Phi   = L (cos(s) F - sin(s) E)                                 (2)  [m]  L sin(theta - e.d / L)
+    C     = cos(s) E + sin(s) F                                     (3)  1 or -1 where Phi = 0
+    Phi_x = [ -L sin(s) h^T, L cos(s) h^T, -C d^T, L (cos(s) g - sin(s) f)^T, C e^T, -C e^T ]     (4)
+            for (f, g, e, h, x_a, x_b)
+    gamma = L cos(s) (Fdd - sd^2 F - sdd E - 2 sd Ed) - L sin(s) (Edd - sd^2 E + sdd F + 2 sd Fd)
+            with Edd = 2 fd.hd, Fdd = 2 gd.hd, sdd = 2 ed.dd / L    (5)
+
+It is periodic as a thread is, so no turns are counted; the neighbouring solutions are half a turn or half a pitch away.
+Singular where h is along f x g.
+"""
+
+import numpy as np
+
+from ..bodies import rotation_matrix
+from ..checks import number
+from ..errors import InvalidConstraint
+from ..markers import Point, Vector
+from ..primitive import Primitive
+from ..recurrences import dot, product, scaled, sine_cosine
+
+
+class Thread(Primitive):
+    """Keep the turn of b against a in proportion to its travel; `Screw` and `RackAndPinion` are made of it.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene, held by other joints so that b turns about f x g alone.
+    reference_a, across_a : array_like (3,)
+        Directions of a across the axis of turning, at right angles: the angles 0 and pi/2. Scaled to unit length.
+    axis_a : array_like (3,)
+        The direction of the travel.
+    reference_b : array_like (3,)
+        The direction of b that turns.
+    point_a, point_b : array_like (3,), m
+        The points whose distance along axis_a is the travel.
+    lead : float, m/rad
+        Travel over turn, not zero; negative for a left-handed thread.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If the lead is zero or not finite, or a direction, point or body is wrong.
+    """
+
+    rows = 1
+    markers = (
+        Vector("a", "reference_a"),
+        Vector("a", "across_a"),
+        Vector("a"),
+        Vector("b", "reference_b"),
+        Point("a"),
+        Point("b"),
+    )
+    slots = 21
+
+    def __init__(
+        self,
+        a,
+        b,
+        *,
+        reference_a=None,
+        across_a=None,
+        axis_a=None,
+        reference_b=None,
+        point_a=(0.0, 0.0, 0.0),
+        point_b=(0.0, 0.0, 0.0),
+        lead=None,
+        name="",
+    ):
+        super().__init__(a, b, (reference_a, across_a, axis_a, reference_b, point_a, point_b), name)
+        self.lead = lead
+        self.check()
+
+    def check(self):
+        """A lead."""
+        demand_lead(self, "lead", self.lead)
+
+    def parameters(self):
+        """(L,)."""
+        return (number(self.lead),)
+
+    @staticmethod
+    def phi(x, par, t, out):
+        """Eq. (2)."""
+        E, F, s = 0.0, 0.0, 0.0
+        for i in range(3):
+            E += x[i] * x[9 + i]
+            F += x[3 + i] * x[9 + i]
+            s += x[6 + i] * (x[15 + i] - x[12 + i])
+        s /= par[0]
+        out[0] = par[0] * (np.cos(s) * F - np.sin(s) * E)
+
+    @staticmethod
+    def jacobian(x, par, t, out):
+        """Eq. (4)."""
+        E, F, s = 0.0, 0.0, 0.0
+        for i in range(3):
+            E += x[i] * x[9 + i]
+            F += x[3 + i] * x[9 + i]
+            s += x[6 + i] * (x[15 + i] - x[12 + i])
+        s /= par[0]
+        sine, cosine = np.sin(s), np.cos(s)
+        C = cosine * E + sine * F
+        sine, cosine = par[0] * sine, par[0] * cosine
+        for i in range(3):
+            out[0, i] = -sine * x[9 + i]
+            out[0, 3 + i] = cosine * x[9 + i]
+            out[0, 6 + i] = -C * (x[15 + i] - x[12 + i])
+            out[0, 9 + i] = cosine * x[3 + i] - sine * x[i]
+            out[0, 12 + i] = C * x[6 + i]
+            out[0, 15 + i] = -C * x[6 + i]
+
+    @staticmethod
+    def gamma(x, xd, par, t, out):
+        """Eq. (5)."""
+        E, F, Ed, Fd, Edd, Fdd, s, sd, sdd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(3):
+            E += x[i] * x[9 + i]
+            F += x[3 + i] * x[9 + i]
+            Ed += xd[i] * x[9 + i] + x[i] * xd[9 + i]
+            Fd += xd[3 + i] * x[9 + i] + x[3 + i] * xd[9 + i]
+            Edd += 2.0 * xd[i] * xd[9 + i]
+            Fdd += 2.0 * xd[3 + i] * xd[9 + i]
+            d, dd = x[15 + i] - x[12 + i], xd[15 + i] - xd[12 + i]
+            s += x[6 + i] * d
+            sd += xd[6 + i] * d + x[6 + i] * dd
+            sdd += 2.0 * xd[6 + i] * dd
+        s, sd, sdd = s / par[0], sd / par[0], sdd / par[0]
+        one = Fdd - sd * sd * F - sdd * E - 2.0 * sd * Ed
+        two = Edd - sd * sd * E + sdd * F + 2.0 * sd * Fd
+        out[0] = par[0] * (np.cos(s) * one - np.sin(s) * two)
+
+    @staticmethod
+    def series(x, par, k, s, out):
+        """Of Eq. (4); rows of f, g, e, h, d, s, sin(s), cos(s), E, F, C."""
+        for i in range(12):
+            s[i, k] = x[i]
+        for i in range(3):
+            s[12 + i, k] = x[15 + i] - x[12 + i]
+        s[15, k] = dot(s, 6, 12, k) / par[0]
+        s[16, k], s[17, k] = sine_cosine(s[15], s[16], s[17], k)
+        s[18, k], s[19, k] = dot(s, 0, 9, k), dot(s, 3, 9, k)
+        s[20, k] = product(s[17], s[18], k) + product(s[16], s[19], k)
+        f0, f1, f2 = scaled(s, 9, 16, k)
+        g0, g1, g2 = scaled(s, 9, 17, k)
+        out[0, 0], out[0, 1], out[0, 2] = -par[0] * f0, -par[0] * f1, -par[0] * f2
+        out[0, 3], out[0, 4], out[0, 5] = par[0] * g0, par[0] * g1, par[0] * g2
+        f0, f1, f2 = scaled(s, 12, 20, k)
+        out[0, 6], out[0, 7], out[0, 8] = -f0, -f1, -f2
+        f0, f1, f2 = scaled(s, 0, 16, k)
+        g0, g1, g2 = scaled(s, 3, 17, k)
+        out[0, 9], out[0, 10], out[0, 11] = par[0] * (g0 - f0), par[0] * (g1 - f1), par[0] * (g2 - f2)
+        f0, f1, f2 = scaled(s, 6, 20, k)
+        out[0, 12], out[0, 13], out[0, 14] = f0, f1, f2
+        out[0, 15], out[0, 16], out[0, 17] = -f0, -f1, -f2
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A random instance."""
+        places = {marker.argument: rng.normal(size=3) for marker in cls.markers}
+        return cls(a, b, **places, lead=rng.uniform(0.5, 2.0))
+
+
+def demand_lead(constraint, word, value):
+    """The lead or radius, refused where there is no travel in a turn."""
+    result = number(value)
+    if not (np.isfinite(result) and result != 0.0):
+        raise InvalidConstraint(
+            f"{constraint.name}: {word} is the travel over the turn (m/rad) and must be a finite number other than "
+            f"zero, got {value!r}; a screw without travel is a Revolute joint."
+        )
+    return result
+
+
+def travel(a, b, direction, point_a, point_b):
+    """How far the point of b is from that of a along a direction of a, as the bodies stand now."""
+    return float((rotation_matrix(a.orientation) @ direction) @ (place(b, point_b) - place(a, point_a)))
+
+
+def place(body, s):
+    """Where a point of a body is now, ground frame."""
+    return body.position + (rotation_matrix(body.orientation) @ s if body.dimension != 3 else 0.0)

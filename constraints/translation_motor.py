@@ -1,0 +1,76 @@
+"""Translation motor: the displacement along an axis is a function of time.
+
+    a.(x_b - x_a) = displacement(t)     (1)  Dot2
+
+Never singular by itself.
+"""
+
+from ..joint import Joint
+from ..markers import Point, Vector
+from ..motion import Motion
+from .dot2 import Dot2
+from .rotation_motor import axes, geometry
+
+
+class TranslationMotor(Joint):
+    """Move one body along an axis of another as a function of time says: a linear drive on a slider.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene, held by a joint that lets them slide (Translational, Cylindrical, ...).
+    point_a, point_b : array_like (3,), m
+        The points whose distance along the axis is prescribed, in the bodies' own frames.
+    axis_a : array_like (3,)
+        The axis, in the frame of a; scaled to unit length.
+    displacement : one of ts.motions, a function f of time or three (f, fd, fdd), or float, m
+        How far the point of b is from that of a, along the axis.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidConstraint
+        If the axis is missing or zero, the displacement is no motion, or a point or body is wrong.
+
+    Notes
+    -----
+    One row: travel. `TranslationMotor.of(joint, displacement=)` drives a joint between its points;
+    `TranslationMotor.at(a, b, point=, axis=, displacement=)` takes a point (or `point_a=`, `point_b=`) and the axis in
+    the ground frame. The force on b along the axis is that of `solution.reaction(motor, on=b)`.
+    """
+
+    markers = (Point("a"), Point("b"), Vector("a"))
+
+    def __init__(
+        self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, displacement=0.0, name=""
+    ):
+        super().__init__(a, b, (point_a, point_b, axis_a), name)
+        self.displacement = displacement
+        self.check()
+
+    def __setattr__(self, name, value):
+        """Set an attribute, checked."""
+        if name == "displacement":
+            value = Motion.wrap(value, f"{self.name}: displacement")
+        super().__setattr__(name, value)
+
+    @classmethod
+    def of(cls, joint, *, displacement, name=""):
+        """Make the motor that moves b of a joint against a, along its axis, measured between the joint's points."""
+        bodies, given = geometry(joint), axes(joint)
+        given.pop("axis_b")
+        return cls(*bodies, **given, displacement=displacement, name=name)
+
+    def compose(self):
+        """Eq. (1)."""
+        yield (
+            "travel",
+            Dot2(
+                self.a,
+                self.b,
+                axis_a=self.axis_a,
+                point_a=self.point_a,
+                point_b=self.point_b,
+                value=self.displacement,
+            ),
+        )

@@ -1,0 +1,91 @@
+"""Taylor series of a smooth motion at a time: one kernel for all motions, which runs a short program of numbers.
+
+A program begins with (t, instructions, place of the constants, place of the rows, rows, row of the result); then come
+four numbers an instruction: what it does, the row that it writes, and two operands, rows or the place of a constant.
+A row is a series, [i] its coefficient of (time - t)^i. `motions.Smooth.program` writes them.
+"""
+
+import numpy as np
+
+from ._kernel import ANY, callback, caller, data_of, kernel, matrix, vector
+from .recurrences import exponential, power, product, quotient, sine_cosine, square
+
+POLYNOMIAL, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, SINE, EXP, LOG, TANH, ARCTAN = range(11)
+HEAD, STEP, WIDTH = 6, 4, 36  # numbers before the instructions, of each, and room for coefficients in a row
+SIGNATURE = "pdip"  # program, t, how many coefficients, where they go
+call_smooth = caller(SIGNATURE)
+
+
+@kernel
+def _polynomial(c, n, t, k):
+    """Coefficient k about t of c_0 + ... + c_{n-1} t^(n-1): sum_j binomial(j, k) c_j t^(j-k)."""
+    if k >= n:
+        return 0.0
+    binomial, total = 1.0, 0.0
+    for i in range(1, k + 1):
+        binomial = binomial * (n - 1 - k + i) / i
+    for j in range(n - 1, k - 1, -1):
+        total = total * t + binomial * c[j]
+        if j > 0:
+            binomial = binomial * (j - k) / j
+    return total
+
+
+@kernel
+def _slope_over(a, w, y, k):
+    """Coefficient k >= 1 of y with y' w = a'."""
+    total = k * a[k]
+    for j in range(1, k):
+        total -= j * y[j] * w[k - j]
+    return total / (k * w[0])
+
+
+@kernel
+def _hyperbolic(a, y, w, k):
+    """Coefficient k of y = tanh(a), y' = (1 - y^2) a'; w is the row of 1 - y^2, known below k."""
+    if k == 0:
+        return np.tanh(a[0])
+    total = 0.0
+    for j in range(1, k + 1):
+        total += j * a[j] * w[k - j]
+    return total / k
+
+
+@callback(SIGNATURE)
+def run_program(program, t, count, out):
+    """out (count,): the motion's series about t; t is left in the program's first place."""
+    p, out = vector(program, ANY), vector(out, count)
+    p[0] = t
+    constants, result = int(p[2]), int(p[5])
+    s = matrix(data_of(p[int(p[3]) :]), int(p[4]), WIDTH)
+    for i in range(int(p[1])):
+        at = HEAD + STEP * i
+        what, y, a, b = int(p[at]), int(p[at + 1]), int(p[at + 2]), int(p[at + 3])
+        for k in range(count):
+            if what == POLYNOMIAL:
+                s[y, k] = _polynomial(p[constants + a :], b, t, k)
+            elif what == ADD:
+                s[y, k] = s[a, k] + s[b, k]
+            elif what == SUBTRACT:
+                s[y, k] = s[a, k] - s[b, k]
+            elif what == MULTIPLY:
+                s[y, k] = product(s[a], s[b], k)
+            elif what == DIVIDE:
+                s[y, k] = quotient(s[a], s[b], s[y], k)
+            elif what == POWER:
+                s[y, k] = power(s[a], s[y], p[constants + b], k)
+            elif what == SINE:
+                s[y, k], s[y + 1, k] = sine_cosine(s[a], s[y], s[y + 1], k)
+            elif what == EXP:
+                s[y, k] = exponential(s[a], s[y], k)
+            elif what == LOG:
+                s[y, k] = np.log(s[a, 0]) if k == 0 else _slope_over(s[a], s[a], s[y], k)
+            elif what == TANH:
+                s[y, k] = _hyperbolic(s[a], s[y], s[y + 1], k)
+                s[y + 1, k] = (1.0 if k == 0 else 0.0) - square(s[y], k)
+            else:
+                s[y + 1, k] = (1.0 if k == 0 else 0.0) + square(s[a], k)
+                s[y, k] = np.arctan(s[a, 0]) if k == 0 else _slope_over(s[a], s[y + 1], s[y], k)
+    for k in range(count):
+        out[k] = s[result, k]
+    return 0

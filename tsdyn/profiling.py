@@ -188,6 +188,8 @@ def _once(scene, method, options, start):
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
     began = clock()
     memory = remembered(state, kept.packed.system.memory.size)
-    kept.start(scene, q, qd, start, options.get("initial_tol", 1e-9), memory)
+    kept.start(
+        scene, q, qd, start, options.get("initial_tol", 1e-9), memory, options.get("redundancy", "drop") == "drop"
+    )
     seconds["check of the start"] = clock() - began
     return seconds

@@ -146,12 +146,14 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     dependent = start.check()
     known = packed.shared.get(DROPPED)
     if dependent == REGULAR:
+        start.demand_velocities()
         if known is not None:  # another start had too many rows
             drop(packed, None)
             start = start.again()
         return start.landed()
     if dependent >= 0 and not allowed:
         _refuse(scene, start, dependent)
+    start.demand_velocities()
     if known is None:
         drop(packed, np.zeros(0, np.int64))
         start = start.again()
@@ -191,6 +193,11 @@ class _Start:
         work.control[U_TOL], work.control[SIZE] = tol, self.packed.size
         work.control[FLOOR] = ROUNDING * (self.packed.size + np.abs(q).max())
 
+    def demand_velocities(self):
+        """Refuse those that are off."""
+        tol = self.tol * (1.0 + np.abs(self.qd).max())
+        demand_small(self.scene, self.velocity, tol, "velocity", "Phi_q qd + Phi_t")
+
     def again(self):
         """The same on the network as it is made now."""
         other = _Start(*self.given)
@@ -212,7 +219,7 @@ class _Start:
         H[network.row[real], 0] = free.H.reshape(-1, 16)[real].sum(axis=1)
         demand_finite(scene, Phi, H, velocity)
         demand_small(scene, Phi, self.tol * (1.0 + np.abs(q).max()), "position", "Phi")
-        demand_small(scene, velocity, self.tol * (1.0 + np.abs(qd).max()), "velocity", "Phi_q qd + Phi_t")
+        self.velocity = velocity
         self.far = np.abs(Phi).max(initial=0.0) > ROUNDING * (1.0 + np.abs(q).max())
         self.fast = np.abs(velocity).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max())
         return dependent

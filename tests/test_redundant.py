@@ -180,6 +180,24 @@ def test_a_start_that_breaks_a_redundant_row_is_refused_by_name():
         ts.simulate(scene, (0.0, 1.0))
 
 
+def test_a_door_on_hinges_of_two_axes_is_told_to_be_locked():
+    scene = door.build()
+    scene.add(C.Revolute.at(scene.ground, scene.bodies[0], point=(0.0, 0.1, 0.0), axis=door.AXIS))
+    solution = ts.simulate(scene, (0.0, 0.5)).raise_if_failed()
+    assert "leave no degree of freedom" in solution.message
+    assert np.abs(solution.qd).max() < 1e-12
+
+
+def test_what_the_solver_sees_of_redundant_rows():
+    scene = closed_loops.four_bar()
+    found = scene.evaluate()
+    first = ts.simulate(scene, (0.0, 0.01))
+    np.testing.assert_allclose(found.qdd, first.qdd[0], atol=1e-11 * np.abs(first.qdd[0]).max())
+    assert np.isnan(found.multipliers).sum() == 3
+    assert found.Phi_q.shape == (23, 21)
+    assert np.abs(found.Phi_q @ found.qdd + found.gamma).max() < 1e-11
+
+
 def test_a_scene_that_is_changed_is_looked_at_anew():
     scene = closed_loops.four_bar()
     assert ts.simulate(scene, (0.0, 0.1)).success

@@ -15,6 +15,7 @@ NOT_UNIQUE = (
     "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
     "leave free carries no inertia."
 )
+DEPENDENT = 1e-7  # of rows of unit length: those that are left less follow from others
 LARGE = 1000  # coordinates from which on matrices are sparse
 
 
@@ -45,14 +46,14 @@ def evaluate(scene, q=None, qd=None, t=0.0):
     -------
     Evaluation
         Named tuple of arrays: Phi, Phi_q, Phi_t, gamma, M, Q_A, S, multipliers, qdd; Phi_q and M are SciPy sparse
-        arrays where n is above 1000.
+        arrays where n is above 1000. Multipliers are NaN for rows that follow from others (up to that size).
 
     Raises
     ------
     InvalidArgument
         If q or qd is not n finite numbers, or t is not finite.
     SingularConfiguration
-        If multipliers and accelerations are not unique there.
+        If accelerations are not unique there, or rows that depend on each other contradict each other.
 
     Notes
     -----
@@ -73,9 +74,32 @@ def evaluate(scene, q=None, qd=None, t=0.0):
     kkt = np.block([[M, Phi_q.T], [Phi_q, np.zeros((m, m))]])
     try:
         solution = equilibrated_solve(kkt, np.concatenate((Q_A + S, -gamma)))
+    except np.linalg.LinAlgError:
+        solution = _of_independent_rows(M, Phi_q, Q_A + S, gamma)
+    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A, S, solution[n:], solution[:n])
+
+
+def _of_independent_rows(M, Phi_q, load, gamma):
+    """(qdd, lam) with NaN for rows of Phi_q that follow from others, and hold with them."""
+    from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
+
+    m, n = Phi_q.shape
+    scaled = Phi_q / np.maximum(np.linalg.norm(Phi_q, axis=1), 1e-300)[:, None]
+    _, R, order = qr(scaled.T, mode="economic", pivoting=True)
+    size = np.abs(R.diagonal())
+    rank = int((size > DEPENDENT * size.max(initial=0.0)).sum())
+    kept, dropped = np.sort(order[:rank]), order[rank:]
+    kkt = np.block([[M, Phi_q[kept].T], [Phi_q[kept], np.zeros((rank, rank))]])
+    try:
+        found = equilibrated_solve(kkt, np.concatenate((load, -gamma[kept])))
     except np.linalg.LinAlgError as error:
         raise SingularConfiguration(NOT_UNIQUE) from error
-    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A, S, solution[n:], solution[:n])
+    left = Phi_q[dropped] @ found[:n] + gamma[dropped]
+    if rank == m or np.abs(left).max(initial=0.0) > DEPENDENT * (1.0 + np.abs(found[:n]).max()):
+        raise SingularConfiguration(NOT_UNIQUE)
+    lam = np.full(m, np.nan)
+    lam[kept] = found[n:]
+    return np.concatenate((found[:n], lam))
 
 
 def _evaluate_sparse(packed, q, qd, t):

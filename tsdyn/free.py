@@ -29,8 +29,8 @@ class Free(NamedTuple):
 
 
 # of the landing; the largest |Phi| of dropped rows; what elimination left of the weakest of the others, as a share:
-# when they were chosen, at a step's start, and at most at any; the length of the last step from no singular place
-RESIDUAL, MOVED, UNHELD, WEAKEST, SHARE, LARGEST_SHARE, STRIDE, SIZES = range(8)
+# when they were chosen, at a step's start, at its end, at most at any; the last step from a place that isn't singular
+RESIDUAL, MOVED, UNHELD, WEAKEST, SHARE, END_SHARE, LARGEST_SHARE, STRIDE, SIZES = range(9)
 
 
 MOST_ROWS = 700  # of which all are compared when independent ones are chosen

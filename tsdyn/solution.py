@@ -101,7 +101,7 @@ class Solution:
     def _message(self, scene, reason):
         """How the run ended, in words."""
         if self.success:
-            return f"{self.status.sentence} {reason}".strip()
+            return " ".join(part for part in (self.status.sentence, reason, self._locked()) if part)
         steps = f"{self.stats.steps} step{'' if self.stats.steps == 1 else 's'}"
         where = f"It stopped at t = {self._reached:.9g} s of {self.span[1]:g} s, after {steps}."
         suspect = self._suspect(scene)
@@ -110,6 +110,14 @@ class Solution:
             suspect = self._growth()
         parts = (self.status.sentence, reason, where, suspect, remedy)
         return " ".join(part for part in parts if part)
+
+    def _locked(self):
+        """Say so where redundant rows leave nothing free."""
+        redundant = len(self.packed.shared.get(DROPPED, ()))
+        still = redundant and not self.system.rheonomic[0]
+        if not (still and self.q.shape[1] == len(self.system.segments) - redundant):
+            return ""
+        return "Nothing can move: the constraints, redundant ones among them, leave no degree of freedom."
 
     def _growth(self):
         """Say that the motion is stiff, or that its speed has grown beyond all measure."""

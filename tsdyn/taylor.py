@@ -11,7 +11,7 @@ from ._kernel import entry, kernel
 from .assembly import remember, set_time
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
 from .errors import Status
-from .free import LARGEST_SHARE, RESIDUAL, SHARE, STRIDE
+from .free import END_SHARE, LARGEST_SHARE, RESIDUAL, SHARE, STRIDE
 from .linalg import copy
 from .local_chart import AT_START, BY_SERIES, ROUNDING
 from .outputs import record, store_now
@@ -127,9 +127,9 @@ def _step_length(c, r):
 @kernel
 def _mind_singular(c):
     """After a step: note how near Phi_q is to losing rank."""
-    f = c.free
-    f.sizes[SHARE] = weakest(c.network, f.S)
-    f.sizes[LARGEST_SHARE] = max(f.sizes[SHARE], f.sizes[LARGEST_SHARE])
+    sizes = c.free.sizes
+    sizes[SHARE] = sizes[END_SHARE]
+    sizes[LARGEST_SHARE] = max(sizes[SHARE], sizes[LARGEST_SHARE])
 
 
 @kernel
@@ -157,7 +157,7 @@ def _longest(c, r, h):
 @kernel
 def _is_near(c):
     """Whether a step has come, from well off, next to a singular configuration: a bad place to go on from."""
-    return weakest(c.network, c.free.S) < NEAR * c.free.sizes[SHARE]
+    return c.free.sizes[END_SHARE] < NEAR * c.free.sizes[SHARE]
 
 
 @kernel
@@ -213,6 +213,7 @@ def _begin_run(context, c, r, log, steps):
     place_bodies(c.network.bodies, w.q, f.poses)
     move_bodies(c.network.bodies, w.q, w.qd, f.poses)
     status = call_reach(steps[REACH], context, r.clock[T], -1.0)
+    f.sizes[END_SHARE] = weakest(c.network, f.S) if status == 0 else 0.0
     _open_chart(w, r, log, r.clock[T], AT_START)
     return _accept(context, c, r, log, steps, r.clock[T]) if status == 0 else status
 
@@ -308,6 +309,8 @@ def advance_series(context, run, log, steps, most):
             row[0], row[1], row[2] = t0, t1 - t0, 0.0
             status = call_reach(steps[REACH], context, t1, t1 - t0)
             landed = status == 0 and (not adaptive or f.sizes[RESIDUAL] <= missed + MISSED * w.control[FLOOR])
+            if landed:
+                f.sizes[END_SHARE] = weakest(c.network, f.S)
             if landed and (not adaptive or shorter == AVOIDING or last or not _is_near(c)):
                 break
             if not adaptive:

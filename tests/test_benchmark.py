@@ -134,7 +134,7 @@ def test_text_and_notebook(small):
     lines = text.splitlines()
     assert sum(line.startswith(("RK45 ", "DOP853 ", "Nystrom4 ")) for line in lines) == 6
     assert "digits are trusted" in text
-    assert benchmark_report.machine() in text
+    assert benchmark_report.machine().rpartition(";")[0] in text  # the day may have ended since
     shown = small._repr_html_()
     assert shown.count("<tr>") == 7
     assert "RK45" in shown

@@ -162,18 +162,6 @@ def write_back(network, l, poses, Z, out):
 
 
 @kernel
-def largest(values):
-    """The largest size; infinite where one is not finite."""
-    worst = 0.0
-    for i in range(values.size):
-        size = abs(values[i])
-        if not size < math.inf:
-            return math.inf
-        worst = max(worst, size)
-    return worst
-
-
-@kernel
 def largest_rates(network, poses):
     """The largest |rd| and |omega'| entries."""
     r, w = 0.0, 0.0

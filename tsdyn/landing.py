@@ -11,7 +11,8 @@ from ._kernel import kernel
 from .block_kernels import solve
 from .errors import Status
 from .free import RESIDUAL
-from .network import REDUCED, VALUES
+from .linalg import largest
+from .network import DRIFT, REDUCED, VALUES
 from .normal import gather, scatter
 from .poses import OMEGA, POSE, RD, P, R, set_pose
 from .rows import factorise_rows, held, run_loops
@@ -36,18 +37,6 @@ def factorise(network, system, w, f, t):
 
 
 @kernel
-def _largest(values):
-    """The largest size; infinite where one is not finite."""
-    worst = 0.0
-    for i in range(values.size):
-        size = abs(values[i])
-        if not size < math.inf:
-            return math.inf
-        worst = max(worst, size)
-    return worst
-
-
-@kernel
 def land(network, system, w, f, t):
     """Bring positions onto the manifold along W H^T; H, Y and S are those of where they land. Status."""
     floor, before, moved, renew = w.control[FLOOR], math.inf, 0.0, True
@@ -60,7 +49,7 @@ def land(network, system, w, f, t):
             renew = False
         else:
             run_loops(network, system.reals, VALUES, f, t, f.b, f.H)
-        worst = _largest(f.b)
+        worst = largest(f.b)
         f.sizes[RESIDUAL] = max(f.sizes[RESIDUAL], worst)
         if not worst < math.inf:
             return NOT_FINITE
@@ -85,6 +74,13 @@ def _displace(network, f):
     for i in range(f.Z.size):
         f.Z[i] = 0.0
     scatter(network, f.Y, f.b, f.Z)
+    move_by(network, f)
+    return largest(f.Z)
+
+
+@kernel
+def move_by(network, f):
+    """Move and turn the bodies by Z, to first order."""
     p = f.p
     for b in range(network.bodies.shape[0]):
         at, o = b * POSE, 8 * b
@@ -98,7 +94,6 @@ def _displace(network, f):
             p[3] = e3 - e2 * x + e1 * y + e0 * z
             normalise(p)
             set_pose(f.poses, at, p)
-    return _largest(f.Z)
 
 
 @kernel
@@ -110,19 +105,38 @@ def normalise(p):
 
 
 @kernel
-def land_velocities(network, f):
-    """Take out of the velocities of the poses what is normal to the manifold, twice: the second time it is rounding."""
-    nb = network.bodies.shape[0]
+def gather_speeds(network, f):
+    """Z = rd and omega' of the poses."""
+    for b in range(network.bodies.shape[0]):
+        put(f.Z, 8 * b, four(f.poses, b * POSE + RD))
+        put(f.Z, 8 * b + 4, four(f.poses, b * POSE + OMEGA))
+
+
+@kernel
+def find_drift(network, system, f, t):
+    """gamma = Phi_t, time being set."""
+    for e in range(f.gamma.size):
+        f.gamma[e] = 0.0
+    run_loops(network, system.reals, DRIFT, f, t, f.gamma, f.H)
+
+
+@kernel
+def land_velocities(network, f, drifting):
+    """Take out of the velocities of the poses what is normal to the manifold, twice: the second time it is rounding.
+
+    H, Y and S are those of the poses; with `drifting`, gamma is Phi_t.
+    """
+    gather_speeds(network, f)
     for _ in range(2):
-        for b in range(nb):
-            put(f.Z, 8 * b, four(f.poses, b * POSE + RD))
-            put(f.Z, 8 * b + 4, four(f.poses, b * POSE + OMEGA))
         gather(network, f.H, f.Z, f.b)
+        if drifting:
+            for e in range(f.b.size):
+                f.b[e] += f.gamma[e]
         solve(network.pattern, f.S, f.b)
         scatter(network, f.Y, f.b, f.Z)
-        for b in range(nb):
-            put(f.poses, b * POSE + RD, four(f.Z, 8 * b))
-            put(f.poses, b * POSE + OMEGA, four(f.Z, 8 * b + 4))
+    for b in range(network.bodies.shape[0]):
+        put(f.poses, b * POSE + RD, four(f.Z, 8 * b))
+        put(f.poses, b * POSE + OMEGA, four(f.Z, 8 * b + 4))
 
 
 @kernel

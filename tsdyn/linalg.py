@@ -213,3 +213,15 @@ def lu_solve(A, pivots, b, n):
         for j in range(i + 1, n):
             b[i] -= A[i, j] * b[j]
         b[i] /= A[i, i]
+
+
+@kernel
+def largest(values):
+    """The largest size; infinite where one is not finite."""
+    worst = 0.0
+    for i in range(values.size):
+        size = abs(values[i])
+        if not size < math.inf:
+            return math.inf
+        worst = max(worst, size)
+    return worst

@@ -8,11 +8,11 @@ import math
 from ._four import fma, four, put, splat, times
 from ._kernel import callback, caller, kernel
 from .assembly import set_time
-from .driven import expand_motions, land_driven_velocities
+from .driven import expand_motions
 from .errors import Status
 from .expansion import begin, expand
 from .free_accelerations import accelerate_bodies
-from .landing import land, land_velocities, sum_series
+from .landing import find_drift, land, land_velocities, sum_series
 from .network import REDUCED
 from .poses import write_accelerations, write_positions, write_velocities
 from .rows import run_loops
@@ -65,10 +65,10 @@ def is_driven(system):
 
 @kernel
 def _land_rates(c, t):
-    if is_driven(c.system):
-        land_driven_velocities(c.network, c.system, c.free, t)
-    else:
-        land_velocities(c.network, c.free)
+    driven = is_driven(c.system)
+    if driven:
+        find_drift(c.network, c.system, c.free, t)
+    land_velocities(c.network, c.free, driven)
 
 
 @callback("pdd")

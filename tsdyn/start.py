@@ -5,25 +5,22 @@ import itertools
 import numpy as np
 
 from . import initial
-from ._four import four, put
-from ._kernel import entry, kernel, resident
+from ._kernel import entry, resident
 from .assembly import set_time
 from .block_kernels import factor, solve
 from .errors import RedundantConstraints, SingularConfiguration, Status
 from .evaluate import constraint_arrays
 from .free import allocate_free
 from .initial import ROUNDING, demand_finite, demand_small
-from .landing import PIVOT_LIMIT, land, normalise
+from .landing import PIVOT_LIMIT, find_drift, gather_speeds, land, land_velocities, move_by
 from .network import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, is_regular, network_of
 from .normal import gather, multiply_rows, scatter, weigh_rows
-from .poses import OMEGA, POSE, RD, P, R, move_bodies, place_bodies, set_pose, write_positions, write_velocities
+from .poses import move_bodies, place_bodies, write_positions, write_velocities
 from .rank import check_rank
 from .rows import run_loops
 from .selection import drop_rows, factor_rows, select
 from .workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 
-SUSPECT = 1e-10  # of a diagonal entry: what long elimination may leave, by rounding, of a row that follows from others
-REGULAR, DOUBTFUL = -1, -2  # in place of a row that depends on others
 LARGE = 1 << 24  # entries of Phi_q from which on no dense one is made
 SHARES = 1e-3, 1e-6, 1e-9, 1e-12  # below which rows are taken for redundant, if they then hold near by, too
 WANDER = 1e-2, 1e-3  # how far to look for what redundant rows are near by: turns, and shares of the scene's size
@@ -46,10 +43,8 @@ def _look(context, q, qd, t, velocity):
     place_bodies(network.bodies, q, f.poses)
     move_bodies(network.bodies, q, qd, f.poses)
     run_loops(network, system.reals, REDUCED, f, t, f.b, f.H)
-    _rates(network, f)
-    for e in range(f.gamma.size):
-        f.gamma[e] = 0.0
-    run_loops(network, system.reals, DRIFT, f, t, f.gamma, f.H)
+    gather_speeds(network, f)
+    find_drift(network, system, f, t)
     gather(network, f.H, f.Z, velocity)
     for e in range(velocity.size):
         velocity[e] += f.gamma[e]
@@ -70,19 +65,8 @@ def _land(context, t):
     if status != 0:
         return status
     write_positions(network.bodies, f.poses, w.q)
-    for e in range(f.gamma.size):
-        f.gamma[e] = 0.0
-    run_loops(network, system.reals, DRIFT, f, t, f.gamma, f.H)
-    _rates(network, f)
-    for _ in range(2):
-        gather(network, f.H, f.Z, f.b)
-        for e in range(f.b.size):
-            f.b[e] += f.gamma[e]
-        solve(network.pattern, f.S, f.b)
-        scatter(network, f.Y, f.b, f.Z)
-    for b in range(network.bodies.shape[0]):
-        put(f.poses, b * POSE + RD, four(f.Z, 8 * b))
-        put(f.poses, b * POSE + OMEGA, four(f.Z, 8 * b + 4))
+    find_drift(network, system, f, t)
+    land_velocities(network, f, True)
     write_velocities(network.bodies, f.poses, w.qd)
     return 0
 
@@ -108,28 +92,10 @@ def _wander(context, t, way, far):
         gather(network, f.H, f.Z, f.b)
         solve(network.pattern, f.S, f.b)
         scatter(network, f.Y, f.b, f.Z)
-    for b in range(network.bodies.shape[0]):
-        at, o = b * POSE, 8 * b
-        for i in range(3):
-            f.poses[at + R + i] += far * f.Z[o + i]
-        if network.bodies[b, 1] == 7:
-            x, y, z = 0.5 * far * f.Z[o + 4], 0.5 * far * f.Z[o + 5], 0.5 * far * f.Z[o + 6]
-            e0, e1, e2, e3 = f.poses[at + P], f.poses[at + P + 1], f.poses[at + P + 2], f.poses[at + P + 3]
-            f.p[0] = e0 - e1 * x - e2 * y - e3 * z
-            f.p[1] = e1 + e0 * x - e3 * y + e2 * z
-            f.p[2] = e2 + e3 * x + e0 * y - e1 * z
-            f.p[3] = e3 - e2 * x + e1 * y + e0 * z
-            normalise(f.p)
-            set_pose(f.poses, at, f.p)
+    for i in range(f.Z.size):
+        f.Z[i] *= far
+    move_by(network, f)
     return land(network, c.system, c.work, f, t)
-
-
-@kernel
-def _rates(network, f):
-    """Z = rd and omega' of the poses."""
-    for b in range(network.bodies.shape[0]):
-        put(f.Z, 8 * b, four(f.poses, b * POSE + RD))
-        put(f.Z, 8 * b + 4, four(f.poses, b * POSE + OMEGA))
 
 
 def consistent(scene, system, q, qd, t, tol, allowed=False):
@@ -144,28 +110,20 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         return initial.consistent(scene, system, q, qd, t, tol)
     start = _Start(scene, system, q, qd, t, tol)
     dependent = start.check()
+    if dependent >= 0 and not allowed:
+        _refuse(scene, start, dependent)
+        dependent = -1
+    start.demand_velocities()
     known = packed.shared.get(DROPPED)
-    if dependent == REGULAR:
-        start.demand_velocities()
+    if dependent < 0:
         if known is not None:  # another start had too many rows
             drop(packed, None)
             start = start.again()
         return start.landed()
-    if dependent >= 0 and not allowed:
-        _refuse(scene, start, dependent)
-    start.demand_velocities()
     if known is None:
         drop(packed, np.zeros(0, np.int64))
         start = start.again()
-    try:
-        rows = start.redundant_rows()
-    except SingularConfiguration:
-        if dependent >= 0:
-            raise
-        rows = ()
-    if len(rows) and not allowed:
-        drop(packed, known)
-        _refuse(scene, start, int(rows[0]))
+    rows = start.redundant_rows()
     if known is None or len(known) != len(rows):
         drop(packed, rows if len(rows) else None)
         start = start.again()
@@ -205,7 +163,7 @@ class _Start:
         return other
 
     def check(self):
-        """Refuse what is off; the row of H that depends on those before it, REGULAR or DOUBTFUL."""
+        """Refuse what is off; the row of H that depends on those before it, or -1."""
         scene, network, free, q, qd = self.scene, self.network, self.free, self.q, self.qd
         dropped, free.dropped[0] = free.dropped[0], 0
         dependent = _look(self.context, q, qd, self.t, self.rates)

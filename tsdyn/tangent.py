@@ -20,14 +20,13 @@ from .displacement import (
     displace,
     factorise_normal,
     gather_rates,
-    largest,
     largest_rates,
     turn_rates,
     write_back,
 )
 from .errors import Status
 from .free_accelerations import solve_accelerations
-from .linalg import copy
+from .linalg import copy, largest
 from .local import END, FACTORED, OFF, TIME
 from .local_chart import BY_FAILURE, CONTRACTION_LOST, touch, turning
 from .network import BIAS, DRIFT, REDUCED, VALUES

@@ -146,8 +146,9 @@ def _longest(c, r, h):
     if h >= SHORT * sizes[STRIDE]:
         return h
     tol, best = max(r.clock[ATOL] + r.clock[RTOL], PASSING), top
+    far, fast = _weights(c, r)
     for k in range(top, LEAST_ORDER, -1):
-        longer = _radius(x.bodies, nb, x.order[ORDERS], k, *_weights(c, r)) * tol ** (1.0 / (k + 2))
+        longer = _radius(x.bodies, nb, x.order[ORDERS], k, far, fast) * tol ** (1.0 / (k + 2))
         if longer > h:
             h, best = longer, k
     x.order[TOP] = best

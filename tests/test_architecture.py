@@ -30,6 +30,9 @@ poses
 attachment marker_forces frames curvature body_loops
 series_loops
 force_series
+force_loops
+friction_loops force_pack
+friction_pack
 network local
 free normal
 selection
@@ -37,8 +40,8 @@ rows
 primitive
 joint
 framed_joint
-force_loops
-force force_pack
+force
+joint_friction
 state_function
 given_load
 system stepping progress state
@@ -54,8 +57,10 @@ integrators.* constraints.__init__ forces.__init__ integrators.__init__
 arguments
 loads
 landing displacement free_accelerations uniqueness
+friction_solve
+friction_basis friction_reactions
 local_chart
-newton evaluate diagnostics reactions power dense
+newton evaluate diagnostics reactions power dense friction_balance
 control turning
 chart rank
 branch initial start kinetic

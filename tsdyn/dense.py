@@ -151,7 +151,7 @@ class Reader:
         work = allocate(*sizes, redundant=len(network.dropped))
         system = system._replace(reals=system.reals.copy())  # the motions' places are written to
         linear = allocate_linear(system, sizes[0], sizes[1], False)
-        context = Context(system, work, linear, *basis_free_parts(network, sizes[0]))
+        context = Context(system, work, linear, *basis_free_parts(network, sizes[0], sizes[5] is None))
         self.n, (self.context, *self._keep) = sizes[0], resident(context)
         self.addresses = addresses
         self.scratch = [np.zeros(size) for size in (nx, ny, ny, nx, warm_size(work))]

@@ -73,6 +73,7 @@ class Status(IntEnum):
     STAGE_FAILED = 12
     STIFF = 13
     UNHELD = 14
+    JAMMED = 15
 
     def __str__(self):
         return self.name.lower()
@@ -130,6 +131,11 @@ _SENTENCES = {
     Status.UNHELD: (
         "Constraint rows that followed from the others at the start hold no longer: together they can't be met here.",
         "Remove one of the constraints that contradict each other, or correct their points and axes.",
+    ),
+    Status.JAMMED: (
+        "No reactions could be found with which the joints' friction is in balance.",
+        "The coefficients may be so large that the mechanism jams, and no motion follows from rigid bodies; else take a "
+        "smaller step.",
     ),
     Status.STIFF: ("The motion is stiff, and an implicit method is cheaper.", "Use SDIRK54."),
     Status.SLICE_DONE: ("A slice of the run is done.", ""),

@@ -72,11 +72,24 @@ def evaluate(scene, q=None, qd=None, t=0.0):
     Q_A = applied_loads(system, np.array([float(t)]), q[None], qd[None])[0]
     m, n = Phi_q.shape
     kkt = np.block([[M, Phi_q.T], [Phi_q, np.zeros((m, m))]])
-    try:
-        solution = equilibrated_solve(kkt, np.concatenate((Q_A + S, -gamma)))
-    except np.linalg.LinAlgError:
-        solution = _of_independent_rows(M, Phi_q, Q_A + S, gamma)
-    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A, S, solution[n:], solution[:n])
+
+    def solve(friction):
+        try:
+            return equilibrated_solve(kkt, np.concatenate((Q_A + S + friction, -gamma)))
+        except np.linalg.LinAlgError:
+            return _of_independent_rows(M, Phi_q, Q_A + S + friction, gamma)
+
+    friction, solution = _with_friction(scene.packed, t, q, qd, Phi_q, solve)
+    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, S, solution[n:], solution[:n])
+
+
+def _with_friction(packed, t, q, qd, Phi_q, solve):
+    """Frictions of joints (n,), and what solve(friction) gives of them."""
+    if not packed.system.normals.size:
+        return 0.0, solve(0.0)
+    from .friction_balance import balance  # imported here: few scenes need it
+
+    return balance(packed, float(t), q, qd, Phi_q, solve)
 
 
 def _of_independent_rows(M, Phi_q, load, gamma):
@@ -119,8 +132,12 @@ def _evaluate_sparse(packed, q, qd, t):
         factors = splu((weights @ kkt @ weights).tocsc())
     except RuntimeError as error:
         raise SingularConfiguration(NOT_UNIQUE) from error
-    solution = scale * factors.solve(scale * np.concatenate((Q_A + S, -gamma)))
-    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A, S, solution[n:], solution[:n])
+
+    def solve(friction):
+        return scale * factors.solve(scale * np.concatenate((Q_A + S + friction, -gamma)))
+
+    friction, solution = _with_friction(packed, t, q, qd, Phi_q, solve)
+    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, S, solution[n:], solution[:n])
 
 
 def equilibrated_solve(A, b):

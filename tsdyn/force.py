@@ -7,6 +7,7 @@ A force works on marker coordinates x and their rates xd (ground frame) and neve
     dissipation(x, xd, par, t)     optional; the power that dampers or friction take, W, >= 0
     remember(x, xd, par, t)        optional, with memory = 1: what par[-1] is after each accepted step
     series(x, xd, par, k, s, out)  optional; out[len(x)]  coefficient k of the law's Taylor series, see recurrences.py
+    normal_load(x, f, par)         optional, of friction: what par[-1] is, from a reaction f, see joint_friction.py
 
 x is the concatenation of the force's markers, par the floats that `parameters()` returns, functions of time among them
 evaluated at t. Conjugate to a Point is a force, to a Turn a torque, both in the ground frame. What does its work by a
@@ -23,7 +24,7 @@ from types import MappingProxyType
 import numpy as np
 
 from . import force_loops as loops
-from . import force_series, series_loops
+from . import force_series, friction_loops, series_loops
 from ._kernel import Callback, kernel, specialised
 from .attachment import Attachment, check_slots, inlined, layout, static_kernel
 from .checks import number
@@ -34,7 +35,7 @@ from .signal import Signal
 
 _registry = {}
 _KERNELS = {"law": 5}  # and their numbers of arguments
-_OPTIONAL = {"potential": 3, "dissipation": 4, "remember": 4, "series": 6}
+_OPTIONAL = {"potential": 3, "dissipation": 4, "remember": 4, "series": 6, "normal_load": 3}
 
 
 class Force(Attachment):
@@ -197,4 +198,10 @@ def callbacks(cls, functions, owner=None):
         names.update(kernel_series=inlined(functions["series"]), SLOTS=cls.slots)
         copy = specialised(force_series.series, f"{label}.series_loop", home, **names)
         result["series"] = Callback(copy, series_loops.SIGNATURE)
+    if "normal_load" in functions:
+        home = getattr(functions["normal_load"], "py_func", functions["normal_load"])
+        names["kernel_normal_load"] = inlined(functions["normal_load"])
+        for name in ("unit_friction", "normal_load"):
+            copy = specialised(getattr(friction_loops, name), f"{label}.{name}_loop", home, **names)
+            result[name] = Callback(copy, getattr(friction_loops, name.upper()))
     return MappingProxyType(result)

@@ -30,6 +30,7 @@ def jacobians(packed, q, qd, t):
     system, size = with_force_jacobians(packed)
     system = system._replace(reals=system.reals.copy())
     Q_q, Q_qd = np.zeros((2, q.size, q.size))
+    system.reals[system.normals] = 1.0
     if len(system.forces):
         evaluate_force_jacobian(system, q, qd, float(t), Q_q, Q_qd, 1, np.zeros(size))
     return Q_q, Q_qd
@@ -95,7 +96,7 @@ def _check(scene, force, name, rng):
     packed, (q, qd) = scene.packed, scene.start
     (load,) = packed.loads
     t = np.array([rng.uniform(0.2, 0.8)])
-    memory = np.zeros((1, packed.system.memory.size))
+    memory = np.append(np.zeros(packed.system.memory.size), np.ones(packed.system.normals.size))[None]
 
     def Q(q, qd):
         return force_loads(packed.system, t, q[None], qd[None], memory)[0]
@@ -123,7 +124,7 @@ def _check_twin(packed, load, name, t, q, qd, value, coordinates):
     """The compiled force against the Python one, carried back by xd_qd."""
     x, xd = marker_states(packed, load, q[None], qd[None])
     par = [part for p in load.parameters for part in (p.value(t[0]) if isinstance(p, Signal) else [p])]
-    par += [0.0] * load.force.memory
+    par += [0.0] * load.force.memory + [1.0] * (load.normal >= 0)
     f = [0.0] * len(x)
     numbers = [[float(np.squeeze(entry)) for entry in part] for part in ([jet.x for jet in x], xd)]
     twin(type(load.force).law)(*numbers, par, t[0], f)

@@ -24,10 +24,11 @@ class Load(NamedTuple):
     coordinates: tuple  # where its markers are, (3,) each
     row: np.ndarray  # (FORCE_COLUMNS,) a row of System.forces that has this instance alone
     slot: int  # of System.memory; -1 for none
+    normal: int  # of System.normals; -1 for none
 
 
 def pack_forces(forces, where, table, reals):
-    """Append the instances to `table` and `reals`; return rows of System.forces, .signals, .memory, and Loads.
+    """Append the instances to `table` and `reals`; return rows of System.forces, .signals, .memory, .normals, Loads.
 
     Raises
     ------
@@ -37,7 +38,7 @@ def pack_forces(forces, where, table, reals):
     groups = {}
     for force in forces:
         groups.setdefault(id(force.kernels), []).append(force)  # user functions have kernels of their own
-    rows, signals, memory, loads = [], [], [], {}
+    rows, signals, memory, normals, loads = [], [], [], [], {}
     tables, programs = {}, []
     for members in groups.values():
         kernels = members[0].kernels
@@ -64,6 +65,9 @@ def pack_forces(forces, where, table, reals):
             if force.memory:
                 memory.append(len(reals))
                 reals.append(0.0)
+            if "normal_load" in kernels:
+                normals.append(len(reals))
+                reals.append(0.0)
             size = len(reals) - begin[1]
             if stride not in (None, size):
                 raise InvalidForce(
@@ -72,7 +76,8 @@ def pack_forces(forces, where, table, reals):
             stride = size
             row = np.array([force_address, 0, 1, stride, *begin, remember, 0], np.int64)
             slot = len(memory) - 1 if force.memory else -1
-            loads[id(force)] = Load(force, parameters, force.coordinates, row, slot)
+            normal = len(normals) - 1 if "normal_load" in kernels else -1
+            loads[id(force)] = Load(force, parameters, force.coordinates, row, slot, normal)
         rows.append([force_address, 0, len(members), stride, *first, remember, 0])
     for source, users in tables.values():
         for signal in users:
@@ -81,7 +86,7 @@ def pack_forces(forces, where, table, reals):
     for signal, motion in programs:
         signal[S_FIRST] = len(reals)
         reals += motion.program()
-    return rows, signals, memory, tuple(loads[id(force)] for force in forces)
+    return rows, signals, memory, normals, tuple(loads[id(force)] for force in forces)
 
 
 def with_force_jacobians(packed):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from types import ModuleType
 
-from . import linearise, maggi_kane, null_space, tangent
+from . import friction_basis, friction_solve, linearise, maggi_kane, null_space, tangent
 from .errors import InvalidArgument
 from .network import REDUCED, is_regular, network_of
 
@@ -25,7 +25,10 @@ class Formulation:
 
     def network(self, packed):
         """The scene's network with the loops that the kernels call."""
-        return network_of(packed, *(self.kernels.COLUMNS if self.basis_free else (REDUCED,)))
+        network = network_of(packed, *(self.kernels.COLUMNS if self.basis_free else (REDUCED,)))
+        if network.frictions.size and network.rub[0] == 0:
+            network.rub[0] = (friction_solve if self.basis_free else friction_basis).rub.address
+        return network
 
     def sizes(self, n, rank, bodies):
         """Lengths of x and y; rank is that of Phi_q."""

@@ -1,9 +1,20 @@
-"""What friction laws share: the slip of a's point over b, and how force and torque act on both.
+"""What friction laws share: the slip of a's point over b, how force and torque act on both, the coefficient of Coulomb.
 
 Markers: Point a, Turn a, Point b, Turn b.
 """
 
+import numpy as np
+
 from ._kernel import kernel
+
+
+@kernel
+def coefficient(vv, par):
+    """mu(|v|) / |v| of Coulomb's law with Stribeck's peak, smooth at rest; vv = |v|^2, par = (mu, mu_s, v_s, v_0, ...).
+
+    mu(v) = (mu + (mu_s - mu) exp(-(v / v_s)^2)) v / sqrt(v^2 + v_0^2)
+    """
+    return (par[0] + (par[1] - par[0]) * np.exp(-vv / (par[2] * par[2]))) / np.sqrt(vv + par[3] * par[3])
 
 
 @kernel

@@ -9,11 +9,13 @@ from .bodies import transform_g
 
 @entry
 def sum_forces(s, t, q, qd, memory, out):
-    """out (k, n) += all forces but gravity at every output; memory (k, slots) is what they remember."""
+    """out (k, n) += all forces but gravity at every output; memory (k, ...) is what they remember, then normal loads."""
     for row in range(t.size):
         set_time(s, t[row])
         for i in range(s.memory.size):
             s.reals[s.memory[i]] = memory[row, i]
+        for i in range(memory.shape[1] - s.memory.size):
+            s.reals[s.normals[i]] = memory[row, s.memory.size + i]
         applied_forces(s, q[row], qd[row], t[row], out[row])
 
 

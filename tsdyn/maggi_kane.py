@@ -13,7 +13,7 @@ from .chart import new_chart, tangent_map
 from .linalg import copy
 from .local import TIME
 from .newton import NOT_FINITE, OK
-from .null_space import look, project, reduced_acceleration, reduced_mass, velocities, weighted_square
+from .null_space import frictional_acceleration, look, project, reduced_mass, velocities, weighted_square
 from .stepping import ACCELERATE, NORM, PLACE
 from .workspace import PLACEMENTS, load
 
@@ -38,7 +38,7 @@ def accelerate(context, t, velocity, wd, qd):
     c = load(context)
     s, w = c.system, c.work
     velocities(s, w, t, vector(velocity, w.v.size))
-    status = reduced_acceleration(s, w, t, vector(wd, w.v.size))
+    status = frictional_acceleration(context, c, t, vector(wd, w.v.size))
     copy(w.qd, vector(qd, w.q.size))
     return status
 

@@ -69,7 +69,7 @@ class Memory:
         linear = allocate_linear(system, n, m, implicit, kept, redundant)
         if implicit:
             linear = linear._replace(now=self.run.now, before=self.run.before)
-        self.settle(Context(system, self.work, linear, *basis_free_parts(network, n)))
+        self.settle(Context(system, self.work, linear, *basis_free_parts(network, n, not self.basis_free)))
         self.addresses = np.zeros(12, np.int64)
         self._written = [self.work.q.base, self.work.counters, self.run.x.base, self.run.numbers]
         self._written += [linear.numbers.base, linear.pivots, linear.kernels, self.context.local.numbers]

@@ -13,6 +13,7 @@ from .attachment import address
 from .blocks import Pattern, analyse
 from .body_loops import BODY, INTS, MASK, ROW
 from .errors import InvalidConstraint
+from .friction_pack import FR_COLUMNS, frictions_of
 from .hubs import cut
 
 # columns of Network.kinds: addresses of the loops, then where a kind's instances are
@@ -46,6 +47,9 @@ class Network(NamedTuple):
     welds: np.ndarray  # int64 (rows of welds, 2): which row, of which body
     diagonal: np.ndarray  # int64 (m,): where the diagonal entry of a row is in a value array of the pattern
     dropped: np.ndarray  # int64: rows that follow from the others, as chosen at the first start; see selection.py
+    frictions: np.ndarray  # int64 (frictions, FR_COLUMNS): those that follow from reactions; see friction_pack.py
+    friction_rows: np.ndarray  # int64 (rows of their joints, 2): which row, and on which side its reaction is taken
+    rub: np.ndarray  # int64 (1,): address of what solves for them, as the form needs it
 
 
 def thin(packed):
@@ -104,7 +108,7 @@ def no_network():
     parts = np.zeros((0, H_WIDTH), np.int64)
     return Network(
         pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none, parts, np.zeros(0),
-        pairs, none, none,
+        pairs, none, none, np.zeros((0, FR_COLUMNS), np.int64), pairs, np.zeros(1, np.int64),
     )  # fmt: skip
 
 
@@ -129,11 +133,8 @@ def build(packed):
         inside.append((node, sizes[node]))
         sizes[node] += constraint.rows
     degrees = np.where(system.bodies[:, 1] == 7, 6, 3).tolist()
-    parts = (
-        []
-        if DROPPED in packed.shared
-        else cut([tuple(body if body < nb else -1 for body in pair) for pair in nodes], sizes, degrees)
-    )
+    whole = DROPPED in packed.shared or packed.system.normals.size  # frictions couple the rows of a hub as they are
+    parts = [] if whole else cut([tuple(body if body < nb else -1 for body in pair) for pair in nodes], sizes, degrees)
     hubs, cliques = {part.body for part in parts}, [[] for _ in range(nb)]
     for pair, node in nodes.items():
         for body in set(pair) - hubs - {nb}:
@@ -216,6 +217,9 @@ def build(packed):
     spins[rigid] = (J[:, :1, :1] * np.eye(3) != J).any(axis=(1, 2))
     for weights, matrices in ((inverse, _inverses(J, system.mass[rigid])), (mass, J)):
         weights[rigid, W_ROTATION:] = np.pad(matrices, ((0, 0), (0, 0), (0, 1))).reshape(-1, 12)
+    frictions, friction_rows = frictions_of(
+        packed, bodies, lambda part: range(firsts[index[id(part)]], firsts[index[id(part)]] + part.rows), sides
+    )
     network = Network(
         bodies=system.bodies,
         kinds=np.array(kinds, np.int64).reshape(-1, N_COLUMNS),
@@ -233,6 +237,9 @@ def build(packed):
         welds=np.array(welds, np.int64).reshape(-1, 2),
         diagonal=_diagonal(pattern),
         dropped=np.array(packed.shared.get(DROPPED, ()), np.int64),
+        frictions=frictions,
+        friction_rows=friction_rows,
+        rub=np.zeros(1, np.int64),
     )
     return network, tuple(used)
 
@@ -252,4 +259,4 @@ def with_loops(network, kinds, *columns):
         for column in columns:
             if column != DRIFT or row[DRIFT] != 0:
                 row[column] = address(kind.kernels, names[column], kind.__name__, InvalidConstraint)
-    return network._replace(kinds=table)
+    return network._replace(kinds=table, rub=np.zeros(1, np.int64))

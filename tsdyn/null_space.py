@@ -15,6 +15,7 @@ from ._kernel import callback, kernel, vector
 from .assembly import acceleration_bias, applied_forces, is_rheonomic, set_time, time_derivative
 from .chart import new_chart, tangent_map
 from .errors import Status
+from .friction_solve import call_rub, forget_loads
 from .linalg import cholesky, cholesky_solve, transposed_times
 from .local import TIME
 from .local_chart import measure_turns, turning
@@ -155,6 +156,17 @@ def reduced_acceleration(s, w, t, vdd):
     return OK if total < math.inf else NOT_FINITE
 
 
+@kernel
+def frictional_acceleration(context, c, t, vdd):
+    """`reduced_acceleration`, then what the frictions of joints change. Status."""
+    s, network = c.system, c.network
+    frictions = network.frictions.shape[0] > 0
+    if frictions:
+        forget_loads(s)
+    status = reduced_acceleration(s, c.work, t, vdd)
+    return call_rub(network.rub[0], context, t, vdd) if frictions and status == OK else status
+
+
 @callback(PLACE)
 def place(context, t, v):
     """Take the position coordinates v: q, Phi_q, B, D and the factor of D^T M D. Status."""
@@ -176,7 +188,7 @@ def accelerate(context, t, vd, vdd, unused):
     c = load(context)
     s, w = c.system, c.work
     velocities(s, w, t, vector(vd, w.v.size))
-    return reduced_acceleration(s, w, t, vector(vdd, w.v.size))
+    return frictional_acceleration(context, c, t, vector(vdd, w.v.size))
 
 
 @callback("pp")

@@ -43,6 +43,8 @@ def load_powers(packed, load, t, q, qd, memory):
     par = [entry for value in load.parameters for entry in (value.over(t) if isinstance(value, Signal) else [value])]
     if load.slot >= 0:
         par.append(memory[:, load.slot])
+    if load.normal >= 0:
+        par.append(memory[:, packed.system.memory.size + load.normal])
     x, xd = marker_states(packed, load, q, qd)
     with np.errstate(divide="ignore", invalid="ignore"):
         U = Jet.of(twin(kind.potential)(x, par, t)) if getattr(kind, "potential", None) else Jet(0.0)

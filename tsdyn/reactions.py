@@ -11,6 +11,7 @@ from .block_kernels import solve
 from .bodies import rotation_matrix, transform_g
 from .loads import applied_loads, force_loads, inertial_forces, velocity_forces
 from .markers import POINT
+from .friction_reactions import with_normal_loads
 from .network import REDUCED, network_of
 from .normal import gather, scatter
 from .poses import place_bodies
@@ -85,6 +86,7 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
 
     memory (k, slots) is what forces remember, zeros by default.
     """
+    memory = with_normal_loads(packed, t, q, qd, qdd, memory)
     system, network = with_short_rows(packed), network_of(packed, REDUCED)
     out = np.zeros((t.size, len(system.segments)))
     system = system._replace(reals=system.reals.copy())

@@ -64,6 +64,7 @@ from .workspace import CONDITION, CONTRACTION, load
 
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
+JAMMED = int(Status.JAMMED)
 
 call_check = caller("p")
 
@@ -211,7 +212,8 @@ def advance(context, run, log, at, most):
                 r.clock[H] = min(r.clock[H], r.clock[SHARE] * longest_step(c.system.bodies, r.now))
             t1 = t0 + r.clock[H]
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
-                return NOT_FINITE if r.numbers[FAILED] == NOT_FINITE else STEP_COLLAPSED
+                failed = r.numbers[FAILED]
+                return failed if failed in (NOT_FINITE, JAMMED) else STEP_COLLAPSED
             last = t1 + 1e-3 * r.clock[H] >= r.clock[T_END]
         else:
             t1 = r.clock[T_ORIGIN] + (i + 1) * r.clock[H]

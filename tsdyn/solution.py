@@ -12,6 +12,7 @@ from .bodies import PointMass, rotation_matrix
 from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
+from .friction_reactions import with_normal_loads
 from .local_chart import REASONS
 from .network import DROPPED
 from .rank import weakest_row
@@ -79,7 +80,7 @@ class Solution:
         rows, n = outcome.rows, task.q.size
         self.t = rows[:, 0].copy()
         self.q, self.qd, self.qdd = (rows[:, 1 + i * n : 1 + (i + 1) * n].copy() for i in range(3))
-        self._memory = rows[:, 1 + 3 * n :].copy()  # (k, slots), what forces remember
+        self._remembers = rows[:, 1 + 3 * n :].copy()  # (k, slots), what forces remember
         self._reached, self._last, self._remembered = outcome.reached, outcome.last, outcome.remembered
         self._history, self._charts = outcome.history, outcome.charts
         self.stats = SimpleNamespace(**outcome.counts, seconds=seconds)
@@ -211,6 +212,11 @@ class Solution:
         return Charts(
             rows[:, 0], tuple(REASONS[int(i)] for i in rows[:, 1]), rows[:, 2], rows[:, 3], rows[:, 4].astype(int)
         )
+
+    @cached_property
+    def _memory(self):
+        """What forces remember, and the normal loads of joints' frictions, (k, ...)."""
+        return with_normal_loads(self.packed, self.t, self.q, self.qd, self.qdd, self._remembers)
 
     @cached_property
     def multipliers(self):

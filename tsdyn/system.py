@@ -33,6 +33,7 @@ class System(NamedTuple):
     forces: np.ndarray  # int64 (kinds, 9): addresses and extents, columns in force_pack
     signals: np.ndarray  # int64 (signals, 5): functions of time and tables that loads are given, force_pack
     memory: np.ndarray  # int64 (slots,): places in reals of what forces, then constraints remember from step to step
+    normals: np.ndarray  # int64 (frictions,): places in reals of the normal loads of joints' frictions
     counters: np.ndarray  # int64 (kinds, 5): loops of constraints that remember: address, count, reals, places of both
 
 
@@ -145,7 +146,7 @@ def pack(scene):
         if kind.memory:
             counters.append([_address(kind, "remember"), len(members), stride, *first])
 
-    forces, signals, memory, loads = pack_forces(scene.forces, where, table, reals)
+    forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals)
     for row, motion in zip(motions, programs, strict=True):
         if motion.smooth is not None:
             row[4] = len(reals)
@@ -165,6 +166,7 @@ def pack(scene):
         forces=np.array(forces, np.int64).reshape(-1, FORCE_COLUMNS),
         signals=np.array(signals, np.int64).reshape(-1, 5),
         memory=np.array([*memory, *kept.values()], np.int64),
+        normals=np.array(normals, np.int64),
         counters=np.array(counters, np.int64).reshape(-1, 5),
     )
     coordinates = tuple(constraint.coordinates for constraint in primitives)

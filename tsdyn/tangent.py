@@ -26,6 +26,7 @@ from .displacement import (
 )
 from .errors import Status
 from .free_accelerations import solve_accelerations
+from .friction_solve import call_rub
 from .linalg import copy, largest
 from .local import END, FACTORED, OFF, TIME
 from .local_chart import BY_FAILURE, CONTRACTION_LOST, touch, turning
@@ -198,7 +199,12 @@ def accelerate(context, t, y, yd, unused):
         return NOT_FINITE
     if s.forces.shape[0] > 0:
         write_velocities(network.bodies, f.poses, w.qd)
-    solve_accelerations(network, s, w, f, t)
+    if network.frictions.shape[0] > 0:
+        status = call_rub(network.rub[0], context, t, yd)
+        if status != OK:
+            return status
+    else:
+        solve_accelerations(network, s, w, f, t)
     write_back(network, l, f.poses, f.Z, yd)
     w.counters[EVALUATIONS] += 1
     total = 0.0

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from .friction_reactions import with_normal_loads
 from .power import driving_power, force_powers
 from .reactions import multipliers
 
@@ -49,6 +50,7 @@ def _power(solution, trajectory, t):
     states, memory, status = trajectory(t)
     q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
     system = solution.system
+    memory = with_normal_loads(solution.packed, t, q, qd, qdd, memory)
     at = SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=solution.packed, system=system)
     if system.rheonomic[0]:
         at.multipliers = multipliers(solution.packed, t, q, qd, qdd, memory)

@@ -172,18 +172,18 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
     return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=np.zeros(ROOM, np.int64))
 
 
-def basis_free_parts(network, n):
-    """Network, Free and Local of a Context; their memory is small in every form."""
-    return network, allocate_free(network, n), allocate_local(network)
+def basis_free_parts(network, n, basis):
+    """Network, Free and Local of a Context; their memory is small in every form, with a basis or without."""
+    return network, allocate_free(network, n, basis=basis), allocate_local(network)
 
 
 def plain_context():
     """A context of the right types."""
     one, two = np.zeros(1), np.zeros((1, 1))
     ones, twos = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    system = System(twos, one, two, one, twos, ones, one, twos, ones, twos, twos, twos, ones, twos)
+    system = System(twos, one, two, one, twos, ones, one, twos, ones, twos, twos, twos, ones, ones, twos)
     return Context(
-        system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False), *basis_free_parts(no_network(), 2)
+        system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False), *basis_free_parts(no_network(), 2, False)
     )
 
 

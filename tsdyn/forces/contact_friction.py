@@ -1,0 +1,89 @@
+"""Friction of a plane contact from its own reaction: of a point that slides over a plane.
+
+    n      normal, v = velocity of a's point over b, less its part along n
+    N      = N_0 + |n.F|                                                 (1)
+    force  = -mu(|v|) N v / |v|     on a at its point, the opposite on b (2)
+    dissipation = mu(|v|) N |v|                                          (3)
+
+F is the force that the contact exerts; mu is that of friction.coefficient.
+"""
+
+from types import MappingProxyType
+
+import numpy as np
+
+from ..constraints.plane_contact import PlaneContact
+from ..force import Force
+from ..friction import act, coefficient, slip
+from ..joint_friction import JointFriction
+from ..markers import Point, Turn, Vector
+
+
+class ContactFriction(JointFriction, Force):
+    """Coulomb friction with Stribeck's peak in a plane contact, in proportion to the contact's reaction.
+
+    The contact is two-sided: where it pulls instead of pushing it rubs, too.
+
+    Parameters
+    ----------
+    joint : PlaneContact
+        Added to its scene.
+    kinetic, static, slip_velocity, stribeck_velocity, preload, name
+        See `JointFriction`: coefficients, velocities (m/s), N.
+
+    Raises
+    ------
+    InvalidForce
+        If joint is no PlaneContact of the scene, or a number is negative, not finite or impossible.
+    RedundantConstraints
+        When a run begins, if the reaction that it needs isn't unique.
+    """
+
+    joints = (PlaneContact,)
+    markers = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("b", "normal_b"))
+    quantities = MappingProxyType(dict(JointFriction.quantities))
+
+    def __init__(
+        self,
+        joint,
+        *,
+        kinetic,
+        static=None,
+        slip_velocity=1e-3,
+        stribeck_velocity=None,
+        preload=0.0,
+        name="",
+    ):
+        super().__init__(
+            joint,
+            kinetic=kinetic,
+            static=static,
+            slip_velocity=slip_velocity,
+            stribeck_velocity=stribeck_velocity,
+            preload=preload,
+            name=name,
+        )
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Eq. (2)."""
+        v0, v1, v2 = slip(x, xd)
+        off = x[12] * v0 + x[13] * v1 + x[14] * v2
+        v0, v1, v2 = v0 - off * x[12], v1 - off * x[13], v2 - off * x[14]
+        f = -par[-1] * coefficient(v0 * v0 + v1 * v1 + v2 * v2, par)
+        act(x, f * v0, f * v1, f * v2, 0.0, 0.0, 0.0, out)
+
+    @staticmethod
+    def normal_load(x, f, par):
+        """Eq. (1)."""
+        along = x[12] * f[0] + x[13] * f[1] + x[14] * f[2]
+        return par[4] + np.sqrt(along * along)
+
+    @staticmethod
+    def dissipation(x, xd, par, t):
+        """Eq. (3)."""
+        v0, v1, v2 = slip(x, xd)
+        off = x[12] * v0 + x[13] * v1 + x[14] * v2
+        v0, v1, v2 = v0 - off * x[12], v1 - off * x[13], v2 - off * x[14]
+        vv = v0 * v0 + v1 * v1 + v2 * v2
+        return par[-1] * coefficient(vv, par) * vv

@@ -1,0 +1,116 @@
+"""Friction of a revolute joint, a pin in a bearing, from the joint's own reaction.
+
+    n      axis, w = n.(omega_a - omega_b),  v = R w
+    N      = N_0 + |F - n n.F| + (R_c / R) |n.F| + (2 / L) |T - n n.T|      (1)
+    torque = -mu(v) R N n     on a, the opposite on b                       (2)
+    dissipation = mu(v) N v                                                 (3)
+
+F and T are the force and the torque that the joint exerts, at its point; mu is that of friction.coefficient. A torque
+that tilts the pin is carried by two forces, L apart.
+"""
+
+from types import MappingProxyType
+
+import numpy as np
+
+from ..constraints.revolute import Revolute
+from ..force import Force, not_negative, positive_number
+from ..friction import coefficient
+from ..joint_friction import AXIS, JointFriction, optional_length
+
+
+class RevoluteFriction(JointFriction, Force):
+    """Coulomb friction with Stribeck's peak in a revolute joint, in proportion to the joint's reaction.
+
+    Parameters
+    ----------
+    joint : Revolute
+        Added to its scene.
+    radius : float, m
+        Of the pin.
+    kinetic, static, slip_velocity, stribeck_velocity, preload, name
+        See `JointFriction`: coefficients, velocities of the pin's surface (m/s), N.
+    collar_radius : float, m
+        Where the force along the axis rubs; 0: it causes no friction.
+    length : float, m, optional
+        Of the bearing, which carries torques that tilt the pin as a pair of forces; None: they cause no friction.
+
+    Raises
+    ------
+    InvalidForce
+        If joint is no Revolute of the scene, or a number is negative, not finite or impossible.
+    RedundantConstraints
+        When a run begins, if the reaction that it needs isn't unique.
+    """
+
+    joints = (Revolute,)
+    markers = AXIS
+    quantities = MappingProxyType(
+        {
+            **JointFriction.quantities,
+            "radius": positive_number,
+            "collar_radius": not_negative,
+            "length": optional_length,
+        }
+    )
+
+    def __init__(
+        self,
+        joint,
+        *,
+        radius,
+        kinetic,
+        static=None,
+        slip_velocity=1e-3,
+        stribeck_velocity=None,
+        collar_radius=0.0,
+        length=None,
+        preload=0.0,
+        name="",
+    ):
+        super().__init__(
+            joint,
+            kinetic=kinetic,
+            static=static,
+            slip_velocity=slip_velocity,
+            stribeck_velocity=stribeck_velocity,
+            preload=preload,
+            name=name,
+            radius=radius,
+            collar_radius=collar_radius,
+            length=length,
+        )
+
+    def geometry(self):
+        """(R, R_c / R, 2 / L)."""
+        return self.radius, self.collar_radius / self.radius, 0.0 if self.length is None else 2.0 / self.length
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Eq. (2)."""
+        n0, n1, n2 = x[12], x[13], x[14]
+        v = par[5] * (n0 * (xd[3] - xd[9]) + n1 * (xd[4] - xd[10]) + n2 * (xd[5] - xd[11]))
+        torque = -par[-1] * par[5] * coefficient(v * v, par) * v
+        out[3], out[4], out[5] = torque * n0, torque * n1, torque * n2
+        out[9], out[10], out[11] = -torque * n0, -torque * n1, -torque * n2
+
+    @staticmethod
+    def normal_load(x, f, par):
+        """Eq. (1)."""
+        n0, n1, n2 = x[12], x[13], x[14]
+        along, turn = n0 * f[0] + n1 * f[1] + n2 * f[2], n0 * f[3] + n1 * f[4] + n2 * f[5]
+        f0, f1, f2 = f[0] - along * n0, f[1] - along * n1, f[2] - along * n2
+        t0, t1, t2 = f[3] - turn * n0, f[4] - turn * n1, f[5] - turn * n2
+        across, tilt = np.sqrt(f0 * f0 + f1 * f1 + f2 * f2), np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        return par[4] + across + par[6] * np.sqrt(along * along) + par[7] * tilt
+
+    @staticmethod
+    def dissipation(x, xd, par, t):
+        """Eq. (3)."""
+        v = par[5] * (x[12] * (xd[3] - xd[9]) + x[13] * (xd[4] - xd[10]) + x[14] * (xd[5] - xd[11]))
+        return par[-1] * coefficient(v * v, par) * v * v
+
+    @classmethod
+    def sizes(cls, rng):
+        """Random arguments of the geometry, for tests."""
+        return dict(zip(("radius", "collar_radius", "length"), rng.uniform(0.5, 1.0, 3), strict=True))

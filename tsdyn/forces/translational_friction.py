@@ -1,0 +1,106 @@
+"""Friction of a translational joint, a slide in its guide, from the joint's own reaction.
+
+    n      axis, v = n.(velocity of a's point over b)
+    N      = N_0 + |F - n n.F| + |n.T| / W + (2 / L) |T - n n.T|     (1)
+    force  = -mu(v) N n     on a along the axis, the opposite on b   (2)
+    dissipation = mu(v) N v                                          (3)
+
+F and T are the force and the torque that the joint exerts, at its point on a (on b where a is the ground); mu is that of
+friction.coefficient. A torque that tilts the slide is carried by two forces, L apart; one about the axis at the arm W.
+"""
+
+from types import MappingProxyType
+
+import numpy as np
+
+from ..constraints.translational import Translational
+from ..force import Force
+from ..friction import act, coefficient, slip
+from ..joint_friction import AXIS, JointFriction, optional_length
+
+
+class TranslationalFriction(JointFriction, Force):
+    """Coulomb friction with Stribeck's peak in a translational joint, in proportion to the joint's reaction.
+
+    Parameters
+    ----------
+    joint : Translational
+        Added to its scene.
+    kinetic, static, slip_velocity, stribeck_velocity, preload, name
+        See `JointFriction`: coefficients, velocities (m/s), N.
+    length : float, m, optional
+        Of the part that is guided, the body that `joint.on` is, about the joint's point on it: it carries torques that
+        tilt the slide as a pair of forces. None: they cause no friction.
+    width : float, m, optional
+        Arm at which the guide carries a torque about the axis; None: that causes no friction.
+
+    Raises
+    ------
+    InvalidForce
+        If joint is no Translational of the scene, or a number is negative, not finite or impossible.
+    RedundantConstraints
+        When a run begins, if the reaction that it needs isn't unique.
+    """
+
+    joints = (Translational,)
+    markers = AXIS
+    quantities = MappingProxyType({**JointFriction.quantities, "length": optional_length, "width": optional_length})
+
+    def __init__(
+        self,
+        joint,
+        *,
+        kinetic,
+        static=None,
+        slip_velocity=1e-3,
+        stribeck_velocity=None,
+        length=None,
+        width=None,
+        preload=0.0,
+        name="",
+    ):
+        super().__init__(
+            joint,
+            kinetic=kinetic,
+            static=static,
+            slip_velocity=slip_velocity,
+            stribeck_velocity=stribeck_velocity,
+            preload=preload,
+            name=name,
+            length=length,
+            width=width,
+        )
+
+    def geometry(self):
+        """(1 / W, 2 / L)."""
+        return 0.0 if self.width is None else 1.0 / self.width, 0.0 if self.length is None else 2.0 / self.length
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Eq. (2)."""
+        v0, v1, v2 = slip(x, xd)
+        v = x[12] * v0 + x[13] * v1 + x[14] * v2
+        force = -par[-1] * coefficient(v * v, par) * v
+        act(x, force * x[12], force * x[13], force * x[14], 0.0, 0.0, 0.0, out)
+
+    @staticmethod
+    def normal_load(x, f, par):
+        """Eq. (1)."""
+        n0, n1, n2 = x[12], x[13], x[14]
+        along, turn = n0 * f[0] + n1 * f[1] + n2 * f[2], n0 * f[3] + n1 * f[4] + n2 * f[5]
+        f0, f1, f2 = f[0] - along * n0, f[1] - along * n1, f[2] - along * n2
+        t0, t1, t2 = f[3] - turn * n0, f[4] - turn * n1, f[5] - turn * n2
+        across, tilt = np.sqrt(f0 * f0 + f1 * f1 + f2 * f2), np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        return par[4] + across + par[5] * np.sqrt(turn * turn) + par[6] * tilt
+
+    @staticmethod
+    def dissipation(x, xd, par, t):
+        """Eq. (3)."""
+        v0, v1, v2 = slip(x, xd)
+        v = x[12] * v0 + x[13] * v1 + x[14] * v2
+        return par[-1] * coefficient(v * v, par) * v * v
+
+    @classmethod
+    def sizes(cls, rng):
+        """Random arguments of the geometry, for tests."""
+        return dict(zip(("length", "width"), rng.uniform(0.5, 1.0, 2), strict=True))

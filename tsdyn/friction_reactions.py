@@ -1,0 +1,65 @@
+"""The normal loads of joints' frictions, from positions, velocities and accelerations."""
+
+import numpy as np
+
+from ._kernel import entry, resident
+from .assembly import set_time
+from .friction_solve import find_reactions
+from .loads import applied_loads, inertial_forces, velocity_forces
+from .network import REDUCED, network_of
+from .normal import weigh
+from .poses import place_bodies
+from .rows import factorise_rows, run_loops
+from .workspace import load_parts, parts
+
+RANK_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
+
+
+@entry
+def _solve(context, t, q, qd, r, out):
+    """out (k, frictions): normal loads with which Phi_q^T lam less the frictions is r (k, n); NaN where there are none.
+
+    H W (H^T lam - sum_i g_i N_i(lam)) = H W r: the equation of the accelerations, of what is left of the forces.
+    """
+    c = load_parts(context)
+    network, s, f = c.network, c.system, c.free
+    bodies = network.bodies
+    for k in range(t.size):
+        set_time(s, t[k])
+        place_bodies(bodies, q[k], f.poses)
+        run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
+        found = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, RANK_LIMIT)
+        for b in range(bodies.shape[0]):
+            i, o = bodies[b, 0], 8 * b
+            for j in range(3):
+                f.Z[o + j] = r[k, i + j]
+            if bodies[b, 1] == 7:
+                e0, e1, e2, e3 = 0.5 * q[k, i + 3], 0.5 * q[k, i + 4], 0.5 * q[k, i + 5], 0.5 * q[k, i + 6]
+                x0, x1, x2, x3 = r[k, i + 3], r[k, i + 4], r[k, i + 5], r[k, i + 6]
+                f.Z[o + 4] = -e1 * x0 + e0 * x1 + e3 * x2 - e2 * x3
+                f.Z[o + 5] = -e2 * x0 - e3 * x1 + e0 * x2 + e1 * x3
+                f.Z[o + 6] = -e3 * x0 + e2 * x1 - e1 * x2 + e0 * x3
+            weigh(network.inverse, b, f.Z, o, f.Z, o)
+        for e in range(f.gamma.size):
+            f.gamma[e] = 0.0
+        found = found and find_reactions(network, s, f, q[k], qd[k], t[k])
+        for i in range(out.shape[1]):
+            out[k, i] = f.friction.load[7 * i] if found else np.nan
+
+
+def with_normal_loads(packed, t, q, qd, qdd, memory):
+    """What forces remember (k, slots) and then the normal loads of joints' frictions; memory as it is without any."""
+    system = packed.system
+    if not system.normals.size:
+        return memory
+    memory = np.zeros((t.size, system.memory.size)) if memory is None else memory
+    if memory.shape[1] > system.memory.size:
+        return memory
+    r = applied_loads(system, t, q, qd, memory)
+    r += velocity_forces(system, q, qd)
+    r -= inertial_forces(system, q, qdd)
+    own = system._replace(reals=system.reals.copy())
+    context, *_keep = resident(parts(own, network_of(packed, REDUCED), q.shape[1]))
+    loads = np.zeros((t.size, system.normals.size))
+    _solve(context, t, q, qd, r, loads)
+    return np.hstack((memory, loads))

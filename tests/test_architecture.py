@@ -58,7 +58,7 @@ arguments
 loads
 landing displacement free_accelerations uniqueness
 friction_solve
-friction_basis friction_reactions
+friction_basis friction_reactions friction_unique
 local_chart
 newton evaluate diagnostics reactions power dense friction_balance
 control turning

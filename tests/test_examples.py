@@ -20,6 +20,7 @@ from examples import (
     sarrus,
     screw_press,
     slider_crank,
+    stick_slip,
     top,
     two_body_pendulum,
 )
@@ -70,6 +71,18 @@ def test_a_rheonomic_pendulum():
     driven_pivot.check(solution, tol=1e-9)
 
 
+def test_stick_slip():
+    """To 1e-9 by DOP853 at 1e-11, in both forms, and by SDIRK54; energy less work stays."""
+    for given in ({}, {"formulation": "null-space"}):
+        method = ts.integrators.DOP853(rtol=1e-11, atol=1e-11)
+        solution = ts.simulate(stick_slip.build(), (0.0, 1.0), integrator=method, dense_output=True, **given)
+        stick_slip.check(solution)
+        assert np.abs(solution.energy - solution.work - solution.energy[0]).max() < 1e-9
+    stick_slip.check(
+        ts.simulate(stick_slip.build(), (0.0, 1.0), integrator=ts.integrators.SDIRK54(1e-8, 1e-8)), tol=1e-6
+    )
+
+
 @pytest.mark.parametrize(
     "module",
     [
@@ -87,6 +100,7 @@ def test_a_rheonomic_pendulum():
         sarrus,
         screw_press,
         geared_pair,
+        stick_slip,
     ],
 )
 def test_main_reports(module, capsys, monkeypatch):

@@ -32,7 +32,8 @@ def pair(rng):
 def load_of(scene, body, t=0.0):
     """Force and torque about the centroid, ground frame, that all forces exert on a body: Q_r and E Q_p / 2."""
     (q, qd), at = scene.start, int(scene.system.bodies[body.index, 0])
-    Q = force_loads(scene.system, np.array([t]), q[None], qd[None])[0]
+    memory = np.append(np.zeros(scene.system.memory.size), np.ones(scene.system.normals.size))  # normal loads of one
+    Q = force_loads(scene.system, np.array([t]), q[None], qd[None], memory[None])[0]
     e0, e = body.orientation[0], body.orientation[1:]
     E = np.column_stack((-e, [[e0, -e[2], e[1]], [e[2], e0, -e[0]], [-e[1], e[0], e0]]))
     return Q[at : at + 3], E @ Q[at + 3 : at + 7] / 2
@@ -56,7 +57,8 @@ def expect(scene, body, force, torque_about_centroid, t=0.0):
 
 def test_every_force_is_registered():
     names = {"Bushing", "CoulombFriction", "PointForce", "Spring", "Torque", "TorsionalSpring", "UserForce"}
-    assert {kind.__name__ for kind in BUILT_IN} == names | {"ViscousFriction"}
+    frictions = {"ViscousFriction", "RevoluteFriction", "TranslationalFriction", "ContactFriction"}
+    assert {kind.__name__ for kind in BUILT_IN} == names | frictions
     assert set(F.__all__) == {kind.__name__ for kind in BUILT_IN} | {"registered"}
 
 

@@ -62,9 +62,14 @@ def test_jacobian_with_every_constraint(name, between, rng):
     demand_derivatives(scene, rng)
 
 
-@pytest.mark.parametrize("kind", F.registered(), ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize(
+    "kind", [k for k in F.registered() if not issubclass(k, ts.JointFriction)], ids=lambda kind: kind.__name__
+)
 def test_jacobian_with_every_force(kind, rng):
-    """On a chain of two bodies, fast enough that stiffness and damping and what they do to joints all count."""
+    """On a chain of two bodies, fast enough that stiffness and damping and what they do to joints all count.
+
+    But for friction of joints, of which the Jacobian holds the normal loads fixed.
+    """
     scene = build(random_chain(rng, 2))
     scene.add(kind.example(rng, *scene.bodies))
     demand_derivatives(scene, rng)
@@ -298,6 +303,7 @@ def test_kept_derivatives_are_exact_in_a_scene_turned_as_a_whole(kind, swapped, 
     force = scene.add(kind.example(rng, *scene.bodies[:: -1 if swapped else 1]))
     system, size = with_force_jacobians(scene.packed)
     system = system._replace(reals=system.reals.copy())
+    system.reals[system.normals] = 1.0
     q, qd = scene.start[0], rng.normal(size=14)
 
     def jacobians(q, qd, anew, kept):

@@ -33,6 +33,7 @@ from .integrator import (  # noqa: E402
     Integrator,
 )
 from .joint import Joint  # noqa: E402
+from .joint_friction import JointFriction  # noqa: E402
 from .markers import Parameters, Point, Turn, Vector  # noqa: E402
 from .motion import Motion  # noqa: E402
 from .primitive import Primitive  # noqa: E402
@@ -60,6 +61,7 @@ __all__ = [
     "InvalidConstraint",
     "InvalidForce",
     "Joint",
+    "JointFriction",
     "MissingDependency",
     "Motion",
     "NystromTableau",

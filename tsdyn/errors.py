@@ -134,8 +134,8 @@ _SENTENCES = {
     ),
     Status.JAMMED: (
         "No reactions could be found with which the joints' friction is in balance.",
-        "The coefficients may be so large that the mechanism jams, and no motion follows from rigid bodies; else take a "
-        "smaller step.",
+        "The coefficients may be so large that the mechanism jams, so that no motion follows from rigid bodies; else "
+        "take a smaller step.",
     ),
     Status.STIFF: ("The motion is stiff, and an implicit method is cheaper.", "Use SDIRK54."),
     Status.SLICE_DONE: ("A slice of the run is done.", ""),

@@ -12,7 +12,7 @@ class Friction(NamedTuple):
     """k frictions of joints; of no size where there are none. "computed by" as in `Free`."""
 
     g: np.ndarray  # (k * 16,)  W times each for a normal load of one, on bodies a and b; friction_solve
-    load: np.ndarray  # (k * 7,)  normal load, and its derivative by the reaction on its body; friction_loops.normal_load
+    load: np.ndarray  # (k * 7,)  normal load, and its derivative by the reaction; friction_loops.normal_load
     lam: np.ndarray  # (m,)  multipliers, from one evaluation to the next; friction_solve
     Z: np.ndarray  # ((b + 1) * 8,)  accelerations of bodies without friction and reactions; friction_solve
     X: np.ndarray  # (m * 16,)  W (H^T - g N_lam); friction_solve

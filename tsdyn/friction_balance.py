@@ -56,7 +56,8 @@ def _reaction(packed, load, q, qd, Phi_q):
     force, member = load.force, next(m for m in packed.members if m.constraint is load.force.joint)
     rows = Phi_q[member.rows]
     rows = rows if isinstance(rows, np.ndarray) else rows.toarray()
-    at, x = starts_of(packed)[force.on], [float(np.squeeze(jet.x)) for jet in marker_states(packed, load, q[None], qd[None])[0]]
+    at, (jets, _) = starts_of(packed)[force.on], marker_states(packed, load, q[None], qd[None])
+    x = [float(np.squeeze(jet.x)) for jet in jets]
     s = np.array(x[:3] if force.on is force.a else x[6:9]) - q[at : at + 3]
     wrench = np.zeros((6, rows.shape[0]))  # of multipliers of one: force, and torque about the point
     wrench[:3] = -rows[:, at : at + 3].T

@@ -8,8 +8,8 @@ evaluation before:
 
     N~ = H (W (H^T - sum_i g_i N_i,lam))^T
 
-g_i acts on the two bodies of its joint and N_i,lam has that joint's rows, so N~ has the blocks of S and is eliminated at
-the same cost.
+g_i acts on the two bodies of its joint and N_i,lam has that joint's rows, so N~ has the blocks of S and costs about as
+much.
 """
 
 import math
@@ -143,7 +143,7 @@ def _factorise(network, f, cold):
                 for k in range(2):
                     body, x = network.sides[e, k], 16 * e + 8 * k
                     g = 16 * i if body == a else 16 * i + 8
-                    if body == a or body == b:
+                    if body in (a, b):
                         put(r.X, x, sub(four(r.X, x), times(four(r.g, g), n)))
                         put(r.X, x + 4, sub(four(r.X, x + 4), times(four(r.g, g + 4), n)))
     multiply_both(network, f.H, r.X, r.lower, r.upper)

@@ -1,4 +1,4 @@
-"""Friction of a constraint from its own reaction: what the laws of revolute and translational joints and contacts share.
+"""Friction of a constraint from its own reaction: what the laws of joints and contacts share.
 
     friction on a   = par[-1] times what `law` gives for a normal load of one
     par[-1]         = normal_load(x, f, par), f (6,) the force and torque that the constraint exerts
@@ -61,7 +61,18 @@ class JointFriction:
         }
     )
 
-    def __init__(self, joint, *, kinetic, static, slip_velocity, stribeck_velocity, preload, name, **geometry):
+    def __init__(
+        self,
+        joint,
+        *,
+        kinetic,
+        static=None,
+        slip_velocity=1e-3,
+        stribeck_velocity=None,
+        preload=0.0,
+        name="",
+        **geometry,
+    ):
         kind = self._kind()
         if not isinstance(joint, self.joints):
             names = " or ".join(cls.__name__ for cls in self.joints)
@@ -124,7 +135,7 @@ class JointFriction:
         places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code != TURN}
         places |= {m.argument: rng.normal(size=3) for m in kind.markers if m.argument.startswith("axis")}
         joint = a.scene.add(kind(a, b, **places))
-        mu, more, v0, vs = rng.uniform(0.5, 1.0, 4)
+        (mu, more), (v0, vs) = rng.uniform(0.5, 1.0, 2), rng.uniform(4.0, 6.0, 2)
         return cls(joint, kinetic=mu, static=mu + more, slip_velocity=v0, stribeck_velocity=vs, **cls.sizes(rng))
 
     @classmethod

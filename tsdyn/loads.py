@@ -9,7 +9,7 @@ from .bodies import transform_g
 
 @entry
 def sum_forces(s, t, q, qd, memory, out):
-    """out (k, n) += all forces but gravity at every output; memory (k, ...) is what they remember, then normal loads."""
+    """out (k, n) += all forces but gravity; memory (k, ...) is what they remember at each output, then normal loads."""
     for row in range(t.size):
         set_time(s, t[row])
         for i in range(s.memory.size):

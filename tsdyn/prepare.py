@@ -7,6 +7,7 @@ import numpy as np
 from .branch import demand_aligned
 from .expansion_pack import refusal
 from .force_pack import with_force_jacobians
+from .friction_unique import demand_unique
 from .network import DROPPED
 from .series_memory import Series
 from .start import consistent
@@ -80,6 +81,7 @@ class Prepared:
                 self.__dict__.pop("series", None)
                 self._spare.clear()
             demand_aligned(self.packed, start[0], t)
+            demand_unique(self.packed, start[0], t)
             self._start = given, start
         return start
 

@@ -9,9 +9,9 @@ from ._kernel import entry, resident
 from .assembly import constraint_jacobian, set_time
 from .block_kernels import solve
 from .bodies import rotation_matrix, transform_g
+from .friction_reactions import with_normal_loads
 from .loads import applied_loads, force_loads, inertial_forces, velocity_forces
 from .markers import POINT
-from .friction_reactions import with_normal_loads
 from .network import REDUCED, network_of
 from .normal import gather, scatter
 from .poses import place_bodies

@@ -23,8 +23,8 @@ NEXT_TO_NOTHING = 1e-7  # of the rows' own size
 
 
 @kernel
-def _stress(network, f, whole, dropped):
-    """b = z but for the dropped row itself, of H whole."""
+def find_stress(network, f, whole, dropped):
+    """b = z of a dropped row, of H whole; its largest entry."""
     for i in range(f.Z.size):
         f.Z[i] = 0.0
     for side in range(2):
@@ -33,8 +33,26 @@ def _stress(network, f, whole, dropped):
             weigh(network.inverse, body, whole, 16 * dropped + 8 * side, f.Z, 8 * body)
     gather(network, f.H, f.Z, f.b)
     solve(network.pattern, f.S, f.b)
+    largest = 1.0
     for e in range(f.b.size):
         f.b[e] = -f.b[e]
+        largest = max(largest, abs(f.b[e]))
+    f.b[dropped] = 1.0
+    return largest
+
+
+@kernel
+def find_rows(network, s, f, q, t, whole):
+    """H with and, in `whole`, without what is dropped, and the factors of S, at q; whether there are any."""
+    set_time(s, t)
+    place_bodies(network.bodies, q, f.poses)
+    run_loops(network, s.reals, REDUCED, f, t, f.b, f.H)
+    regular = factorise_rows(network, s.reals, f, t, f.b, f.H, f.Y, f.S, LEAST)
+    count = f.dropped[0]
+    f.dropped[0] = 0
+    run_loops(network, s.reals, REDUCED, f, t, f.b, whole)
+    f.dropped[0] = count
+    return regular
 
 
 @entry
@@ -43,22 +61,9 @@ def free_loads(context, t, q, rows, sides, whole, out):
     c = load_parts(context)
     network, s, f = c.network, c.system, c.free
     for k in range(t.size):
-        set_time(s, t[k])
-        place_bodies(network.bodies, q[k], f.poses)
-        run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
-        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, LEAST)
-        count = f.dropped[0]
-        f.dropped[0] = 0
-        run_loops(network, s.reals, REDUCED, f, t[k], f.b, whole)
-        f.dropped[0] = count
-        out[k] = 0.0 if regular else math.inf
-        for d in range(count):
-            dropped = f.dropped[1 + d]
-            _stress(network, f, whole, dropped)
-            f.b[dropped] = 1.0
-            largest, size = 1.0, 0.0
-            for e in range(f.b.size):
-                largest = max(largest, abs(f.b[e]))
+        out[k] = 0.0 if find_rows(network, s, f, q[k], t[k], whole) else math.inf
+        for d in range(f.dropped[0]):
+            largest, size = find_stress(network, f, whole, f.dropped[1 + d]), 0.0
             for c in range(8):
                 load = 0.0
                 for i in range(rows.size):

@@ -5,8 +5,9 @@
     force  = -mu(v) N n     on a along the axis, the opposite on b   (2)
     dissipation = mu(v) N v                                          (3)
 
-F and T are the force and the torque that the joint exerts, at its point on a (on b where a is the ground); mu is that of
-friction.coefficient. A torque that tilts the slide is carried by two forces, L apart; one about the axis at the arm W.
+F and T are the force and the torque that the joint exerts, at its point on a (on b where a is the ground); mu is that
+of friction.coefficient. A torque that tilts the slide is carried by two forces, L apart; one about the axis at the arm
+W.
 """
 
 from types import MappingProxyType

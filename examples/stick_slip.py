@@ -4,8 +4,8 @@
     lead        PointDriver, ground and hook         3 rows: the hook moves along x at the speed V
     spring      from the slide, above its axis, to the hook, higher still
 
-The spring lifts and tilts the slide the more the further it is stretched, so the normal load varies; it creeps until the
-spring is strong enough, then jumps, over and over. Compared with the one equation of the slide's place x,
+The spring lifts and tilts the slide the more the further it is stretched, so the normal load varies; it creeps until
+the spring is strong enough, then jumps, over and over. Compared with the one equation of the slide's place x,
 
     m xdd = S_x - mu(xd) N,   N = |m g - S_z| + (2 / L) |arm_z S_x - arm_x S_z|
 

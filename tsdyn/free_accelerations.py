@@ -11,7 +11,7 @@ from .assembly import applied_forces
 from .block_kernels import solve
 from .network import BIAS
 from .normal import gather, scatter, weigh
-from .poses import OMEGA, POSE, P, write_accelerations
+from .poses import OMEGA, POSE, P, add_torque, write_accelerations
 from .rows import run_loops
 
 
@@ -39,13 +39,8 @@ def body_forces(network, system, w, f, t):
                 spin = fma(four(network.mass, o + 8), splat(f.poses[at + OMEGA + 2]), spin)
                 torque = sub(torque, cross(four(f.poses, at + OMEGA), spin))
             put(f.Z, z + 4, torque)
-            if has_forces:  # G Q_p / 2
-                e0, e1 = 0.5 * f.poses[at + P], 0.5 * f.poses[at + P + 1]
-                e2, e3 = 0.5 * f.poses[at + P + 2], 0.5 * f.poses[at + P + 3]
-                q0, q1, q2, q3 = f.Q[i + 3], f.Q[i + 4], f.Q[i + 5], f.Q[i + 6]
-                f.Z[z + 4] += -e1 * q0 + e0 * q1 + e3 * q2 - e2 * q3
-                f.Z[z + 5] += -e2 * q0 - e3 * q1 + e0 * q2 + e1 * q3
-                f.Z[z + 6] += -e3 * q0 + e2 * q1 - e1 * q2 + e0 * q3
+            if has_forces:
+                add_torque(f.poses, at + P, f.Q, i + 3, f.Z, z + 4)
 
 
 @kernel

@@ -8,7 +8,7 @@ from .friction_solve import find_reactions
 from .loads import applied_loads, inertial_forces, velocity_forces
 from .network import REDUCED, network_of
 from .normal import weigh
-from .poses import place_bodies
+from .poses import place_bodies, take_loads
 from .rows import factorise_rows, run_loops
 from .workspace import load_parts, parts
 
@@ -29,17 +29,9 @@ def _solve(context, t, q, qd, r, out):
         place_bodies(bodies, q[k], f.poses)
         run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
         found = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, RANK_LIMIT)
+        take_loads(bodies, q[k], r[k], f.Z)
         for b in range(bodies.shape[0]):
-            i, o = bodies[b, 0], 8 * b
-            for j in range(3):
-                f.Z[o + j] = r[k, i + j]
-            if bodies[b, 1] == 7:
-                e0, e1, e2, e3 = 0.5 * q[k, i + 3], 0.5 * q[k, i + 4], 0.5 * q[k, i + 5], 0.5 * q[k, i + 6]
-                x0, x1, x2, x3 = r[k, i + 3], r[k, i + 4], r[k, i + 5], r[k, i + 6]
-                f.Z[o + 4] = -e1 * x0 + e0 * x1 + e3 * x2 - e2 * x3
-                f.Z[o + 5] = -e2 * x0 - e3 * x1 + e0 * x2 + e1 * x3
-                f.Z[o + 6] = -e3 * x0 + e2 * x1 - e1 * x2 + e0 * x3
-            weigh(network.inverse, b, f.Z, o, f.Z, o)
+            weigh(network.inverse, b, f.Z, 8 * b, f.Z, 8 * b)
         for e in range(f.gamma.size):
             f.gamma[e] = 0.0
         found = found and find_reactions(network, s, f, q[k], qd[k], t[k])

@@ -26,9 +26,9 @@ from .friction_pack import FR_BODY, FR_COUNT, FR_FIRST, FR_INDEX, FR_KIND, FR_NO
 from .linalg import copy, largest
 from .network import BIAS
 from .normal import gather, inner, multiply_both, scatter, weigh
-from .poses import POSE, P
+from .poses import POSE, P, add_torque
 from .rows import run_loops
-from .selection import drop_diagonal
+from .selection import drop, drop_diagonal
 from .workspace import load
 
 OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
@@ -84,13 +84,8 @@ def _weigh_units(network, system, f, q, qd, t):
             for c in range(3):
                 r.g[at + c] = Q[o + c]
             r.g[at + 3] = 0.0
-            if body < network.bodies.shape[0] and network.bodies[body, 1] == 7:  # G Q_p / 2
-                p = body * POSE + P
-                e0, e1, e2, e3 = 0.5 * f.poses[p], 0.5 * f.poses[p + 1], 0.5 * f.poses[p + 2], 0.5 * f.poses[p + 3]
-                q0, q1, q2, q3 = Q[o + 3], Q[o + 4], Q[o + 5], Q[o + 6]
-                r.g[at + 4] = -e1 * q0 + e0 * q1 + e3 * q2 - e2 * q3
-                r.g[at + 5] = -e2 * q0 - e3 * q1 + e0 * q2 + e1 * q3
-                r.g[at + 6] = -e3 * q0 + e2 * q1 - e1 * q2 + e0 * q3
+            if body < network.bodies.shape[0] and network.bodies[body, 1] == 7:
+                add_torque(f.poses, body * POSE + P, Q, o + 3, r.g, at + 4)
             weigh(network.inverse, body, r.g, at, r.g, at)
 
 
@@ -161,12 +156,13 @@ def find_reactions(network, system, f, q, qd, t):
     r = f.friction
     _weigh_units(network, system, f, q, qd, t)
     copy(f.Z, r.Z)
+    drop(f.dropped, r.lam)
     size = largest(r.lam)
     if not size < math.inf:
         for e in range(r.lam.size):
             r.lam[e] = 0.0
         size = 0.0
-    before, anew, done = math.inf, True, False
+    before, anew, done = math.inf, size == 0.0, False  # factors of the evaluation before may do
     for sweep in range(SWEEPS):
         _find_loads(network, system, f, q, qd, t)
         _rub_bodies(network, f)

@@ -34,6 +34,27 @@ def orient(poses, at, e0, e1, e2, e3):
 
 
 @kernel
+def add_torque(p, at, Q, i, out, o):
+    """out[o : o + 3] += G(p) Q_p / 2, the body torque; p is p[at : at + 4], Q_p is Q[i : i + 4]."""
+    e0, e1, e2, e3 = 0.5 * p[at], 0.5 * p[at + 1], 0.5 * p[at + 2], 0.5 * p[at + 3]
+    q0, q1, q2, q3 = Q[i], Q[i + 1], Q[i + 2], Q[i + 3]
+    out[o] += -e1 * q0 + e0 * q1 + e3 * q2 - e2 * q3
+    out[o + 1] += -e2 * q0 - e3 * q1 + e0 * q2 + e1 * q3
+    out[o + 2] += -e3 * q0 + e2 * q1 - e1 * q2 + e0 * q3
+
+
+@kernel
+def take_loads(bodies, q, r, Z):
+    """Z = generalised forces r (n,) as forces and body torques."""
+    for b in range(bodies.shape[0]):
+        i, o = bodies[b, 0], 8 * b
+        put(Z, o, lanes(r[i], r[i + 1], r[i + 2]))
+        put(Z, o + 4, splat(0.0))
+        if bodies[b, 1] == 7:
+            add_torque(q, i + 3, r, i + 3, Z, o + 4)
+
+
+@kernel
 def place_bodies(bodies, q, poses):
     """The poses at q (n,)."""
     for b in range(bodies.shape[0]):

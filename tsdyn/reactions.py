@@ -13,8 +13,9 @@ from .friction_reactions import with_normal_loads
 from .loads import applied_loads, force_loads, inertial_forces, velocity_forces
 from .markers import POINT
 from .network import REDUCED, network_of
+from .linalg import copy
 from .normal import gather, scatter
-from .poses import place_bodies
+from .poses import place_bodies, take_loads
 from .primitive import INTS
 from .rows import factorise_rows, run_loops
 from .sparse_rows import WIDTH, with_short_rows
@@ -40,19 +41,8 @@ def solve_multipliers(context, t, q, r, rows, out):
         run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
         regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, RANK_LIMIT)
         constraint_jacobian(s, q[k], t[k], rows)
-        for b in range(bodies.shape[0]):
-            i, o = bodies[b, 0], 8 * b
-            for c in range(3):
-                f.Q[i + c] = r[k, i + c]
-                f.Z[o + c] = r[k, i + c]
-            if bodies[b, 1] == 7:
-                e0, e1, e2, e3 = 0.5 * q[k, i + 3], 0.5 * q[k, i + 4], 0.5 * q[k, i + 5], 0.5 * q[k, i + 6]
-                x0, x1, x2, x3 = r[k, i + 3], r[k, i + 4], r[k, i + 5], r[k, i + 6]
-                f.Z[o + 4] = -e1 * x0 + e0 * x1 + e3 * x2 - e2 * x3
-                f.Z[o + 5] = -e2 * x0 - e3 * x1 + e0 * x2 + e1 * x3
-                f.Z[o + 6] = -e3 * x0 + e2 * x1 - e1 * x2 + e0 * x3
-                for c in range(3, 7):
-                    f.Q[i + c] = r[k, i + c]
+        copy(r[k], f.Q)
+        take_loads(bodies, q[k], r[k], f.Z)
         for i in range(out.shape[1]):
             out[k, i] = 0.0
         for _ in range(2):

@@ -42,6 +42,7 @@ force force_pack
 state_function
 given_load
 system stepping progress state
+still
 sparse_rows
 assembly interpolation constraints.* forces.*
 expansion

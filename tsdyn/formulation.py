@@ -6,6 +6,7 @@ from types import ModuleType
 from . import linearise, maggi_kane, null_space, tangent
 from .errors import InvalidArgument
 from .network import REDUCED, is_regular, network_of
+from .still import moving_network
 
 
 @dataclass(frozen=True)
@@ -24,8 +25,8 @@ class Formulation:
         return self
 
     def network(self, packed):
-        """The scene's network with the loops that the kernels call."""
-        return network_of(packed, *(self.kernels.COLUMNS if self.basis_free else (REDUCED,)))
+        """The scene's network with the loops that the kernels call; that of the forms with a basis has every row."""
+        return moving_network(packed, *self.kernels.COLUMNS) if self.basis_free else network_of(packed, REDUCED)
 
     def sizes(self, n, rank, bodies):
         """Lengths of x and y; rank is that of Phi_q."""

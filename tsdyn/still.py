@@ -3,31 +3,33 @@
 A row on directions of two bodies alone, which no time enters, holds an orientation. Where three such rows join a body
 to the ground, or to bodies that are held already, and are independent there, the orientations that they allow are
 isolated: the body keeps the one that it has for as long as it moves. So those rows hold by themselves, and neither they
-nor the body's rotation need be in the equations. Rows that are redundant hold nothing here: what is left is then as
-independent as the whole was, and the dropped rows follow from the others as before.
+nor the body's rotation need be in the equations. What is left has as many redundant rows as there were, but for those
+among the rows that are left out.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from .free import MOST_ROWS
 from .markers import PARAMETERS, VECTOR
 from .motion import Motion
 from .network import DROPPED, N_COUNT, N_FIRST_REAL, N_REALS, build, is_regular, network_of, with_loops
 from .system import FIRST_REAL, classes
 
-STILL, NETWORK = ("still",), ("still", "network")  # in Packed.shared, as tuples: `network.drop` takes them out
+# in Packed.shared, as tuples: `network.drop` takes them out
+STILL, PARTS, NETWORK = ("still",), ("still", "parts"), ("still", "network")
 TURNING = "turning"
-LEAST = 1e-6  # of the largest singular value of three rows: with less they don't hold a body
+LEAST = 1e-12  # of the largest square of a singular value of its rows: with less they don't hold a body
 
 
 class Still(NamedTuple):
     """What of a scene never turns."""
 
     bodies: np.ndarray  # int64 (h,)
-    rows: np.ndarray  # int64 (h, 3): the rows of Phi that hold each
+    holding: np.ndarray  # int64 (k, 2): which of these bodies a row of Phi holds
     omitted: frozenset  # places in Packed.constraints: what joins these bodies to each other and the ground so
-    dropped: np.ndarray  # int64: rows of Phi that are redundant
+    dropped: np.ndarray  # int64: rows of Phi, redundant ones of those that are left
 
 
 def still(packed):
@@ -38,9 +40,11 @@ def still(packed):
     return kept[STILL]
 
 
-def turning(packed):
-    """The set of bodies (their numbers) that are never taken for still, whatever holds them; add to it before a run."""
-    return packed.shared.setdefault(TURNING, set())
+def keep_turning(packed, bodies):
+    """Take these bodies (their numbers) for no still ones from now on, whatever holds them."""
+    packed.shared.setdefault(TURNING, set()).update(bodies)
+    for key in [key for key in packed.shared if isinstance(key, tuple) and key[:1] == STILL]:
+        del packed.shared[key]
 
 
 def moving_network(packed, *columns):
@@ -48,11 +52,11 @@ def moving_network(packed, *columns):
     found, kept = still(packed), packed.shared
     if not found.bodies.size:
         return network_of(packed, *columns)
-    key = (*STILL, *columns)
+    key = (*NETWORK, *columns)
     if key not in kept:
-        if NETWORK not in kept:
-            kept[NETWORK] = build(packed, found)
-        kept[key] = with_loops(*kept[NETWORK], *columns)
+        if PARTS not in kept:
+            kept[PARTS] = build(packed, found)
+        kept[key] = with_loops(*kept[PARTS], *columns)
     return kept[key]
 
 
@@ -65,23 +69,17 @@ def moving_parts(packed):
 def settle(packed, network, H):
     """Have bodies turn, from now on, that the rows H of the whole network, (m 16,), don't hold where they stand."""
     while (found := still(packed)).bodies.size:
-        place = np.empty(len(packed.system.segments), np.int64)
-        place[network.row[network.row >= 0]] = np.flatnonzero(network.row >= 0)
-        rows = place[found.rows]
-        side = np.where(network.sides[rows, 0] == found.bodies[:, None], 0, 1)
-        torques = H.reshape(-1, 2, 8)[rows, side, 4:7]
-        sizes = np.linalg.svd(torques, compute_uv=False)
-        loose = ~(sizes[:, 2] > LEAST * sizes[:, 0])
+        place, real = np.full(len(packed.system.segments), -1), network.row >= 0
+        place[network.row[real]] = np.flatnonzero(real)
+        which, rows = found.holding[:, 0], place[found.holding[:, 1]]
+        side = np.where(network.sides[rows, 0] == found.bodies[which], 0, 1)
+        torques, squares = H.reshape(-1, 2, 8)[rows, side, 4:7], np.zeros((len(found.bodies), 3, 3))
+        np.add.at(squares, which, torques[:, :, None] * torques[:, None, :])
+        sizes = np.linalg.eigvalsh(squares)
+        loose = ~(sizes[:, 0] > LEAST * sizes[:, 2])
         if not loose.any():
             return
-        turning(packed).update(found.bodies[loose].tolist())
-        forget(packed)
-
-
-def forget(packed):
-    """Have it found anew what is still."""
-    for key in [key for key in packed.shared if isinstance(key, tuple) and key[:1] == STILL]:
-        del packed.shared[key]
+        keep_turning(packed, found.bodies[loose].tolist())
 
 
 def hold(packed, q, qd):
@@ -112,33 +110,63 @@ def instances(packed, network):
 
 def _find(packed):
     """From the ground outwards, body by body."""
+    joints, held, holding = _joints(packed), {len(packed.bodies)}, {}
+    ways = list(held) if joints[-1] and is_regular(packed) else []
+    turning = packed.shared.get(TURNING, set())
+    while ways:
+        for _, pair, rows in joints[ways.pop()]:
+            for other in set(pair) - held - turning:
+                mine = holding.setdefault(other, [])
+                mine += rows
+                if len(mine) >= 3:
+                    held.add(other)
+                    ways.append(other)
+    omitted = {i: rows for body in held for i, pair, rows in joints[body] if held.issuperset(pair)}
+    bodies = sorted(held - {len(packed.bodies)})
+    dropped = _dropped(packed, omitted, sum(map(len, omitted.values())) - 3 * len(bodies))
+    if dropped is None:
+        bodies = omitted = dropped = ()
+    holding = [(i, row) for i, body in enumerate(bodies) for row in holding[body]]
+    return Still(
+        np.array(bodies, np.int64),
+        np.array(holding, np.int64).reshape(-1, 2),
+        frozenset(omitted),
+        np.array(dropped, np.int64),
+    )
+
+
+def _joints(packed):
+    """For each body and, last, the ground: (place in Packed.constraints, both bodies, rows) of what may hold it."""
     bodies, nb = {id(body): i for i, body in enumerate(packed.bodies)}, len(packed.bodies)
-    joints, row, holds = [[] for _ in range(nb + 1)], 0, {kind: _holds(kind) for kind in classes(packed)}
+    holds, found, row = {kind: _holds(kind) for kind in classes(packed)}, [[] for _ in range(nb + 1)], 0
     for i, (constraint, given) in enumerate(zip(packed.constraints, packed.parameters, strict=True)):
         if holds[type(constraint)] and not any(isinstance(value, Motion) for value in given):
             pair = tuple(bodies.get(id(body), nb) for body in (constraint.a, constraint.b))
             for body in set(pair):
-                joints[body].append((i, pair, range(row, row + constraint.rows)))
+                found[body].append((i, pair, range(row, row + constraint.rows)))
         row += constraint.rows
-    gone = set()
-    if joints[nb] and len(packed.shared.get(DROPPED, ())):
-        whole = network_of(packed)
-        gone = set(whole.row[packed.shared[DROPPED]].tolist())
-    holding = {}  # body: rows
-    held, ways = {nb}, [nb] if joints[nb] and is_regular(packed) else []
-    while ways:
-        body = ways.pop()
-        for _, pair, rows in joints[body]:
-            for other in set(pair) - held - turning(packed):
-                mine = holding.setdefault(other, [])
-                mine += [row for row in rows if row not in gone]
-                if len(mine) >= 3:
-                    held.add(other)
-                    ways.append(other)
-    omitted = frozenset(i for body in held for i, pair, _ in joints[body] if held.issuperset(pair))
-    held = np.array(sorted(held - {nb}), np.int64)
-    rows = np.array([holding[body][:3] for body in held.tolist()], np.int64).reshape(-1, 3)
-    return Still(held, rows, omitted, np.array(sorted(gone), np.int64))
+    return found
+
+
+def _dropped(packed, omitted, spare):
+    """Of the rows that are left those to drop: as many as the whole drops but for the `spare` ones that are omitted.
+
+    Where too few of those that the whole drops are left, some others: a run chooses anew. None where that can't be
+    done.
+    """
+    whole = packed.shared.get(DROPPED, ())
+    if not len(whole):
+        return () if spare == 0 else None
+    gone, row, left, others = set(network_of(packed).row[whole].tolist()), 0, [], []
+    for i, constraint in enumerate(packed.constraints):
+        if i not in omitted and not constraint.normalises:
+            for one in range(row, row + constraint.rows):
+                (left if one in gone else others).append(one)
+        row += constraint.rows
+    wanted = len(gone) - spare - len(left)
+    if wanted < 0 or (wanted > 0 and len(left) + len(others) > MOST_ROWS):
+        return None
+    return sorted(left + others[len(others) - wanted :])
 
 
 def _holds(kind):

@@ -133,12 +133,12 @@ def driven():
     scene = ts.Scene()
     first, second = block(scene, (0.0, 0.0, 0.0), 0.3), block(scene, (0.0, 0.3, 0.0), 0.8)
     rail = scene.add(C.Translational.at(scene.ground, first, point=(0.0, 0.0, 0.0), axis=X))
-    scene.add(C.TranslationMotor.of(rail, displacement=lambda t: 0.2 * np.sin(2.0 * t) ** 2))
+    scene.add(C.TranslationMotor.of(rail, displacement=0.2 * np.sin(2.0 * ts.motions.time) ** 2))
     scene.add(C.Translational.at(first, second, point=second.position, axis=Y))
     scene.add(F.Spring(first, second, stiffness=90.0, free_length=0.25))
     table, load = block(scene, (0.0, 0.0, 0.5), 0.0), block(scene, (0.4, 0.0, 0.5), 0.2)
     hinge = scene.add(C.Revolute.at(first, table, point=table.position, axis=Z))
-    scene.add(C.RotationMotor.of(hinge, angle=lambda t: t * t))
+    scene.add(C.RotationMotor.of(hinge, angle=ts.motions.time**2))
     scene.add(C.Translational.at(table, load, point=load.position, axis=X))
     scene.add(F.Spring(table, load, stiffness=50.0))
     return scene
@@ -338,7 +338,7 @@ def test_what_a_function_of_time_turns_is_not_still():
     scene = ts.Scene()
     body = block(scene, (0.0, 0.0, 0.0), 0.0)
     hinge = scene.add(C.Revolute.at(scene.ground, body, point=(0.0, 0.0, 0.0), axis=Z))
-    motor = scene.add(C.RotationMotor.of(hinge, angle=lambda t: 2.0 * t + 0.0 * t**2))
+    motor = scene.add(C.RotationMotor.of(hinge, angle=2.0 * ts.motions.time))
     body.angular_velocity = (0.0, 0.0, 2.0)
     for method in ("dop853", "taylor"):
         solution = run(scene, method)

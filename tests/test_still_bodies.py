@@ -243,6 +243,50 @@ def test_rows_that_hold_no_orientation_hold_nothing():
     assert np.abs(solution.angular_velocity(body)).max() > 0.1
 
 
+class Upright(ts.Primitive):
+    """The Euler parameters of a body are those of its start: three rows on no direction and on no other body."""
+
+    rows = 3
+    markers = (ts.Parameters("a"),)
+
+    def __init__(self, a, *, name=""):
+        super().__init__(a, None, (None,), name)
+        self.start = tuple(float(e) for e in a.orientation[1:])
+
+    def parameters(self):
+        return self.start
+
+    @staticmethod
+    def phi(x, par, t, out):
+        for i in range(3):
+            out[i] = x[i + 1] - par[i]
+
+    @staticmethod
+    def jacobian(x, par, t, out):
+        for i in range(3):
+            out[i, i + 1] = 1.0
+
+    @staticmethod
+    def gamma(x, xd, par, t, out):
+        for i in range(3):
+            out[i] = 0.0
+
+
+def test_a_constraint_of_a_users_own_holds_a_body():
+    scene = ts.Scene()
+    body = block(scene, (0.0, 0.0, 0.0), 0.4)
+    row = scene.add(Upright(body))
+    scene.add(F.Spring(scene.ground, body, point_a=Z, point_b=(0.3, 0.1, 0.0), stiffness=60.0))
+    bob = block(scene, (0.3, 0.0, -0.5), 0.2)
+    scene.add(C.Spherical.at(body, bob, point=(0.1, 0.0, 0.0)))
+    solution, other = run(scene), run(scene, "null-space")
+    assert solution.stats.rotations_skipped == solution.stats.evaluations
+    np.testing.assert_allclose(solution.q, other.q, rtol=0, atol=1e-11)
+    lam = solution.multipliers[:, solution.rows(row)]
+    assert np.abs(lam).max() > 0.1
+    np.testing.assert_allclose(lam, other.multipliers[:, other.rows(row)], rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("form", ["null-space", "maggi-kane"])
 def test_forms_with_a_basis_keep_every_coordinate(form):
     solution = run(slider_crank(), "", integrator=I.RK45(1e-9, 1e-9), formulation=form)

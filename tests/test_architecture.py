@@ -45,6 +45,7 @@ joint_friction
 state_function
 given_load
 system stepping progress state
+still
 sparse_rows
 assembly interpolation constraints.* forces.*
 expansion

@@ -7,15 +7,17 @@ from ._kernel import twin
 from .aligned import zeros
 from .attachment import address
 from .bodies import Ground
-from .body_loops import INTS, MASK
+from .body_loops import BODY, INTS, MASK
 from .errors import InvalidConstraint, InvalidForce
 from .force_pack import F_FIRST_REAL, F_REALS, members_of
+from .markers import POINT
 from .motion import Motion
 from .network import DRIFT, N_COUNT, N_FIRST_INT, thin
-from .series_loops import BODY_ROW, GROUND, instance_width, scratch_at
+from .poses import STILL
+from .series_loops import BODY_ROW, GROUND, UNTURNED, instance_width, scratch_at
 from .series_state import Expansion
 from .signal import Signal, Table
-from .system import classes
+from .still import instances
 
 SHOWN = 5  # in a message
 FAR = 1 << 15  # orders of all bodies, each some hundred bytes
@@ -111,23 +113,17 @@ def allocate_expansion(network, kinds, packed, highest):
         forces=forces,
         table=table,
         loads=loads,
-        motions=_motions(network, kinds, packed, orders, places, constraints),
+        motions=_motions(network, packed, orders, places, constraints),
     )
 
 
-def _motions(network, kinds, packed, orders, places, constraints):
+def _motions(network, packed, orders, places, constraints):
     """Expansion.motions; what is prescribed and constant is written now."""
-    place = {kind: i for i, kind in enumerate(kinds)}
     motions, rows = iter(packed.system.motions), []
-    for kind in classes(packed):
-        i = place.get(kind)
-        driven = i is not None and network.kinds[i, DRIFT] != 0
-        at = 0
-        for constraint, given in zip(packed.constraints, packed.parameters, strict=True):
-            if type(constraint) is not kind or not driven:
-                continue
+    for i, (kind, members) in enumerate(instances(packed, network)):
+        for at, (_, given) in enumerate(members if network.kinds[i, DRIFT] != 0 else ()):
             first = places[i, 1] + at * places[i, 2] + scratch_at(len(kind.markers), kind.rows, orders, True)
-            at, entry = at + 1, 0
+            entry = 0
             for j in range(len(kind.quantities())):
                 row = first + (kind.slots + j) * orders
                 moves = isinstance(given[entry], Motion)
@@ -158,23 +154,29 @@ def _forces(packed, orders):
     return np.array(rows, np.int64).reshape(-1, 7), np.array(table, np.int64), zeros(total + 4)
 
 
-def masks(network, packed, kinds):
+def masks(network, packed):
     """Write into the network's table which markers' columns vary along a motion, and which are on the ground.
 
-    Columns are constant where the primitive's own series says so for a random motion; returns of how many markers.
+    Directions of bodies that never turn are as good as those of the ground. Columns are constant where the primitive's
+    own series says so for a random motion; returns of how many markers.
     """
-    constant = 0
-    for row, kind in zip(network.kinds, kinds, strict=True):
-        members = [pair for pair in zip(packed.constraints, packed.parameters, strict=True) if type(pair[0]) is kind]
+    constant, lengths = 0, np.append(network.bodies[:, 1], 0)
+    for row, (kind, members) in zip(network.kinds, instances(packed, network), strict=True):
         motions, patterns, series = {}, {}, twin(kind.series)
         for i, (constraint, par) in enumerate(members):
-            grounded = tuple(isinstance(constraint.body_of(marker), Ground) for marker in kind.markers)
+            entry = network.table[row[N_FIRST_INT] + i * INTS :][:INTS]
+            length = [lengths[entry[BODY + (marker.body == "b")]] for marker in kind.markers]
+            grounded = tuple(
+                isinstance(constraint.body_of(marker), Ground) or (size == STILL and marker.code != POINT)
+                for marker, size in zip(kind.markers, length, strict=True)
+            )
             key = grounded, tuple(Motion.numbers(par))
             if key not in patterns:
                 if grounded not in motions:
                     motions[grounded] = _random_motion(grounded)
                 patterns[key] = _mask(kind, series, key[1], grounded, motions[grounded])
-            mask = network.table[row[N_FIRST_INT] + i * INTS + MASK] = patterns[key]
+            mask = patterns[key]
+            entry[MASK] = mask | sum(int(size != 7) << (UNTURNED + j) for j, size in enumerate(length))
             constant += len(kind.markers) - (mask & ((1 << GROUND) - 1)).bit_count()
     return constant
 

@@ -6,6 +6,7 @@ from types import ModuleType
 from . import friction_basis, friction_solve, linearise, maggi_kane, null_space, tangent
 from .errors import InvalidArgument
 from .network import REDUCED, is_regular, network_of
+from .still import moving_network
 
 
 @dataclass(frozen=True)
@@ -24,8 +25,8 @@ class Formulation:
         return self
 
     def network(self, packed):
-        """The scene's network with the loops that the kernels call."""
-        network = network_of(packed, *(self.kernels.COLUMNS if self.basis_free else (REDUCED,)))
+        """The scene's network with the loops that the kernels call; that of the forms with a basis has every row."""
+        network = moving_network(packed, *self.kernels.COLUMNS) if self.basis_free else network_of(packed, REDUCED)
         if network.frictions.size and network.rub[0] == 0:
             network.rub[0] = (friction_solve if self.basis_free else friction_basis).rub.address
         return network

@@ -15,6 +15,7 @@ from .body_loops import BODY, INTS, MASK, ROW
 from .errors import InvalidConstraint
 from .friction_pack import FR_COLUMNS, frictions_of
 from .hubs import cut
+from .poses import STILL
 
 # columns of Network.kinds: addresses of the loops, then where a kind's instances are
 REDUCED, VALUES, BIAS, DRIFT, N_COUNT, N_REALS, N_FIRST_INT, N_FIRST_REAL, N_COLUMNS = range(9)
@@ -31,8 +32,8 @@ THIN = 1e-12  # of the largest principal inertia: what is less is none
 class Network(NamedTuple):
     """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H, which are zero for a weld's."""
 
-    bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length 7 or 3
-    kinds: np.ndarray  # int64 (kinds, N_COLUMNS)
+    bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length: 7, 3, or poses.STILL of what never turns
+    kinds: np.ndarray  # int64 (kinds, N_COLUMNS); more than one of a kind where instances between them are left out
     table: np.ndarray  # int64: body_loops.INTS for each instance
     sides: np.ndarray  # int64 (m, 2): the bodies of a row; nb is the ground
     row: np.ndarray  # int64 (m,): its place among the rows of Phi; -1 for a weld's
@@ -112,16 +113,22 @@ def no_network():
     )  # fmt: skip
 
 
-def build(packed):
-    """The network of a packed scene, with the addresses of the loops still zero, and the classes of its kinds."""
-    system = packed.system
+def build(packed, still=None):
+    """The network of a packed scene, with the addresses of the loops still zero, and the classes of its kinds.
+
+    With `still`, a `still.Still`, without the rotations of those bodies and the rows that hold them.
+    """
+    system, omitted, rows = packed.system, (), packed.system.bodies
+    if still is not None:
+        omitted, rows = still.omitted, rows.copy()
+        rows[still.bodies, 1] = STILL
     bodies = {id(body): i for i, body in enumerate(packed.bodies)}
     nb = len(bodies)
     joints, row, normals = [], 0, np.full(nb, -1, np.int64)
-    for constraint in packed.constraints:
+    for i, constraint in enumerate(packed.constraints):
         if constraint.normalises:
             normals[bodies[id(constraint.a)]] = row
-        else:
+        elif i not in omitted:
             pair = tuple(bodies.get(id(body), nb) for body in (constraint.a, constraint.b))
             joints.append((constraint, pair, row))
         row += constraint.rows
@@ -132,7 +139,7 @@ def build(packed):
             sizes.append(0)
         inside.append((node, sizes[node]))
         sizes[node] += constraint.rows
-    degrees = np.where(system.bodies[:, 1] == 7, 6, 3).tolist()
+    degrees = np.where(rows[:, 1] == 7, 6, 3).tolist()
     whole = DROPPED in packed.shared or packed.system.normals.size  # frictions couple the rows of a hub as they are
     parts = [] if whole else cut([tuple(body if body < nb else -1 for body in pair) for pair in nodes], sizes, degrees)
     hubs, cliques = {part.body for part in parts}, [[] for _ in range(nb)]
@@ -199,20 +206,25 @@ def build(packed):
     for kind, packed_kind in zip(classes, system.kinds, strict=True):
         if kind.normalises:
             continue
-        first = len(table)
-        for constraint in (c for c in packed.constraints if type(c) is kind):
-            i = index[id(constraint)]
+        _, _, _, phi_t, _, stride, _, first_real, _ = packed_kind
+        last = None  # the instance before, where it is not left out
+        for at, constraint in enumerate(c for c in packed.constraints if type(c) is kind):
+            i = index.get(id(constraint))
+            if i is None:
+                continue
+            if last is None or last != at - 1:
+                kinds.append([0, 0, 0, int(phi_t != 0), 0, stride, len(table), first_real + at * stride])
+                used.append(kind)
+            last = at
+            kinds[-1][N_COUNT] += 1
             entry = [0] * INTS
             entry[BODY : BODY + 2], entry[ROW], entry[MASK] = joints[i][1], firsts[i], 0
             table += entry
-        _, _, _, phi_t, count, stride, _, first_real, _ = packed_kind
-        kinds.append([0, 0, 0, int(phi_t != 0), count, stride, first, first_real])
-        used.append(kind)
 
     inverse, mass = np.zeros((nb + 1, WEIGHTS)), np.zeros((nb + 1, WEIGHTS))
     spins = np.zeros(nb, np.int64)
     inverse[:nb, W_MASS], mass[:nb, W_MASS] = 1.0 / system.mass, system.mass
-    rigid = np.flatnonzero(system.bodies[:, 1] == 7)
+    rigid = np.flatnonzero(rows[:, 1] == 7)
     J = system.inertia[rigid].reshape(-1, 3, 3)
     spins[rigid] = (J[:, :1, :1] * np.eye(3) != J).any(axis=(1, 2))
     for weights, matrices in ((inverse, _inverses(J, system.mass[rigid])), (mass, J)):
@@ -220,8 +232,11 @@ def build(packed):
     frictions, friction_rows = frictions_of(
         packed, bodies, lambda part: range(firsts[index[id(part)]], firsts[index[id(part)]] + part.rows), sides
     )
+    dropped = np.array(packed.shared.get(DROPPED, ()), np.int64)
+    if still is not None:
+        dropped = np.flatnonzero(np.isin(places, still.dropped))
     network = Network(
-        bodies=system.bodies,
+        bodies=rows,
         kinds=np.array(kinds, np.int64).reshape(-1, N_COLUMNS),
         table=np.array(table, np.int64),
         sides=sides,
@@ -236,7 +251,7 @@ def build(packed):
         scales=np.array(scales, float),
         welds=np.array(welds, np.int64).reshape(-1, 2),
         diagonal=_diagonal(pattern),
-        dropped=np.array(packed.shared.get(DROPPED, ()), np.int64),
+        dropped=dropped,
         frictions=frictions,
         friction_rows=friction_rows,
         rub=np.zeros(1, np.int64),

@@ -6,7 +6,8 @@
     omega   4   omega', body frame
     p       4   Euler parameters
 
-The ground is the last row, A = I and all else 0, so no kernel asks which body is the ground. A point mass never turns.
+The ground is the last row, A = I and all else 0, so no kernel asks which body is the ground. A point mass never turns,
+nor does a rigid body whose length in the network is STILL: where bodies are placed, its orientation is taken as it is.
 """
 
 from ._four import add, cross, fma, four, lanes, put, splat, times
@@ -14,6 +15,7 @@ from ._kernel import kernel
 from .markers import PARAMETERS, POINT
 
 A, R, RD, OMEGA, P, POSE = 0, 12, 16, 20, 24, 28
+STILL = 4  # in place of a body's length, 7 or 3: a rigid body that never turns
 
 
 @kernel
@@ -60,8 +62,10 @@ def place_bodies(bodies, q, poses):
     for b in range(bodies.shape[0]):
         at, i = b * POSE, bodies[b, 0]
         put(poses, at + R, lanes(q[i], q[i + 1], q[i + 2]))
-        if bodies[b, 1] == 7:
+        if bodies[b, 1] == 7 or bodies[b, 1] == STILL:
             set_pose(poses, at, q[i + 3 : i + 7])
+        if bodies[b, 1] == STILL:
+            put(poses, at + OMEGA, splat(0.0))
 
 
 @kernel

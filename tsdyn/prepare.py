@@ -11,6 +11,7 @@ from .friction_unique import demand_unique
 from .network import DROPPED
 from .series_memory import Series
 from .start import consistent
+from .still import hold, still
 from .system import with_curvatures
 
 SPARE = 8  # memories of a kind that are kept for further runs: as many may run at once without making new ones
@@ -53,6 +54,11 @@ class Prepared:
         J = self.packed.system.inertia[self.packed.system.bodies[:, 1] == 7].reshape(-1, 3, 3)
         return int((J[:, :1, :1] * np.eye(3) == J).all(axis=(1, 2)).sum())
 
+    @property
+    def still(self):
+        """How many rigid bodies never turn."""
+        return len(still(self.packed).bodies)
+
     @cached_property
     def refusal(self):
         """Why Taylor series can't run the scene; empty where they can."""
@@ -72,16 +78,18 @@ class Prepared:
         given = q.tobytes(), qd.tobytes(), t, tol, remembered.tobytes(), redundant_allowed
         known, start = self._start
         if known != given:
-            system, before = self.packed.system, self.packed.shared.get(DROPPED)
+            system, before = self.packed.system, still(self.packed)
+            dropped = self.packed.shared.get(DROPPED)
             if remembered.size:
                 system = system._replace(reals=system.reals.copy())
                 system.reals[system.memory] = remembered
             start = consistent(scene, system, q, qd, t, tol, redundant_allowed)
-            if self.packed.shared.get(DROPPED) is not before:  # the rows that are dropped belong to a network
-                self.__dict__.pop("series", None)
+            if self.packed.shared.get(DROPPED) is not dropped or still(self.packed) is not before:
+                self.__dict__.pop("series", None)  # the rows that are left out belong to a network
                 self._spare.clear()
             demand_aligned(self.packed, start[0], t)
             demand_unique(self.packed, start[0], t)
+            start = hold(self.packed, *start)
             self._start = given, start
         return start
 

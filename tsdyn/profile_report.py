@@ -7,6 +7,7 @@ SKIPPED = {
     "checks_skipped": "checks of a correction that was known to suffice",
     "factorizations_skipped": "factorisations, older factors serving or still contracting",
     "gyroscopic_skipped": "gyroscopic torques of spheres",
+    "rotations_skipped": "rotations of bodies that never turn",
     "columns_skipped": "series of constant columns of Phi_q",
     "forces_skipped": "evaluations without forces",
 }

@@ -10,10 +10,10 @@ from .assembly import constraint_jacobian, set_time
 from .block_kernels import solve
 from .bodies import rotation_matrix, transform_g
 from .friction_reactions import with_normal_loads
+from .linalg import copy
 from .loads import applied_loads, force_loads, inertial_forces, velocity_forces
 from .markers import POINT
 from .network import REDUCED, network_of
-from .linalg import copy
 from .normal import gather, scatter
 from .poses import place_bodies, take_loads
 from .primitive import INTS

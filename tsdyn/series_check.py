@@ -71,7 +71,7 @@ def check_constraint_series(scene, constraint, name, rng):
     packed, m = scene.packed, len(Phi)
     network, kinds = build(packed)
     Phi = Phi[network.row]
-    masks(network, packed, kinds)
+    masks(network, packed)
     expansion = allocate_expansion(network, kinds, packed, ORDER)
     write_bodies(scene, q, expansion)
     begin_motions(packed.system._replace(reals=packed.system.reals.copy()), expansion, t.c[0])

@@ -30,7 +30,9 @@ S_OMEGA, S_R, S_SPIN, BODY_ROW = 12, 16, 20, 24
 SIGNATURE = "iiiiiipppppp"
 call_series = caller(SIGNATURE)
 ADVANCE, RESIDUAL = range(2)
-GROUND = 16  # bits of the mask: from 0 on the markers whose columns vary, from 16 on those that are on the ground
+# bits of the mask: from 0 on the markers whose columns vary, from 16 on those that are on the ground, from 32 on those
+# whose body has no use for a torque
+GROUND, UNTURNED = 16, 32
 
 
 def instance_width(markers, rows, slots, orders, varies, driven=False):
@@ -146,8 +148,9 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b
                 put(values, forces + 4 * k - 4, done)
                 put(values, forces + 4 * k, force)
                 body, s = own[OWNERS[j]], real[3 * j : 3 * j + 3]
-                y = torque(bodies, body * body_size, k, values, forces)
-                put(Z, 8 * body + 4, add(four(Z, 8 * body + 4), cross(lanes(s[0], s[1], s[2]), y)))
+                if mask >> (UNTURNED + j) & 1 == 0:
+                    y = torque(bodies, body * body_size, k, values, forces)
+                    put(Z, 8 * body + 4, add(four(Z, 8 * body + 4), cross(lanes(s[0], s[1], s[2]), y)))
                 if CODES[j] == POINT:
                     put(Z, 8 * body, add(four(Z, 8 * body), force))
         else:

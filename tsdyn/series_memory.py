@@ -26,6 +26,7 @@ from .run_state import (
 )
 from .series_state import HIGHEST, LOWEST, NEXT, TOP, SeriesContext
 from .series_steps import STEPS
+from .still import moving_parts
 from .system import System
 from .taylor import advance_series
 from .workspace import SIZE, U_TOL, plain_work
@@ -49,8 +50,8 @@ class Series:
     def __init__(self, packed, found):
         if found:
             raise InvalidArgument(found)
-        network, self.kinds = graph.build(packed)
-        self.constant_columns = masks(network, packed, self.kinds)
+        network, self.kinds = moving_parts(packed)
+        self.constant_columns = masks(network, packed)
         self.network = graph.with_loops(network, self.kinds, graph.REDUCED, graph.VALUES, graph.BIAS, graph.DRIFT)
         self.packed = packed
 

@@ -19,6 +19,7 @@ from .poses import move_bodies, place_bodies, write_positions, write_velocities
 from .rank import check_rank
 from .rows import run_loops
 from .selection import drop_rows, factor_rows, select
+from .still import keep_turning, settle, still
 from .workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 
 LARGE = 1 << 24  # entries of Phi_q from which on no dense one is made
@@ -119,6 +120,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         if known is not None:  # another start had too many rows
             drop(packed, None)
             start = start.again()
+        settle(packed, start.network, start.free.H)
         return start.landed()
     if known is None:
         drop(packed, np.zeros(0, np.int64))
@@ -127,6 +129,9 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     if known is None or len(known) != len(rows):
         drop(packed, rows if len(rows) else None)
         start = start.again()
+    elif still(packed).bodies.size:
+        start.check()  # for H where it starts
+    settle(packed, start.network, start.free.H)
     return start.landed()
 
 
@@ -218,6 +223,8 @@ class _Start:
             self.work.q[:], self.work.qd[:] = q, qd
             if _land(self.context, self.t) == 0:
                 q, qd = self.work.q.copy(), self.work.qd.copy()
+            else:  # what holds an orientation has not put it right
+                keep_turning(self.packed, still(self.packed).bodies.tolist())
         return q, qd
 
 

@@ -77,7 +77,12 @@ def run_steps(task, observe=None):
         float(run.clock[T]),
         last,
         run.remembered.copy(),
-        counts(run.numbers, memory.work.counters.tolist(), packed, prepared.spheres if form.basis_free else 0),
+        counts(
+            run.numbers,
+            memory.work.counters.tolist(),
+            packed,
+            *((prepared.spheres, prepared.still) if form.basis_free else (0, 0)),
+        ),
         trajectory,
         None if watch is None else watch.found(n),
         began,
@@ -101,8 +106,11 @@ def _addresses(method, form, step, interpolant, adaptive, within):
     ]
 
 
-def counts(numbers, counters, packed, no_spin, constant_columns=0):
-    """What `Solution.stats` counts; of what each evaluation skips, no_spin bodies and so many columns of markers."""
+def counts(numbers, counters, packed, no_spin, no_turn, constant_columns=0):
+    """What `Solution.stats` counts.
+
+    Of what each evaluation skips: the torques of no_spin bodies, the rotations of no_turn, so many columns of markers.
+    """
     evaluations = counters[EVALUATIONS]
     return {
         "steps": int(numbers[STEPS]),
@@ -121,6 +129,7 @@ def counts(numbers, counters, packed, no_spin, constant_columns=0):
         "checks_skipped": counters[UNVERIFIED],
         "factorizations_skipped": counters[KEPT] + counters[STAGE_ITERATIONS] - counters[ITERATION_MATRICES],
         "gyroscopic_skipped": no_spin * evaluations,
+        "rotations_skipped": no_turn * evaluations,
         "columns_skipped": constant_columns * evaluations,
         "forces_skipped": 0 if packed.loads else evaluations,
     }

@@ -8,6 +8,7 @@ import numpy as np
 from . import body_loops, force_loops, force_series, primitive
 from .force_pack import F_COUNT, F_FIRST_INT, F_REMEMBER, FORCE, members_of
 from .network import N_COUNT, N_FIRST_INT
+from .still import instances
 from .system import COUNT, FIRST_INT
 from .timers import (
     ACCELERATE,
@@ -125,7 +126,7 @@ class Timekeeper(Stopwatch):
         network, system = c.network, c.system
         forces = [members_of(row, memory.packed.loads) for row in system.forces]
         classes = list(dict.fromkeys(map(type, memory.packed.constraints)))
-        joints = [kind for kind in classes if not kind.normalises]
+        joints = [kind for kind, _ in instances(memory.packed, network)]
         self.notes = new_notes(len(joints) + len(classes) + 2 * len(forces))
         places = c.expansion.places[:, :1] if series else np.zeros((len(joints), 1), np.int64)
 

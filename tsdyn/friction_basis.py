@@ -146,7 +146,7 @@ def _find_load(s, w, network, friction, lam, t, out, by_row):
                     x -= row[at + c] * out[1 + c] + torque[c] * out[4 + c]
                 by_row[e] = x
         if only_sum == 0:
-            normal_load(s, friction, w.q, w.qd, t, reaction, out)
+            normal_load(s, friction, w.q, w.qd, t, 1, reaction, out)
 
 
 @callback(RUB)

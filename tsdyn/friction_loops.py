@@ -9,7 +9,7 @@ from .marker_forces import carry_back, state
 from .rotation import matrix_a
 
 UNIT_FRICTION = "ippppdp"  # floats of the instance, its table, its floats, q, qd, t, out
-NORMAL_LOAD = "ippppdipp"  # the same to t, the side that f is on, f, out
+NORMAL_LOAD = "ippppdiipp"  # the same to t, the side that f is on, whether to derive, f, out
 call_unit_friction, call_normal_load = caller(UNIT_FRICTION), caller(NORMAL_LOAD)
 STEP = 1e-40  # of complex steps
 
@@ -51,8 +51,8 @@ def _about_point(A, s, f, out):
     out[5] -= s[0] * f[1] - s[1] * f[0]
 
 
-def normal_load(stride, own, real, q, qd, t, side, f, out):
-    """out (7,) = the normal load of a reaction, and what it changes by with that.
+def normal_load(stride, own, real, q, qd, t, side, derive, f, out):
+    """out (7,) = the normal load of a reaction and, with derive = 1, what it changes by with that.
 
     f (6,) is the force, ground frame, and the torque about the centroid, body frame, on the body of a side.
     """
@@ -73,6 +73,9 @@ def normal_load(stride, own, real, q, qd, t, side, f, out):
     for i in range(6):
         z[i] = g[i]
     par = real[3 * MARKERS : stride]
+    if derive == 0:
+        out[0] = kernel_normal_load(x, g, par)
+        return 0
     for i in range(6):
         z[i] = complex(g[i], STEP)
         load = kernel_normal_load(x, z, par)

@@ -56,12 +56,13 @@ def unit_friction(system, friction, q, qd, t, out):
 
 
 @kernel
-def normal_load(system, friction, q, qd, t, reaction, out):
-    """out (7,) = the normal load of a reaction (6,), and its derivative by that."""
+def normal_load(system, friction, q, qd, t, derive, reaction, out):
+    """out (7,) = the normal load of a reaction (6,) and, with derive = 1, its derivative by that."""
     stride, own, real = _instance(system, friction)
     call_normal_load(
-        friction[FR_NORMAL], stride, system.table[own:], system.reals[real:], q, qd, t, friction[FR_ON], reaction, out
-    )
+        friction[FR_NORMAL], stride, system.table[own:], system.reals[real:], q, qd, t, friction[FR_ON], derive,
+        reaction, out,
+    )  # fmt: skip
 
 
 @kernel
@@ -90,8 +91,8 @@ def _weigh_units(network, system, f, q, qd, t):
 
 
 @kernel
-def _find_loads(network, system, f, q, qd, t):
-    """Normal loads and their derivatives at the multipliers r.lam."""
+def _find_loads(network, system, f, q, qd, t, derive):
+    """Normal loads and, with derive = 1, their derivatives at the multipliers r.lam."""
     r, reaction = f.friction, stack(6)
     for i in range(network.frictions.shape[0]):
         friction = network.frictions[i]
@@ -103,7 +104,7 @@ def _find_loads(network, system, f, q, qd, t):
             for c in range(3):
                 reaction[c] -= f.H[at + c] * r.lam[e]
                 reaction[3 + c] -= f.H[at + 4 + c] * r.lam[e]
-        normal_load(system, friction, q, qd, t, reaction, r.load[7 * i :])
+        normal_load(system, friction, q, qd, t, derive, reaction, r.load[7 * i :])
 
 
 @kernel
@@ -162,9 +163,9 @@ def find_reactions(network, system, f, q, qd, t):
         for e in range(r.lam.size):
             r.lam[e] = 0.0
         size = 0.0
-    before, anew, done = math.inf, size == 0.0, False  # factors of the evaluation before may do
+    before, anew, done = math.inf, True, False
     for sweep in range(SWEEPS):
-        _find_loads(network, system, f, q, qd, t)
+        _find_loads(network, system, f, q, qd, t, int(anew and size > 0.0 and not done))
         _rub_bodies(network, f)
         if done:
             return True

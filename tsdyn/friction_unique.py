@@ -24,14 +24,14 @@ def _free_loads(context, t, q, whole, out):
             friction = network.frictions[i]
             for c in range(6):
                 reaction[c] = 0.0
-            normal_load(s, friction, q, q, t, reaction, none)
+            normal_load(s, friction, q, q, t, 0, reaction, none)
             for j in range(friction[FR_FIRST], friction[FR_FIRST] + friction[FR_COUNT]):
                 e, side = network.friction_rows[j]
                 at = 16 * e + 8 * side
                 for c in range(3):
                     reaction[c] -= whole[at + c] * f.b[e] / largest
                     reaction[3 + c] -= whole[at + 4 + c] * f.b[e] / largest
-            normal_load(s, friction, q, q, t, reaction, found)
+            normal_load(s, friction, q, q, t, 0, reaction, found)
             out[i] = max(out[i], abs(found[0] - none[0]))
 
 

@@ -67,9 +67,8 @@ class Solution:
         method has met its limit of stability for a while. What was not needed: solves_skipped, placements that lay on
         the constraints to rounding already; checks_skipped, those whose last correction was known to suffice;
         factorizations_skipped, for which older factors served or still contracted; gyroscopic_skipped, torques of
-        bodies whose inertia is a sphere's, rotations_skipped, of bodies whose orientation their joints hold, and
-        forces_skipped, of scenes without forces, one an evaluation; columns_skipped, series of a marker's columns of
-        Phi_q that are constant, one an order.
+        bodies whose inertia is a sphere's, rotations_skipped, of bodies that their joints never let turn, and
+        forces_skipped, of scenes without any, one an evaluation; columns_skipped, constant ones of series, one an order.
     """
 
     def __init__(self, scene, task, outcome, seconds):

@@ -68,7 +68,7 @@ class Solution:
         the constraints to rounding already; checks_skipped, those whose last correction was known to suffice;
         factorizations_skipped, for which older factors served or still contracted; gyroscopic_skipped, torques of
         bodies whose inertia is a sphere's, rotations_skipped, of bodies that their joints never let turn, and
-        forces_skipped, of scenes without any, one an evaluation; columns_skipped, constant ones of series, one an order.
+        forces_skipped, of scenes without any, one an evaluation; columns_skipped, constant ones of series, an order.
     """
 
     def __init__(self, scene, task, outcome, seconds):

@@ -76,7 +76,7 @@ series_memory
 series_dense
 formulation run
 memory prepare task
-events drive work
+events drive work account
 series_run steps solution
 series_check timers
 timekeeper replay phases

@@ -8,21 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from . import diagnostics, power, reactions, uniqueness
+from .account import account
 from .bodies import PointMass, rotation_matrix
 from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
-from .evaluate import constraint_arrays
 from .friction_reactions import with_normal_loads
 from .local_chart import REASONS
-from .network import DROPPED
-from .rank import weakest_row
 from .state import RememberingState
 from .system import member_of
 from .work import work as integrate_work
-
-NEARLY_SINGULAR = 0.05
-MOST = 2000  # coordinates for which Phi_q is made as a matrix
-BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
 
 
 class Steps(NamedTuple):
@@ -84,7 +78,7 @@ class Solution:
         self._reached, self._last, self._remembered = outcome.reached, outcome.last, outcome.remembered
         self._history, self._charts = outcome.history, outcome.charts
         self.stats = SimpleNamespace(**outcome.counts, seconds=seconds)
-        self.message = self._message(scene, outcome.reason)  # now: the scene may change
+        self.message = account(self, scene, outcome.reason)  # now: the scene may change
 
     def __getstate__(self):
         """All but the dense output, which holds addresses of this process."""
@@ -98,50 +92,6 @@ class Solution:
     def success(self):
         """Whether the run reached the end of the interval, or a terminal event."""
         return self.status in (Status.SUCCESS, Status.EVENT)
-
-    def _message(self, scene, reason):
-        """How the run ended, in words."""
-        if self.success:
-            return " ".join(part for part in (self.status.sentence, reason, self._locked()) if part)
-        steps = f"{self.stats.steps} step{'' if self.stats.steps == 1 else 's'}"
-        where = f"It stopped at t = {self._reached:.9g} s of {self.span[1]:g} s, after {steps}."
-        suspect = self._suspect(scene)
-        remedy = Status.SINGULAR.remedy if suspect else self.status.remedy
-        if not suspect and self.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
-            suspect = self._growth()
-        parts = (self.status.sentence, reason, where, suspect, remedy)
-        return " ".join(part for part in parts if part)
-
-    def _locked(self):
-        """Say so where redundant rows leave nothing free."""
-        redundant = len(self.packed.shared.get(DROPPED, ()))
-        still = redundant and not self.system.rheonomic[0]
-        if not (still and self.q.shape[1] == len(self.system.segments) - redundant):
-            return ""
-        return "Nothing can move: the constraints, redundant ones among them, leave no degree of freedom."
-
-    def _growth(self):
-        """Say that the motion is stiff, or that its speed has grown beyond all measure."""
-        said = "The motion is stiff: an implicit method, such as SDIRK54, may go on. " if self.stats.stiff else ""
-        first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (self.qd[:1], self._last[1]))
-        if last > BLOW_UP * (1.0 + first):
-            said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion itself blows up."
-        return said.strip()
-
-    def _suspect(self, scene):
-        """Name what is nearly singular at the last point."""
-        if self.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
-            return ""
-        if self.q.shape[1] > MOST:
-            return ""
-        _, Phi_q, _, _ = constraint_arrays(self.system, self._last[0], self._last[1], self._reached)
-        rows, share = weakest_row(scene, Phi_q, len(self.packed.shared.get(DROPPED, ())))
-        if not share < NEARLY_SINGULAR:
-            return ""
-        return (
-            f"Phi_q is near to losing rank there (its smallest singular value is {share:.1e} of the largest, rows "
-            f"scaled): a singular configuration, in which {rows} depends on other rows."
-        )
 
     def raise_if_failed(self):
         """Raise StepFailure, with this solution as `.solution`, if the run ended early; return self otherwise."""

@@ -1,0 +1,60 @@
+"""How a run ended, in words: what happened, where, and what to try."""
+
+import numpy as np
+
+from .errors import Status
+from .evaluate import constraint_arrays
+from .network import DROPPED
+from .rank import weakest_row
+
+NEARLY_SINGULAR = 0.05
+MOST = 2000  # coordinates for which Phi_q is made as a matrix
+BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
+
+
+def account(solution, scene, reason):
+    """How the run of a solution ended, in words."""
+    if solution.success:
+        return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
+    steps = f"{solution.stats.steps} step{'' if solution.stats.steps == 1 else 's'}"
+    where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
+    suspect = _suspect(solution, scene)
+    remedy = Status.SINGULAR.remedy if suspect else solution.status.remedy
+    if not suspect and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
+        suspect = _growth(solution)
+    parts = (solution.status.sentence, reason, where, suspect, remedy)
+    return " ".join(part for part in parts if part)
+
+
+def _locked(solution):
+    """Say so where redundant rows leave nothing free."""
+    redundant = len(solution.packed.shared.get(DROPPED, ()))
+    still = redundant and not solution.system.rheonomic[0]
+    if not (still and solution.q.shape[1] == len(solution.system.segments) - redundant):
+        return ""
+    return "Nothing can move: the constraints, redundant ones among them, leave no degree of freedom."
+
+
+def _growth(solution):
+    """Say that the motion is stiff, or that its speed has grown beyond all measure."""
+    said = "The motion is stiff: an implicit method, such as SDIRK54, may go on. " if solution.stats.stiff else ""
+    first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (solution.qd[:1], solution._last[1]))
+    if last > BLOW_UP * (1.0 + first):
+        said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion itself blows up."
+    return said.strip()
+
+
+def _suspect(solution, scene):
+    """Name what is nearly singular at the last point."""
+    if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
+        return ""
+    if solution.q.shape[1] > MOST:
+        return ""
+    _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)
+    rows, share = weakest_row(scene, Phi_q, len(solution.packed.shared.get(DROPPED, ())))
+    if not share < NEARLY_SINGULAR:
+        return ""
+    return (
+        f"Phi_q is near to losing rank there (its smallest singular value is {share:.1e} of the largest, rows "
+        f"scaled): a singular configuration, in which {rows} depends on other rows."
+    )

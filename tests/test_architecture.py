@@ -33,7 +33,7 @@ force_series
 network local
 free normal
 selection
-rows
+rows nearness
 primitive
 joint
 framed_joint
@@ -46,7 +46,7 @@ sparse_rows
 assembly interpolation constraints.* forces.*
 expansion
 workspace run_state
-outputs
+outputs independent
 series_state
 implicit
 integrator
@@ -71,7 +71,9 @@ series_dense
 formulation run
 memory prepare task
 events drive work
+relay
 series_run steps solution
+passage
 series_check timers
 timekeeper replay phases
 simulate choice force_check

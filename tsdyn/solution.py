@@ -12,6 +12,7 @@ from .bodies import PointMass, rotation_matrix
 from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .evaluate import constraint_arrays
+from .expansion_pack import without_series
 from .local_chart import REASONS
 from .network import DROPPED
 from .rank import weakest_row
@@ -21,6 +22,7 @@ from .work import work as integrate_work
 
 NEARLY_SINGULAR = 0.05
 MOST = 2000  # coordinates for which Phi_q is made as a matrix
+FEW = 3  # parts of a scene that are named
 BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
 
 
@@ -106,6 +108,9 @@ class Solution:
         where = f"It stopped at t = {self._reached:.9g} s of {self.span[1]:g} s, after {steps}."
         suspect = self._suspect(scene)
         remedy = Status.SINGULAR.remedy if suspect else self.status.remedy
+        lacking = without_series(self.packed)[:FEW] if suspect else ()
+        if lacking:
+            remedy += f" Without a series: {'; '.join(lacking)}."
         if not suspect and self.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
             suspect = self._growth()
         parts = (self.status.sentence, reason, where, suspect, remedy)

@@ -18,8 +18,9 @@ NOT_UNIQUE = (
 )
 DEPENDENT = 1e-7  # of rows of unit length: those that are left less follow from others
 LOST = 1e-13  # of the largest pivot of a sparse factorisation: less is rounding
-SHARES = 1e-3, 1e-6, 1e-9, 1e-12  # of what elimination leaves of rows that are kept, in turn
-MOST_ROWS = 3000  # for a dense factorisation
+SHARES = 3e-2, 1e-3, 1e-6, 1e-9  # of what elimination leaves of rows that are kept, in turn
+ROUNDS, MOST_AT_ONCE = 8, 64  # of taking back rows that were left out wrongly; how many pushes tell which
+INDEPENDENT = 1e-3  # of what the rows move at most that are left out: more is independent of others that are
 LARGE = 1000  # coordinates from which on matrices are sparse
 
 
@@ -57,8 +58,7 @@ def evaluate(scene, q=None, qd=None, t=0.0):
     InvalidArgument
         If q or qd is not n finite numbers, or t is not finite.
     SingularConfiguration
-        If accelerations are not unique there, rows that depend on each other contradict each other, or no independent
-        ones are found among more than 3000.
+        If accelerations are not unique there, or rows that depend on each other contradict each other.
 
     Notes
     -----
@@ -95,7 +95,7 @@ def _of_independent_rows(M, Phi_q, load, gamma):
         found = equilibrated_solve(kkt, np.concatenate((load, -gamma[kept])))
     except np.linalg.LinAlgError as error:
         raise SingularConfiguration(NOT_UNIQUE) from error
-    return _with_gaps(found, kept, dropped, Phi_q, gamma)
+    return _with_gaps(found, kept, Phi_q, gamma)
 
 
 def _dependent(Phi_q):
@@ -108,10 +108,10 @@ def _dependent(Phi_q):
     return order[(size > DEPENDENT * size.max(initial=0.0)).sum() :]
 
 
-def _with_gaps(found, kept, dropped, Phi_q, gamma):
-    """(qdd, lam) of all rows, from that of the kept ones; refused where the dropped ones don't hold with them."""
+def _with_gaps(found, kept, Phi_q, gamma):
+    """(qdd, lam) of all rows, from that of the kept ones; refused where some row doesn't hold with them."""
     m, n = Phi_q.shape
-    left = Phi_q[dropped] @ found[:n] + gamma[dropped]
+    left = Phi_q @ found[:n] + gamma
     if np.abs(left).max(initial=0.0) > DEPENDENT * (1.0 + np.abs(found[:n]).max()):
         raise SingularConfiguration(NOT_UNIQUE)
     lam = np.full(m, np.nan)
@@ -137,32 +137,49 @@ def _evaluate_sparse(packed, q, qd, t):
 
 def _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t):
     """As `_of_independent_rows`, of sparse arrays."""
-    m, n = Phi_q.shape
-    push = np.random.default_rng(0).normal(size=n)
-    for dropped in _choices(packed, Phi_q, q, t):
-        kept = np.setdiff1d(np.arange(m), dropped)
-        solve = _sparse_solver(M, Phi_q[kept])
-        if solve is None:
-            continue
-        moved = solve(push, np.zeros(kept.size))[:n]  # what the kept rows let move leaves rows at rest that follow
-        if np.abs(Phi_q[dropped] @ moved).max() <= DEPENDENT * np.abs(moved).max():
-            return _with_gaps(solve(load, gamma[kept]), kept, dropped, Phi_q, gamma)
-    raise SingularConfiguration(NOT_UNIQUE)
-
-
-def _choices(packed, Phi_q, q, t):
-    """Rows that may be those that follow from others: by elimination on the network, then by a dense factorisation."""
+    m, found = len(gamma), False
     for share in SHARES:
         dropped = dependent_rows(packed, q, t, share)
-        if dropped is not None and dropped.size:
-            yield dropped
-    if Phi_q.shape[0] <= MOST_ROWS:
-        dropped = _dependent(Phi_q.toarray())
-        if dropped.size:
-            yield dropped
+        if dropped is None or not dropped.size:
+            continue
+        found = True
+        for _ in range(ROUNDS):
+            kept = np.setdiff1d(np.arange(m), dropped)
+            solve = _sparse_solver(M, Phi_q[kept])
+            if solve is None:
+                break
+            wrong = _independent(Phi_q[dropped], solve, np.zeros(kept.size))
+            if not wrong.size:
+                return _with_gaps(solve(load, gamma[kept]), kept, Phi_q, gamma)
+            dropped = np.delete(dropped, wrong)
+    solve = None if found else _sparse_solver(M, Phi_q, 0.0)  # regular, if not by much
+    if solve is None:
+        raise SingularConfiguration(NOT_UNIQUE)
+    return solve(load, gamma)
 
 
-def _sparse_solver(M, Phi_q):
+def _independent(rows, solve, still):
+    """Which of the rows that were left out are independent of the kept ones, and of one another.
+
+    What the kept ones let move, pushed at random, leaves those at rest that follow from them; `still` is their gamma.
+    """
+    from scipy.linalg import qr
+
+    rng, n, count = np.random.default_rng(0), rows.shape[1], 1
+    while True:
+        moved = np.stack([solve(rng.normal(size=n), still)[:n] for _ in range(count)], axis=1)
+        seen = rows @ (moved / np.abs(moved).max(axis=0))
+        if np.abs(seen).max() <= DEPENDENT:
+            return np.zeros(0, int)
+        R, order = qr(seen.T, mode="r", pivoting=True)
+        size = np.abs(R.diagonal())
+        rank = (size > INDEPENDENT * size.max()).sum()
+        if rank < count or count >= MOST_AT_ONCE:
+            return order[:rank]
+        count *= 4
+
+
+def _sparse_solver(M, Phi_q, lost=LOST):
     """(qdd, lam) of a load and gamma, by a sparse factorisation; None where it is singular to working precision."""
     from scipy.sparse import block_array, diags_array
     from scipy.sparse.linalg import splu
@@ -175,7 +192,7 @@ def _sparse_solver(M, Phi_q):
     except RuntimeError:
         return None
     pivots = np.abs(factors.U.diagonal())
-    if pivots.min() < LOST * pivots.max():
+    if pivots.min() < lost * pivots.max():
         return None
     return lambda load, gamma: scale * factors.solve(scale * np.concatenate((load, -gamma)))
 

@@ -73,3 +73,15 @@ def four_bar(planar=False, angle=1.0, rate=3.0, lengths=(1.0, 2.5, 2.0, 2.2)):
     pin(scene, coupler, rocker, top)
     pin(scene, rocker, scene.ground, far, planar)
     return scene
+
+
+def ring(count):
+    """Links of 1 m in a closed regular polygon that stands on its first corner and is free to fold."""
+    scene = ts.Scene(gravity=(0.0, -9.81, 0.0))
+    turn = 2.0 * np.pi * np.arange(count + 1) / count
+    corners = 0.5 / np.sin(np.pi / count) * np.stack((np.cos(turn), np.sin(turn), 0.0 * turn), axis=1)
+    links = [rod(scene, corners[i], corners[i + 1], name=f"link {i}") for i in range(count)]
+    pin(scene, scene.ground, links[0], corners[0])
+    for i in range(count):
+        pin(scene, links[i - 1], links[i], corners[i])
+    return scene

@@ -36,7 +36,7 @@ friction_pack
 network local
 free normal
 selection
-rows
+rows nearness
 primitive
 joint
 framed_joint
@@ -50,7 +50,7 @@ sparse_rows
 assembly interpolation constraints.* forces.*
 expansion
 workspace run_state
-outputs
+outputs independent
 series_state
 implicit
 integrator
@@ -77,7 +77,9 @@ series_dense
 formulation run
 memory prepare task
 events drive work account
+relay
 series_run steps solution
+passage
 series_check timers
 timekeeper replay phases
 simulate choice force_check

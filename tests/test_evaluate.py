@@ -1,5 +1,6 @@
 """scene.evaluate against NumPy formulas of the tests' own: quaternion products, complex steps, Cauchy integrals."""
 
+import closed_loops
 import numpy as np
 import pytest
 from scenes import (
@@ -209,3 +210,28 @@ def test_evaluation_leaves_its_arguments_and_the_scene_alone(rng):
     second = scene.evaluate(q, qd, 0.3)
     assert not (second.M == 7.0).any()
     np.testing.assert_array_equal(scene.bodies[0].position, definition["bodies"][0]["position"])
+
+
+@pytest.mark.parametrize(
+    ("scene", "redundant"),
+    [
+        (closed_loops.ring(150), 3),
+        (closed_loops.parallelogram(0.6, loops=80), 3 * 80),
+        (closed_loops.parallelogram(0.6, loops=300), 3 * 300),
+        (closed_loops.ring(30), 3),
+    ],
+    ids=["ring", "row of loops", "long row of loops", "dense"],
+)
+def test_redundant_rows_of_scenes_of_any_size(scene, redundant):
+    found = scene.evaluate()
+    lam = np.where(np.isnan(found.multipliers), 0.0, found.multipliers)
+    assert np.isnan(found.multipliers).sum() == redundant
+    size = np.abs(found.Q_A).max()
+    np.testing.assert_allclose(found.M @ found.qdd + found.Phi_q.T @ lam, found.Q_A + found.S, atol=1e-9 * size)
+    np.testing.assert_allclose(found.Phi_q @ found.qdd, -found.gamma, atol=1e-9 * (1.0 + np.abs(found.qdd).max()))
+    if redundant < 900:
+        start = ts.simulate(scene, (0.0, 1e-3))
+        np.testing.assert_allclose(found.qdd, start.qdd[0], atol=1e-9 * (1.0 + np.abs(found.qdd).max()))
+    tumbling = np.random.default_rng(1).normal(size=found.qdd.size)
+    with pytest.raises(ts.SingularConfiguration, match="not unique"):
+        scene.evaluate(qd=tumbling)  # what redundant rows ask for contradicts the others

@@ -117,6 +117,15 @@ def test_many_loops_side_by_side():
     assert alone.success
 
 
+@pytest.mark.parametrize("count", [20, 150, 400])
+def test_a_closed_ring_of_many_links(count):
+    """What a link may turn by without shifting those far away by more than their length falls with the size."""
+    solution = ts.simulate(closed_loops.ring(count), (0.0, 0.1)).raise_if_failed()
+    assert (np.isnan(solution.multipliers).sum(axis=1) == 3).all()
+    assert np.ptp(solution.energy) < 1e-9 * np.ptp(solution.kinetic_energy)
+    assert solution.constraint_error.position.max() < 1e-12
+
+
 def test_states_between_the_steps():
     scene = closed_loops.four_bar()
     solution = ts.simulate(scene, (0.0, 1.0), dense_output=True, events=lambda t, state: state.q[1])

@@ -4,11 +4,13 @@ import numpy as np
 
 from .errors import Status
 from .evaluate import constraint_arrays
+from .expansion_pack import without_series
 from .network import DROPPED
 from .rank import weakest_row
 
 NEARLY_SINGULAR = 0.05
 MOST = 2000  # coordinates for which Phi_q is made as a matrix
+FEW = 3  # parts of a scene that are named
 BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
 
 
@@ -20,6 +22,9 @@ def account(solution, scene, reason):
     where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
     suspect = _suspect(solution, scene)
     remedy = Status.SINGULAR.remedy if suspect else solution.status.remedy
+    lacking = without_series(solution.packed)[:FEW] if suspect else ()
+    if lacking:
+        remedy += f" Without a series: {'; '.join(lacking)}."
     if not suspect and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
         suspect = _growth(solution)
     parts = (solution.status.sentence, reason, where, suspect, remedy)

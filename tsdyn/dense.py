@@ -163,6 +163,31 @@ class Reader:
         return out, Status(status)
 
 
+class Pieces:
+    """The trajectories of a run's parts, one after the other, as one `Trajectory`."""
+
+    def __init__(self, parts):
+        self.parts, self.start, self.end = parts, parts[0].start, parts[-1].end
+
+    @property
+    def edges(self):
+        """The steps' ends (k,), s."""
+        return np.unique(np.concatenate([part.edges for part in self.parts]))
+
+    def __call__(self, t):
+        """As of a `Trajectory`."""
+        piece = np.searchsorted([part.end for part in self.parts[:-1]], t)
+        order, found = [], []
+        for i, part in enumerate(self.parts):
+            at = np.flatnonzero(piece == i)
+            if at.size or (not found and i == len(self.parts) - 1):
+                order.append(at)
+                found.append(part(t[at]))
+        back = np.argsort(np.concatenate(order), kind="stable")
+        states, memory, status = zip(*found, strict=True)
+        return np.concatenate(states)[back], np.concatenate(memory)[back], max(status)
+
+
 class Trajectory:
     """What a run with dense_output leaves to its solution.
 

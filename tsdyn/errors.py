@@ -74,6 +74,7 @@ class Status(IntEnum):
     STIFF = 13
     UNHELD = 14
     JAMMED = 15
+    PASSAGE = 16
 
     def __str__(self):
         return self.name.lower()
@@ -104,8 +105,8 @@ _SENTENCES = {
     ),
     Status.SINGULAR: (
         "The constraint Jacobian Phi_q has lost rank: this is a singular configuration.",
-        "Taylor, the default method, passes such a place where the motion is smooth; else start elsewhere, or remove "
-        "the constraint that has become dependent.",
+        "Taylor series pass such a place where the motion is smooth, if every part of the scene has one; else start "
+        "elsewhere, or remove the constraint that has become dependent.",
     ),
     Status.MASS_SINGULAR: (
         "The reduced mass matrix D^T M D is not positive definite: a direction that the constraints leave free "
@@ -139,4 +140,5 @@ _SENTENCES = {
     ),
     Status.STIFF: ("The motion is stiff, and an implicit method is cheaper.", "Use SDIRK54."),
     Status.SLICE_DONE: ("A slice of the run is done.", ""),
+    Status.PASSAGE: ("A singular configuration is near, and there is a way past it.", ""),
 }

@@ -8,6 +8,7 @@ from .assembly import evaluate_constraints
 from .bodies import transform_g
 from .checks import finite_vector, number
 from .errors import InvalidArgument, SingularConfiguration
+from .independent import dependent_rows
 from .loads import applied_loads, velocity_forces
 from .sparse_rows import WIDTH, as_csr, with_short_rows
 
@@ -16,6 +17,10 @@ NOT_UNIQUE = (
     "leave free carries no inertia."
 )
 DEPENDENT = 1e-7  # of rows of unit length: those that are left less follow from others
+LOST = 1e-13  # of the largest pivot of a sparse factorisation: less is rounding
+SHARES = 3e-2, 1e-3, 1e-6, 1e-9  # of what elimination leaves of rows that are kept, in turn
+ROUNDS, MOST_AT_ONCE = 8, 64  # of taking back rows that were left out wrongly; how many pushes tell which
+INDEPENDENT = 1e-3  # of what the rows move at most that are left out: more is independent of others that are
 LARGE = 1000  # coordinates from which on matrices are sparse
 
 
@@ -46,7 +51,7 @@ def evaluate(scene, q=None, qd=None, t=0.0):
     -------
     Evaluation
         Named tuple of arrays: Phi, Phi_q, Phi_t, gamma, M, Q_A, S, multipliers, qdd; Phi_q and M are SciPy sparse
-        arrays where n is above 1000. Multipliers are NaN for rows that follow from others (up to that size).
+        arrays where n is above 1000. Multipliers are NaN for rows that follow from others.
 
     Raises
     ------
@@ -94,21 +99,33 @@ def _with_friction(packed, t, q, qd, Phi_q, solve):
 
 def _of_independent_rows(M, Phi_q, load, gamma):
     """(qdd, lam) with NaN for rows of Phi_q that follow from others, and hold with them."""
-    from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
-
-    m, n = Phi_q.shape
-    scaled = Phi_q / np.maximum(np.linalg.norm(Phi_q, axis=1), 1e-300)[:, None]
-    _, R, order = qr(scaled.T, mode="economic", pivoting=True)
-    size = np.abs(R.diagonal())
-    rank = int((size > DEPENDENT * size.max(initial=0.0)).sum())
-    kept, dropped = np.sort(order[:rank]), order[rank:]
-    kkt = np.block([[M, Phi_q[kept].T], [Phi_q[kept], np.zeros((rank, rank))]])
+    dropped = _dependent(Phi_q)
+    if not dropped.size:
+        raise SingularConfiguration(NOT_UNIQUE)
+    kept = np.setdiff1d(np.arange(len(Phi_q)), dropped)
+    kkt = np.block([[M, Phi_q[kept].T], [Phi_q[kept], np.zeros((kept.size, kept.size))]])
     try:
         found = equilibrated_solve(kkt, np.concatenate((load, -gamma[kept])))
     except np.linalg.LinAlgError as error:
         raise SingularConfiguration(NOT_UNIQUE) from error
-    left = Phi_q[dropped] @ found[:n] + gamma[dropped]
-    if rank == m or np.abs(left).max(initial=0.0) > DEPENDENT * (1.0 + np.abs(found[:n]).max()):
+    return _with_gaps(found, kept, Phi_q, gamma)
+
+
+def _dependent(Phi_q):
+    """Rows of a dense Phi_q that follow from others, by QR with pivoting."""
+    from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
+
+    scaled = Phi_q / np.maximum(np.linalg.norm(Phi_q, axis=1), 1e-300)[:, None]
+    R, order = qr(scaled.T, mode="r", pivoting=True)
+    size = np.abs(R.diagonal())
+    return order[(size > DEPENDENT * size.max(initial=0.0)).sum() :]
+
+
+def _with_gaps(found, kept, Phi_q, gamma):
+    """(qdd, lam) of all rows, from that of the kept ones; refused where some row doesn't hold with them."""
+    m, n = Phi_q.shape
+    left = Phi_q @ found[:n] + gamma
+    if np.abs(left).max(initial=0.0) > DEPENDENT * (1.0 + np.abs(found[:n]).max()):
         raise SingularConfiguration(NOT_UNIQUE)
     lam = np.full(m, np.nan)
     lam[kept] = found[n:]
@@ -116,28 +133,84 @@ def _of_independent_rows(M, Phi_q, load, gamma):
 
 
 def _evaluate_sparse(packed, q, qd, t):
-    from scipy.sparse import block_array, diags_array
-    from scipy.sparse.linalg import splu
-
     system = with_short_rows(packed)
     n = q.size
     Phi, rows, Phi_t, gamma = constraint_arrays(system, q, qd, t, WIDTH)
     Phi_q, M = as_csr(packed, rows), mass_matrix_sparse(system, q)
     S = velocity_forces(system, q[None], qd[None])[0]
     Q_A = applied_loads(system, np.array([t]), q[None], qd[None])[0]
+    regular = _sparse_solver(M, Phi_q)
+
+    def solve(friction):
+        load = Q_A + S + friction
+        if regular is None:
+            return _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t)
+        return regular(load, gamma)
+
+    friction, solution = _with_friction(packed, t, q, qd, Phi_q, solve)
+    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, S, solution[n:], solution[:n])
+
+
+def _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t):
+    """As `_of_independent_rows`, of sparse arrays."""
+    m, found = len(gamma), False
+    for share in SHARES:
+        dropped = dependent_rows(packed, q, t, share)
+        if dropped is None or not dropped.size:
+            continue
+        found = True
+        for _ in range(ROUNDS):
+            kept = np.setdiff1d(np.arange(m), dropped)
+            solve = _sparse_solver(M, Phi_q[kept])
+            if solve is None:
+                break
+            wrong = _independent(Phi_q[dropped], solve, np.zeros(kept.size))
+            if not wrong.size:
+                return _with_gaps(solve(load, gamma[kept]), kept, Phi_q, gamma)
+            dropped = np.delete(dropped, wrong)
+    solve = None if found else _sparse_solver(M, Phi_q, 0.0)  # regular, if not by much
+    if solve is None:
+        raise SingularConfiguration(NOT_UNIQUE)
+    return solve(load, gamma)
+
+
+def _independent(rows, solve, still):
+    """Which of the rows that were left out are independent of the kept ones, and of one another.
+
+    What the kept ones let move, pushed at random, leaves those at rest that follow from them; `still` is their gamma.
+    """
+    from scipy.linalg import qr
+
+    rng, n, count = np.random.default_rng(0), rows.shape[1], 1
+    while True:
+        moved = np.stack([solve(rng.normal(size=n), still)[:n] for _ in range(count)], axis=1)
+        seen = rows @ (moved / np.abs(moved).max(axis=0))
+        if np.abs(seen).max() <= DEPENDENT:
+            return np.zeros(0, int)
+        R, order = qr(seen.T, mode="r", pivoting=True)
+        size = np.abs(R.diagonal())
+        rank = (size > INDEPENDENT * size.max()).sum()
+        if rank < count or count >= MOST_AT_ONCE:
+            return order[:rank]
+        count *= 4
+
+
+def _sparse_solver(M, Phi_q, lost=LOST):
+    """(qdd, lam) of a load and gamma, by a sparse factorisation; None where it is singular to working precision."""
+    from scipy.sparse import block_array, diags_array
+    from scipy.sparse.linalg import splu
+
     kkt = block_array([[M, Phi_q.T], [Phi_q, None]], format="csc")
     scale = 1.0 / np.sqrt(np.maximum(abs(kkt).max(axis=1).toarray().ravel(), 1e-300))
     weights = diags_array(scale)
     try:
         factors = splu((weights @ kkt @ weights).tocsc())
-    except RuntimeError as error:
-        raise SingularConfiguration(NOT_UNIQUE) from error
-
-    def solve(friction):
-        return scale * factors.solve(scale * np.concatenate((Q_A + S + friction, -gamma)))
-
-    friction, solution = _with_friction(packed, t, q, qd, Phi_q, solve)
-    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, S, solution[n:], solution[:n])
+    except RuntimeError:
+        return None
+    pivots = np.abs(factors.U.diagonal())
+    if pivots.min() < lost * pivots.max():
+        return None
+    return lambda load, gamma: scale * factors.solve(scale * np.concatenate((load, -gamma)))
 
 
 def equilibrated_solve(A, b):

@@ -98,11 +98,15 @@ class Watch:
     """The events of one run: the functions' last values, and what has been found."""
 
     def __init__(self, events, packed, reader, start):
-        self.events, self.packed, self.reader = events, packed, reader
+        self.events, self.packed = events, packed
         self.t, self.state, self.values = start, None, None  # at the last step's end
         self.memory = None  # what forces remember of it
         self.list = [[] for _ in events]
-        none = np.empty(0)
+        self.read_by(reader)
+
+    def read_by(self, reader):
+        """Take a reader of the steps that are watched from now on."""
+        none, self.reader = np.empty(0), reader
         reader(none, none.astype(int), np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0)))  # loads the kernel
 
     def found(self, n):

@@ -41,8 +41,12 @@ def _remember_unheld(f, Phi):
 
 @kernel
 def serve_still(network, f, S):
-    """Whether the rows that were chosen are about as independent as they were then, by the factors of S."""
-    return f.dropped[0] == 0 or weakest(network, S) >= WORSE * f.sizes[WEAKEST]
+    """Whether the rows that were chosen are about as independent as at best since then, by the factors of S."""
+    if f.dropped[0] == 0:
+        return True
+    share = weakest(network, S)
+    f.sizes[WEAKEST] = max(f.sizes[WEAKEST], share)  # a choice next to a singular configuration is no measure
+    return share >= WORSE * f.sizes[WEAKEST]
 
 
 @kernel

@@ -28,6 +28,7 @@ from .implicit import KNOWN, T_BEFORE
 from .interpolation import call_fill
 from .linalg import copy
 from .local_chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
+from .nearness import NEXT_TO, WITHIN_A_STEP, is_below, note_share
 from .outputs import record, restore_now, store_now
 from .run_state import (
     ADAPTIVE,
@@ -44,6 +45,7 @@ from .run_state import (
     LAST_STAGE,
     LEAVE_WHEN_STIFF,
     MAX_STEP,
+    MAY_PASS,
     NEXT_EVAL,
     REJECTED,
     REJECTED_LAST,
@@ -64,7 +66,7 @@ from .workspace import CONDITION, CONTRACTION, load
 
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
-JAMMED = int(Status.JAMMED)
+JAMMED, PASSAGE = int(Status.JAMMED), int(Status.PASSAGE)
 
 call_check = caller("p")
 
@@ -80,9 +82,9 @@ def _add(x, low, dx):
 
 
 @kernel
-def _begin_chart(context, w, r, log, at, reason):
-    """A new chart at the present q, qd, qdd; closes the record of the old one. Status."""
-    i = r.numbers[CHART_ROWS]
+def _begin_chart(context, c, r, log, at, reason):
+    """A new chart at the present q, qd, qdd; closes the record of the old one. PASSAGE next to a singular place."""
+    w, i = c.work, r.numbers[CHART_ROWS]
     if reason != AT_START:
         log.charts[i, 2], log.charts[i, 3], log.charts[i, 4] = (
             w.control[CONDITION],
@@ -99,7 +101,12 @@ def _begin_chart(context, w, r, log, at, reason):
         r.y_low[j] = 0.0
     if log.points.shape[0] > 0:
         copy(w.q, log.points[i])
-    return call_chart(at[A_CHART], context, r.clock[T], r.x, r.y, r.yd, r.xd)
+    status = call_chart(at[A_CHART], context, r.clock[T], r.x, r.y, r.yd, r.xd)
+    if r.numbers[MAY_PASS] == 1:
+        note_share(c.network, c.free, c.local.S0)
+        if status == 0 and reason != AT_START and is_below(c.free, NEXT_TO):
+            return PASSAGE
+    return status
 
 
 @kernel
@@ -152,9 +159,9 @@ def _outputs(context, w, r, log, at, t0, h, t1):
 
 
 @kernel
-def _begin(context, w, r, log, at):
+def _begin(context, c, r, log, at):
     """The first chart, the accelerations there, and the first output. Status."""
-    status = _begin_chart(context, w, r, log, at, AT_START)
+    w, status = c.work, _begin_chart(context, c, r, log, at, AT_START)
     if status == 0:
         status = evaluate(context, w, at, r.clock[T], r.x, r.y, r.yd, r.xd)
     if status == 0:
@@ -195,7 +202,7 @@ def advance(context, run, log, at, most):
     if r.numbers[BEGUN] == 0 and most != 0:
         set_time(c.system, r.clock[T])
         remember(c.system, w.q, w.qd, r.clock[T], r.remembered)
-        status = _begin(context, w, r, log, at)
+        status = _begin(context, c, r, log, at)
         if status != 0:
             return status
         r.numbers[BEGUN] = 1
@@ -264,12 +271,13 @@ def advance(context, run, log, at, most):
             r.numbers[REJECTED] += 1
             if r.numbers[IN_CHART] == 0:
                 if not adaptive:
-                    return status
+                    near = r.numbers[MAY_PASS] == 1 and is_below(c.free, WITHIN_A_STEP)
+                    return PASSAGE if near else status
                 r.numbers[FAILED] = status
                 r.clock[H] = 0.25 * h
                 if driven:  # nothing else keeps the next step from being as long
                     r.clock[SHARE] *= 0.5
-            retry = _begin_chart(context, w, r, log, at, BY_FAILURE)
+            retry = _begin_chart(context, c, r, log, at, BY_FAILURE)
             if retry != 0:
                 return retry
             continue
@@ -299,7 +307,7 @@ def advance(context, run, log, at, most):
             return status
         if reason != 0 and not last:
             restore_now(w, r)
-            status = _begin_chart(context, w, r, log, at, reason)
+            status = _begin_chart(context, c, r, log, at, reason)
             if status != 0:
                 return status
         if leave:

@@ -12,7 +12,7 @@ T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, STABLE, SHA
 # numbers
 FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
 HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, DENSE, BLOCKS, STAGE_AT = range(8, 16)
-LAST_STAGE, AT_LIMIT, BELOW_LIMIT, STIFF, LEAVE_WHEN_STIFF, FAILED, NUMBERS = range(16, 23)
+LAST_STAGE, AT_LIMIT, BELOW_LIMIT, STIFF, LEAVE_WHEN_STIFF, FAILED, MAY_PASS, NUMBERS = range(16, 24)
 AGAIN = 2  # REJECTED_LAST: by a failed stage
 FILLED, STORED = 1, 2  # DENSE: every step's block is made, and kept
 
@@ -45,7 +45,7 @@ class Run(NamedTuple):
     memory: np.ndarray  # the method's scratch
     block: np.ndarray  # the present step's: start, h, end, chart, the interpolant's data
     clock: np.ndarray  # T ... STABLE
-    numbers: np.ndarray  # int64, FIRST_ORDER ... FAILED; STAGE_AT: where an implicit method leaves its last stage
+    numbers: np.ndarray  # int64, FIRST_ORDER ... MAY_PASS; STAGE_AT: where an implicit method leaves its last stage
 
 
 class Record(NamedTuple):

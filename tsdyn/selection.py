@@ -19,7 +19,7 @@ from .normal import inner, multiply_rows, weigh_rows
 
 LEAST = 1e-13  # of a diagonal entry: what elimination leaves of a row that is kept is more
 FIRST, FINER = 1e-3, 1e-2  # the share below which rows are dropped, at first; how it falls while those are too many
-WORSE = 0.1  # of what the weakest row had when it was chosen: below it the choice is made anew
+WORSE = 0.1  # of what the weakest row has had since it was chosen: below it the choice is made anew
 
 
 @kernel

@@ -25,7 +25,7 @@ from .run_state import (
     lay_out,
 )
 from .series_state import HIGHEST, LOWEST, NEXT, TOP, SeriesContext
-from .series_steps import STEPS
+from .series_steps import PASS, STEPS, pass_singular
 from .still import moving_parts
 from .system import System
 from .taylor import advance_series
@@ -119,4 +119,8 @@ class SeriesMemory:
 
     def advance(self, record, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""
-        return Status(advance_series(self._context, self._run, record, self.steps, most))
+        status = Status(advance_series(self._context, self._run, record, self.steps, most))
+        if status == Status.PASSAGE:  # the run ends next to a singular configuration
+            self.steps[PASS] = pass_singular.address
+            status = Status(advance_series(self._context, self._run, record, self.steps, most))
+        return status

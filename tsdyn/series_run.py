@@ -7,8 +7,8 @@ import numpy as np
 from .dense import Trajectory
 from .drive import drive
 from .errors import InvalidArgument, Status
-from .events import Watch
 from .expansion_pack import is_far
+from .relay import Relay
 from .run_state import CHART_ROWS, FILLED, STORED, T
 from .series_dense import SeriesReader
 from .series_memory import SeriesMemory
@@ -25,8 +25,11 @@ def addresses(within, far):
     return np.array([expand.address, reach.address, *between], np.int64)
 
 
-def run_series(task, observe=None):
-    """Run a `Task`; the `Outcome`. `observe` is given the memory before the run: one of its own."""
+def run_series(task, observe=None, relay=None, past=None):
+    """Run a `Task`; the `Outcome`. `observe` is given the memory before the run: one of its own.
+
+    As a part of a run by another method it is given a `Relay`, and `past(memory)` makes what is driven of its memory.
+    """
     prepared, method = task.prepared, task.method
     if task.form.name != "tangent":
         raise InvalidArgument(
@@ -49,12 +52,13 @@ def run_series(task, observe=None):
         reading = SeriesReader, packed.system, prepared.series.network, orders, packed.size, memory.steps
     if observe is not None:
         observe(memory)
-    watch = None
-    if task.events is not None:
-        watch = Watch(task.events, packed, reading[0](*reading[1:]), task.span[0])
+    relay = relay or Relay()
+    relay.enter(memory)
+    watch = relay.watching(task, reading)
 
     began = time.perf_counter()
-    status, reason, recorded = drive(memory, task, watch)
+    status, reason, recorded = drive(memory if past is None else past(memory), task, watch)
+    relay.leave(memory)
     charts, last = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy(), run.now.copy()
     trajectory = None
     if task.dense_output:

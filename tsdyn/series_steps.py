@@ -22,7 +22,7 @@ from .series_state import ORDERS, TOP, load_series
 
 NOT_FINITE, SINGULAR = int(Status.NOT_FINITE), int(Status.SINGULAR)
 NEXT_TO_SINGULAR = 1e-8  # as a share of pivots: accelerations by elimination have lost as many digits
-GONE = 1e-12  # rows with less are left out
+GONE = 1e-10  # rows with less are left out: they would make more of what positions are off by than the series is
 EXPAND, REACH, WITHIN, PASS, STEPS = range(5)  # of the addresses that the driver is given
 call_expand, call_reach = caller("pi"), caller("pdd")
 
@@ -112,7 +112,7 @@ def pass_singular(context, t, h):
     count, orders, top = f.dropped[0], x.order[ORDERS], x.order[TOP]
     sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
     status = land(network, c.system, w, f, t)
-    if status == SINGULAR:
+    if status == SINGULAR or (status == 0 and weakest(network, f.S) < GONE):
         sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
         f.dropped[0] = 0
         run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)

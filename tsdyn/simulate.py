@@ -11,16 +11,16 @@ from .errors import InvalidArgument, Status
 from .events import prepare
 from .formulation import formulation as find_formulation
 from .integrator import registered
+from .passage import run_past
 from .prepare import prepared
 from .progress import reporter
 from .scene import Scene
 from .series_run import run_series
 from .solution import Solution
 from .state import remembered
-from .steps import run_steps
 from .task import Task
 
-DRIVERS = {"steps": run_steps, "series": run_series}  # by Integrator.driver, if it isn't one itself; see tsdyn.task
+DRIVERS = {"steps": run_past, "series": run_series}  # by Integrator.driver, if it isn't one itself; see tsdyn.task
 
 
 def simulate(

@@ -1,18 +1,16 @@
 """Initial conditions of scenes of any size: as in initial.py, by the network instead of matrices, at a cost of O(N)."""
 
-import itertools
-
 import numpy as np
 
 from . import initial
-from ._kernel import entry, resident
+from ._kernel import entry, kernel, resident
 from .assembly import set_time
 from .block_kernels import factor, solve
 from .errors import RedundantConstraints, SingularConfiguration, Status
 from .evaluate import constraint_arrays
 from .free import allocate_free
 from .initial import ROUNDING, demand_finite, demand_small
-from .landing import PIVOT_LIMIT, find_drift, gather_speeds, land, land_velocities, move_by
+from .landing import PIVOT_LIMIT, factorise, find_drift, gather_speeds, land, land_velocities, move_by
 from .network import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, is_regular, network_of
 from .normal import gather, multiply_rows, scatter, weigh_rows
 from .poses import move_bodies, place_bodies, write_positions, write_velocities
@@ -24,7 +22,9 @@ from .workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 
 LARGE = 1 << 24  # entries of Phi_q from which on no dense one is made
 SHARES = 1e-3, 1e-6, 1e-9, 1e-12  # below which rows are taken for redundant, if they then hold near by, too
-WANDER = 1e-2, 1e-3  # how far to look for what redundant rows are near by: turns, and shares of the scene's size
+WANDER, NEAR_BY = 1e-2, 1e-3  # how far to look whether they do, and at least: turns, and shares of the scene's size
+SHORTER, SHORTEST = 0.25, 1e-3  # a leg of the way from whose end Newton's method finds no place is cut; no shorter
+NO_WAY = 1e-9  # of a direction is left: nothing can move
 NO_CHOICE = (
     "Phi_q has dependent rows, and no choice among them is independent: a row of it may be zero here. Start from "
     "another configuration."
@@ -84,19 +84,38 @@ def _choose(context, share):
 
 @entry
 def _wander(context, t, way, far):
-    """Go from where `_choose` was a little way along the manifold, way (bodies, 8). Status of landing there."""
+    """Go a little along the manifold: the body that moves most turns by far, or is shifted by that share of the size.
+
+    way (bodies, 8) is any direction, made tangent. Status of landing there.
+    """
     c = load_parts(context)
     network, f = c.network, c.free
+    status = factorise(network, c.system, c.work, f, t)
+    if status != 0:
+        return status
     for i in range(f.Z.size):
         f.Z[i] = way[i]
+    wanted = _farthest(c)
     for _ in range(2):
         gather(network, f.H, f.Z, f.b)
         solve(network.pattern, f.S, f.b)
         scatter(network, f.Y, f.b, f.Z)
+    found = _farthest(c)
+    scale = far / found if found > NO_WAY * wanted else 0.0
     for i in range(f.Z.size):
-        f.Z[i] *= far
+        f.Z[i] *= scale
     move_by(network, f)
     return land(network, c.system, c.work, f, t)
+
+
+@kernel
+def _farthest(c):
+    """The largest entry of Z: of turns, and of shifts as shares of the size."""
+    Z, part, found = c.free.Z, 1.0 / max(c.work.control[SIZE], 1e-3), 0.0
+    for b in range(c.network.bodies.shape[0]):
+        for i in range(3):
+            found = max(found, max(abs(Z[8 * b + i]) * part, abs(Z[8 * b + 4 + i])))
+    return found
 
 
 def consistent(scene, system, q, qd, t, tol, allowed=False):
@@ -196,13 +215,13 @@ class _Start:
         way = np.random.default_rng(0).normal(size=(len(self.network.bodies) + 1, 8))
         way[:, :3] *= max(self.packed.size, 1e-3)
         way[-1] = way[:, 3] = way[:, 7] = 0.0
-        for share, far in itertools.product(SHARES, WANDER):
+        for share in SHARES:
             self.free.dropped[0] = 0
             _look(self.context, self.q, self.qd, self.t, self.rates)
             if _choose(self.context, share) < 0:
                 raise SingularConfiguration(NO_CHOICE)
             rows = self.free.dropped[1 : 1 + self.free.dropped[0]].copy()
-            if _wander(self.context, self.t, way.ravel(), far) == Status.SUCCESS:
+            if self.hold_near_by(way.ravel()):
                 return rows
         which = ", ".join(names[i] for i in sorted(row[rows])[:8])
         free = int(np.where(self.network.bodies[:, 1] == 7, 6, 3).sum()) - row.size + rows.size
@@ -212,6 +231,23 @@ class _Start:
             f"others), so {free} directions are free at this point and fewer next to it. Branches of the motion meet "
             "here, and which it takes is not determined: start from another configuration, on the branch that you mean."
         )
+
+    def hold_near_by(self, way):
+        """Whether the rows that are dropped hold on the way to a place near by: in one go, or in shorter legs."""
+        gone, leg = 0.0, WANDER
+        while gone < WANDER:
+            here = self.free.poses.copy()
+            status = _wander(self.context, self.t, way, leg)
+            if status == Status.UNHELD:
+                return False
+            if status == Status.SUCCESS:
+                gone += leg
+                continue
+            self.free.poses[:] = here
+            leg *= SHORTER
+            if leg < SHORTEST * WANDER:
+                return gone >= NEAR_BY
+        return True
 
     def landed(self):
         """Positions and velocities on the manifold, where they are not to rounding."""

@@ -6,9 +6,9 @@ from .arguments import step_count
 from .dense import Reader, Trajectory
 from .drive import drive
 from .errors import Status
-from .events import Watch
 from .memory import Memory
-from .run_state import CHART_ROWS, FILLED, IN_CHART, REJECTED, STEPS, STIFF, STORED, T
+from .relay import Relay
+from .run_state import CHART_ROWS, FILLED, IN_CHART, MAY_PASS, REJECTED, STEPS, STIFF, STORED, T
 from .task import Outcome
 from .workspace import (
     AT_ROUNDING,
@@ -28,8 +28,11 @@ from .workspace import (
 )
 
 
-def run_steps(task, observe=None):
-    """Run a `Task`; the `Outcome`. `observe` is given the memory before the run: one of its own."""
+def run_steps(task, observe=None, relay=None):
+    """Run a `Task`; the `Outcome`. `observe` is given the memory before the run: one of its own.
+
+    With a `Relay` it ends with Status.PASSAGE next to a singular configuration that there is a way past.
+    """
     prepared, method = task.prepared, task.method
     form = task.form.serving(method, prepared.packed)
     task = task._replace(form=form)
@@ -55,12 +58,14 @@ def run_steps(task, observe=None):
     reading = (Reader, packed.system, sizes, memory.addresses.copy()) if dense else None
     if observe is not None:
         observe(memory)
-    watch = None
-    if task.events is not None:
-        watch = Watch(task.events, packed, reading[0](*reading[1:]), task.span[0])
+    run.numbers[MAY_PASS] = relay is not None
+    relay = relay or Relay()
+    relay.enter(memory)
+    watch = relay.watching(task, reading)
 
     began = time.perf_counter()
     status, reason, recorded = drive(memory, task, watch)
+    relay.leave(memory)
     charts = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy()
     charts[-1, 2:] = control[CONDITION], control[CONTRACTION], run.numbers[IN_CHART]
     last = run.now.copy()

@@ -43,11 +43,11 @@ from .run_state import (
 from .selection import weakest
 from .series_loops import BODY_ROW, S_OMEGA, S_R
 from .series_state import HIGHEST, LOWEST, NEXT, ORDERS, TOP, load_series
-from .series_steps import EXPAND, REACH, call_expand, call_reach, state_within
+from .series_steps import EXPAND, NEXT_TO_SINGULAR, PASS, REACH, call_expand, call_reach, state_within
 from .workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
 
 SLICE_DONE, STEP_COLLAPSED = int(Status.SLICE_DONE), int(Status.STEP_COLLAPSED)
-NOT_FINITE = int(Status.NOT_FINITE)
+NOT_FINITE, SINGULAR, PASSAGE = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.PASSAGE)
 MISSED = 100.0  # times the tolerance: a landing further away than this is no truncation error
 
 
@@ -175,12 +175,13 @@ def _store_block(c, r, log, t0, h, t1):
 
 
 @kernel
-def _accept(context, c, r, log, steps, t):
-    """The poses as they are now are the state at t. Status."""
+def _accept(context, c, r, log, steps, t, ended):
+    """The poses as they are now are the state at t, and qdd, where the run has `ended` in a singular place. Status."""
     w = c.work
     _mind_singular(c)
     remember(c.system, w.q, w.qd, t, r.remembered)
-    call_expand(steps[EXPAND], context, 0)
+    if not ended:
+        call_expand(steps[EXPAND], context, 0)
     total = 0.0
     for i in range(w.q.size):
         total += abs(w.qdd[i])
@@ -204,19 +205,30 @@ def _open_chart(w, r, log, t, reason):
 
 
 @kernel
+def _stand_at(context, c, state, t, steps):
+    """Poses, H and the factors of S at q, qd = state[:2], for a series to begin there. Status."""
+    w = c.work
+    set_time(c.system, t)
+    copy(state[0], w.q)
+    copy(state[1], w.qd)
+    place_bodies(c.network.bodies, w.q, c.free.poses)
+    move_bodies(c.network.bodies, w.q, w.qd, c.free.poses)
+    return call_reach(steps[REACH], context, t, -1.0)
+
+
+@kernel
 def _begin_run(context, c, r, log, steps):
     w, f = c.work, c.free
-    set_time(c.system, r.clock[T])
     largest = 0.0
     for i in range(w.q.size):
         largest = max(largest, abs(w.q[i]))
     w.control[FLOOR] = ROUNDING * (w.control[SIZE] + largest)
-    place_bodies(c.network.bodies, w.q, f.poses)
-    move_bodies(c.network.bodies, w.q, w.qd, f.poses)
-    status = call_reach(steps[REACH], context, r.clock[T], -1.0)
+    copy(w.q, r.now[0])
+    copy(w.qd, r.now[1])
+    status = _stand_at(context, c, r.now, r.clock[T], steps)
     f.sizes[END_SHARE] = weakest(c.network, f.S) if status == 0 else 0.0
     _open_chart(w, r, log, r.clock[T], AT_START)
-    return _accept(context, c, r, log, steps, r.clock[T]) if status == 0 else status
+    return _accept(context, c, r, log, steps, r.clock[T], False) if status == 0 else status
 
 
 @kernel
@@ -308,7 +320,13 @@ def advance_series(context, run, log, steps, most):
                 t1 = r.clock[T_END]
             row = log.history[r.numbers[HISTORY]]
             row[0], row[1], row[2] = t0, t1 - t0, 0.0
-            status = call_reach(steps[REACH], context, t1, t1 - t0)
+            status, way = call_reach(steps[REACH], context, t1, t1 - t0), REACH
+            if last and (status == SINGULAR or (status == 0 and weakest(c.network, f.S) < NEXT_TO_SINGULAR)):
+                if steps[PASS] == 0:  # it isn't loaded before it is needed
+                    status = _stand_at(context, c, r.now, r.clock[T], steps)
+                    call_expand(steps[EXPAND], context, 0)
+                    return PASSAGE if status == 0 else status
+                status, way = call_reach(steps[PASS], context, t1, t1 - t0), PASS
             landed = status == 0 and (not adaptive or f.sizes[RESIDUAL] <= missed + MISSED * w.control[FLOOR])
             if landed:
                 f.sizes[END_SHARE] = weakest(c.network, f.S)
@@ -333,7 +351,7 @@ def advance_series(context, run, log, steps, most):
             status = _within(context, c, r, log, steps, t0, t1)
             if status == 0:
                 _go_to_start(c, r)
-                status = call_reach(steps[REACH], context, t1, t1 - t0)
+                status = call_reach(steps[way], context, t1, t1 - t0)
             if status != 0:
                 return status
         log.charts[r.numbers[CHART_ROWS], 4] = 1.0
@@ -341,7 +359,7 @@ def advance_series(context, run, log, steps, most):
             r.numbers[CHART_ROWS] += 1
             _open_chart(w, r, log, t1, BY_SERIES)
         r.numbers[STEPS] += 1
-        status = _accept(context, c, r, log, steps, t1)
+        status = _accept(context, c, r, log, steps, t1, way == PASS)
         if status != 0:
             return status
         if leave:

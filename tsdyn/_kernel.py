@@ -36,7 +36,7 @@ ANY = 1 << 40  # the length of arrays whose length a kernel doesn't need
 _letters = {"i": types.int64, "d": types.float64, "p": types.int64}
 
 
-def kernel(function, allocates=False):
+def kernel(function, allocates=False, inline=True):
     """Compile a function that other kernels call; it is compiled into each of them.
 
     With allocates=True it may allocate and raise, indices are checked, and it is not inlined: for functions of time.
@@ -48,8 +48,13 @@ def kernel(function, allocates=False):
             f"{function.__qualname__}: a kernel can't raise or assert; write nan where there is no value."
         )
     else:
-        options = {**_OPTIONS, "forceinline": True}
+        options = {**_OPTIONS, "forceinline": inline}
     return function if DEBUG else numba.njit(**options)(function)
+
+
+def long_kernel(function):
+    """`kernel` for what is long and not called often: it is called where it is used, which compiles in less time."""
+    return kernel(function, inline=False)
 
 
 def entry(function):

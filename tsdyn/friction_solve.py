@@ -15,7 +15,7 @@ much.
 import math
 
 from ._four import add, four, put, splat, sub, times
-from ._kernel import callback, caller, kernel, stack
+from ._kernel import callback, caller, kernel, long_kernel, stack
 from .block_kernels import factor_lu, solve_lu
 from .errors import Status
 from .force_loops import INTS
@@ -148,7 +148,7 @@ def _factorise(network, f, cold):
     return factor_lu(network.pattern, r.lower, r.upper, PIVOT_LIMIT) < 0
 
 
-@kernel
+@long_kernel
 def find_reactions(network, system, f, q, qd, t):
     """Z = (r'', omega''), r.lam the multipliers and r.load the normal loads; Z is W F on entry, gamma as Eq. 3 has it.
 

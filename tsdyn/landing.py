@@ -7,7 +7,7 @@ where positions have moved by more than rounding, the accelerations too.
 import math
 
 from ._four import add, fma, four, put, splat
-from ._kernel import kernel
+from ._kernel import kernel, long_kernel
 from .block_kernels import solve
 from .errors import Status
 from .free import RESIDUAL
@@ -28,7 +28,7 @@ MOST_PARTS = 100.0  # of a step on which p is followed
 MOVED = 1e-15  # corrections above this are more than rounding: S is made anew
 
 
-@kernel
+@long_kernel
 def factorise(network, system, w, f, t):
     """b = Phi, and H, W H^T and the factors of S, at the present poses. Status."""
     run_loops(network, system.reals, REDUCED, f, t, f.b, f.H)
@@ -36,7 +36,7 @@ def factorise(network, system, w, f, t):
     return OK if factorise_rows(network, system.reals, f, t, f.b, f.H, f.Y, f.S, PIVOT_LIMIT) else SINGULAR
 
 
-@kernel
+@long_kernel
 def land(network, system, w, f, t):
     """Bring positions onto the manifold along W H^T; H, Y and S are those of where they land. Status."""
     floor, before, moved, renew = w.control[FLOOR], math.inf, 0.0, True

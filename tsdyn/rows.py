@@ -1,6 +1,6 @@
 """The rows of H at the poses, with those left out that are dropped, and S from them."""
 
-from ._kernel import kernel
+from ._kernel import kernel, long_kernel
 from .body_loops import call_body_loop
 from .free import UNHELD, WEAKEST
 from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS, REDUCED
@@ -55,7 +55,7 @@ def held(f, floor):
     return f.dropped[0] == 0 or f.sizes[UNHELD] <= HELD * floor
 
 
-@kernel
+@long_kernel
 def factorise_rows(network, reals, f, t, b, H, Y, S, limit):
     """Y = W H^T and the factors of S of the present H; of redundant rows others are chosen where these serve no more.
 

@@ -12,7 +12,7 @@ order is that of little fill: a choice that is independent, but further from the
 import math
 
 from ._four import put, splat
-from ._kernel import kernel
+from ._kernel import kernel, long_kernel
 from .block_kernels import factor, keep_diagonal, record
 from .block_steps import eliminate, subtract_products
 from .normal import inner, multiply_rows, weigh_rows
@@ -57,7 +57,7 @@ def weakest(network, values):
     return least
 
 
-@kernel
+@long_kernel
 def _choose_of_all(network, H, Y, wanted, least, dropped, A, order):
     """Choose among all rows at once, A (m, m) scratch; how many are dropped, those that are left less than `least`."""
     m = network.row.size
@@ -130,7 +130,7 @@ def _choose(size, width, panel, kept, joints, share, A, order):
     return size
 
 
-@kernel
+@long_kernel
 def _eliminate_choosing(network, values, share, dropped, A, order):
     """Factor S in place but for the rows that are left less than a share of their diagonal entry; how many they are.
 
@@ -179,7 +179,7 @@ def _settle(f, count, wanted):
     return True
 
 
-@kernel
+@long_kernel
 def select(network, f, H, Y, S, wanted, least):
     """Choose `wanted` rows to drop of H, that of all rows; where wanted < 0, all that are left less than a least share.
 

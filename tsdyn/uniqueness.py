@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ._kernel import entry, kernel, resident
+from ._kernel import entry, kernel, long_kernel, resident
 from .assembly import set_time
 from .block_kernels import solve
 from .network import REDUCED, network_of
@@ -41,7 +41,7 @@ def find_stress(network, f, whole, dropped):
     return largest
 
 
-@kernel
+@long_kernel
 def find_rows(network, s, f, q, t, whole):
     """H with and, in `whole`, without what is dropped, and the factors of S, at q; whether there are any."""
     set_time(s, t)

@@ -37,6 +37,7 @@ network local
 free normal
 selection
 rows nearness
+free_memory
 primitive
 joint
 framed_joint

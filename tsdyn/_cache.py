@@ -231,7 +231,7 @@ class KernelCache(FunctionCache):
         if not KernelCache._told and not os.environ.get("TSDYN_QUIET"):
             KernelCache._told = True
             print(
-                "tsdyn: compiling kernels, once for this version and machine (well under a minute) ...",
+                "tsdyn: compiling kernels, once for this version and machine (about a minute) ...",
                 file=sys.stderr,
                 flush=True,
             )

@@ -248,14 +248,14 @@ def resident(value, header=()):
     """
     if DEBUG:
         return value, None
-    image = np.array([*header, *_image(value)], np.int64)
+    image = np.array([*header, *image_of(value)], np.int64)
     return image.ctypes.data + 8 * len(header), (image, value)
 
 
-def _image(value):
+def image_of(value):
     """Of each array the address of its numbers, then its lengths; of a tuple those of its fields in turn."""
     if isinstance(value, tuple):
-        return [word for field in value for word in _image(field)]
+        return [word for field in value for word in image_of(field)]
     assert value.flags.c_contiguous
     return [value.ctypes.data, *value.shape]
 

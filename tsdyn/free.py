@@ -4,9 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .aligned import zeros
-from .poses import POSE
-
 
 class Friction(NamedTuple):
     """k frictions of joints; of no size where there are none. "computed by" as in `Free`."""
@@ -43,6 +40,7 @@ class Free(NamedTuple):
     order: np.ndarray
     block: np.ndarray
     friction: Friction
+    anew: np.ndarray  # int64 (2,)  address of rows.choose_anew, and of its `Choice`; zero where it isn't needed
 
 
 # of the landing; the largest |Phi| of dropped rows; what elimination left of the weakest of the others, as a share:
@@ -50,45 +48,8 @@ class Free(NamedTuple):
 RESIDUAL, MOVED, UNHELD, WEAKEST, SHARE, END_SHARE, LARGEST_SHARE, STRIDE, SIZES = range(9)
 
 
-MOST_ROWS = 700  # of which all are compared when independent ones are chosen
-
-
-def allocate_free(network, n, redundant=False, basis=False):
-    """Lay it out; the ground's pose is set for good, and a point mass has that orientation.
-
-    Where rows are `redundant`, there is room to choose among all at once, if they aren't too many. A form with a basis
-    needs room for its frictions, too.
-    """
-    nb, m = len(network.bodies), len(network.row)
-    choosing = (redundant or network.dropped.size > 0) and m <= MOST_ROWS
-    widest = int(np.diff(network.pattern.starts).max(initial=0))
-    poses = zeros((nb + 1) * POSE)
-    poses.reshape(-1, POSE)[:, [0, 5, 10, 24]] = 1.0
-    free = Free(
-        poses, zeros(16 * m), zeros(16 * m), zeros(network.pattern.shape[2]), zeros(m), zeros(m),
-        zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n), zeros(4), zeros(SIZES),
-        *(np.zeros(size, np.int64) for size in (m + 1, m + 1, m)), zeros(max(widest, m if choosing else 0) ** 2),
-        _allocate_friction(network, n, basis),
-    )  # fmt: skip
-    drop_as_at_first(network, free)
-    return free
-
-
-def _allocate_friction(network, n, basis):
-    k, rows = len(network.frictions), len(network.row) + int((network.normals >= 0).sum())
-    m, nb, size = (len(network.row), len(network.bodies), network.pattern.shape[2]) if k else (0, -1, 0)
-    free = zeros(16 * k), zeros(7 * k), zeros(m), zeros(8 * (nb + 1)), zeros(16 * m), zeros(size), zeros(size)
-    if not basis:
-        k = n = rows = 0
-    matrices = np.zeros((k, n + rows)), np.zeros((k, k)), np.zeros(k, np.int64)
-    return Friction(*free, *matrices, np.zeros(2 * (rows + n) + 2 * k if k else 0))
-
-
-def drop_as_at_first(network, free):
-    """Drop the rows that were found redundant at the scene's first start, and forget multipliers."""
-    free.friction.lam[:] = 0.0
-    free.friction.load[:] = 0.0
-    free.dropped[0] = network.dropped.size
-    free.dropped[1 : 1 + network.dropped.size] = network.dropped
-    free.sizes[WEAKEST] = 1.0
-    free.sizes[SHARE] = free.sizes[LARGEST_SHARE] = free.sizes[STRIDE] = 0.0
+def no_free():
+    """The `Free` of nothing, for its type."""
+    none, whole, square = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
+    friction = Friction(*[none] * 7, square, square, whole, none)
+    return Free(*[none] * 11, whole, whole, whole, none, friction, whole)

@@ -4,7 +4,7 @@ import numpy as np
 
 from ._kernel import entry, resident
 from .assembly import set_time
-from .free import allocate_free
+from .free_memory import allocate_free
 from .network import DROPPED, REDUCED, network_of
 from .poses import place_bodies
 from .rows import run_loops

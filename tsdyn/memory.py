@@ -5,7 +5,7 @@ import numpy as np
 from ._kernel import resident
 from .dense import B_DATA, warm_size
 from .errors import Status
-from .free import drop_as_at_first
+from .free_memory import drop_as_at_first
 from .implicit import prepare_implicit
 from .run import advance
 from .run_state import (

@@ -1,9 +1,13 @@
 """The rows of H at the poses, with those left out that are dropped, and S from them."""
 
-from ._kernel import kernel, long_kernel
+from typing import NamedTuple
+
+import numpy as np
+
+from ._kernel import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, vector
 from .body_loops import call_body_loop
-from .free import UNHELD, WEAKEST
-from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS, REDUCED
+from .free import UNHELD, WEAKEST, Free, no_free
+from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS, REDUCED, Network, no_network
 from .selection import LEAST, WORSE, drop, drop_rows, factor_rows, select, weakest
 
 HELD = 1e6  # times rounding: what dropped rows may be off by, as a start may
@@ -55,16 +59,34 @@ def held(f, floor):
     return f.dropped[0] == 0 or f.sizes[UNHELD] <= HELD * floor
 
 
-@long_kernel
-def factorise_rows(network, reals, f, t, b, H, Y, S, limit):
-    """Y = W H^T and the factors of S of the present H; of redundant rows others are chosen where these serve no more.
+class Choice(NamedTuple):
+    """What `choose_anew` gets by one address."""
 
-    Whether there are any. Then b and H are those of the new choice.
-    """
-    regular = factor_rows(network, f, H, Y, S, limit)
+    network: Network
+    free: Free
+
+
+def choosing_anew(network, free):
+    """The `Free` of a network with which kernels can choose rows anew."""
+    if DEBUG:
+        return free
+    words = len(image_of(Choice(network, free)))
+    whole = np.zeros(words + 2, np.int64)  # what the view `anew` keeps alive
+    free = free._replace(anew=whole[words:])
+    whole[:words] = image_of(Choice(network, free))
+    free.anew[0], free.anew[1] = choose_anew.address, whole.ctypes.data
+    return free
+
+
+load_choice = loader(Choice(no_network(), no_free()))
+CHOOSE = "ppdppppd"
+call_choose = caller(CHOOSE)
+
+
+@kernel
+def _choose(network, f, reals, t, b, H, Y, S, limit):
+    """Choose others to drop, with b, H, Y = W H^T and the factors of S of the new choice; whether there are any."""
     count = f.dropped[0]
-    if count == 0 or (regular and serve_still(network, f, S)):
-        return regular
     f.dropped[0] = 0
     run_loops(network, reals, REDUCED, f, t, b, H)
     found = select(network, f, H, Y, S, count, LEAST)
@@ -75,3 +97,34 @@ def factorise_rows(network, reals, f, t, b, H, Y, S, limit):
     if found and regular:
         f.sizes[WEAKEST] = weakest(network, S)
     return regular
+
+
+@callback(CHOOSE)
+def choose_anew(choice, reals, t, b, H, Y, S, limit):
+    """`_choose` by address: few scenes have redundant rows, and it is as long as all the rest. 1 or 0."""
+    c = load_choice(choice)
+    network, f = c.network, c.free
+    m, size = network.row.size, network.pattern.shape[2]
+    reals, b, H, Y, S = vector(reals, ANY), vector(b, m), vector(H, 16 * m), vector(Y, 16 * m), vector(S, size)
+    return 1 if _choose(network, f, reals, t, b, H, Y, S, limit) else 0
+
+
+if DEBUG:
+    _choose_by_address = _choose
+else:
+
+    @kernel
+    def _choose_by_address(network, f, reals, t, b, H, Y, S, limit):
+        return call_choose(f.anew[0], f.anew[1], reals, t, b, H, Y, S, limit) != 0
+
+
+@long_kernel
+def factorise_rows(network, reals, f, t, b, H, Y, S, limit):
+    """Y = W H^T and the factors of S of the present H; of redundant rows others are chosen where these serve no more.
+
+    Whether there are any. Then b and H are those of the new choice.
+    """
+    regular = factor_rows(network, f, H, Y, S, limit)
+    if f.dropped[0] == 0 or (regular and serve_still(network, f, S)):
+        return regular
+    return _choose_by_address(network, f, reals, t, b, H, Y, S, limit)

@@ -5,7 +5,7 @@ import numpy as np
 from ._kernel import entry, resident
 from .dense import B_DATA, B_START
 from .errors import Status
-from .free import allocate_free
+from .free_memory import allocate_free
 from .linalg import copy
 from .local_chart import ROUNDING
 from .poses import place_bodies

@@ -8,7 +8,7 @@ from .arguments import step_count
 from .dense import B_DATA
 from .errors import InvalidArgument, Status
 from .expansion_pack import allocate_expansion, masks
-from .free import allocate_free, drop_as_at_first
+from .free_memory import allocate_free, drop_as_at_first
 from .run_state import (
     ADAPTIVE,
     ATOL,

@@ -8,7 +8,7 @@ from .assembly import set_time
 from .block_kernels import factor, solve
 from .errors import RedundantConstraints, SingularConfiguration, Status
 from .evaluate import constraint_arrays
-from .free import allocate_free
+from .free_memory import allocate_free
 from .initial import ROUNDING, demand_finite, demand_small
 from .landing import PIVOT_LIMIT, factorise, find_drift, gather_speeds, land, land_velocities, move_by
 from .network import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, is_regular, network_of

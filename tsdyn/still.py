@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .free import MOST_ROWS
+from .free_memory import MOST_ROWS
 from .markers import PARAMETERS, VECTOR
 from .motion import Motion
 from .network import DROPPED, N_COUNT, N_FIRST_REAL, N_REALS, build, is_regular, network_of, with_loops

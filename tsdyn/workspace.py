@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ._kernel import loader
-from .free import Free, allocate_free
+from .free import Free
+from .free_memory import allocate_free
 from .local import Local, allocate_local
 from .network import Network, no_network
 from .system import System

@@ -321,9 +321,7 @@ class BallFriction(ts.JointFriction, ts.Force):
 
     joints = (C.Spherical,)
     markers = (ts.Point("a"), ts.Turn("a"), ts.Point("b"), ts.Turn("b"))
-
-    def __init__(self, joint, *, radius, kinetic, slip_velocity=1e-3, name="", **unused):
-        super().__init__(joint, kinetic=kinetic, slip_velocity=slip_velocity, name=name, radius=float(radius))
+    quantities = {**ts.JointFriction.quantities, "radius": lambda value, *where: float(value)}  # noqa: RUF012
 
     def geometry(self):
         return (self.radius,)
@@ -419,6 +417,8 @@ def test_wrong_arguments():
     for make, message in cases:
         with pytest.raises(ts.InvalidForce, match=message):
             make()
+    with pytest.raises(TypeError, match=r"RevoluteFriction\(\) has no argument slip; it has .*slip_velocity"):
+        F.RevoluteFriction(pin, radius=0.1, kinetic=0.1, slip=0.1)
     friction = F.RevoluteFriction(pin, radius=0.1, kinetic=0.1)
     with pytest.raises(ts.InvalidForce, match="another scene"):
         other.add(friction)

@@ -39,6 +39,16 @@ def act(x, F0, F1, F2, N0, N1, N2, out):
     out[11] = -N2 - (d0 * F1 - d1 * F0)
 
 
+@kernel
+def along_and_across(x, f):
+    """Of a force f[0:3] and a torque f[3:6] the parts along the axis x[12:15], and the sizes of those across it."""
+    n0, n1, n2 = x[12], x[13], x[14]
+    along, turn = n0 * f[0] + n1 * f[1] + n2 * f[2], n0 * f[3] + n1 * f[4] + n2 * f[5]
+    f0, f1, f2 = f[0] - along * n0, f[1] - along * n1, f[2] - along * n2
+    t0, t1, t2 = f[3] - turn * n0, f[4] - turn * n1, f[5] - turn * n2
+    return along, turn, np.sqrt(f0 * f0 + f1 * f1 + f2 * f2), np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+
+
 def demand_bodies(force, torque, name):
     """Refuse what would put a torque on a point mass."""
     if force.b.dimension == 3 or (force.a.dimension == 3 and torque != 0.0):

@@ -77,6 +77,11 @@ class JointFriction:
         if not isinstance(joint, self.joints):
             names = " or ".join(cls.__name__ for cls in self.joints)
             raise InvalidForce(f"{name or kind}: joint must be a {names} of the scene, got {joint!r}.")
+        unknown = ", ".join(sorted(set(geometry) - set(self.quantities)))
+        if unknown:
+            raise TypeError(
+                f"{kind}() has no argument {unknown}; it has {', '.join(sorted(self.quantities))} and name."
+            )
         self.__dict__["joint"] = joint
         super().__init__(joint.a, joint.b, self.coordinates, name or f"{kind}({joint.name})")
         self.kinetic, self.static, self.preload = kinetic, static, preload

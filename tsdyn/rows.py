@@ -69,6 +69,7 @@ class Choice(NamedTuple):
 def choosing_anew(network, free):
     """The `Free` of a network with which kernels can choose rows anew."""
     if DEBUG:
+        free.anew[0] = 1
         return free
     words = len(image_of(Choice(network, free)))
     whole = np.zeros(words + 2, np.int64)  # what the view `anew` keeps alive
@@ -125,6 +126,6 @@ def factorise_rows(network, reals, f, t, b, H, Y, S, limit):
     Whether there are any. Then b and H are those of the new choice.
     """
     regular = factor_rows(network, f, H, Y, S, limit)
-    if f.dropped[0] == 0 or (regular and serve_still(network, f, S)):
-        return regular
+    if f.dropped[0] == 0 or f.anew[0] == 0 or (regular and serve_still(network, f, S)):
+        return regular  # rows may be left out for a moment of a scene that has no redundant ones
     return _choose_by_address(network, f, reals, t, b, H, Y, S, limit)

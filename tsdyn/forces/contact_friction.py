@@ -8,8 +8,6 @@
 F is the force that the contact exerts; mu is that of friction.coefficient.
 """
 
-from types import MappingProxyType
-
 import numpy as np
 
 from ..constraints.plane_contact import PlaneContact
@@ -28,8 +26,10 @@ class ContactFriction(JointFriction, Force):
     ----------
     joint : PlaneContact
         Added to its scene.
-    kinetic, static, slip_velocity, stribeck_velocity, preload, name
-        See `JointFriction`: coefficients, velocities (m/s), N.
+    kinetic : float
+        Coefficient of friction while sliding.
+    static, slip_velocity, stribeck_velocity, preload, name
+        Optional, see `ts.JointFriction`: a coefficient, m/s, m/s, N.
 
     Raises
     ------
@@ -41,28 +41,6 @@ class ContactFriction(JointFriction, Force):
 
     joints = (PlaneContact,)
     markers = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("b", "normal_b"))
-    quantities = MappingProxyType(dict(JointFriction.quantities))
-
-    def __init__(
-        self,
-        joint,
-        *,
-        kinetic,
-        static=None,
-        slip_velocity=1e-3,
-        stribeck_velocity=None,
-        preload=0.0,
-        name="",
-    ):
-        super().__init__(
-            joint,
-            kinetic=kinetic,
-            static=static,
-            slip_velocity=slip_velocity,
-            stribeck_velocity=stribeck_velocity,
-            preload=preload,
-            name=name,
-        )
 
     @staticmethod
     def law(x, xd, par, t, out):

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..constraints.revolute import Revolute
 from ..force import Force, not_negative, positive_number
-from ..friction import coefficient
+from ..friction import along_and_across, coefficient
 from ..joint_friction import AXIS, JointFriction, optional_length
 
 
@@ -28,8 +28,10 @@ class RevoluteFriction(JointFriction, Force):
         Added to its scene.
     radius : float, m
         Of the pin.
-    kinetic, static, slip_velocity, stribeck_velocity, preload, name
-        See `JointFriction`: coefficients, velocities of the pin's surface (m/s), N.
+    kinetic : float
+        Coefficient of friction while sliding.
+    **given
+        static, slip_velocity, stribeck_velocity (of the pin's surface, m/s), preload (N), name: see `ts.JointFriction`.
     collar_radius : float, m
         Where the force along the axis rubs; 0: it causes no friction.
     length : float, m, optional
@@ -54,32 +56,8 @@ class RevoluteFriction(JointFriction, Force):
         }
     )
 
-    def __init__(
-        self,
-        joint,
-        *,
-        radius,
-        kinetic,
-        static=None,
-        slip_velocity=1e-3,
-        stribeck_velocity=None,
-        collar_radius=0.0,
-        length=None,
-        preload=0.0,
-        name="",
-    ):
-        super().__init__(
-            joint,
-            kinetic=kinetic,
-            static=static,
-            slip_velocity=slip_velocity,
-            stribeck_velocity=stribeck_velocity,
-            preload=preload,
-            name=name,
-            radius=radius,
-            collar_radius=collar_radius,
-            length=length,
-        )
+    def __init__(self, joint, *, radius, kinetic, collar_radius=0.0, length=None, **given):
+        super().__init__(joint, kinetic=kinetic, radius=radius, collar_radius=collar_radius, length=length, **given)
 
     def geometry(self):
         """(R, R_c / R, 2 / L)."""
@@ -97,11 +75,7 @@ class RevoluteFriction(JointFriction, Force):
     @staticmethod
     def normal_load(x, f, par):
         """Eq. (1)."""
-        n0, n1, n2 = x[12], x[13], x[14]
-        along, turn = n0 * f[0] + n1 * f[1] + n2 * f[2], n0 * f[3] + n1 * f[4] + n2 * f[5]
-        f0, f1, f2 = f[0] - along * n0, f[1] - along * n1, f[2] - along * n2
-        t0, t1, t2 = f[3] - turn * n0, f[4] - turn * n1, f[5] - turn * n2
-        across, tilt = np.sqrt(f0 * f0 + f1 * f1 + f2 * f2), np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        along, _, across, tilt = along_and_across(x, f)
         return par[4] + across + par[6] * np.sqrt(along * along) + par[7] * tilt
 
     @staticmethod

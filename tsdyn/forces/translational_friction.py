@@ -16,7 +16,7 @@ import numpy as np
 
 from ..constraints.translational import Translational
 from ..force import Force
-from ..friction import act, coefficient, slip
+from ..friction import act, along_and_across, coefficient, slip
 from ..joint_friction import AXIS, JointFriction, optional_length
 
 
@@ -27,8 +27,10 @@ class TranslationalFriction(JointFriction, Force):
     ----------
     joint : Translational
         Added to its scene.
-    kinetic, static, slip_velocity, stribeck_velocity, preload, name
-        See `JointFriction`: coefficients, velocities (m/s), N.
+    kinetic : float
+        Coefficient of friction while sliding.
+    **given
+        static, slip_velocity, stribeck_velocity (m/s), preload (N), name: see `ts.JointFriction`.
     length : float, m, optional
         Of the part that is guided, the body that `joint.on` is, about the joint's point on it: it carries torques that
         tilt the slide as a pair of forces. None: they cause no friction.
@@ -47,30 +49,8 @@ class TranslationalFriction(JointFriction, Force):
     markers = AXIS
     quantities = MappingProxyType({**JointFriction.quantities, "length": optional_length, "width": optional_length})
 
-    def __init__(
-        self,
-        joint,
-        *,
-        kinetic,
-        static=None,
-        slip_velocity=1e-3,
-        stribeck_velocity=None,
-        length=None,
-        width=None,
-        preload=0.0,
-        name="",
-    ):
-        super().__init__(
-            joint,
-            kinetic=kinetic,
-            static=static,
-            slip_velocity=slip_velocity,
-            stribeck_velocity=stribeck_velocity,
-            preload=preload,
-            name=name,
-            length=length,
-            width=width,
-        )
+    def __init__(self, joint, *, kinetic, length=None, width=None, **given):
+        super().__init__(joint, kinetic=kinetic, length=length, width=width, **given)
 
     def geometry(self):
         """(1 / W, 2 / L)."""
@@ -87,11 +67,7 @@ class TranslationalFriction(JointFriction, Force):
     @staticmethod
     def normal_load(x, f, par):
         """Eq. (1)."""
-        n0, n1, n2 = x[12], x[13], x[14]
-        along, turn = n0 * f[0] + n1 * f[1] + n2 * f[2], n0 * f[3] + n1 * f[4] + n2 * f[5]
-        f0, f1, f2 = f[0] - along * n0, f[1] - along * n1, f[2] - along * n2
-        t0, t1, t2 = f[3] - turn * n0, f[4] - turn * n1, f[5] - turn * n2
-        across, tilt = np.sqrt(f0 * f0 + f1 * f1 + f2 * f2), np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        _, turn, across, tilt = along_and_across(x, f)
         return par[4] + across + par[5] * np.sqrt(turn * turn) + par[6] * tilt
 
     @staticmethod

@@ -25,6 +25,7 @@ from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, mod
 from numba.np.arrayobj import populate_array
 
 from ._cache import cache_of
+from ._interrupts import prompt_interrupts
 from .errors import InvalidConstraint
 
 DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
@@ -63,6 +64,7 @@ def entry(function):
         return function
     dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
     dispatcher._cache = cache_of(function)
+    dispatcher.compile = prompt_interrupts()(dispatcher.compile)
     return dispatcher
 
 
@@ -116,7 +118,8 @@ class Callback:
         cfunc = CFunc(self.py_func, (arguments, _letters[self.result]), locals={}, options=self.options)
         cfunc._cache = cache = cache_of(self.py_func)
         try:
-            cfunc.compile()
+            with prompt_interrupts():
+                cfunc.compile()
         finally:
             if hasattr(cache, "release"):
                 cache.release()

@@ -23,7 +23,7 @@ FILES = {
 LAYERS = """
 _code_hash _interrupts _cache errors _discovery jet truncated checks aligned
 _kernel
-_four rotation linalg motion motions motion_program signal angle recurrences
+_four rotation linalg pieces table knots motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
 markers bodies tableau friction
 poses
@@ -52,6 +52,7 @@ assembly interpolation constraints.* forces.*
 expansion
 workspace run_state
 outputs independent
+stops
 series_state
 implicit
 integrator

@@ -38,10 +38,10 @@ from .markers import Parameters, Point, Turn, Vector  # noqa: E402
 from .motion import Motion  # noqa: E402
 from .primitive import Primitive  # noqa: E402
 from .scene import Scene  # noqa: E402
-from .signal import Table  # noqa: E402
 from .simulate import simulate  # noqa: E402
 from .solution import Solution  # noqa: E402
 from .state import State  # noqa: E402
+from .table import Table  # noqa: E402
 from .tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau  # noqa: E402
 
 __version__ = "0.1.0"

@@ -11,6 +11,7 @@ from .errors import InvalidArgument, Status
 from .events import prepare
 from .formulation import formulation as find_formulation
 from .integrator import registered
+from .knots import stops_of
 from .passage import run_past
 from .prepare import prepared
 from .progress import reporter
@@ -138,7 +139,7 @@ def simulate(
         choose = choice.chooser(simulate, scene, method, span[1], options)
     task = Task(
         kept, method, form, span, q, qd, memory, times, bool(dense_output),
-        watched, constraint_tol, max_steps, chart_interval or 0, report, choose,
+        watched, constraint_tol, max_steps, chart_interval or 0, report, choose, stops_of(kept.motions, *span),
     )  # fmt: skip
     outcome = DRIVERS.get(method.driver, method.driver)(task)
     ended = time.perf_counter()

@@ -29,6 +29,7 @@ class Task(NamedTuple):
     interval: int  # steps between charts that are forced; 0 for none
     report: object  # a function of the fraction done, None at the end
     choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
+    stops: np.ndarray = np.empty((0, 2))  # times at which a step ends, s, and whether a controller is asked there
 
     @property
     def within(self):

@@ -21,7 +21,7 @@ FILES = {
 }
 # lowest first; a module imports from lines above its own, or from its own line
 LAYERS = """
-_code_hash _interrupts _cache errors _discovery jet truncated checks aligned
+_code_hash _interrupts _cache errors _discovery jet truncated checks aligned mesh shapes
 _kernel
 _four rotation linalg pieces table knots motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
@@ -73,6 +73,7 @@ assemble
 null_space tangent scene
 maggi_kane linearise driven
 series_steps
+series_stops
 taylor expansion_pack
 series_memory
 series_dense

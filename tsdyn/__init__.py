@@ -6,7 +6,7 @@ _here = _Path(__file__).parent
 if not (_here / "constraints").is_dir():  # a checkout: they stand beside this folder
     __path__.append(str(_here.parent))
 
-from . import constraints, forces, integrators, motions, testing  # noqa: E402
+from . import constraints, forces, integrators, motions, shapes, testing  # noqa: E402
 from ._kernel import kernel  # noqa: E402
 from .benchmark import benchmark  # noqa: E402
 from .bodies import Body, PointMass  # noqa: E402
@@ -90,6 +90,7 @@ __all__ = [
     "motions",
     "plots",
     "profile",
+    "shapes",
     "simulate",
     "testing",
 ]

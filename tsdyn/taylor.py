@@ -46,7 +46,8 @@ from .selection import weakest
 from .series_loops import BODY_ROW, S_OMEGA, S_R
 from .series_state import HIGHEST, LOWEST, NEXT, ORDERS, TOP, load_series
 from .series_steps import EXPAND, NEXT_TO_SINGULAR, PASS, REACH, call_expand, call_reach, state_within
-from .stops import amend, cut_fixed, is_sampled, next_stop, take_pieces
+from .series_stops import cross_stop, lower_order
+from .stops import cut_fixed, is_sampled, next_stop, take_pieces
 from .workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
 
 SLICE_DONE, STEP_COLLAPSED = int(Status.SLICE_DONE), int(Status.STEP_COLLAPSED)
@@ -235,35 +236,6 @@ def _begin_run(context, c, r, log, steps):
 
 
 @kernel
-def _cross_stop(context, c, r, log, steps):
-    """At a stop: poses and accelerations after it, for its output and the next series. Status."""
-    w = c.work
-    take_pieces(c.system, r, log)
-    status = call_reach(steps[REACH], context, r.clock[T], -1.0)
-    if status == 0:
-        call_expand(steps[EXPAND], context, 0)
-        total = 0.0
-        for i in range(w.q.size):
-            total += abs(w.qdd[i])
-        if not total < math.inf:
-            return NOT_FINITE
-        store_now(w, r)
-        amend(r, log, w.q, w.qd, w.qdd)
-    return status
-
-
-@kernel
-def _lower_order(c, r, h):
-    """The next step's order after one that a stop has cut to h: one less, where that would have reached as far."""
-    x, top = c.expansion, c.expansion.order[TOP]
-    if top > x.order[LOWEST]:
-        far, fast = _weights(c, r)
-        rho = _radius(x.bodies, c.network.bodies.shape[0], x.order[ORDERS], top - 2, far, fast)
-        if rho * (r.clock[ATOL] + r.clock[RTOL]) ** (1.0 / top) > h:
-            x.order[NEXT] = top - 1
-
-
-@kernel
 def _go_to_start(c, r):
     """The poses at the step's start, from where p is followed."""
     copy(r.now[0], c.work.q)
@@ -326,7 +298,7 @@ def advance_series(context, run, log, steps, most):
     adaptive = r.numbers[ADAPTIVE] == 1
     if r.numbers[WAITING] == 1:
         r.numbers[WAITING] = 0
-        status = _cross_stop(context, c, r, log, steps)
+        status = cross_stop(context, c, r, log, steps)
         if status != 0:
             return status
     missed = MISSED * (r.clock[ATOL] + r.clock[RTOL])
@@ -396,7 +368,9 @@ def advance_series(context, run, log, steps, most):
         if t1 != stop:  # which is no sign of stiffness
             leave = _watch(c, r, t1 - t0)
         elif adaptive:
-            _lower_order(c, r, t1 - t0)
+            far, fast = _weights(c, r)
+            rho = _radius(x.bodies, c.network.bodies.shape[0], x.order[ORDERS], x.order[TOP] - 2, far, fast)
+            lower_order(x.order, rho, missed / MISSED, t1 - t0)
         if r.numbers[DENSE] != 0:
             _store_block(c, r, log, t0, t1 - t0, t1)
         if r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
@@ -416,7 +390,7 @@ def advance_series(context, run, log, steps, most):
         if status == 0 and t1 == stop and way == REACH:
             if is_sampled(r, log, t1):
                 break
-            status = _cross_stop(context, c, r, log, steps)
+            status = cross_stop(context, c, r, log, steps)
         if status != 0:
             return status
         if leave:

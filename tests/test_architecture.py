@@ -70,7 +70,8 @@ branch initial start kinetic
 approach folds dependence
 conflict mobility
 assemble
-null_space tangent scene
+null_space tangent editing
+scene
 maggi_kane linearise driven
 series_steps
 series_stops

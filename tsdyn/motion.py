@@ -173,6 +173,9 @@ class Motion:
                 f"{self.what}: the motion can't be evaluated near t = {times[0]:g} ... {times[-1]:g}: {error!r}"
             ) from error
 
+    def __getstate__(self):
+        return {**self.__dict__, "_callbacks": None}  # machine code is not for pickling
+
     def forget(self):
         """Drop what was compiled or derived; it is made again when asked for."""
         self._callbacks = None

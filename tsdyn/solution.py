@@ -9,13 +9,13 @@ import numpy as np
 
 from . import diagnostics, power, reactions, uniqueness
 from .account import account
-from .bodies import PointMass, rotation_matrix
+from .bodies import rotation_matrix
 from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .friction_reactions import with_normal_loads
 from .local_chart import REASONS
 from .state import RememberingState
-from .system import member_of
+from .system import index_of, member_of
 from .work import work as integrate_work
 
 
@@ -231,9 +231,10 @@ class Solution:
         raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
 
     def _span(self, body, part):
-        if not isinstance(body, PointMass) or self.packed.bodies[body.index : body.index + 1] != (body,):
+        index = index_of(self.packed, body)
+        if index is None:
             raise InvalidBody(f"{body!r} is not a body of this solution's scene.")
-        at = int(self.system.bodies[body.index, 0])
+        at = int(self.system.bodies[index, 0])
         if part == "r":
             return slice(at, at + 3)
         body.orientation  # noqa: B018  a point mass says that it has none

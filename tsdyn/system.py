@@ -189,6 +189,13 @@ def _members(constraints):
         part, row = parts.stop, rows.stop
 
 
+def index_of(packed, body):
+    """Where a body stood among the others when the scene was packed; None where it was not there."""
+    if "indices" not in packed.shared:
+        packed.shared["indices"] = {id(one): i for i, one in enumerate(packed.bodies)}
+    return packed.shared["indices"].get(id(body))
+
+
 def member_of(packed, constraint):
     """The `Member` that a constraint, or a joint's part, is; None where it is not of that scene."""
     if "members" not in packed.shared:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InvalidConstraint
 from ..framed_joint import FramedJoint, beside, turned_about
+from ..joint_coordinates import Angle
 from ..motion import Motion
 from .angle_driver import AngleDriver
 
@@ -44,6 +45,8 @@ class RotationMotor(FramedJoint):
     angle=)` takes the axis in the ground frame. The torque on b about the axis is that of `solution.reaction(motor,
     on=b)`, its power part of `solution.power`.
     """
+
+    joint_coordinates = (Angle(reference="reference_a", direction="reference_b"),)
 
     def __init__(
         self,

@@ -25,7 +25,8 @@ _code_hash _interrupts _cache errors _discovery jet truncated checks aligned mes
 _kernel
 _four rotation linalg pieces table knots motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
-markers bodies tableau friction
+vectors
+markers bodies tableau friction joint_coordinates joint_motion
 poses
 attachment marker_forces frames curvature body_loops
 series_loops

@@ -26,6 +26,7 @@ class Attachment:
     markers = ()
     error = InvalidConstraint
     particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
+    joint_coordinates = ()  # Angle and Displacement, see tsdyn/joint_coordinates.py
     added = False  # to its scene
     owner = None  # the joint that it is a part of
 
@@ -51,6 +52,7 @@ class Attachment:
         if len(given) != len(self.markers):
             raise self.error(f"{self.name}: {len(self.markers)} markers, but {len(given)} coordinates.")
         self.coordinates = tuple(self._places(given))
+        self.built = tuple(getattr(body, "values", {}).get("orientation") for body in (a, b))
 
     @classmethod
     def at(cls, a, b=None, **arguments):

@@ -45,6 +45,7 @@ framed_joint
 force
 joint_friction
 state_function
+joint_load
 given_load
 system stepping progress state
 still
@@ -80,7 +81,7 @@ taylor expansion_pack
 series_memory
 series_dense
 formulation run
-memory prepare task
+memory prepare task sampling
 events drive work account
 relay
 series_run steps solution

@@ -95,6 +95,7 @@ def drive(memory, task, watch):
             status = Status.INTERRUPTED
     finally:
         task.report(None)
+    reason = reason or getattr(memory, "reason", "")
     _collect(numbers, record, chunks, per_step, dense)
     out = _joined(record.out, chunks["out"]) if per_step else record.out[: numbers[ROWS]]
     blocks = _joined(record.blocks, chunks["blocks"]) if dense else record.blocks

@@ -48,17 +48,22 @@ def demand_followed(motion, t0, t1, what):
             )
 
 
-def stops_of(parameters, t0, t1):
-    """Where steps of a run from t0 to t1 end on account of a scene's Motions and Signals: knots in (t0, t1], (k, 2).
+def stops_of(parameters, instants, t0, t1):
+    """Where steps of a run from t0 to t1 end: at knots of a scene's Motions and Signals, and instants; (k, 2).
 
-    Knots that rounding has parted are one, the last of them, and t1 stands for what is next to it. The second number
-    is whether a controller is asked there.
+    Those that rounding has parted are one, the last of them, and t1 stands for what is next to it. The second number
+    is whether a function is asked there, in Python.
     """
     found = [joints(motion, t0, t1) for given in parameters for motion in given.motions if motion.pieces]
-    times = np.unique(np.concatenate(found)) if found else np.empty(0)
-    if times.size:
-        near = TOGETHER * max(abs(t0), abs(t1), 1e-3 * (t1 - t0))
-        times = np.where(t1 - times <= near, t1, times)
-        times = times[times - t0 > near]
-        times = times[np.append(np.diff(times) > near, np.ones(min(times.size, 1), bool))]
-    return np.column_stack((times, np.zeros(times.size)))
+    times = np.concatenate([instants, *found])
+    order = np.argsort(times, kind="stable")
+    times, asked = times[order], np.where(order < instants.size, 1.0, 0.0)
+    near = TOGETHER * max(abs(t0), abs(t1), 1e-3 * (t1 - t0))
+    late = t1 - times <= near
+    times, asked = np.where(late, t1, times), np.where(late, 0.0, asked)
+    kept = times - t0 > near
+    times, asked = times[kept], asked[kept]
+    if not times.size:
+        return np.empty((0, 2))
+    ends = np.flatnonzero(np.append(np.diff(times) > near, True))  # of those that are one
+    return np.column_stack((times[ends], np.maximum.reduceat(asked, np.append(0, ends[:-1] + 1))))

@@ -15,6 +15,7 @@ from .knots import stops_of
 from .passage import run_past
 from .prepare import prepared
 from .progress import reporter
+from .sampling import Sampling, instants_of, sampled
 from .scene import Scene
 from .series_run import run_series
 from .solution import Solution
@@ -133,13 +134,15 @@ def simulate(
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
     memory = remembered(state, kept.packed.system.memory.size)
     q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
+    stops = stops_of(kept.motions, instants_of(kept.packed, *span), *span)
+    sampling = Sampling(kept.packed, state is not None) if sampled(kept.packed) else None
     choose = None
-    if integrator is None:
+    if integrator is None and sampling is None:  # what is asked in Python is asked once
         options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol}
         choose = choice.chooser(simulate, scene, method, span[1], options)
     task = Task(
         kept, method, form, span, q, qd, memory, times, bool(dense_output),
-        watched, constraint_tol, max_steps, chart_interval or 0, report, choose, stops_of(kept.motions, *span),
+        watched, constraint_tol, max_steps, chart_interval or 0, report, choose, stops, sampling,
     )  # fmt: skip
     outcome = DRIVERS.get(method.driver, method.driver)(task)
     ended = time.perf_counter()

@@ -36,13 +36,13 @@ def remembered(state, slots):
     memory = getattr(state, "memory", None)
     if memory is None and state is not None and slots:
         raise InvalidArgument(
-            "parts of the scene count turns and this state doesn't say how many: give solution.state, what "
-            "solution.at(t) returns or what an event function is given, as they are or changed by _replace."
+            "parts of the scene count turns or hold a load, and this state doesn't say how many: give solution.state, "
+            "what solution.at(t) returns or what an event function is given, as they are or changed by _replace."
         )
     if memory is None:
         return np.zeros(slots)
     if np.shape(memory) != (slots,):
         raise InvalidArgument(
-            f"the state remembers {np.size(memory)} angles and the scene has {slots}; use a state of this scene."
+            f"the state remembers {np.size(memory)} numbers and the scene has {slots}; use a state of this scene."
         )
     return memory

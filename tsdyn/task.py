@@ -29,7 +29,8 @@ class Task(NamedTuple):
     interval: int  # steps between charts that are forced; 0 for none
     report: object  # a function of the fraction done, None at the end
     choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
-    stops: np.ndarray = np.empty((0, 2))  # times at which a step ends, s, and whether a controller is asked there
+    stops: np.ndarray = np.empty((0, 2))  # times at which a step ends, s, and whether a function is asked there
+    sampling: object = None  # a `sampling.Sampling`, or None
 
     @property
     def within(self):

@@ -26,7 +26,8 @@ _kernel
 _four rotation linalg motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
 vectors
-markers bodies tableau friction joint_coordinates joint_motion
+markers bodies tableau friction joint_coordinates joint_turns
+joint_motion
 poses
 attachment marker_forces frames curvature body_loops
 series_loops
@@ -46,7 +47,9 @@ force
 joint_friction
 state_function
 given_load
-system stepping progress state
+names
+system stepping progress
+handles
 still
 sparse_rows
 assembly interpolation constraints.* forces.*
@@ -63,7 +66,10 @@ landing displacement free_accelerations uniqueness
 friction_solve
 friction_basis friction_reactions friction_unique
 local_chart
-newton evaluate diagnostics reactions power dense friction_balance
+newton evaluate diagnostics
+kinematics
+state
+reactions power dense friction_balance
 control turning
 chart rank
 branch initial start kinetic

@@ -130,7 +130,7 @@ def simulate(
     for motion in kept.motions:
         motion.check(*span)
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
-    memory = remembered(state, kept.packed.system.memory.size)
+    memory = remembered(state, kept, span[0], q)
     q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
     choose = None
     if integrator is None:

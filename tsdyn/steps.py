@@ -72,7 +72,7 @@ def run_steps(task, observe=None, relay=None):
     trajectory = None
     if task.dense_output:
         points = recorded.points[: len(charts)].copy()
-        trajectory = Trajectory(reading, recorded.blocks, charts, points, task.span[0], last)
+        trajectory = Trajectory(reading, recorded.blocks, charts, points, task.span[0], last, task.angles)
     outcome = Outcome(
         status,
         reason,

@@ -20,7 +20,7 @@ class Task(NamedTuple):
     span: tuple  # start and end, s
     q: np.ndarray  # (n,) at the start; not to be written to
     qd: np.ndarray  # (n,)
-    remembered: np.ndarray  # (slots,) what forces remember at the start
+    remembered: np.ndarray  # (angles + slots,) angles of joints at the start, and what forces remember
     times: np.ndarray  # (k,) output times, s; empty for every step
     dense_output: bool
     events: list  # of `events.Event`, or None
@@ -29,6 +29,11 @@ class Task(NamedTuple):
     interval: int  # steps between charts that are forced; 0 for none
     report: object  # a function of the fraction done, None at the end
     choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
+
+    @property
+    def angles(self):
+        """Of the joints at the start (angles,)."""
+        return self.remembered[: self.prepared.handles.count]
 
     @property
     def within(self):
@@ -42,12 +47,12 @@ class Outcome(NamedTuple):
 
     status: Status
     reason: str  # what there is to say about the status
-    rows: np.ndarray  # (k, 1 + 3 n + slots)  t, q, qd, qdd, what forces remember
+    rows: np.ndarray  # (k, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
     history: np.ndarray  # (steps tried, 3)  t, h, accepted
     charts: np.ndarray  # (charts, 5)  t, reason, condition, contraction, steps in it
     reached: float  # s
     last: np.ndarray  # (3, n)  q, qd, qdd there
-    remembered: np.ndarray  # (slots,)  what forces remember there
+    remembered: np.ndarray  # (angles + slots,)  there
     counts: dict  # of `Solution.stats`
     trajectory: object  # a `dense.Trajectory`, or None
     events: tuple  # times, positions, velocities of each event; or None

@@ -33,11 +33,16 @@ report(Phi=float(scene.evaluate().Phi[0]))
 KERNELS = 4  # of SMALL: three loops of Distance and the one that Python calls
 
 
-def command(code, environment, cwd):
+def command(code, environment, cwd, before=()):
     full = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "TSDYN_QUIET")}
     full.update(environment)
     return subprocess.Popen(
-        [sys.executable, "-c", code], env=full, cwd=cwd, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [*before, sys.executable, "-c", code],
+        env=full,
+        cwd=cwd,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
     )
 
 
@@ -69,8 +74,16 @@ def edit(file, old, new):
 def warm(tmp_path):
     """A copy of the user's cache that no other test writes to, as an environment."""
     folder = Path(run(SMALL, {})[0]["folder"])
-    shutil.copytree(folder, tmp_path / "warm" / "tsdyn" / folder.name)
+    shutil.copytree(folder, tmp_path / "warm" / "tsdyn" / folder.name, copy_function=linked)
     return {"NUMBA_CACHE_DIR": str(tmp_path / "warm")}
+
+
+def linked(source, target):
+    """Link a file of the cache, which is never written in place; copy it where files can't be linked."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
 
 
 def test_second_process_compiles_nothing(warm):
@@ -182,8 +195,102 @@ def test_edited_callee_in_another_file_is_seen(package):
     )
     after, _ = run(SMALL, environment, package)
     assert after["Phi"] == (36.0 - 9.0) / 6.0
+    assert after["misses"] == 3  # the loops; their caller reaches them by address
     again, _ = run(SMALL, environment, package)
     assert (again["Phi"], again["misses"]) == (after["Phi"], 0)
+    edit(package / "tsdyn" / "solution.py", "import numpy as np\n", "import numpy as np\n\nNOTHING = 0\n")
+    edit(package / "tsdyn" / "markers.py", "2.0 * q[at + i]", "2.0 * q[at + i]  # twice")
+    assert run(SMALL, environment, package)[0]["misses"] == 0  # no code that a kernel reaches has changed
+
+
+def test_kernels_in_a_sub_package_follow_an_edit_of_their_callees(package):
+    folder = package / "tsdyn" / "below"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "inner.py").write_text(
+        "from .._kernel import kernel\nLEVEL = 3.0\n@kernel\ndef level(x):\n    return LEVEL * x\n"
+    )
+    (folder / "outer.py").write_text(
+        "from .._kernel import entry\nfrom . import inner\n@entry\ndef twice(x):\n    return 2.0 * inner.level(x)\n"
+    )
+    environment = {"NUMBA_CACHE_DIR": str(package / "cache")}
+    code = REPORT + "\nfrom tsdyn.below.outer import twice\nreport(value=twice(1.0))\n"
+    first, _ = run(code, environment, package)
+    assert (first["value"], first["misses"]) == (6.0, 1)
+    assert run(code, environment, package)[0]["misses"] == 0
+    edit(folder / "inner.py", "3.0", "5.0")
+    edited, _ = run(code, environment, package)
+    assert (edited["value"], edited["misses"]) == (10.0, 1)
+
+
+def kernels_in(folder):
+    return sorted(Path(folder).rglob("*.kernel"))
+
+
+@pytest.mark.parametrize("damage", [lambda b: b[: len(b) // 2], lambda b: b"", lambda b: b[:-9] + b"\0" * 9])
+def test_damaged_kernels_are_compiled_anew(tmp_path, damage):
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path)}
+    run(SMALL, environment)
+    for file in kernels_in(tmp_path):
+        file.write_bytes(damage(file.read_bytes()))
+    mended, _ = run(SMALL, environment)
+    assert (mended["Phi"], mended["damaged"], mended["misses"]) == (0.0, KERNELS, KERNELS)
+    again, _ = run(SMALL, environment)
+    assert (again.get("damaged", 0), again["misses"]) == (0, 0)
+
+
+def test_full_disk_costs_a_warning_and_not_the_run(tmp_path):
+    full = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
+    result, errors = run(full + SMALL, {"NUMBA_CACHE_DIR": str(tmp_path)})
+    assert (result["Phi"], result["misses"]) == (0.0, KERNELS)
+    assert errors.count("so every process compiles them again") == 1
+    assert not [file for file in Path(result["folder"]).iterdir() if file.suffix != ".lock"]
+
+
+WITHOUT_PRIVILEGE = ["setpriv", "--bounding-set=-dac_override,-dac_read_search"]  # root heeds permissions, too
+
+
+def test_complete_cache_that_can_not_be_written_is_used(tmp_path):
+    as_root = hasattr(os, "getuid") and os.getuid() == 0
+    if as_root and not shutil.which("setpriv"):
+        pytest.skip("root writes everywhere")
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "kept"), "TMPDIR": str(scratch)}
+    folder = Path(run(SMALL, environment)[0]["folder"])
+    for path in (folder, folder.parent, folder.parent.parent):
+        path.chmod(0o555)
+    process = command(SMALL, environment, ROOT, before=WITHOUT_PRIVILEGE if as_root else ())
+    found, errors = finish(process)
+    assert (found["Phi"], found["misses"]) == (0.0, 0)
+    assert Path(found["folder"]).is_relative_to(scratch)
+    assert errors == ""
+
+
+INTERRUPTED = """
+import signal
+from numba.core.registry import cpu_target
+import tsdyn as ts
+engine = cpu_target.target_context.codegen()._engine._ee
+found = engine._object_cache_notify
+def notify(*arguments):
+    signal.raise_signal(signal.SIGINT)
+    found(*arguments)
+engine._object_cache_notify = notify
+scene = ts.Scene()
+scene.add(ts.constraints.Distance(scene.add_point_mass(1.0), scene.ground, point_b=(1, 0, 0)))
+try:
+    scene.evaluate()
+except KeyboardInterrupt:
+    print("interrupted")
+engine._object_cache_notify = found
+print(scene.evaluate().Phi, signal.getsignal(signal.SIGINT) is signal.default_int_handler)
+"""
+
+
+def test_interrupt_while_llvm_works_is_a_keyboard_interrupt(tmp_path):
+    process = command(INTERRUPTED, {"NUMBA_CACHE_DIR": str(tmp_path), "TSDYN_QUIET": "1"}, ROOT)
+    assert process.communicate(timeout=300) == ("interrupted\n[0.] True\n", "")
 
 
 def test_no_writable_home_falls_back_to_the_temporary_folder(package):

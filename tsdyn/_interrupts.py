@@ -1,0 +1,44 @@
+"""Ctrl-C while a kernel compiles.
+
+LLVM calls back into Python. An exception raised in such a callback is printed and forgotten, and Numba finds no machine
+code afterwards. Here a signal that arrives in a callback is kept until the end of the compilation.
+"""
+
+import contextlib
+import signal
+import threading
+
+
+@contextlib.contextmanager
+def prompt_interrupts():
+    """Turn a Ctrl-C during the block into KeyboardInterrupt: at once, or at the end where LLVM calls back."""
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    interrupted = False
+
+    def handle(number, frame):
+        nonlocal interrupted
+        interrupted = True
+        if not _in_callback(frame):
+            raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, handle)
+    try:
+        yield
+    except Exception:
+        if not interrupted:
+            raise
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if interrupted:
+        raise KeyboardInterrupt
+
+
+def _in_callback(frame):
+    while frame is not None:
+        if frame.f_code.co_name.startswith("_raw_object_cache"):
+            return True
+        frame = frame.f_back
+    return False

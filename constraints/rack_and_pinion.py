@@ -96,6 +96,10 @@ class RackAndPinion(Joint):
                 f"{self.name}: reference_b is parallel to axis_b; choose a direction across the pinion's axis."
             )
 
+    def counted_from(self, t, *displacements):
+        """The angle that goes with the travel."""
+        return displacements[0] / self.radius
+
     def compose(self):
         """Eq. (1)."""
         f, g = beside(self.axis_a, self.direction_a)

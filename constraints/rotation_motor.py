@@ -71,6 +71,10 @@ class RotationMotor(FramedJoint):
         """Set an attribute, checked; an angle is always a motion."""
         super().__setattr__(name, Motion.always(value, f"{self.name}: angle") if name == "angle" else value)
 
+    def counted_from(self, t, *displacements):
+        """The angle prescribed."""
+        return self.angle.value(t)[0]
+
     @classmethod
     def of(cls, joint, *, angle, name=""):
         """Make the motor that turns b of a joint against a, about its axis, from where the bodies stand now."""

@@ -91,6 +91,10 @@ class Screw(FramedJoint):
             ),
         )
 
+    def counted_from(self, t, *displacements):
+        """The angle that goes with the travel."""
+        return displacements[0] / self.lead
+
     def aligned(self):
         """Nothing more than Parallel says."""
         return ()

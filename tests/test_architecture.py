@@ -26,7 +26,8 @@ _kernel
 _four rotation linalg pieces table knots motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
 vectors
-markers bodies tableau friction joint_coordinates joint_motion
+markers bodies tableau friction joint_coordinates joint_turns
+joint_motion
 poses
 attachment marker_forces frames curvature body_loops
 series_loops
@@ -47,7 +48,9 @@ joint_friction
 state_function
 joint_load
 given_load
-system stepping progress state
+names
+system stepping progress
+handles
 still
 sparse_rows
 assembly interpolation constraints.* forces.*
@@ -65,7 +68,10 @@ landing displacement free_accelerations uniqueness
 friction_solve
 friction_basis friction_reactions friction_unique
 local_chart
-newton evaluate diagnostics reactions power dense friction_balance
+newton evaluate diagnostics
+kinematics
+state
+reactions power dense friction_balance
 control turning
 chart rank
 branch initial start kinetic

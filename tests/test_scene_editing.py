@@ -89,7 +89,7 @@ def test_what_is_referred_to_stays():
 
 BAD = {
     "ground": (lambda s: s.ground, "ground can't"),
-    "nothing": (lambda s: "nothing", "nothing like 'nothing'"),
+    "nothing": (lambda s: "nothing", "no body, constraint or force is named 'nothing'"),
     "none": (lambda s: None, "nothing like None"),
     "array": (lambda s: np.zeros(3), "nothing like"),
     "normalisation": (lambda s: s.constraints[-1], "belongs to its body"),
@@ -108,8 +108,12 @@ def test_what_is_not_there(item, words):
 def test_a_name_of_several():
     scene, links = chain()
     scene.add(F.Torque(links[0], torque=(1, 0, 0), name="spring"))
-    with pytest.raises(ts.InvalidArgument, match="2 things are named 'spring'"):
+    with pytest.raises(ts.InvalidArgument, match="'spring' is the name of 2"):
         scene.remove("spring")
+
+
+def swing(t):
+    return 0.1 * t * t
 
 
 def pull(t):
@@ -118,7 +122,7 @@ def pull(t):
 
 def test_a_copy_is_independent():
     scene, links = chain()
-    scene.add(C.RotationMotor.of(scene["hinge0"], angle=lambda t: 0.1 * t * t, name="motor"))
+    scene.add(C.RotationMotor.of(scene["hinge0"], angle=swing, name="motor"))
     scene.add(F.Spring(links[0], scene.ground, point_b=(0, 0, 2), actuator=pull, name="rope"))
     options = {"integrator": "dop853", "t_eval": (0.0, 0.2)}
     first = ts.simulate(scene, (0.0, 0.2), **options)

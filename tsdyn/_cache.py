@@ -16,11 +16,11 @@ import time
 import uuid
 import warnings
 from collections import Counter
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import numba
-from numba.core.caching import NullCache, _Cache, dumps
+from numba.core.caching import _Cache, dumps
 from numba.core.compiler import CompileResult
 
 from ._code_hash import deep_hash, platform_hash
@@ -104,10 +104,16 @@ class KernelCache(_Cache):
     """The disk cache of one function, with a lock so that processes starting together compile once."""
 
     def __init__(self, function):
+        self._function = function
+        self._lock = None
+
+    @cached_property
+    def _name(self):
+        """Computed at first use, when all that the function names is defined."""
+        function = self._function
         home = Path(function.__code__.co_filename).stem
         label = f"{home}.{function.__qualname__}".translate({ord(c): "" for c in '<>:"/\\|?*'})
-        self._name = f"{label[:100]}-{deep_hash(function)}"
-        self._lock = None
+        return f"{label[:100]}-{deep_hash(function)}"
 
     @property
     def cache_path(self):
@@ -235,8 +241,3 @@ def _acquire(name, patience=300.0):
         except OSError:
             handle.close()
             return None
-
-
-def cache_of(function):
-    """Return the disk cache of a function, or Numba's null cache where nothing can be read or written."""
-    return KernelCache(function) if folders() or folder() is not None else NullCache()

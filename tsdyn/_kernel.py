@@ -24,7 +24,7 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
 from numba.np.arrayobj import populate_array
 
-from ._cache import cache_of
+from ._cache import KernelCache
 from ._interrupts import prompt_interrupts
 from .errors import InvalidConstraint
 
@@ -63,7 +63,7 @@ def entry(function):
     if DEBUG:
         return function
     dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
-    dispatcher._cache = cache_of(function)
+    dispatcher._cache = KernelCache(function)
     dispatcher.compile = prompt_interrupts()(dispatcher.compile)
     return dispatcher
 
@@ -116,13 +116,12 @@ class Callback:
     def _compile(self):
         arguments = tuple(_letters[c] for c in self.signature)
         cfunc = CFunc(self.py_func, (arguments, _letters[self.result]), locals={}, options=self.options)
-        cfunc._cache = cache = cache_of(self.py_func)
+        cfunc._cache = cache = KernelCache(self.py_func)
         try:
             with prompt_interrupts():
                 cfunc.compile()
         finally:
-            if hasattr(cache, "release"):
-                cache.release()
+            cache.release()
         self._cfunc = cfunc  # keeps the code alive
         return cfunc.address
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from .bodies import Ground, PointMass
 from .errors import InvalidArgument, InvalidBody
+from .names import named
 
 SHOWN = 5  # in a message
 
@@ -64,12 +65,10 @@ def demand_present(item, bodies):
 def found(scene, item):
     """The handle itself, or the one thing that has this name."""
     present = [*scene._bodies, *scene._added, *scene._forces]
-    found = [other for other in present if other is item or (isinstance(item, str) and other.name == item)]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        kinds = ", ".join(repr(other) for other in found[:SHOWN])
-        raise InvalidArgument(f"{len(found)} things are named {item!r}: {kinds}; give the one that is meant.")
+    if isinstance(item, str):
+        return named(present, item, "body, constraint or force")
+    if any(item is other for other in present):
+        return item
     if isinstance(item, Ground):
         raise InvalidArgument("the ground can't be removed.")
     if any(item is own for own in scene._normalisations.values()):

@@ -13,6 +13,8 @@ from . import reactions
 from .checks import number
 from .dense import B_END
 from .errors import InvalidArgument, Status
+from .handles import handles_of
+from .kinematics import Anchor, Kinematics
 from .run_state import BEGUN, BLOCKS, CHART_ROWS, DENSE, ROWS, STEPS, STORED, T
 
 EPS = float(np.finfo(float).eps)
@@ -64,25 +66,37 @@ def prepare(events):
     return found
 
 
-class Instant:
-    """What an event function is given: t, q, qd, qdd as of a `State`, with multipliers made when asked for."""
+class Instant(Kinematics):
+    """What an event function is given: a `State`, with multipliers made when asked for."""
 
-    __slots__ = ("_memory", "_packed", "q", "qd", "qdd", "t")
+    __slots__ = ("_beside", "_packed", "q", "qd", "qdd", "t")
 
-    def __init__(self, packed, memory, t, state):
-        self._packed, self._memory, self.t = packed, memory, t
+    def __init__(self, packed, beside, t, state):
+        self._packed, self._beside, self.t = packed, beside, t
         self.q, self.qd, self.qdd = state.copy()  # the function may keep or change it
+
+    @property
+    def handles(self):
+        """The scene's `Handles`."""
+        return handles_of(self._packed)
+
+    @property
+    def anchor(self):
+        """The end of the step that it is in."""
+        t, state, remembered = self._beside
+        angles = remembered[: self.handles.count]
+        return Anchor(angles) if t == self.t else Anchor(angles, self.t - t, tuple(state[:2]))
 
     @property
     def memory(self):
         """What forces remember, for a run from here."""
-        return self._memory
+        return self._beside[2][self.handles.count :]
 
     @property
     def multipliers(self):
         """Multipliers (m,)."""
         parts = (part[None] for part in (self.q, self.qd, self.qdd))
-        return reactions.multipliers(self._packed, np.array([self.t]), *parts, self._memory[None])[0]
+        return reactions.multipliers(self._packed, np.array([self.t]), *parts, self.memory[None])[0]
 
     def __iter__(self):
         return iter((self.t, self.q, self.qd, self.qdd, self.multipliers))
@@ -100,7 +114,7 @@ class Watch:
     def __init__(self, events, packed, reader, start):
         self.events, self.packed = events, packed
         self.t, self.state, self.values = start, None, None  # at the last step's end
-        self.memory = None  # what forces remember of it
+        self.memory = None  # angles of joints and what forces remember of it
         self.list = [[] for _ in events]
         self.read_by(reader)
 
@@ -144,7 +158,7 @@ class Watch:
     def _value(self, i, t, state):
         event = self.events[i]
         try:
-            given = event.function(t, Instant(self.packed, self.memory, t, state))
+            given = event.function(t, Instant(self.packed, (self.t, self.state, self.memory), t, state))
         except Exception as error:
             raise Failed(f"{event.name} raised {type(error).__name__} at t = {t:.9g} s: {error}.") from error
         value = number(given)

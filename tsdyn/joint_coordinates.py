@@ -11,7 +11,11 @@ reversed, so that theta is the angle of b against a about the axis (right hand) 
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from .vectors import cross, dot, to_body, to_ground, unit
+from . import vectors
+from ._kernel import twin
+from .vectors import IDENTITY, unit
+
+cross, dot, to_body, to_ground = map(twin, (vectors.cross, vectors.dot, vectors.to_body, vectors.to_ground))
 
 TINY = 1e-9  # sine of the angle below which a direction counts as parallel to an axis
 
@@ -110,7 +114,7 @@ def displacements(item):
 
 def _bodies(item, axis):
     """The body that an axis belongs to, the other one, and the Euler parameters of both as built."""
-    one, other = (None if p is None else tuple(p.tolist()) for p in item.built)
+    one, other = (IDENTITY if p is None else tuple(p.tolist()) for p in item.built)
     return (item.b, item.a, other, one) if axis.endswith("_b") else (item.a, item.b, one, other)
 
 

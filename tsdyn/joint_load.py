@@ -29,6 +29,7 @@ class JointLoad:
     loads = ("function",)
     memory = 1
     coordinate = ""  # "angle" or "displacement"
+    remembers_angle = False  # of its joint, from the start of a run on
 
     def __init__(self, joint, *, function, period=None, which=0, name=""):
         kind = self._kind()

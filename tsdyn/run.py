@@ -28,6 +28,7 @@ from .dense import (
 from .errors import Status
 from .implicit import KNOWN, T_BEFORE
 from .interpolation import call_fill
+from .joint_turns import count_turns
 from .linalg import copy
 from .local_chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .nearness import NEXT_TO, WITHIN_A_STEP, is_below, note_share
@@ -172,6 +173,7 @@ def _begin(context, c, r, log, at):
         status = evaluate(context, w, at, r.clock[T], r.x, r.y, r.yd, r.xd)
     if status == 0:
         store_now(w, r)
+        count_turns(r, w.q, w.qd, 0.0)
         call_check(at[A_CHECK], context)
         wanted = log.t_eval.size == 0
         if not wanted and log.t_eval[0] == r.clock[T]:
@@ -233,7 +235,7 @@ def advance(context, run, log, at, most):
     if r.numbers[BEGUN] == 0 and most != 0:
         take_pieces(c.system, r, log)
         set_time(c.system, r.clock[T])
-        remember(c.system, w.q, w.qd, r.clock[T], r.remembered)
+        remember(c.system, w.q, w.qd, r.clock[T], r.remembered[r.joints.shape[0] :])
         status = _begin(context, c, r, log, at)
         if status != 0:
             return status
@@ -340,8 +342,9 @@ def advance(context, run, log, at, most):
             for j in range(3):
                 copy(r.now[j], r.before[j])
             c.linear.numbers[T_BEFORE] = t0
+        count_turns(r, w.q, w.qd, h)
         store_now(w, r)
-        remember(c.system, w.q, w.qd, t1, r.remembered)
+        remember(c.system, w.q, w.qd, t1, r.remembered[r.joints.shape[0] :])
         r.clock[T] = t1
         r.numbers[STEPS] = i + 1
         r.numbers[CUTS] += 1 if cut else 0

@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 
+from . import joint_motion
 from .checks import number
 from .errors import InvalidArgument, Status
-from .joint_motion import BodyMotion
 from .run_state import BEGUN, HISTORY, WAITING, T
 
 MOST = 1 << 25  # instants of a run
@@ -26,19 +26,15 @@ class Sampling:
 
     Parameters
     ----------
-    packed : Packed
+    prepared : Prepared
     continued : bool
         Whether the run goes on from a state, so that what is held there stays until the next instant.
     """
 
-    def __init__(self, packed, continued):
-        self.packed, self.loads = packed, sampled(packed)
-        self.near = [0.0] * len(self.loads)  # where each coordinate is expected
+    def __init__(self, prepared, continued):
+        self.packed, self.handles, self.loads = prepared.packed, prepared.handles, sampled(prepared.packed)
         self.last = [-math.inf] * len(self.loads)  # when each was asked
-        self.rates = [0.0] * len(self.loads)
         self.begun = continued
-        starts = packed.system.bodies
-        self.places = {id(body): tuple(map(int, row)) for body, row in zip(packed.bodies, starts, strict=True)}
         for load in self.loads:
             reset = getattr(load.force.function, "reset", None)
             if callable(reset) and not continued:
@@ -49,18 +45,19 @@ class Sampling:
         for i, load in enumerate(self.loads):
             force = load.force
             if t > self.last[i] and (not self.begun or is_due(t, force.period)):
-                value = self._value(i, force, t, q, qd)
+                angles, self.last[i] = memory.run.remembered[: self.handles.count], t
+                value = self._value(force, t, (q, qd), angles)
                 memory.context.system.reals[self.packed.system.memory[load.slot]] = value
-                memory.run.remembered[load.slot] = value
+                memory.run.remembered[self.handles.count + load.slot] = value
         self.begun = True
 
-    def _value(self, i, force, t, q, qd):
-        own, other = (BodyMotion(*self.places.get(id(body), (0, 0)), q, qd) for body in (force.a, force.b))
-        if math.isfinite(self.last[i]):  # by a rate that is the mean of both ends'
-            rate = force.measure(own, other, 0.0)[1]
-            self.near[i] += 0.5 * (t - self.last[i]) * (self.rates[i] + rate)
-        x, rate = map(float, force.measure(own, other, self.near[i]))
-        self.near[i], self.last[i], self.rates[i] = x, t, rate
+    def _value(self, force, t, levels, angles):
+        """What the function of a force says; angles are those that the run has counted, roughly."""
+        row = self.handles.row(force.joint, force.coordinate)
+        evaluate, geometry = getattr(joint_motion, force.coordinate), force.geometry
+        x, rate = (float(evaluate(geometry, *self.handles.motions(geometry, levels), level)) for level in (0, 1))
+        if force.coordinate == "angle":
+            x = float(joint_motion.counted(x, angles[row.first + force.which]))
         try:
             given = force.function(t, x, rate)
         except Exception as error:

@@ -64,7 +64,8 @@ def run_series(task, observe=None, relay=None, past=None):
     charts, last = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy(), run.now.copy()
     trajectory = None
     if task.dense_output:
-        trajectory = Trajectory(reading, recorded.blocks, charts, recorded.points, task.span[0], last, task.stops)
+        sides = task.span[0], last, task.angles, task.stops
+        trajectory = Trajectory(reading, recorded.blocks, charts, recorded.points, *sides)
     outcome = Outcome(
         status,
         reason,

@@ -132,10 +132,10 @@ def simulate(
     for motion in kept.motions:
         motion.check(*span)
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
-    memory = remembered(state, kept.packed.system.memory.size)
+    memory = remembered(state, kept, span[0], q)
     q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
     stops = stops_of(kept.motions, instants_of(kept.packed, *span), *span)
-    sampling = Sampling(kept.packed, state is not None) if sampled(kept.packed) else None
+    sampling = Sampling(kept, state is not None) if sampled(kept.packed) else None
     choose = None
     if integrator is None and sampling is None:  # what is asked in Python is asked once
         options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol}

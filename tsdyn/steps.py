@@ -74,7 +74,8 @@ def run_steps(task, observe=None, relay=None):
     trajectory = None
     if task.dense_output:
         points = recorded.points[: len(charts)].copy()
-        trajectory = Trajectory(reading, recorded.blocks, charts, points, task.span[0], last, task.stops)
+        sides = task.span[0], last, task.angles, task.stops
+        trajectory = Trajectory(reading, recorded.blocks, charts, points, *sides)
     outcome = Outcome(
         status,
         reason,

@@ -20,7 +20,7 @@ class Task(NamedTuple):
     span: tuple  # start and end, s
     q: np.ndarray  # (n,) at the start; not to be written to
     qd: np.ndarray  # (n,)
-    remembered: np.ndarray  # (slots,) what forces remember at the start
+    remembered: np.ndarray  # (angles + slots,) angles of joints at the start, and what forces remember
     times: np.ndarray  # (k,) output times, s; empty for every step
     dense_output: bool
     events: list  # of `events.Event`, or None
@@ -31,6 +31,11 @@ class Task(NamedTuple):
     choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
     stops: np.ndarray = np.empty((0, 2))  # times at which a step ends, s, and whether a function is asked there
     sampling: object = None  # a `sampling.Sampling`, or None
+
+    @property
+    def angles(self):
+        """Of the joints at the start (angles,)."""
+        return self.remembered[: self.prepared.handles.count]
 
     @property
     def within(self):
@@ -44,12 +49,12 @@ class Outcome(NamedTuple):
 
     status: Status
     reason: str  # what there is to say about the status
-    rows: np.ndarray  # (k, 1 + 3 n + slots)  t, q, qd, qdd, what forces remember
+    rows: np.ndarray  # (k, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
     history: np.ndarray  # (steps tried, 3)  t, h, accepted
     charts: np.ndarray  # (charts, 5)  t, reason, condition, contraction, steps in it
     reached: float  # s
     last: np.ndarray  # (3, n)  q, qd, qdd there
-    remembered: np.ndarray  # (slots,)  what forces remember there
+    remembered: np.ndarray  # (angles + slots,)  there
     counts: dict  # of `Solution.stats`
     trajectory: object  # a `dense.Trajectory`, or None
     events: tuple  # times, positions, velocities of each event; or None

@@ -12,6 +12,7 @@ from .assembly import remember, set_time
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
 from .errors import Status
 from .free import END_SHARE, LARGEST_SHARE, RESIDUAL, SHARE, STRIDE
+from .joint_turns import count_turns
 from .linalg import copy
 from .local_chart import AT_START, BY_SERIES, ROUNDING
 from .outputs import record, store_now
@@ -183,7 +184,7 @@ def _accept(context, c, r, log, steps, t, ended):
     """The poses as they are now are the state at t, and qdd, where the run has `ended` in a singular place. Status."""
     w = c.work
     _mind_singular(c)
-    remember(c.system, w.q, w.qd, t, r.remembered)
+    remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
     if not ended:
         call_expand(steps[EXPAND], context, 0)
     total = 0.0
@@ -191,6 +192,7 @@ def _accept(context, c, r, log, steps, t, ended):
         total += abs(w.qdd[i])
     if not total < math.inf:
         return NOT_FINITE
+    count_turns(r, w.q, w.qd, t - r.clock[T])
     store_now(w, r)
     r.clock[T] = t
     if log.t_eval.size == 0:

@@ -15,7 +15,6 @@ from .._kernel import specialised
 from ..force import Force
 from ..joint_coordinates import displacements
 from ..joint_load import JointLoad, instants, law_of_joint
-from ..joint_motion import displacement, displacement_rate
 from ..markers import Point, Vector
 from ..state_function import ByState
 
@@ -58,11 +57,6 @@ class JointForce(JointLoad, Force):
     def directions(geometry):
         """The axis and the two points."""
         return geometry.e, geometry.s_own, geometry.s_other
-
-    def measure(self, own, other, near):
-        """Displacement and rate; own and other are `BodyMotion`."""
-        geometry = self.geometry
-        return displacement(geometry, own, other), displacement_rate(geometry, own, other)
 
     @staticmethod
     def law(x, xd, par, t, out):

@@ -17,7 +17,6 @@ from ..angle import angle_near
 from ..force import Force
 from ..joint_coordinates import angles
 from ..joint_load import JointLoad, instants, law_of_joint
-from ..joint_motion import angle, angle_rate, counted
 from ..markers import Turn, Vector
 from ..state_function import ByState
 
@@ -49,8 +48,8 @@ class JointTorque(JointLoad, Force):
 
     Notes
     -----
-    Its power is applied power. Turns are counted from the one nearest to zero at the start of a run. What the function
-    raises, or a value that is not finite, ends the run.
+    Its power is applied power. Turns are counted as for `solution.angle(joint)`. What the function raises, or a value
+    that is not finite, ends the run.
     """
 
     markers = (Vector("a", "axis"), Turn("a"), Turn("b"))
@@ -66,11 +65,6 @@ class JointTorque(JointLoad, Force):
     def directions(geometry):
         """The axis."""
         return (np.cross(geometry.f, geometry.g),)
-
-    def measure(self, own, other, near):
-        """Angle, on the turn nearest to another, and rate; own and other are `BodyMotion`."""
-        geometry = self.geometry
-        return counted(angle(geometry, own, other), near), angle_rate(geometry, own, other)
 
     @staticmethod
     def law(x, xd, par, t, out):
@@ -101,6 +95,7 @@ class JointTorque(JointLoad, Force):
 class _ContinuousTorque(ByState, JointTorque):
     """By the function at every evaluation, Eq. (2); what it remembers is the angle."""
 
+    remembers_angle = True
     markers = (Vector("a", "axis"), Vector("a", "reference"), Vector("b", "direction"), Turn("a"), Turn("b"))
     given = "function"
     series = None

@@ -16,6 +16,7 @@ from .motions import Piecewise, Smooth
 from .table import is_data
 
 SIGNATURE = "d"
+UNNAMED = "motion"
 call_motion = caller(SIGNATURE, "d")
 
 
@@ -33,7 +34,7 @@ class Motion:
         What error messages call it.
     """
 
-    def __init__(self, f, fd=None, fdd=None, what="motion"):
+    def __init__(self, f, fd=None, fdd=None, what=UNNAMED):
         self.what, self.smooth, self.given = what, None, (f, fd, fdd)
         if is_data(f) and fd is fdd is None:
             (f,) = self.components(f, 1, what)
@@ -79,6 +80,7 @@ class Motion:
     def wrap(cls, value, what):
         """Return a Motion for functions, one of `ts.motions`, data or a Motion; a finite float for a number."""
         if isinstance(value, Motion):
+            what = what if value.what == UNNAMED else value.what  # a part's motion is its joint's
             return cls(*(value.given or (value.smooth,)), what=what)
         if is_data(value):
             return cls(value, what=what)

@@ -57,6 +57,8 @@ class SeriesReader:
         Addresses, series_steps.EXPAND ... WITHIN.
     """
 
+    degree = 16  # as of dense.Reader
+
     def __init__(self, system, network, orders, size, steps):
         system = system._replace(reals=system.reals.copy())
         n = int(system.bodies[:, 1].sum())

@@ -21,7 +21,7 @@ FILES = {
 }
 # lowest first; a module imports from lines above its own, or from its own line
 LAYERS = """
-_code_hash _interrupts _cache errors _discovery jet truncated checks aligned
+_code_hash _interrupts _cache errors _discovery jet truncated checks aligned chebyshev history
 _kernel
 _four rotation linalg motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
@@ -84,7 +84,8 @@ series_memory
 series_dense
 formulation run
 memory prepare task
-events drive work account
+sign_search events drive work account
+watch
 relay
 series_run steps solution
 passage

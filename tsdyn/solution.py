@@ -79,7 +79,7 @@ class Solution(Kinematics):
         self._remembers = rows[:, 1 + 3 * n + angles :].copy()  # (k, slots), what forces remember
         self._reached, self._last = outcome.reached, outcome.last
         self._angles, self._remembered = outcome.remembered[:angles], outcome.remembered[angles:]
-        self._history, self._charts = outcome.history, outcome.charts
+        self._step_log, self._chart_log = outcome.steps, outcome.charts
         self.stats = SimpleNamespace(**outcome.counts, seconds=seconds)
         self.message = account(self, scene, outcome.reason)  # now: the scene may change
 
@@ -168,16 +168,20 @@ class Solution(Kinematics):
 
     @property
     def steps(self):
-        """History of the steps, a `Steps`."""
-        return Steps(self._history[:, 0], self._history[:, 1], self._history[:, 2] == 1.0)
+        """History of the steps, a `Steps`; raises InvalidArgument if the run kept none."""
+        return Steps(*self._kept(self._step_log).arrays())
 
     @property
     def charts(self):
-        """History of the charts, a `Charts`."""
-        rows = self._charts
-        return Charts(
-            rows[:, 0], tuple(REASONS[int(i)] for i in rows[:, 1]), rows[:, 2], rows[:, 3], rows[:, 4].astype(int)
-        )
+        """History of the charts, a `Charts`; raises InvalidArgument if the run kept none."""
+        t, reasons, condition, contraction, steps = self._kept(self._chart_log).arrays()
+        return Charts(t, tuple(REASONS[i] for i in reasons.tolist()), condition, contraction, steps.astype(int))
+
+    @staticmethod
+    def _kept(log):
+        if log is None:
+            raise InvalidArgument("the run kept no histories of steps and charts: it was made with history=False.")
+        return log
 
     @cached_property
     def _memory(self):

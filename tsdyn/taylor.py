@@ -9,6 +9,7 @@ import math
 from ._four import first, four, larger, second, splat, third
 from ._kernel import entry, kernel
 from .assembly import remember, set_time
+from .control import stretch
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
 from .errors import Status
 from .free import END_SHARE, LARGEST_SHARE, RESIDUAL, SHARE, STRIDE
@@ -317,7 +318,9 @@ def advance_series(context, run, log, steps, most):
                 t1 = r.clock[T_ORIGIN] + (r.numbers[STEPS] + 1) * r.clock[H]
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 return STEP_COLLAPSED
-            last = t1 + 1e-3 * h >= r.clock[T_END] if adaptive else r.numbers[STEPS] + 1 == r.numbers[STEPS_WANTED]
+            last = r.numbers[STEPS] + 1 == r.numbers[STEPS_WANTED]
+            if adaptive:
+                last = t1 + stretch(h, r.clock[MAX_STEP]) >= r.clock[T_END]
             if last:
                 t1 = r.clock[T_END]
             row = log.history[r.numbers[HISTORY]]

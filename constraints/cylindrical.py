@@ -7,6 +7,7 @@ Holds with the axes opposed, too: a start there is refused. Never singular.
 """
 
 from ..joint import Joint
+from ..joint_coordinates import Angle, Displacement
 from ..markers import Point, Vector
 from .parallel import Parallel
 from .point_on_line import PointOnLine
@@ -37,6 +38,7 @@ class Cylindrical(Joint):
     """
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
+    joint_coordinates = (Angle(), Displacement())
 
     def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)

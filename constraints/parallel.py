@@ -7,6 +7,7 @@ refused. Never singular.
 """
 
 from ..joint import Joint, across
+from ..joint_coordinates import Angle
 from ..markers import Vector
 from .dot1 import Dot1
 
@@ -33,6 +34,7 @@ class Parallel(Joint):
     """
 
     markers = (Vector("a"), Vector("b"))
+    joint_coordinates = (Angle(),)
 
     def __init__(self, a, b, *, axis_a=None, axis_b=None, name=""):
         super().__init__(a, b, (axis_a, axis_b), name)

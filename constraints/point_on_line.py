@@ -6,6 +6,7 @@ Never singular.
 """
 
 from ..joint import Joint, across
+from ..joint_coordinates import Displacement
 from ..markers import Point, Vector
 from .dot2 import Dot2
 
@@ -36,6 +37,7 @@ class PointOnLine(Joint):
     """
 
     markers = (Point("a"), Point("b"), Vector("b"))
+    joint_coordinates = (Displacement("axis_b"),)
 
     def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_b=None, name=""):
         super().__init__(a, b, (point_a, point_b, axis_b), name)

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InvalidConstraint
 from ..framed_joint import PARALLEL, beside, carried, turned_about
 from ..joint import Joint
+from ..joint_coordinates import Angle, Displacement
 from ..markers import Point, Vector
 from .thread import Thread, demand_lead, travel
 
@@ -57,6 +58,7 @@ class RackAndPinion(Joint):
         Vector("a", "direction_a"),
         Vector("b", "reference_b"),
     )
+    joint_coordinates = (Angle(reference="direction_a", direction="reference_b"), Displacement("direction_a"))
 
     def __init__(
         self,
@@ -93,6 +95,10 @@ class RackAndPinion(Joint):
             raise InvalidConstraint(
                 f"{self.name}: reference_b is parallel to axis_b; choose a direction across the pinion's axis."
             )
+
+    def counted_from(self, t, *displacements):
+        """The angle that goes with the travel."""
+        return displacements[0] / self.radius
 
     def compose(self):
         """Eq. (1)."""

@@ -7,6 +7,7 @@ Holds with the axes opposed, too: a start there is refused. Never singular.
 """
 
 from ..joint import Joint
+from ..joint_coordinates import Angle
 from ..markers import Point, Vector
 from .parallel import Parallel
 from .spherical import Spherical
@@ -37,6 +38,7 @@ class Revolute(Joint):
     """
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
+    joint_coordinates = (Angle(),)
 
     def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)

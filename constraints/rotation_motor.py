@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InvalidConstraint
 from ..framed_joint import FramedJoint, beside, turned_about
+from ..joint_coordinates import Angle
 from ..motion import Motion
 from .angle_driver import AngleDriver
 
@@ -44,6 +45,8 @@ class RotationMotor(FramedJoint):
     on=b)`, its power part of `solution.power`.
     """
 
+    joint_coordinates = (Angle(reference="reference_a", direction="reference_b"),)
+
     def __init__(
         self,
         a,
@@ -66,6 +69,10 @@ class RotationMotor(FramedJoint):
     def __setattr__(self, name, value):
         """Set an attribute, checked; an angle is always a motion."""
         super().__setattr__(name, Motion.always(value, f"{self.name}: angle") if name == "angle" else value)
+
+    def counted_from(self, t, *displacements):
+        """The angle prescribed."""
+        return self.angle.value(t)[0]
 
     @classmethod
     def of(cls, joint, *, angle, name=""):

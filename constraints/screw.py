@@ -9,6 +9,7 @@ refused. (3) is periodic as the thread is, and counts no turns. Never singular.
 """
 
 from ..framed_joint import FramedJoint
+from ..joint_coordinates import Angle, Displacement
 from .cylindrical import Cylindrical
 from .rotation_motor import axes, set_apart
 from .thread import Thread, demand_lead, travel
@@ -43,6 +44,8 @@ class Screw(FramedJoint):
     Rows: axis[0], axis[1], line[0], line[1], thread. `Screw.at(a, b, point=, axis=, lead=)` takes a point and the
     direction of the axis in the ground frame. A thread of one pitch p in m has lead = p / (2 pi).
     """
+
+    joint_coordinates = (Angle(reference="reference_a", direction="reference_b"), Displacement())
 
     def __init__(
         self,
@@ -87,6 +90,10 @@ class Screw(FramedJoint):
                 lead=self.lead,
             ),
         )
+
+    def counted_from(self, t, *displacements):
+        """The angle that goes with the travel."""
+        return displacements[0] / self.lead
 
     def aligned(self):
         """Nothing more than Parallel says."""

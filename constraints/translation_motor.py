@@ -6,6 +6,7 @@ Never singular by itself.
 """
 
 from ..joint import Joint
+from ..joint_coordinates import Displacement
 from ..markers import Point, Vector
 from ..motion import Motion
 from .dot2 import Dot2
@@ -40,6 +41,7 @@ class TranslationMotor(Joint):
     """
 
     markers = (Point("a"), Point("b"), Vector("a"))
+    joint_coordinates = (Displacement(),)
 
     def __init__(
         self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, displacement=0.0, name=""

@@ -9,6 +9,7 @@ is refused. Never singular.
 """
 
 from ..framed_joint import FramedJoint
+from ..joint_coordinates import Displacement
 from .dot1 import Dot1
 from .parallel import Parallel
 from .point_on_line import PointOnLine
@@ -40,6 +41,8 @@ class Translational(FramedJoint):
     Rows: axis[0], axis[1], turn, line[0], line[1]. `Translational.at(a, b, point=, axis=)` takes a point and the
     direction of the axis in the ground frame.
     """
+
+    joint_coordinates = (Displacement(),)
 
     def __init__(
         self,

@@ -12,6 +12,7 @@ import numpy as np
 from ..attachment import in_frame
 from ..errors import InvalidConstraint
 from ..joint import Joint
+from ..joint_coordinates import Angle
 from ..markers import Point, Vector
 from .dot1 import Dot1
 from .spherical import Spherical
@@ -44,6 +45,7 @@ class Universal(Joint):
     """
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
+    joint_coordinates = (Angle(direction="axis_b"), Angle("axis_b", direction="axis_a"))
 
     def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)

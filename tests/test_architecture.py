@@ -21,11 +21,13 @@ FILES = {
 }
 # lowest first; a module imports from lines above its own, or from its own line
 LAYERS = """
-_code_hash _interrupts _cache errors _discovery jet truncated checks aligned
+_code_hash _interrupts _cache errors _discovery jet truncated checks aligned chebyshev history
 _kernel
 _four rotation linalg motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
-markers bodies tableau friction
+vectors
+markers bodies tableau friction joint_coordinates joint_turns
+joint_motion
 poses
 attachment marker_forces frames curvature body_loops
 series_loops
@@ -45,7 +47,9 @@ force
 joint_friction
 state_function
 given_load
-system stepping progress state
+names
+system stepping progress
+handles
 still
 sparse_rows
 assembly interpolation constraints.* forces.*
@@ -62,7 +66,10 @@ landing displacement free_accelerations uniqueness
 friction_solve
 friction_basis friction_reactions friction_unique
 local_chart
-newton evaluate diagnostics reactions power dense friction_balance
+newton evaluate diagnostics
+kinematics
+state
+reactions power dense friction_balance
 control turning
 chart rank
 branch initial start kinetic
@@ -77,7 +84,8 @@ series_memory
 series_dense
 formulation run
 memory prepare task
-events drive work account
+sign_search events drive work account
+watch
 relay
 series_run steps solution
 passage

@@ -26,6 +26,8 @@ class Attachment:
     markers = ()
     error = InvalidConstraint
     particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
+    joint_coordinates = ()  # Angle and Displacement, see tsdyn/joint_coordinates.py
+    angle_near = 0.0  # on which turn its angles begin: set by `Scene.set`
     added = False  # to its scene
     owner = None  # the joint that it is a part of
 
@@ -51,6 +53,7 @@ class Attachment:
         if len(given) != len(self.markers):
             raise self.error(f"{self.name}: {len(self.markers)} markers, but {len(given)} coordinates.")
         self.coordinates = tuple(self._places(given))
+        self.built = tuple(getattr(body, "values", {}).get("orientation") for body in (a, b))
 
     @classmethod
     def at(cls, a, b=None, **arguments):
@@ -145,6 +148,10 @@ class Attachment:
     def body_of(self, marker):
         """The body that a marker is on."""
         return self.a if marker.body == "a" else self.b
+
+    def counted_from(self, t, *displacements):
+        """The angle near which a run that begins at t counts the turns of its angles; (-pi, pi] is about zero."""
+        return self.angle_near
 
     def parameters(self):
         """What the kernels get as `par`: floats, and functions of time."""

@@ -38,7 +38,7 @@ def chooser(simulate, scene, method, end, options):
         if run.now.shape[1] > LARGEST_PILOT:
             return False
         start = float(run.clock[T])
-        state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered.copy())
+        state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered[len(run.joints) :].copy())
         try:
             pilot = simulate(scene, (start, end), integrator=implicit(method), max_steps=PILOT, state=state, **options)
         except TsdynError:  # the run itself goes on

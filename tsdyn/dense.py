@@ -134,7 +134,7 @@ def read(context, at, t, rows, blocks, charts, points, xs, ys, yds, xds, store, 
 
 
 class Reader:
-    """Reads states between steps; one thread at a time.
+    """Reads states between steps; one thread at a time. A block ends with what is remembered at the step's end.
 
     Parameters
     ----------
@@ -144,7 +144,15 @@ class Reader:
         Arguments of `workspace.allocate`; then the network, nx and ny.
     addresses : ndarray
         Those of the run.
+
+    Attributes
+    ----------
+    degree : int
+        Power of two, of a polynomial by which a function of the states in a step can be expected to be followed.
     """
+
+    shift = 1  # from a step to the block with the angles at its start
+    degree = 8
 
     def __init__(self, system, sizes, addresses):
         *sizes, network, nx, ny = sizes
@@ -176,16 +184,25 @@ class Pieces:
 
     def __call__(self, t):
         """As of a `Trajectory`."""
+        states, memory, status = self._gathered(t, lambda part, times: part(times))
+        return states, memory, max(status)
+
+    def anchors(self, t):
+        """As of a `Trajectory`."""
+        return self._gathered(t, lambda part, times: part.anchors(times))
+
+    def _gathered(self, t, ask):
+        """What the parts say of times t, in their order; where it is no array, a list."""
         piece = np.searchsorted([part.end for part in self.parts[:-1]], t)
         order, found = [], []
         for i, part in enumerate(self.parts):
             at = np.flatnonzero(piece == i)
             if at.size or (not found and i == len(self.parts) - 1):
                 order.append(at)
-                found.append(part(t[at]))
+                found.append(ask(part, t[at]))
         back = np.argsort(np.concatenate(order), kind="stable")
-        states, memory, status = zip(*found, strict=True)
-        return np.concatenate(states)[back], np.concatenate(memory)[back], max(status)
+        columns = zip(*found, strict=True)
+        return [np.concatenate(column)[back] if isinstance(column[0], np.ndarray) else column for column in columns]
 
 
 class Trajectory:
@@ -202,12 +219,14 @@ class Trajectory:
     start : float, s
     first : ndarray (3, n)
         q, qd, qdd there, for a run that has made no step.
+    angles : ndarray (count,)
+        Of the joints, there.
     """
 
-    def __init__(self, reading, blocks, charts, points, start, first):
+    def __init__(self, reading, blocks, charts, points, start, first, angles):
         self.reading = reading
         self.blocks, self.charts, self.points = blocks, charts, points
-        self.start, self.first = start, first
+        self.start, self.first, self.angles = start, first, angles
 
     @property
     def end(self):
@@ -230,3 +249,14 @@ class Trajectory:
         reader, *arguments = self.reading
         out[order], status = reader(*arguments)(t[order], rows[order], self.blocks, self.charts, self.points)
         return out, self.blocks[rows, self.blocks.shape[1] - slots :], status
+
+    def anchors(self, t):
+        """The starts (k,) of the steps that times t (k,) lie in, and the angles (k, count) of joints there."""
+        if not len(self.blocks):
+            return np.full(t.size, self.start), np.repeat(self.angles[None], t.size, axis=0)
+        rows = np.searchsorted(self.blocks[:, B_END], t)
+        end = self.blocks.shape[1] - self.reading[1].memory.size
+        kept = self.blocks[:, end - self.angles.size : end]
+        if self.reading[0].shift:
+            kept = np.concatenate((self.angles[None], kept[:-1]))
+        return self.blocks[rows, B_START], kept[rows]

@@ -1,5 +1,6 @@
 """What an integrator is: a small object that holds its settings and names the kernel that makes a step."""
 
+from copy import copy
 from types import MappingProxyType
 
 from .checks import positive
@@ -44,6 +45,13 @@ class Integrator:
 
     def __init__(self, step):
         self.step = positive(step, f"{type(self).__name__}: step (s)")
+
+    def bounded(self, longest):
+        """Return the method with steps of at most `longest`, s."""
+        method = copy(self)
+        method.max_step = min(self.max_step or longest, longest)
+        method.step = None if self.step is None else min(self.step, longest)
+        return method
 
     def kernel(self, first_order):
         """Return (step kernel, its numbers (float64), floats of memory it needs for systems of sizes nx, ny)."""

@@ -29,6 +29,7 @@ from .run_state import (
     H,
     Record,
     T,
+    enter_joints,
     lay_out,
 )
 from .system import System
@@ -64,8 +65,9 @@ class Memory:
         system = System(*(array.copy() for array in self.source))
         self.network, redundant = network, len(network.dropped)
         self.work = allocate(n, m, len(prepared.packed.bodies), 0.0, joint_rows=joint_rows, redundant=redundant)
-        slots = system.memory.size
-        self.run = lay_out(n, nx, ny, tableau, scratch, warm_size(self.work), B_DATA + width + slots, slots)
+        slots, angles = system.memory.size, prepared.handles.count
+        block = B_DATA + width + angles + slots
+        self.run = lay_out(n, nx, ny, tableau, scratch, warm_size(self.work), block, slots, angles)
         linear = allocate_linear(system, n, m, implicit, kept, redundant)
         if implicit:
             linear = linear._replace(now=self.run.now, before=self.run.before)
@@ -98,8 +100,9 @@ class Memory:
             for own, new in zip(system, source, strict=True):
                 own[:] = new
         system.reals[:] = source.reals  # motions, signals and what forces remember are written there
+        enter_joints(self.run, task.prepared.handles, task.remembered)
         if system.memory.size:
-            system.reals[system.memory] = task.remembered
+            system.reals[system.memory] = task.remembered[self.run.joints.shape[0] :]
         work.q[:], work.qd[:] = task.q, task.qd
         self.run.now[0], self.run.now[1] = task.q, task.qd
         control = work.control

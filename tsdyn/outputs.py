@@ -1,13 +1,14 @@
 """What a driver keeps of accepted states."""
 
 from ._kernel import kernel
+from .joint_turns import angle_after
 from .linalg import copy
-from .run_state import ROWS
+from .run_state import ROWS, T
 
 
 @kernel
 def record(r, log, t, q, qd, qdd):
-    """One row of output."""
+    """One row of output, at the last accepted point or within the step at its side."""
     n, i = q.size, r.numbers[ROWS]
     row = log.out[i]
     row[0] = t
@@ -15,6 +16,9 @@ def record(r, log, t, q, qd, qdd):
         row[1 + j], row[1 + n + j], row[1 + 2 * n + j] = q[j], qd[j], qdd[j]
     for j in range(r.remembered.size):
         row[1 + 3 * n + j] = r.remembered[j]
+    if t != r.clock[T]:
+        for j in range(r.joints.shape[0]):
+            row[1 + 3 * n + j] = angle_after(r, j, q, qd, t - r.clock[T])
     r.numbers[ROWS] = i + 1
 
 

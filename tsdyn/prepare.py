@@ -8,6 +8,7 @@ from .branch import demand_aligned
 from .expansion_pack import refusal
 from .force_pack import with_force_jacobians
 from .friction_unique import demand_unique
+from .handles import handles_of
 from .network import DROPPED
 from .series_memory import Series
 from .start import consistent
@@ -41,7 +42,8 @@ class Prepared:
         every = scene.__dict__.setdefault("_spare", {})
         if len(every) >= KINDS:
             every.clear()
-        self._spare = every.setdefault(tuple(array.shape for array in packed.system), {})
+        self.handles = handles_of(packed)
+        self._spare = every.setdefault((self.handles.count, *(array.shape for array in packed.system)), {})
 
     @cached_property
     def implicit(self):
@@ -80,9 +82,9 @@ class Prepared:
         if known != given:
             system, before = self.packed.system, still(self.packed)
             dropped = self.packed.shared.get(DROPPED)
-            if remembered.size:
+            if system.memory.size:
                 system = system._replace(reals=system.reals.copy())
-                system.reals[system.memory] = remembered
+                system.reals[system.memory] = remembered[self.handles.count :]
             start = consistent(scene, system, q, qd, t, tol, redundant_allowed)
             if self.packed.shared.get(DROPPED) is not dropped or still(self.packed) is not before:
                 self.__dict__.pop("series", None)  # the rows that are left out belong to a network

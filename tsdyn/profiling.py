@@ -187,7 +187,7 @@ def _once(scene, method, options, start):
     state = options.get("state")
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
     began = clock()
-    memory = remembered(state, kept.packed.system.memory.size)
+    memory = remembered(state, kept, start, q)
     kept.start(
         scene, q, qd, start, options.get("initial_tol", 1e-9), memory, options.get("redundancy", "drop") == "drop"
     )

@@ -2,7 +2,7 @@
 
 from ._kernel import caller, entry, kernel
 from .assembly import is_rheonomic, remember, set_time
-from .control import accept, first_step, watch_stiffness
+from .control import accept, first_step, stretch, watch_stiffness
 from .dense import (
     A_ACCELERATE,
     A_CHART,
@@ -26,6 +26,7 @@ from .dense import (
 from .errors import Status
 from .implicit import KNOWN, T_BEFORE
 from .interpolation import call_fill
+from .joint_turns import count_turns
 from .linalg import copy
 from .local_chart import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
 from .nearness import NEXT_TO, WITHIN_A_STEP, is_below, note_share
@@ -166,6 +167,7 @@ def _begin(context, c, r, log, at):
         status = evaluate(context, w, at, r.clock[T], r.x, r.y, r.yd, r.xd)
     if status == 0:
         store_now(w, r)
+        count_turns(r, w.q, w.qd, 0.0)
         call_check(at[A_CHECK], context)
         wanted = log.t_eval.size == 0
         if not wanted and log.t_eval[0] == r.clock[T]:
@@ -201,7 +203,7 @@ def advance(context, run, log, at, most):
     driven = is_rheonomic(c.system)
     if r.numbers[BEGUN] == 0 and most != 0:
         set_time(c.system, r.clock[T])
-        remember(c.system, w.q, w.qd, r.clock[T], r.remembered)
+        remember(c.system, w.q, w.qd, r.clock[T], r.remembered[r.joints.shape[0] :])
         status = _begin(context, c, r, log, at)
         if status != 0:
             return status
@@ -221,7 +223,7 @@ def advance(context, run, log, at, most):
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 failed = r.numbers[FAILED]
                 return failed if failed in (NOT_FINITE, JAMMED) else STEP_COLLAPSED
-            last = t1 + 1e-3 * r.clock[H] >= r.clock[T_END]
+            last = t1 + stretch(r.clock[H], r.clock[MAX_STEP]) >= r.clock[T_END]
         else:
             t1 = r.clock[T_ORIGIN] + (i + 1) * r.clock[H]
             last = i + 1 == r.numbers[STEPS_WANTED]
@@ -295,8 +297,9 @@ def advance(context, run, log, at, most):
             for j in range(3):
                 copy(r.now[j], r.before[j])
             c.linear.numbers[T_BEFORE] = t0
+        count_turns(r, w.q, w.qd, h)
         store_now(w, r)
-        remember(c.system, w.q, w.qd, t1, r.remembered)
+        remember(c.system, w.q, w.qd, t1, r.remembered[r.joints.shape[0] :])
         r.clock[T] = t1
         r.numbers[STEPS] = i + 1
         r.numbers[IN_CHART] += 1

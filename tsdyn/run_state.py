@@ -40,7 +40,9 @@ class Run(NamedTuple):
     xs: np.ndarray  # (nx,)  dense output and the guess of a first step
     ys: np.ndarray  # (ny,)
     yds: np.ndarray  # (ny,)
-    remembered: np.ndarray  # (slots,)  what forces remember of the last accepted point
+    remembered: np.ndarray  # (angles + slots,)  angles of joints at the last accepted point, and what forces remember
+    frames: np.ndarray  # (angles, 9)  f, g and h of each angle; see joint_table.py
+    joints: np.ndarray  # int64 (angles, 4)  where its two bodies' coordinates begin, and how many they are
     tableau: np.ndarray  # the method's numbers
     memory: np.ndarray  # the method's scratch
     block: np.ndarray  # the present step's: start, h, end, chart, the interpolant's data
@@ -52,27 +54,36 @@ class Record(NamedTuple):
     """What is asked of a run and what it records: arrays of its own, unlike those of `Run`."""
 
     t_eval: np.ndarray  # output times, or empty: every step
-    out: np.ndarray  # (rows, 1 + 3 n + slots)  t, q, qd, qdd, remembered
+    out: np.ndarray  # (rows, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
     history: np.ndarray  # (rows, 3)  t, h, accepted
     charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left
     points: np.ndarray  # (rows, n)  q0 of each chart, or (0, n) where nothing asks for it
     blocks: np.ndarray  # (rows, block)  those of accepted steps
 
 
-def lay_out(n, nx, ny, tableau, memory, warm, block, slots):
-    """The `Run` of a system of sizes nx, ny, the other lengths being those of its arrays; slots that of remembered."""
+def enter_joints(run, handles, remembered):
+    """Let a run count the angles of a scene's joints from those remembered on."""
+    run.joints[:], run.frames[:], run.remembered[:] = handles.joints, handles.frames, remembered
+
+
+def lay_out(n, nx, ny, tableau, memory, warm, block, slots, angles):
+    """The `Run` of a system of sizes nx, ny, the other lengths being those of its arrays.
+
+    slots and angles are the numbers of what forces remember and of the joints' angles.
+    """
     shapes = {
         **dict.fromkeys(("x", "xd", "xd_old", "dx", "x_low", "x_low_old", "x_old", "xs"), (nx,)),
         **dict.fromkeys(("y", "yd", "dy", "y_low", "y_low_old", "y_old", "yd_old", "ys", "yds"), (ny,)),
         **dict.fromkeys(("now", "before"), (3, n)),
         "warm": (warm,),
-        "remembered": (slots,),
+        "remembered": (angles + slots,),
+        "frames": (angles, 9),
         "tableau": (tableau,),
         "memory": (memory,),
         "block": (block,),
         "clock": (CLOCKS,),
     }
-    return Run(**carve(shapes), numbers=np.zeros(NUMBERS, np.int64))
+    return Run(**carve(shapes), joints=np.zeros((angles, 4), np.int64), numbers=np.zeros(NUMBERS, np.int64))
 
 
-load_run = loader(lay_out(1, 1, 1, 1, 1, 1, 1, 1))
+load_run = loader(lay_out(1, 1, 1, 1, 1, 1, 1, 1, 1))

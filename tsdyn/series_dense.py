@@ -42,7 +42,7 @@ def read_series(context, steps, t, rows, blocks, out):
 
 
 class SeriesReader:
-    """Reads states between steps; one thread at a time.
+    """Reads states between steps; one thread at a time. A block ends with what is remembered at the step's start.
 
     Parameters
     ----------
@@ -56,6 +56,9 @@ class SeriesReader:
     steps : ndarray
         Addresses, series_steps.EXPAND ... WITHIN.
     """
+
+    shift = 0
+    degree = 16  # as of dense.Reader
 
     def __init__(self, system, network, orders, size, steps):
         system = system._replace(reals=system.reals.copy())

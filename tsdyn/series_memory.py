@@ -22,6 +22,7 @@ from .run_state import (
     H,
     Record,
     T,
+    enter_joints,
     lay_out,
 )
 from .series_state import HIGHEST, LOWEST, NEXT, TOP, SeriesContext
@@ -69,12 +70,13 @@ class SeriesMemory:
     def __init__(self, prepared, highest):
         self.series, self.packed, self.weight = prepared.series, prepared.packed, prepared.n
         packed = self.packed
-        series, n, slots = self.series, prepared.n, packed.system.memory.size
+        series, n, slots, angles = self.series, prepared.n, packed.system.memory.size, prepared.handles.count
         system = System(*(array.copy() for array in packed.system))
         self.work, free = plain_work(n), allocate_free(series.network, n)
         expansion = allocate_expansion(series.network, series.kinds, packed, highest)
         self.steps = np.zeros(STEPS, np.int64)
-        self.run = lay_out(n, 0, 0, 0, 0, 0, B_DATA + 1 + n + expansion.bodies.size + slots, slots)
+        block = B_DATA + 1 + n + expansion.bodies.size + angles + slots
+        self.run = lay_out(n, 0, 0, 0, 0, 0, block, slots, angles)
         self.settle(SeriesContext(system, self.work, series.network, free, expansion))
         self._run, *self._keep_run = resident(self.run)
         self.nbytes = 8 * (expansion.bodies.size + expansion.constraints.size + free.S.size + self.run.block.size)
@@ -93,8 +95,9 @@ class SeriesMemory:
         """As if it were new, for this task; the order is the first step's, and the two bounds of the others'."""
         system, work, clock, numbers = self.context.system, self.work, self.run.clock, self.run.numbers
         system.reals[:] = task.prepared.packed.system.reals  # what forces remember is written there
+        enter_joints(self.run, task.prepared.handles, task.remembered)
         if system.memory.size:
-            system.reals[system.memory] = task.remembered
+            system.reals[system.memory] = task.remembered[self.run.joints.shape[0] :]
         drop_as_at_first(self.series.network, self.context.free)
         numbers.fill(0)
         clock.fill(0.0)

@@ -62,13 +62,13 @@ def run_series(task, observe=None, relay=None, past=None):
     charts, last = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy(), run.now.copy()
     trajectory = None
     if task.dense_output:
-        trajectory = Trajectory(reading, recorded.blocks, charts, recorded.points, task.span[0], last)
+        trajectory = Trajectory(reading, recorded.blocks, charts, recorded.points, task.span[0], last, task.angles)
     outcome = Outcome(
         status,
         reason,
         recorded.out,
-        recorded.history,
-        charts,
+        recorded.steps,
+        recorded.log(charts),
         float(run.clock[T]),
         last,
         run.remembered.copy(),

@@ -9,10 +9,10 @@ import numpy as np
 
 from . import diagnostics, power, reactions, uniqueness
 from .account import account
-from .bodies import PointMass, rotation_matrix
 from .checks import floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .friction_reactions import with_normal_loads
+from .kinematics import Anchor, Kinematics
 from .local_chart import REASONS
 from .state import RememberingState
 from .system import member_of
@@ -37,7 +37,7 @@ class Charts(NamedTuple):
     steps: np.ndarray
 
 
-class Solution:
+class Solution(Kinematics):
     """The result of `simulate`; k outputs, n coordinates, m constraint rows.
 
     Attributes
@@ -71,12 +71,15 @@ class Solution:
         self.system = self.packed.system
         self.status, self._trajectory = outcome.status, outcome.trajectory
         self.t_events, self.q_events, self.qd_events = outcome.events or (None, None, None)
-        rows, n = outcome.rows, task.q.size
+        self.handles = task.prepared.handles
+        rows, n, angles = outcome.rows, task.q.size, self.handles.count
         self.t = rows[:, 0].copy()
         self.q, self.qd, self.qdd = (rows[:, 1 + i * n : 1 + (i + 1) * n].copy() for i in range(3))
-        self._remembers = rows[:, 1 + 3 * n :].copy()  # (k, slots), what forces remember
-        self._reached, self._last, self._remembered = outcome.reached, outcome.last, outcome.remembered
-        self._history, self._charts = outcome.history, outcome.charts
+        self.anchor = Anchor(rows[:, 1 + 3 * n : 1 + 3 * n + angles].copy())
+        self._remembers = rows[:, 1 + 3 * n + angles :].copy()  # (k, slots), what forces remember
+        self._reached, self._last = outcome.reached, outcome.last
+        self._angles, self._remembered = outcome.remembered[:angles], outcome.remembered[angles:]
+        self._step_log, self._chart_log = outcome.steps, outcome.charts
         self.stats = SimpleNamespace(**outcome.counts, seconds=seconds)
         self.message = account(self, scene, outcome.reason)  # now: the scene may change
 
@@ -110,7 +113,8 @@ class Solution:
         q, qd, qdd = (a.copy() for a in self._last)
         t, memory = np.array([self._reached]), self._remembered[None]
         lam = reactions.multipliers(self.packed, t, q[None], qd[None], qdd[None], memory)[0]
-        return RememberingState.of(self._remembered.copy(), self._reached, q, qd, qdd, lam)
+        remembered = self.handles, self._remembered.copy(), Anchor(self._angles)
+        return RememberingState.of(*remembered, self._reached, q, qd, qdd, lam)
 
     def at(self, t):
         """State at any time of a run with dense_output=True, on the manifold as the steps are.
@@ -146,22 +150,38 @@ class Solution:
             raise StepFailure(f"no state could be found at some t in {t!r}. {status.sentence} {status.remedy}", self)
         q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
         parts = q, qd, qdd, reactions.multipliers(self.packed, every, q, qd, qdd, memory)
+        anchor = self._anchor_of(every)
         if times.ndim:
-            return RememberingState.of(memory, every, *parts)
-        return RememberingState.of(memory[0], float(times), *(part[0] for part in parts))
+            return RememberingState.of(self.handles, memory, anchor, every, *parts)
+        angles, h, levels = anchor
+        anchor = Anchor(angles[0], h[0], tuple(level[0] for level in levels))
+        return RememberingState.of(self.handles, memory[0], anchor, float(times), *(part[0] for part in parts))
+
+    def _anchor_of(self, t):
+        """What angles at times t (k,) are counted from: the starts of the steps that they are in."""
+        start, angles = self._trajectory.anchors(t)
+        if not angles.size:
+            return Anchor(angles, np.zeros(t.size))
+        starts, back = np.unique(start, return_inverse=True)
+        states, _, _ = self._trajectory(starts)
+        return Anchor(angles, t - start, (states[back, 0], states[back, 1]))
 
     @property
     def steps(self):
-        """History of the steps, a `Steps`."""
-        return Steps(self._history[:, 0], self._history[:, 1], self._history[:, 2] == 1.0)
+        """History of the steps, a `Steps`; raises InvalidArgument if the run kept none."""
+        return Steps(*self._kept(self._step_log).arrays())
 
     @property
     def charts(self):
-        """History of the charts, a `Charts`."""
-        rows = self._charts
-        return Charts(
-            rows[:, 0], tuple(REASONS[int(i)] for i in rows[:, 1]), rows[:, 2], rows[:, 3], rows[:, 4].astype(int)
-        )
+        """History of the charts, a `Charts`; raises InvalidArgument if the run kept none."""
+        t, reasons, condition, contraction, steps = self._kept(self._chart_log).arrays()
+        return Charts(t, tuple(REASONS[i] for i in reasons.tolist()), condition, contraction, steps.astype(int))
+
+    @staticmethod
+    def _kept(log):
+        if log is None:
+            raise InvalidArgument("the run kept no histories of steps and charts: it was made with history=False.")
+        return log
 
     @cached_property
     def _memory(self):
@@ -229,43 +249,6 @@ class Solution:
                 return on
             raise InvalidBody(f"{item.name}: what acts on the ground is the opposite of what acts on {item.on.name!r}.")
         raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
-
-    def _span(self, body, part):
-        if not isinstance(body, PointMass) or self.packed.bodies[body.index : body.index + 1] != (body,):
-            raise InvalidBody(f"{body!r} is not a body of this solution's scene.")
-        at = int(self.system.bodies[body.index, 0])
-        if part == "r":
-            return slice(at, at + 3)
-        body.orientation  # noqa: B018  a point mass says that it has none
-        return slice(at + 3, at + 7)
-
-    def position(self, body):
-        """Position of the centroid (k, 3), m, ground frame."""
-        return self.q[:, self._span(body, "r")]
-
-    def velocity(self, body):
-        """Velocity of the centroid (k, 3), m/s, ground frame."""
-        return self.qd[:, self._span(body, "r")]
-
-    def acceleration(self, body):
-        """Acceleration of the centroid (k, 3), m/s^2, ground frame."""
-        return self.qdd[:, self._span(body, "r")]
-
-    def orientation(self, body):
-        """Euler parameters (k, 4), body to ground, scalar first."""
-        return self.q[:, self._span(body, "p")]
-
-    def rotation(self, body):
-        """Rotation matrices A(p) (k, 3, 3), body to ground."""
-        return rotation_matrix(self.orientation(body))
-
-    def angular_velocity(self, body):
-        """Angular velocity (k, 3), rad/s, body frame."""
-        return diagnostics.angular_velocity(self.orientation(body), self.qd[:, self._span(body, "p")])
-
-    def angular_acceleration(self, body):
-        """Angular acceleration (k, 3), rad/s^2, body frame."""
-        return diagnostics.angular_velocity(self.orientation(body), self.qdd[:, self._span(body, "p")])
 
     @cached_property
     def kinetic_energy(self):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .errors import InvalidArgument
+from .kinematics import Kinematics
 
 
 class State(NamedTuple):
@@ -17,32 +18,44 @@ class State(NamedTuple):
     multipliers: np.ndarray
 
 
-class RememberingState(State):
-    """A State that also says what forces remember, so that a run from it goes on counting turns."""
+class RememberingState(Kinematics, State):
+    """A State that knows the bodies and joints of its scene, and what forces remember, so that a run from it goes on.
+
+    Attributes
+    ----------
+    memory : ndarray (slots,) or (k, slots)
+        What forces remember.
+    handles : Handles
+    anchor : Anchor
+        What the turns of joints are counted from.
+    """
 
     @classmethod
-    def of(cls, memory, *parts):
-        """A state with its memory (slots,), or (k, slots) for k states."""
+    def of(cls, handles, memory, anchor, *parts):
+        """A state, or k states."""
         state = cls(*parts)
-        state.memory = memory
+        state.handles, state.memory, state.anchor = handles, memory, anchor
         return state
 
     def _replace(self, **changes):
-        return self.of(self.memory, *super()._replace(**changes))
+        return self.of(self.handles, self.memory, self.anchor, *super()._replace(**changes))
 
 
-def remembered(state, slots):
-    """What forces and constraints remember in a state given to `simulate`: zeros where it doesn't say."""
-    memory = getattr(state, "memory", None)
+def remembered(state, prepared, t, q):
+    """What a run from a state given to `simulate`, or None, goes on from: joints' angles, then what forces remember."""
+    slots, memory = prepared.packed.system.memory.size, getattr(state, "memory", None)
     if memory is None and state is not None and slots:
         raise InvalidArgument(
             "parts of the scene count turns and this state doesn't say how many: give solution.state, what "
             "solution.at(t) returns or what an event function is given, as they are or changed by _replace."
         )
     if memory is None:
-        return np.zeros(slots)
+        memory = np.zeros(slots)
     if np.shape(memory) != (slots,):
         raise InvalidArgument(
             f"the state remembers {np.size(memory)} angles and the scene has {slots}; use a state of this scene."
         )
-    return memory
+    angles = state.angles if isinstance(state, Kinematics) else np.empty(0)
+    if angles.size != prepared.handles.count:
+        angles = prepared.handles.angles_at_start(t, q)
+    return np.append(angles, memory)

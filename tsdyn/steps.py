@@ -72,13 +72,13 @@ def run_steps(task, observe=None, relay=None):
     trajectory = None
     if task.dense_output:
         points = recorded.points[: len(charts)].copy()
-        trajectory = Trajectory(reading, recorded.blocks, charts, points, task.span[0], last)
+        trajectory = Trajectory(reading, recorded.blocks, charts, points, task.span[0], last, task.angles)
     outcome = Outcome(
         status,
         reason,
         recorded.out,
-        recorded.history,
-        charts,
+        recorded.steps,
+        recorded.log(charts),
         float(run.clock[T]),
         last,
         run.remembered.copy(),

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .errors import Status
+from .history import ChartLog, StepLog
 
 
 class Task(NamedTuple):
@@ -20,7 +21,7 @@ class Task(NamedTuple):
     span: tuple  # start and end, s
     q: np.ndarray  # (n,) at the start; not to be written to
     qd: np.ndarray  # (n,)
-    remembered: np.ndarray  # (slots,) what forces remember at the start
+    remembered: np.ndarray  # (angles + slots,) angles of joints at the start, and what forces remember
     times: np.ndarray  # (k,) output times, s; empty for every step
     dense_output: bool
     events: list  # of `events.Event`, or None
@@ -28,7 +29,13 @@ class Task(NamedTuple):
     max_steps: int  # or None
     interval: int  # steps between charts that are forced; 0 for none
     report: object  # a function of the fraction done, None at the end
+    history: bool  # whether the histories of steps and charts are kept
     choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
+
+    @property
+    def angles(self):
+        """Of the joints at the start (angles,)."""
+        return self.remembered[: self.prepared.handles.count]
 
     @property
     def within(self):
@@ -42,12 +49,12 @@ class Outcome(NamedTuple):
 
     status: Status
     reason: str  # what there is to say about the status
-    rows: np.ndarray  # (k, 1 + 3 n + slots)  t, q, qd, qdd, what forces remember
-    history: np.ndarray  # (steps tried, 3)  t, h, accepted
-    charts: np.ndarray  # (charts, 5)  t, reason, condition, contraction, steps in it
+    rows: np.ndarray  # (k, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
+    steps: StepLog  # or None
+    charts: ChartLog  # or None
     reached: float  # s
     last: np.ndarray  # (3, n)  q, qd, qdd there
-    remembered: np.ndarray  # (slots,)  what forces remember there
+    remembered: np.ndarray  # (angles + slots,)  there
     counts: dict  # of `Solution.stats`
     trajectory: object  # a `dense.Trajectory`, or None
     events: tuple  # times, positions, velocities of each event; or None

@@ -9,9 +9,11 @@ import math
 from ._four import first, four, larger, second, splat, third
 from ._kernel import entry, kernel
 from .assembly import remember, set_time
+from .control import stretch
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
 from .errors import Status
 from .free import END_SHARE, LARGEST_SHARE, RESIDUAL, SHARE, STRIDE
+from .joint_turns import count_turns
 from .linalg import copy
 from .local_chart import AT_START, BY_SERIES, ROUNDING
 from .outputs import record, store_now
@@ -179,7 +181,7 @@ def _accept(context, c, r, log, steps, t, ended):
     """The poses as they are now are the state at t, and qdd, where the run has `ended` in a singular place. Status."""
     w = c.work
     _mind_singular(c)
-    remember(c.system, w.q, w.qd, t, r.remembered)
+    remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
     if not ended:
         call_expand(steps[EXPAND], context, 0)
     total = 0.0
@@ -187,6 +189,7 @@ def _accept(context, c, r, log, steps, t, ended):
         total += abs(w.qdd[i])
     if not total < math.inf:
         return NOT_FINITE
+    count_turns(r, w.q, w.qd, t - r.clock[T])
     store_now(w, r)
     r.clock[T] = t
     if log.t_eval.size == 0:
@@ -315,7 +318,9 @@ def advance_series(context, run, log, steps, most):
                 t1 = r.clock[T_ORIGIN] + (r.numbers[STEPS] + 1) * r.clock[H]
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 return STEP_COLLAPSED
-            last = t1 + 1e-3 * h >= r.clock[T_END] if adaptive else r.numbers[STEPS] + 1 == r.numbers[STEPS_WANTED]
+            last = r.numbers[STEPS] + 1 == r.numbers[STEPS_WANTED]
+            if adaptive:
+                last = t1 + stretch(h, r.clock[MAX_STEP]) >= r.clock[T_END]
             if last:
                 t1 = r.clock[T_END]
             row = log.history[r.numbers[HISTORY]]

@@ -19,6 +19,7 @@ from ..bodies import rotation_matrix
 from ..checks import vector3
 from ..errors import InvalidForce
 from ..force import Force, finite, load, not_negative
+from ..joint_coordinates import Angle
 from ..markers import Turn, Vector
 from ..recurrences import angle, cross, dot, scaled, square
 from ..signal import Signal
@@ -55,6 +56,7 @@ class TorsionalSpring(Force):
     """
 
     markers = (Vector("a"), Vector("a", "reference_a"), Vector("b", "reference_b"), Turn("a"), Turn("b"))
+    joint_coordinates = (Angle(reference="reference_a", direction="reference_b"),)
     memory = 1
     slots = 20
     conservative = False  # only about an axis that a joint holds

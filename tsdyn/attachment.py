@@ -1,13 +1,19 @@
 """What constraints and forces share: two bodies, a name, markers, and attributes that are checked when they are set."""
 
+
+from inspect import CO_VARKEYWORDS, signature, unwrap
+from types import MethodType
+
 import numpy as np
 from numba.core.errors import NumbaError
 
 from ._kernel import kernel
 from .bodies import Ground, PointMass, rotation_matrix
 from .checks import demand_known, floats, number
+from .calls import Placing, complete_signature, fitting
 from .errors import InvalidConstraint
 from .markers import PARAMETERS, POINT, TURN
+from .membership import note
 
 
 class Attachment:
@@ -27,7 +33,16 @@ class Attachment:
     error = InvalidConstraint
     particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
     added = False  # to its scene
+    named = False  # by its user
     owner = None  # the joint that it is a part of
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        cls.__init__ = fitting(cls.__init__, then=note)
+        if unwrap(cls.__init__).__code__.co_flags & CO_VARKEYWORDS:
+            cls.__init__.__signature__ = complete_signature(cls)
+        if "__new__" in vars(cls):  # else the signature would be that of __new__
+            cls.__signature__ = signature(MethodType(cls.__init__, cls))
 
     def __init__(self, a, b=None, coordinates=(), name=""):
         """Attach it to its bodies; coordinates has an entry for each marker, in the body frame."""
@@ -40,6 +55,7 @@ class Attachment:
                 raise self.error(
                     f"{name or kind}: {body!r} is not a body; pass one that add_body returned, or the ground."
                 )
+        self.named = bool(str(name))
         self.name = str(name) or f"{kind}({', '.join(body.name for body in bodies)})"
         if all(body.dimension == 0 for body in bodies):
             raise self.error(f"{self.name}: one of the bodies must not be the ground.")
@@ -52,7 +68,7 @@ class Attachment:
             raise self.error(f"{self.name}: {len(self.markers)} markers, but {len(given)} coordinates.")
         self.coordinates = tuple(self._places(given))
 
-    @classmethod
+    @Placing
     def at(cls, a, b=None, **arguments):
         """Make one from points and directions in the ground frame, the bodies being where they stand now.
 
@@ -108,6 +124,8 @@ class Attachment:
             super().__setattr__(name, value)
             return
         demand_known(self, name, (*self.__dict__, *slots))
+        if name == "name":
+            self.scene._titles = None
         before = self.__dict__[name]
         super().__setattr__(name, value)
         try:

@@ -64,7 +64,7 @@ friction_solve
 friction_basis friction_reactions friction_unique
 local_chart
 newton evaluate diagnostics reactions power dense friction_balance
-control turning
+control turning holonomic
 chart rank
 branch initial start kinetic
 approach folds dependence

@@ -26,7 +26,7 @@ _kernel
 _four rotation linalg motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
 markers bodies tableau friction
-poses
+poses axis_rows massless
 attachment marker_forces frames curvature body_loops
 series_loops
 force_series

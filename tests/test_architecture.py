@@ -29,7 +29,7 @@ blocks block_steps block_kernels hubs
 vectors
 markers bodies tableau friction joint_coordinates joint_turns
 joint_motion
-poses
+poses axis_rows massless
 attachment marker_forces frames curvature body_loops
 series_loops
 force_series

@@ -201,14 +201,6 @@ def test_a_run_that_ends_early():
     assert said.startswith("The run ended early: The run reached max_steps.")
 
 
-def test_bodies_without_inertia():
-    scene = ts.Scene()
-    rod = scene.add_body(1.0, (1.0, 1.0, 0.0), name="rod")
-    scene.add(ts.constraints.Dot1(rod, scene.ground, axis_a=(1.0, 0.0, 0.0), axis_b=(0.0, 1.0, 0.0)))
-    scene.add(ts.constraints.Spherical(rod, scene.ground, point_a=(0, 0, 1), point_b=(0, 0, 1)))
-    assert "since about an axis rod has no inertia" in advice(scene, (0.0, 0.1))
-
-
 # what it looks like, and what it refuses
 
 

@@ -182,7 +182,7 @@ def _once(scene, method, options, start):
     if method.driver == "series":
         kept.series  # noqa: B018
     else:
-        form = formulation(options.get("formulation", "tangent")).serving(method, kept.packed)
+        form = formulation(options.get("formulation", "tangent")).serving(method)
         form.network(kept.packed)
         kept.system(method.implicit)
     seconds["order of elimination"] = clock() - began

@@ -147,7 +147,7 @@ def simulate(
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
     memory = remembered(state, kept, span[0], q)
     q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
-    if not form.serving(method, kept.packed).basis_free:
+    if not form.serving(method).basis_free:
         demand_holonomic(kept.packed, q, span[0], form.name)
     choose = None
     if integrator is None:

@@ -29,6 +29,14 @@ STIFF_STEPS, MILD_STEPS = 15, 6  # at the limit of stability until a motion is c
 
 
 @kernel
+def stretch(h, longest):
+    """How much longer than h the last step of a run may be, so that no tiny one is left."""
+    if h < 0.999 * longest or longest == math.inf:
+        return 1e-3 * h
+    return max(longest - h, 1e-9 * h)
+
+
+@kernel
 def first_step(context, w, r, at):
     """A first step from the sizes of y, y' and y'' (Hairer, Norsett, Wanner, Solving ODEs I, II.4)."""
     first = r.xd if r.numbers[FIRST_ORDER] == 1 else r.y

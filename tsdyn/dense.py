@@ -144,9 +144,15 @@ class Reader:
         Arguments of `workspace.allocate`; then the network, nx and ny.
     addresses : ndarray
         Those of the run.
+
+    Attributes
+    ----------
+    degree : int
+        Power of two, of a polynomial by which a function of the states in a step can be expected to be followed.
     """
 
     shift = 1  # from a step to the block with the angles at its start
+    degree = 8
 
     def __init__(self, system, sizes, addresses):
         *sizes, network, nx, ny = sizes

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .errors import InconsistentState, SingularConfiguration, Status
+from .history import ChartLog, StepLog
 from .run_state import BEGUN, BLOCKS, CHART_ROWS, DENSE, HISTORY, ROWS, STEPS, STEPS_WANTED, STIFF, STORED, Record, T
 
 SLICE_SECONDS = 0.2  # how often a run comes back to Python: progress, interrupts
@@ -15,13 +16,20 @@ BLOCK_ROOM = 1 << 22  # floats of a slice's blocks
 
 
 class Recorded(NamedTuple):
-    """Rows of all that a run has recorded, as in `Record`; charts and points have room left."""
+    """All that a run has recorded: rows as in `Record`, and histories."""
 
     out: np.ndarray
-    history: np.ndarray
     blocks: np.ndarray
-    charts: np.ndarray
+    charts: np.ndarray  # those that blocks refer to, if any, and the last one
     points: np.ndarray
+    steps: StepLog  # or None
+    passed: ChartLog  # charts before those, or None
+
+    def log(self, charts):
+        """The history of charts with those that are left at the end, or None."""
+        if self.passed is not None:
+            self.passed.add(charts, self.steps.latest)
+        return self.passed
 
 
 def drive(memory, task, watch):
@@ -39,7 +47,8 @@ def drive(memory, task, watch):
     most = min(max(FIRST_WORK // memory.weight, 1), FIRST_SLICE)
     width = 1 + 3 * n + run.remembered.size
     largest = max(BLOCK_ROOM // block, 1) if dense else LARGEST_SLICE
-    chunks = {"out": [], "history": [], "blocks": []}
+    chunks = {"out": [], "blocks": []}
+    steps, passed = (StepLog(), ChartLog()) if task.history else (None, None)
 
     def room(rows, out, charts, points):
         """A record for the next slice, of so many rows, besides what goes on being filled."""
@@ -83,12 +92,17 @@ def drive(memory, task, watch):
             if left <= 0:
                 status = Status.MAX_STEPS
                 break
-            _collect(numbers, record, chunks, per_step, dense)
+            _collect(numbers, record, chunks, per_step, dense, steps)
             rows, charts, points = min(most, left), record.charts, record.points
-            if numbers[CHART_ROWS] + CHART_ROOM > len(charts):
+            full = numbers[CHART_ROWS] + CHART_ROOM > len(charts)
+            if not dense:
+                _pass_by(numbers, charts, points, steps, passed)
+            if full and (dense or len(charts) < LARGEST_SLICE):
                 charts, points = _doubled(charts), _doubled(points)
             record = room(rows, record.out, charts, points)
     except KeyboardInterrupt:
+        if watch is not None:
+            watch.go_back(run, record)
         if run.clock[T] >= t1:
             status = Status.SUCCESS
         elif status == Status.SLICE_DONE:
@@ -96,17 +110,15 @@ def drive(memory, task, watch):
     finally:
         task.report(None)
     reason = reason or getattr(memory, "reason", "")
-    _collect(numbers, record, chunks, per_step, dense)
+    _collect(numbers, record, chunks, per_step, dense, steps)
+    if not dense:
+        _pass_by(numbers, record.charts, record.points, steps, passed)
     out = _joined(record.out, chunks["out"]) if per_step else record.out[: numbers[ROWS]]
     blocks = _joined(record.blocks, chunks["blocks"]) if dense else record.blocks
-    return (
-        status,
-        reason,
-        Recorded(out, _joined(record.history, chunks["history"]), blocks, record.charts, record.points),
-    )
+    return status, reason, Recorded(out, blocks, record.charts, record.points, steps, passed)
 
 
-def _collect(numbers, record, chunks, per_step, dense):
+def _collect(numbers, record, chunks, per_step, dense, steps):
     if per_step and numbers[ROWS]:
         chunks["out"].append(record.out[: numbers[ROWS]])
         numbers[ROWS] = 0
@@ -114,8 +126,18 @@ def _collect(numbers, record, chunks, per_step, dense):
         chunks["blocks"].append(record.blocks[: numbers[BLOCKS]])
         numbers[BLOCKS] = 0
     if numbers[HISTORY]:
-        chunks["history"].append(record.history[: numbers[HISTORY]])
+        if steps is not None:
+            steps.add(record.history[: numbers[HISTORY]])
         numbers[HISTORY] = 0
+
+
+def _pass_by(numbers, charts, points, steps, passed):
+    """Log the charts that have been left, and let the present one be the first."""
+    left = numbers[CHART_ROWS]
+    if passed is not None:
+        passed.add(charts[:left], steps.latest)
+    charts[0], points[:1] = charts[left], points[left : left + 1]
+    numbers[CHART_ROWS] = 0
 
 
 def _doubled(rows):

@@ -48,6 +48,7 @@ def remove(scene, item):
         members = scene._forces if any(item is force for force in scene._forces) else scene._added
         members[:] = [other for other in members if other is not item]
         item.__dict__["added"] = False
+    scene._titles = None
     scene.touch()
     return item
 

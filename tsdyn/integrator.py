@@ -1,7 +1,9 @@
 """What an integrator is: a small object that holds its settings and names the kernel that makes a step."""
 
+from copy import copy
 from types import MappingProxyType
 
+from .calls import fitting
 from .checks import positive
 from .implicit import implicit_step
 from .interpolation import HERMITE, HERMITE_FIRST_ORDER, hermite_second
@@ -39,11 +41,21 @@ class Integrator:
 
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)
+        if "__init__" in vars(cls):
+            cls.__init__ = fitting(cls.__init__)
         if cls.order:
             _registry[cls.__name__.lower().replace("_", "")] = cls
 
+    @fitting
     def __init__(self, step):
         self.step = positive(step, f"{type(self).__name__}: step (s)")
+
+    def bounded(self, longest):
+        """Return the method with steps of at most `longest`, s."""
+        method = copy(self)
+        method.max_step = min(self.max_step or longest, longest)
+        method.step = None if self.step is None else min(self.step, longest)
+        return method
 
     def kernel(self, first_order):
         """Return (step kernel, its numbers (float64), floats of memory it needs for systems of sizes nx, ny)."""

@@ -44,6 +44,7 @@ class JointLoad:
         self.__dict__.update(joint=joint, which=int(which))
         own, other = self.geometry[:2]
         super().__init__(own, other, self.coordinates, name or f"{kind}({joint.name})")
+        self.__dict__["named"] = bool(str(name))
         self.function, self.period = function, period
         self.check()
 

@@ -14,6 +14,7 @@ from .dense import Pieces
 from .errors import Status, TsdynError
 from .formulation import formulation
 from .free import LARGEST_SHARE, SHARE, STRIDE
+from .history import ChartLog, StepLog
 from .integrators import Taylor
 from .relay import Relay
 from .run_state import STEPS, T_END, T
@@ -67,8 +68,8 @@ def _go_on(task, relay, first):
     return last._replace(
         reason=" ".join(part for part in (last.reason, _said(parts)) if part),
         rows=np.concatenate([_new_rows(task, part, i) for i, part in enumerate(parts)]),
-        history=np.concatenate([part.history for part in parts]),
-        charts=np.concatenate([part.charts for part in parts]),
+        steps=StepLog([part.steps for part in parts]) if task.history else None,
+        charts=ChartLog([part.charts for part in parts]) if task.history else None,
         counts=_summed([part.counts for part in parts]),
         trajectory=Pieces([part.trajectory for part in parts]) if task.dense_output else None,
         began=first.began,
@@ -110,7 +111,9 @@ def _rest(task, parts, series):
     if not series:
         return rest
     rtol, atol = (FINEST if tol is None else min(tol, FINEST) for tol in (task.method.rtol, task.method.atol))
-    return rest._replace(method=Taylor(rtol=rtol, atol=atol), form=formulation("tangent"), choose=None)
+    return rest._replace(
+        method=Taylor(rtol=rtol, atol=atol, max_step=task.method.max_step), form=formulation("tangent"), choose=None
+    )
 
 
 def _summed(counts):

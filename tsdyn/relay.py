@@ -1,7 +1,7 @@
 """What the parts of one run, made by different methods, hand on to each other."""
 
-from .events import Watch
 from .free import LARGEST_SHARE, SHARE
+from .watch import Watch
 
 
 class Relay:

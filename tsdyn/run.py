@@ -4,7 +4,7 @@ import math
 
 from ._kernel import caller, entry, kernel
 from .assembly import is_rheonomic, remember, set_time
-from .control import accept, first_step, watch_stiffness
+from .control import accept, first_step, stretch, watch_stiffness
 from .dense import (
     A_ACCELERATE,
     A_CHART,
@@ -262,7 +262,7 @@ def advance(context, run, log, at, most):
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 failed = r.numbers[FAILED]
                 return failed if failed in (NOT_FINITE, JAMMED) else STEP_COLLAPSED
-            if t1 + 1e-3 * r.clock[H] >= end:
+            if t1 + stretch(r.clock[H], r.clock[MAX_STEP]) >= end:
                 t1 = end
             last = t1 == r.clock[T_END]
         else:

@@ -58,6 +58,7 @@ class SeriesReader:
     """
 
     shift = 0
+    degree = 16  # as of dense.Reader
 
     def __init__(self, system, network, orders, size, steps):
         system = system._replace(reals=system.reals.copy())

@@ -6,12 +6,15 @@ import numpy as np
 
 from . import choice
 from .arguments import interval, method_of, output_times, state_arrays
-from .checks import positive, whole
+from .calls import fitting
+from .checks import one_of, positive, whole
 from .errors import InvalidArgument, Status
 from .events import prepare
 from .formulation import formulation as find_formulation
+from .holonomic import demand_holonomic
 from .integrator import registered
 from .knots import stops_of
+from .membership import warn_of_waiting
 from .passage import run_past
 from .prepare import prepared
 from .progress import reporter
@@ -25,6 +28,7 @@ from .task import Task
 DRIVERS = {"steps": run_past, "series": run_series}  # by Integrator.driver, if it isn't one itself; see tsdyn.task
 
 
+@fitting
 def simulate(
     scene,
     t_span,
@@ -40,6 +44,8 @@ def simulate(
     dense_output=False,
     events=None,
     max_steps=None,
+    max_step=None,
+    history=True,
     progress=None,
     chart_interval=None,
     state=None,
@@ -76,12 +82,18 @@ def simulate(
     dense_output : bool
         Keep every step's interpolant, for `solution.at(t)` at any time.
     events : callable or list of callables, optional
-        f(t, state) -> float, state being a `State`; each change of its sign is found on the manifold and recorded in
-        `solution.t_events`, which never changes the steps. As for scipy.integrate.solve_ivp, an attribute
-        `direction` > 0 or < 0 restricts to rising or falling ones, and `terminal` = True, or a number of occurrences,
-        ends the run there. A function that raises, or gives no finite number, ends it too, with success=False.
+        f(t, state) -> float, state being a `State`. Every zero within every step is found on the manifold and recorded
+        in `solution.t_events`, which never changes the steps: changes of sign, and touches of zero within rounding,
+        which count once. As for scipy.integrate.solve_ivp, an attribute `direction` > 0 or < 0 restricts to changes
+        that rise or fall, and `terminal` = True, or a number of occurrences, ends the run there. A function that
+        raises, or gives no finite number, ends it too, with success=False.
     max_steps : int, optional
         End the run after so many steps.
+    max_step : float, s, optional
+        The longest step, for every method; a fixed step that is longer becomes this one.
+    history : bool
+        Keep `solution.steps` and `solution.charts`: 8 bytes a step, 16 to 40 more for each step rejected and each
+        chart.
     progress : bool or callable, optional
         True shows a bar (needs tqdm); a callable is given the fraction done, 0 to 1.
     chart_interval : int, optional
@@ -103,6 +115,7 @@ def simulate(
     """
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
+    warn_of_waiting(scene, 3)
     span = interval(t_span)
     form = find_formulation(formulation)
     chart_interval = whole(chart_interval, "chart_interval")
@@ -117,12 +130,14 @@ def simulate(
             f"{type(method).__name__} solves its stages in the tangent-space form only; formulation={form.name!r} is "
             f"served by {others}."
         )
+    if max_step is not None:
+        method = method.bounded(positive(max_step, "max_step (s)"))
     constraint_tol = positive(constraint_tol, "constraint_tol")
     initial_tol = positive(initial_tol, "initial_tol")
-    if redundancy not in ("drop", "refuse"):
-        raise InvalidArgument(f"redundancy must be 'drop' or 'refuse', got {redundancy!r}.")
-    if not isinstance(dense_output, (bool, np.bool_)):
-        raise InvalidArgument(f"dense_output must be True or False, got {dense_output!r}.")
+    one_of(redundancy, ("drop", "refuse"), "redundancy")
+    for name, value in (("dense_output", dense_output), ("history", history)):
+        if not isinstance(value, (bool, np.bool_)):
+            raise InvalidArgument(f"{name} must be True or False, got {value!r}.")
     watched = prepare(events)
     times = output_times(t_eval, *span)
     max_steps = whole(max_steps, "max_steps")
@@ -134,15 +149,17 @@ def simulate(
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
     memory = remembered(state, kept, span[0], q)
     q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
+    if not form.serving(method).basis_free:
+        demand_holonomic(kept.packed, q, span[0], form.name)
     stops = stops_of(kept.motions, instants_of(kept.packed, *span), *span)
     sampling = Sampling(kept, state is not None) if sampled(kept.packed) else None
     choose = None
     if integrator is None and sampling is None:  # what is asked in Python is asked once
-        options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol}
+        options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol, "max_step": max_step}
         choose = choice.chooser(simulate, scene, method, span[1], options)
     task = Task(
         kept, method, form, span, q, qd, memory, times, bool(dense_output),
-        watched, constraint_tol, max_steps, chart_interval or 0, report, choose, stops, sampling,
+        watched, constraint_tol, max_steps, chart_interval or 0, report, bool(history), choose, stops, sampling,
     )  # fmt: skip
     outcome = DRIVERS.get(method.driver, method.driver)(task)
     ended = time.perf_counter()
@@ -159,6 +176,8 @@ def simulate(
             dense_output=dense_output,
             events=events,
             max_steps=max_steps,
+            max_step=max_step,
+            history=history,
             progress=progress,
             chart_interval=chart_interval,
             state=state,

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import diagnostics, power, reactions, uniqueness
 from .account import account
-from .checks import floats
+from .checks import counted, floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .friction_reactions import with_normal_loads
 from .kinematics import Anchor, Kinematics
@@ -79,7 +79,7 @@ class Solution(Kinematics):
         self._remembers = rows[:, 1 + 3 * n + angles :].copy()  # (k, slots), what forces remember
         self._reached, self._last = outcome.reached, outcome.last
         self._angles, self._remembered = outcome.remembered[:angles], outcome.remembered[angles:]
-        self._history, self._charts = outcome.history, outcome.charts
+        self._step_log, self._chart_log = outcome.steps, outcome.charts
         self.stats = SimpleNamespace(**outcome.counts, seconds=seconds)
         self.message = account(self, scene, outcome.reason)  # now: the scene may change
 
@@ -168,16 +168,20 @@ class Solution(Kinematics):
 
     @property
     def steps(self):
-        """History of the steps, a `Steps`."""
-        return Steps(self._history[:, 0], self._history[:, 1], self._history[:, 2] == 1.0)
+        """History of the steps, a `Steps`; raises InvalidArgument if the run kept none."""
+        return Steps(*self._kept(self._step_log).arrays())
 
     @property
     def charts(self):
-        """History of the charts, a `Charts`."""
-        rows = self._charts
-        return Charts(
-            rows[:, 0], tuple(REASONS[int(i)] for i in rows[:, 1]), rows[:, 2], rows[:, 3], rows[:, 4].astype(int)
-        )
+        """History of the charts, a `Charts`; raises InvalidArgument if the run kept none."""
+        t, reasons, condition, contraction, steps = self._kept(self._chart_log).arrays()
+        return Charts(t, tuple(REASONS[i] for i in reasons.tolist()), condition, contraction, steps.astype(int))
+
+    @staticmethod
+    def _kept(log):
+        if log is None:
+            raise InvalidArgument("the run kept no histories of steps and charts: it was made with history=False.")
+        return log
 
     @cached_property
     def _memory(self):
@@ -302,12 +306,14 @@ class Solution(Kinematics):
 
     def _facts(self):
         s = self.stats
-        sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement" if s.newton_iterations else ""
+        sweeps = f", {counted(s.newton_iterations, 'Newton sweep')}" if s.newton_iterations else ""
+        if sweeps and s.placements:  # series place none
+            sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement"
         return {
-            "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {self.t.size} outputs",
+            "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self.t.size, 'output')}",
             "method": f"{self.method}, formulation {self.formulation}",
-            "steps": f"{s.steps}, {s.rejected} rejected, {s.charts} charts",
-            "work": f"{s.evaluations} evaluations, {s.placements} placements{sweeps}",
+            "steps": f"{s.steps}, {s.rejected} rejected, {counted(s.charts, 'chart')}",
+            "work": f"{counted(s.evaluations, 'evaluation')}, {counted(s.placements, 'placement')}{sweeps}",
             "time": f"{s.seconds['run']:.3g} s, {s.seconds['prepare']:.2g} s to prepare",
         }
 
@@ -325,5 +331,6 @@ class Solution(Kinematics):
         s = self.stats
         return (
             f"<Solution: {self.status.name.lower()} at t = {self._reached:g} s by {self.method}, {self.formulation}: "
-            f"{s.steps} steps, {s.evaluations} evaluations, {s.charts} charts, {s.seconds['run']:.3g} s>"
+            f"{counted(s.steps, 'step')}, {counted(s.evaluations, 'evaluation')}, {counted(s.charts, 'chart')}, "
+            f"{s.seconds['run']:.3g} s>"
         )

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 
+from .calls import fitting
 from .checks import floats
 from .errors import InvalidArgument
 from .pieces import Pieces
@@ -31,6 +32,7 @@ class Table:
     object instead: CubicSpline, PchipInterpolator, make_interp_spline(...), any PPoly or BSpline.
     """
 
+    @fitting
     def __init__(self, times, values):
         self.times, self.values = floats(times), floats(values)
         k = self.times.size

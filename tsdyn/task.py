@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .errors import Status
+from .history import ChartLog, StepLog
 
 
 class Task(NamedTuple):
@@ -28,6 +29,7 @@ class Task(NamedTuple):
     max_steps: int  # or None
     interval: int  # steps between charts that are forced; 0 for none
     report: object  # a function of the fraction done, None at the end
+    history: bool  # whether the histories of steps and charts are kept
     choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
     stops: np.ndarray = np.empty((0, 2))  # times at which a step ends, s, and whether a function is asked there
     sampling: object = None  # a `sampling.Sampling`, or None
@@ -50,8 +52,8 @@ class Outcome(NamedTuple):
     status: Status
     reason: str  # what there is to say about the status
     rows: np.ndarray  # (k, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
-    history: np.ndarray  # (steps tried, 3)  t, h, accepted
-    charts: np.ndarray  # (charts, 5)  t, reason, condition, contraction, steps in it
+    steps: StepLog  # or None
+    charts: ChartLog  # or None
     reached: float  # s
     last: np.ndarray  # (3, n)  q, qd, qdd there
     remembered: np.ndarray  # (angles + slots,)  there

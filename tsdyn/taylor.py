@@ -9,6 +9,7 @@ import math
 from ._four import first, four, larger, second, splat, third
 from ._kernel import entry, kernel
 from .assembly import remember, set_time
+from .control import stretch
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
 from .errors import Status
 from .free import END_SHARE, LARGEST_SHARE, RESIDUAL, SHARE, STRIDE
@@ -54,8 +55,6 @@ from .workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
 SLICE_DONE, STEP_COLLAPSED = int(Status.SLICE_DONE), int(Status.STEP_COLLAPSED)
 NOT_FINITE, SINGULAR, PASSAGE = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.PASSAGE)
 MISSED = 100.0  # times the tolerance: a landing further away than this is no truncation error
-
-
 NEAR = 0.02  # of the shares of pivots: less of it is next to a singular configuration
 AVOID, AVOIDING = 0.7, 5  # a step that ends there is made shorter by this factor, so many times
 SHORT = 0.3  # of the last step from elsewhere: less is short for one that begins there
@@ -331,7 +330,7 @@ def advance_series(context, run, log, steps, most):
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 return STEP_COLLAPSED
             if adaptive:
-                if t1 + 1e-3 * h >= end:
+                if t1 + stretch(h, r.clock[MAX_STEP]) >= end:
                     t1 = end
                 last = t1 == r.clock[T_END]
             else:

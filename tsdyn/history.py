@@ -1,0 +1,61 @@
+"""Histories of steps and charts in little memory: eight bytes a step, and none for charts that are made every step."""
+
+import numpy as np
+
+
+class StepLog:
+    """Steps tried, in order: of those accepted the start, as each ends where the next one begins."""
+
+    def __init__(self, parts=()):
+        self.chunks = [chunk for part in parts for chunk in part.chunks]
+
+    def add(self, rows):
+        """Add rows (k, 3): start and length, s, and whether the step was accepted."""
+        accepted = rows[:, 2] == 1.0
+        t, other = rows[accepted, 0].copy(), np.flatnonzero(~accepted)
+        ends = np.append(t[1:], np.nan)
+        odd = np.flatnonzero(~(ends - t == rows[accepted, 1]))  # the last one, and whatever doesn't follow on
+        self.chunks.append((t, odd, rows[accepted, 1][odd], other, rows[other, :2].copy()))
+
+    @property
+    def latest(self):
+        """Starts (k,) of the steps accepted among the rows added last."""
+        return self.chunks[-1][0] if self.chunks else np.empty(0)
+
+    def arrays(self):
+        """Start and length of each step (k,), s, and whether it was accepted."""
+        parts = [np.empty((0, 3))]
+        for t, odd, lengths, other, tried in self.chunks:
+            rows, accepted = np.empty((t.size + other.size, 3)), np.ones(t.size + other.size, bool)
+            accepted[other] = False
+            h = np.diff(t, append=np.nan)
+            h[odd] = lengths
+            rows[accepted, 0], rows[accepted, 1] = t, h
+            rows[other, :2], rows[:, 2] = tried, accepted
+            parts.append(rows)
+        rows = np.concatenate(parts)
+        return rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2] == 1.0
+
+
+class ChartLog:
+    """Charts, in order: column by column, a constant one as a number."""
+
+    def __init__(self, parts=()):
+        self.chunks = [chunk for part in parts for chunk in part.chunks]
+
+    def add(self, rows, starts):
+        """Add rows (k, 5) as of `Record.charts`; the instants are not copied where they are these `starts`."""
+        if not len(rows):
+            return
+        same = np.array_equal(rows[:, 0], starts)
+        columns = [_compact(column) for column in (rows[:, 1].astype(np.uint8), rows[:, 2], rows[:, 3])]
+        self.chunks.append((starts if same else rows[:, 0].copy(), *columns, _compact(rows[:, 4].astype(np.uint32))))
+
+    def arrays(self):
+        """Instant, s, number of the reason, condition, contraction and steps of each chart, (k,) each."""
+        columns = zip(*([np.broadcast_to(x, chunk[0].shape) for x in chunk] for chunk in self.chunks), strict=True)
+        return [np.concatenate(column) for column in columns]
+
+
+def _compact(column):
+    return column[0] if (column == column[0]).all() else column.copy()

@@ -1,0 +1,209 @@
+"""Times between which the sign of a function changes once at most: where to look for its zeros.
+
+The function is sampled at Chebyshev points. Where an interpolant of degree 4, 8, 16 or 32 has resolved the function,
+its extremes next to zero are sampled too, so that no pair of close zeros is missed; elsewhere the interval
+is halved. What stays rough on ever shorter intervals is a kink or a jump, of which the samples' signs count.
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from .chebyshev import CHECK, FINE, extremes, table
+
+EPS = float(np.finfo(float).eps)
+LARGEST = 32  # degree
+# shares of the largest sample
+TIGHT = 1e-10  # error of an interpolant that has resolved the function
+HOPELESS = 0.05  # error of an interpolant of degree 16 that is not worth one of degree 32
+NEAR = 0.01  # an extreme that is nearer to zero is sampled
+AT_ZERO = 1e-6  # next to an end that is nearer to zero an extreme is looked for
+
+CLEAR = 10.0  # times what the higher half of the coefficients adds: further away from zero there is no zero
+CALM = 10  # halvings in a row that leave one half resolved: the rest is a kink or a jump
+TINY = 1e-7  # of the interval: what is rough on so little is rounding
+SHORTEST = 1e4 * EPS  # of the time: an interval that is not halved
+POLISH = 16  # degree of the interpolant by which an extreme is found
+MOST = 1 << 20  # samples of one search
+
+
+class TooFast(Exception):
+    """A function has more turns than can be followed."""
+
+
+class Fit(NamedTuple):
+    """Samples of a function at the Chebyshev points of [a, b], and the interpolant through them."""
+
+    a: float
+    b: float
+    times: np.ndarray  # (N + 1,)
+    samples: np.ndarray  # (N + 1,)
+    fine: np.ndarray  # (FINE N + 1,)  the interpolant on the fine grid
+    off: float  # its error
+    scale: float  # the largest sample
+    resolved: bool
+
+
+class Search:
+    """A search.
+
+    Parameters
+    ----------
+    sample : function
+        Values (k,) at increasing times (k,); NaN where there is none.
+    noise : float
+        Rounding error that the values are known to have.
+
+    Attributes
+    ----------
+    points : list of (float, float)
+        Times, increasing, and values; zero for a value that touches zero within rounding.
+    spent : int
+        Samples taken.
+    """
+
+    def __init__(self, sample, noise=0.0):
+        self.sample, self.noise = sample, noise
+        self.points, self.spent = [], 0
+
+    def run(self, a, value, b, degree):
+        """Search [a, b], the value at a being known, with interpolants of this degree at first; the degree needed.
+
+        Raises TooFast.
+        """
+        self.points.append((a, value))
+        whole = self._fit(a, b, value, None, degree)
+        if not (whole.resolved or np.isnan(whole.off)):
+            self.noise = self._rounding(whole)
+            whole = whole._replace(resolved=whole.off <= self.noise)
+        self._follow(whole, 0)
+        return whole.samples.size - 1
+
+    def _values(self, times):
+        self.spent += times.size
+        if self.spent > MOST:
+            raise TooFast
+        return self.sample(times)
+
+    def _fit(self, a, b, first, last, degree):
+        """The `Fit` of the degree that resolves the function on [a, b], or of the highest that is worth trying."""
+        half, nodes = 0.5 * (b - a), table(degree).nodes
+        check = int(np.searchsorted(nodes, CHECK))
+        times = a + half * (np.insert(nodes, check, CHECK) + 1.0)
+        times[-1] = b
+        values = np.empty(times.size)
+        values[0], values[-1] = first, np.nan if last is None else last
+        unknown = slice(1, None if last is None else -1)
+        values[unknown] = self._values(times[unknown])
+        at_check, times, samples = values[check], np.delete(times, check), np.delete(values, check)
+        while True:
+            fit = self._judged(a, b, times, samples, at_check)
+            hopeless = degree == LARGEST or (degree == LARGEST // 2 and fit.off > HOPELESS * fit.scale)
+            if fit.resolved or hopeless or np.isnan(fit.off):
+                return fit
+            degree *= 2
+            times, samples = a + half * (table(degree).nodes + 1.0), np.empty(degree + 1)
+            times[-1], samples[::2] = b, fit.samples
+            samples[1::2] = self._values(times[1::2])
+
+    def _judged(self, a, b, times, samples, at_check):
+        grid, scale = FINE * (samples.size - 1) + 1, float(np.abs(samples).max())
+        found = table(samples.size - 1).values @ samples
+        fine, missed, higher = found[:grid], abs(found[grid] - at_check), np.abs(found[grid + 1 :])
+        off = missed + max(higher[-2], higher[-1])
+        clear = max(fine.min(), -fine.max(), 0.0)
+        resolved = off <= max(TIGHT * scale, self.noise) or CLEAR * (missed + higher.sum()) <= clear
+        return Fit(a, b, times, samples, fine, off, scale, bool(resolved))
+
+    def _rounding(self, fit):
+        """The rounding error of the values: what high degrees add where a smooth function is of a low one."""
+        t, least = fit.a + 0.382 * (fit.b - fit.a), SHORTEST * max(abs(fit.a), abs(fit.b))
+        half, found = max(TINY * (fit.b - fit.a), least), np.inf
+        while half < 1e-3 * (fit.b - fit.a):
+            rough = table(8).coefficients[5:] @ self._values(t + half * table(8).nodes)
+            found = min(found, 10.0 * float(np.abs(rough).max()))
+            if found <= 1e-12 * fit.scale or half == least:
+                break
+            half = max(1e-3 * half, least)
+        return found if found < np.inf else 0.0
+
+    def _follow(self, fit, calm):
+        """Take the points of a fit or of its halves; so many halvings before have left one half resolved."""
+        if fit.resolved:
+            self._take(fit)
+        elif calm == CALM or np.isnan(fit.off) or not fit.b - fit.a > SHORTEST * max(abs(fit.a), abs(fit.b)):
+            self._take_rough(fit)
+        else:
+            middle = fit.samples.size // 2
+            t, value = fit.times[middle], fit.samples[middle]
+            left = self._fit(fit.a, t, fit.samples[0], value, 8)
+            right = self._fit(t, fit.b, value, fit.samples[-1], 8)
+            calm = calm + 1 if left.resolved != right.resolved else 0
+            self._follow(left, calm)
+            self._follow(right, calm)
+
+    def _take(self, fit):
+        """The samples, and the extremes next to zero and beyond it that they miss."""
+        size, sign, last = np.abs(fit.fine), np.sign(fit.fine), fit.fine.size - 1
+        spans = set()
+        if fit.scale > self.noise:
+            least = (size[1:-1] <= np.minimum(size[:-2], size[2:])) & (sign[:-2] == sign[2:])
+            spans |= {(i, i + 2) for i in np.flatnonzero(least & (size[1:-1] <= NEAR * fit.scale)).tolist()}
+            runs = (np.flatnonzero(sign[1:] != sign[:-1]) + 1).tolist()
+            spans |= {(i - 1, j) for i, j in pairwise(runs) if -(-i // FINE) * FINE >= j}
+            spans |= {(i, i + 1) for i, end in ((0, 0), (last - 1, last)) if size[end] <= AT_ZERO * fit.scale}
+        found = dict(zip(fit.times.tolist(), fit.samples.tolist(), strict=True))
+        grid = fit.a + 0.5 * (fit.b - fit.a) * (table(fit.samples.size - 1).fine + 1.0)
+        grid[::FINE] = fit.times
+        for i, j in spans:
+            found.update(self._polish(float(grid[i]), float(grid[j])))
+        self._append(found)
+
+    def _polish(self, a, b):
+        """Extremes between a and b, and an end that touches zero with one of them: values by their times."""
+        times = a + 0.5 * (b - a) * (table(POLISH).nodes + 1.0)
+        times[-1] = b
+        samples = self._values(times)
+        series = table(POLISH).coefficients @ samples
+        if not np.isfinite(series).all():
+            return {}
+        noise = 8.0 * float(np.abs(series[-5:]).max()) + EPS * float(np.abs(samples).max())
+        inner = a + 0.5 * (b - a) * (extremes(series) + 1.0)
+        inner = inner[(inner > a) & (inner < b)]
+        values = self._values(inner)
+        touch = np.abs(values) <= noise
+        found = dict(zip(inner.tolist(), np.where(touch, 0.0, values).tolist(), strict=True))
+        if touch.any():
+            found |= {t: 0.0 for t, value in ((a, samples[0]), (b, samples[-1])) if abs(value) <= noise}
+        return found
+
+    def _take_rough(self, fit):
+        """The samples, and the least between two of the same sign."""
+        good = ~np.isnan(fit.samples)
+        times, samples = fit.times[good], fit.samples[good]
+        found = dict(zip(times.tolist(), samples.tolist(), strict=True))
+        size, sign = np.abs(samples), np.sign(samples)
+        least = (
+            (size[1:-1] < size[:-2]) & (size[1:-1] < size[2:]) & (sign[:-2] == sign[1:-1]) & (sign[1:-1] == sign[2:])
+        )
+        for i in np.flatnonzero(least).tolist():
+            found.update(self._least(times[i], times[i + 2], sign[i], min(size[i], size[i + 2])))
+        self._append(found)
+
+    def _least(self, a, b, sign, scale):
+        """The least of sign times the function between a and b, as good as zero if it is AT_ZERO."""
+        from scipy.optimize import minimize_scalar  # takes a while to import
+
+        value = lambda s: sign * self._values(np.array([a + s]))[0]  # noqa: E731
+        found = minimize_scalar(value, bounds=(0.0, b - a), method="bounded", options={"xatol": 1e-9 * (b - a)})
+        if not abs(found.fun) < np.inf:
+            return {}
+        return {a + float(found.x): 0.0 if abs(found.fun) <= AT_ZERO * scale else sign * float(found.fun)}
+
+    def _append(self, found):
+        """Add values by their times; the first may be known already."""
+        if self.points and self.points[-1][0] in found:
+            t, value = self.points.pop()
+            found[t] = value if value == 0.0 else found[t]
+        self.points += sorted(found.items())

@@ -284,7 +284,7 @@ def test_command_on_an_example(capsys, tmp_path):
     arguments = ["--t-end", "1", "--method", "dop853", "--rtol", "1e-6", "--atol", "1e-6", "--outputs", "20"]
     assert main(["profile", "top", *arguments, "--no-advice", "--figure", str(figure)]) == 0
     out = capsys.readouterr().out
-    assert out.startswith("<Scene of 1 bodies")
+    assert out.startswith("<Scene of 1 rigid body")
     assert "DOP853(rtol=1e-06, atol=1e-06)" in out
     assert "times of t_eval" in out
     assert figure.exists()
@@ -298,7 +298,7 @@ def test_command_on_a_file(capsys, tmp_path):
     )
     for where in (str(file), f"{file}:scene"):
         assert main(["profile", where, "--t-end", "0.1", "--no-advice"]) == 0
-        assert "<Scene of 1 bodies: 3 coordinates" in capsys.readouterr().out
+        assert "<Scene of 1 point mass: 3 coordinates" in capsys.readouterr().out
     for where, words in (
         (f"{file}:number", "must give a ts.Scene, got 3"),
         (f"{file}:needs", "must need no argument"),

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 
 from . import friction_basis, friction_solve, linearise, maggi_kane, null_space, tangent
-from .errors import InvalidArgument
+from .checks import unknown_name
 from .network import REDUCED, is_regular, network_of
 from .still import moving_network
 
@@ -73,5 +73,5 @@ FORMULATIONS = {
 def formulation(name):
     """Return the formulation of this name."""
     if not isinstance(name, str) or name not in FORMULATIONS:
-        raise InvalidArgument(f"unknown formulation {name!r}; there are {', '.join(map(repr, FORMULATIONS))}.")
+        raise unknown_name("formulation", name, FORMULATIONS)
     return FORMULATIONS[name]

@@ -71,7 +71,7 @@ newton evaluate diagnostics
 kinematics
 state
 reactions power dense friction_balance
-control turning
+control turning holonomic
 chart rank
 branch initial start kinetic
 approach folds dependence

@@ -62,14 +62,16 @@ def _inertia(value, body):
     if skew > 1e-12:
         raise InvalidBody(f"{body.name}: the inertia matrix is not symmetric; J - J^T is up to {skew * scale:.3g}.")
     principal = np.linalg.eigvalsh(unit / 2.0 + unit.T / 2.0)
+    with np.errstate(over="ignore"):
+        moments = principal * scale
     if principal[0] < -1e-12 or scale == 0.0:
         raise InvalidBody(
-            f"{body.name}: the principal moments of inertia {principal * scale} kg m^2 must not be negative, nor all "
+            f"{body.name}: the principal moments of inertia {moments} kg m^2 must not be negative, nor all "
             "zero; a body without extent is scene.add_point_mass(...)."
         )
     if principal[2] > (principal[0] + principal[1]) * (1.0 + 1e-9):
         raise InvalidBody(
-            f"{body.name}: no body has the principal moments {principal * scale} kg m^2: the largest exceeds the sum "
+            f"{body.name}: no body has the principal moments {moments} kg m^2: the largest exceeds the sum "
             "of the others (triangle inequality). Are products of inertia or units mixed up?"
         )
     return given / 2.0 + given.T / 2.0

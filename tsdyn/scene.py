@@ -203,7 +203,8 @@ class Scene:
 
     def __getstate__(self):
         """What is packed holds addresses of this process, so it stays here."""
-        return {**self.__dict__, "_packed": None, "_start": None, "_prepared": None, "_users": None, "_spare": {}, "_waiting": {}}
+        made = {"_packed": None, "_start": None, "_prepared": None, "_users": None, "_spare": {}, "_waiting": {}}
+        return {**self.__dict__, **made}
 
     def touch(self):
         """Forget the packed numbers: something has changed."""

@@ -11,6 +11,7 @@ from .checks import one_of, positive, whole
 from .errors import InvalidArgument, Status
 from .events import prepare
 from .formulation import formulation as find_formulation
+from .holonomic import demand_holonomic
 from .integrator import registered
 from .membership import warn_of_waiting
 from .passage import run_past
@@ -146,6 +147,8 @@ def simulate(
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
     memory = remembered(state, kept, span[0], q)
     q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
+    if not form.serving(method, kept.packed).basis_free:
+        demand_holonomic(kept.packed, q, span[0], form.name)
     choose = None
     if integrator is None:
         options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol, "max_step": max_step}

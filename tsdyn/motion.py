@@ -8,6 +8,7 @@ from numba.core.errors import NumbaError
 
 from . import motions
 from ._kernel import Callback, caller, kernel, specialised
+from .calls import fitting
 from .checks import number
 from .errors import InvalidConstraint
 from .motion_program import run_program
@@ -31,6 +32,7 @@ class Motion:
         What error messages call it.
     """
 
+    @fitting
     def __init__(self, f, fd=None, fdd=None, what="motion"):
         self.what, self.smooth, self.given = what, None, (f, fd, fdd)
         if isinstance(f, Smooth) and fd is fdd is None:

@@ -1,6 +1,7 @@
 """A prescribed function of time with its two derivatives: compiled and reached by address, or a program of numbers."""
 
 import math
+from functools import partial
 from types import FunctionType
 
 import numpy as np
@@ -10,6 +11,7 @@ from . import motions
 from ._kernel import Callback, caller, kernel, specialised
 from .calls import fitting
 from .checks import number
+from .compiled_once import compiled_once
 from .errors import InvalidConstraint
 from .motion_program import run_program
 from .motions import Smooth
@@ -158,7 +160,7 @@ class Motion:
             return run_program.address, 0, 0
         try:
             if self._callbacks is None:
-                self._callbacks = tuple(_callback(function) for function in self.given)
+                self._callbacks = tuple(compiled_once("motion", f, partial(_callback, f)) for f in self.given)
             return tuple(callback.address for callback in self._callbacks)
         except NumbaError as error:
             raise InvalidConstraint(

@@ -1,6 +1,7 @@
 """A load as a function of time: a plain function of t, smooth motions, or a table, evaluated once a time of a run."""
 
 import math
+from functools import partial
 from types import FunctionType
 
 import numpy as np
@@ -9,6 +10,7 @@ from numba.core.errors import NumbaError
 from ._kernel import Callback, caller, kernel, specialised, vector
 from .calls import fitting
 from .checks import floats, number
+from .compiled_once import compiled_once
 from .errors import InvalidArgument
 from .motion_program import run_program
 from .motions import Constant, Smooth
@@ -186,7 +188,8 @@ class Signal:
             return 0
         try:
             if self._callback is None:
-                self._callback = _callback(self.source, self.width)
+                make = partial(_callback, self.source, self.width)
+                self._callback = compiled_once(f"signal{self.width}", self.source, make)
             return self._callback.address
         except NumbaError as error:
             raise self.error(

@@ -10,6 +10,7 @@ axis, too: a start there is refused. Never singular.
 
 from ..calls import Placing
 from ..bodies import Ground, PointMass, rotation_matrix
+from ..calls import Placing
 from ..framed_joint import FramedJoint
 from .dot1 import Dot1
 from .parallel import Parallel

@@ -1,6 +1,7 @@
 """A prescribed function of time with its two derivatives: compiled and reached by address, or a program of numbers."""
 
 import math
+from functools import partial
 from types import FunctionType
 
 import numpy as np
@@ -8,9 +9,10 @@ from numba.core.errors import NumbaError
 
 from . import motions
 from ._kernel import Callback, caller, kernel, specialised
+from .calls import fitting
 from .checks import number
-from .errors import InvalidArgument, InvalidConstraint
-from .knots import demand_covered, demand_followed
+from .compiled_once import compiled_once
+from .errors import InvalidConstraint
 from .motion_program import run_program
 from .motions import Piecewise, Smooth
 from .table import is_data
@@ -34,7 +36,8 @@ class Motion:
         What error messages call it.
     """
 
-    def __init__(self, f, fd=None, fdd=None, what=UNNAMED):
+    @fitting
+    def __init__(self, f, fd=None, fdd=None, what="motion"):
         self.what, self.smooth, self.given = what, None, (f, fd, fdd)
         if is_data(f) and fd is fdd is None:
             (f,) = self.components(f, 1, what)
@@ -191,7 +194,7 @@ class Motion:
             return run_program.address, 0, 0
         try:
             if self._callbacks is None:
-                self._callbacks = tuple(_callback(function) for function in self.given)
+                self._callbacks = tuple(compiled_once("motion", f, partial(_callback, f)) for f in self.given)
             return tuple(callback.address for callback in self._callbacks)
         except NumbaError as error:
             raise InvalidConstraint(

@@ -8,8 +8,8 @@ import numpy as np
 from ._cache import deep_hash
 from .assemble import assemble
 from .bodies import IDENTITY, Body, Ground, PointMass
-from .calls import fitting
-from .checks import counted, demand_known, vector3
+from .calls import fitting, fitting_methods
+from .checks import counted, demand_known, label, vector3
 from .constraints.euler_normalization import EulerNormalization
 from .editing import copy, demand_present, found, remove
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint
@@ -24,6 +24,7 @@ from .signal import Signal
 from .system import pack, user_functions
 
 
+@fitting_methods
 class Scene:
     """Bodies, constraints, forces and gravity.
 
@@ -154,7 +155,7 @@ class Scene:
             self._names = {"ground", *(body.name for body in self._bodies)}
         taken = self._names
         free = (f"body{i}" for i in count(len(self._bodies) + 1))
-        name = str(name) or next(name for name in free if name not in taken)
+        name = label(name, kind.__name__, InvalidBody) or next(name for name in free if name not in taken)
         if name in taken:
             raise InvalidBody(f"the scene has a body named {name!r} already; choose another name.")
         body = kind(self, len(self._bodies), name, **values)
@@ -206,8 +207,8 @@ class Scene:
 
     def __getstate__(self):
         """What is packed holds addresses of this process, so it stays here."""
-        gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins"))
-        return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
+        made = {"_packed": None, "_start": None, "_prepared": None, "_users": None, "_spare": {}, "_waiting": {}}
+        return {**self.__dict__, **made}
 
     def touch(self):
         """Forget the packed numbers: something has changed."""
@@ -244,7 +245,7 @@ class Scene:
     def body(self, name):
         """Return the body of this name."""
         for body in self._bodies:
-            if body.name == name:
+            if isinstance(name, str) and body.name == name:
                 return body
         raise InvalidBody(f"no body is named {name!r}; there are {', '.join(b.name for b in self._bodies) or 'none'}.")
 

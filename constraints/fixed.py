@@ -8,7 +8,6 @@ f_a and f_b are the references made perpendicular to the axes, g = axis x f. Hol
 axis, too: a start there is refused. Never singular.
 """
 
-from ..calls import Placing
 from ..bodies import Ground, PointMass, rotation_matrix
 from ..calls import Placing
 from ..framed_joint import FramedJoint

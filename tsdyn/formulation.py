@@ -5,7 +5,7 @@ from types import ModuleType
 
 from . import friction_basis, friction_solve, linearise, maggi_kane, null_space, tangent
 from .checks import unknown_name
-from .network import REDUCED, is_regular, network_of
+from .network import REDUCED, network_of
 from .still import moving_network
 
 

@@ -12,7 +12,8 @@ from ._kernel import Callback, caller, kernel, specialised
 from .calls import fitting
 from .checks import number
 from .compiled_once import compiled_once
-from .errors import InvalidConstraint
+from .errors import InvalidArgument, InvalidConstraint
+from .knots import demand_covered, demand_followed
 from .motion_program import run_program
 from .motions import Piecewise, Smooth
 from .table import is_data
@@ -37,7 +38,7 @@ class Motion:
     """
 
     @fitting
-    def __init__(self, f, fd=None, fdd=None, what="motion"):
+    def __init__(self, f, fd=None, fdd=None, what=UNNAMED):
         self.what, self.smooth, self.given = what, None, (f, fd, fdd)
         if is_data(f) and fd is fdd is None:
             (f,) = self.components(f, 1, what)

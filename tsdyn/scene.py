@@ -207,8 +207,8 @@ class Scene:
 
     def __getstate__(self):
         """What is packed holds addresses of this process, so it stays here."""
-        made = {"_packed": None, "_start": None, "_prepared": None, "_users": None, "_spare": {}, "_waiting": {}}
-        return {**self.__dict__, **made}
+        gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins"))
+        return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
 
     def touch(self):
         """Forget the packed numbers: something has changed."""

@@ -8,7 +8,6 @@ import numpy as np
 from numba.core.errors import NumbaError
 
 from ._kernel import Callback, caller, kernel, specialised, vector
-from .calls import fitting
 from .checks import floats, number
 from .compiled_once import compiled_once
 from .errors import InvalidArgument
@@ -19,52 +18,6 @@ from .table import is_data
 
 SIGNATURE = "dp"  # t, where the values go
 call_signal = caller(SIGNATURE)
-
-
-class Table:
-    """Values at given times, joined by a cubic spline (SciPy's CubicSpline, not-a-knot).
-
-    Parameters
-    ----------
-    times : array_like (k,), s
-        Increasing, at least two.
-    values : array_like (k,) or (k, 3)
-        Numbers or vectors, in the unit of what the table is given to.
-
-    Raises
-    ------
-    InvalidArgument
-        If the times don't increase, or a number is not finite, or the shapes don't match.
-    """
-
-    @fitting
-    def __init__(self, times, values):
-        self.times, self.values = floats(times), floats(values)
-        k = self.times.size
-        if self.times.ndim != 1 or k < 2 or not np.isfinite(self.times).all() or not (np.diff(self.times) > 0.0).all():
-            raise InvalidArgument("Table: times must be two or more finite times in s, each after the one before.")
-        if self.values.shape not in ((k,), (k, 3)) or not np.isfinite(self.values).all():
-            raise InvalidArgument(
-                f"Table: values must be {k} finite numbers or {k} vectors of three, one for each time; their shape is "
-                f"{np.shape(values)}."
-            )
-        from scipy.interpolate import CubicSpline  # it takes long to import
-
-        self._spline = CubicSpline(self.times, self.values, extrapolate=False)
-        self.times.setflags(write=False)
-        self.values.setflags(write=False)
-
-    def __call__(self, t):
-        """The values at a time or times; NaN outside the table."""
-        return self._spline(t)
-
-    def numbers(self):
-        """What the kernels get: the times, then for each interval the coefficients, highest power first."""
-        c = self._spline.c.reshape(4, self.times.size - 1, -1)
-        return [*self.times.tolist(), *c.transpose(1, 0, 2).ravel().tolist()]
-
-    def __repr__(self):
-        return f"<Table of {self.times.size} values, {self.times[0]:g} to {self.times[-1]:g} s>"
 
 
 class Signal:

@@ -13,6 +13,7 @@ from .events import prepare
 from .formulation import formulation as find_formulation
 from .holonomic import demand_holonomic
 from .integrator import registered
+from .knots import stops_of
 from .membership import warn_of_waiting
 from .passage import run_past
 from .prepare import prepared
@@ -148,8 +149,10 @@ def simulate(
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
     memory = remembered(state, kept, span[0], q)
     q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
-    if not form.serving(method, kept.packed).basis_free:
+    if not form.serving(method).basis_free:
         demand_holonomic(kept.packed, q, span[0], form.name)
+    stops = stops_of(kept.motions, instants_of(kept.packed, *span), *span)
+    sampling = Sampling(kept, state is not None) if sampled(kept.packed) else None
     choose = None
     if integrator is None and sampling is None:  # what is asked in Python is asked once
         options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol, "max_step": max_step}

@@ -48,7 +48,7 @@ joint_friction
 state_function
 given_load
 names
-system stepping progress
+rigid_shift system stepping progress
 handles
 still
 sparse_rows
@@ -76,7 +76,8 @@ branch initial start kinetic
 approach folds dependence
 conflict mobility
 assemble
-null_space tangent scene
+setting null_space tangent
+scene
 maggi_kane linearise driven
 series_steps
 taylor expansion_pack

@@ -28,7 +28,7 @@ class Handles:
     Attributes
     ----------
     bodies, items : tuple
-        Items are the constraints and forces, joints whole.
+        Items are the constraints and forces that have been added, joints whole.
     rows : tuple of Row
         Of the items that have joint coordinates.
     count : int
@@ -42,7 +42,9 @@ class Handles:
     def __init__(self, packed):
         places = packed.system.bodies.tolist()
         self.bodies = packed.bodies
-        self.items = tuple(member.constraint for member in packed.members) + tuple(load.force for load in packed.loads)
+        constraints = [member.constraint for member in packed.members]
+        constraints = [each for each in constraints if not getattr(each, "normalises", False)]
+        self.items = (*constraints, *(load.force for load in packed.loads))
         self._where = {body: tuple(place) for body, place in zip(self.bodies, places, strict=True)}
         self._by_item = None
         rows, joints, frames = [], [], []
@@ -68,7 +70,7 @@ class Handles:
         """A body of the scene, by handle or name."""
         if isinstance(body, str):
             return named(self.bodies, body, "body", InvalidBody)
-        if not isinstance(body, PointMass) or self.bodies[body.index : body.index + 1] != (body,):
+        if not isinstance(body, PointMass) or body not in self._where:
             raise InvalidBody(f"{body!r} is not a body of this solution's scene.")
         return body
 

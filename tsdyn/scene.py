@@ -17,6 +17,7 @@ from .joint import Joint
 from .mobility import mobility
 from .motion import Motion
 from .primitive import Primitive
+from .setting import set_joint
 from .signal import Signal
 from .system import pack, user_functions
 
@@ -255,6 +256,7 @@ class Scene:
     evaluate = evaluate
     assemble = assemble
     mobility = mobility
+    set = set_joint
 
     def __repr__(self):
         rows = sum(constraint.rows for constraint in self.constraints)

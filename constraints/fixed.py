@@ -8,6 +8,7 @@ f_a and f_b are the references made perpendicular to the axes, g = axis x f. Hol
 axis, too: a start there is refused. Never singular.
 """
 
+from ..calls import Placing
 from ..bodies import Ground, PointMass, rotation_matrix
 from ..framed_joint import FramedJoint
 from .dot1 import Dot1
@@ -58,7 +59,7 @@ class Fixed(FramedJoint):
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
         self.check()
 
-    @classmethod
+    @Placing
     def at(cls, a, b=None, *, point=None, **arguments):
         """Make one from points and directions in the ground frame; none are needed."""
         bodies = [body for body in (b, a) if isinstance(body, (PointMass, Ground))]

@@ -10,6 +10,7 @@ sin(theta)^2), theta being the turn of the shaft of a from where its arm is acro
 import numpy as np
 
 from ..attachment import in_frame
+from ..calls import Placing
 from ..errors import InvalidConstraint
 from ..joint import Joint
 from ..joint_coordinates import Angle
@@ -50,7 +51,7 @@ class Universal(Joint):
     def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
 
-    @classmethod
+    @Placing
     def at(cls, a, b=None, *, point=None, axis=None, axis_b=None, **arguments):
         """Make one from its point and axes in the ground frame, the bodies being where they stand now.
 

@@ -22,13 +22,14 @@ FILES = {
 # lowest first; a module imports from lines above its own, or from its own line
 LAYERS = """
 _code_hash _interrupts _cache errors _discovery jet truncated checks aligned chebyshev history
+calls membership
 _kernel
 _four rotation linalg motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
 vectors
 markers bodies tableau friction joint_coordinates joint_turns
 joint_motion
-poses
+poses axis_rows massless
 attachment marker_forces frames curvature body_loops
 series_loops
 force_series
@@ -70,7 +71,7 @@ newton evaluate diagnostics
 kinematics
 state
 reactions power dense friction_balance
-control turning
+control turning holonomic
 chart rank
 branch initial start kinetic
 approach folds dependence

@@ -201,14 +201,6 @@ def test_a_run_that_ends_early():
     assert said.startswith("The run ended early: The run reached max_steps.")
 
 
-def test_bodies_without_inertia():
-    scene = ts.Scene()
-    rod = scene.add_body(1.0, (1.0, 1.0, 0.0), name="rod")
-    scene.add(ts.constraints.Dot1(rod, scene.ground, axis_a=(1.0, 0.0, 0.0), axis_b=(0.0, 1.0, 0.0)))
-    scene.add(ts.constraints.Spherical(rod, scene.ground, point_a=(0, 0, 1), point_b=(0, 0, 1)))
-    assert "since about an axis rod has no inertia" in advice(scene, (0.0, 0.1))
-
-
 # what it looks like, and what it refuses
 
 
@@ -284,7 +276,7 @@ def test_command_on_an_example(capsys, tmp_path):
     arguments = ["--t-end", "1", "--method", "dop853", "--rtol", "1e-6", "--atol", "1e-6", "--outputs", "20"]
     assert main(["profile", "top", *arguments, "--no-advice", "--figure", str(figure)]) == 0
     out = capsys.readouterr().out
-    assert out.startswith("<Scene of 1 bodies")
+    assert out.startswith("<Scene of 1 rigid body")
     assert "DOP853(rtol=1e-06, atol=1e-06)" in out
     assert "times of t_eval" in out
     assert figure.exists()
@@ -298,7 +290,7 @@ def test_command_on_a_file(capsys, tmp_path):
     )
     for where in (str(file), f"{file}:scene"):
         assert main(["profile", where, "--t-end", "0.1", "--no-advice"]) == 0
-        assert "<Scene of 1 bodies: 3 coordinates" in capsys.readouterr().out
+        assert "<Scene of 1 point mass: 3 coordinates" in capsys.readouterr().out
     for where, words in (
         (f"{file}:number", "must give a ts.Scene, got 3"),
         (f"{file}:needs", "must need no argument"),

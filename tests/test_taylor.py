@@ -173,15 +173,6 @@ def test_bad_settings(settings, message):
         I.Taylor(**settings)
 
 
-def test_a_body_without_inertia_about_an_axis_is_refused_by_name():
-    scene = ts.Scene()
-    rod = scene.add_body(mass=1.0, inertia=(1.0, 1.0, 0.0), name="thin rod")
-    scene.add(C.Spherical(rod, scene.ground, point_a=(0.0, 0.0, 0.5), point_b=(0.0, 0.0, 0.5)))
-    scene.add(C.Dot1(rod, scene.ground, axis_a=(1.0, 0.0, 0.0), axis_b=(0.0, 1.0, 0.0)))
-    with pytest.raises(ts.InvalidArgument, match="thin rod: a principal moment of inertia is zero"):
-        ts.simulate(scene, (0.0, 0.1), integrator=I.Taylor())
-
-
 # the default method
 
 

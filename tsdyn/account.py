@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from .checks import counted
 from .errors import Status
 from .evaluate import constraint_arrays
 from .expansion_pack import without_series
@@ -18,7 +19,7 @@ def account(solution, scene, reason):
     """How the run of a solution ended, in words."""
     if solution.success:
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
-    steps = f"{solution.stats.steps} step{'' if solution.stats.steps == 1 else 's'}"
+    steps = counted(solution.stats.steps, "step")
     where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
     suspect = _suspect(solution, scene)
     remedy = Status.SINGULAR.remedy if suspect else solution.status.remedy

@@ -16,7 +16,6 @@ from .choice import LARGEST_PILOT
 from .errors import Status, TsdynError
 from .expansion_pack import lacking, without_series
 from .integrators import SDIRK54, Taylor
-from .network import is_regular, thin
 from .prepare import prepared
 from .profile_report import duration
 
@@ -48,7 +47,7 @@ def advise(profile, simulate, plain, options):
     plain, options : dict
         Options of the call with two outputs, and of the call as it is.
     """
-    said = [*_outputs(profile), *_around(profile), *_forces(profile), *_steps(profile), *_form(profile)]
+    said = [*_outputs(profile), *_around(profile), *_forces(profile), *_steps(profile)]
     if not profile.solution.success:
         return (f"The run ended early: {profile.solution.message}", *said)
     limit = profile.seconds * (1.0 - profile.share("outputs"))
@@ -116,14 +115,6 @@ def _steps(profile):
         )
 
 
-def _form(profile):
-    packed = prepared(profile.scene).packed
-    bodies = [body.name for body, is_thin in zip(packed.bodies, thin(packed), strict=True) if is_thin]
-    if profile.solution.formulation == "tangent" and not profile.method.implicit and bodies:
-        names = _names(bodies)
-        yield f"The scene is run with a basis, at the cost of matrices, since about an axis {names} has no inertia."
-
-
 def _alternatives(profile, run, plain, options, limit):
     """Those that were tried and found quicker than the limit, s."""
     method, solution = profile.method, profile.solution
@@ -175,7 +166,7 @@ def _series(profile, plain, limit, simulate):
         return
     said = f"Taylor series can't run this scene: {_names(without_series(packed))}."
     forces = {id(load.force) for load in packed.loads} & {id(item) for item, _ in found}
-    if len(forces) < len(found) or not is_regular(packed) or profile.seconds > LONGEST:
+    if len(forces) < len(found) or profile.seconds > LONGEST:
         yield said
         return
     bare = copy.copy(scene)

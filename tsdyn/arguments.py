@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from .checks import finite_vector, floats
+from .checks import finite_vector, floats, unknown_name
 from .errors import InvalidArgument
 from .integrator import Integrator, registered
 
@@ -66,7 +66,7 @@ def method_of(integrator, rtol, atol):
         )
     if isinstance(integrator, str):
         if _key(integrator) not in known:
-            raise InvalidArgument(f"unknown integrator {integrator!r}; there are {', '.join(map(repr, known))}.")
+            raise unknown_name("integrator", integrator, known)
         return known[_key(integrator)](**tolerances)
     if isinstance(integrator, type) and integrator in known.values():
         return integrator()

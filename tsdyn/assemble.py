@@ -6,7 +6,8 @@ import numpy as np
 
 from .approach import STAGES, Found, Kept, close, nearest, relax, settle, stuck
 from .branch import demand_aligned
-from .checks import number, positive
+from .calls import fitting
+from .checks import number, one_of, positive
 from .conflict import refuse
 from .errors import InconsistentState, InvalidArgument, InvalidBody, SingularConfiguration
 from .folds import Folds
@@ -44,6 +45,7 @@ class AssemblyReport:
     folded: tuple = ()
 
 
+@fitting
 def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
     """Move the bodies to the nearest consistent positions, then to the nearest consistent velocities.
 
@@ -82,8 +84,7 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
     tol = positive(tol, "tol")
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
-    if folds not in ("keep", "free"):
-        raise InvalidArgument(f'folds must be "keep" or "free", got {folds!r}.')
+    one_of(folds, ("keep", "free"), "folds")
     packed, (sketch, qd) = scene.packed, scene.start
     held = _held(scene, fixed)
     metric = Metric(packed, held, float(t))
@@ -124,7 +125,7 @@ def _held(scene, fixed):
     bodies = scene.system.bodies
     held = np.zeros(int(bodies[:, 1].sum()), bool)
     for body in fixed:
-        if body not in scene.bodies:
+        if not any(body is known for known in scene.bodies):
             raise InvalidBody(f"fixed: {body!r} is not a body of this scene.")
         at = int(bodies[body.index, 0])
         held[at : at + body.dimension] = True

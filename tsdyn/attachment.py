@@ -1,13 +1,19 @@
 """What constraints and forces share: two bodies, a name, markers, and attributes that are checked when they are set."""
 
+
+from inspect import CO_VARKEYWORDS, signature, unwrap
+from types import MethodType
+
 import numpy as np
 from numba.core.errors import NumbaError
 
 from ._kernel import kernel
 from .bodies import Ground, PointMass, rotation_matrix
 from .checks import demand_known, floats, number
+from .calls import Placing, complete_signature, fitting
 from .errors import InvalidConstraint
 from .markers import PARAMETERS, POINT, TURN
+from .membership import note
 
 
 class Attachment:
@@ -29,7 +35,16 @@ class Attachment:
     joint_coordinates = ()  # Angle and Displacement, see tsdyn/joint_coordinates.py
     angle_near = 0.0  # on which turn its angles begin: set by `Scene.set`
     added = False  # to its scene
+    named = False  # by its user
     owner = None  # the joint that it is a part of
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        cls.__init__ = fitting(cls.__init__, then=note)
+        if unwrap(cls.__init__).__code__.co_flags & CO_VARKEYWORDS:
+            cls.__init__.__signature__ = complete_signature(cls)
+        if "__new__" in vars(cls):  # else the signature would be that of __new__
+            cls.__signature__ = signature(MethodType(cls.__init__, cls))
 
     def __init__(self, a, b=None, coordinates=(), name=""):
         """Attach it to its bodies; coordinates has an entry for each marker, in the body frame."""
@@ -42,6 +57,7 @@ class Attachment:
                 raise self.error(
                     f"{name or kind}: {body!r} is not a body; pass one that add_body returned, or the ground."
                 )
+        self.named = bool(str(name))
         self.name = str(name) or f"{kind}({', '.join(body.name for body in bodies)})"
         if all(body.dimension == 0 for body in bodies):
             raise self.error(f"{self.name}: one of the bodies must not be the ground.")
@@ -55,7 +71,7 @@ class Attachment:
         self.coordinates = tuple(self._places(given))
         self.built = tuple(getattr(body, "values", {}).get("orientation") for body in (a, b))
 
-    @classmethod
+    @Placing
     def at(cls, a, b=None, **arguments):
         """Make one from points and directions in the ground frame, the bodies being where they stand now.
 
@@ -111,6 +127,8 @@ class Attachment:
             super().__setattr__(name, value)
             return
         demand_known(self, name, (*self.__dict__, *slots))
+        if name == "name":
+            self.scene._titles = None
         before = self.__dict__[name]
         super().__setattr__(name, value)
         try:

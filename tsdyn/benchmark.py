@@ -9,7 +9,8 @@ import numpy as np
 
 from .agreement import Reference, agreed, errors
 from .benchmark_report import Benchmark, Row
-from .checks import floats, positive, whole
+from .calls import fitting
+from .checks import floats, positive, unknown_name, whole
 from .errors import InvalidArgument, Status
 from .formulation import formulation as find_formulation
 from .integrator import Integrator, registered
@@ -17,6 +18,7 @@ from .scene import Scene
 from .simulate import simulate
 
 
+@fitting
 def benchmark(
     scene,
     methods=None,
@@ -182,7 +184,7 @@ def _plan(methods, tolerances, steps, form):
         if isinstance(method, str):
             key = method.lower().replace("-", "").replace("_", "")
             if key not in known:
-                raise InvalidArgument(f"unknown integrator {method!r}; there are {', '.join(map(repr, known))}.")
+                raise unknown_name("integrator", method, known)
             method = known[key]
         if isinstance(method, Integrator) or not callable(method):
             raise InvalidArgument(
@@ -197,7 +199,9 @@ def _plan(methods, tolerances, steps, form):
         else:
             if not tolerances:
                 raise InvalidArgument(f"{name} is adaptive: tolerances must hold at least one.")
-            plan += [(name, "tolerance", value, partial(method, value, value)) for value in tolerances]
+            by_name = isinstance(method, type)  # the second of Taylor's is its order
+            makes = [partial(method, rtol=tol, atol=tol) if by_name else partial(method, tol, tol) for tol in tolerances]
+            plan += [(name, "tolerance", tol, make) for tol, make in zip(tolerances, makes, strict=True)]
     return plan
 
 

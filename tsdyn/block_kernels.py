@@ -1,6 +1,6 @@
 """Numeric part of the sparse factorisation: block elimination in the panels that blocks.analyse laid out.
 
-    S = U^T D^-1 U    symmetric and positive definite, values hold U
+    S = U^T D^-1 U    symmetric and, but for late nodes (see blocks.py), positive definite; values hold U
     N = L D^-1 U      any other, without pivoting: `upper` holds U, `lower` holds L^T
 
 D is the diagonal of U and of L; the arrays hold its reciprocals. With U = L^T both are the same, so that one pair of
@@ -22,11 +22,14 @@ def keep_diagonal(pattern, values):
         head, step, first = heads[j], widths[j] + 1, starts[j]
         for k in range(starts[j + 1] - first):
             kept[first + k] = values[head + k * step]
+    for i in range(pattern.negative.size):
+        if kept[pattern.negative[i]] == 0.0:
+            kept[pattern.negative[i]] = -1.0
 
 
 @kernel
 def factor(pattern, values, limit):
-    """Factor S in place; S positive definite.
+    """Factor S in place; S positive definite, but for rows that are to have negative pivots.
 
     Returns -1, or the row of the eliminated vector where elimination leaves less than `limit` of a diagonal entry.
     """

@@ -2,7 +2,7 @@
 
 A step works on rows of a panel (see blocks.py) from the first pivot on, rows `width` apart: in u, or for a matrix that
 isn't symmetric in u and, transposed, in l. It puts the pivots' reciprocals in their places, and returns which pivot
-fails, or -1. `kept` holds the diagonal as it was before elimination.
+fails, or -1. `kept` holds the diagonal as it was before elimination, and its sign is the pivot's.
 """
 
 import math
@@ -14,7 +14,7 @@ from ._kernel import kernel
 def eliminate(u, size, width, n, kept, limit):
     """Eliminate up to three rows of a panel, n columns from the diagonal on; which of them fails, or -1."""
     u00 = u[0]
-    if not limit * kept[0] < u00 < math.inf:
+    if not limit * kept[0] * kept[0] < u00 * kept[0] < math.inf:
         return 0
     d0 = 1.0 / u00
     u[0] = d0
@@ -24,7 +24,7 @@ def eliminate(u, size, width, n, kept, limit):
     u01 = u[1]
     f01 = u01 * d0
     u11 = v[1] - f01 * u01
-    if not limit * kept[1] < u11 < math.inf:
+    if not limit * kept[1] * kept[1] < u11 * kept[1] < math.inf:
         return 1
     d1 = 1.0 / u11
     v[1] = d1
@@ -39,7 +39,7 @@ def eliminate(u, size, width, n, kept, limit):
     v[2] = u12
     f12 = u12 * d1
     u22 = w[2] - f02 * u02 - f12 * u12
-    if not limit * kept[2] < u22 < math.inf:
+    if not limit * kept[2] * kept[2] < u22 * kept[2] < math.inf:
         return 2
     w[2] = 1.0 / u22
     u, v, w = u[3:], v[3:], w[3:]
@@ -108,17 +108,17 @@ def link(u, values, record, kept, limit):
     o = values[record[4] :]
     p, q = o[stride:], o[2 * stride :]
     u00, u01, u02 = u[0], u[1], u[2]
-    if not limit * kept[0] < u00 < math.inf:
+    if not limit * kept[0] * kept[0] < u00 * kept[0] < math.inf:
         return 0
     d0 = 1.0 / u00
     f01, f02 = u01 * d0, u02 * d0
     u11, u12 = v[1] - f01 * u01, v[2] - f01 * u02
-    if not limit * kept[1] < u11 < math.inf:
+    if not limit * kept[1] * kept[1] < u11 * kept[1] < math.inf:
         return 1
     d1 = 1.0 / u11
     f12 = u12 * d1
     u22 = w[2] - f02 * u02 - f12 * u12
-    if not limit * kept[2] < u22 < math.inf:
+    if not limit * kept[2] * kept[2] < u22 * kept[2] < math.inf:
         return 2
     d2 = 1.0 / u22
     a0, a1, a2 = u[3], u[4], u[5]

@@ -33,9 +33,10 @@ class Pattern(NamedTuple):
     segments: np.ndarray  # pairs: first row in the eliminated vector, count; the rows that each panel reaches
     updates: np.ndarray  # of each block, the first of its records, and the end
     records: np.ndarray  # sixes: row column, rows, first column, columns in its own panel; target, target's row length
+    negative: np.ndarray  # rows of late nodes, whose pivots are below zero
 
 
-def analyse(sizes, cliques):
+def analyse(sizes, cliques, late=0):
     """Order the nodes, group them into blocks and lay out the value array.
 
     Parameters
@@ -44,6 +45,9 @@ def analyse(sizes, cliques):
         Rows of each node; zero is allowed.
     cliques : iterable of sequences of int
         Nodes that are coupled to one another.
+    late : int
+        So many nodes, the last ones, are eliminated after all others that they are coupled to. No two of them share a
+        clique.
 
     Returns
     -------
@@ -61,9 +65,26 @@ def analyse(sizes, cliques):
     """
     sizes = [int(size) for size in sizes]
     cliques = [{int(i) for i in clique if sizes[i]} for clique in cliques]
-    order = _order(sizes, [clique for clique in cliques if len(clique) > 1])
+    early = len(sizes) - late
+    others = [{i for i in clique if i < early} for clique in cliques] if late else cliques
+    order = _order(sizes[:early], [clique for clique in others if len(clique) > 1])
+    order = _with_late(order, cliques, early) if late else order
     groups = _amalgamate(sizes, order, *_tree(sizes, order, cliques))
-    return _lay_out(sizes, cliques, groups)
+    rows, pattern, where = _lay_out(sizes, cliques, groups)
+    negative = [row for i in range(early, len(sizes)) for row in range(rows[i], rows[i] + sizes[i])]
+    return rows, pattern._replace(negative=np.array(negative, np.int64)), where
+
+
+def _with_late(order, cliques, early):
+    """The order with each late node behind the last of those that it is coupled to."""
+    rank = {i: at for at, i in enumerate(order)}
+    behind, alone = {}, []
+    for clique in cliques:
+        for i in clique:
+            if i >= early:
+                others = [rank[n] for n in clique if n < early]
+                (behind.setdefault(max(others), []) if others else alone).append(i)
+    return alone + [i for at, node in enumerate(order) for i in (node, *behind.get(at, ()))]
 
 
 def _order(sizes, cliques):
@@ -297,7 +318,7 @@ def _lay_out(sizes, cliques, groups):
     shape = pack([at, length, length + at])
     return (
         rows,
-        Pattern(shape, *map(pack, (starts, heads, widths, columns, segments, updates, records))),
+        Pattern(shape, *map(pack, (starts, heads, widths, columns, segments, updates, records, ()))),
         where,
     )
 

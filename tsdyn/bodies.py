@@ -57,23 +57,24 @@ def _inertia(value, body):
             f"got {value!r}."
         )
     scale = np.abs(given).max()
-    if np.abs(given - given.T).max() > 1e-12 * scale:
+    unit = given / (scale or 1.0)  # no square or sum of its entries overflows
+    skew = np.abs(unit - unit.T).max()
+    if skew > 1e-12:
+        raise InvalidBody(f"{body.name}: the inertia matrix is not symmetric; J - J^T is up to {skew * scale:.3g}.")
+    principal = np.linalg.eigvalsh(unit / 2.0 + unit.T / 2.0)
+    with np.errstate(over="ignore"):
+        moments = principal * scale
+    if principal[0] < -1e-12 or scale == 0.0:
         raise InvalidBody(
-            f"{body.name}: the inertia matrix is not symmetric; J - J^T is up to {np.abs(given - given.T).max():.3g}."
-        )
-    given = (given + given.T) / 2.0
-    principal = np.linalg.eigvalsh(given)
-    if principal[0] < -1e-12 * scale or scale == 0.0:
-        raise InvalidBody(
-            f"{body.name}: the principal moments of inertia {principal} kg m^2 must not be negative, nor all zero; "
-            "a body without extent is scene.add_point_mass(...)."
+            f"{body.name}: the principal moments of inertia {moments} kg m^2 must not be negative, nor all "
+            "zero; a body without extent is scene.add_point_mass(...)."
         )
     if principal[2] > (principal[0] + principal[1]) * (1.0 + 1e-9):
         raise InvalidBody(
-            f"{body.name}: no body has the principal moments {principal} kg m^2: the largest exceeds the sum of the "
-            "others (triangle inequality). Are products of inertia or units mixed up?"
+            f"{body.name}: no body has the principal moments {moments} kg m^2: the largest exceeds the sum "
+            "of the others (triangle inequality). Are products of inertia or units mixed up?"
         )
-    return given
+    return given / 2.0 + given.T / 2.0
 
 
 def _orientation(value, body):

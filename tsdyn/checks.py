@@ -58,11 +58,32 @@ def whole(value, what):
     return int(value)
 
 
+def one_of(value, options, what, error=InvalidArgument):
+    """Return one of some names, or raise `error`."""
+    if not isinstance(value, str) or value not in options:
+        raise error(f"{what} must be {' or '.join(map(repr, options))}, got {value!r}.")
+    return value
+
+
+def counted(count, noun, nouns=None):
+    """A number of things, in words: 1 row, 2 rows."""
+    return f"{count} {noun if count == 1 else nouns or noun + 's'}"
+
+
+def nearest(name, known):
+    """The end of a sentence on a wrong name: the right ones that are near to it."""
+    near = difflib.get_close_matches(str(name), known, 3)
+    return f"; did you mean {' or '.join(near)}?" if near else "."
+
+
+def unknown_name(what, name, known):
+    """The error of a name that there isn't."""
+    return InvalidArgument(f"unknown {what} {name!r}; there are {', '.join(map(repr, known))}{nearest(name, known)}")
+
+
 def demand_known(owner, attribute, known):
     """Refuse to set a public attribute that the owner does not have."""
     if attribute.startswith("_") or attribute in known or hasattr(type(owner), attribute):
         return
     public = [name for name in {*known, *dir(type(owner))} if not name.startswith("_")]
-    near = difflib.get_close_matches(attribute, public, 3)
-    hint = f"; did you mean {' or '.join(near)}?" if near else "."
-    raise UnknownAttribute(f"{owner!r} has no attribute {attribute!r} to set{hint}")
+    raise UnknownAttribute(f"{owner!r} has no attribute {attribute!r} to set{nearest(attribute, public)}")

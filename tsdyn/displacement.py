@@ -9,6 +9,7 @@ import math
 
 from ._four import add, cross, first, fma, four, lanes, put, second, splat, sub, third, times, total
 from ._kernel import kernel, stack
+from .axis_rows import leave_axes_out
 from .block_kernels import factor_lu
 from .network import (
     H_BODY,
@@ -132,8 +133,9 @@ def factorise_normal(network, w, f, l):
     multiply_both(network, f.H, l.X, l.lower, l.upper)
     if network.parts.shape[0] > 0:
         _multiply_parts_both(network, l, f.H, l.lower, l.upper)
-    drop_diagonal(network, f.dropped, l.lower)
-    drop_diagonal(network, f.dropped, l.upper)
+    for values in (l.lower, l.upper):
+        drop_diagonal(network, f.dropped, values)
+        leave_axes_out(network, values)
     w.counters[FACTORIZATIONS] += 1
     return factor_lu(network.pattern, l.lower, l.upper, PIVOT_LIMIT) < 0
 

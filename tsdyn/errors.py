@@ -11,6 +11,10 @@ class InvalidArgument(TsdynError, ValueError):
     """An argument that is neither a body nor a constraint has a wrong value, type or shape."""
 
 
+class InvalidCall(InvalidArgument, TypeError):
+    """A call that the signature doesn't allow: an argument is misspelt, missing, given twice or one too many."""
+
+
 class InvalidBody(TsdynError, ValueError):
     """A body's mass, inertia, pose or velocity is impossible, or the body belongs to another scene."""
 

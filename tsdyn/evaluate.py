@@ -6,6 +6,7 @@ import numpy as np
 
 from .assembly import evaluate_constraints
 from .bodies import transform_g
+from .calls import fitting
 from .checks import finite_vector, number
 from .errors import InvalidArgument, SingularConfiguration
 from .independent import dependent_rows
@@ -38,6 +39,7 @@ class Evaluation(NamedTuple):
     qdd: np.ndarray  # (n,) accelerations
 
 
+@fitting
 def evaluate(scene, q=None, qd=None, t=0.0):
     """Evaluate constraints, masses, forces, multipliers and accelerations at one state.
 

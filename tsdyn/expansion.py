@@ -9,10 +9,11 @@
 zero for every k, factorised once a step.
 """
 
-from ._four import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times
+from ._four import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times, total
 from ._kernel import kernel
 from .block_kernels import solve
 from .linalg import copy
+from .massless import AXIS_BODY, AXIS_H, AXIS_ROW
 from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS
 from .normal import scatter, weigh
 from .poses import OMEGA, POSE, RD, R
@@ -142,11 +143,11 @@ def expand(network, system, k, last, ahead, orders, x, f):
             _turn(bodies, at, k + 2, times(four(Z, 8 * b + 4), h))
     refined = k == 0 and nb > MANY
     if refined:
-        _solve(network, system, k, orders, x, f)
+        _solve(network, system, k, orders, x, f, False)
         copy(f.b, f.gamma)
         for b in range(nb):
             _change(network, b, bodies, b * size, orders, k, g, h, Z)
-    _solve(network, system, k, orders, x, f)
+    _solve(network, system, k, orders, x, f, refined)
     if refined:
         for e in range(f.b.size):
             f.b[e] += f.gamma[e]
@@ -164,11 +165,16 @@ def expand(network, system, k, last, ahead, orders, x, f):
 
 
 @kernel
-def _solve(network, system, k, orders, x, f):
-    """b = lam_k, or what it lacks, and with it Z = -W H^T lam_k."""
+def _solve(network, system, k, orders, x, f, refined):
+    """b = lam_k, or what it lacks to gamma where it is `refined`, and with it Z = -W H^T lam_k."""
     run_loops(network, system.reals, RESIDUAL, k, orders, x.bodies, x.constraints, x.places, f.b, f.Z)
     for i in range(network.welds.shape[0]):
         f.b[network.welds[i, 0]] = 0.0
+    for i in range(network.axes.rows.shape[0]):
+        e, b = network.axes.rows[i, AXIS_ROW], network.axes.rows[i, AXIS_BODY]
+        omega = four(x.bodies, (b * BODY_ROW + S_OMEGA) * orders + 4 * (k + 1))
+        f.b[e] = (k + 1.0) * total(times(four(network.axes.values[i], AXIS_H), omega))
+        f.b[e] += f.gamma[e] if refined else 0.0
     drop(f.dropped, f.b)
     solve(network.pattern, f.S, f.b)
     for i in range(f.Z.size):

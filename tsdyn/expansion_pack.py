@@ -12,7 +12,7 @@ from .errors import InvalidConstraint, InvalidForce
 from .force_pack import F_FIRST_REAL, F_REALS, members_of
 from .markers import POINT
 from .motion import Motion
-from .network import DRIFT, N_COUNT, N_FIRST_INT, thin
+from .network import DRIFT, N_COUNT, N_FIRST_INT
 from .poses import STILL
 from .series_loops import BODY_ROW, GROUND, UNTURNED, instance_width, scratch_at
 from .series_state import Expansion
@@ -26,7 +26,6 @@ FAR = 1 << 15  # orders of all bodies, each some hundred bytes
 def refusal(packed):
     """Why a scene can't be run by Taylor series, naming each part that has none; empty where it can."""
     found = without_series(packed)
-    found += [f"{packed.bodies[i].name}: a principal moment of inertia is zero" for i in np.flatnonzero(thin(packed))]
     if not found:
         return ""
     shown = found[:SHOWN] + ([f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else [])

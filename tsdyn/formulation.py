@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 
 from . import friction_basis, friction_solve, linearise, maggi_kane, null_space, tangent
-from .errors import InvalidArgument
-from .network import REDUCED, is_regular, network_of
+from .checks import unknown_name
+from .network import REDUCED, network_of
 from .still import moving_network
 
 
@@ -18,9 +18,9 @@ class Formulation:
     first_order: bool = False
     basis_free: bool = False
 
-    def serving(self, method, packed):
-        """The form that a method runs a scene in: implicit methods, and bodies without inertia, need a basis."""
-        if self.basis_free and (method.implicit or not is_regular(packed)):
+    def serving(self, method):
+        """The form that a method runs a scene in: implicit methods need a basis."""
+        if self.basis_free and method.implicit:
             return replace(self, kernels=null_space, basis_free=False)
         return self
 
@@ -73,5 +73,5 @@ FORMULATIONS = {
 def formulation(name):
     """Return the formulation of this name."""
     if not isinstance(name, str) or name not in FORMULATIONS:
-        raise InvalidArgument(f"unknown formulation {name!r}; there are {', '.join(map(repr, FORMULATIONS))}.")
+        raise unknown_name("formulation", name, FORMULATIONS)
     return FORMULATIONS[name]

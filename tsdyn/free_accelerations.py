@@ -8,6 +8,7 @@ in terms of (r'', omega''): Q_A + S is the force and body torque less omega' x J
 from ._four import cross, fma, four, put, splat, sub, times
 from ._kernel import kernel
 from .assembly import applied_forces
+from .axis_rows import gather_axes
 from .block_kernels import solve
 from .network import BIAS
 from .normal import gather, scatter, weigh
@@ -59,6 +60,7 @@ def solve_accelerations(network, system, w, f, t):
     if f.b.size == 0:
         return
     gather(network, f.H, f.Z, f.b)
+    gather_axes(network, f.Z, f.b)
     run_loops(network, system.reals, BIAS, f, t, f.gamma, f.H)
     for e in range(f.b.size):
         f.b[e] += f.gamma[e]

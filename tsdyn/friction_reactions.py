@@ -28,7 +28,7 @@ def _solve(context, t, q, qd, r, out):
         set_time(s, t[k])
         place_bodies(bodies, q[k], f.poses)
         run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
-        found = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, RANK_LIMIT)
+        found = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, RANK_LIMIT, 0)
         take_loads(bodies, q[k], r[k], f.Z)
         for b in range(bodies.shape[0]):
             weigh(network.inverse, b, f.Z, 8 * b, f.Z, 8 * b)

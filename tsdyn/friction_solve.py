@@ -16,6 +16,7 @@ import math
 
 from ._four import add, four, put, splat, sub, times
 from ._kernel import callback, caller, kernel, long_kernel, stack
+from .axis_rows import gather_axes, multiply_axes_both
 from .block_kernels import factor_lu, solve_lu
 from .errors import Status
 from .force_loops import INTS
@@ -24,6 +25,7 @@ from .free_accelerations import body_forces
 from .friction_loops import call_normal_load, call_unit_friction
 from .friction_pack import FR_BODY, FR_COUNT, FR_FIRST, FR_INDEX, FR_KIND, FR_NORMAL, FR_ON, FR_UNIT
 from .linalg import copy, largest
+from .massless import AXIS_ROW
 from .network import BIAS
 from .normal import gather, inner, multiply_both, scatter, weigh
 from .poses import POSE, P, add_torque
@@ -143,6 +145,7 @@ def _factorise(network, f, cold):
                         put(r.X, x, sub(four(r.X, x), times(four(r.g, g), n)))
                         put(r.X, x + 4, sub(four(r.X, x + 4), times(four(r.g, g + 4), n)))
     multiply_both(network, f.H, r.X, r.lower, r.upper)
+    multiply_axes_both(network, f.H, r.X, r.lower, r.upper)
     drop_diagonal(network, f.dropped, r.lower)
     drop_diagonal(network, f.dropped, r.upper)
     return factor_lu(network.pattern, r.lower, r.upper, PIVOT_LIMIT) < 0
@@ -172,6 +175,10 @@ def find_reactions(network, system, f, q, qd, t):
         gather(network, f.H, f.Z, f.b)
         for e in range(f.b.size):
             f.b[e] += f.gamma[e]
+        gather_axes(network, f.Z, f.b)
+        for i in range(network.axes.rows.shape[0]):
+            e = network.axes.rows[i, AXIS_ROW]
+            f.b[e] += r.lam[e]
         if anew and not _factorise(network, f, size == 0.0):
             return False
         solve_lu(network.pattern, r.lower, r.upper, f.b)

@@ -3,6 +3,7 @@
 import math
 
 from ._kernel import specialised, stack
+from .checks import one_of
 from .errors import InvalidForce
 from .recurrences import rotation
 from .rotation import rotate
@@ -20,9 +21,7 @@ class Given:
 
     def take(self, value, frame, hint):
         """Take the vector over, and the frame that it is in; hint is how to write it, with its unit."""
-        if not isinstance(frame, str) or frame not in ("ground", "body"):
-            raise InvalidForce(f"{self.name}: frame must be 'ground' or 'body', got {frame!r}.")
-        self.frame = frame
+        self.frame = one_of(frame, ("ground", "body"), f"{self.name}: frame", InvalidForce)
         if value is None:
             raise InvalidForce(f"{self.name}: no {self.given} given; set {self.given}={hint}, or a function of time.")
         setattr(self, self.given, value)

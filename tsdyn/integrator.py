@@ -3,6 +3,7 @@
 from copy import copy
 from types import MappingProxyType
 
+from .calls import fitting
 from .checks import positive
 from .implicit import implicit_step
 from .interpolation import HERMITE, HERMITE_FIRST_ORDER, hermite_second
@@ -40,9 +41,12 @@ class Integrator:
 
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)
+        if "__init__" in vars(cls):
+            cls.__init__ = fitting(cls.__init__)
         if cls.order:
             _registry[cls.__name__.lower().replace("_", "")] = cls
 
+    @fitting
     def __init__(self, step):
         self.step = positive(step, f"{type(self).__name__}: step (s)")
 

@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from .attachment import Attachment
+from .checks import counted
 from .errors import InvalidConstraint
 from .markers import TURN, Marker
+from .membership import settle
 from .primitive import Primitive
 
 _registry = {}
@@ -77,6 +79,7 @@ class Joint(Attachment):
         for pair in self.compose():
             label, part = pair if isinstance(pair, tuple) and len(pair) == 2 else (None, None)
             self._demand_fit(part, pair)
+            settle(part)
             aligned += getattr(part, "opposed", ())
             parts += part.parts
             labels += [str(label)] * part.rows
@@ -138,7 +141,7 @@ class Joint(Attachment):
         return cls(a, b, **places)
 
     def __repr__(self):
-        return f"<{self.title}: {self.rows} rows>"
+        return f"<{self.title}: {counted(self.rows, 'row')}>"
 
 
 def registered():

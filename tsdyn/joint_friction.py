@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from .calls import fitting, unknown_argument
 from .checks import number
 from .errors import InvalidForce
 from .force import not_negative, positive_number
@@ -61,6 +62,7 @@ class JointFriction:
         }
     )
 
+    @fitting
     def __init__(
         self,
         joint,
@@ -77,11 +79,8 @@ class JointFriction:
         if not isinstance(joint, self.joints):
             names = " or ".join(cls.__name__ for cls in self.joints)
             raise InvalidForce(f"{name or kind}: joint must be a {names} of the scene, got {joint!r}.")
-        unknown = ", ".join(sorted(set(geometry) - set(self.quantities)))
-        if unknown:
-            raise TypeError(
-                f"{kind}() has no argument {unknown}; it has {', '.join(sorted(self.quantities))} and name."
-            )
+        for unknown in geometry.keys() - self.quantities.keys():
+            raise unknown_argument(kind, unknown, [*self.quantities, "name"])
         self.__dict__["joint"] = joint
         super().__init__(joint.a, joint.b, self.coordinates, name or f"{kind}({joint.name})")
         self.kinetic, self.static, self.preload = kinetic, static, preload

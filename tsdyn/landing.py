@@ -33,7 +33,7 @@ def factorise(network, system, w, f, t):
     """b = Phi, and H, W H^T and the factors of S, at the present poses. Status."""
     run_loops(network, system.reals, REDUCED, f, t, f.b, f.H)
     w.counters[FACTORIZATIONS] += 1
-    return OK if factorise_rows(network, system.reals, f, t, f.b, f.H, f.Y, f.S, PIVOT_LIMIT) else SINGULAR
+    return OK if factorise_rows(network, system.reals, f, t, f.b, f.H, f.Y, f.S, PIVOT_LIMIT, 1) else SINGULAR
 
 
 @long_kernel

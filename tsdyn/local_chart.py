@@ -45,7 +45,7 @@ SAME = 1e-6  # of N: factors that are off by less tell the contraction as well a
 def touch(network, system, w, f, l, t):
     """The chart at w.q: base, H0, Y0, the factors of S0. Whether the rows of H0 are independent."""
     regular = True
-    last = l.numbers[END] > 0.0 and l.numbers[END] == w.counters[PLACEMENTS]
+    last = l.numbers[END] > 0.0 and l.numbers[END] == w.counters[PLACEMENTS] and network.axes.rows.shape[0] == 0
     if last and serve_still(network, f, f.S):  # the place that was left last
         copy(f.H, l.H0)
         copy(f.Y, l.Y0)
@@ -56,7 +56,7 @@ def touch(network, system, w, f, l, t):
         run_loops(network, system.reals, REDUCED, f, t, f.b, l.H0)
         if f.b.size > 0:
             w.counters[FACTORIZATIONS] += 1
-            regular = factorise_rows(network, system.reals, f, t, f.b, l.H0, l.Y0, l.S0, PIVOT_LIMIT)
+            regular = factorise_rows(network, system.reals, f, t, f.b, l.H0, l.Y0, l.S0, PIVOT_LIMIT, 0)
     for b in range(network.bodies.shape[0]):
         at, o = b * POSE, 8 * b
         for c in range(3):

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .approach import close
-from .checks import finite_vector, number
+from .calls import fitting
+from .checks import counted, finite_vector, number
 from .dependence import divide, partners, put_aside, rank_of
 from .errors import InvalidArgument
 from .initial import demand_finite, demand_small
@@ -89,7 +90,7 @@ class Mobility:
         more = ", singular here" if self.singular else ""
         n, r = self.degrees_of_freedom, len(self.redundant)
         return (
-            f"<Mobility: {n} degree{'' if n == 1 else 's'} of freedom, rank {self.rank} of {self.rows} rows, "
+            f"<Mobility: {counted(n, 'degree')} of freedom, rank {self.rank} of {self.rows} rows, "
             f"{r or 'no'} redundant row{'' if r == 1 else 's'}{more}>"
         )
 
@@ -107,6 +108,7 @@ class Mobility:
         return f"<table><caption>Mobility</caption>{rows}</table>"
 
 
+@fitting
 def mobility(scene, q=None, t=0.0):
     """Count degrees of freedom, and name the rows that are redundant.
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import motion_program as code
+from .calls import fitting
 from .checks import floats, number
 from .errors import InvalidArgument
 from .jet import Jet
@@ -191,6 +192,7 @@ class Polynomial(Smooth):
         If they are no finite numbers.
     """
 
+    @fitting
     def __init__(self, coefficients):
         c = floats(coefficients)
         if c.ndim != 1 or not c.size or not np.isfinite(c).all():
@@ -203,6 +205,7 @@ class Polynomial(Smooth):
 class Constant(Polynomial):
     """A value that stays."""
 
+    @fitting
     def __init__(self, value):
         super().__init__(_demand(self, value=value))
 
@@ -210,6 +213,7 @@ class Constant(Polynomial):
 class Ramp(Polynomial):
     """start + rate t: uniform motion."""
 
+    @fitting
     def __init__(self, start=0.0, rate=1.0):
         super().__init__(_demand(self, start=start, rate=rate))
 
@@ -217,6 +221,7 @@ class Ramp(Polynomial):
 class Sine(Smooth):
     """offset + amplitude sin(frequency t + phase), frequency in rad/s and phase in rad."""
 
+    @fitting
     def __init__(self, amplitude, frequency, phase=0.0, offset=0.0):
         a, w, phi, c = _demand(self, amplitude=amplitude, frequency=frequency, phase=phase, offset=offset)
         wave = a * np.sin(Ramp(phi, w))
@@ -226,6 +231,7 @@ class Sine(Smooth):
 class Exponential(Smooth):
     """offset + amplitude exp(rate t), rate in 1/s."""
 
+    @fitting
     def __init__(self, amplitude, rate, offset=0.0):
         a, r, c = _demand(self, amplitude=amplitude, rate=rate, offset=offset)
         growth = a * np.exp(Ramp(0.0, r))

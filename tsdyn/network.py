@@ -15,6 +15,7 @@ from .body_loops import BODY, INTS, MASK, ROW
 from .errors import InvalidConstraint
 from .friction_pack import FR_COLUMNS, frictions_of
 from .hubs import cut
+from .massless import Axes, Share, axes_of, inverses, lean_bodies, no_axes
 from .poses import STILL
 
 # columns of Network.kinds: addresses of the loops, then where a kind's instances are
@@ -26,17 +27,16 @@ H_LEFT, H_ROWS, H_RIGHT, H_COLUMNS, H_TARGET, H_STRIDE, H_KIND, H_BODY, H_WIDTH 
 ROWS, ROWS_WELD, WELD_ROWS, WELDS = range(4)
 W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
 DROPPED = "dropped"  # in Packed.shared: the rows of a network of its own that are redundant
-THIN = 1e-12  # of the largest principal inertia: what is less is none
 
 
 class Network(NamedTuple):
-    """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H, which are zero for a weld's."""
+    """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H, which are zero where row is -1."""
 
     bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length: 7, 3, or poses.STILL of what never turns
     kinds: np.ndarray  # int64 (kinds, N_COLUMNS); more than one of a kind where instances between them are left out
     table: np.ndarray  # int64: body_loops.INTS for each instance
     sides: np.ndarray  # int64 (m, 2): the bodies of a row; nb is the ground
-    row: np.ndarray  # int64 (m,): its place among the rows of Phi; -1 for a weld's
+    row: np.ndarray  # int64 (m,): its place among the rows of Phi; -1 for a weld's or an axis's
     products: np.ndarray  # int64 (products, P_WIDTH): rows of sides that meet at a body, and where their product goes
     inverse: np.ndarray  # ((nb + 1) 16,): 1 / m and three zeros, columns of J'^-1; zero for the ground
     mass: np.ndarray  # ((nb + 1) 16,): m and three zeros, columns of J'
@@ -51,31 +51,7 @@ class Network(NamedTuple):
     frictions: np.ndarray  # int64 (frictions, FR_COLUMNS): those that follow from reactions; see friction_pack.py
     friction_rows: np.ndarray  # int64 (rows of their joints, 2): which row, and on which side its reaction is taken
     rub: np.ndarray  # int64 (1,): address of what solves for them, as the form needs it
-
-
-def thin(packed):
-    """Which bodies' inertias have no inverse: about an axis they have none; bool (nb,)."""
-    system, result = packed.system, np.zeros(len(packed.bodies), bool)
-    rigid = system.bodies[:, 1] == 7
-    principal = np.linalg.eigvalsh(system.inertia[rigid].reshape(-1, 3, 3))
-    result[rigid] = ~(principal[:, 0] > THIN * principal[:, 2])
-    return result
-
-
-def is_regular(packed):
-    """Whether all inertias can be inverted; a body without inertia about an axis needs D^T M D."""
-    return not thin(packed).any()
-
-
-def _inverses(J, mass):
-    """Of inertias (k, 3, 3); of one that has none, with as much as lets it serve as a metric."""
-    size, axes = np.linalg.eigh(J)
-    thin = ~(size[:, 0] > THIN * size[:, 2])
-    least = np.where(size[:, 2] > 0.0, 0.1 * size[:, 2], mass)
-    size = np.maximum(size, least[:, None])
-    result = (axes / size[:, None, :]) @ axes.transpose(0, 2, 1)
-    result[~thin] = np.linalg.inv(J[~thin])
-    return result
+    axes: Axes  # rows of bodies with next to no inertia about an axis
 
 
 def network_of(packed, *columns):
@@ -110,6 +86,7 @@ def no_network():
     return Network(
         pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none, parts, np.zeros(0),
         pairs, none, none, np.zeros((0, FR_COLUMNS), np.int64), pairs, np.zeros(1, np.int64),
+        no_axes(),
     )  # fmt: skip
 
 
@@ -147,7 +124,15 @@ def build(packed, still=None):
         for body in set(pair) - hubs - {nb}:
             cliques[body].append(node)
     cliques += [[*part.nodes, *(weld for weld, _ in part.welds)] for part in parts]
-    starts, pattern, where = analyse(sizes, cliques)
+    lean = {body: one for body, one in lean_bodies(packed).items() if rows[body, 1] == 7}
+    held = [(body, body, 1.0, None, []) for body in sorted(lean.keys() - hubs)]  # body, clique, scale, nodes, welds
+    held += [
+        (part.body, nb + i, part.scale, part.nodes, part.welds) for i, part in enumerate(parts) if part.body in lean
+    ]
+    for i, (_, clique, *_) in enumerate(held):
+        cliques[clique].append(len(sizes) + i)
+    sizes += [len(lean[body].axes) for body, *_ in held]
+    starts, pattern, where = analyse(sizes, cliques, len(held))
 
     m = sum(sizes)
     firsts = [int(starts[node]) + offset for node, offset in inside]
@@ -175,9 +160,12 @@ def build(packed, still=None):
                 if firsts[i] < firsts[j]:
                     products.append((*product(i, side, j, other), 0))
 
+    def at_part(body, nodes):
+        return [(i, joints[i][1].index(body)) for node in nodes for i in at_node[node]]
+
     welded, scales, welds = [], [], []
     for part in parts:
-        found = [(i, joints[i][1].index(part.body)) for node in part.nodes for i in at_node[node]]
+        found = at_part(part.body, part.nodes)
         for i, side in found:
             for j, other in found:
                 if firsts[i] <= firsts[j]:
@@ -199,6 +187,13 @@ def build(packed, still=None):
                     scales.append(sign * other_sign * part.scale)
             if sign > 0:
                 welds += [(int(starts[weld]) + r, part.body) for r in range(count)]
+
+    shares = [
+        Share(body, scale, at_body[body] if nodes is None else at_part(body, nodes), welds, len(sizes) - len(held) + i)
+        for i, (body, _, scale, nodes, welds) in enumerate(held)
+    ]
+    axes = axes_of(shares, lean, [part.rows for part, _, _ in joints], inside, starts, where)
+    sides[axes.rows[:, 0], 0] = axes.rows[:, 1]
 
     index = {id(constraint): i for i, (constraint, _, _) in enumerate(joints)}
     classes = dict.fromkeys(type(constraint) for constraint in packed.constraints)
@@ -227,7 +222,7 @@ def build(packed, still=None):
     rigid = np.flatnonzero(rows[:, 1] == 7)
     J = system.inertia[rigid].reshape(-1, 3, 3)
     spins[rigid] = (J[:, :1, :1] * np.eye(3) != J).any(axis=(1, 2))
-    for weights, matrices in ((inverse, _inverses(J, system.mass[rigid])), (mass, J)):
+    for weights, matrices in ((inverse, inverses(J, [lean.get(i) for i in rigid])), (mass, J)):
         weights[rigid, W_ROTATION:] = np.pad(matrices, ((0, 0), (0, 0), (0, 1))).reshape(-1, 12)
     frictions, friction_rows = frictions_of(
         packed, bodies, lambda part: range(firsts[index[id(part)]], firsts[index[id(part)]] + part.rows), sides
@@ -255,6 +250,7 @@ def build(packed, still=None):
         frictions=frictions,
         friction_rows=friction_rows,
         rub=np.zeros(1, np.int64),
+        axes=axes,
     )
     return network, tuple(used)
 

@@ -11,6 +11,7 @@ from ._cache import statistics
 from ._kernel import DEBUG
 from .advice import advise
 from .arguments import interval, method_of, state_arrays
+from .calls import fitting
 from .errors import InvalidArgument, Status
 from .formulation import formulation
 from .phases import Phase, of_series, of_steps, orders
@@ -28,6 +29,7 @@ LONG = 5.0  # s, of calls that are made as few times as can be
 OUTPUTS = {"t_eval": "times of t_eval", "dense_output": "dense output", "events": "events"}
 
 
+@fitting
 def profile(scene, t_span=(0.0, 10.0), *, advice=True, **options):
     """Measure where the time of `simulate(scene, t_span, **options)` goes; the scene is not changed.
 
@@ -180,7 +182,7 @@ def _once(scene, method, options, start):
     if method.driver == "series":
         kept.series  # noqa: B018
     else:
-        form = formulation(options.get("formulation", "tangent")).serving(method, kept.packed)
+        form = formulation(options.get("formulation", "tangent")).serving(method)
         form.network(kept.packed)
         kept.system(method.implicit)
     seconds["order of elimination"] = clock() - began

@@ -39,7 +39,7 @@ def solve_multipliers(context, t, q, r, rows, out):
         set_time(s, t[k])
         place_bodies(bodies, q[k], f.poses)
         run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
-        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, RANK_LIMIT)
+        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, RANK_LIMIT, 0)
         constraint_jacobian(s, q[k], t[k], rows)
         copy(r[k], f.Q)
         take_loads(bodies, q[k], r[k], f.Z)

@@ -21,7 +21,7 @@ ROUNDS = 5
 @kernel
 def _system(network, f):
     """W H^T, H W H^T and its factors."""
-    factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT)
+    factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 1)
 
 
 @entry

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._kernel import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, vector
+from .axis_rows import clear_axes
 from .body_loops import call_body_loop
 from .free import UNHELD, WEAKEST, Free, no_free
 from .network import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS, REDUCED, Network, no_network
@@ -15,7 +16,7 @@ HELD = 1e6  # times rounding: what dropped rows may be off by, as a start may
 
 @kernel
 def run_loops(network, reals, column, f, t, out, H):
-    """One of the loops of body_loops, for every kind that has it; zeros for welds and dropped rows."""
+    """One of the loops of body_loops, for every kind that has it; zeros for welds, axes and dropped rows."""
     for i in range(network.kinds.shape[0]):
         kind = network.kinds[i]
         if kind[column] != 0:
@@ -25,6 +26,7 @@ def run_loops(network, reals, column, f, t, out, H):
             )  # fmt: skip
     for i in range(network.welds.shape[0]):
         out[network.welds[i, 0]] = 0.0
+    clear_axes(network, out)
     if f.dropped[0] > 0:
         if column == REDUCED:
             _remember_unheld(f, out)
@@ -80,12 +82,12 @@ def choosing_anew(network, free):
 
 
 load_choice = loader(Choice(no_network(), no_free()))
-CHOOSE = "ppdppppd"
+CHOOSE = "ppdppppdi"
 call_choose = caller(CHOOSE)
 
 
 @kernel
-def _choose(network, f, reals, t, b, H, Y, S, limit):
+def _choose(network, f, reals, t, b, H, Y, S, limit, axes):
     """Choose others to drop, with b, H, Y = W H^T and the factors of S of the new choice; whether there are any."""
     count = f.dropped[0]
     f.dropped[0] = 0
@@ -94,20 +96,20 @@ def _choose(network, f, reals, t, b, H, Y, S, limit):
     f.dropped[0] = count
     drop_rows(f.dropped, H)
     drop(f.dropped, b)
-    regular = factor_rows(network, f, H, Y, S, limit)
+    regular = factor_rows(network, f, H, Y, S, limit, axes) < 0
     if found and regular:
         f.sizes[WEAKEST] = weakest(network, S)
     return regular
 
 
 @callback(CHOOSE)
-def choose_anew(choice, reals, t, b, H, Y, S, limit):
+def choose_anew(choice, reals, t, b, H, Y, S, limit, axes):
     """`_choose` by address: few scenes have redundant rows, and it is as long as all the rest. 1 or 0."""
     c = load_choice(choice)
     network, f = c.network, c.free
     m, size = network.row.size, network.pattern.shape[2]
     reals, b, H, Y, S = vector(reals, ANY), vector(b, m), vector(H, 16 * m), vector(Y, 16 * m), vector(S, size)
-    return 1 if _choose(network, f, reals, t, b, H, Y, S, limit) else 0
+    return 1 if _choose(network, f, reals, t, b, H, Y, S, limit, axes) else 0
 
 
 if DEBUG:
@@ -115,17 +117,17 @@ if DEBUG:
 else:
 
     @kernel
-    def _choose_by_address(network, f, reals, t, b, H, Y, S, limit):
-        return call_choose(f.anew[0], f.anew[1], reals, t, b, H, Y, S, limit) != 0
+    def _choose_by_address(network, f, reals, t, b, H, Y, S, limit, axes):
+        return call_choose(f.anew[0], f.anew[1], reals, t, b, H, Y, S, limit, axes) != 0
 
 
 @long_kernel
-def factorise_rows(network, reals, f, t, b, H, Y, S, limit):
+def factorise_rows(network, reals, f, t, b, H, Y, S, limit, axes):
     """Y = W H^T and the factors of S of the present H; of redundant rows others are chosen where these serve no more.
 
-    Whether there are any. Then b and H are those of the new choice.
+    Whether there are any. Then b and H are those of the new choice. `axes` (0 or 1) as in `selection.factor_rows`.
     """
-    regular = factor_rows(network, f, H, Y, S, limit)
+    regular = factor_rows(network, f, H, Y, S, limit, axes) < 0
     if f.dropped[0] == 0 or f.anew[0] == 0 or (regular and serve_still(network, f, S)):
         return regular  # rows may be left out for a moment of a scene that has no redundant ones
-    return _choose_by_address(network, f, reals, t, b, H, Y, S, limit)
+    return _choose_by_address(network, f, reals, t, b, H, Y, S, limit, axes)

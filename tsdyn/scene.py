@@ -8,12 +8,14 @@ import numpy as np
 from ._cache import deep_hash
 from .assemble import assemble
 from .bodies import IDENTITY, Body, Ground, PointMass
-from .checks import demand_known, vector3
+from .calls import fitting
+from .checks import counted, demand_known, vector3
 from .constraints.euler_normalization import EulerNormalization
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint
 from .evaluate import evaluate
 from .force import Force
 from .joint import Joint
+from .membership import admit, settle
 from .mobility import mobility
 from .motion import Motion
 from .primitive import Primitive
@@ -47,9 +49,11 @@ class Scene:
     orientation or velocities and run again: nothing is rebuilt but the numbers that changed.
     """
 
+    @fitting
     def __init__(self, gravity=(0.0, 0.0, -9.81)):
         self.ground = Ground(self)
         self._bodies, self._added, self._forces, self._normalisations = [], [], [], {}
+        self._waiting, self._titles = {}, None  # see membership.py
         self._names = None  # of ground and bodies; None where one may have been renamed
         self.gravity = gravity
 
@@ -89,6 +93,7 @@ class Scene:
         """The forces, in the order added."""
         return tuple(self._forces)
 
+    @fitting
     def add_body(
         self,
         mass,
@@ -135,8 +140,10 @@ class Scene:
         }
         body = self._admit(Body, name, values)
         self._normalisations[body] = EulerNormalization(body, name=f"EulerNormalization({body.name})")
+        settle(self._normalisations[body])
         return body
 
+    @fitting
     def add_point_mass(self, mass, position=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), name=""):
         """Add a particle of three coordinates and return its handle; arguments as for `add_body`."""
         return self._admit(PointMass, name, {"mass": mass, "position": position, "velocity": velocity})
@@ -177,10 +184,12 @@ class Scene:
             raise item.error(f"{item.name}: it is a part of {item.owner.title}; add that instead.")
         if isinstance(item, Joint):
             item.parts  # noqa: B018  it says what is wrong with them
+        settle(item)
         if type(item) is EulerNormalization:
             return self._normalisations[item.a]
         if item.added and any(item is other for other in members):
             raise item.error(f"{item.name}: it has been added to this scene before; add each {word} once.")
+        admit(self, item)
         item.added = True
         members.append(item)
         self.touch()
@@ -195,7 +204,7 @@ class Scene:
 
     def __getstate__(self):
         """What is packed holds addresses of this process, so it stays here."""
-        return {**self.__dict__, "_packed": None, "_start": None, "_prepared": None, "_users": None, "_spare": {}}
+        return {**self.__dict__, "_packed": None, "_start": None, "_prepared": None, "_users": None, "_spare": {}, "_waiting": {}}
 
     def touch(self):
         """Forget the packed numbers: something has changed."""
@@ -261,8 +270,11 @@ class Scene:
     def __repr__(self):
         rows = sum(constraint.rows for constraint in self.constraints)
         n = sum(body.dimension for body in self._bodies)
-        forces = f", {len(self._forces)} forces" if self._forces else ""
-        return f"<Scene of {len(self._bodies)} bodies: {n} coordinates, {rows} constraint rows{forces}>"
+        rigid = len(self._normalisations)
+        parts = [(rigid, "rigid body", "rigid bodies"), (len(self._bodies) - rigid, "point mass", "point masses")]
+        bodies = ", ".join(counted(*part) for part in parts if part[0]) or "no bodies"
+        forces = f", {counted(len(self._forces), 'force')}" if self._forces else ""
+        return f"<Scene of {bodies}: {counted(n, 'coordinate')}, {counted(rows, 'constraint row')}{forces}>"
 
 
 def _marks(users):

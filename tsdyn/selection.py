@@ -13,6 +13,7 @@ import math
 
 from ._four import put, splat
 from ._kernel import kernel, long_kernel
+from .axis_rows import leave_axes_out, multiply_axes, weigh_axes
 from .block_kernels import factor, keep_diagonal, record
 from .block_steps import eliminate, subtract_products
 from .normal import inner, multiply_rows, weigh_rows
@@ -47,12 +48,15 @@ def drop_diagonal(network, dropped, values):
 
 @kernel
 def weakest(network, values):
-    """The least share of its diagonal entry that elimination has left of a row; values are factors of S."""
+    """The least share of its diagonal entry that elimination has left of a row, axis rows not among them.
+
+    values are factors of S.
+    """
     pattern, least = network.pattern, 1.0
     kept = values[pattern.shape[1] :]
     for e in range(network.diagonal.size):
         share = values[network.diagonal[e]] * kept[e]
-        if not share * least < 1.0:
+        if not share * least < 1.0 and not kept[e] < 0.0:
             least = 1.0 / share
     return least
 
@@ -60,9 +64,11 @@ def weakest(network, values):
 @long_kernel
 def _choose_of_all(network, H, Y, wanted, least, dropped, A, order):
     """Choose among all rows at once, A (m, m) scratch; how many are dropped, those that are left less than `least`."""
-    m = network.row.size
+    m, count = network.row.size, 0
     for i in range(m):
-        order[i] = i
+        if network.row[i] >= 0:
+            order[count] = i
+            count += 1
         for j in range(i + 1):
             x = 0.0
             for k in range(2):
@@ -77,33 +83,33 @@ def _choose_of_all(network, H, Y, wanted, least, dropped, A, order):
             A[i * m + j] = A[j * m + i] = A[i * m + j] / math.sqrt(size) if size > 0.0 else 0.0
     for i in range(m):
         A[i * m + i] = 1.0 if A[i * m + i] > 0.0 else 0.0
-    rank = m
-    for k in range(m):
+    rank = count
+    for k in range(count):
         best, pivot = -1.0, k
-        for i in range(k, m):
+        for i in range(k, count):
             if A[order[i] * m + order[i]] > best:
                 best, pivot = A[order[i] * m + order[i]], i
-        if m - k <= wanted or not best > least:
+        if count - k <= wanted or not best > least:
             rank = k
             break
         order[k], order[pivot] = order[pivot], order[k]
         own = A[order[k] * m :]
-        for i in range(k + 1, m):
+        for i in range(k + 1, count):
             other = A[order[i] * m :]
             f = other[order[k]] / best
             if f != 0.0:
-                for j in range(k + 1, m):
+                for j in range(k + 1, count):
                     other[order[j]] -= f * own[order[j]]
-    for i in range(rank, m):
+    for i in range(rank, count):
         dropped[1 + i - rank] = order[i]
-    return m - rank
+    return count - rank
 
 
 @kernel
 def _choose(size, width, panel, kept, joints, share, A, order):
     """Order the rows of a block, A (size, size) scratch: the kept ones first; how many they are.
 
-    joints (size,) is negative for rows that are kept in any case, the welds of a hub.
+    joints (size,) is negative for rows that are kept in any case, the welds of a hub and the rows of axes.
     """
     for i in range(size):
         order[i] = i
@@ -194,6 +200,7 @@ def select(network, f, H, Y, S, wanted, least):
     while True:
         weigh_rows(network, H, Y)
         multiply_rows(network, H, Y, S)
+        leave_axes_out(network, S)
         count = _eliminate_choosing(network, S, share, f.chosen, f.block, f.order)
         if _settle(f, count, wanted):
             return True
@@ -203,9 +210,18 @@ def select(network, f, H, Y, S, wanted, least):
 
 
 @kernel
-def factor_rows(network, f, H, Y, S, limit):
-    """Y = W H^T and the factors of S = H W H^T, of H without the dropped rows; whether there are any."""
+def factor_rows(network, f, H, Y, S, limit, axes):
+    """Y = W H^T and the factors of S = H W H^T, of H without the dropped rows; the row that fails, or -1.
+
+    Without the `axes` W is that of the inertias given, which serves as a metric; accelerations need them.
+    """
     weigh_rows(network, H, Y)
     multiply_rows(network, H, Y, S)
     drop_diagonal(network, f.dropped, S)
-    return factor(network.pattern, S, limit) < 0
+    if network.axes.rows.shape[0] > 0:
+        weigh_axes(network, Y)
+        if axes:
+            multiply_axes(network, H, Y, S)
+        else:
+            leave_axes_out(network, S)
+    return factor(network.pattern, S, limit)

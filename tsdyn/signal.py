@@ -7,6 +7,7 @@ import numpy as np
 from numba.core.errors import NumbaError
 
 from ._kernel import Callback, caller, kernel, specialised, vector
+from .calls import fitting
 from .checks import floats, number
 from .errors import InvalidArgument
 from .motion_program import run_program
@@ -32,6 +33,7 @@ class Table:
         If the times don't increase, or a number is not finite, or the shapes don't match.
     """
 
+    @fitting
     def __init__(self, times, values):
         self.times, self.values = floats(times), floats(values)
         k = self.times.size

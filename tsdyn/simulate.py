@@ -6,11 +6,14 @@ import numpy as np
 
 from . import choice
 from .arguments import interval, method_of, output_times, state_arrays
-from .checks import positive, whole
+from .calls import fitting
+from .checks import one_of, positive, whole
 from .errors import InvalidArgument, Status
 from .events import prepare
 from .formulation import formulation as find_formulation
+from .holonomic import demand_holonomic
 from .integrator import registered
+from .membership import warn_of_waiting
 from .passage import run_past
 from .prepare import prepared
 from .progress import reporter
@@ -23,6 +26,7 @@ from .task import Task
 DRIVERS = {"steps": run_past, "series": run_series}  # by Integrator.driver, if it isn't one itself; see tsdyn.task
 
 
+@fitting
 def simulate(
     scene,
     t_span,
@@ -109,6 +113,7 @@ def simulate(
     """
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
+    warn_of_waiting(scene, 3)
     span = interval(t_span)
     form = find_formulation(formulation)
     chart_interval = whole(chart_interval, "chart_interval")
@@ -127,8 +132,7 @@ def simulate(
         method = method.bounded(positive(max_step, "max_step (s)"))
     constraint_tol = positive(constraint_tol, "constraint_tol")
     initial_tol = positive(initial_tol, "initial_tol")
-    if redundancy not in ("drop", "refuse"):
-        raise InvalidArgument(f"redundancy must be 'drop' or 'refuse', got {redundancy!r}.")
+    one_of(redundancy, ("drop", "refuse"), "redundancy")
     for name, value in (("dense_output", dense_output), ("history", history)):
         if not isinstance(value, (bool, np.bool_)):
             raise InvalidArgument(f"{name} must be True or False, got {value!r}.")
@@ -143,6 +147,8 @@ def simulate(
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
     memory = remembered(state, kept, span[0], q)
     q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
+    if not form.serving(method).basis_free:
+        demand_holonomic(kept.packed, q, span[0], form.name)
     choose = None
     if integrator is None:
         options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol, "max_step": max_step}

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import diagnostics, power, reactions, uniqueness
 from .account import account
-from .checks import floats
+from .checks import counted, floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .friction_reactions import with_normal_loads
 from .kinematics import Anchor, Kinematics
@@ -335,12 +335,14 @@ class Solution(Kinematics):
 
     def _facts(self):
         s = self.stats
-        sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement" if s.newton_iterations else ""
+        sweeps = f", {counted(s.newton_iterations, 'Newton sweep')}" if s.newton_iterations else ""
+        if sweeps and s.placements:  # series place none
+            sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement"
         return {
-            "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {self.t.size} outputs",
+            "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self.t.size, 'output')}",
             "method": f"{self.method}, formulation {self.formulation}",
-            "steps": f"{s.steps}, {s.rejected} rejected, {s.charts} charts",
-            "work": f"{s.evaluations} evaluations, {s.placements} placements{sweeps}",
+            "steps": f"{s.steps}, {s.rejected} rejected, {counted(s.charts, 'chart')}",
+            "work": f"{counted(s.evaluations, 'evaluation')}, {counted(s.placements, 'placement')}{sweeps}",
             "time": f"{s.seconds['run']:.3g} s, {s.seconds['prepare']:.2g} s to prepare",
         }
 
@@ -358,5 +360,6 @@ class Solution(Kinematics):
         s = self.stats
         return (
             f"<Solution: {self.status.name.lower()} at t = {self._reached:g} s by {self.method}, {self.formulation}: "
-            f"{s.steps} steps, {s.evaluations} evaluations, {s.charts} charts, {s.seconds['run']:.3g} s>"
+            f"{counted(s.steps, 'step')}, {counted(s.evaluations, 'evaluation')}, {counted(s.charts, 'chart')}, "
+            f"{s.seconds['run']:.3g} s>"
         )

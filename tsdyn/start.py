@@ -2,17 +2,18 @@
 
 import numpy as np
 
-from . import initial
 from ._kernel import entry, kernel, resident
 from .assembly import set_time
-from .block_kernels import factor, solve
+from .axis_rows import is_axis
+from .block_kernels import solve
 from .errors import RedundantConstraints, SingularConfiguration, Status
 from .evaluate import constraint_arrays
 from .free_memory import allocate_free
 from .initial import ROUNDING, demand_finite, demand_small
 from .landing import PIVOT_LIMIT, factorise, find_drift, gather_speeds, land, land_velocities, move_by
-from .network import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, is_regular, network_of
-from .normal import gather, multiply_rows, scatter, weigh_rows
+from .massless import axis_of
+from .network import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, network_of
+from .normal import gather, scatter
 from .poses import move_bodies, place_bodies, write_positions, write_velocities
 from .rank import check_rank
 from .rows import run_loops
@@ -49,9 +50,7 @@ def _look(context, q, qd, t, velocity):
     gather(network, f.H, f.Z, velocity)
     for e in range(velocity.size):
         velocity[e] += f.gamma[e]
-    weigh_rows(network, f.H, f.Y)
-    multiply_rows(network, f.H, f.Y, f.S)
-    return factor(network.pattern, f.S, PIVOT_LIMIT)
+    return factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 0)
 
 
 @entry
@@ -79,7 +78,19 @@ def _choose(context, share):
     f = c.free
     select(c.network, f, f.H, f.Y, f.S, -1, share)
     drop_rows(f.dropped, f.H)
-    return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, PIVOT_LIMIT) else -1
+    return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 0) < 0 else -1
+
+
+@entry
+def _hold_axes(context, q, t):
+    """The row of an axis without inertia that the rows which are kept leave free at q, or -1."""
+    c = load_parts(context)
+    network, f = c.network, c.free
+    set_time(c.system, t)
+    place_bodies(network.bodies, q, f.poses)
+    run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)
+    failed = factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 1)
+    return failed if is_axis(network, f.S, failed) else -1
 
 
 @entry
@@ -121,13 +132,10 @@ def _farthest(c):
 def consistent(scene, system, q, qd, t, tol, allowed=False):
     """Check positions and velocities against the constraints, then remove what rounding is left. Returns (q, qd).
 
-    As `initial.consistent`, which serves bodies without inertia and names what depends on what; positions and
-    velocities change by the least in the metric of kinetic energy. Where redundant rows are `allowed` and there are
-    some, the networks of the packed scene drop them from now on.
+    Positions and velocities change by the least in the metric of kinetic energy. Where redundant rows are `allowed` and
+    there are some, the networks of the packed scene drop them from now on.
     """
     packed = scene.packed
-    if not is_regular(packed):
-        return initial.consistent(scene, system, q, qd, t, tol)
     start = _Start(scene, system, q, qd, t, tol)
     dependent = start.check()
     if dependent >= 0 and not allowed:
@@ -139,6 +147,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         if known is not None:  # another start had too many rows
             drop(packed, None)
             start = start.again()
+        start.demand_inertia()
         settle(packed, start.network, start.free.H)
         return start.landed()
     if known is None:
@@ -180,6 +189,25 @@ class _Start:
         tol = self.tol * (1.0 + np.abs(self.qd).max())
         demand_small(self.scene, self.velocity, tol, "velocity", "Phi_q qd + Phi_t")
 
+    def loose_axis(self):
+        """The row of an axis without inertia that the rows which are kept leave free; -1 where there is none."""
+        return _hold_axes(self.context, self.q, self.t) if len(self.network.axes.rows) else -1
+
+    def demand_inertia(self):
+        """Refuse an axis that nothing holds and that carries no inertia."""
+        self.refuse_axis(self.loose_axis())
+
+    def refuse_axis(self, row):
+        """By body and axis; -1 is none."""
+        if row < 0:
+            return
+        body, axis = axis_of(self.network.axes, row)
+        raise SingularConfiguration(
+            f"{self.scene.bodies[body].name}: turning about the axis {np.round(axis, 3) + 0.0} of its frame is free "
+            "and carries no inertia, so the accelerations are not determined. Give it inertia about that axis, or add "
+            "the constraint that holds it."
+        )
+
     def again(self):
         """The same on the network as it is made now."""
         other = _Start(*self.given)
@@ -209,25 +237,31 @@ class _Start:
     def redundant_rows(self):
         """The rows that follow from others, here and near by; a singular configuration is refused."""
         names, row, H = self.scene.row_names(), self.network.row, self.free.H.reshape(-1, 16)
-        gone = np.flatnonzero(~H.any(axis=1))
+        gone = np.flatnonzero(~H.any(axis=1) & (row >= 0))
         if gone.size:
             _refuse_vanished(names[row[gone[0]]])
         way = np.random.default_rng(0).normal(size=(len(self.network.bodies) + 1, 8))
         way[:, :3] *= max(self.packed.size, 1e-3)
         way[-1] = way[:, 3] = way[:, 7] = 0.0
+        loose = -1
         for share in SHARES:
             self.free.dropped[0] = 0
             _look(self.context, self.q, self.qd, self.t, self.rates)
             if _choose(self.context, share) < 0:
                 raise SingularConfiguration(NO_CHOICE)
+            loose = self.loose_axis()
+            if loose >= 0:
+                continue
             rows = self.free.dropped[1 : 1 + self.free.dropped[0]].copy()
             if self.hold_near_by(way.ravel()):
                 return rows
+        self.refuse_axis(loose)
         which = ", ".join(names[i] for i in sorted(row[rows])[:8])
-        free = int(np.where(self.network.bodies[:, 1] == 7, 6, 3).sum()) - row.size + rows.size
+        count = int((row >= 0).sum())
+        free = int(np.where(self.network.bodies[:, 1] == 7, 6, 3).sum()) - count + rows.size
         raise SingularConfiguration(
-            f"Phi_q has lost rank in this configuration, and has not near by: of {row.size} rows of the joints "
-            f"{row.size - rows.size} are independent here ({which} follow{'s' if rows.size == 1 else ''} from the "
+            f"Phi_q has lost rank in this configuration, and has not near by: of {count} rows of the joints "
+            f"{count - rows.size} are independent here ({which} follow{'s' if rows.size == 1 else ''} from the "
             f"others), so {free} directions are free at this point and fewer next to it. Branches of the motion meet "
             "here, and which it takes is not determined: start from another configuration, on the branch that you mean."
         )

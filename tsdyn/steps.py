@@ -34,7 +34,7 @@ def run_steps(task, observe=None, relay=None):
     With a `Relay` it ends with Status.PASSAGE next to a singular configuration that there is a way past.
     """
     prepared, method = task.prepared, task.method
-    form = task.form.serving(method, prepared.packed)
+    form = task.form.serving(method)
     task = task._replace(form=form)
     steps = None if method.step is None else step_count(*task.span, method.step)
     packed, n, m = prepared.packed, prepared.n, prepared.m

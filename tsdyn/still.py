@@ -14,7 +14,7 @@ import numpy as np
 from .free_memory import MOST_ROWS
 from .markers import PARAMETERS, VECTOR
 from .motion import Motion
-from .network import DROPPED, N_COUNT, N_FIRST_REAL, N_REALS, build, is_regular, network_of, with_loops
+from .network import DROPPED, N_COUNT, N_FIRST_REAL, N_REALS, build, network_of, with_loops
 from .system import FIRST_REAL, classes
 
 # in Packed.shared, as tuples: `network.drop` takes them out
@@ -111,7 +111,7 @@ def instances(packed, network):
 def _find(packed):
     """From the ground outwards, body by body."""
     joints, held, holding = _joints(packed), {len(packed.bodies)}, {}
-    ways = list(held) if joints[-1] and is_regular(packed) else []
+    ways = list(held) if joints[-1] else []
     turning = packed.shared.get(TURNING, set()) | _rubbing(packed)
     while ways:
         for _, pair, rows in joints[ways.pop()]:

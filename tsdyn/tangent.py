@@ -15,6 +15,7 @@ import math
 
 from ._kernel import callback, kernel, vector
 from .assembly import is_rheonomic, set_time
+from .axis_rows import is_axis
 from .block_kernels import solve, solve_lu
 from .displacement import (
     displace,
@@ -52,7 +53,7 @@ from .workspace import (
     load,
 )
 
-OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
+OK, SINGULAR, MASS_SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR), int(Status.MASS_SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
 CHART_LOST, UNHELD = int(Status.CHART_LOST), int(Status.UNHELD)
 COLUMNS = REDUCED, VALUES, BIAS, DRIFT  # the loops of a network that are called
@@ -85,8 +86,9 @@ def place(context, t, x):
         return status
     if f.b.size > 0:
         w.counters[FACTORIZATIONS] += 1
-        if not factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT):
-            return SINGULAR
+        failed = factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 1)
+        if failed >= 0:
+            return MASS_SINGULAR if is_axis(network, f.S, failed) else SINGULAR
     if s.forces.shape[0] > 0:
         write_positions(network.bodies, f.poses, w.q)
     return OK
@@ -157,6 +159,10 @@ def solve_velocities(network, s, w, f, l, t):
     if rheonomic:
         run_loops(network, s.reals, DRIFT, f, t, l.drift, f.H)
     factored = l.numbers[FACTORED] > 0.0
+    if not factored and network.axes.rows.shape[0] > 0:  # S is of another metric than the chart
+        if not factorise_normal(network, w, f, l):
+            return False
+        factored, l.numbers[FACTORED], l.numbers[OFF] = True, 1.0, 0.0
     lower, upper = l.lower if factored else f.S, l.upper if factored else f.S
     floor, before = 0.0, math.inf
     for sweep in range(SWEEPS):

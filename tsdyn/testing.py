@@ -7,10 +7,11 @@ import numpy as np
 
 from ._kernel import twin
 from .diagnostics import constraint_rows
-from .errors import CheckFailed, InvalidArgument, TsdynError
+from .errors import CheckFailed, InvalidArgument, InvalidCall, TsdynError
 from .evaluate import constraint_arrays
 from .force_check import check_force
 from .integrator_checks import check_integrator
+from .jet import Jet
 from .joint import Joint
 from .motion import Motion
 from .primitive import Primitive
@@ -19,6 +20,9 @@ from .series_check import check_constraint_series
 
 STEP = 1e-40  # of complex steps: no cancellation, so as small as can be
 TOLERANCE = 1e-11  # relative to the size of what is compared
+NOT_HOLONOMIC = (
+    " A row on velocities that is the rate of no phi is not holonomic; constraints are functions of positions and time."
+)
 _AXES = "xyz"
 
 
@@ -29,7 +33,8 @@ def check_primitive(kind, *, seed=0, states=3):
     ----------
     kind : Primitive or Joint subclass, or callable (a, b) -> Primitive or Joint
         Of a joint every part is checked, then all together. A class is tried with its own `example(rng, a, b)`.
-        Primitives that have markers on a only get b too and may ignore it.
+        Primitives that have markers on a only get b too and may ignore it. The kernels of a primitive that has no
+        `example` of its own are checked with its parameters changed at random, too: defaults hide errors.
     seed : int
         Of the random states.
     states : int
@@ -39,7 +44,8 @@ def check_primitive(kind, *, seed=0, states=3):
     ------
     CheckFailed
         If an entry of jacobian, phi_t or gamma, or of the assembled Phi_q, Phi_t or gamma, is not the derivative that
-        it should be, or the compiled kernel differs from the Python one.
+        it should be, the compiled kernel differs from the Python one, or a kernel compares or leaves its arrays. A row
+        whose jacobian is of no phi is not holonomic, and refused too.
 
     Notes
     -----
@@ -57,7 +63,9 @@ def check_primitive(kind, *, seed=0, states=3):
             name = f"{type(constraint).__name__} ({arrangement})"
             for part in constraint.parts:
                 own = name if part is constraint else f"{type(part).__name__} in {name}"
-                _check_kernels(part, own, rng)
+                _check_kernels(part, own, rng, part.parameters())
+                if type(part).example.__func__ is Primitive.example.__func__:
+                    _check_perturbed(part, own, rng)
             _check_assembled(scene, constraint, name, rng)
             check_constraint_series(scene, constraint, name, rng)
 
@@ -74,7 +82,7 @@ def _instance(kind, arrangement, rng):
     if isinstance(kind, type) and issubclass(kind, (Primitive, Joint)):
         if arrangement != "body to body" and not any(m.body == "b" for m in kind.markers):
             return scene, None
-        constraint = kind.example(rng, a, b)
+        constraint = _example(kind, rng, a, b)
     elif callable(kind):
         try:
             constraint = kind(a, b)
@@ -89,17 +97,48 @@ def _instance(kind, arrangement, rng):
     return scene, scene.add(constraint)
 
 
+def _example(kind, rng, a, b):
+    try:
+        return kind.example(rng, a, b)
+    except InvalidCall as error:
+        raise CheckFailed(
+            f"{kind.__name__}: no example could be made ({error}); give the argument a default, or write a classmethod "
+            "example(cls, rng, a, b) that returns a random valid instance."
+        ) from error
+
+
+def _check_perturbed(constraint, name, rng):
+    """The kernels with other numbers as par: where they are defaults such as 1, a power of them can't be told."""
+    timed = "phi_t" in type(constraint).kernels  # zeros may be the rates of what stands still
+    par = [
+        p if isinstance(p, Motion) or (timed and p == 0.0) else p * rng.uniform(0.5, 2.0) if p else rng.normal()
+        for p in constraint.parameters()
+    ]
+    if par == list(constraint.parameters()):
+        return
+    try:
+        _check_kernels(constraint, name, rng, par)
+    except CheckFailed as error:
+        numbers = ", ".join("a motion" if isinstance(p, Motion) else f"{p:.6g}" for p in par)
+        raise CheckFailed(
+            f"{error} This is with par = ({numbers}), changed at random; where such parameters can't be, write a "
+            "classmethod example(cls, rng, a, b) that returns a random valid instance."
+        ) from error
+
+
 def _unit(rng):
     p = rng.normal(size=4)
     return p / np.linalg.norm(p)
 
 
-def _check_kernels(constraint, name, rng):
+def _check_kernels(constraint, name, rng, par):
     kind = type(constraint)
-    written = [name for name in ("phi", "jacobian", "gamma", "phi_t") if name in kind.kernels]
-    f = SimpleNamespace(**{name: _python(getattr(kind, name), constraint, name) for name in written})
+    written = [kernel for kernel in ("phi", "jacobian", "gamma", "phi_t") if kernel in kind.kernels]
+    f = SimpleNamespace(**{kernel: _python(constraint, kernel, name, par) for kernel in written})
     size = sum(m.size for m in kind.markers)
     x, xd, t = rng.normal(size=size), 10.0 * rng.normal(size=size), rng.uniform(0.1, 2.0)
+    for kernel in written:
+        _demand_no_comparison(getattr(f, kernel), kernel, name, kind.rows, x, xd, t)
     # entries are named by the argument that places their marker
     labels = [
         f"{m.argument}, component {_AXES[i] if m.size == 3 else f'e{i}'}" for m in kind.markers for i in range(m.size)
@@ -107,6 +146,7 @@ def _check_kernels(constraint, name, rng):
 
     Phi_x = np.zeros((kind.rows, size))
     f.jacobian(x, t, Phi_x)
+    fixed = _vector(f.phi, kind.rows, x, t) == _vector(f.phi, kind.rows, x + xd, t)
     for j in range(size):
         step = np.zeros(size, complex)
         step[j] = 1j * STEP
@@ -119,7 +159,8 @@ def _check_kernels(constraint, name, rng):
                 "x. Write np.sqrt(x[0] ** 2 + ...) for a norm."
             )
         for i in range(kind.rows):
-            _compare(name, f"jacobian[{i}, {j}] (d phi[{i}] / d {labels[j]})", Phi_x[i, j], expected[i], Phi_x)
+            entry = f"jacobian[{i}, {j}] (d phi[{i}] / d {labels[j]})"
+            _compare(name, entry, Phi_x[i, j], expected[i], Phi_x, NOT_HOLONOMIC if fixed[i] else "")
 
     expected = _vector(f.phi, kind.rows, x, t + 1j * STEP).imag / STEP
     if hasattr(f, "phi_t"):
@@ -145,23 +186,45 @@ def _check_kernels(constraint, name, rng):
         _compare(name, f"gamma[{i}]", gamma[i], expected[i], scale)
 
 
-def _python(function, constraint, name):
+def _python(constraint, kernel, name, given):
     """The kernel as a Python function of (x, t, out), or (x, t, out, xd), with par filled in."""
-    plain = twin(function)
+    plain = twin(getattr(type(constraint), kernel))
 
     def call(x, t, out, *xd):
-        par = [part for value in constraint.parameters() for part in _parts(value, t)] + [0.0] * constraint.memory
+        par = [part for value in given for part in _parts(value, t)] + [0.0] * constraint.memory
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error", np.exceptions.ComplexWarning)
                 plain(x, *xd, par, t, out)
         except (TypeError, np.exceptions.ComplexWarning) as error:
             raise CheckFailed(
-                f"{type(constraint).__name__}: {name} can't be run on complex numbers ({error}); use arithmetic and "
-                "NumPy functions (np.sin, not math.sin), and no comparison, abs or norm of x."
+                f"{name}: {kernel} can't be run on complex numbers ({error}); use arithmetic and NumPy functions "
+                "(np.sin, not math.sin), and no comparison, abs or norm of x."
             ) from error
+        except IndexError as error:
+            raise CheckFailed(
+                f"{name}: {kernel} reads or writes outside its arrays ({error}): x has {len(x)} entries, par, which is "
+                f"what parameters() returns, has {len(par)}, and out the shape {np.shape(out)}."
+            ) from error
+        except ArithmeticError as error:
+            raise CheckFailed(f"{name}: {kernel} raises {type(error).__name__} at a random x: {error}.") from error
 
     return call
+
+
+def _demand_no_comparison(function, kernel, name, rows, x, xd, t):
+    """Refuse a kernel that compares x or xd, or takes its absolute value: Jets have no order."""
+    x, xd = ([Jet(value) for value in part] for part in (x, xd))
+    out = np.full((rows, len(x)) if kernel == "jacobian" else rows, 0.0, object)
+    try:
+        function(x, t, out, *([xd] if kernel == "gamma" else []))
+    except CheckFailed as error:
+        reason = str(error.__cause__)
+        if "not supported between instances" in reason or "for abs()" in reason:
+            raise CheckFailed(
+                f"{name}: {kernel} compares x, or takes its absolute value ({reason}); a kernel goes through the same "
+                "smooth formulas for every x, with np.sqrt(x[0] ** 2 + ...) for a norm."
+            ) from error
 
 
 def _parts(value, t):
@@ -202,10 +265,10 @@ def _check_assembled(scene, constraint, name, rng):
             _compare(name, f"compiled Phi_q[{i}, {j}] ({coordinate})", Phi_q[i, j], expected[i], Phi_q)
 
 
-def _compare(name, entry, got, expected, scale):
+def _compare(name, entry, got, expected, scale, remark=""):
     size = max(1.0, np.abs(expected), np.abs(scale).max(initial=0.0))
     if not abs(got - expected) <= TOLERANCE * size:
-        raise CheckFailed(f"{name}: {entry} is {got:.15g} and should be {np.real(expected):.15g}.")
+        raise CheckFailed(f"{name}: {entry} is {got:.15g} and should be {np.real(expected):.15g}.{remark}")
 
 
 __all__ = ["CheckFailed", "check_force", "check_integrator", "check_primitive"]

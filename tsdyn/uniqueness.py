@@ -47,7 +47,7 @@ def find_rows(network, s, f, q, t, whole):
     set_time(s, t)
     place_bodies(network.bodies, q, f.poses)
     run_loops(network, s.reals, REDUCED, f, t, f.b, f.H)
-    regular = factorise_rows(network, s.reals, f, t, f.b, f.H, f.Y, f.S, LEAST)
+    regular = factorise_rows(network, s.reals, f, t, f.b, f.H, f.Y, f.S, LEAST, 0)
     count = f.dropped[0]
     f.dropped[0] = 0
     run_loops(network, s.reals, REDUCED, f, t, f.b, whole)

@@ -44,11 +44,11 @@ class PointForce(Given, Force):
     loads = ("force",)
     given = "force"
 
-    def __new__(cls, a=None, *, force=None, frame="ground", **others):
+    def __new__(cls, *others, force=None, frame="ground", **more):
         """Choose the kernel by frame and by the sort of the force."""
         if cls is PointForce and arguments_of(force) == 2:
             cls = _StatePointForce
-        elif cls is PointForce and frame == "body":
+        elif cls is PointForce and isinstance(frame, str) and frame == "body":
             cls = _BodyPointForce
         return super().__new__(cls)
 

@@ -44,11 +44,11 @@ class Torque(Given, Force):
     loads = ("torque",)
     given = "torque"
 
-    def __new__(cls, a=None, *, torque=None, frame="ground", **others):
+    def __new__(cls, *others, torque=None, frame="ground", **more):
         """Choose the kernel by frame and by the sort of the torque."""
         if cls is Torque and arguments_of(torque) == 2:
             cls = _StateTorque
-        elif cls is Torque and frame == "body":
+        elif cls is Torque and isinstance(frame, str) and frame == "body":
             cls = _BodyTorque
         return super().__new__(cls)
 

@@ -1,0 +1,145 @@
+"""Every result through everything that a user may ask of it, for every method, and all that README and docs say to run."""
+
+import itertools
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from examples import door, slider_crank, stick_slip, top
+from journeys import displayed, visit
+
+import tsdyn as ts
+
+ROOT = Path(__file__).parents[1]
+METHODS = [None, *sorted(kind.__name__.lower() for kind in ts.integrators.registered() if "tsdyn" in kind.__module__)]
+FORMS = ("tangent", "null-space", "maggi-kane")
+
+
+def bobs():
+    """Point masses alone, on a rope, with a spring."""
+    scene = ts.Scene()
+    a = scene.add_point_mass(1.0, position=(1.0, 0.0, 0.0), name="a")
+    b = scene.add_point_mass(0.5, position=(1.0, 1.0, 0.0), name="b")
+    scene.add(ts.constraints.Distance(a, scene.ground, name="rope"))
+    scene.add(ts.forces.Spring(a, b, stiffness=30.0, name="spring"))
+    return scene
+
+
+def motor():
+    """A driven hinge, and a pendulum on it with a spring that counts turns."""
+    scene = ts.Scene()
+    hub = scene.add_body(1.0, (0.1, 0.1, 0.1), name="hub")
+    hinge = scene.add(ts.constraints.Revolute.at(scene.ground, hub, point=(0, 0, 0), axis=(0, 0, 1), name="hinge"))
+    angle = ts.motions.Ramp(0.0, 2.0) + ts.motions.Sine(0.1, 3.0) - 0.3 * ts.motions.Ramp(0.0, 1.0)
+    scene.add(ts.constraints.RotationMotor.of(hinge, angle=angle, name="motor"))
+    hub.angular_velocity = (0.0, 0.0, 2.0)
+    arm = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0), velocity=(0.0, 2.0, 0.0), name="arm")
+    arm.angular_velocity = (0.0, 0.0, 2.0)
+    pin = scene.add(ts.constraints.Revolute.at(hub, arm, point=(0.5, 0, 0), axis=(0, 1, 0), name="pin"))
+    scene.add(
+        ts.forces.TorsionalSpring(
+            hub, arm, axis_a=pin.axis_a, reference_a=(1, 0, 0), reference_b=(1, 0, 0), stiffness=2.0, damping=0.1,
+            name="coil",
+        )
+    )  # fmt: skip
+    return scene
+
+
+SCENES = {
+    "point masses": bobs,
+    "one body": top.build,
+    "redundant": door.build,
+    "driven": motor,
+    "friction": stick_slip.build,
+    "loop": slider_crank.build,
+}
+SMOOTH = [name for name in SCENES if name != "friction"]
+
+
+def options(index):
+    """With and without t_eval, dense output, events and histories, so that two of them meet in some run."""
+    t_eval, dense, events, history = list(itertools.product((False, True), repeat=4))[index % 16]
+    return {
+        "t_eval": [0.0, 0.013, 0.03] if t_eval else None,
+        "dense_output": dense,
+        "events": (lambda t, state: state.q[0] - 0.4 * t, lambda t, state: t - 0.011) if events else None,
+        "history": history,
+    }
+
+
+def runs():
+    """Method, form, scene, options: every method with every scene, the options in turn."""
+    cases = [(m, "tangent", s) for m in METHODS for s in SCENES if s != "friction" or m != "taylor"]
+    explicit = [m for m in METHODS if m not in (None, "taylor", "sdirk54", "implicittrapezoid")]
+    cases += [(m, f, s) for f in FORMS[1:] for m, s in zip(itertools.cycle(explicit), SCENES, strict=False)]
+    return [(*case, 3 * i + i // 16) for i, case in enumerate(cases)]
+
+
+@pytest.mark.parametrize(("method", "form", "scene", "index"), runs(), ids=str)
+def test_every_result_answers_everything(method, form, scene, index):
+    scene, given = SCENES[scene](), options(index)
+    solution = ts.simulate(scene, (0.0, 0.03), integrator=method, formulation=form, initial_tol=1e-6, **given)
+    assert solution.success, solution.message
+    if given["events"]:
+        assert solution.t_events[1] == pytest.approx([0.011], abs=1e-12)
+    visit(scene, solution)
+    went_on = ts.simulate(scene, (0.03, 0.04), integrator=method, formulation=form, state=solution.state)
+    assert went_on.raise_if_failed().t[-1] == 0.04
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_what_a_scene_tells(scene):
+    scene = SCENES[scene]()
+    for thing in (scene, scene.mobility(), scene.evaluate(), scene.assemble(), scene.ground):
+        displayed(thing)
+    for thing in (*scene.bodies, *scene.constraints, *scene.forces):
+        displayed(thing)
+        assert scene[thing.name] is thing
+
+
+def test_a_run_that_fails_tells_as_much():
+    scene = top.build()
+    ended = ts.simulate(scene, (0.0, 1.0), max_steps=3, dense_output=True)
+    displayed(ended)
+    assert not ended.success
+    assert ended.reached < 1.0
+    with pytest.raises(ts.StepFailure) as caught:
+        ended.raise_if_failed()
+    assert caught.value.solution is ended
+    assert np.isfinite(ended.at(ended.reached).q).all()
+
+
+def snippets():
+    """Python of README and docs, a session a file: later blocks may use names of earlier ones."""
+    for file in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+        blocks = re.findall(r"```python\n(.*?)```", file.read_text(), re.DOTALL)
+        if blocks:
+            yield pytest.param(blocks, id=file.stem)
+
+
+@pytest.mark.parametrize("blocks", list(snippets()))
+def test_snippets_run(blocks, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    for i, block in enumerate(blocks):
+        file = tmp_path / f"snippet_{i}_{abs(hash(str(tmp_path)))}.py"
+        file.write_text(block)
+        exec(compile(block, str(file), "exec"), {"__name__": file.stem, "__file__": str(file)})
+
+
+def test_commands_of_the_docs_exist():
+    """Modules and verbs that README and docs name in commands."""
+    from tsdyn.cli import main
+
+    for file in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+        for command in re.findall(r"`([^`\n]+)`", file.read_text()):
+            words = command.split()
+            if words[:2] == ["python", "-m"] and words[2] != "pytest":
+                module = ROOT.joinpath(*words[2].split("."))
+                assert module.with_suffix(".py").exists() or (module / "__main__.py").exists(), command
+            if words[0] == "tsdyn" and len(words) > 1:
+                with pytest.raises(SystemExit) as ended:
+                    main([shlex.split(command)[1], "--help"])
+                assert ended.value.code == 0, command

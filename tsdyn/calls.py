@@ -1,0 +1,131 @@
+"""Calls of public functions and classes: one that doesn't fit the signature says what would.
+
+`fitting` wraps a function and costs nothing where a call fits; `Placing` is the descriptor of `.at`, which gives every
+class a signature of its own.
+"""
+
+import inspect
+from functools import wraps
+from types import MethodType
+
+from .checks import nearest
+from .errors import InvalidCall
+
+KEYWORD, OPEN = inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.VAR_KEYWORD
+BY_POSITION = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+
+
+def unknown_argument(title, name, known):
+    """The error of a keyword that a call doesn't have."""
+    return InvalidCall(f"{title}() has no argument {name}{nearest(name, known)} It has {', '.join(known)}.")
+
+
+def fitting(function, then=None):
+    """Wrap a public function, or an `__init__`: a call that doesn't fit its signature raises InvalidCall.
+
+    `then` is called with an instance when its `__init__` has ended, that of its own class.
+    """
+
+    @wraps(function)
+    def call(*arguments, **keywords):
+        try:
+            result = function(*arguments, **keywords)
+            if then is not None and type(arguments[0]).__init__ is call:
+                then(arguments[0])
+            return result
+        except TypeError as error:
+            if isinstance(error, InvalidCall):
+                raise
+            title, known = function.__name__, inspect.signature(call)
+            if title == "__init__":
+                title = getattr(arguments[0], "_kind", lambda: type(arguments[0]).__name__)()
+            misfit = misfit_of(title, known, arguments, keywords)
+            if misfit is None:
+                raise
+        raise misfit
+
+    return call
+
+
+def misfit_of(title, signature, arguments, keywords):
+    """The InvalidCall of a call that a signature doesn't allow, or None."""
+    try:
+        signature.bind(*arguments, **keywords)
+        return None
+    except TypeError as error:
+        reason = str(error)
+    known = [p for p in signature.parameters.values() if p.name not in ("self", "cls") and p.kind != OPEN]
+    names = [p.name for p in known]
+    for name in keywords:
+        if name not in names:
+            return unknown_argument(title, name, names)
+    places = [p.name for p in known if p.kind in BY_POSITION]
+    given = len(arguments) - (len(places) < sum(p.kind in BY_POSITION for p in signature.parameters.values()))
+    if given > len(places):
+        others = ", ".join(f"{p.name}=" for p in known if p.kind == KEYWORD)
+        first = f"takes {', '.join(places)} by position" if places else "takes nothing by position"
+        return InvalidCall(f"{title}() {first}, got {given} arguments there; name the others: {others or 'none'}.")
+    return InvalidCall(f"{title}(): {reason}. Its arguments are {', '.join(names)}.")
+
+
+def complete_signature(cls):
+    """The signature of a class, what its __init__ passes on by **keywords filled in from its bases."""
+    signature = inspect.signature(cls.__init__)
+    parameters = dict(signature.parameters)
+    for base in cls.__mro__[1:]:
+        opened = [name for name, p in parameters.items() if p.kind == OPEN]
+        if not opened:
+            break
+        if "__init__" in vars(base) and base is not object:
+            del parameters[opened[0]]
+            for name, p in inspect.signature(base.__init__).parameters.items():
+                if p.kind in (KEYWORD, OPEN):
+                    parameters.setdefault(name, p)
+    order = sorted(parameters.values(), key=lambda p: p.kind)  # stable
+    return signature.replace(parameters=order)
+
+
+class Placing:
+    """Decorate `at`: a classmethod whose signature has the arguments of the class that it is asked of.
+
+    A point or an axis that both bodies have, `point_a` and `point_b`, may be given once, as `point`.
+    """
+
+    def __init__(self, function):
+        self.function, self._made = function, {}
+        self.__doc__ = function.__doc__
+
+    def __get__(self, instance, owner):
+        if owner not in self._made:
+            self._made[owner] = self._of(owner)
+        return MethodType(self._made[owner], owner)
+
+    def _of(self, owner):
+        @wraps(self.function)
+        def at(cls, *arguments, **keywords):
+            try:
+                return self.function(cls, *arguments, **keywords)
+            except TypeError:
+                misfit = misfit_of(f"{cls._kind()}.at", at.__signature__, (cls, *arguments), keywords)
+                if misfit is None:
+                    raise
+            raise misfit
+
+        del at.__wrapped__
+        at.__qualname__ = f"{owner.__qualname__}.at"
+        at.__signature__ = self._signature(owner)
+        return at
+
+    def _signature(self, owner):
+        own = inspect.signature(self.function).parameters
+        whole = complete_signature(owner).parameters
+        first = [inspect.Parameter("cls", BY_POSITION[1])]
+        first += [p for name, p in whole.items() if name != "self" and p.kind in BY_POSITION]
+        keywords = {name: p for name, p in own.items() if p.kind == KEYWORD}
+        markers = [marker.argument for marker in owner.markers]
+        for name in markers:
+            common = name[:-2]
+            if name.endswith("_a") and f"{common}_b" in markers:
+                keywords.setdefault(common, inspect.Parameter(common, KEYWORD, default=None))
+        keywords |= {name: p for name, p in whole.items() if p.kind in (KEYWORD, OPEN) and name not in keywords}
+        return inspect.Signature([*first, *sorted(keywords.values(), key=lambda p: p.kind)])

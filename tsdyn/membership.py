@@ -1,0 +1,44 @@
+"""Which constraints and forces have been made for a scene, which of them were added, and by what names."""
+
+import warnings
+
+SHOWN = 5
+
+
+def note(item):
+    """A constraint or force has been made: it waits to be added to its scene, or to become a part of a joint."""
+    item.scene._waiting[id(item)] = item
+
+
+def settle(item):
+    """It waits no longer."""
+    item.scene._waiting.pop(id(item), None)
+
+
+def warn_of_waiting(scene, stacklevel):
+    """Warn, once, of what was made for a scene and never added."""
+    if not scene._waiting:
+        return
+    titles = [item.title for item in scene._waiting.values()]
+    scene._waiting.clear()
+    more = f" and {len(titles) - SHOWN} more" if len(titles) > SHOWN else ""
+    warnings.warn(
+        f"made for this scene and never added: {', '.join(titles[:SHOWN])}{more}. What scene.add(...) isn't given has "
+        "no effect.",
+        stacklevel=stacklevel + 1,
+    )
+
+
+def admit(scene, item):
+    """Give an item that is added a name of its own, or refuse the one that its user gave it and another has."""
+    taken = scene._titles
+    if taken is None:
+        taken = scene._titles = {other.name for other in (*scene._added, *scene._forces)}
+    if item.name in taken and item.named:
+        raise item.error(f"the scene has a constraint or force named {item.name!r} already; choose another name.")
+    name, count = item.name, 1
+    while name in taken:
+        name, count = f"{item.name} #{count + 1}", count + 1
+    taken.add(name)
+    if name != item.name:
+        item.name = name

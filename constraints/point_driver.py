@@ -11,6 +11,7 @@ from ..errors import InvalidConstraint
 from ..joint import Joint
 from ..markers import Point
 from ..motion import Motion
+from ..table import is_data
 from .dot2 import Dot2
 
 
@@ -26,7 +27,8 @@ class PointDriver(Joint):
     point_b : array_like (3,), m
         The point that is led, in the frame of b.
     path : sequence of three, m
-        The coordinates along the axes of a: one of ts.motions, a function f of time or three (f, fd, fdd), or a float.
+        The coordinates along the axes of a: one of ts.motions, a function f of time or three (f, fd, fdd), data, or a
+        float. Or data of vectors: a ts.Table, a spline of SciPy's, or (t, x) with x (k, 3).
     name : str, optional
 
     Raises
@@ -49,6 +51,8 @@ class PointDriver(Joint):
     def __setattr__(self, name, value):
         """Set an attribute, checked."""
         if name == "path":
+            if is_data(value):
+                value = Motion.components(value, 3, f"{self.name}: path")
             if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 3:
                 raise InvalidConstraint(
                     f"{self.name}: path must be three motions or numbers, the coordinates along the axes of a, got "

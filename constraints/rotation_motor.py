@@ -28,7 +28,8 @@ class RotationMotor(FramedJoint):
         The axis, in the bodies' own frames; scaled to unit length.
     reference_a, reference_b : array_like (3,), optional
         Directions beside the axis, in the bodies' own frames; the angle goes from the first to the second about the
-        axis (right hand). What is left out follows from the bodies as they stand now: their angle is that at t = 0.
+        axis (right hand). What is left out follows from the bodies as they stand now: their angle is that at t = 0,
+        or at the time nearest to it that data cover.
     angle : one of ts.motions, a function f of time or three (f, fd, fdd), or float, rad
         The angle of b against a.
     name : str, optional
@@ -63,7 +64,7 @@ class RotationMotor(FramedJoint):
     ):
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
         self.angle = angle
-        set_apart(self, reference_a is None, reference_b is None, self.angle.value(0.0)[0])
+        set_apart(self, reference_a is None, reference_b is None, Motion.at_start(self.angle))
         self.check()
 
     def __setattr__(self, name, value):

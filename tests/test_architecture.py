@@ -21,10 +21,10 @@ FILES = {
 }
 # lowest first; a module imports from lines above its own, or from its own line
 LAYERS = """
-_code_hash _interrupts _cache errors _discovery jet truncated checks aligned chebyshev history
+_code_hash _interrupts _cache errors _discovery jet truncated checks aligned chebyshev history mesh shapes
 calls membership
 _kernel
-_four rotation linalg motion motions motion_program signal angle recurrences
+_four rotation linalg pieces table knots motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
 vectors
 markers bodies tableau friction joint_coordinates joint_turns
@@ -47,6 +47,7 @@ framed_joint
 force
 joint_friction
 state_function
+joint_load
 given_load
 names
 rigid_shift system stepping progress
@@ -57,6 +58,7 @@ assembly interpolation constraints.* forces.*
 expansion
 workspace run_state
 outputs independent
+stops
 series_state
 implicit
 integrator
@@ -77,15 +79,16 @@ branch initial start kinetic
 approach folds dependence
 conflict mobility
 assemble
-setting null_space tangent
+setting null_space tangent editing
 scene
 maggi_kane linearise driven
 series_steps
+series_stops
 taylor expansion_pack
 series_memory
 series_dense
 formulation run
-memory prepare task
+memory prepare task sampling
 sign_search events drive work account
 watch
 relay

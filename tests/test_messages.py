@@ -29,7 +29,10 @@ def two():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda s, a, b: C.Revolute(a, b, pont_a=(0, 0, 0)), r"Revolute\(\) has no argument pont_a; did you mean point_a"),
+        (
+            lambda s, a, b: C.Revolute(a, b, pont_a=(0, 0, 0)),
+            r"Revolute\(\) has no argument pont_a; did you mean point_a",
+        ),
         (lambda s, a, b: C.Revolute.at(a, b, pont=0), r"Revolute\.at\(\) has no argument pont; did you mean point "),
         (lambda s, a, b: C.Revolute.at(a, b, (0, 0, 0)), r"Revolute\.at\(\) takes a, b by position, .*point=, axis="),
         (lambda s, a, b: C.Universal.at(a, b, axs=0), r"Universal\.at\(\) has no argument axs; did you mean axis"),
@@ -38,10 +41,16 @@ def two():
         (lambda s, a, b: F.PointForce(a, forse=(0, 0, 1)), "did you mean force"),
         (lambda s, a, b: F.RevoluteFriction(a, radus=1.0), "did you mean radius"),
         (lambda s, a, b: F.ContactFriction(a), r"ContactFriction\(\): missing .*kinetic"),
-        (lambda s, a, b: s.add_body(mas=1.0, inertia=(1, 1, 1)), r"add_body\(\) has no argument mas; did you mean mass"),
+        (
+            lambda s, a, b: s.add_body(mas=1.0, inertia=(1, 1, 1)),
+            r"add_body\(\) has no argument mas; did you mean mass",
+        ),
         (lambda s, a, b: s.add_body(1.0), r"add_body\(\): missing .*inertia"),
         (lambda s, a, b: ts.Scene(gravty=(0, 0, 0)), r"Scene\(\) has no argument gravty; did you mean gravity"),
-        (lambda s, a, b: ts.simulate(s, (0, 1), t_evel=[1]), r"simulate\(\) has no argument t_evel; did you mean t_eval"),
+        (
+            lambda s, a, b: ts.simulate(s, (0, 1), t_evel=[1]),
+            r"simulate\(\) has no argument t_evel; did you mean t_eval",
+        ),
         (lambda s, a, b: ts.simulate(s), r"simulate\(\): missing .*t_span"),
         (lambda s, a, b: s.assemble(fixd=()), r"assemble\(\) has no argument fixd; did you mean fixed"),
         (lambda s, a, b: I.RK45(rtoll=1e-3), r"RK45\(\) has no argument rtoll; did you mean rtol"),

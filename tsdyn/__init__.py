@@ -6,7 +6,7 @@ _here = _Path(__file__).parent
 if not (_here / "constraints").is_dir():  # a checkout: they stand beside this folder
     __path__.append(str(_here.parent))
 
-from . import constraints, forces, integrators, motions, testing  # noqa: E402
+from . import constraints, forces, integrators, motions, shapes, testing  # noqa: E402
 from ._kernel import kernel  # noqa: E402
 from .benchmark import benchmark  # noqa: E402
 from .bodies import Body, PointMass  # noqa: E402
@@ -40,10 +40,10 @@ from .markers import Parameters, Point, Turn, Vector  # noqa: E402
 from .motion import Motion  # noqa: E402
 from .primitive import Primitive  # noqa: E402
 from .scene import Scene  # noqa: E402
-from .signal import Table  # noqa: E402
 from .simulate import simulate  # noqa: E402
 from .solution import Solution  # noqa: E402
 from .state import State  # noqa: E402
+from .table import Table  # noqa: E402
 from .tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau  # noqa: E402
 
 __version__ = "0.1.0"
@@ -95,6 +95,7 @@ __all__ = [
     "motions",
     "plots",
     "profile",
+    "shapes",
     "simulate",
     "testing",
 ]

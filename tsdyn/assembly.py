@@ -7,9 +7,9 @@ from .curvature import SIGNATURE as CURVATURE_SIGNATURE
 from .force_loops import JACOBIAN as FORCE_JACOBIAN_SIGNATURE
 from .force_pack import F_COUNT, F_FIRST_INT, F_FIRST_REAL, F_KEPT, F_REALS, F_REMEMBER, FORCE, FORCE_JACOBIAN
 from .motion import call_motion
-from .motion_program import call_smooth
+from .motion_program import HOLD, call_smooth
 from .primitive import call_kind
-from .signal import call_signal, spline
+from .signal import call_signal
 from .system import COUNT, CURVATURE, FIRST_INT, FIRST_REAL, GAMMA, JACOBIAN, PHI, PHI_T, REALS
 
 call_curvature = caller(CURVATURE_SIGNATURE)
@@ -31,16 +31,26 @@ def set_time(s, t):
                 s.reals[place + j] = call_motion(s.motions[i, j], t)
             total += abs(s.reals[place + j])
     for i in range(s.signals.shape[0]):
-        address, place, width, first, knots = s.signals[i]
-        if knots < 0:
+        address, place, width, first = s.signals[i]
+        if first >= 0:
             call_smooth(address, s.reals[first:], t, 1, s.reals[place:])
-        elif address != 0:
-            call_signal(address, t, s.reals[place:])
         else:
-            spline(t, s.reals[first:], knots, width, s.reals[place:])
+            call_signal(address, t, s.reals[place:])
         for j in range(width):
             total += abs(s.reals[place + j])
     return total < math.inf
+
+
+@kernel
+def hold_pieces(s, t):
+    """Let piecewise motions and signals stay with their pieces at t, whatever time is set from now on."""
+    for i in range(s.motions.shape[0]):
+        if s.motions[i, 1] == 0:
+            call_smooth(s.motions[i, 0], s.reals[s.motions[i, 4] :], t, HOLD, s.reals)
+    for i in range(s.signals.shape[0]):
+        address, _, _, first = s.signals[i]
+        if first >= 0:
+            call_smooth(address, s.reals[first:], t, HOLD, s.reals)
 
 
 @kernel

@@ -1,6 +1,5 @@
 """What constraints and forces share: two bodies, a name, markers, and attributes that are checked when they are set."""
 
-
 from inspect import CO_VARKEYWORDS, signature, unwrap
 from types import MethodType
 

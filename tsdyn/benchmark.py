@@ -200,7 +200,9 @@ def _plan(methods, tolerances, steps, form):
             if not tolerances:
                 raise InvalidArgument(f"{name} is adaptive: tolerances must hold at least one.")
             by_name = isinstance(method, type)  # the second of Taylor's is its order
-            makes = [partial(method, rtol=tol, atol=tol) if by_name else partial(method, tol, tol) for tol in tolerances]
+            makes = [
+                partial(method, rtol=tol, atol=tol) if by_name else partial(method, tol, tol) for tol in tolerances
+            ]
             plan += [(name, "tolerance", tol, make) for tol, make in zip(tolerances, makes, strict=True)]
     return plan
 

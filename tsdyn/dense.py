@@ -221,12 +221,15 @@ class Trajectory:
         q, qd, qdd there, for a run that has made no step.
     angles : ndarray (count,)
         Of the joints, there.
+    stops : ndarray (stops, 2)
+        Of the `Task`: at one where a function is asked the step counts that begins there, as for outputs.
     """
 
-    def __init__(self, reading, blocks, charts, points, start, first, angles):
+    def __init__(self, reading, blocks, charts, points, start, first, angles, stops):
         self.reading = reading
         self.blocks, self.charts, self.points = blocks, charts, points
         self.start, self.first, self.angles = start, first, angles
+        self.asked = stops[stops[:, 1] != 0.0, 0]
 
     @property
     def end(self):
@@ -244,6 +247,8 @@ class Trajectory:
         if not len(self.blocks):
             return np.repeat(self.first[None], t.size, axis=0), np.zeros((t.size, slots)), Status.SUCCESS
         rows = np.searchsorted(self.blocks[:, B_END], t)
+        if self.asked.size:
+            rows = np.minimum(rows + np.isin(t, self.asked), len(self.blocks) - 1)
         order = np.argsort(rows, kind="stable")  # so that a chart is made once
         out = np.empty((t.size, *self.first.shape))
         reader, *arguments = self.reading

@@ -41,7 +41,7 @@ def drive(memory, task, watch):
     """
     run, numbers, times, choose = memory.run, memory.run.numbers, task.times, task.choose
     t0, t1 = task.span
-    limit = int(numbers[STEPS_WANTED]) if task.max_steps is None else task.max_steps
+    limit = int(numbers[STEPS_WANTED]) + len(task.stops) if task.max_steps is None else task.max_steps
     per_step, dense = times.size == 0, numbers[DENSE] == STORED
     n, block = run.now.shape[1], run.block.size
     most = min(max(FIRST_WORK // memory.weight, 1), FIRST_SLICE)
@@ -53,7 +53,9 @@ def drive(memory, task, watch):
     def room(rows, out, charts, points):
         """A record for the next slice, of so many rows, besides what goes on being filled."""
         out = np.empty((rows + 1, width)) if per_step else out
-        return Record(times, out, np.empty((rows, 3)), charts, points, np.empty((rows if dense else 0, block)))
+        return Record(
+            times, task.stops, out, np.empty((rows, 3)), charts, points, np.empty((rows if dense else 0, block))
+        )
 
     rows = min(most, limit)
     charts, points = np.zeros((2 * CHART_ROOM, 5)), np.zeros((2 * CHART_ROOM if numbers[DENSE] else 0, n))
@@ -107,6 +109,7 @@ def drive(memory, task, watch):
             status = Status.INTERRUPTED
     finally:
         task.report(None)
+    reason = reason or getattr(memory, "reason", "")
     _collect(numbers, record, chunks, per_step, dense, steps)
     if not dense:
         _pass_by(numbers, record.charts, record.points, steps, passed)

@@ -79,6 +79,7 @@ class Status(IntEnum):
     UNHELD = 14
     JAMMED = 15
     PASSAGE = 16
+    SAMPLING_FAILED = 17
 
     def __str__(self):
         return self.name.lower()
@@ -144,5 +145,9 @@ _SENTENCES = {
     ),
     Status.STIFF: ("The motion is stiff, and an implicit method is cheaper.", "Use SDIRK54."),
     Status.SLICE_DONE: ("A slice of the run is done.", ""),
+    Status.SAMPLING_FAILED: (
+        "A function that is sampled gave no number.",
+        "Mend it, or return a finite float for every angle and rate.",
+    ),
     Status.PASSAGE: ("A singular configuration is near, and there is a way past it.", ""),
 }

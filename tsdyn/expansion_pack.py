@@ -16,8 +16,9 @@ from .network import DRIFT, N_COUNT, N_FIRST_INT
 from .poses import STILL
 from .series_loops import BODY_ROW, GROUND, UNTURNED, instance_width, scratch_at
 from .series_state import Expansion
-from .signal import Signal, Table
+from .signal import Signal
 from .still import instances
+from .table import is_data
 
 SHOWN = 5  # in a message
 FAR = 1 << 15  # orders of all bodies, each some hundred bytes
@@ -71,7 +72,7 @@ def _given_by(item, kind):
     """Which attribute is a function of time, or a table."""
     for name, value in vars(item).items():
         if isinstance(value, kind) and not getattr(value, "has_series", False):
-            table = isinstance(getattr(value, "source", None), Table)
+            table = is_data(getattr(value, "source", None))
             return f"its {name} is {'a table' if table else 'a function of time'}"
     return "it has a function of time"
 

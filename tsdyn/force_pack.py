@@ -7,13 +7,12 @@ import numpy as np
 from .attachment import address, checked_parameters
 from .errors import InvalidForce
 from .force_loops import AT, DIMENSION, INTS, kept_size
-from .signal import Signal, Table
+from .signal import Signal
 
 # columns of System.forces: three addresses, then where a kind's instances are
 FORCE, FORCE_JACOBIAN, F_COUNT, F_REALS, F_FIRST_INT, F_FIRST_REAL, F_REMEMBER, F_KEPT, FORCE_COLUMNS = range(9)
-# columns of System.signals: the function's address, zero for a table; its places in reals; a table's numbers in reals
-S_ADDRESS, S_PLACE, S_WIDTH, S_FIRST, S_KNOTS = range(5)
-PROGRAM = -1  # of knots: the numbers are a motion's program
+# columns of System.signals: the address of what runs; its places in reals; where a motion's program begins there, or -1
+S_ADDRESS, S_PLACE, S_WIDTH, S_FIRST, SIGNAL_COLUMNS = range(5)
 
 
 class Load(NamedTuple):
@@ -39,7 +38,7 @@ def pack_forces(forces, where, table, reals):
     for force in forces:
         groups.setdefault(id(force.kernels), []).append(force)  # user functions have kernels of their own
     rows, signals, memory, normals, loads = [], [], [], [], {}
-    tables, programs = {}, []
+    programs = []
     for members in groups.values():
         kernels = members[0].kernels
         force_address = _address(members[0], "force")
@@ -54,13 +53,11 @@ def pack_forces(forces, where, table, reals):
                 if not isinstance(value, Signal):
                     reals.append(float(value))
                     continue
-                for i, motion in enumerate(value.smooth):
-                    signals.append([value.address, len(reals) + i, 1, 0, PROGRAM])
+                for i, motion in enumerate(value.motions):
+                    signals.append([value.address, len(reals) + i, 1, -1])
                     programs.append((signals[-1], motion))
-                if not value.smooth:
-                    signals.append([value.address, len(reals), value.width, 0, 0])
-                if isinstance(value.source, Table):
-                    tables.setdefault(id(value.source), (value.source, []))[1].append(signals[-1])
+                if not value.motions:
+                    signals.append([value.address, len(reals), value.width, -1])
                 reals += [np.nan] * value.width  # until the time is set
             if force.memory:
                 memory.append(len(reals))
@@ -79,13 +76,12 @@ def pack_forces(forces, where, table, reals):
             normal = len(normals) - 1 if "normal_load" in kernels else -1
             loads[id(force)] = Load(force, parameters, force.coordinates, row, slot, normal)
         rows.append([force_address, 0, len(members), stride, *first, remember, 0])
-    for source, users in tables.values():
-        for signal in users:
-            signal[S_FIRST], signal[S_KNOTS] = len(reals), source.times.size
-        reals += source.numbers()
+    begins = {}
     for signal, motion in programs:
-        signal[S_FIRST] = len(reals)
-        reals += motion.program()
+        if id(motion) not in begins:  # one program for all that are given the same
+            begins[id(motion)] = len(reals)
+            reals += motion.program()
+        signal[S_FIRST] = begins[id(motion)]
     return rows, signals, memory, normals, tuple(loads[id(force)] for force in forces)
 
 
@@ -111,7 +107,7 @@ def find_forces(system, loads):
             one[[FORCE, FORCE_JACOBIAN, F_REMEMBER]] = row[[FORCE, FORCE_JACOBIAN, F_REMEMBER]]
             rows[id(load)] = load._replace(row=one)
             for value in load.parameters:
-                for _ in range(max(len(value.smooth), 1) if isinstance(value, Signal) else 0):
+                for _ in range(max(len(value.motions), 1) if isinstance(value, Signal) else 0):
                     next(signals)[S_ADDRESS] = value.address
     return tuple(rows[id(load)] for load in loads)
 

@@ -18,6 +18,7 @@ add, cross, dot, spin, subtract = map(twin, (vectors.add, vectors.cross, vectors
 to_body, to_ground, seen, rate_of = map(
     twin, (vectors.to_body, vectors.to_ground, joint_turns.seen, joint_turns.rate_of)
 )
+TURN_ROUND = 2.0 * np.pi
 ZERO, IDENTITY = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 
 
@@ -68,6 +69,11 @@ class BodyMotion:
     def point(self, s, level):
         """x = r + A s, or its first or second derivative."""
         return add(self.centroid(level), self.arm(s, level))
+
+
+def counted(value, near):
+    """An angle on the turn that lies nearest to another."""
+    return value + TURN_ROUND * np.round((near - value) / TURN_ROUND)
 
 
 def angle(geometry, own, other, level):

@@ -10,8 +10,6 @@ from .checks import vector3
 from .diagnostics import angular_velocity
 from .errors import InvalidArgument
 
-TURN_ROUND = 2.0 * np.pi
-
 
 class Anchor(NamedTuple):
     """A point of the run in the same step, from which the turns of the joints' angles are known."""
@@ -130,8 +128,8 @@ class Kinematics:
         if anchor.levels:
             before = self.handles.motions(geometry, anchor.levels)
             rates = (joint_motion.angle(geometry, *pair, 1) for pair in (before, bodies))
-            near = _near(joint_motion.angle(geometry, *before, 0), near) + 0.5 * anchor.h * sum(rates)
-        return _near(joint_motion.angle(geometry, *bodies, 0), near)
+            near = joint_motion.counted(joint_motion.angle(geometry, *before, 0), near) + 0.5 * anchor.h * sum(rates)
+        return joint_motion.counted(joint_motion.angle(geometry, *bodies, 0), near)
 
     def _motions(self, geometry):
         return self.handles.motions(geometry, (self.q, self.qd, self.qdd))
@@ -157,11 +155,6 @@ class Kinematics:
     def _turned(self, body, v):
         """A v, of vectors in the body frame."""
         return np.einsum("...ij,...j->...i", self.rotation(body), v)
-
-
-def _near(value, near):
-    """An angle on the turn that lies nearest to another."""
-    return value + TURN_ROUND * np.round((near - value) / TURN_ROUND)
 
 
 def _one(values):

@@ -140,7 +140,7 @@ class Memory:
         """Load the driver, where this process has not called it yet."""
         if not getattr(advance, "overloads", True):
             none = np.zeros((0, 1))
-            advance(self._context, self._run, Record(np.zeros(0), *[none] * 5), self.addresses, 0)
+            advance(self._context, self._run, Record(np.zeros(0), np.zeros((0, 2)), *[none] * 5), self.addresses, 0)
 
     def advance(self, record, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""

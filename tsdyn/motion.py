@@ -9,11 +9,14 @@ from numba.core.errors import NumbaError
 from . import motions
 from ._kernel import Callback, caller, kernel, specialised
 from .checks import number
-from .errors import InvalidConstraint
+from .errors import InvalidArgument, InvalidConstraint
+from .knots import demand_covered, demand_followed
 from .motion_program import run_program
-from .motions import Smooth
+from .motions import Piecewise, Smooth
+from .table import is_data
 
 SIGNATURE = "d"
+UNNAMED = "motion"
 call_motion = caller(SIGNATURE, "d")
 
 
@@ -31,8 +34,10 @@ class Motion:
         What error messages call it.
     """
 
-    def __init__(self, f, fd=None, fdd=None, what="motion"):
+    def __init__(self, f, fd=None, fdd=None, what=UNNAMED):
         self.what, self.smooth, self.given = what, None, (f, fd, fdd)
+        if is_data(f) and fd is fdd is None:
+            (f,) = self.components(f, 1, what)
         if isinstance(f, Smooth) and fd is fdd is None:
             self.given, self.smooth = (), f
         elif fd is fdd is None:
@@ -41,7 +46,7 @@ class Motion:
         for function in self.given:
             _plain_function(function, what)
         self._callbacks = None
-        self.value(0.0)
+        self.value(self.origin)
 
     @property
     def functions(self):
@@ -54,6 +59,17 @@ class Motion:
         """Whether it is one of `ts.motions`: of a user's own function no series is taken."""
         return not self.given
 
+    @property
+    def motions(self):
+        """The motions of `ts.motions` that it is made of."""
+        return () if self.smooth is None else (self.smooth,)
+
+    @property
+    def origin(self):
+        """The time that is nearest to t = 0 among those for which it has a value, s."""
+        covers = [pieces.covers for motion in self.motions for pieces in motion.pieces]
+        return float(min([max([0.0, *(first for first, _ in covers)]), *(last for _, last in covers)]))
+
     @classmethod
     def always(cls, value, what):
         """Return a Motion, of a number too."""
@@ -62,9 +78,12 @@ class Motion:
 
     @classmethod
     def wrap(cls, value, what):
-        """Return a Motion for functions, one of `ts.motions` or a Motion; a finite float for a number."""
+        """Return a Motion for functions, one of `ts.motions`, data or a Motion; a finite float for a number."""
         if isinstance(value, Motion):
+            what = what if value.what == UNNAMED else value.what  # a part's motion is its joint's
             return cls(*(value.given or (value.smooth,)), what=what)
+        if is_data(value):
+            return cls(value, what=what)
         if isinstance(value, (tuple, list)) and len(value) == 3 and all(callable(f) for f in value):
             return cls(*value, what=what)
         if callable(value):
@@ -72,15 +91,26 @@ class Motion:
         result = number(value)
         if not math.isfinite(result):
             raise InvalidConstraint(
-                f"{what} must be a finite number, one of ts.motions, a function of time f or three functions of time "
-                f"(f, fd, fdd), got {value!r}."
+                f"{what} must be a finite number, one of ts.motions, a ts.Table, a spline of SciPy's, arrays (t, x), a "
+                f"function of time f or three functions of time (f, fd, fdd), got {value!r}."
             )
         return result
 
     @staticmethod
-    def numbers(given, t=0.0):
-        """Parameters as kernels have them: a Motion is its value, rate and acceleration at t."""
-        return [x for value in given for x in (value.value(t) if isinstance(value, Motion) else (value,))]
+    def components(value, count, what):
+        """The motions of so many components that data say; each a `Piecewise`."""
+        try:
+            motions = Piecewise.each(value)
+        except InvalidArgument as reason:
+            raise InvalidConstraint(f"{what}: {reason}") from reason
+        if len(motions) != count:
+            raise InvalidConstraint(f"{what}: the data have {len(motions)} values a time and must have {count}.")
+        return motions
+
+    @staticmethod
+    def numbers(given):
+        """Parameters as kernels have them: a Motion is its value, rate and acceleration at its origin."""
+        return [x for value in given for x in (value.value(value.origin) if isinstance(value, Motion) else (value,))]
 
     @staticmethod
     def places(value):
@@ -89,8 +119,8 @@ class Motion:
 
     @staticmethod
     def at_start(value):
-        """The value itself, or that of a Motion at t = 0."""
-        return value.value(0.0)[0] if isinstance(value, Motion) else value
+        """The value itself, or that of a Motion at its origin: t = 0, or the time nearest to it that data cover."""
+        return value.value(value.origin)[0] if isinstance(value, Motion) else value
 
     def value(self, t):
         """Return (f, fd, fdd) at t, by the plain Python functions."""
@@ -105,12 +135,14 @@ class Motion:
         return result
 
     def check(self, t0, t1):
-        """Refuse derivatives that are not those of f, by difference quotients at a few times of the interval.
+        """Refuse derivatives that are not those of f, by difference quotients at a few times; data with a jump.
 
         Several quotients are tried at each time, and most times must fail: a kink or a short wave is no error.
         """
-        if self.smooth is not None:
-            return  # they are
+        if self.smooth is not None:  # they are
+            demand_covered(self.smooth, t0, t1, self.what, InvalidConstraint)
+            demand_followed(self.smooth, t0, t1, self.what)
+            return
         times = t0 + (t1 - t0) * np.array([0.11, 0.29, 0.53, 0.71, 0.89])
         for i, names in ((0, ("f", "fd")), (1, ("fd", "fdd"))):
             given, values = self._at(i + 1, times), self._at(i, times)
@@ -142,6 +174,9 @@ class Motion:
             raise InvalidConstraint(
                 f"{self.what}: the motion can't be evaluated near t = {times[0]:g} ... {times[-1]:g}: {error!r}"
             ) from error
+
+    def __getstate__(self):
+        return {**self.__dict__, "_callbacks": None}  # machine code is not for pickling
 
     def forget(self):
         """Drop what was compiled or derived; it is made again when asked for."""

@@ -2,17 +2,22 @@
 
 A program begins with (t, instructions, place of the constants, place of the rows, rows, row of the result); then come
 four numbers an instruction: what it does, the row that it writes, and two operands, rows or the place of a constant.
-A row is a series, [i] its coefficient of (time - t)^i. `motions.Smooth.program` writes them.
+A row is a series, [i] its coefficient of (time - t)^i. `motions.Smooth.program` writes them. What is piecewise finds
+its piece by the time, until a run holds it in one (`HOLD` for the count).
 """
 
 import numpy as np
 
 from ._kernel import ANY, callback, caller, data_of, kernel, matrix, vector
+from .pieces import HEAD as PIECES_HEAD
 from .recurrences import exponential, power, product, quotient, sine_cosine, square
 
-POLYNOMIAL, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, SINE, EXP, LOG, TANH, ARCTAN = range(11)
+POLYNOMIAL, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, SINE, EXP, LOG, TANH, ARCTAN, PIECEWISE = range(12)
 HEAD, STEP, WIDTH = 6, 4, 36  # numbers before the instructions, of each, and room for coefficients in a row
+HOLD = 0  # as a count: stay with the pieces at t
 SIGNATURE = "pdip"  # program, t, how many coefficients, where they go
+# what a piecewise constant begins with, see Pieces.numbers
+COUNT, SIZE, PERIOD, BEYOND, PIECE, SHIFT, HELD = range(PIECES_HEAD)
 call_smooth = caller(SIGNATURE)
 
 
@@ -51,10 +56,52 @@ def _hyperbolic(a, y, w, k):
     return total / k
 
 
+@kernel
+def _find_piece(c, t):
+    """Note the piece at t, and how far its knots are shifted there."""
+    knots, low, high = c[PIECES_HEAD:], 0, int(c[COUNT])
+    c[SHIFT] = np.floor((t - knots[0]) / c[PERIOD]) * c[PERIOD] if c[PERIOD] > 0.0 else 0.0
+    x = t - c[SHIFT]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x < knots[middle]:
+            high = middle
+        else:
+            low = middle
+    c[PIECE] = low
+
+
+@kernel
+def _piecewise(c, t, k):
+    """Coefficient k about t of a piecewise polynomial; NaN where it has none."""
+    count, size, knots = int(c[COUNT]), int(c[SIZE]), c[PIECES_HEAD:]
+    if c[HELD] == 0.0 and k == 0:
+        _find_piece(c, t)
+    i = int(c[PIECE])
+    if c[HELD] == 0.0 and c[BEYOND] == 0.0 and not (t >= knots[0] and t <= knots[count]):
+        return np.nan
+    return _polynomial(knots[count + 1 + i * size :], size, (t - c[SHIFT]) - knots[i], k)
+
+
+@kernel
+def _hold(p, t):
+    """Let everything piecewise stay with its piece at t, whatever time it is asked for."""
+    constants = int(p[2])
+    for i in range(int(p[1])):
+        at = HEAD + STEP * i
+        if int(p[at]) == PIECEWISE:
+            c = p[constants + int(p[at + 2]) :]
+            _find_piece(c, t)
+            c[HELD] = 1.0
+
+
 @callback(SIGNATURE)
 def run_program(program, t, count, out):
-    """out (count,): the motion's series about t; t is left in the program's first place."""
+    """out (count,): the motion's series about t; t is left in the program's first place. HOLD writes nothing."""
     p, out = vector(program, ANY), vector(out, count)
+    if count == HOLD:
+        _hold(p, t)
+        return 0
     p[0] = t
     constants, result = int(p[2]), int(p[5])
     s = matrix(data_of(p[int(p[3]) :]), int(p[4]), WIDTH)
@@ -64,6 +111,8 @@ def run_program(program, t, count, out):
         for k in range(count):
             if what == POLYNOMIAL:
                 s[y, k] = _polynomial(p[constants + a :], b, t, k)
+            elif what == PIECEWISE:
+                s[y, k] = _piecewise(p[constants + a :], t, k)
             elif what == ADD:
                 s[y, k] = s[a, k] + s[b, k]
             elif what == SUBTRACT:

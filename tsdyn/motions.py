@@ -1,6 +1,7 @@
 """Smooth motions: functions of time that know their derivatives and their Taylor series, and compile nothing.
 
     Polynomial, Constant, Ramp, Sine, Exponential, and time itself
+    Piecewise, of data: tables and SciPy's splines
     + - * / of them and of numbers, powers, and np.sin, cos, tan, exp, log, sqrt, sinh, cosh, tanh, arctan of them
 
 A motion is a graph of operations. Its value and two derivatives follow in Python by `jet`, its series in a run by
@@ -18,6 +19,8 @@ from .calls import fitting
 from .checks import floats, number
 from .errors import InvalidArgument
 from .jet import Jet
+from .table import Table, is_data, pieces_of
+from .truncated import Truncated
 
 
 class Operation(NamedTuple):
@@ -26,7 +29,7 @@ class Operation(NamedTuple):
     code: int
     rows: int  # that it writes
     result: int  # which of them is its own
-    apply: object  # of the values of its operands, and of its numbers
+    apply: object  # of the values of its operands, and of its numbers; of the time, where it has no operands
 
 
 def _horner(t, c):
@@ -38,6 +41,7 @@ def _horner(t, c):
 
 _OPERATIONS = {
     "polynomial": Operation(code.POLYNOMIAL, 1, 0, _horner),
+    "piecewise": Operation(code.PIECEWISE, 1, 0, None),
     "add": Operation(code.ADD, 1, 0, operator.add),
     "subtract": Operation(code.SUBTRACT, 1, 0, operator.sub),
     "multiply": Operation(code.MULTIPLY, 1, 0, operator.mul),
@@ -53,7 +57,7 @@ _OPERATIONS = {
 
 
 class Smooth:
-    """Base of all smooth motions: one operation on others, or a polynomial of the time."""
+    """Base of all smooth motions: one operation on others, or a polynomial of the time, whole or in pieces."""
 
     def __init__(self, operation, operands=(), numbers=()):
         self._operation, self._operands, self._numbers = operation, operands, numbers
@@ -73,14 +77,32 @@ class Smooth:
         """The second derivative at a time or times."""
         return self._jet(t).xdd + 0.0 * t
 
+    def jerk(self, t):
+        """The third derivative at a time or times."""
+        series = [self._on(Truncated([time, 1.0, 0.0, 0.0])) for time in np.ravel(t).tolist()]
+        return 6.0 * np.reshape([x.c[3] for x in series], np.shape(t))[()]
+
+    @property
+    def pieces(self):
+        """The `Pieces` that it is made of."""
+        return [node._numbers for node in self._order() if node._operation == "piecewise"]
+
+    def sides(self, t):
+        """Value and rate at times t (k,), by the pieces that end there and by those that begin: (2, 2, k)."""
+        found = [Jet.of(self._on(Jet(t, 1.0), left)) for left in (True, False)]
+        return np.array([[x.x + 0.0 * t, x.xd + 0.0 * t] for x in found])
+
     def _jet(self, t):
         return Jet.of(self._on(Jet(t, 1.0)))
 
-    def _on(self, t):
-        """The value where the time is any kind of number."""
+    def _on(self, t, left=False):
+        """The value where the time is any kind of number; left: at a knot that of the piece which ends there."""
         found = {}
         for node in self._order():
             operation = _OPERATIONS[node._operation]
+            if node._operation == "piecewise":
+                found[id(node)] = node._numbers.value(t, left)
+                continue
             if node._operation == "polynomial":
                 found[id(node)] = operation.apply(t, node._numbers)
                 continue
@@ -111,7 +133,8 @@ class Smooth:
             operands = [row[id(operand)] for operand in node._operands]
             if node._numbers:
                 operands.append(len(constants))
-                constants += node._numbers
+                pieces = node._operation == "piecewise"
+                constants += node._numbers.numbers() if pieces else node._numbers
             if node._operation == "polynomial":
                 operands.append(len(node._numbers))
             instructions += [operation.code, rows, *operands, *[0] * (2 - len(operands))]
@@ -218,6 +241,56 @@ class Ramp(Polynomial):
         super().__init__(_demand(self, start=start, rate=rate))
 
 
+class Piecewise(Smooth):
+    """A motion from data: a spline or another piecewise polynomial of the time.
+
+    Parameters
+    ----------
+    source : ts.Table, (times, values), or SciPy's PPoly (CubicSpline, PchipInterpolator, ...), BPoly or BSpline
+        Of numbers. Outside its times it goes on where SciPy's object says so by `extrapolate`; else a run that leaves
+        them is refused.
+
+    Raises
+    ------
+    InvalidArgument
+        If it is none of these, its times don't increase, or its values are not real numbers.
+
+    Notes
+    -----
+    Steps of a run end at the knots, so a method keeps its order. A constraint follows no jump of value or rate, and a
+    run over one is refused; jumps of acceleration are followed.
+    """
+
+    def __init__(self, source):
+        if not is_data(source):
+            raise InvalidArgument(
+                f"Piecewise: source must be a ts.Table, (times, values), or SciPy's CubicSpline, PPoly, BPoly or "
+                f"BSpline, got {source!r}."
+            )
+        parts = pieces_of(source)
+        if len(parts) != 1:
+            raise InvalidArgument(f"Piecewise: source must have one value a time, it has {len(parts)}.")
+        super().__init__("piecewise", (), parts[0])
+
+    @classmethod
+    def each(cls, source):
+        """One motion for each component of a source of vectors."""
+        if not isinstance(source, Table):
+            return tuple(cls._of(pieces) for pieces in pieces_of(source))
+        if source.motions is None:  # many may share a table's numbers
+            source.motions = tuple(cls._of(pieces) for pieces in source.pieces())
+        return source.motions
+
+    @classmethod
+    def _of(cls, pieces):
+        motion = cls.__new__(cls)
+        Smooth.__init__(motion, "piecewise", (), pieces)
+        return motion
+
+    def __repr__(self):
+        return f"<Piecewise: {self._numbers!r}>"
+
+
 class Sine(Smooth):
     """offset + amplitude sin(frequency t + phase), frequency in rad/s and phase in rad."""
 
@@ -279,4 +352,4 @@ FUNCTIONS = {
 }
 time = Ramp(0.0, 1.0)
 
-__all__ = ["Constant", "Exponential", "Polynomial", "Ramp", "Sine", "Smooth", "time"]
+__all__ = ["Constant", "Exponential", "Piecewise", "Polynomial", "Ramp", "Sine", "Smooth", "time"]

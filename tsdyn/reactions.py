@@ -19,7 +19,7 @@ from .poses import place_bodies, take_loads
 from .primitive import INTS
 from .rows import factorise_rows, run_loops
 from .sparse_rows import WIDTH, with_short_rows
-from .system import COUNT, FIRST_INT, FIRST_REAL, REALS, classes
+from .system import COUNT, FIRST_INT, FIRST_REAL, REALS, classes, index_of
 from .workspace import load_parts, parts
 
 RANK_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
@@ -104,7 +104,7 @@ def reaction(solution, member, body):
     packed = solution.packed
     system = with_short_rows(packed)
     system = system._replace(reals=system.reals.copy(), kinds=only(packed, member.parts))
-    load = np.zeros((solution.t.size, system.bodies[body.index, 1]))
+    load = np.zeros((solution.t.size, system.bodies[index_of(packed, body), 1]))
     rows = np.zeros((len(system.segments), WIDTH))
     halves = []  # where the body's numbers are in each row
     for part in packed.constraints[member.parts]:
@@ -143,13 +143,13 @@ def force_reaction(solution, load, body):
     """Force and torque (k, 3) that a force exerts on a body, torque about its first point on it, ground frame."""
     force, system = load.force, solution.system._replace(forces=load.row[None])
     Q = force_loads(system, solution.t, solution.q, solution.qd, solution._memory)
-    at, length = solution.system.bodies[body.index]
+    at, length = solution.system.bodies[index_of(solution.packed, body)]
     return _at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)
 
 
 def _at_first_point(solution, body, load, item, coordinates):
     """Force and torque of generalised forces load (k, 7 or 3) on a body, about the first point of the item on it."""
-    at, length = solution.system.bodies[body.index]
+    at, length = solution.system.bodies[index_of(solution.packed, body)]
     force, torque = load[:, :3].copy(), np.zeros((load.shape[0], 3))
     if length == 7:
         p = solution.q[:, at + 3 : at + 7]

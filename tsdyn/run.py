@@ -1,5 +1,7 @@
 """The driver: steps, outputs, charts. One kernel for every scene, method and formulation; it calls them by address."""
 
+import math
+
 from ._kernel import caller, entry, kernel
 from .assembly import is_rheonomic, remember, set_time
 from .control import accept, first_step, stretch, watch_stiffness
@@ -37,7 +39,9 @@ from .run_state import (
     BEGUN,
     BLOCKS,
     CHART_ROWS,
+    CUTS,
     DENSE,
+    ERROR_BEFORE,
     FAILED,
     FIRST_ORDER,
     HISTORY,
@@ -57,11 +61,13 @@ from .run_state import (
     STORED,
     T_END,
     T_ORIGIN,
+    WAITING,
     H,
     T,
     load_run,
 )
 from .stepping import call_step
+from .stops import SHORT, amend, cut_fixed, is_sampled, next_stop, take_pieces
 from .turning import GAIN, longest_step, too_far
 from .workspace import CONDITION, CONTRACTION, load
 
@@ -179,6 +185,31 @@ def _begin(context, c, r, log, at):
 
 
 @kernel
+def _cross_stop(context, c, r, log, at, implicit):
+    """At a stop: the accelerations after it, for its output and the next step. Status.
+
+    Of an implicit method those of its last stage change by what f changes by: f itself would amplify what its
+    iteration has left.
+    """
+    w, status = c.work, 0
+    if implicit:
+        status = evaluate(context, w, at, r.clock[T], r.x, r.y, r.dy, r.dx)
+    take_pieces(c.system, r, log)
+    if status == 0 and implicit:
+        status = evaluate(context, w, at, r.clock[T], r.x, r.y, r.yds, r.dx)
+        for j in range(r.y.size):
+            r.yd[j] += r.yds[j] - r.dy[j]
+        call_complete(at[A_COMPLETE], context, r.yd)
+        for j in range(w.qdd.size):  # what is extrapolated from the step before has no jump
+            r.before[2, j] += w.qdd[j] - r.now[2, j]
+    elif status == 0:
+        status = evaluate(context, w, at, r.clock[T], r.x, r.y, r.yd, r.xd)
+    store_now(w, r)
+    amend(r, log, w.q, w.qd, w.qdd)
+    return status
+
+
+@kernel
 def _go_back(r):
     """Everything as at the start of the step."""
     copy(r.x_old, r.x)
@@ -202,6 +233,7 @@ def advance(context, run, log, at, most):
     adaptive, implicit = r.numbers[ADAPTIVE] == 1, r.numbers[STAGE_AT] > 0
     driven = is_rheonomic(c.system)
     if r.numbers[BEGUN] == 0 and most != 0:
+        take_pieces(c.system, r, log)
         set_time(c.system, r.clock[T])
         remember(c.system, w.q, w.qd, r.clock[T], r.remembered[r.joints.shape[0] :])
         status = _begin(context, c, r, log, at)
@@ -210,12 +242,19 @@ def advance(context, run, log, at, most):
         r.numbers[BEGUN] = 1
         if adaptive and r.clock[H] == 0.0:
             r.clock[H] = min(first_step(context, w, r, at), r.clock[MAX_STEP])
+    if r.numbers[WAITING] == 1:
+        r.numbers[WAITING] = 0
+        status = _cross_stop(context, c, r, log, at, implicit)
+        if status != 0:
+            return status
     for _ in range(most):
         if r.numbers[CHART_ROWS] + 2 >= log.charts.shape[0] or r.numbers[HISTORY] >= log.history.shape[0]:
             break
         i, t0 = r.numbers[STEPS], r.clock[T]
         if t0 >= r.clock[T_END]:
             return 0
+        stop, wanted, before, cut = next_stop(r, log), r.clock[H], r.clock[ERROR_BEFORE], False
+        end = min(stop, r.clock[T_END])
         if adaptive:
             if driven:
                 r.clock[H] = min(r.clock[H], r.clock[SHARE] * longest_step(c.system.bodies, r.now))
@@ -223,12 +262,16 @@ def advance(context, run, log, at, most):
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 failed = r.numbers[FAILED]
                 return failed if failed in (NOT_FINITE, JAMMED) else STEP_COLLAPSED
-            last = t1 + stretch(r.clock[H], r.clock[MAX_STEP]) >= r.clock[T_END]
+            if t1 + stretch(r.clock[H], r.clock[MAX_STEP]) >= end:
+                t1 = end
+            last = t1 == r.clock[T_END]
         else:
-            t1 = r.clock[T_ORIGIN] + (i + 1) * r.clock[H]
-            last = i + 1 == r.numbers[STEPS_WANTED]
-        if last:
-            t1 = r.clock[T_END]
+            done = i - r.numbers[CUTS]
+            last = done + 1 == r.numbers[STEPS_WANTED]
+            t1 = r.clock[T_END] if last else r.clock[T_ORIGIN] + (done + 1) * r.clock[H]
+            if stop < math.inf:
+                t1, cut = cut_fixed(stop, t1, r.clock[H], last)
+                last = last and not cut
         h = t1 - t0
         row = log.history[r.numbers[HISTORY]]
         row[0], row[1], row[2] = t0, h, 0.0
@@ -287,6 +330,8 @@ def advance(context, run, log, at, most):
             r.numbers[REJECTED] += 1
             _go_back(r)
             continue
+        if adaptive and t1 == stop and h < SHORT * wanted:
+            r.clock[H], r.clock[ERROR_BEFORE] = max(r.clock[H], wanted), before
         row[2] = 1.0
         r.numbers[FAILED] = 0
         r.clock[SHARE] = min(GAIN * r.clock[SHARE], 1.0)
@@ -302,6 +347,7 @@ def advance(context, run, log, at, most):
         remember(c.system, w.q, w.qd, t1, r.remembered[r.joints.shape[0] :])
         r.clock[T] = t1
         r.numbers[STEPS] = i + 1
+        r.numbers[CUTS] += 1 if cut else 0
         r.numbers[IN_CHART] += 1
         if reason == 0 and r.numbers[INTERVAL] > 0 and r.numbers[IN_CHART] >= r.numbers[INTERVAL]:
             reason = BY_INTERVAL
@@ -313,6 +359,12 @@ def advance(context, run, log, at, most):
             status = _begin_chart(context, c, r, log, at, reason)
             if status != 0:
                 return status
+        if t1 == stop:
+            if is_sampled(r, log, t1):
+                break
+            status = _cross_stop(context, c, r, log, at, implicit)
+            if status != 0:
+                return status
         if leave:
             break
-    return 0 if r.clock[T] >= r.clock[T_END] else SLICE_DONE
+    return 0 if r.clock[T] >= r.clock[T_END] and r.numbers[WAITING] == 0 else SLICE_DONE

@@ -12,7 +12,8 @@ T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, STABLE, SHA
 # numbers
 FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
 HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, DENSE, BLOCKS, STAGE_AT = range(8, 16)
-LAST_STAGE, AT_LIMIT, BELOW_LIMIT, STIFF, LEAVE_WHEN_STIFF, FAILED, MAY_PASS, NUMBERS = range(16, 24)
+LAST_STAGE, AT_LIMIT, BELOW_LIMIT, STIFF, LEAVE_WHEN_STIFF, FAILED, MAY_PASS, NEXT_STOP = range(16, 24)
+CUTS, WAITING, NUMBERS = range(24, 27)  # fixed steps cut at stops; whether a stop waits for Python
 AGAIN = 2  # REJECTED_LAST: by a failed stage
 FILLED, STORED = 1, 2  # DENSE: every step's block is made, and kept
 
@@ -47,13 +48,14 @@ class Run(NamedTuple):
     memory: np.ndarray  # the method's scratch
     block: np.ndarray  # the present step's: start, h, end, chart, the interpolant's data
     clock: np.ndarray  # T ... STABLE
-    numbers: np.ndarray  # int64, FIRST_ORDER ... MAY_PASS; STAGE_AT: where an implicit method leaves its last stage
+    numbers: np.ndarray  # int64, FIRST_ORDER ... WAITING; STAGE_AT: where an implicit method leaves its last stage
 
 
 class Record(NamedTuple):
     """What is asked of a run and what it records: arrays of its own, unlike those of `Run`."""
 
     t_eval: np.ndarray  # output times, or empty: every step
+    stops: np.ndarray  # (stops, 2)  times at which a step ends, increasing, and whether Python is asked there
     out: np.ndarray  # (rows, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
     history: np.ndarray  # (rows, 3)  t, h, accepted
     charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left

@@ -11,6 +11,7 @@ from .bodies import IDENTITY, Body, Ground, PointMass
 from .calls import fitting
 from .checks import counted, demand_known, vector3
 from .constraints.euler_normalization import EulerNormalization
+from .editing import copy, demand_present, found, remove
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint
 from .evaluate import evaluate
 from .force import Force
@@ -55,6 +56,7 @@ class Scene:
         self._bodies, self._added, self._forces, self._normalisations = [], [], [], {}
         self._waiting, self._titles = {}, None  # see membership.py
         self._names = None  # of ground and bodies; None where one may have been renamed
+        self._twins = None  # handle of the scene that this one is a copy of -> handle here
         self.gravity = gravity
 
     def __setattr__(self, name, value):
@@ -180,6 +182,7 @@ class Scene:
             raise item.error(f"{type(item).__name__}: its __init__ must call super().__init__(...).")
         if item.scene is not self:
             raise item.error(f"{item.name}: its bodies belong to another scene; use bodies of this one.")
+        demand_present(item.name, (item.a, item.b))
         if item.owner is not None:
             raise item.error(f"{item.name}: it is a part of {item.owner.title}; add that instead.")
         if isinstance(item, Joint):
@@ -204,7 +207,8 @@ class Scene:
 
     def __getstate__(self):
         """What is packed holds addresses of this process, so it stays here."""
-        return {**self.__dict__, "_packed": None, "_start": None, "_prepared": None, "_users": None, "_spare": {}, "_waiting": {}}
+        gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins"))
+        return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
 
     def touch(self):
         """Forget the packed numbers: something has changed."""
@@ -245,6 +249,14 @@ class Scene:
                 return body
         raise InvalidBody(f"no body is named {name!r}; there are {', '.join(b.name for b in self._bodies) or 'none'}.")
 
+    def __getitem__(self, item):
+        """The body, constraint or force of this name; in a copy also that of a handle of the scene it was made of."""
+        if item == self.ground.name:
+            return self.ground
+        known = isinstance(item, (PointMass, Ground, Primitive, Joint, Force))
+        twin = self._twins.get(item) if self._twins is not None and known else None
+        return found(self, item) if twin is None else twin
+
     def row_names(self):
         """Name the rows of Phi, in order: a constraint's title, with the row's label where it has several."""
         names, seen = [], Counter()
@@ -266,6 +278,8 @@ class Scene:
     assemble = assemble
     mobility = mobility
     set = set_joint
+    remove = remove
+    copy = copy
 
     def __repr__(self):
         rows = sum(constraint.rows for constraint in self.constraints)

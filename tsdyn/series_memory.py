@@ -118,7 +118,7 @@ class SeriesMemory:
         """Load the driver, where this process has not called it yet."""
         if not getattr(advance_series, "overloads", True):
             none = np.zeros((0, 1))
-            advance_series(self._context, self._run, Record(np.zeros(0), *[none] * 5), self.steps, 0)
+            advance_series(self._context, self._run, Record(np.zeros(0), np.zeros((0, 2)), *[none] * 5), self.steps, 0)
 
     def advance(self, record, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""

@@ -10,6 +10,7 @@ from .errors import InvalidArgument, Status
 from .expansion_pack import is_far
 from .relay import Relay
 from .run_state import CHART_ROWS, FILLED, STORED, T
+from .sampling import Sampled
 from .series_dense import SeriesReader
 from .series_memory import SeriesMemory
 from .series_state import ORDERS
@@ -57,12 +58,14 @@ def run_series(task, observe=None, relay=None, past=None):
     watch = relay.watching(task, reading)
 
     began = time.perf_counter()
-    status, reason, recorded = drive(memory if past is None else past(memory), task, watch)
+    driven = memory if task.sampling is None else Sampled(memory, task.sampling)
+    status, reason, recorded = drive(driven if past is None else past(driven), task, watch)
     relay.leave(memory)
     charts, last = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy(), run.now.copy()
     trajectory = None
     if task.dense_output:
-        trajectory = Trajectory(reading, recorded.blocks, charts, recorded.points, task.span[0], last, task.angles)
+        sides = task.span[0], last, task.angles, task.stops
+        trajectory = Trajectory(reading, recorded.blocks, charts, recorded.points, *sides)
     outcome = Outcome(
         status,
         reason,

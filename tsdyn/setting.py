@@ -18,6 +18,7 @@ from .constraints.thread import Thread
 from .errors import InconsistentState, InvalidArgument, SingularConfiguration
 from .handles import handles_of
 from .joint_coordinates import Angle, AngleGeometry
+from .membership import settle
 from .motions import Polynomial
 from .rigid_shift import RigidShift
 
@@ -204,12 +205,14 @@ def _drive(scene, joint, goals, held, t):
 
 def _assembled(scene, drivers, t):
     """Assemble the scene with some constraints that it does not keep."""
+    for driver in drivers:
+        settle(driver)
+    scene._added.extend(drivers)
+    scene.touch()
     try:
-        for driver in drivers:
-            scene.add(driver)
         return assemble(scene, t=t, folds="free")
     finally:
-        scene._added[:] = [item for item in scene._added if not any(item is driver for driver in drivers)]
+        del scene._added[-len(drivers) :]
         scene.touch()
 
 

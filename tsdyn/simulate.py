@@ -13,10 +13,12 @@ from .events import prepare
 from .formulation import formulation as find_formulation
 from .holonomic import demand_holonomic
 from .integrator import registered
+from .knots import stops_of
 from .membership import warn_of_waiting
 from .passage import run_past
 from .prepare import prepared
 from .progress import reporter
+from .sampling import Sampling, instants_of, sampled
 from .scene import Scene
 from .series_run import run_series
 from .solution import Solution
@@ -149,13 +151,15 @@ def simulate(
     q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
     if not form.serving(method).basis_free:
         demand_holonomic(kept.packed, q, span[0], form.name)
+    stops = stops_of(kept.motions, instants_of(kept.packed, *span), *span)
+    sampling = Sampling(kept, state is not None) if sampled(kept.packed) else None
     choose = None
-    if integrator is None:
+    if integrator is None and sampling is None:  # what is asked in Python is asked once
         options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol, "max_step": max_step}
         choose = choice.chooser(simulate, scene, method, span[1], options)
     task = Task(
         kept, method, form, span, q, qd, memory, times, bool(dense_output),
-        watched, constraint_tol, max_steps, chart_interval or 0, report, bool(history), choose,
+        watched, constraint_tol, max_steps, chart_interval or 0, report, bool(history), choose, stops, sampling,
     )  # fmt: skip
     outcome = DRIVERS.get(method.driver, method.driver)(task)
     ended = time.perf_counter()

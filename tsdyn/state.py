@@ -46,16 +46,20 @@ def remembered(state, prepared, t, q):
     slots, memory = prepared.packed.system.memory.size, getattr(state, "memory", None)
     if memory is None and state is not None and slots:
         raise InvalidArgument(
-            "parts of the scene count turns and this state doesn't say how many: give solution.state, what "
-            "solution.at(t) returns or what an event function is given, as they are or changed by _replace."
+            "parts of the scene count turns or hold a load, and this state doesn't say how many: give solution.state, "
+            "what solution.at(t) returns or what an event function is given, as they are or changed by _replace."
         )
-    if memory is None:
-        memory = np.zeros(slots)
+    fresh = memory is None
+    memory = np.zeros(slots) if fresh else memory
     if np.shape(memory) != (slots,):
         raise InvalidArgument(
-            f"the state remembers {np.size(memory)} angles and the scene has {slots}; use a state of this scene."
+            f"the state remembers {np.size(memory)} numbers and the scene has {slots}; use a state of this scene."
         )
     angles = state.angles if isinstance(state, Kinematics) else np.empty(0)
     if angles.size != prepared.handles.count:
         angles = prepared.handles.angles_at_start(t, q)
+    for load in prepared.packed.loads if fresh else ():
+        if getattr(load.force, "remembers_angle", False):
+            row = prepared.handles.row(load.force.joint, "angle")
+            memory[load.slot] = angles[row.first + load.force.which]
     return np.append(angles, memory)

@@ -17,6 +17,8 @@ class Kernels(dict):
 
     def __init__(self, kind, function):
         functions = {"law": kind.wrap(kernel(function, allocates=True), function)}
+        if kind.memory:
+            functions["remember"] = kind.remember
         super().__init__(callbacks(kind, functions, function))
         self.made_of = kind, function
 

@@ -9,6 +9,7 @@ from .errors import Status
 from .memory import Memory
 from .relay import Relay
 from .run_state import CHART_ROWS, FILLED, IN_CHART, MAY_PASS, REJECTED, STEPS, STIFF, STORED, T
+from .sampling import Sampled
 from .task import Outcome
 from .workspace import (
     AT_ROUNDING,
@@ -64,7 +65,8 @@ def run_steps(task, observe=None, relay=None):
     watch = relay.watching(task, reading)
 
     began = time.perf_counter()
-    status, reason, recorded = drive(memory, task, watch)
+    driven = memory if task.sampling is None else Sampled(memory, task.sampling)
+    status, reason, recorded = drive(driven, task, watch)
     relay.leave(memory)
     charts = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy()
     charts[-1, 2:] = control[CONDITION], control[CONTRACTION], run.numbers[IN_CHART]
@@ -72,7 +74,8 @@ def run_steps(task, observe=None, relay=None):
     trajectory = None
     if task.dense_output:
         points = recorded.points[: len(charts)].copy()
-        trajectory = Trajectory(reading, recorded.blocks, charts, points, task.span[0], last, task.angles)
+        sides = task.span[0], last, task.angles, task.stops
+        trajectory = Trajectory(reading, recorded.blocks, charts, points, *sides)
     outcome = Outcome(
         status,
         reason,

@@ -7,10 +7,10 @@ import numpy as np
 
 from .attachment import address, checked_parameters
 from .errors import InvalidConstraint
-from .force_pack import FORCE_COLUMNS, find_forces, pack_forces
+from .force_pack import FORCE_COLUMNS, SIGNAL_COLUMNS, find_forces, pack_forces
 from .motion import Motion
 from .primitive import AT, BLOCK, DIMENSION, INTS, ROW, STRIDE
-from .signal import Signal, Table
+from .signal import Signal
 
 # columns of System.kinds: four addresses, where a kind's instances are, the address that implicit methods need
 PHI, JACOBIAN, GAMMA, PHI_T, COUNT, REALS, FIRST_INT, FIRST_REAL, CURVATURE, COLUMNS = range(10)
@@ -31,7 +31,7 @@ class System(NamedTuple):
     rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
     segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
     forces: np.ndarray  # int64 (kinds, 9): addresses and extents, columns in force_pack
-    signals: np.ndarray  # int64 (signals, 5): functions of time and tables that loads are given, force_pack
+    signals: np.ndarray  # int64 (signals, 4): functions of time and motions that loads are given, force_pack
     memory: np.ndarray  # int64 (slots,): places in reals of what forces, then constraints remember from step to step
     normals: np.ndarray  # int64 (frictions,): places in reals of the normal loads of joints' frictions
     counters: np.ndarray  # int64 (kinds, 5): loops of constraints that remember: address, count, reals, places of both
@@ -127,7 +127,7 @@ def pack(scene):
                 if isinstance(value, Motion):
                     motions.append([*value.addresses, len(reals), 0])
                     programs.append(value)
-                    reals += value.value(0.0)
+                    reals += value.value(value.origin)
                 else:
                     reals.append(float(value))
             if kind.memory:
@@ -147,10 +147,13 @@ def pack(scene):
             counters.append([_address(kind, "remember"), len(members), stride, *first])
 
     forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals)
+    begins = {}  # of programs: one for all that move alike
     for row, motion in zip(motions, programs, strict=True):
         if motion.smooth is not None:
-            row[4] = len(reals)
-            reals += motion.smooth.program()
+            if id(motion.smooth) not in begins:
+                begins[id(motion.smooth)] = len(reals)
+                reals += motion.smooth.program()
+            row[4] = begins[id(motion.smooth)]
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
@@ -164,7 +167,7 @@ def pack(scene):
         rheonomic=np.array([any(kind[PHI_T] for kind in kinds)], np.int64),
         segments=np.array(segments, np.int64).reshape(-1, 4),
         forces=np.array(forces, np.int64).reshape(-1, FORCE_COLUMNS),
-        signals=np.array(signals, np.int64).reshape(-1, 5),
+        signals=np.array(signals, np.int64).reshape(-1, SIGNAL_COLUMNS),
         memory=np.array([*memory, *kept.values()], np.int64),
         normals=np.array(normals, np.int64),
         counters=np.array(counters, np.int64).reshape(-1, 5),
@@ -184,6 +187,13 @@ def _members(constraints):
         parts, rows = slice(part, part + len(constraint.parts)), slice(row, row + constraint.rows)
         yield Member(constraint, constraint.coordinates, parts, rows)
         part, row = parts.stop, rows.stop
+
+
+def index_of(packed, body):
+    """Where a body stood among the others when the scene was packed; None where it was not there."""
+    if "indices" not in packed.shared:
+        packed.shared["indices"] = {id(one): i for i, one in enumerate(packed.bodies)}
+    return packed.shared["indices"].get(id(body))
 
 
 def member_of(packed, constraint):
@@ -210,7 +220,7 @@ def user_functions(packed):
                 yield value, value.given
     for load in packed.loads:
         for value in load.parameters:
-            if isinstance(value, Signal) and not isinstance(value.source, (Table, tuple)):
+            if isinstance(value, Signal) and not value.motions:
                 yield value, (value.source,)
         if hasattr(load.force, "function_of_state"):
             yield load.force, (load.force.function_of_state,)

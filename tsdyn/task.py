@@ -31,6 +31,8 @@ class Task(NamedTuple):
     report: object  # a function of the fraction done, None at the end
     history: bool  # whether the histories of steps and charts are kept
     choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
+    stops: np.ndarray = np.empty((0, 2))  # times at which a step ends, s, and whether a function is asked there
+    sampling: object = None  # a `sampling.Sampling`, or None
 
     @property
     def angles(self):

@@ -25,6 +25,7 @@ from .run_state import (
     BEGUN,
     BLOCKS,
     CHART_ROWS,
+    CUTS,
     DENSE,
     HISTORY,
     LEAVE_WHEN_STIFF,
@@ -38,6 +39,7 @@ from .run_state import (
     STORED,
     T_END,
     T_ORIGIN,
+    WAITING,
     H,
     T,
     load_run,
@@ -46,13 +48,13 @@ from .selection import weakest
 from .series_loops import BODY_ROW, S_OMEGA, S_R
 from .series_state import HIGHEST, LOWEST, NEXT, ORDERS, TOP, load_series
 from .series_steps import EXPAND, NEXT_TO_SINGULAR, PASS, REACH, call_expand, call_reach, state_within
+from .series_stops import cross_stop, lower_order
+from .stops import cut_fixed, is_sampled, next_stop, take_pieces
 from .workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
 
 SLICE_DONE, STEP_COLLAPSED = int(Status.SLICE_DONE), int(Status.STEP_COLLAPSED)
 NOT_FINITE, SINGULAR, PASSAGE = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.PASSAGE)
 MISSED = 100.0  # times the tolerance: a landing further away than this is no truncation error
-
-
 NEAR = 0.02  # of the shares of pivots: less of it is next to a singular configuration
 AVOID, AVOIDING = 0.7, 5  # a step that ends there is made shorter by this factor, so many times
 SHORT = 0.3  # of the last step from elsewhere: less is short for one that begins there
@@ -289,11 +291,17 @@ def advance_series(context, run, log, steps, most):
     c, r = load_series(context), load_run(run)
     w, f, x = c.work, c.free, c.expansion
     if r.numbers[BEGUN] == 0 and most != 0:
+        take_pieces(c.system, r, log)
         status = _begin_run(context, c, r, log, steps)
         if status != 0:
             return status
         r.numbers[BEGUN] = 1
     adaptive = r.numbers[ADAPTIVE] == 1
+    if r.numbers[WAITING] == 1:
+        r.numbers[WAITING] = 0
+        status = cross_stop(context, c, r, log, steps)
+        if status != 0:
+            return status
     missed = MISSED * (r.clock[ATOL] + r.clock[RTOL])
     for _ in range(most):
         if r.numbers[CHART_ROWS] + 2 >= log.charts.shape[0] or r.numbers[HISTORY] >= log.history.shape[0]:
@@ -301,6 +309,8 @@ def advance_series(context, run, log, steps, most):
         t0 = r.clock[T]
         if t0 >= r.clock[T_END]:
             return 0
+        stop = next_stop(r, log)
+        end, cut = min(stop, r.clock[T_END]), False
         x.order[TOP] = x.order[NEXT]
         for k in range(1, x.order[TOP]):
             call_expand(steps[EXPAND], context, k)
@@ -314,15 +324,21 @@ def advance_series(context, run, log, steps, most):
             h = min(h, r.clock[H])
         while True:
             t1 = t0 + h
+            done = r.numbers[STEPS] + 1 - r.numbers[CUTS]
             if not adaptive:
-                t1 = r.clock[T_ORIGIN] + (r.numbers[STEPS] + 1) * r.clock[H]
+                t1 = r.clock[T_ORIGIN] + done * r.clock[H]
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 return STEP_COLLAPSED
-            last = r.numbers[STEPS] + 1 == r.numbers[STEPS_WANTED]
             if adaptive:
-                last = t1 + stretch(h, r.clock[MAX_STEP]) >= r.clock[T_END]
-            if last:
-                t1 = r.clock[T_END]
+                if t1 + stretch(h, r.clock[MAX_STEP]) >= end:
+                    t1 = end
+                last = t1 == r.clock[T_END]
+            else:
+                last = done == r.numbers[STEPS_WANTED]
+                t1 = r.clock[T_END] if last else t1
+                if stop < math.inf:
+                    t1, cut = cut_fixed(stop, t1, r.clock[H], last)
+                    last = last and not cut
             row = log.history[r.numbers[HISTORY]]
             row[0], row[1], row[2] = t0, t1 - t0, 0.0
             status, way = call_reach(steps[REACH], context, t1, t1 - t0), REACH
@@ -349,7 +365,13 @@ def advance_series(context, run, log, steps, most):
         r.numbers[HISTORY] += 1
         if adaptive:
             r.clock[H] = t1 - t0
-        leave = _watch(c, r, t1 - t0)
+        leave = False
+        if t1 != stop:  # which is no sign of stiffness
+            leave = _watch(c, r, t1 - t0)
+        elif adaptive:
+            far, fast = _weights(c, r)
+            rho = _radius(x.bodies, c.network.bodies.shape[0], x.order[ORDERS], x.order[TOP] - 2, far, fast)
+            lower_order(x.order, rho, missed / MISSED, t1 - t0)
         if r.numbers[DENSE] != 0:
             _store_block(c, r, log, t0, t1 - t0, t1)
         if r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
@@ -364,9 +386,14 @@ def advance_series(context, run, log, steps, most):
             r.numbers[CHART_ROWS] += 1
             _open_chart(w, r, log, t1, BY_SERIES)
         r.numbers[STEPS] += 1
+        r.numbers[CUTS] += 1 if cut else 0
         status = _accept(context, c, r, log, steps, t1, way == PASS)
+        if status == 0 and t1 == stop and way == REACH:
+            if is_sampled(r, log, t1):
+                break
+            status = cross_stop(context, c, r, log, steps)
         if status != 0:
             return status
         if leave:
             break
-    return 0 if r.clock[T] >= r.clock[T_END] else SLICE_DONE
+    return 0 if r.clock[T] >= r.clock[T_END] and r.numbers[WAITING] == 0 else SLICE_DONE

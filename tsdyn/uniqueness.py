@@ -17,6 +17,7 @@ from .normal import gather, weigh
 from .poses import place_bodies
 from .rows import factorise_rows, run_loops
 from .selection import LEAST
+from .system import index_of
 from .workspace import load_parts, parts
 
 NEXT_TO_NOTHING = 1e-7  # of the rows' own size
@@ -81,7 +82,7 @@ def unique(solution, rows, body):
     if not network.dropped.size:
         return np.ones(solution.t.size, bool)
     wanted = np.flatnonzero((network.row >= rows.start) & (network.row < rows.stop))
-    sides = np.where(network.sides[wanted, 0] == body.index, 0, 1)
+    sides = np.where(network.sides[wanted, 0] == index_of(solution.packed, body), 0, 1)
     system = solution.system._replace(reals=solution.system.reals.copy())
     context, *_keep = resident(parts(system, network, solution.q.shape[1]))
     out = np.zeros(solution.t.size)

@@ -1,0 +1,120 @@
+"""A force along a joint's axis by time, displacement and rate: a linear drive with its law of control.
+
+    f = F e at x_b on b, -F e there on a             (1)  [N]  e: the axis, in the ground frame
+    s = e.(x_b - x_a)                                (2)  the displacement
+    F = function(t, s, sd)                           (3)  continuous
+    F = function(t_k, s(t_k), sd(t_k))               (4)  from t_k = k period to t_{k+1}
+
+The power of (1) is F sd, however the bodies move.
+"""
+
+import math
+from types import MappingProxyType
+
+from .._kernel import specialised
+from ..force import Force
+from ..joint_coordinates import displacements
+from ..joint_load import JointLoad, instants, law_of_joint
+from ..markers import Point, Vector
+from ..state_function import ByState
+
+
+class JointForce(JointLoad, Force):
+    """Push b of a joint along its axis by a function of time, displacement and rate; with a period, sampled and held.
+
+    Parameters
+    ----------
+    joint : Joint
+        Of the scene, with a displacement: Translational, Cylindrical, PointOnLine, Screw, ...
+    function : callable (t, displacement, rate) -> float, N
+        t in s, the displacement in m, the rate in m/s; else as for JointTorque.
+    period : float, s, optional
+        As for JointTorque.
+    which : int
+        Which displacement, of a joint that has several.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidForce
+        As for JointTorque.
+
+    Notes
+    -----
+    Its power is applied power.
+    """
+
+    markers = (Vector("a", "axis"), Point("a", "own_point"), Point("b", "other_point"))
+    coordinate = "displacement"
+    quantities = MappingProxyType({"function": law_of_joint, "period": instants})
+    geometries = staticmethod(displacements)
+
+    def __new__(cls, joint=None, *, period=None, **others):
+        """Choose the kernel: held, or by the function."""
+        return super().__new__(_ContinuousForce if cls is JointForce and period is None else cls)
+
+    @staticmethod
+    def directions(geometry):
+        """The axis and the two points."""
+        return geometry.e, geometry.s_own, geometry.s_other
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Eqs. (1), (4); conjugate to e is F (x_b - x_a)."""
+        for i in range(3):
+            out[i], out[3 + i], out[6 + i] = par[0] * (x[6 + i] - x[3 + i]), -par[0] * x[i], par[0] * x[i]
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eq. (1), F being constant."""
+        for i in range(3):
+            out[i], out[3 + i], out[6 + i] = par[0] * (x[6 + i] - x[3 + i]), -par[0] * x[i], par[0] * x[i]
+
+    @staticmethod
+    def remember(x, xd, par, t):
+        """The force, as it is held."""
+        return par[0]
+
+    @staticmethod
+    def joint_of_example(rng, a, b):
+        """A guide."""
+        from ..constraints.translational import Translational
+
+        return Translational(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3))
+
+
+class _ContinuousForce(ByState, JointForce):
+    """By the function at every evaluation, Eq. (3)."""
+
+    given = "function"
+    memory, remember, series = 0, None, None
+    no_series = "it is a function of the joint's displacement, of which only values are known; with period= it has one"
+    check = JointLoad.check
+
+    @staticmethod
+    def wrap(inner, owner):
+        """The kernel of a user's function."""
+        return specialised(_law, f"{owner.__qualname__}.joint_force", owner, function=inner)
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Of no function: what instances replace."""
+        for i in range(9):
+            out[i] = math.nan
+
+
+function = None  # filled in by `wrap`
+
+
+def _law(x, xd, par, t, out):
+    s, rate = 0.0, 0.0
+    for i in range(3):
+        s += x[i] * (x[6 + i] - x[3 + i])
+        rate += x[i] * (xd[6 + i] - xd[3 + i]) + xd[i] * (x[6 + i] - x[3 + i])
+    force = math.nan
+    try:
+        force = float(function(t, s, rate))
+    except Exception:
+        force = math.nan
+    for i in range(3):
+        out[i], out[3 + i], out[6 + i] = force * (x[6 + i] - x[3 + i]), -force * x[i], force * x[i]

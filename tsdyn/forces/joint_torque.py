@@ -1,0 +1,145 @@
+"""A torque about a joint's axis by time, angle and rate: a motor with its law of control, continuous or sampled.
+
+    N = T u on b, -T u on a                          (1)  [N m]  u: the axis, in the ground frame
+    T = function(t, angle, rate)                     (2)  continuous
+    T = function(t_k, angle(t_k), rate(t_k))         (3)  from t_k = k period to t_{k+1}
+
+The power of (1) is T times the rate of the angle, where the joint holds the axis.
+"""
+
+import math
+from types import MappingProxyType
+
+import numpy as np
+
+from .._kernel import specialised
+from ..angle import angle_near
+from ..force import Force
+from ..joint_coordinates import angles
+from ..joint_load import JointLoad, instants, law_of_joint
+from ..markers import Turn, Vector
+from ..state_function import ByState
+
+
+class JointTorque(JointLoad, Force):
+    """Turn b of a joint against a by a function of time, angle and rate; with a period, sampled and held.
+
+    Parameters
+    ----------
+    joint : Joint
+        Of the scene, with an angle: Revolute, Cylindrical, Universal, ... The torque has the sign of the angle.
+    function : callable (t, angle, rate) -> float, N m
+        t in s, the angle in rad as built from zero and counted over full turns, the rate in rad/s. Without a period a
+        plain Python function that Numba can compile. With one, any object: it is called in Python at the instants only,
+        in their order, so it may keep what it likes from one to the next, such as the integral of a PID controller. If
+        it has a method `reset()`, that is called before each run that does not go on from a state.
+    period : float, s, optional
+        Between the instants k period at which the function is called; the torque is held from each to the next. Steps
+        end there, and every method keeps its order.
+    which : int
+        Which angle, of a joint that has several (Universal).
+    name : str, optional
+
+    Raises
+    ------
+    InvalidForce
+        If the joint has no such angle or is not of the scene, the period is not positive, or the function can't be
+        called so.
+
+    Notes
+    -----
+    Its power is applied power. Turns are counted as for `solution.angle(joint)`. What the function raises, or a value
+    that is not finite, ends the run.
+    """
+
+    markers = (Vector("a", "axis"), Turn("a"), Turn("b"))
+    coordinate = "angle"
+    quantities = MappingProxyType({"function": law_of_joint, "period": instants})
+    geometries = staticmethod(angles)
+
+    def __new__(cls, joint=None, *, period=None, **others):
+        """Choose the kernel: held, or by the function."""
+        return super().__new__(_ContinuousTorque if cls is JointTorque and period is None else cls)
+
+    @staticmethod
+    def directions(geometry):
+        """The axis."""
+        return (np.cross(geometry.f, geometry.g),)
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Eqs. (1), (3)."""
+        for i in range(3):
+            out[i] = 0.0 * x[i]
+            out[3 + i], out[6 + i] = -par[0] * x[i], par[0] * x[i]
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eq. (1), T being constant."""
+        for i in range(3):
+            out[3 + i], out[6 + i] = -par[0] * x[i], par[0] * x[i]
+
+    @staticmethod
+    def remember(x, xd, par, t):
+        """The torque, as it is held."""
+        return par[0]
+
+    @staticmethod
+    def joint_of_example(rng, a, b):
+        """A hinge."""
+        from ..constraints.revolute import Revolute
+
+        return Revolute(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3))
+
+
+class _ContinuousTorque(ByState, JointTorque):
+    """By the function at every evaluation, Eq. (2); what it remembers is the angle."""
+
+    remembers_angle = True
+    markers = (Vector("a", "axis"), Vector("a", "reference"), Vector("b", "direction"), Turn("a"), Turn("b"))
+    given = "function"
+    series = None
+    no_series = "it is a function of the joint's angle, of which only values are known; with period= it has a series"
+    check = JointLoad.check
+
+    @staticmethod
+    def directions(geometry):
+        """The axis, and the directions whose angle it is."""
+        return np.cross(geometry.f, geometry.g), geometry.f, geometry.h
+
+    @staticmethod
+    def wrap(inner, owner):
+        """The kernel of a user's function."""
+        return specialised(_law, f"{owner.__qualname__}.joint_torque", owner, function=inner)
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Of no function: what instances replace."""
+        for i in range(15):
+            out[i] = math.nan
+
+    @staticmethod
+    def remember(x, xd, par, t):
+        """The angle."""
+        w0, w1, w2 = x[1] * x[5] - x[2] * x[4], x[2] * x[3] - x[0] * x[5], x[0] * x[4] - x[1] * x[3]
+        y = x[6] * w0 + x[7] * w1 + x[8] * w2
+        return angle_near(y, x[6] * x[3] + x[7] * x[4] + x[8] * x[5], par[0])
+
+
+function = None  # filled in by `wrap`
+
+
+def _law(x, xd, par, t, out):
+    w0, w1, w2 = x[1] * x[5] - x[2] * x[4], x[2] * x[3] - x[0] * x[5], x[0] * x[4] - x[1] * x[3]  # u x f
+    y = x[6] * w0 + x[7] * w1 + x[8] * w2
+    turned = angle_near(y, x[6] * x[3] + x[7] * x[4] + x[8] * x[5], par[0])
+    rate = x[0] * (xd[12] - xd[9]) + x[1] * (xd[13] - xd[10]) + x[2] * (xd[14] - xd[11])
+    torque = math.nan
+    try:
+        torque = float(function(t, turned, rate))
+    except Exception:
+        torque = math.nan
+    for i in range(9):
+        out[i] = 0.0
+    for i in range(3):
+        out[9 + i], out[12 + i] = -torque * x[i], torque * x[i]

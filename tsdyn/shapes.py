@@ -1,0 +1,187 @@
+"""Mass and inertia of shapes: scene.add_body(**ts.shapes.box((1, 2, 3), density=7850)).
+
+box, sphere, cylinder, rod, from_mesh; +, moved and rotated make one body of several.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .checks import floats, number, positive, vector3
+from .errors import InvalidArgument
+from .mesh import moments
+
+AXES = {"x": 0, "y": 1, "z": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Mass, centroid and inertia of a shape; unpacked by `**` it is the mass and inertia of `Scene.add_body`.
+
+    Attributes
+    ----------
+    mass : float, kg
+    inertia : ndarray (3, 3), kg m^2
+        About the centroid, in axes parallel to the shape's own frame: those of the body.
+    centroid : ndarray (3,), m
+        In the shape's own frame. A point p of that frame is p - centroid in the body's.
+    """
+
+    mass: float
+    inertia: np.ndarray
+    centroid: np.ndarray
+
+    def keys(self):
+        """What `add_body` is given."""
+        return ("mass", "inertia")
+
+    def __getitem__(self, name):
+        return {"mass": self.mass, "inertia": self.inertia}[name]
+
+    def moved(self, by):
+        """The same shape elsewhere in its frame; by (3,), m."""
+        return Shape(self.mass, self.inertia, self.centroid + vector3(by, "shape.moved: by (m)", InvalidArgument))
+
+    def rotated(self, rotation):
+        """The shape turned about the origin of its frame, by a matrix (3, 3) or a scipy Rotation."""
+        A = floats(rotation.as_matrix() if hasattr(rotation, "as_matrix") else rotation)
+        if A.shape != (3, 3) or not np.abs(A @ A.T - np.eye(3)).max() < 1e-9 or np.linalg.det(A) < 0.0:
+            raise InvalidArgument(
+                f"shape.rotated: rotation must be a rotation matrix (3, 3) or one scipy Rotation, got {rotation!r}."
+            )
+        return Shape(self.mass, A @ self.inertia @ A.T, A @ self.centroid)
+
+    def __add__(self, other):
+        if not isinstance(other, Shape):
+            raise InvalidArgument(f"a shape can be added to a shape only, not to {other!r}.")
+        mass = self.mass + other.mass
+        apart = other.centroid - self.centroid
+        centroid = self.centroid + (other.mass / mass) * apart
+        inertia = self.inertia + other.inertia + (self.mass * other.mass / mass) * _steiner(apart)
+        return Shape(mass, inertia, centroid)
+
+
+def box(size, *, mass=None, density=None):
+    """A cuboid about its centre, edges along the axes.
+
+    Parameters
+    ----------
+    size : array_like (3,), m
+        Lengths of the edges along x, y, z.
+    mass : float, kg
+    density : float, kg/m^3
+        Either of the two.
+
+    Returns
+    -------
+    Shape
+
+    Raises
+    ------
+    InvalidArgument
+        If a length, mass or density is not positive and finite, or not one of mass and density is given.
+    """
+    edges = vector3(size, "box: size (m)", InvalidArgument)
+    if not (edges > 0.0).all():
+        raise InvalidArgument(f"box: size must be three positive lengths in m, got {size!r}.")
+    m = _mass("box", float(edges.prod()), mass, density)
+    squares = edges**2
+    return _shape(m, (m / 12.0) * (squares.sum() - squares))
+
+
+def sphere(radius, *, inner=0.0, mass=None, density=None):
+    """A ball about its centre; with an inner radius, m, a hollow one. Other arguments and errors as for `box`."""
+    a, b = _radii("sphere", radius, inner)
+    m = _mass("sphere", 4.0 / 3.0 * math.pi * (a - b) * (a * a + a * b + b * b), mass, density)
+    ratio = b / a  # (a^5 - b^5) / (a^3 - b^3), with a - b divided out
+    share = (1 + ratio + ratio**2 + ratio**3 + ratio**4) / (1 + ratio + ratio**2)
+    return _shape(m, np.full(3, 0.4 * m * a * a * share))
+
+
+def cylinder(radius, length, *, axis="z", inner=0.0, mass=None, density=None):
+    """A cylinder about its centre, along the axis "x", "y" or "z"; with an inner radius, m, a tube.
+
+    Other arguments and errors as for `box`.
+    """
+    a, b = _radii("cylinder", radius, inner)
+    length = positive(length, "cylinder: length (m)")
+    m = _mass("cylinder", math.pi * (a - b) * (a + b) * length, mass, density)
+    return _round("cylinder", m, a * a + b * b, length, axis)
+
+
+def rod(length, *, axis="z", mass):
+    """A slender rod about its centre, along the axis "x", "y" or "z".
+
+    It has no inertia about its axis: a joint must hold that turn. A rod with a thickness is a `cylinder`.
+
+    Raises
+    ------
+    InvalidArgument
+        If the length or mass is not positive and finite, or the axis is unknown.
+    """
+    return _round("rod", positive(mass, "rod: mass (kg)"), 0.0, positive(length, "rod: length (m)"), axis)
+
+
+def from_mesh(vertices, faces, *, mass=None, density=None):
+    """The solid that a closed mesh of triangles bounds; exact, but for rounding.
+
+    Parameters
+    ----------
+    vertices : array_like (v, 3), m
+    faces : array_like (f, 3) of int
+        Vertices of each triangle, counterclockwise as seen from outside. A cavity is bounded by triangles that are
+        counterclockwise as seen from within it.
+    mass, density : float
+        As for `box`.
+
+    Returns
+    -------
+    Shape
+        Its `centroid` is in the frame of the vertices.
+
+    Raises
+    ------
+    InvalidArgument
+        If the mesh is not closed, its triangles don't turn the same way or all face inward, it has no volume, or an
+        index is out of range. A mesh that cuts through itself is not noticed.
+    """
+    volume, centroid, second = moments(vertices, faces)
+    m = _mass("from_mesh", volume, mass, density)
+    second = (m / volume) * second
+    return Shape(m, np.trace(second) * np.eye(3) - second, centroid)
+
+
+def _round(what, m, squares, length, axis):
+    """A body of revolution without taper: squares is the sum of both radii's."""
+    if not isinstance(axis, str) or axis not in AXES:
+        raise InvalidArgument(f"{what}: axis must be 'x', 'y' or 'z', got {axis!r}.")
+    inertia = np.full(3, m * (3.0 * squares + length**2) / 12.0)
+    inertia[AXES[axis]] = 0.5 * m * squares
+    return _shape(m, inertia)
+
+
+def _shape(mass, inertia):
+    return Shape(mass, np.diag(inertia), np.zeros(3))
+
+
+def _steiner(d):
+    return (d @ d) * np.eye(3) - np.outer(d, d)
+
+
+def _radii(what, radius, inner):
+    a, b = positive(radius, f"{what}: radius (m)"), number(inner)
+    if not 0.0 <= b < a:
+        raise InvalidArgument(f"{what}: inner must be a radius from 0 to less than {a:g} m, got {inner!r}.")
+    return a, b
+
+
+def _mass(what, volume, mass, density):
+    if (mass is None) == (density is None):
+        raise InvalidArgument(f"{what}: give either mass= in kg or density= in kg/m^3.")
+    if mass is not None:
+        return positive(mass, f"{what}: mass (kg)")
+    return positive(density, f"{what}: density (kg/m^3)") * volume
+
+
+__all__ = ["Shape", "box", "cylinder", "from_mesh", "rod", "sphere"]

@@ -91,6 +91,11 @@ class Screw(FramedJoint):
             ),
         )
 
+    @property
+    def travel_per_radian(self):
+        """The lead, m/rad: its angle and its displacement are one freedom."""
+        return self.lead
+
     def counted_from(self, t, *displacements):
         """The angle that goes with the travel."""
         return displacements[0] / self.lead

@@ -50,7 +50,7 @@ state_function
 joint_load
 given_load
 names
-system stepping progress
+rigid_shift system stepping progress
 handles
 still
 sparse_rows
@@ -79,7 +79,7 @@ branch initial start kinetic
 approach folds dependence
 conflict mobility
 assemble
-null_space tangent editing
+setting null_space tangent editing
 scene
 maggi_kane linearise driven
 series_steps

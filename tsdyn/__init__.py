@@ -34,6 +34,7 @@ from .integrator import (  # noqa: E402
     Integrator,
 )
 from .joint import Joint  # noqa: E402
+from .joint_coordinates import Angle, Displacement  # noqa: E402
 from .joint_friction import JointFriction  # noqa: E402
 from .markers import Parameters, Point, Turn, Vector  # noqa: E402
 from .motion import Motion  # noqa: E402
@@ -49,8 +50,10 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Adaptive",
+    "Angle",
     "Body",
     "DiagonallyImplicit",
+    "Displacement",
     "ExplicitNystrom",
     "ExplicitRungeKutta",
     "Force",

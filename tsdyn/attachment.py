@@ -168,7 +168,7 @@ class Attachment:
         return self.a if marker.body == "a" else self.b
 
     def counted_from(self, t, *displacements):
-        """The angle near which a run that begins at t counts the turns of its angles; (-pi, pi] is about zero."""
+        """The angle, or angles, near which a run that begins at t counts turns: zero, or what `Scene.set` has set."""
         return self.angle_near
 
     def parameters(self):

@@ -28,7 +28,7 @@ class Handles:
     Attributes
     ----------
     bodies, items : tuple
-        Items are the constraints and forces, joints whole.
+        Items are the constraints and forces that have been added, joints whole.
     rows : tuple of Row
         Of the items that have joint coordinates.
     count : int
@@ -42,7 +42,9 @@ class Handles:
     def __init__(self, packed):
         places = packed.system.bodies.tolist()
         self.bodies = packed.bodies
-        self.items = tuple(member.constraint for member in packed.members) + tuple(load.force for load in packed.loads)
+        constraints = [member.constraint for member in packed.members]
+        constraints = [each for each in constraints if not getattr(each, "normalises", False)]
+        self.items = (*constraints, *(load.force for load in packed.loads))
         self._where = {body: tuple(place) for body, place in zip(self.bodies, places, strict=True)}
         self._by_item = None
         rows, joints, frames = [], [], []

@@ -82,11 +82,22 @@ def _turning(p, pd):
     return list((2.0 * (p[:, :1] * ed - pd[:, :1] * e + np.cross(e, ed))).T)
 
 
-def driving_power(solution):
-    """Power (k,) of constraints that depend on time, lam . Phi_t."""
+def power_of(solution, item):
+    """Power (k,) that a constraint puts in, lam . Phi_t of its rows, or a force: applied, less what it dissipates.
+
+    item is a system.Member or a force_pack.Load.
+    """
+    if not hasattr(item, "rows"):
+        _, lost, applied = load_powers(solution.packed, item, solution.t, solution.q, solution.qd, solution._memory)
+        return applied - lost + np.zeros(solution.t.size)
+    return driving_power(solution, item.rows)
+
+
+def driving_power(solution, rows=slice(None)):
+    """Power (k,) of constraints that depend on time, lam . Phi_t; of some rows, a slice."""
     packed, t = solution.packed, solution.t
     if not solution.system.rheonomic[0]:
         return np.zeros(t.size)
     still = np.zeros_like(solution.q)
     Phi_t = constraint_rows(packed, t, solution.q, still, still)[1]
-    return (particular(solution.multipliers) * Phi_t).sum(axis=1)
+    return (particular(solution.multipliers) * Phi_t)[:, rows].sum(axis=1)

@@ -20,6 +20,7 @@ from .membership import admit, settle
 from .mobility import mobility
 from .motion import Motion
 from .primitive import Primitive
+from .setting import set_joint
 from .signal import Signal
 from .system import pack, user_functions
 
@@ -251,6 +252,8 @@ class Scene:
 
     def __getitem__(self, item):
         """The body, constraint or force of this name; in a copy also that of a handle of the scene it was made of."""
+        if item == self.ground.name:
+            return self.ground
         known = isinstance(item, (PointMass, Ground, Primitive, Joint, Force))
         twin = self._twins.get(item) if self._twins is not None and known else None
         return found(self, item) if twin is None else twin
@@ -275,6 +278,7 @@ class Scene:
     evaluate = evaluate
     assemble = assemble
     mobility = mobility
+    set = set_joint
     remove = remove
     copy = copy
 

@@ -205,8 +205,8 @@ class Solution(Kinematics):
 
         Parameters
         ----------
-        item : constraint or force
-        on : Body, optional
+        item : constraint, force, or name of one
+        on : Body or str, optional
             Which of its bodies they act on; by default a, or b where a is the ground (`item.on`).
 
         Returns
@@ -215,6 +215,7 @@ class Solution(Kinematics):
             In the ground frame; the torque is about the item's first point on that body (`point_a`), or the centroid
             where it has none.
         """
+        item = self.handles.item(item)
         load = reactions.loads_of(self.packed).get(id(item))
         if load is not None:
             return reactions.force_reaction(self, load, self._acted(item, on))
@@ -227,13 +228,14 @@ class Solution(Kinematics):
         Redundant constraints share their loads in many ways, all of which move the bodies alike; `reaction` is then
         one of them, with the multipliers of dropped rows, NaN in `multipliers`, taken as zero.
         """
+        item = self.handles.item(item)
         if id(item) in reactions.loads_of(self.packed):
             return np.ones(self.t.size, bool)
         return uniqueness.unique(self, self._member(item).rows, self._acted(item, on))
 
     def rows(self, constraint):
         """Which columns of `multipliers` are those of a constraint, a slice."""
-        return self._member(constraint).rows
+        return self._member(self.handles.item(constraint)).rows
 
     def _member(self, constraint):
         member = member_of(self.packed, constraint)
@@ -241,11 +243,11 @@ class Solution(Kinematics):
             raise InvalidConstraint(f"{constraint!r} is not a constraint or force of this solution's scene.")
         return member
 
-    @staticmethod
-    def _acted(item, on):
+    def _acted(self, item, on):
         """The body that a reaction is asked for."""
         if on is None:
             return item.on
+        on = self.handles.body(on) if isinstance(on, str) else on
         if on is item.a or on is item.b:
             if on.dimension:
                 return on
@@ -292,9 +294,36 @@ class Solution(Kinematics):
         InvalidArgument
             If the run kept no dense output.
         """
+        return self._integrated(None)
+
+    def power_of(self, item):
+        """Power (k,), W, that one constraint or force, or that of a name, puts in: what dE/dt owes to it.
+
+        Of a motor or a driver: of its force or torque along the motion prescribed. Of a force: of its loads and
+        actuators, less what it dissipates; what a spring stores is energy, not power. Of any other constraint: zero.
+        """
+        return power.power_of(self, self._part(item))
+
+    def work_of(self, item):
+        """Work (k,), J, since the start, of `power_of` one constraint or force: the energy that a motor has put in.
+
+        Raises
+        ------
+        InvalidArgument
+            If the run kept no dense output.
+        """
+        return self._integrated(self._part(item))
+
+    def _part(self, item):
+        """The `Load` of a force, or the `Member` of a constraint."""
+        item = self.handles.item(item)
+        load = reactions.loads_of(self.packed).get(id(item))
+        return self._member(item) if load is None else load
+
+    def _integrated(self, part):
         if self._trajectory is None:
             raise InvalidArgument("work is integrated over dense output: simulate(..., dense_output=True) keeps it.")
-        return integrate_work(self, self._trajectory)
+        return integrate_work(self, self._trajectory, part)
 
     @cached_property
     def linear_momentum(self):

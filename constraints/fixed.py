@@ -8,8 +8,8 @@ f_a and f_b are the references made perpendicular to the axes, g = axis x f. Hol
 axis, too: a start there is refused. Never singular.
 """
 
-from ..calls import Placing
 from ..bodies import Ground, PointMass, rotation_matrix
+from ..calls import Placing
 from ..framed_joint import FramedJoint
 from .dot1 import Dot1
 from .parallel import Parallel

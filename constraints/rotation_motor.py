@@ -8,6 +8,7 @@ Singular where the axes are at right angles: a joint keeps them together.
 
 import numpy as np
 
+from ..calls import fitting
 from ..errors import InvalidConstraint
 from ..framed_joint import FramedJoint, beside, turned_about
 from ..joint_coordinates import Angle
@@ -76,6 +77,7 @@ class RotationMotor(FramedJoint):
         return self.angle.value(t)[0]
 
     @classmethod
+    @fitting
     def of(cls, joint, *, angle, name=""):
         """Make the motor that turns b of a joint against a, about its axis, from where the bodies stand now."""
         return cls(*geometry(joint), **axes(joint), angle=angle, name=name)

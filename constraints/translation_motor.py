@@ -5,6 +5,7 @@
 Never singular by itself.
 """
 
+from ..calls import fitting
 from ..joint import Joint
 from ..joint_coordinates import Displacement
 from ..markers import Point, Vector
@@ -57,6 +58,7 @@ class TranslationMotor(Joint):
         super().__setattr__(name, value)
 
     @classmethod
+    @fitting
     def of(cls, joint, *, displacement, name=""):
         """Make the motor that moves b of a joint against a, along its axis, measured between the joint's points."""
         bodies, given = geometry(joint), axes(joint)

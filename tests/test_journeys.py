@@ -1,4 +1,4 @@
-"""Every result through everything that a user may ask of it, for every method, and all that README and docs say to run."""
+"""Every result through everything that a user may ask, for every method; snippets and commands of README and docs."""
 
 import itertools
 import re
@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from examples import door, slider_crank, stick_slip, top
 from journeys import displayed, visit
 
 import tsdyn as ts
+from examples import door, slider_crank, stick_slip, top
 
 ROOT = Path(__file__).parents[1]
 METHODS = [None, *sorted(kind.__name__.lower() for kind in ts.integrators.registered() if "tsdyn" in kind.__module__)]

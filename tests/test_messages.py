@@ -1,6 +1,5 @@
 """What a user is told: wrong calls, names, what was forgotten, and how results and scenes print."""
 
-import copy
 import inspect
 import warnings
 
@@ -87,7 +86,7 @@ def test_at_has_the_arguments_of_its_class():
     assert list(inspect.signature(C.Revolute.at).parameters)[:4] == ["a", "b", "point", "axis"]
     assert "lead" in inspect.signature(C.Screw.at).parameters
     assert "lead" not in inspect.signature(C.Revolute.at).parameters
-    assert list(inspect.signature(F.PointForce.at).parameters)[0] == "a"
+    assert next(iter(inspect.signature(F.PointForce.at).parameters)) == "a"
 
 
 def test_names_of_constraints_and_forces_are_unique():

@@ -8,8 +8,8 @@ from numba.core.errors import NumbaError
 
 from ._kernel import kernel
 from .bodies import Ground, PointMass, rotation_matrix
-from .checks import demand_known, floats, number
 from .calls import Placing, complete_signature, fitting
+from .checks import demand_known, floats, label, number
 from .errors import InvalidConstraint
 from .markers import PARAMETERS, POINT, TURN
 from .membership import note
@@ -49,6 +49,7 @@ class Attachment:
         """Attach it to its bodies; coordinates has an entry for each marker, in the body frame."""
         self.a, self.b = a, b
         kind = self._kind()
+        name = label(name, kind, self.error)
         needed = {marker.body for marker in self.markers} | {"a"}
         bodies = [body for body, letter in ((a, "a"), (b, "b")) if body is not None or letter in needed]
         for body in bodies:
@@ -56,8 +57,8 @@ class Attachment:
                 raise self.error(
                     f"{name or kind}: {body!r} is not a body; pass one that add_body returned, or the ground."
                 )
-        self.named = bool(str(name))
-        self.name = str(name) or f"{kind}({', '.join(body.name for body in bodies)})"
+        self.named = bool(name)
+        self.name = name or f"{kind}({', '.join(body.name for body in bodies)})"
         if all(body.dimension == 0 for body in bodies):
             raise self.error(f"{self.name}: one of the bodies must not be the ground.")
         if len(bodies) == 2 and a is b:

@@ -6,7 +6,7 @@ class a signature of its own.
 
 import inspect
 from functools import wraps
-from types import MethodType
+from types import FunctionType, MethodType
 
 from .checks import nearest
 from .errors import InvalidCall
@@ -36,8 +36,8 @@ def fitting(function, then=None):
         except TypeError as error:
             if isinstance(error, InvalidCall):
                 raise
-            title, known = function.__name__, inspect.signature(call)
-            if title == "__init__":
+            title, known = function.__qualname__, inspect.signature(call)
+            if function.__name__ == "__init__":
                 title = getattr(arguments[0], "_kind", lambda: type(arguments[0]).__name__)()
             misfit = misfit_of(title, known, arguments, keywords)
             if misfit is None:
@@ -45,6 +45,14 @@ def fitting(function, then=None):
         raise misfit
 
     return call
+
+
+def fitting_methods(cls):
+    """Decorate a class: `fitting` for the public methods that it defines."""
+    for name, value in list(vars(cls).items()):
+        if isinstance(value, FunctionType) and not name.startswith("_") and not hasattr(value, "__wrapped__"):
+            setattr(cls, name, fitting(value))
+    return cls
 
 
 def misfit_of(title, signature, arguments, keywords):

@@ -13,7 +13,7 @@ from .assembly import constraint_jacobian
 from .linalg import null_space
 from .local_chart import touch
 from .newton import OK, SINGULAR, invert_normal_matrix, leave_rows_out, normal_matrix, update_b
-from .workspace import FACTORIZATIONS, KEPT, RATE
+from .workspace import FACTORIZATIONS, KEPT, RATE, SIZE
 
 RANK_LIMIT = 1e-8  # smallest singular value of Phi_q, rows scaled to length one, below which it has lost rank
 
@@ -46,7 +46,8 @@ def new_chart(s, w, f, l, network, t):
     for j in range(k):
         w.v[j] = 0.0
     low, high = null_space(w.householder, n, kept, w.V, w.R, w.z)
-    if m > 0 and not (regular and low > RANK_LIMIT * high):
+    least = RANK_LIMIT * min(w.control[SIZE], 1.0)  # rows of points that are so near to each other differ by that
+    if m > 0 and not (regular and low > least * high):
         return SINGULAR
     _normal_space(network, w, l)
     normal_matrix(s, w)

@@ -11,14 +11,18 @@ CHECK = -float(np.cos(0.3 * np.pi))  # well off the nodes of every degree that i
 
 
 class Table(NamedTuple):
-    """The interpolant of degree N, a power of two, through N + 1 samples."""
+    """The interpolant of degree N, a power of two, through samples at N + 1 nodes; one more sample is to check it."""
 
     nodes: np.ndarray  # (N + 1,)  Chebyshev points of the second kind, increasing; those of N / 2 are every other one
+    points: np.ndarray  # (N + 2,)  the same and CHECK
+    at_nodes: np.ndarray  # (N + 1,)  which of them are nodes
+    known: np.ndarray  # (N / 2 + 2,)  which of them are points of N / 2
+    fresh: np.ndarray  # (N / 2,)  which are not
+    middle: int  # which is 0
     fine: np.ndarray  # (FINE N + 1,)  grid of which the nodes are every FINE-th point
-    coefficients: np.ndarray  # (N + 1, N + 1)  samples -> Chebyshev coefficients
-    values: (
-        np.ndarray
-    )  # (FINE N + 2 + N / 2, N + 1)  samples -> values on the fine grid and at CHECK, higher coefficients
+    coefficients: np.ndarray  # (N + 1, N + 1)  samples at nodes -> Chebyshev coefficients
+    values: np.ndarray  # (FINE N + 1, N + 2)  samples at points -> values on the fine grid
+    errors: np.ndarray  # (N / 2 + 1, N + 2)  samples at points -> what is missed at CHECK, and the higher coefficients
 
 
 @cache
@@ -29,8 +33,24 @@ def table(N):
     coefficients = 2.0 / N * chebyshev.chebvander(nodes, N).T
     coefficients[:, [0, -1]] *= 0.5
     coefficients[[0, -1]] *= 0.5
-    values = chebyshev.chebvander(np.append(fine, CHECK), N) @ coefficients
-    return Table(nodes, fine, coefficients, np.concatenate((values, coefficients[N // 2 + 1 :])))
+    check = int(np.searchsorted(nodes, CHECK))
+    points, widened = np.insert(nodes, check, CHECK), np.insert(coefficients, check, 0.0, axis=1)
+    known = np.searchsorted(points, np.append(nodes[::2], CHECK))
+    known.sort()
+    missed = chebyshev.chebvander(CHECK, N).ravel() @ widened
+    missed[check] = -1.0
+    return Table(
+        nodes,
+        points,
+        np.delete(np.arange(N + 2), check),
+        known,
+        np.setdiff1d(np.arange(N + 2), known),
+        int(np.searchsorted(points, 0.0)),
+        fine,
+        coefficients,
+        chebyshev.chebvander(fine, N) @ widened,
+        np.concatenate((missed[None], widened[N // 2 + 1 :])),
+    )
 
 
 def extremes(coefficients):

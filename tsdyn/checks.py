@@ -65,6 +65,13 @@ def one_of(value, options, what, error=InvalidArgument):
     return value
 
 
+def label(name, what, error):
+    """A name as text: that of a string or a whole number, "" for None, or raise `error`."""
+    if name is None or (isinstance(name, (str, int, np.integer)) and not isinstance(name, bool)):
+        return "" if name is None else str(name)
+    raise error(f"{what}: name must be text, got {name!r}.")
+
+
 def counted(count, noun, nouns=None):
     """A number of things, in words: 1 row, 2 rows."""
     return f"{count} {noun if count == 1 else nouns or noun + 's'}"

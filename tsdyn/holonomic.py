@@ -32,10 +32,10 @@ def demand_holonomic(packed, q, t, form):
         row = _wrong_row(constraint, par, _markers(packed, constraint, places, q), t)
         if row is not None:
             raise InvalidConstraint(
-                f"{constraint.name}: row {row} of its jacobian is not the derivative of its phi, so it is not holonomic, "
-                f"and {form!r}, and implicit methods, would run it wrongly. Correct the kernels by "
-                f"ts.testing.check_primitive({kind.__name__}); a row on velocities alone is run by formulation='tangent' "
-                "with an explicit method."
+                f"{constraint.name}: row {row} of its jacobian is not the derivative of its phi: it is not holonomic, "
+                f"which {form!r} with this method would run wrongly. Correct the kernels with the help of "
+                f"ts.testing.check_primitive({kind.__name__}); a row on velocities alone is served by "
+                "formulation='tangent' with an explicit method."
             )
     packed.shared[AGREED] = True
 

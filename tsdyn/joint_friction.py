@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from .calls import fitting, unknown_argument
-from .checks import number
+from .checks import label, number
 from .errors import InvalidForce
 from .force import not_negative, positive_number
 from .markers import TURN, Point, Turn, Vector
@@ -76,6 +76,7 @@ class JointFriction:
         **geometry,
     ):
         kind = self._kind()
+        name = label(name, kind, InvalidForce)
         if not isinstance(joint, self.joints):
             names = " or ".join(cls.__name__ for cls in self.joints)
             raise InvalidForce(f"{name or kind}: joint must be a {names} of the scene, got {joint!r}.")

@@ -6,6 +6,7 @@ import numpy as np
 
 from . import joint_motion
 from .bodies import rotation_matrix
+from .calls import fitting_methods
 from .checks import vector3
 from .diagnostics import angular_velocity
 from .errors import InvalidArgument
@@ -19,6 +20,7 @@ class Anchor(NamedTuple):
     levels: tuple = ()  # q, qd there, (n,) or (k, n); empty for the point itself
 
 
+@fitting_methods
 class Kinematics:
     """Mixed into what has `handles`, q, qd and qdd, (n,) at one instant or (k, n) along a run, and an `anchor`.
 

@@ -1,6 +1,7 @@
 """A prescribed function of time with its two derivatives: compiled and reached by address, or a program of numbers."""
 
 import math
+from functools import partial
 from types import FunctionType
 
 import numpy as np
@@ -8,7 +9,9 @@ from numba.core.errors import NumbaError
 
 from . import motions
 from ._kernel import Callback, caller, kernel, specialised
+from .calls import fitting
 from .checks import number
+from .compiled_once import compiled_once
 from .errors import InvalidArgument, InvalidConstraint
 from .knots import demand_covered, demand_followed
 from .motion_program import run_program
@@ -34,6 +37,7 @@ class Motion:
         What error messages call it.
     """
 
+    @fitting
     def __init__(self, f, fd=None, fdd=None, what=UNNAMED):
         self.what, self.smooth, self.given = what, None, (f, fd, fdd)
         if is_data(f) and fd is fdd is None:
@@ -191,7 +195,7 @@ class Motion:
             return run_program.address, 0, 0
         try:
             if self._callbacks is None:
-                self._callbacks = tuple(_callback(function) for function in self.given)
+                self._callbacks = tuple(compiled_once("motion", f, partial(_callback, f)) for f in self.given)
             return tuple(callback.address for callback in self._callbacks)
         except NumbaError as error:
             raise InvalidConstraint(

@@ -8,8 +8,8 @@ import numpy as np
 from ._cache import deep_hash
 from .assemble import assemble
 from .bodies import IDENTITY, Body, Ground, PointMass
-from .calls import fitting
-from .checks import counted, demand_known, vector3
+from .calls import fitting, fitting_methods
+from .checks import counted, demand_known, label, vector3
 from .constraints.euler_normalization import EulerNormalization
 from .editing import copy, demand_present, found, remove
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint
@@ -25,6 +25,7 @@ from .signal import Signal
 from .system import pack, user_functions
 
 
+@fitting_methods
 class Scene:
     """Bodies, constraints, forces and gravity.
 
@@ -155,7 +156,7 @@ class Scene:
             self._names = {"ground", *(body.name for body in self._bodies)}
         taken = self._names
         free = (f"body{i}" for i in count(len(self._bodies) + 1))
-        name = str(name) or next(name for name in free if name not in taken)
+        name = label(name, kind.__name__, InvalidBody) or next(name for name in free if name not in taken)
         if name in taken:
             raise InvalidBody(f"the scene has a body named {name!r} already; choose another name.")
         body = kind(self, len(self._bodies), name, **values)
@@ -245,7 +246,7 @@ class Scene:
     def body(self, name):
         """Return the body of this name."""
         for body in self._bodies:
-            if body.name == name:
+            if isinstance(name, str) and body.name == name:
                 return body
         raise InvalidBody(f"no body is named {name!r}; there are {', '.join(b.name for b in self._bodies) or 'none'}.")
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .chebyshev import CHECK, FINE, extremes, table
+from .chebyshev import FINE, extremes, table
 
 EPS = float(np.finfo(float).eps)
 LARGEST = 32  # degree
@@ -33,14 +33,16 @@ class TooFast(Exception):
 
 
 class Fit(NamedTuple):
-    """Samples of a function at the Chebyshev points of [a, b], and the interpolant through them."""
+    """Samples of a function at the points of a `Table` on [a, b], and the interpolant through them."""
 
     a: float
     b: float
-    times: np.ndarray  # (N + 1,)
-    samples: np.ndarray  # (N + 1,)
+    degree: int
+    times: np.ndarray  # (N + 2,)
+    samples: np.ndarray  # (N + 2,)
     fine: np.ndarray  # (FINE N + 1,)  the interpolant on the fine grid
     off: float  # its error
+    clear: float  # how far from zero it stays; 0 if it changes sign
     scale: float  # the largest sample
     resolved: bool
 
@@ -74,11 +76,11 @@ class Search:
         """
         self.points.append((a, value))
         whole = self._fit(a, b, value, None, degree)
-        if not (whole.resolved or np.isnan(whole.off)):
+        if not (whole.resolved or whole.off != whole.off):
             self.noise = self._rounding(whole)
             whole = whole._replace(resolved=whole.off <= self.noise)
         self._follow(whole, 0)
-        return whole.samples.size - 1
+        return whole.degree
 
     def _values(self, times):
         self.spent += times.size
@@ -88,33 +90,31 @@ class Search:
 
     def _fit(self, a, b, first, last, degree):
         """The `Fit` of the degree that resolves the function on [a, b], or of the highest that is worth trying."""
-        half, nodes = 0.5 * (b - a), table(degree).nodes
-        check = int(np.searchsorted(nodes, CHECK))
-        times = a + half * (np.insert(nodes, check, CHECK) + 1.0)
-        times[-1] = b
-        values = np.empty(times.size)
-        values[0], values[-1] = first, np.nan if last is None else last
-        unknown = slice(1, None if last is None else -1)
-        values[unknown] = self._values(times[unknown])
-        at_check, times, samples = values[check], np.delete(times, check), np.delete(values, check)
+        half, grid = 0.5 * (b - a), table(degree)
+        times, samples = a + half * (grid.points + 1.0), np.empty(degree + 2)
+        times[-1], samples[0] = b, first
+        if last is None:
+            samples[1:] = self._values(times[1:])
+        else:
+            samples[1:-1], samples[-1] = self._values(times[1:-1]), last
         while True:
-            fit = self._judged(a, b, times, samples, at_check)
+            fit = self._judged(a, b, degree, times, samples)
             hopeless = degree == LARGEST or (degree == LARGEST // 2 and fit.off > HOPELESS * fit.scale)
-            if fit.resolved or hopeless or np.isnan(fit.off):
+            if fit.resolved or hopeless or fit.off != fit.off:
                 return fit
             degree *= 2
-            times, samples = a + half * (table(degree).nodes + 1.0), np.empty(degree + 1)
-            times[-1], samples[::2] = b, fit.samples
-            samples[1::2] = self._values(times[1::2])
+            grid, before = table(degree), samples
+            times, samples = a + half * (grid.points + 1.0), np.empty(degree + 2)
+            times[-1], samples[grid.known] = b, before
+            samples[grid.fresh] = self._values(times[grid.fresh])
 
-    def _judged(self, a, b, times, samples, at_check):
-        grid, scale = FINE * (samples.size - 1) + 1, float(np.abs(samples).max())
-        found = table(samples.size - 1).values @ samples
-        fine, missed, higher = found[:grid], abs(found[grid] - at_check), np.abs(found[grid + 1 :])
-        off = missed + max(higher[-2], higher[-1])
-        clear = max(fine.min(), -fine.max(), 0.0)
-        resolved = off <= max(TIGHT * scale, self.noise) or CLEAR * (missed + higher.sum()) <= clear
-        return Fit(a, b, times, samples, fine, off, scale, bool(resolved))
+    def _judged(self, a, b, degree, times, samples):
+        grid = table(degree)
+        fine, errors = grid.values @ samples, np.abs(grid.errors @ samples)
+        scale, off = float(np.abs(samples).max()), float(errors[0] + max(errors[-2], errors[-1]))
+        clear = max(float(fine.min()), -float(fine.max()), 0.0)
+        resolved = off <= max(TIGHT * scale, self.noise) or CLEAR * float(errors.sum()) <= clear
+        return Fit(a, b, degree, times, samples, fine, off, clear, scale, resolved)
 
     def _rounding(self, fit):
         """The rounding error of the values: what high degrees add where a smooth function is of a low one."""
@@ -132,10 +132,10 @@ class Search:
         """Take the points of a fit or of its halves; so many halvings before have left one half resolved."""
         if fit.resolved:
             self._take(fit)
-        elif calm == CALM or np.isnan(fit.off) or not fit.b - fit.a > SHORTEST * max(abs(fit.a), abs(fit.b)):
+        elif calm == CALM or fit.off != fit.off or not fit.b - fit.a > SHORTEST * max(abs(fit.a), abs(fit.b)):
             self._take_rough(fit)
         else:
-            middle = fit.samples.size // 2
+            middle = table(fit.degree).middle
             t, value = fit.times[middle], fit.samples[middle]
             left = self._fit(fit.a, t, fit.samples[0], value, 8)
             right = self._fit(t, fit.b, value, fit.samples[-1], 8)
@@ -145,20 +145,25 @@ class Search:
 
     def _take(self, fit):
         """The samples, and the extremes next to zero and beyond it that they miss."""
-        size, sign, last = np.abs(fit.fine), np.sign(fit.fine), fit.fine.size - 1
-        spans = set()
-        if fit.scale > self.noise:
-            least = (size[1:-1] <= np.minimum(size[:-2], size[2:])) & (sign[:-2] == sign[2:])
-            spans |= {(i, i + 2) for i in np.flatnonzero(least & (size[1:-1] <= NEAR * fit.scale)).tolist()}
-            runs = (np.flatnonzero(sign[1:] != sign[:-1]) + 1).tolist()
-            spans |= {(i - 1, j) for i, j in pairwise(runs) if -(-i // FINE) * FINE >= j}
-            spans |= {(i, i + 1) for i, end in ((0, 0), (last - 1, last)) if size[end] <= AT_ZERO * fit.scale}
         found = dict(zip(fit.times.tolist(), fit.samples.tolist(), strict=True))
-        grid = fit.a + 0.5 * (fit.b - fit.a) * (table(fit.samples.size - 1).fine + 1.0)
-        grid[::FINE] = fit.times
-        for i, j in spans:
-            found.update(self._polish(float(grid[i]), float(grid[j])))
+        if fit.scale > self.noise and fit.clear <= NEAR * fit.scale:
+            grid = fit.a + 0.5 * (fit.b - fit.a) * (table(fit.degree).fine + 1.0)
+            grid[-1] = fit.b
+            for i, j in self._spans(fit):
+                found.update(self._polish(float(grid[i]), float(grid[j])))
         self._append(found)
+
+    @staticmethod
+    def _spans(fit):
+        """Between which points of the fine grid extremes are to be looked at."""
+        fine, last = fit.fine.copy(), fit.fine.size - 1
+        fine[::FINE] = fit.samples[table(fit.degree).at_nodes]
+        size, sign = np.abs(fine), np.sign(fine)
+        least = (size[1:-1] <= np.minimum(size[:-2], size[2:])) & (sign[:-2] == sign[2:])
+        yield from ((i, i + 2) for i in np.flatnonzero(least & (size[1:-1] <= NEAR * fit.scale)).tolist())
+        runs = (np.flatnonzero(sign[1:] != sign[:-1]) + 1).tolist()
+        yield from ((i - 1, j) for i, j in pairwise(runs) if -(-i // FINE) * FINE >= j)  # that no node is in
+        yield from ((i, i + 1) for i, end in ((0, 0), (last - 1, last)) if size[end] <= AT_ZERO * fit.scale)
 
     def _polish(self, a, b):
         """Extremes between a and b, and an end that touches zero with one of them: values by their times."""
@@ -184,9 +189,7 @@ class Search:
         times, samples = fit.times[good], fit.samples[good]
         found = dict(zip(times.tolist(), samples.tolist(), strict=True))
         size, sign = np.abs(samples), np.sign(samples)
-        least = (
-            (size[1:-1] < size[:-2]) & (size[1:-1] < size[2:]) & (sign[:-2] == sign[1:-1]) & (sign[1:-1] == sign[2:])
-        )
+        least = (size[1:-1] < np.minimum(size[:-2], size[2:])) & (sign[:-2] == sign[1:-1]) & (sign[1:-1] == sign[2:])
         for i in np.flatnonzero(least).tolist():
             found.update(self._least(times[i], times[i + 2], sign[i], min(size[i], size[i + 2])))
         self._append(found)

@@ -1,6 +1,7 @@
 """A load as a function of time: a plain function of t, smooth motions, or data, evaluated once a time of a run."""
 
 import math
+from functools import partial
 from types import FunctionType
 
 import numpy as np
@@ -8,6 +9,7 @@ from numba.core.errors import NumbaError
 
 from ._kernel import Callback, caller, kernel, specialised, vector
 from .checks import floats, number
+from .compiled_once import compiled_once
 from .errors import InvalidArgument
 from .knots import demand_covered
 from .motion_program import run_program
@@ -134,7 +136,8 @@ class Signal:
             return run_program.address
         try:
             if self._callback is None:
-                self._callback = _callback(self.source, self.width)
+                make = partial(_callback, self.source, self.width)
+                self._callback = compiled_once(f"signal{self.width}", self.source, make)
             return self._callback.address
         except NumbaError as error:
             raise self.error(

@@ -9,6 +9,7 @@ import numpy as np
 
 from . import diagnostics, power, reactions, uniqueness
 from .account import account
+from .calls import fitting_methods
 from .checks import counted, floats
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .friction_reactions import with_normal_loads
@@ -37,6 +38,7 @@ class Charts(NamedTuple):
     steps: np.ndarray
 
 
+@fitting_methods
 class Solution(Kinematics):
     """The result of `simulate`; k outputs, n coordinates, m constraint rows.
 

@@ -1,15 +1,13 @@
 """Functions of time and state that users write, as kernels of forces; each gives callbacks of its own, once."""
 
+from functools import partial
 from types import FunctionType
-from weakref import WeakValueDictionary
 
-from ._cache import deep_hash
 from ._kernel import kernel
+from .compiled_once import compiled_once
 from .force import callbacks
 
 STATE = 13  # position, Euler parameters, velocity, angular velocity
-
-_made = WeakValueDictionary()
 
 
 class Kernels(dict):
@@ -31,11 +29,7 @@ class Kernels(dict):
 def kernels_of(kind, function):
     """The kernels of a kind with a user's function; the same ones for the same two."""
     function = getattr(function, "py_func", function)
-    key = kind, function, deep_hash(function)  # a global of it may have changed
-    found = _made.get(key)
-    if found is None:
-        found = _made[key] = Kernels(kind, function)
-    return found
+    return compiled_once(kind, function, partial(Kernels, kind, function))
 
 
 def arguments_of(function):

@@ -35,17 +35,20 @@ class Inside:
     """States within the step that a run has just made."""
 
     def __init__(self, reader, run, record, t0, before):
-        self.t0, self.t1 = t0, float(run.clock[T])
+        self.t0, self.t1, self.degree = t0, float(run.clock[T]), 0
         self._reader, self._record, self._block = reader, record, run.block[None]
         self._known = {t0: before, self.t1: run.now.copy()}
 
     def states(self, times):
         """States (3, n) at times (k,), None where there is none."""
-        missing = np.array([t for t in times.tolist() if t not in self._known])
-        found = dict(zip(missing.tolist(), self._read(missing), strict=True)) if missing.size else {}
-        if len(self._known) < ROOM:
-            self._known |= found
-        return [found[t] if t in found else self._known[t] for t in times.tolist()]
+        times, known = times.tolist(), self._known
+        missing = [t for t in times if t not in known]
+        if missing:
+            found = dict(zip(missing, self._read(np.array(missing)), strict=True))
+            if len(known) > ROOM:
+                return [found[t] if t in found else known[t] for t in times]
+            known.update(found)
+        return [known[t] for t in times]
 
     def _read(self, times):
         rows = np.zeros(times.size, int)
@@ -162,6 +165,7 @@ class Watch:
 
     def _looked(self, run, record, step):
         found, failure, end = [], None, step.t1
+        step.degree = self._degree(step)
         for i in range(len(self.events)):
             points, failed = self._points(i, step, end)
             if failed is not None:
@@ -203,7 +207,7 @@ class Watch:
         while end > step.t0:
             search = Search(sample, track.noise)
             try:
-                track.degree = search.run(step.t0, track.value, end, max(self._degree(step), track.degree // 2))
+                track.degree = search.run(step.t0, track.value, end, max(step.degree, track.degree // 2))
                 track.noise = search.noise
                 return search.points, failure
             except Failed as failed:
@@ -218,10 +222,8 @@ class Watch:
 
     def _degree(self, step):
         """The degree that the interpolant and the fastest turn of a body ask for."""
-        fastest = max(
-            (2.0 * np.sqrt((step.at(t)[1][self._p] ** 2).sum(axis=1)).max(initial=0.0)) for t in (step.t0, step.t1)
-        )
-        turn = fastest * (step.t1 - step.t0)
+        squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
+        turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
         return LARGEST if turn > FAST else self.reader.degree if turn > SLOW else self.reader.degree // 2
 
     def _walk(self, i, step, points):
@@ -234,7 +236,7 @@ class Watch:
             else:
                 rest = points
         for t, value in rest:
-            sign = float(np.sign(value))
+            sign = float(value > 0.0) - float(value < 0.0)
             if value == 0.0:
                 if track.zero is None or track.passed:
                     track.passed, track.pending = False, direction != 0.0 and direction * track.sign >= 0.0

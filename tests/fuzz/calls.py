@@ -1,0 +1,308 @@
+"""A fuzzer of calls: right and wrong arguments for every public constructor, function and method.
+
+    python -m tests.fuzz.calls --count 10000 --seed 1
+
+Nothing but a TsdynError may come out, nothing may hang, and what is accepted must hold finite numbers.
+"""
+
+import argparse
+import contextlib
+import datetime
+import decimal
+import fractions
+import inspect
+import signal
+import sys
+import time
+import traceback
+import types
+import warnings
+from collections import Counter
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+import tsdyn as ts
+
+PATIENCE = 30.0  # s a call may take
+RUNS = 0.1  # of the calls are of `simulate`
+KINDS = (ts.Primitive, ts.Joint, ts.Force, ts.Integrator, ts.motions.Smooth)
+SPACES = (ts.constraints, ts.forces, ts.integrators, ts.motions)
+TIME_DEPENDENT = {"f", "fd", "fdd", "length", "value", "angle", "displacement", "actuator"}
+
+
+def swinging(t):
+    """A motion or load."""
+    return 0.3 * np.sin(2.0 * t)
+
+
+def swinging_rate(t):
+    """Its rate."""
+    return 0.6 * np.cos(2.0 * t)
+
+
+def swinging_acceleration(t):
+    """Its acceleration."""
+    return -1.2 * np.sin(2.0 * t)
+
+
+def pushing(t):
+    """A force."""
+    return (0.0, 0.1, 0.2 * t)
+
+
+def raising(*arguments):
+    """What raises."""
+    raise ValueError("of the user's")
+
+
+class World(NamedTuple):
+    """What calls are made with."""
+
+    scene: ts.Scene
+    bodies: tuple
+    joint: object
+    spring: object
+    stranger: object  # a body of another scene
+    solution: ts.Solution
+
+
+class Found(NamedTuple):
+    """One call: what it was, and its outcome; `story` is empty where that is allowed."""
+
+    call: str
+    outcome: str
+    story: str
+
+
+def world():
+    """A fresh scene, and a run of it."""
+    scene = ts.Scene()
+    a = scene.add_body(1.0, (0.2, 0.3, 0.4), position=(1.0, 0.0, 0.0), name="arm")
+    b = scene.add_body(2.0, (0.2, 0.3, 0.4), position=(2.0, 0.0, 0.0), name="hand")
+    p = scene.add_point_mass(0.5, position=(0.0, 3.0, 0.0), name="bead")
+    joint = scene.add(ts.constraints.Revolute.at(a, scene.ground, point=(0, 0, 0), axis=(0, 1, 0), name="pivot"))
+    spring = scene.add(ts.forces.Spring(b, p, stiffness=1.0, name="band"))
+    solution = ts.simulate(scene, (0.0, 0.05))
+    return World(scene, (a, b, p), joint, spring, ts.Scene().add_point_mass(1.0), solution)
+
+
+def junk(rng, w):
+    """Anything."""
+    pool = (
+        None, True, False, 0, -1, 3, 10**400, -2.5, 1e-320, 1e308, -1e308, np.nan, np.inf, -np.inf, 1j, "text", "", b"x",
+        (), [], {}, set(), {"a": 1}, (1, 2), (1, 2, 3), (0, 0, 0), (np.nan, 0, 1), (1e308, 1e308, 1e308), [1, [2, 3]],
+        ["a", "b", "c"], (None, 1, 2), np.zeros(3), np.ones(7), np.zeros((3, 3)), np.eye(3), np.full((3, 3), np.nan),
+        np.array([]), np.array(2.0), np.array(["a", "b", "c"]), np.array([1, 2, 3], object), np.array([True, False, True]),
+        np.ones((2, 3, 4)), np.datetime64("2020-01-01"), datetime.timedelta(1), decimal.Decimal("1.5"),
+        fractions.Fraction(1, 3), object(), int, ts.Scene, ts.Status.SUCCESS, lambda: 1.0, lambda t: t, lambda t, x: 1.0,
+        raising, swinging, print, len, range(3), iter([1, 2, 3]), Rotation.identity(), Rotation.random(3, random_state=1),
+        w.scene, w.scene.ground, *w.bodies, w.stranger, w.joint, w.spring, w.solution, w.solution.state,
+        ts.motions.time, ts.Table((0.0, 1.0), (1.0, 2.0)), slice(3), ..., np.float32(2), np.int8(3), types.SimpleNamespace(),
+    )  # fmt: skip
+    return pool[rng.integers(len(pool))]
+
+
+def right(name, rng, w):
+    """What an argument of this name may be."""
+    bodies = (*w.bodies, w.scene.ground)
+    choices = {
+        ("a", "on", "body"): lambda: w.bodies[rng.integers(3)],
+        ("b",): lambda: bodies[rng.integers(4)],
+        ("joint", "item", "constraint"): lambda: (w.joint, w.spring)[rng.integers(2)],
+        ("name",): lambda: f"name {rng.integers(10**6)}",
+        ("frame",): lambda: ("ground", "body")[rng.integers(2)],
+        ("t_span",): lambda: (0.0, float(rng.uniform(0.01, 0.05))),
+        ("t_eval",): lambda: [0.0, 0.005, 0.01],
+        ("integrator",): lambda: (None, "rk45", "taylor", "nystrom4")[rng.integers(4)],
+        ("formulation",): lambda: "tangent",
+        ("scene",): lambda: w.scene,
+        ("state",): lambda: w.solution.state,
+        ("redundancy",): lambda: "drop",
+        ("folds",): lambda: "keep",
+        ("fixed",): lambda: w.bodies[:1],
+        ("dense_output", "advice"): lambda: bool(rng.integers(2)),
+        ("events", "progress"): lambda: None,
+        ("max_steps", "chart_interval", "order", "repeats"): lambda: int(rng.integers(4, 20)),
+        ("inertia",): lambda: rng.uniform(1.0, 1.9, 3),
+        ("orientation",): lambda: Rotation.random(random_state=int(rng.integers(99))),
+        ("t",): lambda: 0.01 * rng.random(),
+        ("q",): lambda: w.scene.start[0],
+        ("qd",): lambda: w.scene.start[1],
+        ("times",): lambda: np.arange(4.0),
+        ("values",): lambda: rng.normal(size=4),
+        ("force", "torque"): lambda: (rng.normal(size=3), pushing)[rng.integers(2)],
+        ("path",): lambda: (0.1, swinging, ts.motions.Sine(0.1, 2.0)),
+        ("f",): lambda: swinging,
+        ("fd",): lambda: swinging_rate,
+        ("fdd",): lambda: swinging_acceleration,
+        ("coefficients",): lambda: rng.normal(size=3),
+        ("function",): lambda: swinging,
+    }
+    for names, make in choices.items():
+        if name in names:
+            return make()
+    if name in TIME_DEPENDENT and rng.random() < 0.3:
+        return (ts.motions.Ramp(0.3, 0.1), swinging)[rng.integers(2)]
+    if name.startswith(
+        ("point", "axis", "reference", "normal", "position", "velocity", "angular", "across", "gravity")
+    ):
+        return rng.normal(size=3)
+    return float(rng.uniform(0.1, 2.0))
+
+
+def targets(w):
+    """(what it is called, the callable) of all that is called."""
+    found = []
+    for space in SPACES:
+        for name in sorted(vars(space)):
+            thing = getattr(space, name)
+            if isinstance(thing, type) and not name.startswith("_") and issubclass(thing, KINDS):
+                found.append((name, thing))
+                if hasattr(thing, "at"):
+                    found.append((f"{name}.at", thing.at))
+                if "of" in vars(thing):
+                    found.append((f"{name}.of", thing.of))
+    found += [("Scene", ts.Scene), ("Table", ts.Table), ("Motion", ts.Motion), ("Integrator", ts.Integrator)]
+    for owner, label in ((w.scene, "scene"), (w.solution, "solution")):
+        for name, method in inspect.getmembers(type(owner), inspect.isfunction):
+            if not name.startswith("_") and name not in ("place", "touch", "refresh", "motions", "row_names"):
+                found.append((f"{label}.{name}", getattr(owner, name)))
+    return found
+
+
+def arguments_for(function, rng, w):
+    """Positional and keyword arguments, most of them right."""
+    wrong = rng.choice((0.0, 0.15, 0.5))
+    positional, keywords = [], {}
+    for p in inspect.signature(function).parameters.values():
+        value = junk(rng, w) if rng.random() < wrong else right(p.name, rng, w)
+        if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD):
+            continue
+        needed = p.default is p.empty or p.name.startswith(("axis", "normal", "reference"))
+        if rng.random() < (0.97 if needed else 0.3):
+            if p.kind == p.KEYWORD_ONLY or len(keywords) or p.default is not p.empty:
+                keywords[p.name] = value
+            else:
+                positional.append(value)
+    if rng.random() < 0.05:
+        keywords[("nam", "pointt", "rtoll", "x")[rng.integers(4)]] = junk(rng, w)
+    if rng.random() < 0.03:
+        positional += [junk(rng, w)] * int(rng.integers(1, 4))
+    return positional, keywords
+
+
+@contextlib.contextmanager
+def deadline(seconds):
+    """Raise TimeoutError in what takes longer, where a timer can be had."""
+    if not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def ring(number, frame):
+        raise TimeoutError(f"longer than {seconds:g} s")
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def leaks(result):
+    """Which number of what a call gave is not finite; empty where none is."""
+    numbers = {}
+    if isinstance(result, (ts.Primitive, ts.Joint, ts.Force)):
+        numbers = {"coordinates": np.ravel(result.coordinates)}
+        numbers["parameters"] = [p for p in result.parameters() if isinstance(p, (int, float))]
+    elif isinstance(result, ts.PointMass):
+        numbers = {name: np.ravel(value) for name, value in result.values.items()}
+    elif isinstance(result, ts.Solution) and result.success:
+        numbers = {name: getattr(result, name).ravel() for name in ("t", "q", "qd", "qdd", "energy")}
+        str(result), repr(result), result._repr_html_()
+    elif isinstance(result, ts.Integrator):
+        numbers = {name: [value] for name, value in vars(result).items() if isinstance(value, float)}
+        repr(result)
+    return ", ".join(name for name, values in numbers.items() if not np.isfinite(np.asarray(values, float)).all())
+
+
+def attempt(label, function, positional, keywords):
+    """The `Found` of one call."""
+    given = [*map(_shown, positional), *(f"{name}={_shown(value)}" for name, value in keywords.items())]
+    call = f"{label}({', '.join(given)})"
+    result, story = None, ""
+    try:
+        with deadline(PATIENCE), warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warnings.filterwarnings("ignore", "made for this scene")
+            result = function(*positional, **keywords)
+            outcome = "failed" if isinstance(result, ts.Solution) and not result.success else "accepted"
+            unsound = leaks(result)
+        if unsound:
+            outcome, story = "NOT FINITE", unsound
+    except ts.TsdynError as error:
+        outcome = type(error).__name__
+        if not str(error).strip():
+            outcome, story = "NO MESSAGE", type(error).__name__
+    except TimeoutError as error:
+        outcome, story = "HANGS", str(error)
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        outcome = f"RAW {type(error).__name__}"
+        story = f"{error} ({last.filename.rpartition('/')[2]}:{last.lineno})"
+    return Found(call, outcome, story), result
+
+
+def _shown(value):
+    try:
+        text = " ".join(repr(value).split())
+    except Exception as error:
+        text = f"<{type(value).__name__}: {error!r}>"
+    return text if len(text) < 60 else text[:57] + "..."
+
+
+def fuzz(count, seed, runs=RUNS):
+    """Yield a `Found` for each of so many calls; the same ones for the same seed."""
+    rng = np.random.default_rng(seed)
+    w = None
+    for i in range(count):
+        if w is None or i % 40 == 0:
+            w = world()
+            known = targets(w)
+        if rng.random() < runs:
+            label, function = "simulate", ts.simulate
+        else:
+            label, function = known[rng.integers(len(known))]
+        found, result = attempt(label, function, *arguments_for(function, rng, w))
+        yield found
+        if isinstance(result, (ts.Primitive, ts.Joint, ts.Force)) and not result.added and rng.random() < 2.0 * runs:
+            yield attempt("scene.add", w.scene.add, [result], {})[0]
+            yield attempt(f"simulate with {found.call}", ts.simulate, [w.scene, (0.0, 0.01)], {"max_steps": 20})[0]
+            w = None
+
+
+def main(arguments=None):
+    """Run the command line: the table of outcomes, and every call that is not allowed; its exit code."""
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz.calls", description=__doc__.split("\n")[0])
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--runs", type=float, default=RUNS, help="share of calls of simulate")
+    parsed = parser.parse_args(arguments)
+    began, outcomes, bad = time.perf_counter(), Counter(), []
+    for found in fuzz(parsed.count, parsed.seed, parsed.runs):
+        outcomes[found.outcome] += 1
+        if found.story:
+            bad.append(found)
+    for outcome, times in outcomes.most_common():
+        print(f"{times:7d}  {outcome}")
+    print(f"{sum(outcomes.values()):7d}  calls, seed {parsed.seed}, {time.perf_counter() - began:.0f} s")
+    for found in bad:
+        print(f"\n{found.outcome}: {found.story}\n  {found.call}")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -10,8 +10,9 @@ refused. (3) is periodic as the thread is, and counts no turns. Never singular.
 
 from ..framed_joint import FramedJoint
 from ..joint_coordinates import Angle, Displacement
-from .cylindrical import Cylindrical
-from .rotation_motor import axes, set_apart
+from .parallel import Parallel
+from .point_on_line import PointOnLine
+from .rotation_motor import set_apart
 from .thread import Thread, demand_lead, travel
 
 
@@ -75,7 +76,8 @@ class Screw(FramedJoint):
     def compose(self):
         """Eqs. (1) to (3)."""
         (f, g), (h, _) = self.frames
-        yield from Cylindrical(self.a, self.b, **axes(self)).compose()
+        yield "axis", Parallel(self.a, self.b, axis_a=self.axis_a, axis_b=self.axis_b)
+        yield "line", PointOnLine(self.b, self.a, point_a=self.point_b, point_b=self.point_a, axis_b=self.axis_a)
         yield (
             "thread",
             Thread(

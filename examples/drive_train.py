@@ -53,11 +53,8 @@ def build():
 def check(solution):
     """The balance of energy and work, and the shaft's torque against the rotor's equation of motion."""
     solution.raise_if_failed()
-    scene = solution.scene
-    rotor = scene.body("rotor")
-    motor, shaft = (next(force for force in scene.forces if force.name == name) for name in ("motor", "shaft"))
-    moments = solution.reaction(motor)[1][:, 1] + solution.reaction(shaft)[1][:, 1]
-    rates = 0.03 * solution.angular_acceleration(rotor)[:, 1]
+    moments = solution.reaction("motor")[1][:, 1] + solution.reaction("shaft")[1][:, 1]
+    rates = 0.03 * solution.angle_acceleration("bearing of rotor")
     assert np.abs(moments - rates).max() < 1e-9 * np.abs(rates).max()
     balance = solution.energy - solution.work
     assert np.ptp(balance) < 1e-6 * np.ptp(solution.energy)
@@ -69,10 +66,11 @@ def main():
     solution = ts.simulate(build(), (0.0, 4.0), rtol=1e-9, atol=1e-9, dense_output=True)
     check(solution)
     print(solution)
-    speed = np.abs(solution.angular_velocity(solution.scene.body("wheel"))[:, 1]).max()
+    speed = np.abs(solution.angle_rate("bearing of wheel")).max()
     print(f"  the wheel turns at up to {speed:.2f} rad/s")
-    gain, done = solution.energy[-1] - solution.energy[0], solution.work[-1]
-    print(f"  the motor's work less all losses is {done:.9f} J, the gain in energy {gain:.9f} J")
+    for name in ("motor", "shaft", "brake", "cord"):
+        print(f"  work of the {name:6}{solution.work_of(name)[-1]:14.9f} J")
+    print(f"  gain in energy    {solution.energy[-1] - solution.energy[0]:14.9f} J")
 
 
 if __name__ == "__main__":

@@ -53,8 +53,7 @@ def reference(times):
 
 def turn(solution, name):
     """The turn of a body about y, rad, counted over turns."""
-    first = solution.rotation(solution.scene.body(name))[:, :, 0]
-    return np.unwrap(np.arctan2(-first[:, 2], first[:, 0]))
+    return solution.angle(f"bearing of the {name}")
 
 
 def check(solution, tol=1e-9):
@@ -64,8 +63,7 @@ def check(solution, tol=1e-9):
     pinion, wheel = turn(solution, "pinion"), turn(solution, "wheel")
     assert np.abs(pinion - theta).max() < tol * max(1.0, np.abs(theta).max())
     assert np.abs(wheel - RATIO * pinion).max() < 1e-12
-    teeth = next(joint for joint in solution.scene.constraints if joint.name == "teeth")
-    _, torque = solution.reaction(teeth, on=solution.scene.body("pinion"))
+    _, torque = solution.reaction("teeth", on="pinion")
     through = J1 * gain - TORQUE
     assert np.abs(torque[:, 1] - through).max() < 1e3 * tol * np.abs(through).max()
     assert solution.constraint_error.position.max() < 1e-13

@@ -13,6 +13,7 @@ from .errors import InconsistentState, InvalidArgument, InvalidBody, SingularCon
 from .folds import Folds
 from .initial import ROUNDING, demand_finite
 from .kinetic import Metric, least_step, row_lengths
+from .names import named
 
 STIFFER = (0.1, 0.01, 0.001)  # softness of what keeps a fold, from try to try
 
@@ -53,7 +54,7 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
     ----------
     tol : float
         Largest |Phi| accepted at the end, relative to 1 + max |q|.
-    fixed : sequence of Body
+    fixed : sequence of Body, or names
         Bodies whose pose (not velocity) must stay as it is.
     t : float, s
         The time at which constraints that depend on time are met.
@@ -125,6 +126,7 @@ def _held(scene, fixed):
     bodies = scene.system.bodies
     held = np.zeros(int(bodies[:, 1].sum()), bool)
     for body in fixed:
+        body = named(scene.bodies, body, "body", InvalidBody) if isinstance(body, str) else body
         if not any(body is known for known in scene.bodies):
             raise InvalidBody(f"fixed: {body!r} is not a body of this scene.")
         at = int(bodies[body.index, 0])

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .attachment import Attachment
 from .bodies import PointMass
 from .errors import InvalidBody, InvalidConstraint
 from .joint_coordinates import angles, displacements
@@ -55,6 +56,7 @@ class Handles:
                     joints.append([*self.where(angle.own), *self.where(angle.other)])
                     frames.append([*angle.f, *angle.g, *angle.h])
         self.rows, self.count = tuple(rows), len(joints)
+        self._begins = [row for row in rows if row.angles and _begins(row.item)]
         self.joints = np.array(joints, np.int64).reshape(-1, 4)
         self.frames = np.array(frames, float).reshape(-1, 9)
 
@@ -98,11 +100,15 @@ class Handles:
     def angles_at_start(self, t, q):
         """The angles (count,) near which counting begins at q (n,)."""
         near = np.zeros(self.count)
-        for row in self.rows:
-            if row.angles:
-                moved = [displacement(g, *self.motions(g, (q,)), 0) for g in row.displacements]
-                near[row.first : row.first + len(row.angles)] = row.item.counted_from(t, *moved)
+        for row in self._begins:
+            moved = [displacement(g, *self.motions(g, (q,)), 0) for g in row.displacements]
+            near[row.first : row.first + len(row.angles)] = row.item.counted_from(t, *moved)
         return near
+
+
+def _begins(item):
+    """Whether the angles of an item may begin elsewhere than near zero."""
+    return type(item).counted_from is not Attachment.counted_from or np.any(item.angle_near)
 
 
 def handles_of(packed):

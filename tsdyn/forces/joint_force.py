@@ -50,8 +50,9 @@ class JointForce(JointLoad, Force):
     geometries = staticmethod(displacements)
 
     def __new__(cls, joint=None, *, period=None, **others):
-        """Choose the kernel: held, or by the function."""
-        return super().__new__(_ContinuousForce if cls is JointForce and period is None else cls)
+        """Choose the kernel: held, or by the function; a copy has its class already."""
+        continuous = joint is not None and period is None
+        return super().__new__(_ContinuousForce if cls is JointForce and continuous else cls)
 
     @staticmethod
     def directions(geometry):

@@ -58,8 +58,9 @@ class JointTorque(JointLoad, Force):
     geometries = staticmethod(angles)
 
     def __new__(cls, joint=None, *, period=None, **others):
-        """Choose the kernel: held, or by the function."""
-        return super().__new__(_ContinuousTorque if cls is JointTorque and period is None else cls)
+        """Choose the kernel: held, or by the function; a copy has its class already."""
+        continuous = joint is not None and period is None
+        return super().__new__(_ContinuousTorque if cls is JointTorque and continuous else cls)
 
     @staticmethod
     def directions(geometry):

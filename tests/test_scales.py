@@ -86,6 +86,17 @@ def attraction(t, state):
     return (-1e-6 * state[0], 0.0, 0.0)
 
 
+def test_a_run_that_would_never_end_is_ended():
+    scene = ts.Scene()
+    bob = scene.add_point_mass(mass=1.0, position=(1.0, 0.0, 0.0))
+    scene.add(F.Spring(scene.ground, bob, stiffness=1e20, free_length=0.9))
+    solution = ts.simulate(scene, (0.0, 1e6), integrator=I.DOP853())
+    assert solution.status == ts.Status.STEP_COLLAPSED
+    assert "At the pace of the last 1000 steps" in solution.message
+    assert solution.stats.steps < 10_000
+    assert ts.simulate(scene, (0.0, 1e6), integrator=I.DOP853(), max_steps=5000).status == ts.Status.MAX_STEPS
+
+
 def four_bar(size):
     """Rods on balls, of density 1000 and of this size in m."""
     scene, corners = ts.Scene(), size * np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.5, 0.0, 1.5), (2.0, 0.0, 0.0)])

@@ -9,6 +9,7 @@ from .massless import levers
 
 NOISE = 4.0 * ROUNDING  # of a position, over the lever: what a placement leaves of a direction
 FAR = 1e4  # levers: below that no tolerance is touched
+ARMS = "levers"  # in Packed.shared
 
 
 def within_rounding(method, packed, q):
@@ -18,8 +19,12 @@ def within_rounding(method, packed, q):
     """
     if method.step is not None or method.driver != "steps":
         return method, ""
-    arms, places = levers(packed), packed.system.bodies[:, :1] + np.arange(3)
-    far = np.abs(q[places]).max(axis=1)
+    if ARMS not in packed.shared:
+        packed.shared[ARMS] = levers(packed)
+    arms = packed.shared[ARMS]
+    if np.abs(q).max() < FAR * arms.min(where=arms > 0.0, initial=np.inf):
+        return method, ""
+    far = np.abs(q[packed.system.bodies[:, :1] + np.arange(3)]).max(axis=1)
     ratios = np.where(arms > 0.0, far / np.where(arms > 0.0, arms, 1.0), 0.0)
     worst = int(np.argmax(ratios))
     noise = NOISE * ratios[worst]

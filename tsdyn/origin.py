@@ -18,18 +18,19 @@ from .state_function import Kernels
 from .system import FIRST_REAL, REALS, classes
 
 FAR = 100.0  # sizes of a scene: its distance from the origin above which it has one of its own
-LOCAL = "local origin"  # in Packed.shared
+LOCAL, POINTS = "local origin", "points"  # in Packed.shared
 
 
 def origin_of(packed, q):
     """The origin (3,) for a run from positions q (n,), or None for that of the scene."""
-    if all(constraint.normalises for constraint in packed.constraints) and not packed.loads:
+    if POINTS not in packed.shared:
+        packed.shared[POINTS] = _points(packed)
+    grounded, longest = packed.shared[POINTS]
+    if np.abs(q).max() <= FAR * longest:
         return None
-    grounded, levers = _points(packed)
-    centroids = q[packed.system.bodies[:, :1] + np.arange(3)]
-    places = np.concatenate((centroids, grounded)) if len(grounded) else centroids
+    places = np.concatenate((q[packed.system.bodies[:, :1] + np.arange(3)], grounded))
     low, high = places.min(axis=0), places.max(axis=0)
-    size, centre = max(float((high - low).max()), levers), 0.5 * (low + high)
+    size, centre = max(float((high - low).max()), longest), 0.5 * (low + high)
     if not (size > 0.0 and np.abs(centre).max() > FAR * size and _sees_differences(packed)):
         return None
     step = 2.0 ** np.floor(np.log2(size))
@@ -37,7 +38,7 @@ def origin_of(packed, q):
 
 
 def _points(packed):
-    """Points of the ground (k, 3) that constraints and forces are on, and the longest lever on a body."""
+    """The corners (2, 3) of a box with the points of the ground that items are on, and the longest lever on a body."""
     grounded, longest = [], 0.0
     pairs = [*zip(packed.constraints, packed.coordinates, strict=True)]
     pairs += [(load.force, load.coordinates) for load in packed.loads]
@@ -47,13 +48,15 @@ def _points(packed):
                 grounded.append(s)
             elif marker.code == POINT:
                 longest = max(longest, float(np.abs(s).max()))
-    return np.array(grounded).reshape(-1, 3), longest
+    grounded = np.array(grounded).reshape(-1, 3)
+    return np.array([grounded.min(axis=0), grounded.max(axis=0)]) if len(grounded) else grounded, longest
 
 
 def _sees_differences(packed):
-    """Whether no part of the scene is given positions as they are: no plug-in, no function of a user's."""
+    """Whether there are constraints or forces, and none that may depend on positions as they are."""
     items = [*packed.constraints, *(load.force for load in packed.loads)]
-    own = all(type(item).__module__.startswith("tsdyn.") for item in items)
+    joined = packed.loads or not all(constraint.normalises for constraint in packed.constraints)
+    own = joined and all(type(item).__module__.startswith("tsdyn.") for item in items)
     return own and not any(isinstance(load.force.kernels, Kernels) for load in packed.loads)
 
 

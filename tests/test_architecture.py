@@ -93,7 +93,7 @@ sign_search events drive work account
 watch
 relay
 series_run steps solution
-passage
+passage origin digits
 series_check timers
 timekeeper replay phases
 simulate choice force_check

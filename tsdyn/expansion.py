@@ -19,7 +19,6 @@ from .normal import scatter, weigh
 from .poses import OMEGA, POSE, RD, R
 from .selection import drop
 from .series_loops import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R, S_SPIN, call_series
-from .series_state import REFINED
 
 
 @kernel
@@ -131,13 +130,13 @@ def run_forces(reals, x, k, orders, poses, Z):
 
 
 @kernel
-def expand(network, system, k, last, ahead, orders, x, f):
+def expand(network, system, k, last, ahead, orders, refine, x, f):
     """Order k of the forces and multipliers, k + 1 of omega', k + 2 of r and A; k in turn from zero, after `begin`.
 
     On entry Z has the gyroscopic torques of order k, and A_{k+2} what (1) has without omega'_{k+1}; on exit both are
     of the next order, unless this is the last one. lam_k stays in b until then.
 
-    The first x.order[REFINED] orders of lam are refined once. If more than lam_0, factors 1 / n are exact as well: their
+    The first `refine` orders of lam are refined once. If more than lam_0, factors 1 / n are exact as well: their
     rounding errors have the same sign in every step, and add up. With `ahead`, a constant, the next body's numbers are
     prefetched: that pays where the series don't fit into the cache. x is a `series_state.Expansion`, f a `free.Free`.
     """
@@ -145,7 +144,7 @@ def expand(network, system, k, last, ahead, orders, x, f):
     nb, size = network.bodies.shape[0], orders * BODY_ROW
     run_loops(network, system.reals, ADVANCE, k, orders, bodies, x.constraints, x.places, f.b, Z)
     run_forces(system.reals, x, k, orders, f.poses, Z)
-    exact = x.order[REFINED] > 1
+    exact = refine > 1
     share, half, ahead_share = 1.0 / (k + 1), 1.0 / ((k + 1) * (k + 2)), 1.0 / (k + 3)
     share_low = half_low = ahead_low = 0.0
     if exact:
@@ -161,7 +160,7 @@ def expand(network, system, k, last, ahead, orders, x, f):
         if network.bodies[b, 1] == 7:
             put(bodies, at + S_OMEGA * orders + 4 * (k + 1), _product(four(Z, 8 * b + 4), g, g_low))
             _turn(bodies, at, k + 2, _product(four(Z, 8 * b + 4), h, h_low))
-    refined = k < x.order[REFINED]
+    refined = k < refine
     if refined:
         _solve(network, system, k, orders, x, f, False)
         copy(f.b, f.gamma)

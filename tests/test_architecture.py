@@ -72,7 +72,7 @@ local_chart
 newton evaluate diagnostics
 kinematics
 state
-reactions power dense friction_balance
+reactions power dense friction_balance conservation
 control turning holonomic
 chart rank
 branch initial start kinetic

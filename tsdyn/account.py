@@ -18,6 +18,7 @@ BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
 
 def account(solution, scene, reason):
     """How the run of a solution ended, in words."""
+    reason = " ".join(part for part in (reason, _kept(solution.stats)) if part)
     if solution.success:
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
     steps = counted(solution.stats.steps, "step")
@@ -31,6 +32,19 @@ def account(solution, scene, reason):
         suspect = _growth(solution)
     parts = (solution.status.sentence, reason, where, suspect, remedy)
     return " ".join(part for part in parts if part)
+
+
+def _kept(stats):
+    """The accuracy that was kept next to singular configurations, as energy and landings tell."""
+    if not stats.steps_near_singular:
+        return ""
+    energy = (
+        "" if stats.energy_error is None else f"energy was kept to {stats.energy_error:.1e} of the kinetic energy, "
+    )
+    return (
+        f"Next to singular configurations ({stats.steps_near_singular} steps) {energy}constraints moved bodies by at "
+        f"most {stats.largest_landing:.1e} (m, rad) at the end of a step."
+    )
 
 
 def _locked(solution):

@@ -76,7 +76,7 @@ def run_series(task, observe=None, relay=None, past=None):
         last,
         run.remembered.copy(),
         counts(
-            run.numbers,
+            run,
             memory.work.counters.tolist(),
             packed,
             prepared.spheres,

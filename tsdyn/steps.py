@@ -8,7 +8,7 @@ from .drive import drive
 from .errors import Status
 from .memory import Memory
 from .relay import Relay
-from .run_state import CHART_ROWS, FILLED, IN_CHART, MAY_PASS, REJECTED, STEPS, STIFF, STORED, T
+from .run_state import CHART_ROWS, FILLED, IN_CHART, LANDED, MAY_PASS, NEAR_STEPS, REJECTED, STEPS, STIFF, STORED, T
 from .sampling import Sampled
 from .task import Outcome
 from .workspace import (
@@ -86,7 +86,7 @@ def run_steps(task, observe=None, relay=None):
         last,
         run.remembered.copy(),
         counts(
-            run.numbers,
+            run,
             memory.work.counters.tolist(),
             packed,
             *((prepared.spheres, prepared.still) if form.basis_free else (0, 0)),
@@ -114,12 +114,12 @@ def _addresses(method, form, step, interpolant, adaptive, within):
     ]
 
 
-def counts(numbers, counters, packed, no_spin, no_turn, constant_columns=0):
+def counts(run, counters, packed, no_spin, no_turn, constant_columns=0):
     """What `Solution.stats` counts.
 
     Of what each evaluation skips: the torques of no_spin bodies, the rotations of no_turn, so many columns of markers.
     """
-    evaluations = counters[EVALUATIONS]
+    numbers, evaluations = run.numbers, counters[EVALUATIONS]
     return {
         "steps": int(numbers[STEPS]),
         "rejected": int(numbers[REJECTED]),
@@ -130,6 +130,8 @@ def counts(numbers, counters, packed, no_spin, no_turn, constant_columns=0):
         "charts": counters[CHARTS],
         "factorizations": counters[FACTORIZATIONS],
         "stiff": bool(numbers[STIFF]),
+        "steps_near_singular": int(numbers[NEAR_STEPS]),
+        "largest_landing": float(run.clock[LANDED]),
         "jacobians": counters[JACOBIANS],
         "iteration_matrices": counters[ITERATION_MATRICES],
         "stage_iterations": counters[STAGE_ITERATIONS],

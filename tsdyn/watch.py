@@ -69,7 +69,7 @@ class Track:
     """What is known of one function up to the last step's end."""
 
     def __init__(self, value):
-        self.value = value  # at that time
+        self.value = self.end = value  # at that time, and at the end of the step that is looked at
         self.sign = 0.0  # the last it had; 0 for none yet
         self.significant = None  # time and value at which it had that sign
         self.zero = None  # time of the last zero, if it has had no sign since
@@ -97,6 +97,7 @@ class Watch:
         self.list = [[] for _ in events]
         rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, 0]
         self._p = rigid[:, None] + np.arange(3, 7)
+        self._signs = np.random.default_rng(0).choice([-1.0, 1.0], (3, 3, packed.system.bodies[:, 1].sum()))
         self.read_by(reader)
 
     def read_by(self, reader):
@@ -205,9 +206,10 @@ class Watch:
             return values
 
         while end > step.t0:
-            search = Search(sample, track.noise)
+            search = Search(sample, lambda t: self._shaken(i, step, t), track.noise)
             try:
-                track.degree = search.run(step.t0, track.value, end, max(step.degree, track.degree // 2))
+                degree = max(step.degree, track.degree // 2)
+                track.degree, track.end = search.run(step.t0, track.value, end, degree)
                 track.noise = search.noise
                 return search.points, failure
             except Failed as failed:
@@ -239,21 +241,32 @@ class Watch:
             sign = float(value > 0.0) - float(value < 0.0)
             if value == 0.0:
                 if track.zero is None or track.passed:
-                    track.passed, track.pending = False, direction != 0.0 and direction * track.sign >= 0.0
+                    late = track.sign == 0.0 and t > self.start  # the start's own zero, within rounding
+                    track.passed, track.pending = False, late or (direction != 0.0 and direction * track.sign >= 0.0)
                     if not track.pending:
                         found.append(self._zero(i, step, t, before))
                 track.zero = t
             elif abs(value) > track.noise:
                 if track.zero is not None:
-                    if track.pending and direction * sign > 0.0:
-                        found.append(self._zero(i, step, track.zero, t))
+                    if track.pending and direction * sign >= 0.0:
+                        found.append(self._left(i, step, track.zero, (t, value)))
                     track.zero, track.passed, track.pending = None, False, False
                 elif sign == -track.sign and direction * sign >= 0.0:
                     found += self._root(i, step, t, value)
                 track.sign, track.significant = sign, (t, value)
             before = t
-        track.value = points[-1][1]
+        track.value = track.end
         return found
+
+    def _shaken(self, i, step, t):
+        """By how much the value of event i at t changes with rounding errors of the state."""
+        try:
+            state, value = step.at(t), self._at(i, step, t)
+            size = 4.0 * EPS * np.abs(state).max(axis=1, keepdims=True)
+            shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
+        except Failed:
+            return 0.0
+        return 4.0 * max(abs(each - value) for each in shaken)
 
     def _zero(self, i, step, t, other):
         """The `Occurrence` at a zero, or at the end next to another time of the zeros around it."""
@@ -265,27 +278,40 @@ class Watch:
                     other = middle
         return Occurrence(t, i, step.at(t))
 
+    def _left(self, i, step, t, last):
+        """The `Occurrence` where event i leaves a zero: that at t, or one that is so within rounding."""
+        value = self._at(i, step, t)
+        if value * last[1] < 0.0:
+            t = self._between(i, step, (t, value), last)
+            return Occurrence(t, i, step.at(t))
+        return self._zero(i, step, t, last[0])
+
     def _root(self, i, step, t1, b):
         """The change of sign up to t1, where event i has the value b; none if it is that of the run's start."""
-        from scipy.optimize import brentq  # takes a while to import
-
         track = self.tracks[i]
         t0, a = max(track.significant, (step.t0, track.value))
         if a * b >= 0.0:
             return [Occurrence(t0, i, step.at(t0))]
-        known = {t0: a, t1: b}
+        root = self._between(i, step, (t0, a), (t1, b))
+        if root - self.start <= AT_START * max(1.0, abs(self.start)):
+            return []
+        return [Occurrence(root, i, step.at(root))]
+
+    def _between(self, i, step, first, last):
+        """Where event i changes its sign between two times with values."""
+        from scipy.optimize import brentq  # takes a while to import
+
+        known, (t1, b) = dict((first, last)), last
 
         def value(t):
             return known[t] if t in known else self._at(i, step, t)
 
-        root = brentq(value, t0, t1, xtol=4.0 * EPS, rtol=4.0 * EPS, maxiter=1000)
-        if root - self.start <= AT_START * max(1.0, abs(self.start)):
-            return []
+        root = brentq(value, first[0], t1, xtol=4.0 * EPS, rtol=4.0 * EPS, maxiter=1000)
         shift = 4.0 * EPS * max(abs(root), 1.0)
         # a run that goes on from a terminal event had better find it behind itself
         while self.events[i].limit < math.inf and root + shift < t1 and value(root) * b <= 0.0:
             root, shift = root + shift, 2.0 * shift
-        return [Occurrence(root, i, step.at(root))]
+        return root
 
     def _at(self, i, step, t):
         return self._value(i, t, step.at(t))

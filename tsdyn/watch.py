@@ -233,8 +233,8 @@ class Watch:
         track, direction, found = self.tracks[i], self.events[i].direction, []
         (before, value), *rest = points
         if track.sign == 0.0 and track.zero is None:  # the run's first step
-            if 0.0 < abs(value) <= AT_START * max(abs(value) for _, value in points):
-                track.zero, track.passed = before, True
+            if 0.0 < abs(track.value) <= AT_START * max(abs(value) for _, value in points):
+                track.zero, track.passed, track.pending = before, value != 0.0, value == 0.0
             else:
                 rest = points
         for t, value in rest:

@@ -15,12 +15,12 @@ from .dense import B_END
 from .errors import InvalidArgument, Status
 from .events import Failed, Instant
 from .handles import handles_of
+from .inside import Inside
 from .run_state import BEGUN, BLOCKS, CHART_ROWS, DENSE, ROWS, STEPS, STORED, T
 from .sign_search import EPS, LARGEST, Search, TooFast
 
 SLOW, FAST = 0.1, 2.0  # rad that a body turns in a step: less needs half of the samples, more needs the most
 AT_START = 64.0 * EPS  # a value, or a time, that is no more than this beside others is that of the start
-ROOM = 2 * LARGEST  # states of a step that are kept
 
 
 class Occurrence(NamedTuple):
@@ -29,40 +29,6 @@ class Occurrence(NamedTuple):
     t: float
     index: int
     state: np.ndarray  # (3, n)
-
-
-class Inside:
-    """States within the step that a run has just made."""
-
-    def __init__(self, reader, run, record, t0, before):
-        self.t0, self.t1, self.degree = t0, float(run.clock[T]), 0
-        self._reader, self._record, self._block = reader, record, run.block[None]
-        self._known = {t0: before, self.t1: run.now.copy()}
-
-    def states(self, times):
-        """States (3, n) at times (k,), None where there is none."""
-        times, known = times.tolist(), self._known
-        missing = [t for t in times if t not in known]
-        if missing:
-            found = dict(zip(missing, self._read(np.array(missing)), strict=True))
-            if len(known) > ROOM:
-                return [found[t] if t in found else known[t] for t in times]
-            known.update(found)
-        return [known[t] for t in times]
-
-    def _read(self, times):
-        rows = np.zeros(times.size, int)
-        states, status = self._reader(times, rows, self._block, self._record.charts, self._record.points)
-        if status == Status.SUCCESS:
-            return states
-        return [self._read(times[i : i + 1])[0] for i in range(times.size)] if times.size > 1 else [None]
-
-    def at(self, t):
-        """The state (3, n) at t."""
-        (state,) = self.states(np.array([t]))
-        if state is None:
-            raise Failed(f"there is no state at t = {t:.9g} s to evaluate events at.", t)
-        return state
 
 
 class Track:

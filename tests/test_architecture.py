@@ -90,6 +90,7 @@ series_dense
 formulation run
 memory prepare task sampling
 sign_search events drive work account
+inside
 watch
 relay
 series_run steps solution

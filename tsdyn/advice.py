@@ -170,7 +170,7 @@ def _series(profile, plain, limit, simulate):
         yield said
         return
     bare = copy.copy(scene)
-    bare._forces, bare._spare = [force for force in scene.forces if id(force) not in forces], {}
+    bare._forces = [twin for twin, force in zip(bare.forces, scene.forces, strict=True) if id(force) not in forces]
     bare.touch()
     tolerances = {"rtol": method.rtol or 1e-8, "atol": method.atol or 1e-8}
     series = _attempt(partial(simulate, bare, profile.span), {**plain, "integrator": Taylor(**tolerances)}, limit, None)

@@ -1,5 +1,6 @@
 """The scene: what a user assembles from bodies, constraints and forces, checked piece by piece."""
 
+import copy
 from collections import Counter
 from itertools import count
 
@@ -210,6 +211,10 @@ class Scene:
         """What is packed holds addresses of this process, so it stays here."""
         gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins"))
         return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
+
+    def __copy__(self):
+        """A scene of its own: bodies, constraints and forces are copied with it."""
+        return copy.deepcopy(self)
 
     def touch(self):
         """Forget the packed numbers: something has changed."""

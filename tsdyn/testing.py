@@ -222,8 +222,8 @@ def _demand_no_comparison(function, kernel, name, rows, x, xd, t):
         reason = str(error.__cause__)
         if "not supported between instances" in reason or "for abs()" in reason:
             raise CheckFailed(
-                f"{name}: {kernel} compares x, or takes its absolute value ({reason}); a kernel goes through the same "
-                "smooth formulas for every x, with np.sqrt(x[0] ** 2 + ...) for a norm."
+                f"{name}: {kernel} is not analytic: it compares x, or takes its absolute value ({reason}); a kernel "
+                "goes through the same smooth formulas for every x, with np.sqrt(x[0] ** 2 + ...) for a norm."
             ) from error
 
 

@@ -188,9 +188,6 @@ class Motion:
         if self.given and self.smooth is not None:
             self.smooth = _derived(self.given[0], self.what)
 
-    def __getstate__(self):
-        return {**self.__dict__, "_callbacks": None}  # machine code is not for pickling
-
     @property
     def addresses(self):
         """The addresses of the three compiled functions; of a program, what runs it and two zeros."""

@@ -1,6 +1,5 @@
 """The scene: what a user assembles from bodies, constraints and forces, checked piece by piece."""
 
-import copy
 from collections import Counter
 from itertools import count
 
@@ -212,10 +211,6 @@ class Scene:
         gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins"))
         return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
 
-    def __copy__(self):
-        """A scene of its own: bodies, constraints and forces are copied with it."""
-        return copy.deepcopy(self)
-
     def touch(self):
         """Forget the packed numbers: something has changed."""
         self._packed = self._start = self._prepared = None
@@ -286,6 +281,7 @@ class Scene:
     set = set_joint
     remove = remove
     copy = copy
+    __copy__ = copy
 
     def __repr__(self):
         rows = sum(constraint.rows for constraint in self.constraints)

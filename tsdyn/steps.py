@@ -115,7 +115,7 @@ def _reading(packed, form, constraint_tol, addresses):
 
 def read_again(packed, method, name, constraint_tol):
     """The same in another process than the run's."""
-    form = formulation(name).serving(method, packed)
+    form = formulation(name).serving(method)
     step, interpolant = method.kernel(form.first_order)[0], method.interpolant(form.first_order)
     addresses = np.array(_addresses(method, form, step, interpolant, False, True), np.int64)
     return _reading(packed, form, constraint_tol, addresses)

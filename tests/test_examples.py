@@ -15,6 +15,7 @@ from examples import (
     four_bar,
     geared_pair,
     hooke_joint,
+    parallel_runs,
     pendulum_chain,
     plug_in_integrator,
     sarrus,
@@ -151,3 +152,7 @@ def test_check_can_fail():
     solution = ts.simulate(top.build(), (0.0, 1.0), formulation="maggi-kane", integrator=ts.integrators.Nystrom4(0.01))
     with pytest.raises(AssertionError):
         top.check(solution)
+
+
+def test_parallel_runs():
+    parallel_runs.check(parallel_runs.SPINS[:3])

@@ -163,9 +163,9 @@ def _alternatives(profile, run, plain, options, limit):
             yield f"Without chart_interval, which forces charts, it is {_quicker(found, limit)}."
     if astray:
         yield (
-            f"What would be quicker ends elsewhere, by up to {max(astray):.1e} (m, or of a rotation matrix): the end of "
-            "this run depends on the method and its tolerances more than they allow for. Tighten them, or shorten the "
-            "interval, until the end stays where it is."
+            f"What would be quicker ends elsewhere, by up to {max(astray):.1e} (m, or of a rotation matrix): the end "
+            "of this run depends on the method and its tolerances more than they allow for. Tighten them, or shorten "
+            "the interval, until the end stays where it is."
         )
 
 

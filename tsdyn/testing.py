@@ -272,3 +272,8 @@ def _compare(name, entry, got, expected, scale, remark=""):
 
 
 __all__ = ["CheckFailed", "check_force", "check_integrator", "check_primitive"]
+
+
+def __dir__():
+    """What users use, for completion."""
+    return sorted(__all__)

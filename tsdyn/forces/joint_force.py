@@ -49,7 +49,7 @@ class JointForce(JointLoad, Force):
     quantities = MappingProxyType({"function": law_of_joint, "period": instants})
     geometries = staticmethod(displacements)
 
-    def __new__(cls, joint=None, *, period=None, **others):
+    def __new__(cls, *others, period=None, **more):
         """Choose the kernel: held, or by the function."""
         return super().__new__(_ContinuousForce if cls is JointForce and period is None else cls)
 

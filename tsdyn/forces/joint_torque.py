@@ -57,7 +57,7 @@ class JointTorque(JointLoad, Force):
     quantities = MappingProxyType({"function": law_of_joint, "period": instants})
     geometries = staticmethod(angles)
 
-    def __new__(cls, joint=None, *, period=None, **others):
+    def __new__(cls, *others, period=None, **more):
         """Choose the kernel: held, or by the function."""
         return super().__new__(_ContinuousTorque if cls is JointTorque and period is None else cls)
 

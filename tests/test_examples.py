@@ -141,11 +141,7 @@ def test_readme_example(capsys):
         r"```python\n(.*?)```\n+```\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL
     ).groups()
     exec(code, {})
-    printed = capsys.readouterr().out
-    words = [line.split("  ")[0] for line in printed.splitlines()]
-    assert words == [line.split("  ")[0] for line in shown.splitlines()]
-    tilt, said = (float(re.search(r"[\d.]+", text).group()) for text in (printed, shown))
-    assert tilt == pytest.approx(said, rel=1e-9)
+    assert capsys.readouterr().out == shown
 
 
 def test_check_can_fail():

@@ -282,6 +282,7 @@ class Scene:
     set = set_joint
     remove = remove
     copy = copy
+    __copy__ = copy
 
     def __repr__(self):
         rows = sum(constraint.rows for constraint in self.constraints)

@@ -91,10 +91,6 @@ class Solution(Kinematics):
             self.stats.energy_error = energy_error(self, task)
         self.message = account(self, scene, outcome.reason)  # now: the scene may change
 
-    def __getstate__(self):
-        """All but the dense output, which holds addresses of this process."""
-        return {**self.__dict__, "_trajectory": None}
-
     def __setstate__(self, state):
         """Take over what was pickled; the packed scene finds its kernels again."""
         self.__dict__.update(state, system=state["packed"].system)

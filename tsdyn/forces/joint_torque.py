@@ -57,9 +57,9 @@ class JointTorque(JointLoad, Force):
     quantities = MappingProxyType({"function": law_of_joint, "period": instants})
     geometries = staticmethod(angles)
 
-    def __new__(cls, joint=None, *, period=None, **others):
+    def __new__(cls, *given, period=None, **others):
         """Choose the kernel: held, or by the function; a copy has its class already."""
-        continuous = joint is not None and period is None
+        continuous = (given or others) and period is None
         return super().__new__(_ContinuousTorque if cls is JointTorque and continuous else cls)
 
     @staticmethod

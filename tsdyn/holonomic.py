@@ -28,7 +28,8 @@ def demand_holonomic(packed, q, t, form):
         seen[kind] = seen.get(kind, 0) + 1
         if kind.__module__.startswith("tsdyn.") or seen[kind] > TRIED:
             continue
-        par = [*Motion.numbers(given, t), *[0.0] * kind.memory]
+        par = [x for value in given for x in (value.value(t) if isinstance(value, Motion) else (value,))]
+        par += [0.0] * kind.memory
         row = _wrong_row(constraint, par, _markers(packed, constraint, places, q), t)
         if row is not None:
             raise InvalidConstraint(

@@ -59,6 +59,7 @@ _OPERATIONS = {
 class Smooth:
     """Base of all smooth motions: one operation on others, or a polynomial of the time, whole or in pieces."""
 
+    @fitting
     def __init__(self, operation, operands=(), numbers=()):
         self._operation, self._operands, self._numbers = operation, operands, numbers
 
@@ -261,6 +262,7 @@ class Piecewise(Smooth):
     run over one is refused; jumps of acceleration are followed.
     """
 
+    @fitting
     def __init__(self, source):
         if not is_data(source):
             raise InvalidArgument(

@@ -106,8 +106,8 @@ def test_what_is_not_there(item, words):
 
 
 def test_a_name_of_several():
-    scene, links = chain()
-    scene.add(F.Torque(links[0], torque=(1, 0, 0), name="spring"))
+    scene, _ = chain()
+    scene.add_point_mass(1.0, name="spring")
     with pytest.raises(ts.InvalidArgument, match="'spring' is the name of 2"):
         scene.remove("spring")
 

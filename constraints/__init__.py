@@ -18,3 +18,8 @@ def registered_joints():
     from ..joint import registered as known
 
     return tuple(known().values())
+
+
+def __dir__():
+    """What users use, for completion."""
+    return sorted(__all__)

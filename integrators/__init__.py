@@ -11,3 +11,8 @@ def registered():
     from ..integrator import registered as known
 
     return tuple(known().values())
+
+
+def __dir__():
+    """What users use, for completion."""
+    return sorted(__all__)

@@ -11,6 +11,9 @@ from ..errors import InvalidArgument
 from ..integrator import Integrator
 
 LOWEST, HIGHEST = 4, 30
+TIGHT = 1e-12  # mean of rtol and atol: below it rounding counts
+FINEST = 4e-18  # of a step: truncation of one sign that stays below the rounding of a million steps
+REFINED = 3  # orders of the multipliers that are refined where rounding counts
 
 
 class Taylor(Integrator):
@@ -22,7 +25,8 @@ class Taylor(Integrator):
     Parameters
     ----------
     tol : float
-        Tolerance of a step's error, relative to 1 + size.
+        Tolerance relative to 1 + size. A step's error is held to tol / 1000, below 1e-12 to less, since errors of one
+        sign add up. From 1e-13 down a run's error is rounding, which grows as the square root of the number of steps.
     order : int, optional
         From 4 to 30; None lets every step have the order that gets furthest for its work.
     rtol, atol : float, optional
@@ -56,8 +60,24 @@ class Taylor(Integrator):
             self.order = self.embedded_order = self.fixed
 
     def step_tolerances(self):
-        """Return (rtol, atol) that each step's error is held to: less than a rounding error is none."""
-        return max(self.rtol / self.margin, 1e-16), max(self.atol / self.margin, 1e-16)
+        """Return (rtol, atol) that each step's error is held to.
+
+        Truncation has one sign for many steps and adds up, rounding has either. So below TIGHT the margin grows, until
+        truncation is a small part of rounding.
+        """
+        if not self._tight:
+            return max(self.rtol / self.margin, 1e-16), max(self.atol / self.margin, 1e-16)
+        share = 0.5 * (self.rtol + self.atol) / TIGHT / self.margin
+        return max(self.rtol * share, FINEST), max(self.atol * share, FINEST)
+
+    @property
+    def _tight(self):
+        return 0.5 * (self.rtol + self.atol) < TIGHT
+
+    @property
+    def refined(self):
+        """How many orders of the multipliers are refined, from zero on."""
+        return REFINED if self._tight else 0
 
     def orders(self):
         """Return the first step's order, and the lowest and highest of all."""

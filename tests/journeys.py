@@ -164,6 +164,17 @@ class Tour:
                 assert unique.dtype == bool
                 self.shape(unique)
 
+    def power_of(self):
+        for item in self.items():
+            self.shape(self.on.power_of(item))
+
+    def work_of(self):
+        for item in self.items():
+            if self.on._trajectory is None:
+                with_message(ts.InvalidArgument, lambda item=item: self.on.work_of(item))
+            else:
+                self.shape(self.on.work_of(item))
+
     def rows(self):
         columns = np.zeros(self.on.multipliers.shape[1], int)
         for item in self.scene.constraints:

@@ -72,7 +72,7 @@ local_chart
 newton evaluate diagnostics
 kinematics
 state
-reactions power dense friction_balance
+reactions power dense friction_balance conservation
 control turning holonomic
 chart rank
 branch initial start kinetic
@@ -90,10 +90,11 @@ series_dense
 formulation run
 memory prepare task sampling
 sign_search events drive work account
+inside
 watch
 relay
 series_run steps solution
-passage
+passage origin digits
 series_check timers
 timekeeper replay phases
 simulate choice force_check

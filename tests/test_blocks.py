@@ -269,6 +269,34 @@ def test_failure_names_the_row(row, value):
         assert factor_lu(pattern, lower, upper, 1e-14) == failed
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_late_nodes_have_negative_pivots(seed):
+    """[A, B; B^T, -C] with A definite and C next to nothing, as bodies without inertia about an axis make it."""
+    rng = np.random.default_rng(seed)
+    n, cliques = [chain(12), ring(9), grid(4, 3), tree([0, 1, 1, 2, 0, 5, 5, 3])][seed % 4]
+    sizes, bodies = rng.integers(1, 5, n).tolist(), [clique for clique in cliques if clique]
+    lean = [i for i in range(len(bodies)) if rng.random() < 0.6]
+    cliques = [[*clique, *([n + lean.index(i)] if i in lean else [])] for i, clique in enumerate(bodies)]
+    A, starts, pairs = matrices(sizes, bodies, rng)
+    B = np.zeros((len(A), len(lean)))
+    for k, i in enumerate(lean):
+        at = np.concatenate([np.arange(starts[j], starts[j + 1]) for j in bodies[i]])
+        B[at, k] = rng.normal(size=at.size)
+        pairs |= {(j, n + k) for j in bodies[i]} | {(n + k, n + k)}
+    C = np.diag(rng.choice((0.0, 1e-9), len(lean)))
+    whole = np.block([[A, B], [B.T, -C]])
+    starts = np.concatenate((starts, starts[-1] + 1 + np.arange(len(lean))))
+    rows, pattern, where = analyse([*sizes, *[1] * len(lean)], cliques, len(lean))
+    values = fill(whole, starts, pairs, where, pattern)[1]
+    assert factor(pattern, values, 1e-14) == -1
+    order, x = permutation([*sizes, *[1] * len(lean)], rows).astype(int), rng.normal(size=len(whole))
+    b = np.zeros(len(whole))
+    b[order] = whole @ x
+    solve(pattern, values, b)
+    np.testing.assert_allclose(b[order], x, rtol=0.0, atol=1e-9)
+    assert sorted(pattern.negative.tolist()) == sorted(rows[n:].tolist())
+
+
 def test_the_type_of_a_pattern_never_changes():
     problems = [([], []), ([0], [[0]]), ([1], []), ([6], [[0]]), ([3] * 40, chain(40)[1]), ([2] * 40, ring(40)[1])]
     for sizes, cliques in problems:

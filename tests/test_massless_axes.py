@@ -120,7 +120,7 @@ def test_next_to_no_inertia_is_next_to_none(inertia):
 
 def test_friction_of_a_joint():
     scene = chain(2, {1})
-    scene.add(F.RevoluteFriction(scene.constraints[1], coefficient=0.2, radius=0.05))
+    scene.add(F.RevoluteFriction(scene.constraints[1], kinetic=0.2, radius=0.05))
     solution = ts.simulate(scene, (0.0, 0.2), integrator=METHODS[1]).raise_if_failed()
     state = scene.evaluate(solution.q[-1], solution.qd[-1], solution.t[-1])
     np.testing.assert_allclose(solution.qdd[-1], state.qdd, rtol=0.0, atol=1e-10 * np.abs(state.qdd).max())

@@ -1,12 +1,17 @@
 """What a user is told: wrong calls, names, what was forgotten, and how results and scenes print."""
 
+import copy
+import gc
 import inspect
 import warnings
+import weakref
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
+from tests.fuzz.calls import fuzz
 from tsdyn.calls import fitting
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
@@ -161,3 +166,91 @@ def test_a_huge_inertia_is_no_raw_error():
     scene = ts.Scene()
     body = scene.add_body(1.0, (1e308, 1e308, 1e308))
     assert (np.diag(body.inertia) == 1e308).all()
+
+
+@pytest.mark.parametrize("space", [ts, C, F, I, ts.motions, ts.testing, ts.shapes], ids=lambda space: space.__name__)
+def test_completion_shows_what_users_use(space):
+    assert set(space.__all__) <= set(dir(space))
+    assert not {"np", "math", "Joint", "Point"} & set(dir(space)) or space is ts
+
+
+def test_copies_of_scenes_are_scenes_of_their_own():
+    scene = pendulum()
+    for twin in (copy.copy(scene), copy.deepcopy(scene)):
+        twin.body("bob").mass = 5.0
+        twin.add_point_mass(1.0)
+        assert scene.body("bob").mass == 1.0
+        assert len(scene.bodies) == 1
+        assert twin.bodies[0].scene is twin
+        with pytest.raises(ts.InvalidConstraint, match="different scenes"):
+            twin.add(C.Spherical(scene.bodies[0], scene.ground))
+
+
+def load(factor):
+    return lambda t: (factor, 0.0, 0.0)
+
+
+def test_the_same_source_and_constants_are_compiled_once():
+    _, a, _ = two()
+    first, second, other = (F.PointForce(a, force=load(factor)).force for factor in (1.0, 1.0, 2.0))
+    assert first is not second
+    assert first.address == second.address
+    assert first.address != other.address
+    of_state = [F.PointForce(a, force=lambda t, state: (0.0, 0.0, state[0])).kernels for _ in range(2)]
+    assert of_state[0] is of_state[1]
+
+
+def test_scenes_leave_nothing_behind():
+    def run():
+        scene = pendulum()
+        scene.add(F.Spring(scene.bodies[0], scene.ground, point_b=(0, 0, 3), stiffness=1.0))
+        ts.simulate(scene, (0.0, 0.01))
+        return weakref.ref(scene), weakref.ref(scene.bodies[0])
+
+    run()
+    gone = run()
+    gc.collect()
+    count = len(gc.get_objects())
+    assert [ref() for ref in gone] == [None, None]
+    for _ in range(5):
+        run()
+    gc.collect()
+    assert len(gc.get_objects()) < count + 5
+
+
+def test_a_small_sample_of_the_fuzzer_of_calls():
+    found = list(fuzz(300, seed=5, runs=0.02))
+    assert not [each for each in found if each.story]
+    assert {"accepted", "InvalidCall", "InvalidConstraint", "InvalidForce"} <= {each.outcome for each in found}
+
+
+def test_the_axis_and_references_of_a_torsional_spring_are_derived():
+    scene = ts.Scene()
+    turned = Rotation.from_euler("zyx", (0.3, 0.7, -0.4))
+    body = scene.add_body(1.0, (1.0, 1.0, 1.0), orientation=turned)
+    axis = np.array((0.0, 0.6, 0.8))
+    own = turned.inv().apply(axis)
+    scene.add(C.Revolute.at(scene.ground, body, point=(0, 0, 0), axis=axis))
+    springs = [
+        F.TorsionalSpring(scene.ground, body, axis_a=axis, stiffness=2.0),
+        F.TorsionalSpring(scene.ground, body, axis_b=own, stiffness=2.0),
+        F.TorsionalSpring(scene.ground, body, axis_a=axis, axis_b=own, reference_b=(1, 0, 0), stiffness=2.0),
+        F.TorsionalSpring.at(scene.ground, body, axis=axis, stiffness=2.0),
+        F.TorsionalSpring.at(scene.ground, body, axis=axis, reference=(1, 0, 0), stiffness=2.0),
+    ]
+    for i, spring in enumerate(springs):
+        spring.name = f"spring {i}"
+        scene.add(spring)
+        np.testing.assert_allclose(spring.axis_a, axis, atol=1e-15)
+        np.testing.assert_allclose(spring.axis_b, own, atol=1e-15)
+    solution = ts.simulate(scene, (0.0, 0.02))
+    assert np.abs(solution.reaction(springs[0])[1]).max() < 1e-12
+    body.angular_velocity = own
+    moved = ts.simulate(scene, (0.0, 0.02))
+    for spring in springs:
+        np.testing.assert_allclose(moved.angle(spring)[-1], moved.angle(springs[0])[-1], atol=1e-12)
+    springs[0].axis_b = own
+    with pytest.raises(ts.InvalidForce, match="axis_b is not along axis_a"):
+        F.TorsionalSpring(scene.ground, body, axis_a=axis, axis_b=axis, stiffness=2.0)
+    with pytest.raises(ts.InvalidForce, match="axis_a"):
+        F.TorsionalSpring(scene.ground, body, stiffness=2.0)

@@ -106,10 +106,10 @@ def test_what_is_not_there(item, words):
 
 
 def test_a_name_of_several():
-    scene, _ = chain()
-    scene.add_point_mass(1.0, name="spring")
-    with pytest.raises(ts.InvalidArgument, match="'spring' is the name of 2"):
-        scene.remove("spring")
+    scene, links = chain()
+    scene.add(F.Torque(links[0], torque=(1, 0, 0), name="link1"))
+    with pytest.raises(ts.InvalidArgument, match="'link1' is the name of 2"):
+        scene.remove("link1")
 
 
 def swing(t):

@@ -112,3 +112,8 @@ def __getattr__(name):
 
         return profile
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__():
+    """What users use, for completion."""
+    return sorted([*__all__, "__version__"])

@@ -6,17 +6,19 @@ from .checks import counted
 from .errors import Status
 from .evaluate import constraint_arrays
 from .expansion_pack import without_series
+from .independent import dependent_rows
 from .network import DROPPED
 from .rank import weakest_row
 
 NEARLY_SINGULAR = 0.05
-MOST = 2000  # coordinates for which Phi_q is made as a matrix
+MOST = 600  # coordinates for which singular values are worked out
 FEW = 3  # parts of a scene that are named
 BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
 
 
 def account(solution, scene, reason):
     """How the run of a solution ended, in words."""
+    reason = " ".join(part for part in (reason, _kept(solution.stats)) if part)
     if solution.success:
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
     steps = counted(solution.stats.steps, "step")
@@ -30,6 +32,19 @@ def account(solution, scene, reason):
         suspect = _growth(solution)
     parts = (solution.status.sentence, reason, where, suspect, remedy)
     return " ".join(part for part in parts if part)
+
+
+def _kept(stats):
+    """The accuracy that was kept next to singular configurations, as energy and landings tell."""
+    if not stats.steps_near_singular:
+        return ""
+    energy = (
+        "" if stats.energy_error is None else f"energy was kept to {stats.energy_error:.1e} of the kinetic energy, "
+    )
+    return (
+        f"Next to singular configurations ({stats.steps_near_singular} steps) {energy}constraints moved bodies by at "
+        f"most {stats.largest_landing:.1e} (m, rad) at the end of a step."
+    )
 
 
 def _locked(solution):
@@ -55,7 +70,7 @@ def _suspect(solution, scene):
     if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
         return ""
     if solution.q.shape[1] > MOST:
-        return ""
+        return _suspect_of_many(solution, scene)
     _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)
     rows, share = weakest_row(scene, Phi_q, len(solution.packed.shared.get(DROPPED, ())))
     if not share < NEARLY_SINGULAR:
@@ -63,4 +78,19 @@ def _suspect(solution, scene):
     return (
         f"Phi_q is near to losing rank there (its smallest singular value is {share:.1e} of the largest, rows "
         f"scaled): a singular configuration, in which {rows} depends on other rows."
+    )
+
+
+def _suspect_of_many(solution, scene):
+    """The same by elimination, at a cost of O(N)."""
+    packed = solution.packed
+    rows = dependent_rows(packed, solution._last[0], solution._reached, NEARLY_SINGULAR**2)
+    redundant = len(packed.shared.get(DROPPED, ()))
+    if rows is None or len(rows) <= redundant:
+        return ""
+    names = scene.row_names()
+    which = ", ".join(names[i] for i in rows[:FEW]) + (", ..." if len(rows) > FEW else "")
+    return (
+        f"Phi_q is near to losing rank there: a singular configuration, in which {len(rows)} rows nearly depend on "
+        f"others ({which}), {redundant} of them everywhere."
     )

@@ -27,6 +27,7 @@ LOOSER, LOOSEST = 100.0, 1e-3  # times the tolerances; not looser than that
 LONGEST = 10.0  # s, of calls beside which nothing is tried
 SAMPLE, SHORT = 0.1, 20  # s of an alternative's calls; steps by which its whole time is guessed
 SHOWN = 3
+ERRORS, LARGEST_GAP = 100.0, 1e-2  # times the tolerances, and in all, that the ends of advised alternatives may differ
 
 
 class Alternative(NamedTuple):
@@ -118,9 +119,14 @@ def _steps(profile):
 def _alternatives(profile, run, plain, options, limit):
     """Those that were tried and found quicker than the limit, s."""
     method, solution = profile.method, profile.solution
+    astray = []
 
     def attempt(**changes):
-        return _attempt(run, {**plain, "integrator": method, **changes}, limit, solution)
+        found = _attempt(run, {**plain, "integrator": method, **changes}, limit, solution)
+        if found and found.gap > _allowed(changes.get("integrator"), method):
+            astray.append(found.gap)
+            return None
+        return found
 
     adaptive = method.step is None
     tolerances = {"rtol": method.rtol, "atol": method.atol} if adaptive else {}
@@ -155,6 +161,18 @@ def _alternatives(profile, run, plain, options, limit):
         found = attempt(chart_interval=None)
         if found:
             yield f"Without chart_interval, which forces charts, it is {_quicker(found, limit)}."
+    if astray:
+        yield (
+            f"What would be quicker ends elsewhere, by up to {max(astray):.1e} (m, or of a rotation matrix): the end "
+            "of this run depends on the method and its tolerances more than they allow for. Tighten them, or shorten "
+            "the interval, until the end stays where it is."
+        )
+
+
+def _allowed(integrator, method):
+    """How far apart the ends may be for an alternative to be advised."""
+    tolerances = [tol for each in (integrator, method) if each is not None for tol in (each.rtol, each.atol) if tol]
+    return min(ERRORS * max(tolerances), LARGEST_GAP) if tolerances else LARGEST_GAP
 
 
 def _series(profile, plain, limit, simulate):
@@ -170,7 +188,7 @@ def _series(profile, plain, limit, simulate):
         yield said
         return
     bare = copy.copy(scene)
-    bare._forces, bare._spare = [force for force in scene.forces if id(force) not in forces], {}
+    bare._forces = [twin for twin, force in zip(bare.forces, scene.forces, strict=True) if id(force) not in forces]
     bare.touch()
     tolerances = {"rtol": method.rtol or 1e-8, "atol": method.atol or 1e-8}
     series = _attempt(partial(simulate, bare, profile.span), {**plain, "integrator": Taylor(**tolerances)}, limit, None)

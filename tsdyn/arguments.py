@@ -8,6 +8,8 @@ from .checks import finite_vector, floats, unknown_name
 from .errors import InvalidArgument
 from .integrator import Integrator, registered
 
+TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
+
 
 def interval(t_span):
     """Start and end of the interval, s."""
@@ -55,19 +57,26 @@ def state_arrays(state, n):
     return finite_vector(state.q, n, "state.q"), finite_vector(state.qd, n, "state.qd")
 
 
+def tolerances(rtol, atol):
+    """Rtol and atol by name, TOLERANCE for None."""
+    return {"rtol": TOLERANCE if rtol is None else rtol, "atol": TOLERANCE if atol is None else atol}
+
+
 def method_of(integrator, rtol, atol):
     """The method that is given as an instance, a class or a name; tolerances are for a name."""
     known = registered()
-    tolerances = {name: value for name, value in (("rtol", rtol), ("atol", atol)) if value is not None}
-    if tolerances and not (isinstance(integrator, str) and getattr(known.get(_key(integrator)), "embedded_order", 0)):
+    given = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
+    adaptive = isinstance(integrator, str) and getattr(known.get(_key(integrator)), "embedded_order", 0) > 0
+    if given and not adaptive:
         raise InvalidArgument(
-            f"{' and '.join(tolerances)} set the tolerances of an adaptive method given by its name, such as "
+            f"{' and '.join(given)} set the tolerances of an adaptive method given by its name, such as "
             f"integrator='rk45', not of {integrator!r}; give an instance its own, such as RK45(rtol=1e-8)."
         )
     if isinstance(integrator, str):
         if _key(integrator) not in known:
             raise unknown_name("integrator", integrator, known)
-        return known[_key(integrator)](**tolerances)
+        kind = known[_key(integrator)]
+        return kind(**tolerances(rtol, atol)) if adaptive else kind()
     if isinstance(integrator, type) and integrator in known.values():
         return integrator()
     if not isinstance(integrator, Integrator):

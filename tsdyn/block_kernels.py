@@ -15,16 +15,16 @@ from .block_steps import eliminate, eliminate_lu, link, link_lu, subtract_produc
 
 @kernel
 def keep_diagonal(pattern, values):
-    """Copy the diagonal to where `factor` judges pivots by it."""
+    """Copy the diagonal to where `factor` judges pivots by it, its sign that of the pivot."""
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     kept = values[pattern.shape[1] :]
     for j in range(heads.size):
         head, step, first = heads[j], widths[j] + 1, starts[j]
         for k in range(starts[j + 1] - first):
-            kept[first + k] = values[head + k * step]
+            kept[first + k] = abs(values[head + k * step])
     for i in range(pattern.negative.size):
-        if kept[pattern.negative[i]] == 0.0:
-            kept[pattern.negative[i]] = -1.0
+        row = pattern.negative[i]
+        kept[row] = -kept[row] if kept[row] > 0.0 else -1.0
 
 
 @kernel
@@ -35,7 +35,7 @@ def factor(pattern, values, limit):
     """
     kept = values[pattern.shape[1] :]
     if pattern.shape[0] == 1:
-        kept[0] = values[0]
+        keep_diagonal(pattern, values)
         return eliminate(values, 1, 1, 1, kept, limit)
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     keep_diagonal(pattern, values)

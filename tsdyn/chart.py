@@ -13,9 +13,10 @@ from .assembly import constraint_jacobian
 from .linalg import null_space
 from .local_chart import touch
 from .newton import OK, SINGULAR, invert_normal_matrix, leave_rows_out, normal_matrix, update_b
-from .workspace import FACTORIZATIONS, KEPT, RATE, SIZE
+from .workspace import FACTORIZATIONS, KEPT, RATE
 
-RANK_LIMIT = 1e-8  # smallest singular value of Phi_q, rows scaled to length one, below which it has lost rank
+RANK_LIMIT = 1e-14  # smallest singular value of Phi_q, rows scaled to length one: less is rounding; S, in the metric
+# of the masses, says what is independent: rows of points that are a nanometre apart differ by 1e-9
 
 
 @kernel
@@ -46,8 +47,7 @@ def new_chart(s, w, f, l, network, t):
     for j in range(k):
         w.v[j] = 0.0
     low, high = null_space(w.householder, n, kept, w.V, w.R, w.z)
-    least = RANK_LIMIT * min(w.control[SIZE], 1.0)  # rows of points that are so near to each other differ by that
-    if m > 0 and not (regular and low > least * high):
+    if m > 0 and not (regular and low > RANK_LIMIT * high):
         return SINGULAR
     _normal_space(network, w, l)
     normal_matrix(s, w)

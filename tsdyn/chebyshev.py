@@ -54,10 +54,9 @@ def table(N):
 
 
 def extremes(coefficients):
-    """Zeros (k,) in (-1, 1) of the derivative of a Chebyshev series, increasing."""
+    """Real zeros (k,) of the derivative of a Chebyshev series, increasing."""
     slope = np.trim_zeros(chebyshev.chebder(coefficients), "b")
     if slope.size < 2:
         return np.empty(0)
     roots = chebyshev.chebroots(slope)
-    real = roots.real[np.abs(roots.imag) < 1e-6]
-    return np.sort(real[np.abs(real) < 1.0])
+    return np.sort(roots.real[np.abs(roots.imag) < 1e-6])

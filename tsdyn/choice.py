@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from .arguments import tolerances
 from .errors import Status, TsdynError
 from .integrators import DOP853, SDIRK54, Taylor
 from .run_state import H, T
@@ -21,9 +22,9 @@ LARGEST_PILOT = 700  # coordinates: above that implicit methods, whose matrices 
 
 
 def explicit(prepared, rtol, atol, series):
-    """The method that a run begins with; tolerances default to 1e-8. Whether series may be it."""
-    rtol, atol = 1e-8 if rtol is None else rtol, 1e-8 if atol is None else atol
-    return Taylor(rtol=rtol, atol=atol) if series and not prepared.refusal else DOP853(rtol, atol)
+    """The method that a run begins with; series: whether Taylor may be it."""
+    kind = Taylor if series and not prepared.refusal else DOP853
+    return kind(**tolerances(rtol, atol))
 
 
 def implicit(method):

@@ -211,7 +211,9 @@ class Trajectory:
     Parameters
     ----------
     reading : tuple
-        A kind of reader and what to make one with, the System first.
+        A kind of reader and what to make one with, the System first; of this process.
+    again : tuple
+        A function and its arguments, which make `reading` in another process.
     blocks : ndarray (steps, ...)
     charts : ndarray (charts, 5)
     points : ndarray (charts, n)
@@ -225,11 +227,22 @@ class Trajectory:
         Of the `Task`: at one where a function is asked the step counts that begins there, as for outputs.
     """
 
-    def __init__(self, reading, blocks, charts, points, start, first, angles, stops):
-        self.reading = reading
+    def __init__(self, reading, again, blocks, charts, points, start, first, angles, stops):
+        self._reading, self.again = reading, again
         self.blocks, self.charts, self.points = blocks, charts, points
         self.start, self.first, self.angles = start, first, angles
         self.asked = stops[stops[:, 1] != 0.0, 0]
+
+    def __getstate__(self):
+        return {**self.__dict__, "_reading": None}
+
+    @property
+    def reading(self):
+        """A kind of reader and what to make one with."""
+        if self._reading is None:
+            make, *arguments = self.again
+            self._reading = make(*arguments)
+        return self._reading
 
     @property
     def end(self):

@@ -7,11 +7,26 @@ import numpy as np
 
 from .errors import InconsistentState, SingularConfiguration, Status
 from .history import ChartLog, StepLog
-from .run_state import BEGUN, BLOCKS, CHART_ROWS, DENSE, HISTORY, ROWS, STEPS, STEPS_WANTED, STIFF, STORED, Record, T
+from .run_state import (
+    ADAPTIVE,
+    BEGUN,
+    BLOCKS,
+    CHART_ROWS,
+    DENSE,
+    HISTORY,
+    ROWS,
+    STEPS,
+    STEPS_WANTED,
+    STIFF,
+    STORED,
+    Record,
+    T,
+)
 
 SLICE_SECONDS = 0.2  # how often a run comes back to Python: progress, interrupts
 LARGEST_SLICE, CHART_ROOM = 1 << 17, 64
 FIRST_SLICE, FIRST_WORK = 1024, 1 << 17  # steps; coordinates stepped on, unless that is less than a step
+PACED, HOPELESS = 1000, 1e10  # steps tried over which a run's pace is taken; as many to go are too many
 BLOCK_ROOM = 1 << 22  # floats of a slice's blocks
 
 
@@ -32,6 +47,33 @@ class Recorded(NamedTuple):
         return self.passed
 
 
+class Pace:
+    """Whether a run gets on: an adaptive one whose steps stay so short that it would never end is ended.
+
+    Parameters
+    ----------
+    t : float, s
+        Where it begins.
+    """
+
+    def __init__(self, t):
+        self.t, self.tries, self.before = t, 0, 0.0  # since when, how many; s a try before that
+
+    def judge(self, t, tries, end):
+        """Status, and what there is to say: of a run that is at t after so many more tries."""
+        self.tries += tries
+        if self.tries < PACED:
+            return Status.SLICE_DONE, ""
+        before, now = self.before, (t - self.t) / self.tries
+        self.t, self.tries, self.before = t, 0, now
+        if now > 0.0 and (end - t <= HOPELESS * now or now > 2.0 * before):
+            return Status.SLICE_DONE, ""
+        left = f"{(end - t) / now:.0e} more" if now > 0.0 else "for ever"
+        return Status.STEP_COLLAPSED, (
+            f"At the pace of the last {PACED} steps the rest would take {left}; with max_steps given it would go on."
+        )
+
+
 def drive(memory, task, watch):
     """Drive a run; the Status, what there is to say about it, and what it `Recorded`.
 
@@ -49,6 +91,7 @@ def drive(memory, task, watch):
     largest = max(BLOCK_ROOM // block, 1) if dense else LARGEST_SLICE
     chunks = {"out": [], "blocks": []}
     steps, passed = (StepLog(), ChartLog()) if task.history else (None, None)
+    pace = Pace(t0)
 
     def room(rows, out, charts, points):
         """A record for the next slice, of so many rows, besides what goes on being filled."""
@@ -86,6 +129,8 @@ def drive(memory, task, watch):
             except Exception as error:  # what has been computed is worth more than a progress bar
                 if status == Status.SLICE_DONE:
                     status, reason = Status.INTERRUPTED, f"progress raised {type(error).__name__}: {error}."
+            if status == Status.SLICE_DONE and task.max_steps is None and numbers[ADAPTIVE]:
+                status, reason = pace.judge(float(run.clock[T]), int(numbers[HISTORY]), t1)
             left = limit - int(numbers[STEPS])
             if status != Status.SLICE_DONE:
                 break

@@ -10,6 +10,7 @@ from .errors import InvalidArgument, InvalidBody
 from .names import named
 
 SHOWN = 5  # in a message
+WHAT = "body, constraint or force"  # has a name
 
 
 def remove(scene, item):
@@ -67,7 +68,7 @@ def found(scene, item):
     """The handle itself, or the one thing that has this name."""
     present = [*scene._bodies, *scene._added, *scene._forces]
     if isinstance(item, str):
-        return named(present, item, "body, constraint or force")
+        item = named([*present, *scene._normalisations.values()], item, WHAT)
     if any(item is other for other in present):
         return item
     if isinstance(item, Ground):

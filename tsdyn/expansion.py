@@ -20,8 +20,6 @@ from .poses import OMEGA, POSE, RD, R
 from .selection import drop
 from .series_loops import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R, S_SPIN, call_series
 
-MANY = 100  # bodies: errors of a solution by elimination grow with their number
-
 
 @kernel
 def begin(network, system, poses, orders, bodies, Z):
@@ -39,7 +37,7 @@ def begin(network, system, poses, orders, bodies, Z):
             put(bodies, at + 16, splat(0.0))
             put(bodies, at + 20, splat(0.0))
             _turn(bodies, at, 1, four(poses, p + OMEGA))
-            _turn_ahead(bodies, at, orders, 1)
+            _turn_ahead(bodies, at, orders, 1, 0.5, 0.0)
             put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, 0))
 
 
@@ -77,8 +75,8 @@ def _turn(bodies, at, k, change):
 
 
 @kernel
-def _turn_ahead(bodies, at, orders, k):
-    """A_{k+1} of (1) but for omega'_k."""
+def _turn_ahead(bodies, at, orders, k, share, low):
+    """A_{k+1} of (1) but for omega'_k; share + low = 1 / (k + 1)."""
     x, y, z = splat(0.0), splat(0.0), splat(0.0)
     u, v, w = splat(0.0), splat(0.0), splat(0.0)
     o = at + S_OMEGA * orders + 4 * (k - 1)
@@ -89,10 +87,24 @@ def _turn_ahead(bodies, at, orders, k):
         y, v = fma(a2, w0, y), fma(a0, w2, v)
         z, w = fma(a0, w1, z), fma(a1, w0, w)
         o -= 4
-    o, f = at + 12 * (k + 1), splat(1.0 / (k + 1))
-    put(bodies, o, times(sub(x, u), f))
-    put(bodies, o + 4, times(sub(y, v), f))
-    put(bodies, o + 8, times(sub(z, w), f))
+    o, f, l = at + 12 * (k + 1), splat(share), splat(low)
+    put(bodies, o, _product(sub(x, u), f, l))
+    put(bodies, o + 4, _product(sub(y, v), f, l))
+    put(bodies, o + 8, _product(sub(z, w), f, l))
+
+
+@kernel
+def _product(x, f, low):
+    """x (f + low), rounded once where the processor can."""
+    return fma(x, f, times(x, low))
+
+
+@kernel
+def _lacking(n, f):
+    """1 / n - f, f being 1 / n to rounding, n an integer up to 2^20."""
+    wide = 134217729.0 * f  # Dekker: f in two halves, whose products with n are exact
+    high = wide - (wide - f)
+    return ((1.0 - n * high) - n * (f - high)) * f
 
 
 @kernel
@@ -118,35 +130,42 @@ def run_forces(reals, x, k, orders, poses, Z):
 
 
 @kernel
-def expand(network, system, k, last, ahead, orders, x, f):
+def expand(network, system, k, last, ahead, orders, refine, x, f):
     """Order k of the forces and multipliers, k + 1 of omega', k + 2 of r and A; k in turn from zero, after `begin`.
 
     On entry Z has the gyroscopic torques of order k, and A_{k+2} what (1) has without omega'_{k+1}; on exit both are
     of the next order, unless this is the last one. lam_k stays in b until then.
 
-    Of many bodies, lam_0 is refined once. With `ahead`, a constant, each body has the next one's numbers brought into
-    the cache: that pays where they are in none near by. x is a `series_state.Expansion`, f a `free.Free`.
+    The first `refine` orders of lam are refined once. If more than lam_0, factors 1 / n are exact as well: their
+    rounding errors have the same sign in every step, and add up. With `ahead`, a constant, the next body's numbers are
+    prefetched: that pays where the series don't fit into the cache. x is a `series_state.Expansion`, f a `free.Free`.
     """
     bodies, Z = x.bodies, f.Z
     nb, size = network.bodies.shape[0], orders * BODY_ROW
     run_loops(network, system.reals, ADVANCE, k, orders, bodies, x.constraints, x.places, f.b, Z)
     run_forces(system.reals, x, k, orders, f.poses, Z)
-    g, h = splat(1.0 / (k + 1)), splat(1.0 / ((k + 1) * (k + 2)))
+    exact = refine > 1
+    share, half, ahead_share = 1.0 / (k + 1), 1.0 / ((k + 1) * (k + 2)), 1.0 / (k + 3)
+    share_low = half_low = ahead_low = 0.0
+    if exact:
+        share_low, half_low = _lacking(k + 1.0, share), _lacking((k + 1.0) * (k + 2.0), half)
+        ahead_low = _lacking(k + 3.0, ahead_share)
+    g, h, g_low, h_low = splat(share), splat(half), splat(share_low), splat(half_low)
     for b in range(nb):
         at = b * size
         if ahead:
             _fetch_next(bodies, at + size, orders, 12, k + 2)
         weigh(network.inverse, b, Z, 8 * b, Z, 8 * b)
-        put(bodies, at + S_R * orders + 4 * (k + 2), times(four(Z, 8 * b), h))
+        put(bodies, at + S_R * orders + 4 * (k + 2), _product(four(Z, 8 * b), h, h_low))
         if network.bodies[b, 1] == 7:
-            put(bodies, at + S_OMEGA * orders + 4 * (k + 1), times(four(Z, 8 * b + 4), g))
-            _turn(bodies, at, k + 2, times(four(Z, 8 * b + 4), h))
-    refined = k == 0 and nb > MANY
+            put(bodies, at + S_OMEGA * orders + 4 * (k + 1), _product(four(Z, 8 * b + 4), g, g_low))
+            _turn(bodies, at, k + 2, _product(four(Z, 8 * b + 4), h, h_low))
+    refined = k < refine
     if refined:
         _solve(network, system, k, orders, x, f, False)
         copy(f.b, f.gamma)
         for b in range(nb):
-            _change(network, b, bodies, b * size, orders, k, g, h, Z)
+            _change(network, b, bodies, b * size, orders, k, g, h, g_low, h_low, exact, Z)
     _solve(network, system, k, orders, x, f, refined)
     if refined:
         for e in range(f.b.size):
@@ -157,11 +176,11 @@ def expand(network, system, k, last, ahead, orders, x, f):
             _fetch_next(bodies, at + size, orders, 12 * (k + 3), k + 2)
             fetch(bodies, at + size + S_OMEGA * orders, 4 * (k + 1))
             fetch(bodies, at + size + S_SPIN * orders, 4 * (k + 2))
-        _change(network, b, bodies, at, orders, k, g, h, Z)
+        _change(network, b, bodies, at, orders, k, g, h, g_low, h_low, exact, Z)
         put(Z, 8 * b, splat(0.0))
         if network.bodies[b, 1] == 7 and not last:
             put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, k + 1))
-            _turn_ahead(bodies, at, orders, k + 2)
+            _turn_ahead(bodies, at, orders, k + 2, ahead_share, ahead_low)
 
 
 @kernel
@@ -183,11 +202,20 @@ def _solve(network, system, k, orders, x, f, refined):
 
 
 @kernel
-def _change(network, b, bodies, at, orders, k, g, h, Z):
-    """Add what Z makes of a body's r_{k+2}, omega'_{k+1} and A_{k+2}; g = 1 / (k + 1), h = g / (k + 2)."""
-    o = at + S_R * orders + 4 * (k + 2)
-    put(bodies, o, fma(four(Z, 8 * b), h, four(bodies, o)))
+def _change(network, b, bodies, at, orders, k, g, h, g_low, h_low, exact, Z):
+    """Add what Z makes of a body's r_{k+2}, omega'_{k+1} and A_{k+2}.
+
+    g + g_low = 1 / (k + 1), h + h_low = 1 / ((k + 1) (k + 2)); `exact`: the low parts are not zero.
+    """
+    push, o = four(Z, 8 * b), at + S_R * orders + 4 * (k + 2)
+    if exact:
+        put(bodies, o, add(four(bodies, o), _product(push, h, h_low)))
+    else:
+        put(bodies, o, fma(push, h, four(bodies, o)))
     if network.bodies[b, 1] == 7:
         change, o = four(Z, 8 * b + 4), at + S_OMEGA * orders + 4 * (k + 1)
-        put(bodies, o, fma(change, g, four(bodies, o)))
-        _turn(bodies, at, k + 2, times(change, h))
+        if exact:
+            put(bodies, o, add(four(bodies, o), _product(change, g, g_low)))
+        else:
+            put(bodies, o, fma(change, g, four(bodies, o)))
+        _turn(bodies, at, k + 2, _product(change, h, h_low))

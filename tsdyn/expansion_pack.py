@@ -106,7 +106,7 @@ def allocate_expansion(network, kinds, packed, highest):
     forces, table, loads = _forces(packed, orders)
     constraints = zeros(total + 4)
     return Expansion(
-        order=np.array([highest, orders, highest, highest, highest]),
+        order=np.array([highest, orders, highest, highest, highest, 0]),
         bodies=bodies,
         constraints=constraints,
         places=places,

@@ -43,9 +43,9 @@ class Free(NamedTuple):
     anew: np.ndarray  # int64 (2,)  address of rows.choose_anew, and of its `Choice`; zero where it isn't needed
 
 
-# of the landing; the largest |Phi| of dropped rows; what elimination left of the weakest of the others, as a share:
-# when they were chosen, at a step's start, at its end, at most at any; the last step from a place that isn't singular
-RESIDUAL, MOVED, UNHELD, WEAKEST, SHARE, END_SHARE, LARGEST_SHARE, STRIDE, SIZES = range(9)
+# of the landing: |Phi|, and how far it moved a body; the largest |Phi| of dropped rows; what elimination left of the
+# weakest of the others, as a share: when they were chosen, at a step's start, at its end, at most at any
+RESIDUAL, MOVED, UNHELD, WEAKEST, SHARE, END_SHARE, LARGEST_SHARE, SIZES = range(8)
 
 
 def no_free():

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .aligned import zeros
-from .free import LARGEST_SHARE, SHARE, SIZES, STRIDE, WEAKEST, Free, Friction
+from .free import LARGEST_SHARE, SHARE, SIZES, WEAKEST, Free, Friction
 from .poses import POSE
 from .rows import choosing_anew
 
@@ -48,4 +48,4 @@ def drop_as_at_first(network, free):
     free.dropped[0] = network.dropped.size
     free.dropped[1 : 1 + network.dropped.size] = network.dropped
     free.sizes[WEAKEST] = 1.0
-    free.sizes[SHARE] = free.sizes[LARGEST_SHARE] = free.sizes[STRIDE] = 0.0
+    free.sizes[SHARE] = free.sizes[LARGEST_SHARE] = 0.0

@@ -10,12 +10,14 @@ from ._four import add, fma, four, put, splat
 from ._kernel import kernel, long_kernel
 from .block_kernels import solve
 from .errors import Status
-from .free import RESIDUAL
+from .free import LARGEST_SHARE, MOVED, RESIDUAL
 from .linalg import largest
+from .nearness import NEAR
 from .network import DRIFT, REDUCED, VALUES
 from .normal import gather, scatter
 from .poses import OMEGA, POSE, RD, P, R, set_pose
 from .rows import factorise_rows, held, run_loops
+from .selection import weakest
 from .series_loops import BODY_ROW, S_OMEGA, S_R
 from .workspace import AT_ROUNDING, FACTORIZATIONS, FLOOR, NEWTON
 
@@ -25,7 +27,7 @@ UNHELD = int(Status.UNHELD)
 PIVOT_LIMIT = 1e-13  # of S: less of a diagonal entry than this is rounding
 SWEEPS = 12
 MOST_PARTS = 100.0  # of a step on which p is followed
-MOVED = 1e-15  # corrections above this are more than rounding: S is made anew
+LEAST_MOVE = 1e-15  # corrections above this are more than rounding: S is made anew
 
 
 @long_kernel
@@ -40,12 +42,14 @@ def factorise(network, system, w, f, t):
 def land(network, system, w, f, t):
     """Bring positions onto the manifold along W H^T; H, Y and S are those of where they land. Status."""
     floor, before, moved, renew = w.control[FLOOR], math.inf, 0.0, True
-    f.sizes[RESIDUAL] = -1.0
+    f.sizes[RESIDUAL], f.sizes[MOVED] = -1.0, 0.0
     for _ in range(SWEEPS):
         if renew:
             status = factorise(network, system, w, f, t)
-            if status != OK or f.sizes[RESIDUAL] >= 0.0:
-                return UNHELD if status == OK and not held(f, floor) else status
+            if status != OK:
+                return status
+            if f.sizes[RESIDUAL] >= 0.0:
+                return _settle(network, f, floor)
             renew = False
         else:
             run_loops(network, system.reals, VALUES, f, t, f.b, f.H)
@@ -56,16 +60,31 @@ def land(network, system, w, f, t):
         if worst <= floor or worst > 0.5 * before:
             if worst > 100.0 * floor:
                 return NEWTON_FAILED
-            if moved <= MOVED:
+            if moved <= LEAST_MOVE:
                 w.counters[AT_ROUNDING] += 1 if moved == 0.0 else 0
-                return OK if held(f, floor) else UNHELD
+                return _settle(network, f, floor)
             renew = True
             continue
         before = worst
         w.counters[NEWTON] += 1
         solve(network.pattern, f.S, f.b)
         moved = max(moved, _displace(network, f))
+        f.sizes[MOVED] = moved
     return NEWTON_FAILED
+
+
+@kernel
+def _settle(network, f, floor):
+    """End a landing, b being Phi: next to a singular configuration it is corrected below its floor. Status.
+
+    What Phi leaves there moves bodies by as much over the distance.
+    """
+    if not held(f, floor):
+        return UNHELD
+    if weakest(network, f.S) < NEAR * f.sizes[LARGEST_SHARE]:
+        solve(network.pattern, f.S, f.b)
+        _displace(network, f)
+    return OK
 
 
 @kernel

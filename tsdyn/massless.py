@@ -50,7 +50,7 @@ def lean_bodies(packed):
     system = packed.system
     rigid = np.flatnonzero(system.bodies[:, 1] == 7)
     size, axes = np.linalg.eigh(system.inertia[rigid].reshape(-1, 3, 3))
-    whole = np.maximum(size[:, 2], system.mass[rigid] * _levers(packed)[rigid] ** 2)
+    whole = np.maximum(size[:, 2], system.mass[rigid] * levers(packed)[rigid] ** 2)
     found = {}
     for i in np.flatnonzero(size[:, 0] < THIN * whole):
         few = size[i] < THIN * whole[i]
@@ -59,7 +59,7 @@ def lean_bodies(packed):
     return found
 
 
-def _levers(packed):
+def levers(packed):
     """The largest distance of a constraint's point from each body's centroid."""
     bodies, far = {id(body): i for i, body in enumerate(packed.bodies)}, np.zeros(len(packed.bodies))
     for constraint, coordinates in zip(packed.constraints, packed.coordinates, strict=True):

@@ -353,3 +353,8 @@ FUNCTIONS = {
 time = Ramp(0.0, 1.0)
 
 __all__ = ["Constant", "Exponential", "Piecewise", "Polynomial", "Ramp", "Sine", "Smooth", "time"]
+
+
+def __dir__():
+    """What users use, for completion."""
+    return sorted(__all__)

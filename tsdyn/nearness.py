@@ -7,7 +7,8 @@ from ._kernel import kernel
 from .free import LARGEST_SHARE, SHARE
 from .selection import weakest
 
-NEXT_TO, WITHIN_A_STEP = 1e-3, 0.2  # of the largest share: less is near; where fixed steps can't be made, less than
+NEAR = 0.02  # of the largest share: a place with less is near a singular configuration
+NEXT_TO, WITHIN_A_STEP = 1e-3, 0.2  # of it: less is next to one; where fixed steps can't be made, less than
 
 
 @kernel

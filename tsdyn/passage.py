@@ -13,7 +13,7 @@ import numpy as np
 from .dense import Pieces
 from .errors import Status, TsdynError
 from .formulation import formulation
-from .free import LARGEST_SHARE, SHARE, STRIDE
+from .free import LARGEST_SHARE, SHARE
 from .history import ChartLog, StepLog
 from .integrators import Taylor
 from .relay import Relay
@@ -118,10 +118,8 @@ def _rest(task, parts, series):
 
 def _summed(counts):
     """Counts of the whole run."""
-    return {
-        name: any(each[name] for each in counts) if name == "stiff" else sum(each[name] for each in counts)
-        for name in counts[0]
-    }
+    ways = {"stiff": any, "largest_landing": max}
+    return {name: ways.get(name, sum)(each[name] for each in counts) for name in counts[0]}
 
 
 class Carrier:
@@ -142,7 +140,6 @@ class Carrier:
         self.origin, self.end = task.span
         self.step = task.method.step
         self.grid = math.nan  # the time of the grid that is made for
-        memory.context.free.sizes[STRIDE] = math.inf  # of the last step from elsewhere: the first is made long
 
     def advance(self, record, most):
         """As `SeriesMemory.advance`; Status.PASSAGE where the configuration is regular again."""

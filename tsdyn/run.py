@@ -25,6 +25,7 @@ from .dense import (
     evaluate,
     keep,
 )
+from .displacement import turned_most
 from .errors import Status
 from .implicit import KNOWN, T_BEFORE
 from .interpolation import call_fill
@@ -74,6 +75,8 @@ from .workspace import CONDITION, CONTRACTION, load
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
 JAMMED, PASSAGE = int(Status.JAMMED), int(Status.PASSAGE)
+OFF_CHART = CHART_LOST, int(Status.NEWTON_FAILED), int(Status.SINGULAR)  # what a chart that reaches nowhere ends in
+LITTLE = 0.1  # |d|: a step that turns bodies by less is no long one, and a chart that it loses a small one
 
 call_check = caller("p")
 
@@ -210,6 +213,12 @@ def _cross_stop(context, c, r, log, at, implicit):
 
 
 @kernel
+def _has_hardly_turned(c):
+    """Whether bodies have turned on the present chart, but by little."""
+    return 0.0 < turned_most(c.local) < LITTLE
+
+
+@kernel
 def _go_back(r):
     """Everything as at the start of the step."""
     copy(r.x_old, r.x)
@@ -261,6 +270,8 @@ def advance(context, run, log, at, most):
             t1 = t0 + r.clock[H]
             if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
                 failed = r.numbers[FAILED]
+                if failed in OFF_CHART and r.numbers[MAY_PASS] == 1:
+                    return PASSAGE
                 return failed if failed in (NOT_FINITE, JAMMED) else STEP_COLLAPSED
             if t1 + stretch(r.clock[H], r.clock[MAX_STEP]) >= end:
                 t1 = end
@@ -316,8 +327,8 @@ def advance(context, run, log, at, most):
             r.numbers[REJECTED] += 1
             if r.numbers[IN_CHART] == 0:
                 if not adaptive:
-                    near = r.numbers[MAY_PASS] == 1 and is_below(c.free, WITHIN_A_STEP)
-                    return PASSAGE if near else status
+                    near = is_below(c.free, WITHIN_A_STEP) or (status in OFF_CHART and _has_hardly_turned(c))
+                    return PASSAGE if near and r.numbers[MAY_PASS] == 1 else status
                 r.numbers[FAILED] = status
                 r.clock[H] = 0.25 * h
                 if driven:  # nothing else keeps the next step from being as long

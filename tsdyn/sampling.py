@@ -10,7 +10,7 @@ import numpy as np
 
 from . import joint_motion
 from .checks import number
-from .errors import InvalidArgument, Status
+from .errors import InvalidArgument, InvalidForce, Status
 from .run_state import BEGUN, HISTORY, WAITING, T
 
 MOST = 1 << 25  # instants of a run
@@ -96,6 +96,8 @@ class Sampled:
                 if status != Status.SLICE_DONE or numbers[HISTORY] - first >= most:
                     return status
         except Failed as failure:
+            if not numbers[BEGUN]:
+                raise InvalidForce(str(failure)) from failure.__cause__
             self.reason = str(failure)
             return Status.SAMPLING_FAILED
 

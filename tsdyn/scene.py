@@ -11,7 +11,7 @@ from .bodies import IDENTITY, Body, Ground, PointMass
 from .calls import fitting, fitting_methods
 from .checks import counted, demand_known, label, vector3
 from .constraints.euler_normalization import EulerNormalization
-from .editing import copy, demand_present, found, remove
+from .editing import WHAT, copy, demand_present, found, remove
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint
 from .evaluate import evaluate
 from .force import Force
@@ -19,6 +19,7 @@ from .joint import Joint
 from .membership import admit, settle
 from .mobility import mobility
 from .motion import Motion
+from .names import named
 from .primitive import Primitive
 from .setting import set_joint
 from .signal import Signal
@@ -252,8 +253,8 @@ class Scene:
 
     def __getitem__(self, item):
         """The body, constraint or force of this name; in a copy also that of a handle of the scene it was made of."""
-        if item == self.ground.name:
-            return self.ground
+        if isinstance(item, str):
+            return named([self.ground, *self._bodies, *self.constraints, *self._forces], item, WHAT)
         known = isinstance(item, (PointMass, Ground, Primitive, Joint, Force))
         twin = self._twins.get(item) if self._twins is not None and known else None
         return found(self, item) if twin is None else twin
@@ -281,6 +282,7 @@ class Scene:
     set = set_joint
     remove = remove
     copy = copy
+    __copy__ = copy
 
     def __repr__(self):
         rows = sum(constraint.rows for constraint in self.constraints)

@@ -9,7 +9,7 @@ from .free_memory import allocate_free
 from .linalg import copy
 from .local_chart import ROUNDING
 from .poses import place_bodies
-from .series_state import ORDERS, TOP, Expansion, SeriesContext, load_series
+from .series_state import NUMBERS, ORDERS, TOP, Expansion, SeriesContext, load_series
 from .series_steps import state_within
 from .workspace import FLOOR, SIZE, plain_work
 
@@ -67,7 +67,7 @@ class SeriesReader:
         work.control[SIZE] = size
         none, whole, table = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0), np.int64)
         bodies = np.zeros((len(network.bodies) + 1) * 24 * orders)
-        order = np.zeros(5, np.int64)
+        order = np.zeros(NUMBERS, np.int64)
         order[ORDERS] = orders
         expansion = Expansion(order, bodies, none, table, table, whole, none, table)
         context = SeriesContext(system, work, network, allocate_free(network, n), expansion)

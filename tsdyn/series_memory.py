@@ -25,12 +25,14 @@ from .run_state import (
     enter_joints,
     lay_out,
 )
-from .series_state import HIGHEST, LOWEST, NEXT, TOP, SeriesContext
+from .series_state import HIGHEST, LOWEST, NEXT, REFINED, TOP, SeriesContext
 from .series_steps import PASS, STEPS, pass_singular
 from .still import moving_parts
 from .system import System
 from .taylor import advance_series
 from .workspace import SIZE, U_TOL, plain_work
+
+MANY = 100  # bodies: errors of a solution by elimination grow with their number
 
 
 class Series:
@@ -113,6 +115,7 @@ class SeriesMemory:
         numbers[STEPS_WANTED] = step_count(*task.span, method.step) if method.step else 2**62
         numbers[LEAVE_WHEN_STIFF] = task.choose is not None
         self.context.expansion.order[[TOP, NEXT, LOWEST, HIGHEST]] = order[0], *order
+        self.context.expansion.order[REFINED] = max(method.refined, int(len(self.series.network.bodies) > MANY))
 
     def load(self):
         """Load the driver, where this process has not called it yet."""

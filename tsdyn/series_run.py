@@ -7,13 +7,12 @@ import numpy as np
 from .dense import Trajectory
 from .drive import drive
 from .errors import InvalidArgument, Status
-from .expansion_pack import is_far
+from .expansion_pack import is_far, refusal, room
 from .relay import Relay
 from .run_state import CHART_ROWS, FILLED, STORED, T
 from .sampling import Sampled
 from .series_dense import SeriesReader
-from .series_memory import SeriesMemory
-from .series_state import ORDERS
+from .series_memory import Series, SeriesMemory
 from .series_steps import accelerate_here, expand_far_series, expand_series, pass_singular, reach
 from .steps import counts
 from .task import Outcome
@@ -24,6 +23,17 @@ def addresses(within, far):
     expand = expand_far_series if far else expand_series
     between = (accelerate_here.address, pass_singular.address) if within else (0, 0)
     return np.array([expand.address, reach.address, *between], np.int64)
+
+
+def _reading(packed, network, highest, steps):
+    """A reader's kind, and what to make one with."""
+    return SeriesReader, packed.system, network, room(highest), packed.size, steps
+
+
+def read_again(packed, highest):
+    """The same in another process than the run's."""
+    network = Series(packed, refusal(packed)).network
+    return _reading(packed, network, highest, addresses(True, is_far(network, highest)))
 
 
 def run_series(task, observe=None, relay=None, past=None):
@@ -49,8 +59,7 @@ def run_series(task, observe=None, relay=None, past=None):
     run, packed = memory.run, prepared.packed
     reading = None
     if dense:
-        orders = int(memory.context.expansion.order[ORDERS])
-        reading = SeriesReader, packed.system, prepared.series.network, orders, packed.size, memory.steps
+        reading = _reading(packed, prepared.series.network, order[2], memory.steps)
     if observe is not None:
         observe(memory)
     relay = relay or Relay()
@@ -64,8 +73,8 @@ def run_series(task, observe=None, relay=None, past=None):
     charts, last = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy(), run.now.copy()
     trajectory = None
     if task.dense_output:
-        sides = task.span[0], last, task.angles, task.stops
-        trajectory = Trajectory(reading, recorded.blocks, charts, recorded.points, *sides)
+        again, sides = (read_again, packed, order[2]), (task.span[0], last, task.angles, task.stops)
+        trajectory = Trajectory(reading, again, recorded.blocks, charts, recorded.points, *sides)
     outcome = Outcome(
         status,
         reason,
@@ -76,7 +85,7 @@ def run_series(task, observe=None, relay=None, past=None):
         last,
         run.remembered.copy(),
         counts(
-            run.numbers,
+            run,
             memory.work.counters.tolist(),
             packed,
             prepared.spheres,

@@ -10,13 +10,14 @@ from .network import Network
 from .system import System
 from .workspace import Work, plain_context
 
-TOP, ORDERS, NEXT, LOWEST, HIGHEST = range(5)  # of Expansion.order
+TOP, ORDERS, NEXT, LOWEST, HIGHEST, REFINED, NUMBERS = range(7)  # of Expansion.order
 
 
 class Expansion(NamedTuple):
     """The series of a step; orders is what fits, from zero to two above the order of the method."""
 
-    order: np.ndarray  # int64 (5,): TOP of omega', one less than that of r and A; room for; the next step's; bounds
+    order: np.ndarray  # int64 (6,): TOP of omega', one less than that of r and A; room for; the next step's; bounds;
+    # how many orders of lam, from zero on, are refined
     bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
     constraints: np.ndarray  # each kind's instances; series_loops.series
     places: np.ndarray  # int64 (kinds, 3): addresses of the loops; where a kind's series begin, floats of an instance

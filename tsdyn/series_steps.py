@@ -18,7 +18,7 @@ from .poses import write_accelerations, write_positions, write_velocities
 from .rows import run_loops
 from .selection import select, weakest
 from .series_loops import BODY_ROW, S_OMEGA, S_R
-from .series_state import ORDERS, TOP, load_series
+from .series_state import ORDERS, REFINED, TOP, load_series
 
 NOT_FINITE, SINGULAR = int(Status.NOT_FINITE), int(Status.SINGULAR)
 NEXT_TO_SINGULAR = 1e-8  # as a share of pivots: accelerations by elimination have lost as many digits
@@ -47,7 +47,7 @@ def _expand(context, k, ahead):
     if k == 0:
         expand_motions(c.system, x)
         begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
-    expand(c.network, c.system, k, k > 0 and k + 1 == x.order[TOP], ahead, orders, x, f)
+    expand(c.network, c.system, k, k > 0 and k + 1 == x.order[TOP], ahead, orders, x.order[REFINED], x, f)
     if k == 0:
         for b in range(c.network.bodies.shape[0]):
             at = b * orders * BODY_ROW

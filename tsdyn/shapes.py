@@ -185,3 +185,8 @@ def _mass(what, volume, mass, density):
 
 
 __all__ = ["Shape", "box", "cylinder", "from_mesh", "rod", "sphere"]
+
+
+def __dir__():
+    """What users use, for completion."""
+    return sorted(__all__)

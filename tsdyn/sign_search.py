@@ -21,9 +21,10 @@ NEAR = 0.01  # an extreme that is nearer to zero is sampled
 AT_ZERO = 1e-6  # next to an end that is nearer to zero an extreme is looked for
 
 CLEAR = 10.0  # times what the higher half of the coefficients adds: further away from zero there is no zero
-CALM = 10  # halvings in a row that leave one half resolved: the rest is a kink or a jump
+CALM = 12  # halvings in a row that leave one half resolved: the rest is a kink or a jump
 TINY = 1e-7  # of the interval: what is rough on so little is rounding
 SHORTEST = 1e4 * EPS  # of the time: an interval that is not halved
+DEEPEST = 2.0**-24  # of the whole interval: likewise
 POLISH = 16  # degree of the interpolant by which an extreme is found
 MOST = 1 << 20  # samples of one search
 
@@ -54,33 +55,37 @@ class Search:
     ----------
     sample : function
         Values (k,) at increasing times (k,); NaN where there is none.
+    shaken : function
+        What the value at a time is off by, rounding errors of the state being what they are.
     noise : float
         Rounding error that the values are known to have.
 
     Attributes
     ----------
     points : list of (float, float)
-        Times, increasing, and values; zero for a value that touches zero within rounding.
+        Times, increasing, and values; zero for a value that touches zero within rounding. Where nothing stands out of
+        the noise there are none.
     spent : int
         Samples taken.
     """
 
-    def __init__(self, sample, noise=0.0):
-        self.sample, self.noise = sample, noise
-        self.points, self.spent = [], 0
+    def __init__(self, sample, shaken, noise=0.0):
+        self.sample, self.shaken, self.noise = sample, shaken, noise
+        self.points, self.spent, self._shortest = [], 0, 0.0
 
     def run(self, a, value, b, degree):
-        """Search [a, b], the value at a being known, with interpolants of this degree at first; the degree needed.
+        """Search [a, b], the value at a being known, with interpolants of this degree at first.
 
-        Raises TooFast.
+        The degree that was needed, and the value at b. Raises TooFast.
         """
         self.points.append((a, value))
+        self._shortest = max(DEEPEST * (b - a), SHORTEST * max(abs(a), abs(b)))
         whole = self._fit(a, b, value, None, degree)
         if not (whole.resolved or whole.off != whole.off):
-            self.noise = self._rounding(whole)
+            self.noise = max(self._rounding(whole), self.shaken(0.5 * (a + b)))
             whole = whole._replace(resolved=whole.off <= self.noise)
         self._follow(whole, 0)
-        return whole.degree
+        return whole.degree, self.points[-1][1] if self.points[-1][0] == b else float(whole.samples[-1])
 
     def _values(self, times):
         self.spent += times.size
@@ -132,7 +137,7 @@ class Search:
         """Take the points of a fit or of its halves; so many halvings before have left one half resolved."""
         if fit.resolved:
             self._take(fit)
-        elif calm == CALM or fit.off != fit.off or not fit.b - fit.a > SHORTEST * max(abs(fit.a), abs(fit.b)):
+        elif calm == CALM or fit.off != fit.off or fit.b - fit.a <= self._shortest:
             self._take_rough(fit)
         else:
             middle = table(fit.degree).middle
@@ -145,8 +150,10 @@ class Search:
 
     def _take(self, fit):
         """The samples, and the extremes next to zero and beyond it that they miss."""
+        if fit.scale <= self.noise:
+            return
         found = dict(zip(fit.times.tolist(), fit.samples.tolist(), strict=True))
-        if fit.scale > self.noise and fit.clear <= NEAR * fit.scale:
+        if fit.clear <= NEAR * fit.scale:
             grid = fit.a + 0.5 * (fit.b - fit.a) * (table(fit.degree).fine + 1.0)
             grid[-1] = fit.b
             for i, j in self._spans(fit):
@@ -173,9 +180,9 @@ class Search:
         series = table(POLISH).coefficients @ samples
         if not np.isfinite(series).all():
             return {}
-        noise = 8.0 * float(np.abs(series[-5:]).max()) + EPS * float(np.abs(samples).max())
-        inner = a + 0.5 * (b - a) * (extremes(series) + 1.0)
-        inner = inner[(inner > a) & (inner < b)]
+        noise = max(8.0 * float(np.abs(series[-5:]).max()) + EPS * float(np.abs(samples).max()), self.noise)
+        inner, ulps = a + 0.5 * (b - a) * (extremes(series) + 1.0), 8.0 * EPS * max(abs(a), abs(b))
+        inner = np.unique(np.clip(inner[(inner >= a - ulps) & (inner <= b + ulps)], a, b))
         values = self._values(inner)
         touch = np.abs(values) <= noise
         found = dict(zip(inner.tolist(), np.where(touch, 0.0, values).tolist(), strict=True))

@@ -8,6 +8,7 @@ from . import choice
 from .arguments import interval, method_of, output_times, state_arrays
 from .calls import fitting
 from .checks import one_of, positive, whole
+from .digits import within_rounding
 from .errors import InvalidArgument, Status
 from .events import prepare
 from .formulation import formulation as find_formulation
@@ -15,6 +16,7 @@ from .holonomic import demand_holonomic
 from .integrator import registered
 from .knots import stops_of
 from .membership import warn_of_waiting
+from .origin import origin_of, run_near
 from .passage import run_past
 from .prepare import prepared
 from .progress import reporter
@@ -74,8 +76,7 @@ def simulate(
     redundancy : {"drop", "refuse"}
         What to do about constraint rows that follow from the others: "drop" leaves them out of the equations where
         they are sure to hold (independent rows are chosen anew where those that were chosen come close to depending on
-        one another); "refuse" raises RedundantConstraints, as always in scenes with a body that has no inertia about
-        an axis.
+        one another); "refuse" raises RedundantConstraints.
     t_eval : array_like, s, optional
         Increasing output times within t_span, from dense output on the manifold, which never changes the steps;
         None gives every accepted step and both ends.
@@ -161,7 +162,12 @@ def simulate(
         kept, method, form, span, q, qd, memory, times, bool(dense_output),
         watched, constraint_tol, max_steps, chart_interval or 0, report, bool(history), choose, stops, sampling,
     )  # fmt: skip
-    outcome = DRIVERS.get(method.driver, method.driver)(task)
+    driver, origin, said = DRIVERS.get(method.driver, method.driver), origin_of(kept.packed, q), ""
+    if origin is None:
+        limited, said = within_rounding(method, kept.packed, q)
+        outcome = driver(task._replace(method=limited))
+    else:
+        outcome = run_near(driver, task, scene, origin, initial_tol)
     ended = time.perf_counter()
     if outcome.status == Status.STIFF:
         return simulate(
@@ -182,5 +188,7 @@ def simulate(
             chart_interval=chart_interval,
             state=state,
         )
+    if said:
+        outcome = outcome._replace(reason=" ".join(part for part in (outcome.reason, said) if part))
     seconds = {"prepare": outcome.began - started, "run": ended - outcome.began}
     return Solution(scene, task, outcome, seconds)

@@ -11,6 +11,7 @@ from . import diagnostics, power, reactions, uniqueness
 from .account import account
 from .calls import fitting_methods
 from .checks import counted, floats
+from .conservation import energy_error
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from .friction_reactions import with_normal_loads
 from .kinematics import Anchor, Kinematics
@@ -65,6 +66,9 @@ class Solution(Kinematics):
         factorizations_skipped, for which older factors served or still contracted; gyroscopic_skipped, torques of
         bodies whose inertia is a sphere's, rotations_skipped, of bodies that their joints never let turn, and
         forces_skipped, of scenes without any, one an evaluation; columns_skipped, constant ones of series, an order.
+        Of series: steps_near_singular, which began or ended next to a singular configuration; largest_landing, how far
+        (m, rad) the constraints moved a body at the end of one of them; energy_error, the largest change of the energy
+        in such a run, of the largest kinetic energy, None where energy isn't constant.
     """
 
     def __init__(self, scene, task, outcome, seconds):
@@ -82,12 +86,10 @@ class Solution(Kinematics):
         self._reached, self._last = outcome.reached, outcome.last
         self._angles, self._remembered = outcome.remembered[:angles], outcome.remembered[angles:]
         self._step_log, self._chart_log = outcome.steps, outcome.charts
-        self.stats = SimpleNamespace(**outcome.counts, seconds=seconds)
+        self.stats = SimpleNamespace(**outcome.counts, seconds=seconds, energy_error=None)
+        if self.stats.steps_near_singular:
+            self.stats.energy_error = energy_error(self, task)
         self.message = account(self, scene, outcome.reason)  # now: the scene may change
-
-    def __getstate__(self):
-        """All but the dense output, which holds addresses of this process."""
-        return {**self.__dict__, "_trajectory": None}
 
     def __setstate__(self, state):
         """Take over what was pickled; the packed scene finds its kernels again."""

@@ -21,7 +21,7 @@ from .selection import drop_rows, factor_rows, select
 from .still import keep_turning, settle, still
 from .workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 
-LARGE = 1 << 24  # entries of Phi_q from which on no dense one is made
+LARGE = 1 << 20  # entries of Phi_q from which on no dense one is made
 SHARES = 1e-3, 1e-6, 1e-9, 1e-12  # below which rows are taken for redundant, if they then hold near by, too
 WANDER, NEAR_BY = 1e-2, 1e-3  # how far to look whether they do, and at least: turns, and shares of the scene's size
 SHORTER, SHORTEST = 0.25, 1e-3  # a leg of the way from whose end Newton's method finds no place is cut; no shorter

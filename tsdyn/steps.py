@@ -2,13 +2,16 @@
 
 import time
 
+import numpy as np
+
 from .arguments import step_count
 from .dense import Reader, Trajectory
 from .drive import drive
 from .errors import Status
+from .formulation import formulation
 from .memory import Memory
 from .relay import Relay
-from .run_state import CHART_ROWS, FILLED, IN_CHART, MAY_PASS, REJECTED, STEPS, STIFF, STORED, T
+from .run_state import CHART_ROWS, FILLED, IN_CHART, LANDED, MAY_PASS, NEAR_STEPS, REJECTED, STEPS, STIFF, STORED, T
 from .sampling import Sampled
 from .task import Outcome
 from .workspace import (
@@ -55,8 +58,7 @@ def run_steps(task, observe=None, relay=None):
     memory.give_method(task, tableau, steps, dense, addresses)
     run, control = memory.run, memory.work.control
     memory.load()
-    sizes = n, m, len(packed.bodies), task.constraint_tol, packed.size, joint_rows, network, nx, ny
-    reading = (Reader, packed.system, sizes, memory.addresses.copy()) if dense else None
+    reading = _reading(packed, form, task.constraint_tol, memory.addresses.copy()) if dense else None
     if observe is not None:
         observe(memory)
     run.numbers[MAY_PASS] = relay is not None
@@ -74,8 +76,9 @@ def run_steps(task, observe=None, relay=None):
     trajectory = None
     if task.dense_output:
         points = recorded.points[: len(charts)].copy()
+        again = read_again, packed, method, form.name, task.constraint_tol
         sides = task.span[0], last, task.angles, task.stops
-        trajectory = Trajectory(reading, recorded.blocks, charts, points, *sides)
+        trajectory = Trajectory(reading, again, recorded.blocks, charts, points, *sides)
     outcome = Outcome(
         status,
         reason,
@@ -86,7 +89,7 @@ def run_steps(task, observe=None, relay=None):
         last,
         run.remembered.copy(),
         counts(
-            run.numbers,
+            run,
             memory.work.counters.tolist(),
             packed,
             *((prepared.spheres, prepared.still) if form.basis_free else (0, 0)),
@@ -98,6 +101,24 @@ def run_steps(task, observe=None, relay=None):
     if observe is None and status != Status.NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give((form.name, *kind), memory)
     return outcome
+
+
+def _reading(packed, form, constraint_tol, addresses):
+    """A reader's kind, and what to make one with."""
+    n, m = int(packed.system.bodies[:, 1].sum()), len(packed.system.segments)
+    network = form.network(packed)
+    sizes = form.sizes(n, m - len(network.dropped), len(packed.bodies))
+    rows = len(network.row) if form.basis_free else None
+    given = n, m, len(packed.bodies), constraint_tol, packed.size, rows, network, *sizes
+    return Reader, packed.system, given, addresses
+
+
+def read_again(packed, method, name, constraint_tol):
+    """The same in another process than the run's."""
+    form = formulation(name).serving(method)
+    step, interpolant = method.kernel(form.first_order)[0], method.interpolant(form.first_order)
+    addresses = np.array(_addresses(method, form, step, interpolant, False, True), np.int64)
+    return _reading(packed, form, constraint_tol, addresses)
 
 
 def _addresses(method, form, step, interpolant, adaptive, within):
@@ -114,12 +135,12 @@ def _addresses(method, form, step, interpolant, adaptive, within):
     ]
 
 
-def counts(numbers, counters, packed, no_spin, no_turn, constant_columns=0):
+def counts(run, counters, packed, no_spin, no_turn, constant_columns=0):
     """What `Solution.stats` counts.
 
     Of what each evaluation skips: the torques of no_spin bodies, the rotations of no_turn, so many columns of markers.
     """
-    evaluations = counters[EVALUATIONS]
+    numbers, evaluations = run.numbers, counters[EVALUATIONS]
     return {
         "steps": int(numbers[STEPS]),
         "rejected": int(numbers[REJECTED]),
@@ -130,6 +151,8 @@ def counts(numbers, counters, packed, no_spin, no_turn, constant_columns=0):
         "charts": counters[CHARTS],
         "factorizations": counters[FACTORIZATIONS],
         "stiff": bool(numbers[STIFF]),
+        "steps_near_singular": int(numbers[NEAR_STEPS]),
+        "largest_landing": float(run.clock[LANDED]),
         "jacobians": counters[JACOBIANS],
         "iteration_matrices": counters[ITERATION_MATRICES],
         "stage_iterations": counters[STAGE_ITERATIONS],

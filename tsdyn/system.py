@@ -62,7 +62,7 @@ class Packed(NamedTuple):
 
     def __reduce__(self):
         """In another process the kernels have other addresses."""
-        kept = {name: self.shared[name] for name in ("dropped", "handles") if name in self.shared}
+        kept = {name: self.shared[name] for name in ("dropped", "turning", "handles") if name in self.shared}
         return _found_again, (os.getpid(), kept, *self[:-1])
 
 

@@ -12,10 +12,11 @@ from .assembly import remember, set_time
 from .control import stretch
 from .dense import B_CHART, B_DATA, B_END, B_H, B_START
 from .errors import Status
-from .free import END_SHARE, LARGEST_SHARE, RESIDUAL, SHARE, STRIDE
+from .free import END_SHARE, LARGEST_SHARE, MOVED, RESIDUAL, SHARE
 from .joint_turns import count_turns
 from .linalg import copy
 from .local_chart import AT_START, BY_SERIES, ROUNDING
+from .nearness import NEAR
 from .outputs import record, store_now
 from .poses import OMEGA, POSE, RD, move_bodies, place_bodies
 from .run_state import (
@@ -28,8 +29,10 @@ from .run_state import (
     CUTS,
     DENSE,
     HISTORY,
+    LANDED,
     LEAVE_WHEN_STIFF,
     MAX_STEP,
+    NEAR_STEPS,
     NEXT_EVAL,
     REJECTED,
     RTOL,
@@ -55,10 +58,15 @@ from .workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
 SLICE_DONE, STEP_COLLAPSED = int(Status.SLICE_DONE), int(Status.STEP_COLLAPSED)
 NOT_FINITE, SINGULAR, PASSAGE = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.PASSAGE)
 MISSED = 100.0  # times the tolerance: a landing further away than this is no truncation error
-NEAR = 0.02  # of the shares of pivots: less of it is next to a singular configuration
+# of the share at a step's start: one that ends next to such a place with less has come closer; too close to go on from;
+# too close if it has passed
+CLOSER, CLOSE, PASSED = 0.3, 0.1, 0.02
 AVOID, AVOIDING = 0.7, 5  # a step that ends there is made shorter by this factor, so many times
-SHORT = 0.3  # of the last step from elsewhere: less is short for one that begins there
-LEAST_ORDER, PASSING = 5, 1e-10  # of the series of such a step; the tolerance that it is to meet at most
+LEAST_ORDER = 5  # of the series of a step past such a place
+TIGHTER, TIGHTEST = 0.01, 1e-16  # times the tolerance of a step from next to such a place; no less than
+SPARE = 0.1  # times the tolerance of a run that has come next to such a place
+LOOSER = 4.0  # times that, as long as the step doesn't pass
+FAR_PASSING, PASSING = 1e-13, 1e-10  # the loosest tolerance of a step past: from elsewhere, and from close by
 STEP_COST = 3  # of a step's landing, in orders
 MOST_TURN = 1.0  # rad in a step, where turns are counted
 SMALL, SMALL_STEPS = 0.02, 40  # a step that turns and moves everything by less; so many of them, and it may be stiff
@@ -137,32 +145,39 @@ def _mind_singular(c):
 
 
 @kernel
-def _longest(c, r, h):
-    """From near a singular configuration: the longest step of any order, which becomes the step's.
+def _longest(c, r, tol, most):
+    """The longest step to a tolerance by any order up to `most`, which becomes the step's.
 
-    A motion may pass such a place smoothly while rounding of lam grows from order to order as if it ended there, so
-    that high orders, and tight tolerances, see no further than to it.
+    Next to a singular configuration rounding of lam grows from order to order as if the motion ended there: high orders
+    see no further than to it.
     """
-    x, nb, top = c.expansion, c.network.bodies.shape[0], c.expansion.order[TOP]
-    sizes = c.free.sizes
-    if sizes[SHARE] >= NEAR * sizes[LARGEST_SHARE]:
-        sizes[STRIDE] = h
-    if h >= SHORT * sizes[STRIDE]:
-        return h
-    tol, best = max(r.clock[ATOL] + r.clock[RTOL], PASSING), top
+    x, nb = c.expansion, c.network.bodies.shape[0]
     far, fast = _weights(c, r)
-    for k in range(top, LEAST_ORDER, -1):
+    h = 0.0
+    for k in range(most, LEAST_ORDER, -1):
         longer = _radius(x.bodies, nb, x.order[ORDERS], k, far, fast) * tol ** (1.0 / (k + 2))
         if longer > h:
-            h, best = longer, k
-    x.order[TOP] = best
+            h, x.order[TOP] = longer, k
     return h
 
 
 @kernel
-def _is_near(c):
-    """Whether a step has come, from well off, next to a singular configuration: a bad place to go on from."""
-    return c.free.sizes[END_SHARE] < NEAR * c.free.sizes[SHARE]
+def _is_next_to(share, c):
+    """Whether a place with this share is next to a singular configuration."""
+    return share < NEAR * c.free.sizes[LARGEST_SHARE]
+
+
+@kernel
+def _loosest(c, tol):
+    """The loosest tolerance of a step past a singular configuration: next to it lam has few digits."""
+    return max(tol, PASSING if _is_next_to(c.free.sizes[SHARE], c) else FAR_PASSING)
+
+
+@kernel
+def _is_near(c, part):
+    """Whether a step ends next to a singular configuration, with less than a part of the share that it began with."""
+    sizes = c.free.sizes
+    return _is_next_to(sizes[END_SHARE], c) and sizes[END_SHARE] < part * sizes[SHARE]
 
 
 @kernel
@@ -302,7 +317,7 @@ def advance_series(context, run, log, steps, most):
         status = cross_stop(context, c, r, log, steps)
         if status != 0:
             return status
-    missed = MISSED * (r.clock[ATOL] + r.clock[RTOL])
+    tol = r.clock[ATOL] + r.clock[RTOL]
     for _ in range(most):
         if r.numbers[CHART_ROWS] + 2 >= log.charts.shape[0] or r.numbers[HISTORY] >= log.history.shape[0]:
             break
@@ -315,13 +330,19 @@ def advance_series(context, run, log, steps, most):
         for k in range(1, x.order[TOP]):
             call_expand(steps[EXPAND], context, k)
         w.counters[EVALUATIONS] += x.order[TOP]
-        h, t1, last, shorter = min(_longest(c, r, _step_length(c, r)), r.clock[MAX_STEP]), t0, False, 0
+        h, t1, last, shorter, highest, wanted = _step_length(c, r), t0, False, 0, x.order[TOP], tol
+        if adaptive and _is_next_to(f.sizes[SHARE], c):
+            wanted = max(TIGHTER * tol, min(tol, TIGHTEST))
+            h = _longest(c, r, wanted, highest)
+        limit = r.clock[MAX_STEP]
         if not adaptive:
-            h = r.clock[H]
+            h = limit = r.clock[H]
         if c.system.memory.size > 0:  # what counts turns must see each of them
-            h = min(h, MOST_TURN / max(_fastest(c), 1e-300))
+            limit = min(limit, MOST_TURN / max(_fastest(c), 1e-300))
         if r.numbers[STEPS] == 0 and r.clock[H] > 0.0:
-            h = min(h, r.clock[H])
+            limit = min(limit, r.clock[H])
+        h = min(h, limit)
+        own, top, tight, before, serves, looser = h, x.order[TOP], wanted, math.inf, False, adaptive
         while True:
             t1 = t0 + h
             done = r.numbers[STEPS] + 1 - r.numbers[CUTS]
@@ -348,21 +369,45 @@ def advance_series(context, run, log, steps, most):
                     call_expand(steps[EXPAND], context, 0)
                     return PASSAGE if status == 0 else status
                 status, way = call_reach(steps[PASS], context, t1, t1 - t0), PASS
-            landed = status == 0 and (not adaptive or f.sizes[RESIDUAL] <= missed + MISSED * w.control[FLOOR])
+            landed = status == 0 and (not adaptive or f.sizes[RESIDUAL] <= MISSED * (wanted + w.control[FLOOR]))
             if landed:
                 f.sizes[END_SHARE] = weakest(c.network, f.S)
-            if landed and (not adaptive or shorter == AVOIDING or last or not _is_near(c)):
+            if landed and (not adaptive or shorter == AVOIDING or last):
                 break
             if not adaptive:
                 return status
-            shorter += 1 if landed else 0
+            if landed and not _is_near(c, CLOSER if looser else CLOSE):
+                break
+            if looser and landed and f.sizes[END_SHARE] > before and not _is_near(c, PASSED):
+                break
+            serves = serves or (landed and before == math.inf and not _is_near(c, CLOSE))
+            longer = 0.0
+            if looser and landed and LOOSER * wanted <= _loosest(c, tol):
+                before, wanted = f.sizes[END_SHARE], LOOSER * wanted
+                longer = min(_longest(c, r, wanted, highest), limit)
+            if longer > h:
+                h = longer
+            elif looser and serves and h == own:
+                break
+            else:
+                if looser:  # no step passes: the own one, or a shorter one
+                    h, x.order[TOP], wanted, looser, landed = own, top, tight, False, landed or before < math.inf
+                if not serves:
+                    shorter += 1 if landed else 0
+                    h *= AVOID if landed else 0.5
+                serves = False
             _go_to_start(c, r)
-            r.numbers[REJECTED] += 1  # the same series serves a shorter step
+            r.numbers[REJECTED] += 1  # the same series serves another step
             if r.numbers[HISTORY] + 1 < log.history.shape[0]:
                 r.numbers[HISTORY] += 1
-            h *= AVOID if landed else 0.5
         row[2] = 1.0
         r.numbers[HISTORY] += 1
+        if _is_next_to(f.sizes[END_SHARE], c) or _is_next_to(f.sizes[SHARE], c):
+            if r.numbers[NEAR_STEPS] == 0:  # what is lost there is gained elsewhere
+                spare = max(SPARE, min(TIGHTEST / tol, 1.0))
+                tol, r.clock[ATOL], r.clock[RTOL] = spare * tol, spare * r.clock[ATOL], spare * r.clock[RTOL]
+            r.numbers[NEAR_STEPS] += 1
+            r.clock[LANDED] = max(r.clock[LANDED], f.sizes[MOVED])
         if adaptive:
             r.clock[H] = t1 - t0
         leave = False
@@ -371,7 +416,7 @@ def advance_series(context, run, log, steps, most):
         elif adaptive:
             far, fast = _weights(c, r)
             rho = _radius(x.bodies, c.network.bodies.shape[0], x.order[ORDERS], x.order[TOP] - 2, far, fast)
-            lower_order(x.order, rho, missed / MISSED, t1 - t0)
+            lower_order(x.order, rho, tol, t1 - t0)
         if r.numbers[DENSE] != 0:
             _store_block(c, r, log, t0, t1 - t0, t1)
         if r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:

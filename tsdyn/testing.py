@@ -222,8 +222,8 @@ def _demand_no_comparison(function, kernel, name, rows, x, xd, t):
         reason = str(error.__cause__)
         if "not supported between instances" in reason or "for abs()" in reason:
             raise CheckFailed(
-                f"{name}: {kernel} compares x, or takes its absolute value ({reason}); a kernel goes through the same "
-                "smooth formulas for every x, with np.sqrt(x[0] ** 2 + ...) for a norm."
+                f"{name}: {kernel} is not analytic: it compares x, or takes its absolute value ({reason}); a kernel "
+                "goes through the same smooth formulas for every x, with np.sqrt(x[0] ** 2 + ...) for a norm."
             ) from error
 
 
@@ -272,3 +272,8 @@ def _compare(name, entry, got, expected, scale, remark=""):
 
 
 __all__ = ["CheckFailed", "check_force", "check_integrator", "check_primitive"]
+
+
+def __dir__():
+    """What users use, for completion."""
+    return sorted(__all__)

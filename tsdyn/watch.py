@@ -15,12 +15,12 @@ from .dense import B_END
 from .errors import InvalidArgument, Status
 from .events import Failed, Instant
 from .handles import handles_of
+from .inside import Inside
 from .run_state import BEGUN, BLOCKS, CHART_ROWS, DENSE, ROWS, STEPS, STORED, T
 from .sign_search import EPS, LARGEST, Search, TooFast
 
 SLOW, FAST = 0.1, 2.0  # rad that a body turns in a step: less needs half of the samples, more needs the most
 AT_START = 64.0 * EPS  # a value, or a time, that is no more than this beside others is that of the start
-ROOM = 2 * LARGEST  # states of a step that are kept
 
 
 class Occurrence(NamedTuple):
@@ -31,45 +31,11 @@ class Occurrence(NamedTuple):
     state: np.ndarray  # (3, n)
 
 
-class Inside:
-    """States within the step that a run has just made."""
-
-    def __init__(self, reader, run, record, t0, before):
-        self.t0, self.t1, self.degree = t0, float(run.clock[T]), 0
-        self._reader, self._record, self._block = reader, record, run.block[None]
-        self._known = {t0: before, self.t1: run.now.copy()}
-
-    def states(self, times):
-        """States (3, n) at times (k,), None where there is none."""
-        times, known = times.tolist(), self._known
-        missing = [t for t in times if t not in known]
-        if missing:
-            found = dict(zip(missing, self._read(np.array(missing)), strict=True))
-            if len(known) > ROOM:
-                return [found[t] if t in found else known[t] for t in times]
-            known.update(found)
-        return [known[t] for t in times]
-
-    def _read(self, times):
-        rows = np.zeros(times.size, int)
-        states, status = self._reader(times, rows, self._block, self._record.charts, self._record.points)
-        if status == Status.SUCCESS:
-            return states
-        return [self._read(times[i : i + 1])[0] for i in range(times.size)] if times.size > 1 else [None]
-
-    def at(self, t):
-        """The state (3, n) at t."""
-        (state,) = self.states(np.array([t]))
-        if state is None:
-            raise Failed(f"there is no state at t = {t:.9g} s to evaluate events at.", t)
-        return state
-
-
 class Track:
     """What is known of one function up to the last step's end."""
 
     def __init__(self, value):
-        self.value = value  # at that time
+        self.value = self.end = value  # at that time, and at the end of the step that is looked at
         self.sign = 0.0  # the last it had; 0 for none yet
         self.significant = None  # time and value at which it had that sign
         self.zero = None  # time of the last zero, if it has had no sign since
@@ -97,6 +63,7 @@ class Watch:
         self.list = [[] for _ in events]
         rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, 0]
         self._p = rigid[:, None] + np.arange(3, 7)
+        self._signs = np.random.default_rng(0).choice([-1.0, 1.0], (3, 3, packed.system.bodies[:, 1].sum()))
         self.read_by(reader)
 
     def read_by(self, reader):
@@ -205,9 +172,10 @@ class Watch:
             return values
 
         while end > step.t0:
-            search = Search(sample, track.noise)
+            search = Search(sample, lambda t: self._shaken(i, step, t), track.noise)
             try:
-                track.degree = search.run(step.t0, track.value, end, max(step.degree, track.degree // 2))
+                degree = max(step.degree, track.degree // 2)
+                track.degree, track.end = search.run(step.t0, track.value, end, degree)
                 track.noise = search.noise
                 return search.points, failure
             except Failed as failed:
@@ -231,29 +199,40 @@ class Watch:
         track, direction, found = self.tracks[i], self.events[i].direction, []
         (before, value), *rest = points
         if track.sign == 0.0 and track.zero is None:  # the run's first step
-            if 0.0 < abs(value) <= AT_START * max(abs(value) for _, value in points):
-                track.zero, track.passed = before, True
+            if 0.0 < abs(track.value) <= AT_START * max(abs(value) for _, value in points):
+                track.zero, track.passed, track.pending = before, value != 0.0, value == 0.0
             else:
                 rest = points
         for t, value in rest:
             sign = float(value > 0.0) - float(value < 0.0)
             if value == 0.0:
                 if track.zero is None or track.passed:
-                    track.passed, track.pending = False, direction != 0.0 and direction * track.sign >= 0.0
+                    late = track.sign == 0.0 and t > self.start  # the start's own zero, within rounding
+                    track.passed, track.pending = False, late or (direction != 0.0 and direction * track.sign >= 0.0)
                     if not track.pending:
                         found.append(self._zero(i, step, t, before))
                 track.zero = t
             elif abs(value) > track.noise:
                 if track.zero is not None:
-                    if track.pending and direction * sign > 0.0:
-                        found.append(self._zero(i, step, track.zero, t))
+                    if track.pending and direction * sign >= 0.0:
+                        found.append(self._left(i, step, track.zero, (t, value)))
                     track.zero, track.passed, track.pending = None, False, False
                 elif sign == -track.sign and direction * sign >= 0.0:
                     found += self._root(i, step, t, value)
                 track.sign, track.significant = sign, (t, value)
             before = t
-        track.value = points[-1][1]
+        track.value = track.end
         return found
+
+    def _shaken(self, i, step, t):
+        """By how much the value of event i at t changes with rounding errors of the state."""
+        try:
+            state, value = step.at(t), self._at(i, step, t)
+            size = 4.0 * EPS * np.abs(state).max(axis=1, keepdims=True)
+            shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
+        except Failed:
+            return 0.0
+        return 4.0 * max(abs(each - value) for each in shaken)
 
     def _zero(self, i, step, t, other):
         """The `Occurrence` at a zero, or at the end next to another time of the zeros around it."""
@@ -265,27 +244,40 @@ class Watch:
                     other = middle
         return Occurrence(t, i, step.at(t))
 
+    def _left(self, i, step, t, last):
+        """The `Occurrence` where event i leaves a zero: that at t, or one that is so within rounding."""
+        value = self._at(i, step, t)
+        if value * last[1] < 0.0:
+            t = self._between(i, step, (t, value), last)
+            return Occurrence(t, i, step.at(t))
+        return self._zero(i, step, t, last[0])
+
     def _root(self, i, step, t1, b):
         """The change of sign up to t1, where event i has the value b; none if it is that of the run's start."""
-        from scipy.optimize import brentq  # takes a while to import
-
         track = self.tracks[i]
         t0, a = max(track.significant, (step.t0, track.value))
         if a * b >= 0.0:
             return [Occurrence(t0, i, step.at(t0))]
-        known = {t0: a, t1: b}
+        root = self._between(i, step, (t0, a), (t1, b))
+        if root - self.start <= AT_START * max(1.0, abs(self.start)):
+            return []
+        return [Occurrence(root, i, step.at(root))]
+
+    def _between(self, i, step, first, last):
+        """Where event i changes its sign between two times with values."""
+        from scipy.optimize import brentq  # takes a while to import
+
+        known, (t1, b) = dict((first, last)), last
 
         def value(t):
             return known[t] if t in known else self._at(i, step, t)
 
-        root = brentq(value, t0, t1, xtol=4.0 * EPS, rtol=4.0 * EPS, maxiter=1000)
-        if root - self.start <= AT_START * max(1.0, abs(self.start)):
-            return []
+        root = brentq(value, first[0], t1, xtol=4.0 * EPS, rtol=4.0 * EPS, maxiter=1000)
         shift = 4.0 * EPS * max(abs(root), 1.0)
         # a run that goes on from a terminal event had better find it behind itself
         while self.events[i].limit < math.inf and root + shift < t1 and value(root) * b <= 0.0:
             root, shift = root + shift, 2.0 * shift
-        return [Occurrence(root, i, step.at(root))]
+        return root
 
     def _at(self, i, step, t):
         return self._value(i, t, step.at(t))

@@ -90,17 +90,39 @@ def world():
 
 def junk(rng, w):
     """Anything."""
-    pool = (
-        None, True, False, 0, -1, 3, 10**400, -2.5, 1e-320, 1e308, -1e308, np.nan, np.inf, -np.inf, 1j, "text", "", b"x",
-        (), [], {}, set(), {"a": 1}, (1, 2), (1, 2, 3), (0, 0, 0), (np.nan, 0, 1), (1e308, 1e308, 1e308), [1, [2, 3]],
-        ["a", "b", "c"], (None, 1, 2), np.zeros(3), np.ones(7), np.zeros((3, 3)), np.eye(3), np.full((3, 3), np.nan),
-        np.array([]), np.array(2.0), np.array(["a", "b", "c"]), np.array([1, 2, 3], object), np.array([True, False, True]),
-        np.ones((2, 3, 4)), np.datetime64("2020-01-01"), datetime.timedelta(1), decimal.Decimal("1.5"),
-        fractions.Fraction(1, 3), object(), int, ts.Scene, ts.Status.SUCCESS, lambda: 1.0, lambda t: t, lambda t, x: 1.0,
-        raising, swinging, print, len, range(3), iter([1, 2, 3]), Rotation.identity(), Rotation.random(3, random_state=1),
-        w.scene, w.scene.ground, *w.bodies, w.stranger, w.joint, w.spring, w.solution, w.solution.state,
-        ts.motions.time, ts.Table((0.0, 1.0), (1.0, 2.0)), slice(3), ..., np.float32(2), np.int8(3), types.SimpleNamespace(),
-    )  # fmt: skip
+    numbers = (0, -1, 3, 10**400, -2.5, 1e-320, 1e308, -1e308, np.nan, np.inf, -np.inf, 1j, np.float32(2), np.int8(3))
+    others = (
+        None,
+        True,
+        False,
+        "text",
+        "",
+        b"x",
+        object(),
+        int,
+        ...,
+        slice(3),
+        ts.Scene,
+        ts.Status.SUCCESS,
+        print,
+        len,
+    )
+    groups = ((), [], {}, set(), {"a": 1}, (1, 2), (1, 2, 3), (0, 0, 0), (np.nan, 0, 1), (1e308, 1e308, 1e308))
+    ragged = ([1, [2, 3]], ["a", "b", "c"], (None, 1, 2), range(3), iter([1, 2, 3]), types.SimpleNamespace())
+    arrays = (np.zeros(3), np.ones(7), np.zeros((3, 3)), np.eye(3), np.full((3, 3), np.nan), np.ones((2, 3, 4)))
+    kinds = (
+        np.array([]),
+        np.array(2.0),
+        np.array(["a", "b", "c"]),
+        np.array([1, 2, 3], object),
+        np.array([True, False]),
+    )
+    dates = (np.datetime64("2020-01-01"), datetime.timedelta(1), decimal.Decimal("1.5"), fractions.Fraction(1, 3))
+    functions = (lambda: 1.0, lambda t: t, lambda t, x: 1.0, raising, swinging)
+    rotations = (Rotation.identity(), Rotation.random(3, random_state=1))
+    handles = (w.scene, w.scene.ground, *w.bodies, w.stranger, w.joint, w.spring, w.solution, w.solution.state)
+    motions = (ts.motions.time, ts.Table((0.0, 1.0), (1.0, 2.0)))
+    pool = (*numbers, *others, *groups, *ragged, *arrays, *kinds, *dates, *functions, *rotations, *handles, *motions)
     return pool[rng.integers(len(pool))]
 
 
@@ -166,7 +188,7 @@ def targets(w):
                     found.append((f"{name}.of", thing.of))
     found += [("Scene", ts.Scene), ("Table", ts.Table), ("Motion", ts.Motion), ("Integrator", ts.Integrator)]
     for owner, label in ((w.scene, "scene"), (w.solution, "solution")):
-        for name, method in inspect.getmembers(type(owner), inspect.isfunction):
+        for name, _ in inspect.getmembers(type(owner), inspect.isfunction):
             if not name.startswith("_") and name not in ("place", "touch", "refresh", "motions", "row_names"):
                 found.append((f"{label}.{name}", getattr(owner, name)))
     return found

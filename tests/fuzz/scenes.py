@@ -187,9 +187,8 @@ def generate(seed, least=40, most=2000):
     scene = KINDS[name](rng, n)
     if rng.random() < 0.3:
         for body in scene.bodies[:: max(n // 5, 1)]:
-            scene.add(
-                F.Spring(scene.ground, body, stiffness=10.0 ** rng.uniform(0.0, 5.0), damping=rng.uniform(0.0, 1.0))
-            )
+            k, c, point = 10.0 ** rng.uniform(0.0, 5.0), rng.uniform(0.0, 1.0), body.position + unit(rng)
+            scene.add(F.Spring(scene.ground, body, point_a=point, stiffness=k, damping=c))
     if rng.random() < 0.2:
         for body in scene.bodies:
             body.velocity = rng.normal(size=3) * 0.3

@@ -49,9 +49,10 @@ class JointForce(JointLoad, Force):
     quantities = MappingProxyType({"function": law_of_joint, "period": instants})
     geometries = staticmethod(displacements)
 
-    def __new__(cls, joint=None, *, period=None, **others):
-        """Choose the kernel: held, or by the function."""
-        return super().__new__(_ContinuousForce if cls is JointForce and period is None else cls)
+    def __new__(cls, *given, period=None, **others):
+        """Choose the kernel: held, or by the function; a copy has its class already."""
+        continuous = (given or others) and period is None
+        return super().__new__(_ContinuousForce if cls is JointForce and continuous else cls)
 
     @staticmethod
     def directions(geometry):

@@ -57,9 +57,10 @@ class JointTorque(JointLoad, Force):
     quantities = MappingProxyType({"function": law_of_joint, "period": instants})
     geometries = staticmethod(angles)
 
-    def __new__(cls, joint=None, *, period=None, **others):
-        """Choose the kernel: held, or by the function."""
-        return super().__new__(_ContinuousTorque if cls is JointTorque and period is None else cls)
+    def __new__(cls, *given, period=None, **others):
+        """Choose the kernel: held, or by the function; a copy has its class already."""
+        continuous = (given or others) and period is None
+        return super().__new__(_ContinuousTorque if cls is JointTorque and continuous else cls)
 
     @staticmethod
     def directions(geometry):

@@ -15,10 +15,13 @@ from types import MappingProxyType
 import numpy as np
 
 from ..angle import angle_near
+from ..attachment import in_frame
 from ..bodies import rotation_matrix
+from ..calls import Placing
 from ..checks import vector3
 from ..errors import InvalidForce
 from ..force import Force, finite, load, not_negative
+from ..joint import across
 from ..joint_coordinates import Angle
 from ..markers import Turn, Vector
 from ..recurrences import angle, cross, dot, scaled, square
@@ -35,11 +38,12 @@ class TorsionalSpring(Force):
     a, b : Body or ground
         Two different bodies of one scene, held on a common axis by a joint. Without one the moment about axis_a has no
         potential, and what it adds is counted as applied power.
-    axis_a : array_like (3,)
-        The axis, in the frame of a; turning b positively about it (right hand) increases the angle.
-    reference_a, reference_b : array_like (3,)
+    axis_a, axis_b : array_like (3,)
+        The axis, in the bodies' own frames; turning b positively about it (right hand) increases the angle. One of them
+        is enough: the other follows from where the bodies stand.
+    reference_a, reference_b : array_like (3,), optional
         Directions in the frames of a and b; the angle goes from the first to the second about the axis. reference_a is
-        made perpendicular to the axis.
+        made perpendicular to the axis. What is left out follows from where the bodies stand: the angle is zero there.
     stiffness : float, N m/rad
     damping : float, N m s/rad
     free_angle : float, rad
@@ -70,15 +74,17 @@ class TorsionalSpring(Force):
         a,
         b,
         *,
-        axis_a,
-        reference_a,
-        reference_b,
+        axis_a=None,
+        axis_b=None,
+        reference_a=None,
+        reference_b=None,
         stiffness=0.0,
         damping=0.0,
         free_angle=0.0,
         actuator=0.0,
         name="",
     ):
+        self.__dict__["_given"] = axis_b
         super().__init__(a, b, (axis_a, reference_a, reference_b, None, None), name)
         self.reference_a = self.coordinates[1]
         self.stiffness, self.damping, self.free_angle, self.actuator = stiffness, damping, free_angle, actuator
@@ -90,11 +96,59 @@ class TorsionalSpring(Force):
             )
         self.check()
 
+    @Placing
+    def at(cls, a, b=None, *, axis=None, reference=None, axis_b=None, **arguments):
+        """Make one from directions in the ground frame, the bodies being where they stand now.
+
+        Parameters
+        ----------
+        axis : array_like (3,)
+        reference : array_like (3,), optional
+            Of both bodies: the angle is zero now.
+        """
+        arguments.setdefault("axis_a", axis)
+        for name in ("reference_a", "reference_b"):
+            arguments.setdefault(name, reference)
+        if axis_b is not None:
+            arguments["axis_b"] = in_frame(b, Vector("b"), axis_b)
+        return super().at(a, b, **arguments)
+
+    def _places(self, given):
+        """Fill in the axis and the references that were left out: as the bodies stand, the angle is zero."""
+        axis_a, reference_a, reference_b, *rest = given
+        axis_b = self.__dict__.pop("_given")
+        if axis_b is not None:
+            along = self._carried(self.b, self._place(Vector("b"), axis_b), self.a)
+            if axis_a is None:
+                axis_a = along
+            elif not np.linalg.norm(np.cross(self._place(self.markers[0], axis_a), along)) < PARALLEL:
+                raise InvalidForce(f"{self.name}: axis_b is not along axis_a as the bodies stand; give one of them.")
+        axis_a = self._place(self.markers[0], axis_a)
+        if reference_a is None:
+            free = reference_b is None
+            other = None if free else self._place(self.markers[2], reference_b)
+            reference_a = across(axis_a)[0] if free else self._carried(self.b, other, self.a)
+        if reference_b is None:
+            reference_b = self._carried(self.a, self._place(self.markers[1], reference_a), self.b)
+        return super()._places([axis_a, reference_a, reference_b, *rest])
+
+    @staticmethod
+    def _carried(body, direction, other):
+        """A direction of one body as one of the other, as they stand."""
+        return rotation_matrix(other.orientation).T @ (rotation_matrix(body.orientation) @ direction)
+
+    @property
+    def axis_b(self):
+        """The axis in the frame of b, as the bodies stand."""
+        return self._carried(self.a, self.axis_a, self.b)
+
     def _turned(self, i):
         return rotation_matrix(self.body_of(self.markers[i]).orientation) @ self.coordinates[i]
 
     def __setattr__(self, name, value):
         """Set an attribute; reference_a is made perpendicular to the axis, as is the present one to a new axis."""
+        if name == "axis_b":
+            name, value = "axis_a", self._carried(self.b, self._place(Vector("b"), value), self.a)
         if name == "reference_a" and "coordinates" in self.__dict__:
             value = self._across(self.coordinates[0], value)
         super().__setattr__(name, value)

@@ -139,6 +139,8 @@ def test_two_angles_of_a_universal_joint():
         ({"displacement": 1.0}, "it has an angle"),
         ({"rate": 1.0, "angle_rate": 1.0}, "not both"),
         ({"angle": 1.0, "keep": ["hing"]}, "did you mean"),
+        ({"angle": 1.0, "keep": "hinge1"}, "sequence of joints"),
+        ({"angle": 1.0, "t": "soon"}, "finite time"),
     ],
 )
 def test_wrong_values_are_refused(wrong, message):

@@ -59,6 +59,8 @@ class BodyMotion:
 
     def arm(self, s, level):
         """A s, or its first or second derivative, ground frame."""
+        if self.dimension != 7:
+            return s if level == 0 else ZERO
         if level > 0:
             omega, s0 = self.turning(1), s
             s = cross(omega, s)
@@ -67,8 +69,8 @@ class BodyMotion:
         return to_ground(self.p, s)
 
     def point(self, s, level):
-        """x = r + A s, or its first or second derivative."""
-        return add(self.centroid(level), self.arm(s, level))
+        """x = r + A s, or its first or second derivative; the only point of a point mass is r."""
+        return self.centroid(level) if self.dimension == 3 else add(self.centroid(level), self.arm(s, level))
 
 
 def counted(value, near):

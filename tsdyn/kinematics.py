@@ -31,25 +31,15 @@ class Kinematics:
 
     def position(self, body, point=None):
         """Position (3,) of the centroid, or of a point (3,) in the body frame; m, ground frame."""
-        at, s = self._point(body, point)
-        r = self.q[..., at : at + 3]
-        return r if s is None else r + self.rotation(body) @ s
+        return self._place(body, point, 0)
 
     def velocity(self, body, point=None):
         """Velocity (3,) of the centroid, or of a point (3,) in the body frame; m/s, ground frame."""
-        at, s = self._point(body, point)
-        rd = self.qd[..., at : at + 3]
-        return rd if s is None else rd + self._turned(body, np.cross(self.angular_velocity(body), s))
+        return self._place(body, point, 1)
 
     def acceleration(self, body, point=None):
         """Acceleration (3,) of the centroid, or of a point (3,) in the body frame; m/s^2, ground frame."""
-        at, s = self._point(body, point)
-        rdd = self.qdd[..., at : at + 3]
-        if s is None:
-            return rdd
-        omega = self.angular_velocity(body)
-        along = np.cross(self.angular_acceleration(body), s) + np.cross(omega, np.cross(omega, s))
-        return rdd + self._turned(body, along)
+        return self._place(body, point, 2)
 
     def orientation(self, body):
         """Euler parameters (4,), body to ground, scalar first."""
@@ -136,16 +126,16 @@ class Kinematics:
     def _motions(self, geometry):
         return self.handles.motions(geometry, (self.q, self.qd, self.qdd))
 
-    def _point(self, body, point):
-        """Where the coordinates of a body begin, and a point of it as an array (3,); None for the centroid."""
-        body = self.handles.body(body)
+    def _place(self, body, point, level):
+        """Position, velocity or acceleration of the centroid of a body, or of a point of it."""
+        body, levels = self.handles.body(body), (self.q, self.qd, self.qdd)
         at, dimension = self.handles.where(body)
         if point is None:
-            return at, None
+            return levels[level][..., at : at + 3]
         s = vector3(point, f"{body.name}: point (m, body frame)", InvalidArgument)
         if dimension == 3 and s.any():
             raise InvalidArgument(f"{body.name}: a point mass has no other point than (0, 0, 0), got {point!r}.")
-        return at, s if dimension == 7 else None
+        return np.array(joint_motion.BodyMotion(at, dimension, levels).point(s.tolist(), level)).T
 
     def _parameters(self, body):
         """Where the Euler parameters of a body are."""
@@ -153,10 +143,6 @@ class Kinematics:
         body.orientation  # noqa: B018  a point mass says that it has none
         at, _ = self.handles.where(body)
         return slice(at + 3, at + 7)
-
-    def _turned(self, body, v):
-        """A v, of vectors in the body frame."""
-        return np.einsum("...ij,...j->...i", self.rotation(body), v)
 
 
 def _one(values):

@@ -87,6 +87,10 @@ def set_joint(
     changes. In closed loops the joint goes to its value in small steps, on the branch of the configuration that the
     scene has; what is nearest in the metric of kinetic energy decides about other freedoms.
     """
+    if isinstance(keep, str) or not hasattr(keep, "__iter__"):
+        raise InvalidArgument(f"set: keep must be a sequence of joints or names, such as (joint,), got {keep!r}.")
+    if not np.isfinite(number(t)):
+        raise InvalidArgument(f"set: t must be a finite time in s, got {t!r}.")
     handles = handles_of(scene.packed)
     given = {"angle": [angle, angle_rate], "displacement": [displacement, displacement_rate]}
     if rate is not None:
@@ -97,7 +101,8 @@ def set_joint(
     if not given:
         raise InvalidArgument(f"set: nothing is said of {joint!r}; give angle=, displacement= or rate=.")
     goals = [goal for kind, pair in given.items() for goal in _goals(scene, handles, joint, kind, pair, t)]
-    held = [(handles.item(other), goal) for other in keep for goal in _present(scene, handles, other, t)]
+    others = [other for other in map(handles.item, keep) if other is not joint]
+    held = [(other, goal) for other in others for goal in _present(scene, handles, other, t)]
     before = scene.start
     try:
         report = _drive(scene, joint, goals, held, t)

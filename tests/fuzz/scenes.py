@@ -3,7 +3,8 @@
     python -m tests.fuzz.scenes --count 1000 --seed 0
 
 runs each in a process of its own that is ended after a time limit, and prints how they came out. A scene must run, or
-be refused or end with a message; whatever else happens is a fault: another exception, a crash, silence.
+be refused or end with a message; whatever else happens is a fault: another exception, a crash, silence. The first time
+of all, kernels are compiled: give a limit of minutes.
 """
 
 import argparse

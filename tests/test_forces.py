@@ -58,7 +58,8 @@ def expect(scene, body, force, torque_about_centroid, t=0.0):
 def test_every_force_is_registered():
     names = {"Bushing", "CoulombFriction", "PointForce", "Spring", "Torque", "TorsionalSpring", "UserForce"}
     frictions = {"ViscousFriction", "RevoluteFriction", "TranslationalFriction", "ContactFriction"}
-    assert {kind.__name__ for kind in BUILT_IN} == names | frictions
+    joint_loads = {"JointForce", "JointTorque"}
+    assert {kind.__name__ for kind in BUILT_IN} == names | frictions | joint_loads
     assert set(F.__all__) == {kind.__name__ for kind in BUILT_IN} | {"registered"}
 
 

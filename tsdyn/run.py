@@ -203,10 +203,10 @@ def _cross_stop(context, c, r, log, at, implicit):
         for j in range(r.y.size):
             r.yd[j] += r.yds[j] - r.dy[j]
         call_complete(at[A_COMPLETE], context, r.yd)
-        for j in range(w.qdd.size):  # what is extrapolated from the step before has no jump
-            r.before[2, j] += w.qdd[j] - r.now[2, j]
     elif status == 0:
         status = evaluate(context, w, at, r.clock[T], r.x, r.y, r.yd, r.xd)
+    for j in range(w.qdd.size):  # what is extrapolated from the step before has no jump
+        r.before[2, j] += w.qdd[j] - r.now[2, j]
     store_now(w, r)
     amend(r, log, w.q, w.qd, w.qdd)
     return status
@@ -253,7 +253,7 @@ def advance(context, run, log, at, most):
             r.clock[H] = min(first_step(context, w, r, at), r.clock[MAX_STEP])
     if r.numbers[WAITING] == 1:
         r.numbers[WAITING] = 0
-        status = _cross_stop(context, c, r, log, at, implicit)
+        status = _cross_stop(context, c, r, log, at, False)  # what f was before is known no more
         if status != 0:
             return status
     for _ in range(most):

@@ -85,3 +85,18 @@ def ring(count):
     for i in range(count):
         pin(scene, links[i - 1], links[i], corners[i])
     return scene
+
+
+def bricard():
+    """Five rods of 1 m and the ground, along edges of a cube, on six Revolutes: one row follows from the others."""
+    scene = ts.Scene(gravity=(0.0, -9.81, 0.0))
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1), (0, 1, 1), (0, 0, 1)], float)
+    links = [scene.ground]
+    for i in range(5):
+        along = corners[i + 1] - corners[i]
+        turn = Rotation.align_vectors([along], [(1.0, 0.0, 0.0)])[0]
+        links.append(scene.add_body(1.0, (1 / 1200, 1 / 12, 1 / 12), corners[i] + along / 2, turn, name=f"rod {i}"))
+    for i in range(6):
+        axis = np.cross(corners[i] - corners[i - 1], corners[(i + 1) % 6] - corners[i])
+        scene.add(ts.constraints.Revolute.at(links[i], links[(i + 1) % 6], point=corners[i], axis=axis))
+    return scene

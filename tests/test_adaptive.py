@@ -137,3 +137,14 @@ def test_collapsing_step_says_where_and_hands_back_what_it_had():
 def test_bad_input(call, words):
     with pytest.raises(ts.InvalidArgument, match=words):
         call()
+
+
+@pytest.mark.parametrize("name", ["rk45", "taylor"])
+def test_a_method_named_by_a_string_has_the_tolerances_of_simulate(name):
+    kind = ts.integrators.RK45 if name == "rk45" else ts.integrators.Taylor
+    scene = load("two_body_pendulum")[0]
+    named = ts.simulate(scene, (0.0, 1.0), integrator=name)
+    given = ts.simulate(scene, (0.0, 1.0), integrator=kind(rtol=1e-8, atol=1e-8))
+    assert np.array_equal(named.q, given.q)
+    half = ts.simulate(scene, (0.0, 1.0), integrator=name, rtol=1e-5)
+    assert np.array_equal(half.q, ts.simulate(scene, (0.0, 1.0), integrator=kind(rtol=1e-5, atol=1e-8)).q)

@@ -463,3 +463,29 @@ def test_first_guesses_are_exact_for_polynomials():
         for power in range(min(i, 4)):
             assert weights[i] @ c**power == pytest.approx(c[i] ** power, abs=100 * EPS * np.abs(weights[i]).sum())
         assert not weights[i, i:].any()
+
+
+def governor():
+    """A flyball governor: shaft, sleeve on a damped spring, two balls."""
+    scene, angle, arm, rate = ts.Scene(gravity=(0.0, 0.0, -9.81)), 0.6, 0.5, 8.0
+    omega, low = (0.0, 0.0, rate), (0.0, 0.0, -2.0 * arm * np.cos(angle))
+    shaft = scene.add_body(2.0, (0.02, 0.02, 0.01), angular_velocity=omega, name="shaft")
+    sleeve = scene.add_body(1.0, (0.01, 0.01, 0.01), position=low, angular_velocity=omega, name="sleeve")
+    scene.add(ts.constraints.Revolute.at(scene.ground, shaft, point=(0, 0, 0), axis=(0, 0, 1)))
+    scene.add(ts.constraints.Translational.at(shaft, sleeve, point=low, axis=(0, 0, 1)))
+    for side in (1.0, -1.0):
+        x = side * arm * np.sin(angle)
+        ball = scene.add_body(
+            3.0, (0.05, 0.06, 0.04), (x, 0.0, low[2] / 2), velocity=(0.0, rate * x, 0.0), angular_velocity=omega
+        )
+        scene.add(ts.constraints.Revolute.at(shaft, ball, point=(0, 0, 0), axis=(0, 1, 0)))
+        scene.add(ts.constraints.Distance(ball, sleeve))
+    scene.add(ts.forces.Spring(shaft, sleeve, stiffness=300.0, damping=5.0))
+    return scene
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_velocity_constraints_hold_as_by_explicit_methods(method):
+    solution = ts.simulate(governor(), (0.0, 2.0), integrator=method(rtol=1e-5, atol=1e-5))
+    assert solution.success
+    assert solution.constraint_error.velocity.max() < 8.0 * EPS * np.abs(solution.qd).max()

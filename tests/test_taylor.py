@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from closed_loops import bricard
 from reference import demand_on_the_manifold, error, load
+from scenes import EPS
 
 import tsdyn as ts
 
@@ -194,3 +196,24 @@ def test_a_stiff_motion_is_handed_to_an_implicit_method():
     solution = ts.simulate(scene, (0.0, 1.0), rtol=1e-4, atol=1e-4)
     assert solution.method.startswith("SDIRK54")
     solution.raise_if_failed()
+
+
+@pytest.mark.parametrize("tol", [1e-13, 1e-15])
+def test_the_energy_error_at_the_limit_of_rounding_is_a_random_walk(tol):
+    """Errors of one sign reach 59 eps sqrt(steps) here; of either sign, about one."""
+    solution = ts.simulate(bricard(), (0.0, 300.0), integrator=I.Taylor(tol))
+    size = solution.kinetic_energy.max() + np.abs(solution.potential_energy).max()
+    error = np.abs(solution.energy - solution.energy[0]) / size
+    assert solution.stats.steps > 2000
+    assert error.max() < 4.0 * EPS * np.sqrt(solution.stats.steps)
+
+
+def test_steps_follow_the_tolerance_down_to_the_limit_of_rounding():
+    """1e-15 is finer than 1e-13; from 1e-12 up a step is held to a thousandth."""
+    steps = [
+        ts.simulate(load("two_body_pendulum_spatial")[0], (0.0, 50.0), integrator=I.Taylor(tol)).stats.steps
+        for tol in (1e-12, 1e-13, 1e-15)
+    ]
+    assert steps[0] < steps[1] < steps[2]
+    assert [I.Taylor(tol).step_tolerances()[0] for tol in (1e-8, 1e-12)] == [1e-8 / 1000.0, 1e-12 / 1000.0]
+    assert I.Taylor(1e-12).refined == 0 < I.Taylor(9e-13).refined

@@ -80,6 +80,26 @@ def velocities(s, w, t, vd):
 
 
 @kernel
+def _refine_velocities(s, w):
+    """qd -= U B (Phi_q qd + Phi_t)."""
+    driven = is_rheonomic(s)
+    for i in range(w.Phi.size):
+        w.Phi[i] = (w.Phi_t[i] if driven else 0.0) + _row_times(s, w, i, w.qd)
+    _correct(w, w.Phi, w.qd)
+
+
+@kernel
+def _row_times(s, w, i, x):
+    """Row i of Phi_q x."""
+    total = 0.0
+    for part in range(0, 4, 2):
+        begin = s.segments[i, part]
+        for j in range(begin, begin + s.segments[i, part + 1]):
+            total += w.Phi_q[i, j] * x[j]
+    return total
+
+
+@kernel
 def _correct(w, f, out):
     """out -= U B f, by z = B f."""
     m = f.size
@@ -188,6 +208,8 @@ def accelerate(context, t, vd, vdd, unused):
     c = load(context)
     s, w = c.system, c.work
     velocities(s, w, t, vector(vd, w.v.size))
+    if c.linear.K.size > 0:  # of implicit methods, whose long steps leave B less exact
+        _refine_velocities(s, w)
     return frictional_acceleration(context, c, t, vector(vdd, w.v.size))
 
 

@@ -60,11 +60,12 @@ def simulate(
     t_span : (float, float), s
         Start and end, the end later.
     integrator : Integrator or str, optional
-        A method, or its name with its defaults ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor,
+        A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor,
         DOP853 where a part of the scene has no series, and SDIRK54 from the start where the motion turns out to be
         stiff and evaluations are saved by it.
     rtol, atol : float, optional
-        Tolerances for the default method, 1e-8 if not given, or for an adaptive method that is given by its name.
+        Tolerances of the default method, or of an adaptive method that is given by its name; 1e-8 if not given. An
+        instance has its own, and rtol or atol beside one is refused.
     formulation : {"tangent", "null-space", "maggi-kane"}
         "tangent": the tangent-space ODE without a basis, at a cost that grows with the scene's size and fill;
         "null-space": the same by Eq. 26, as in the paper; "maggi-kane": Eqs. 17-18, which drift off the constraints,

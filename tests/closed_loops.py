@@ -8,17 +8,21 @@ import tsdyn as ts
 AXIS = (0.0, 0.0, 1.0)
 
 
-def rod(scene, first, last, mass=1.0, name="", velocity=(0.0, 0.0, 0.0), rate=0.0):
-    """A rod between two places, its x axis along it."""
+def rod(scene, first, last, mass=1.0, name="", velocity=(0.0, 0.0, 0.0), rate=0.0, thin=0.01):
+    """A rod between two places, its x axis along it; thin is its inertia about that."""
     first, last = np.array(first, float), np.array(last, float)
     along = last - first
     J = mass * (along @ along) / 12 + 0.01
     turn = Rotation.from_rotvec((0.0, 0.0, np.arctan2(along[1], along[0])))
-    return scene.add_body(mass, (0.01, J, J), (first + last) / 2, turn, velocity, (0.0, 0.0, rate), name)
+    return scene.add_body(mass, (thin, J, J), (first + last) / 2, turn, velocity, (0.0, 0.0, rate), name)
 
 
-def pin(scene, a, b, place, planar=False):
-    """A Revolute, or of its rows the two that a plane motion needs."""
+def pin(scene, a, b, place, planar=False, kind=None):
+    """A Revolute, or of its rows the two that a plane motion needs; or a joint of another kind."""
+    if kind == "spherical":
+        return scene.add(ts.constraints.Spherical.at(a, b, point=place))
+    if kind == "cylindrical":
+        return scene.add(ts.constraints.Cylindrical.at(a, b, point=place, axis=AXIS))
     if not planar:
         return scene.add(ts.constraints.Revolute.at(a, b, point=place, axis=AXIS))
     for normal in np.eye(3)[:2]:
@@ -26,21 +30,35 @@ def pin(scene, a, b, place, planar=False):
     return None
 
 
-def parallelogram(angle=1.0, rate=6.0, base=2.0, crank=1.0, loops=1, planar=False, gravity=(0.0, -9.81, 0.0)):
-    """Cranks side by side, turning at a rate, and couplers between them: flat, and singular, twice a turn."""
+def parallelogram(
+    angle=1.0,
+    rate=6.0,
+    base=2.0,
+    crank=1.0,
+    loops=1,
+    planar=False,
+    gravity=(0.0, -9.81, 0.0),
+    thin=0.01,
+    last=None,
+    heavy=2.0,
+):
+    """Cranks side by side, turning at a rate, and couplers between them: flat, and singular, twice a turn.
+
+    `last` is the kind of the joint between a coupler and the crank after it, heavy a coupler's mass.
+    """
     scene = ts.Scene(gravity=gravity)
     arm = crank * np.array([np.cos(angle), np.sin(angle), 0.0])
     speed = rate * np.array([-arm[1], arm[0], 0.0])
     cranks = []
     for i in range(loops + 1):
         foot = np.array([i * base, 0.0, 0.0])
-        cranks.append(rod(scene, foot, foot + arm, name=f"crank {i}", velocity=speed / 2, rate=rate))
+        cranks.append(rod(scene, foot, foot + arm, name=f"crank {i}", velocity=speed / 2, rate=rate, thin=thin))
         pin(scene, scene.ground, cranks[i], foot)
     for i in range(loops):
-        first, last = np.array([i * base, 0.0, 0.0]) + arm, np.array([(i + 1) * base, 0.0, 0.0]) + arm
-        coupler = rod(scene, first, last, 2.0, f"coupler {i}", speed)
-        pin(scene, cranks[i], coupler, first)
-        pin(scene, coupler, cranks[i + 1], last, planar)
+        near, far = np.array([i * base, 0.0, 0.0]) + arm, np.array([(i + 1) * base, 0.0, 0.0]) + arm
+        coupler = rod(scene, near, far, heavy, f"coupler {i}", speed, thin=thin)
+        pin(scene, cranks[i], coupler, near)
+        pin(scene, coupler, cranks[i + 1], far, planar, last)
     return scene
 
 

@@ -84,6 +84,7 @@ scene
 maggi_kane linearise driven
 series_steps
 series_stops
+series_length
 taylor expansion_pack
 series_memory
 series_dense

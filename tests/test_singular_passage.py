@@ -9,6 +9,7 @@ import closed_loops
 import numpy as np
 import pytest
 from closed_loops import angles
+from scipy.integrate import solve_ivp
 
 import tsdyn as ts
 
@@ -86,6 +87,65 @@ def test_every_method_passes(method, shape):
     assert "step of a series" in solution.charts.reason
     if shape == "alone":
         assert turned[0][-1] - turned[0][0] > 20.0 * np.pi
+
+
+def released(loops, heavy=2.0, **scene):
+    """A row of parallelograms with equal links of 1 m, released upright with unit speed; and angle(t) of its cranks.
+
+    Its cranks turn alike: one equation of motion.
+    """
+    per_crank = 1.0 / 12 + 0.01 + 0.25
+    inertia = (loops + 1) * per_crank + heavy * loops
+    pull = 9.81 * (0.5 * (loops + 1) + heavy * loops) / inertia
+
+    def angle(t):
+        return solve_ivp(
+            lambda t, y: (y[1], -pull * np.cos(y[0])), (0.0, t[-1]), (0.5 * np.pi, -1.0), "DOP853", t,
+            rtol=3e-14, atol=1e-15,
+        ).y[0]  # fmt: skip
+
+    return closed_loops.parallelogram(0.5 * np.pi, -1.0, 1.0, loops=loops, heavy=heavy, **scene), angle
+
+
+@pytest.mark.parametrize(
+    ("loops", "options", "off"),
+    [
+        (1, {"rtol": 1e-10, "atol": 1e-10}, 1e-8),
+        (2, {"rtol": 1e-10, "atol": 1e-10}, 1e-8),
+        (40, {"rtol": 1e-10, "atol": 1e-10}, 1e-7),
+        (1, {"integrator": I.Taylor(1e-13)}, 1e-9),
+        (5, {"integrator": I.Taylor(1e-13)}, 3e-9),
+    ],
+)
+def test_accuracy_is_kept_over_ten_turns(loops, options, off):
+    """And message and stats say what was kept."""
+    scene, angle = released(loops, heavy=1.0 if loops == 5 else 2.0)
+    t = np.linspace(0.0, 19.5, 301)
+    solution = ts.simulate(scene, (0.0, t[-1]), t_eval=t, **options).raise_if_failed()
+    assert np.abs(np.array(angles(solution)) - angle(t)).max() < off
+    stats, energy = solution.stats, solution.energy
+    assert stats.steps_near_singular > 0
+    kept = np.abs(energy - energy[0]).max() / solution.kinetic_energy.max()
+    np.testing.assert_allclose(stats.energy_error, kept, rtol=1e-6, atol=1e-15)
+    assert 0.0 <= stats.largest_landing < 1e-9
+    assert f"energy was kept to {stats.energy_error:.1e}" in solution.message
+
+
+def test_a_regular_run_says_nothing_of_singular_configurations():
+    solution = ts.simulate(closed_loops.parallelogram(0.5, 0.5, gravity=(0.0, 0.0, 0.0)), (0.0, 1.0))
+    assert solution.stats.steps_near_singular == 0
+    assert solution.stats.energy_error is None
+    assert "singular" not in solution.message
+
+
+@pytest.mark.parametrize("loops", [2, 5])
+@pytest.mark.parametrize("thin", [1e-4, 1e-6])
+def test_rods_of_little_inertia_about_their_axes_pass(loops, thin):
+    """Their charts are small at regular places, too: near the lowest place, at 0.97 s, one step left them."""
+    scene, angle = released(loops, thin=thin, last="spherical" if thin > 1e-5 else "cylindrical")
+    t = np.linspace(0.0, 1.2, 13)
+    solution = ts.simulate(scene, (0.0, 1.2), t_eval=t, integrator=I.Nystrom4(step=2e-3)).raise_if_failed()
+    assert np.abs(np.array(angles(solution)) - angle(t)).max() < 1e-6
 
 
 def test_a_passage_is_a_part_of_one_run():

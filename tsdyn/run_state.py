@@ -13,7 +13,9 @@ T, T_ORIGIN, T_END, H, RTOL, ATOL, MAX_STEP, EXPONENT, ERROR_BEFORE, STABLE, SHA
 FIRST_ORDER, BEGUN, STEPS, STEPS_WANTED, IN_CHART, INTERVAL, ROWS, NEXT_EVAL = range(8)
 HISTORY, CHART_ROWS, REJECTED, ADAPTIVE, REJECTED_LAST, DENSE, BLOCKS, STAGE_AT = range(8, 16)
 LAST_STAGE, AT_LIMIT, BELOW_LIMIT, STIFF, LEAVE_WHEN_STIFF, FAILED, MAY_PASS, NEXT_STOP = range(16, 24)
-CUTS, WAITING, NEAR_STEPS, NUMBERS = range(24, 28)  # fixed steps cut at stops; whether a stop waits for Python
+CUTS, WAITING, NEAR_STEPS, TIGHTENED, NUMBERS = range(
+    24, 29
+)  # fixed steps cut at stops; whether a stop waits for Python
 AGAIN = 2  # REJECTED_LAST: by a failed stage
 FILLED, STORED = 1, 2  # DENSE: every step's block is made, and kept
 

@@ -6,7 +6,6 @@ back on the manifold along W Phi_q^T.
 
 import math
 
-from ._four import first, four, larger, second, splat, third
 from ._kernel import entry, kernel
 from .assembly import remember, set_time
 from .control import stretch
@@ -16,7 +15,6 @@ from .free import END_SHARE, LARGEST_SHARE, MOVED, RESIDUAL, SHARE
 from .joint_turns import count_turns
 from .linalg import copy
 from .local_chart import AT_START, BY_SERIES, ROUNDING
-from .nearness import NEAR
 from .outputs import record, store_now
 from .poses import OMEGA, POSE, RD, move_bodies, place_bodies
 from .run_state import (
@@ -48,8 +46,8 @@ from .run_state import (
     load_run,
 )
 from .selection import weakest
-from .series_loops import BODY_ROW, S_OMEGA, S_R
-from .series_state import HIGHEST, LOWEST, NEXT, ORDERS, TOP, load_series
+from .series_length import is_near, is_next_to, longest, loosest, radius, step_length, weights
+from .series_state import NEXT, ORDERS, TOP, load_series
 from .series_steps import EXPAND, NEXT_TO_SINGULAR, PASS, REACH, call_expand, call_reach, state_within
 from .series_stops import cross_stop, lower_order
 from .stops import cut_fixed, is_sampled, next_stop, take_pieces
@@ -62,78 +60,11 @@ MISSED = 100.0  # times the tolerance: a landing further away than this is no tr
 # too close if it has passed
 CLOSER, CLOSE, PASSED = 0.3, 0.1, 0.02
 AVOID, AVOIDING = 0.7, 5  # a step that ends there is made shorter by this factor, so many times
-LEAST_ORDER = 5  # of the series of a step past such a place
 TIGHTER, TIGHTEST = 0.01, 1e-16  # times the tolerance of a step from next to such a place; no less than
-SPARE = 0.1  # times the tolerance of a run that has come next to such a place
-LOOSER = 4.0  # times that, as long as the step doesn't pass
-FAR_PASSING, PASSING = 1e-13, 1e-10  # the loosest tolerance of a step past: from elsewhere, and from close by
-STEP_COST = 3  # of a step's landing, in orders
+WARY, SPARE = 0.06, 0.1  # of the largest share: a run that has come to less goes on with this part of its tolerance
+LOOSER = 2.0  # times that, as long as the step doesn't pass
 MOST_TURN = 1.0  # rad in a step, where turns are counted
 SMALL, SMALL_STEPS = 0.02, 40  # a step that turns and moves everything by less; so many of them, and it may be stiff
-
-
-@kernel
-def _most(f):
-    return max(first(f), max(second(f), third(f)))
-
-
-@kernel
-def _size(bodies, nb, orders, k, far, fast):
-    """The largest coefficient k of A and of r over far, and k - 1 of omega' over fast."""
-    turn, shift, spin = splat(0.0), splat(0.0), splat(0.0)
-    for b in range(nb):
-        at = b * orders * BODY_ROW
-        for i in range(at + 12 * k, at + 12 * k + 12, 4):
-            turn = larger(four(bodies, i), turn)
-        shift = larger(four(bodies, at + S_R * orders + 4 * k), shift)
-        spin = larger(four(bodies, at + S_OMEGA * orders + 4 * (k - 1)), spin)
-    return max(_most(turn), max(_most(shift) * far, _most(spin) * fast))
-
-
-@kernel
-def _radius(bodies, nb, orders, top, far, fast):
-    """The radius of convergence as the last coefficients up to top + 1 have it (Jorba, Zou, 2005); 0 if not finite.
-
-    More than their two: where a motion began at rest every fourth coefficient can vanish.
-    """
-    rho = math.inf
-    for k in range(top + 1, max(top - 3, 1), -1):
-        size = _size(bodies, nb, orders, k, far, fast)
-        if not size < math.inf:
-            return 0.0
-        if size > 0.0:
-            rho = min(rho, size ** (-1.0 / k))
-    return rho
-
-
-@kernel
-def _weights(c, r):
-    """What coefficients of r and omega' are multiplied by to be compared with those of A; sets the floor of Phi."""
-    x, orders = c.expansion, c.expansion.order[ORDERS]
-    rtol, atol = r.clock[RTOL], r.clock[ATOL]
-    far, fast = splat(0.0), splat(0.0)
-    for b in range(c.network.bodies.shape[0]):
-        at = b * orders * BODY_ROW
-        far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
-    far, fast = _most(far), _most(fast)
-    c.work.control[FLOOR] = ROUNDING * (c.work.control[SIZE] + far)
-    tol = atol + rtol
-    return tol / (atol + rtol * far), tol / (atol + rtol * fast)
-
-
-@kernel
-def _step_length(c, r):
-    """h = rho tol^(1 / (top + 2)); and the order of the next step, that with the longer step for the work."""
-    x, nb = c.expansion, c.network.bodies.shape[0]
-    top, orders = x.order[TOP], x.order[ORDERS]
-    tol = r.clock[ATOL] + r.clock[RTOL]
-    far, fast = _weights(c, r)
-    h = _radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2))
-    if x.order[HIGHEST] > x.order[LOWEST]:
-        lower = _radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top)
-        change = 1 if h * (top + STEP_COST - 2) > lower * (top + STEP_COST) else -1
-        x.order[NEXT] = min(max(top + change, x.order[LOWEST]), x.order[HIGHEST])
-    return h
 
 
 @kernel
@@ -142,42 +73,6 @@ def _mind_singular(c):
     sizes = c.free.sizes
     sizes[SHARE] = sizes[END_SHARE]
     sizes[LARGEST_SHARE] = max(sizes[SHARE], sizes[LARGEST_SHARE])
-
-
-@kernel
-def _longest(c, r, tol, most):
-    """The longest step to a tolerance by any order up to `most`, which becomes the step's.
-
-    Next to a singular configuration rounding of lam grows from order to order as if the motion ended there: high orders
-    see no further than to it.
-    """
-    x, nb = c.expansion, c.network.bodies.shape[0]
-    far, fast = _weights(c, r)
-    h = 0.0
-    for k in range(most, LEAST_ORDER, -1):
-        longer = _radius(x.bodies, nb, x.order[ORDERS], k, far, fast) * tol ** (1.0 / (k + 2))
-        if longer > h:
-            h, x.order[TOP] = longer, k
-    return h
-
-
-@kernel
-def _is_next_to(share, c):
-    """Whether a place with this share is next to a singular configuration."""
-    return share < NEAR * c.free.sizes[LARGEST_SHARE]
-
-
-@kernel
-def _loosest(c, tol):
-    """The loosest tolerance of a step past a singular configuration: next to it lam has few digits."""
-    return max(tol, PASSING if _is_next_to(c.free.sizes[SHARE], c) else FAR_PASSING)
-
-
-@kernel
-def _is_near(c, part):
-    """Whether a step ends next to a singular configuration, with less than a part of the share that it began with."""
-    sizes = c.free.sizes
-    return _is_next_to(sizes[END_SHARE], c) and sizes[END_SHARE] < part * sizes[SHARE]
 
 
 @kernel
@@ -330,10 +225,10 @@ def advance_series(context, run, log, steps, most):
         for k in range(1, x.order[TOP]):
             call_expand(steps[EXPAND], context, k)
         w.counters[EVALUATIONS] += x.order[TOP]
-        h, t1, last, shorter, highest, wanted = _step_length(c, r), t0, False, 0, x.order[TOP], tol
-        if adaptive and _is_next_to(f.sizes[SHARE], c):
+        h, t1, last, shorter, highest, wanted = step_length(c, r), t0, False, 0, x.order[TOP], tol
+        if adaptive and is_next_to(f.sizes[SHARE], c):
             wanted = max(TIGHTER * tol, min(tol, TIGHTEST))
-            h = _longest(c, r, wanted, highest)
+            h = longest(c, r, wanted, highest)
         limit = r.clock[MAX_STEP]
         if not adaptive:
             h = limit = r.clock[H]
@@ -376,15 +271,15 @@ def advance_series(context, run, log, steps, most):
                 break
             if not adaptive:
                 return status
-            if landed and not _is_near(c, CLOSER if looser else CLOSE):
+            if landed and not is_near(c, CLOSER if looser else CLOSE):
                 break
-            if looser and landed and f.sizes[END_SHARE] > before and not _is_near(c, PASSED):
+            if looser and landed and f.sizes[END_SHARE] > before and not is_near(c, PASSED):
                 break
-            serves = serves or (landed and before == math.inf and not _is_near(c, CLOSE))
+            serves = serves or (landed and before == math.inf and not is_near(c, CLOSE))
             longer = 0.0
-            if looser and landed and LOOSER * wanted <= _loosest(c, tol):
+            if looser and landed and LOOSER * wanted <= loosest(c, tol):
                 before, wanted = f.sizes[END_SHARE], LOOSER * wanted
-                longer = min(_longest(c, r, wanted, highest), limit)
+                longer = min(longest(c, r, wanted, highest), limit)
             if longer > h:
                 h = longer
             elif looser and serves and h == own:
@@ -402,8 +297,8 @@ def advance_series(context, run, log, steps, most):
                 r.numbers[HISTORY] += 1
         row[2] = 1.0
         r.numbers[HISTORY] += 1
-        if _is_next_to(f.sizes[END_SHARE], c) or _is_next_to(f.sizes[SHARE], c):
-            if r.numbers[NEAR_STEPS] == 0:  # what is lost there is gained elsewhere
+        if min(f.sizes[END_SHARE], f.sizes[SHARE]) < WARY * f.sizes[LARGEST_SHARE]:
+            if r.numbers[NEAR_STEPS] == 0:  # what is lost here is gained elsewhere
                 spare = max(SPARE, min(TIGHTEST / tol, 1.0))
                 tol, r.clock[ATOL], r.clock[RTOL] = spare * tol, spare * r.clock[ATOL], spare * r.clock[RTOL]
             r.numbers[NEAR_STEPS] += 1
@@ -414,8 +309,8 @@ def advance_series(context, run, log, steps, most):
         if t1 != stop:  # which is no sign of stiffness
             leave = _watch(c, r, t1 - t0)
         elif adaptive:
-            far, fast = _weights(c, r)
-            rho = _radius(x.bodies, c.network.bodies.shape[0], x.order[ORDERS], x.order[TOP] - 2, far, fast)
+            far, fast = weights(c, r)
+            rho = radius(x.bodies, c.network.bodies.shape[0], x.order[ORDERS], x.order[TOP] - 2, far, fast)
             lower_order(x.order, rho, tol, t1 - t0)
         if r.numbers[DENSE] != 0:
             _store_block(c, r, log, t0, t1 - t0, t1)

@@ -254,3 +254,17 @@ def test_the_axis_and_references_of_a_torsional_spring_are_derived():
         F.TorsionalSpring(scene.ground, body, axis_a=axis, axis_b=axis, stiffness=2.0)
     with pytest.raises(ts.InvalidForce, match="axis_a"):
         F.TorsionalSpring(scene.ground, body, stiffness=2.0)
+
+
+def test_bodies_by_name_beside_a_handle():
+    scene = ts.Scene()
+    crank = scene.add_body(1.0, (1, 1, 1), name="crank")
+    rod = scene.add_body(1.0, (1, 1, 1), position=(1, 0, 0), name="rod")
+    assert C.Revolute(crank, "rod", axis_a=(0, 0, 1), axis_b=(0, 0, 1)).b is rod
+    assert C.Revolute.at("crank", rod, point=(0, 0, 0), axis=(0, 0, 1)).a is crank
+    assert C.Spherical(a="crank", b=scene.ground).a is crank
+    assert F.Spring(crank, "ground", point_b=(0, 0, 1), stiffness=1.0).b is scene.ground
+    with pytest.raises(ts.InvalidArgument, match="no body, constraint or force is named 'rood'; did you mean 'rod'"):
+        C.Spherical(crank, "rood")
+    with pytest.raises(ts.InvalidConstraint, match=r"'crank' is not a body; .* beside the handle of the other"):
+        C.Spherical("crank", "rod")

@@ -1,5 +1,6 @@
 """What constraints and forces share: two bodies, a name, markers, and attributes that are checked when they are set."""
 
+from functools import wraps
 from inspect import CO_VARKEYWORDS, signature, unwrap
 from types import MethodType
 
@@ -15,13 +16,37 @@ from .markers import PARAMETERS, POINT, TURN
 from .membership import note
 
 
+def by_name(function):
+    """Wrap an `__init__`: a or b may be the name of a body in the scene of the other."""
+
+    @wraps(function)
+    def call(self, *arguments, **keywords):
+        arguments, keywords = _meant(arguments, keywords)
+        return function(self, *arguments, **keywords)
+
+    return call
+
+
+def _meant(arguments, keywords):
+    """The arguments of a call, with the bodies a and b that are given by name."""
+    bodies = [*arguments[:2], keywords.get("a"), keywords.get("b")]
+    if any(isinstance(body, str) for body in bodies):
+        for scene in (body.scene for body in bodies if isinstance(body, (PointMass, Ground))):
+            here = [scene[body] if isinstance(body, str) else body for body in bodies]
+            given = len(arguments[:2])
+            named = {key: body for key, body in zip("ab", here[-2:], strict=True) if key in keywords}
+            return (*here[:given], *arguments[2:]), {**keywords, **named}
+    return arguments, keywords
+
+
 class Attachment:
     """Base of Primitive, Joint and Force: attached to one or two bodies of a scene by markers.
 
     Attributes
     ----------
     a, b : Body or ground
-        The bodies; b is None where there are markers on a only.
+        The bodies; b is None where there are markers on a only. Where one is given by its handle, the name of the
+        other serves: Revolute(crank, "rod").
     name : str
         What error messages call it.
     coordinates : tuple of ndarray (3,)
@@ -39,7 +64,7 @@ class Attachment:
 
     def __init_subclass__(cls, **keywords):
         super().__init_subclass__(**keywords)
-        cls.__init__ = fitting(cls.__init__, then=note)
+        cls.__init__ = fitting(by_name(cls.__init__), then=note)
         if unwrap(cls.__init__).__code__.co_flags & CO_VARKEYWORDS:
             cls.__init__.__signature__ = complete_signature(cls)
         if "__new__" in vars(cls):  # else the signature would be that of __new__
@@ -55,7 +80,8 @@ class Attachment:
         for body in bodies:
             if not isinstance(body, (PointMass, Ground)):
                 raise self.error(
-                    f"{name or kind}: {body!r} is not a body; pass one that add_body returned, or the ground."
+                    f"{name or kind}: {body!r} is not a body; pass one that add_body returned, the ground, or the name "
+                    "of one beside the handle of the other."
                 )
         self.named = bool(name)
         self.name = name or f"{kind}({', '.join(body.name for body in bodies)})"
@@ -83,6 +109,7 @@ class Attachment:
             Those of the class, its points (m) and directions in the ground frame: `point_a=` is carried into the frame
             of a, `point=` into those of both bodies, and so with every other pair. All else is passed on.
         """
+        (a, b), _ = _meant((a, b), {})
         given = {}
         for name, value in arguments.items():
             common = [marker for marker in cls.markers if marker.argument == f"{name}_{marker.body}"]

@@ -3,6 +3,7 @@
 import itertools
 import re
 import shlex
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -112,7 +113,7 @@ def test_a_run_that_fails_tells_as_much():
 
 
 def snippets():
-    """Python of README and docs, a session a file: later blocks may use names of earlier ones."""
+    """Python of README and docs, by file: later blocks may use names of earlier ones."""
     for file in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
         blocks = re.findall(r"```python\n(.*?)```", file.read_text(), re.DOTALL)
         if blocks:
@@ -120,13 +121,12 @@ def snippets():
 
 
 @pytest.mark.parametrize("blocks", list(snippets()))
-def test_snippets_run(blocks, tmp_path, monkeypatch):
+def test_snippets_run(blocks, request, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    for i, block in enumerate(blocks):
-        file = tmp_path / f"snippet_{i}_{abs(hash(str(tmp_path)))}.py"
-        file.write_text(block)
-        exec(compile(block, str(file), "exec"), {"__name__": file.stem, "__file__": str(file)})
+    name = f"snippets_of_{request.node.callspec.id.replace('-', '_')}"
+    (tmp_path / f"{name}.py").write_text("\n\n".join(blocks))
+    import_module(name)
 
 
 def test_commands_of_the_docs_exist():

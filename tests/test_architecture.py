@@ -22,7 +22,7 @@ FILES = {
 # lowest first; a module imports from lines above its own, or from its own line
 LAYERS = """
 _code_hash _interrupts _cache errors _discovery jet truncated checks aligned chebyshev history mesh shapes
-calls membership compiled_once
+calls membership compiled_once names
 _kernel
 _four rotation linalg pieces table knots motion motions motion_program signal angle recurrences
 blocks block_steps block_kernels hubs
@@ -49,7 +49,6 @@ joint_friction
 state_function
 joint_load
 given_load
-names
 rigid_shift system stepping progress
 handles
 still

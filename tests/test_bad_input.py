@@ -182,7 +182,8 @@ PAIRS = [
     ("both ground", lambda w: (w.ground, w.ground), ("ground",)),
     ("another scene", lambda w: (w.rod, w.stranger), ("rod", "stranger", "different scenes")),
     ("ground of another scene", lambda w: (w.rod, w.other.ground), ("rod", "different scenes")),
-    ("name of a body", lambda w: (w.rod, "bead"), ("'bead'", "not a body", "ground")),
+    ("name of no body", lambda w: (w.rod, "baed"), ("'baed'", "no body", "'bead'")),
+    ("names alone", lambda w: ("rod", "bead"), ("'rod'", "not a body", "ground")),
     ("the scene", lambda w: (w.rod, w.scene), ("not a body", "ground")),
     ("class of bodies", lambda w: (w.rod, ts.Body), ("not a body", "ground")),
     ("b is None", lambda w: (w.rod, None), ("None", "not a body", "ground")),
@@ -722,7 +723,7 @@ ARGUMENTS = [
         for what, f in {
             "None": lambda w: None,
             "one body": lambda w: w.rod,
-            "a name": lambda w: ["rod"],
+            "a name": lambda w: ["bod"],
             "text": lambda w: "rod",
             "a number": lambda w: [0],
             "the ground": lambda w: [w.ground],
@@ -753,8 +754,9 @@ def test_results_of_what_is_no_body_of_the_scene(query):
     w = build()
     solution = run(max_steps=1)(w)
     late = w.scene.add_body(1.0, (1.0, 1.0, 1.0), name="late")
-    for body in (None, "rod", 0, w.ground, w.stranger, late):
+    for body in (None, 0, w.ground, w.stranger, late):
         refuse(lambda body=body: getattr(solution, query)(body), ts.InvalidBody, ("not a body of this solution",))
+    refuse(lambda: getattr(solution, query)("late"), ts.InvalidBody, ("no body is named 'late'",))
     if query in ("position", "velocity", "acceleration"):
         assert getattr(solution, query)(w.bead).shape == (2, 3)
     else:
@@ -765,7 +767,8 @@ def test_results_of_what_is_no_constraint_of_the_scene():
     w = build()
     solution = run(max_steps=1)(w)
     late = w.scene.add(C.Distance(w.rod, w.bead, name="late"))
-    for constraint in (None, "pivot", 0, w.rod, C.EulerNormalization(w.stranger), late):
+    refuse(lambda: solution.reaction("late"), ts.InvalidConstraint, ("no constraint or force is named 'late'",))
+    for constraint in (None, 0, w.rod, C.EulerNormalization(w.stranger), late):
         refuse(
             lambda c=constraint: solution.reaction(c),
             ts.InvalidConstraint,
@@ -961,7 +964,11 @@ def with_parameters(value):
 
 
 def count_differs(w):
-    mine = type("Mine", (ts.Primitive,), {**GOOD, "parameters": lambda self: (1.0,) * (1 + self.a.dimension // 4)})
+    def named(self, a):
+        ts.Primitive.__init__(self, a, None, ((0.0, 0.0, 0.0),), f"mine on {a.name}")
+
+    own = {"__init__": named, "parameters": lambda self: (1.0,) * (1 + self.a.dimension // 4)}
+    mine = type("Mine", (ts.Primitive,), {**GOOD, **own})
     w.scene.add(mine(w.bead))
     w.scene.add(mine(w.rod))
     return w.scene.evaluate()

@@ -126,7 +126,7 @@ def _held(scene, fixed):
     bodies = scene.system.bodies
     held = np.zeros(int(bodies[:, 1].sum()), bool)
     for body in fixed:
-        body = named(scene.bodies, body, "body", InvalidBody) if isinstance(body, str) else body
+        body = named(scene.bodies, body, "body to be fixed", InvalidBody) if isinstance(body, str) else body
         if not any(body is known for known in scene.bodies):
             raise InvalidBody(f"fixed: {body!r} is not a body of this scene.")
         at = int(bodies[body.index, 0])

@@ -14,6 +14,7 @@ from .checks import demand_known, floats, label, number
 from .errors import InvalidConstraint
 from .markers import PARAMETERS, POINT, TURN
 from .membership import note
+from .names import named
 
 
 def by_name(function):
@@ -21,21 +22,22 @@ def by_name(function):
 
     @wraps(function)
     def call(self, *arguments, **keywords):
-        arguments, keywords = _meant(arguments, keywords)
+        arguments, keywords = _meant(self.error, arguments, keywords)
         return function(self, *arguments, **keywords)
 
     return call
 
 
-def _meant(arguments, keywords):
+def _meant(error, arguments, keywords):
     """The arguments of a call, with the bodies a and b that are given by name."""
     bodies = [*arguments[:2], keywords.get("a"), keywords.get("b")]
     if any(isinstance(body, str) for body in bodies):
         for scene in (body.scene for body in bodies if isinstance(body, (PointMass, Ground))):
-            here = [scene[body] if isinstance(body, str) else body for body in bodies]
+            known = (scene.ground, *scene.bodies)
+            here = [named(known, body, "body", error) if isinstance(body, str) else body for body in bodies]
             given = len(arguments[:2])
-            named = {key: body for key, body in zip("ab", here[-2:], strict=True) if key in keywords}
-            return (*here[:given], *arguments[2:]), {**keywords, **named}
+            found = {key: body for key, body in zip("ab", here[-2:], strict=True) if key in keywords}
+            return (*here[:given], *arguments[2:]), {**keywords, **found}
     return arguments, keywords
 
 
@@ -109,7 +111,7 @@ class Attachment:
             Those of the class, its points (m) and directions in the ground frame: `point_a=` is carried into the frame
             of a, `point=` into those of both bodies, and so with every other pair. All else is passed on.
         """
-        (a, b), _ = _meant((a, b), {})
+        (a, b), _ = _meant(cls.error, (a, b), {})
         given = {}
         for name, value in arguments.items():
             common = [marker for marker in cls.markers if marker.argument == f"{name}_{marker.body}"]

@@ -7,7 +7,8 @@ SHOWN = 5
 
 def note(item):
     """A constraint or force has been made: it waits to be added to its scene, or to become a part of a joint."""
-    item.scene._waiting[id(item)] = item
+    if "a" in vars(item):  # its __init__ has called that of its base
+        item.scene._waiting[id(item)] = item
 
 
 def settle(item):

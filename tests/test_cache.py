@@ -277,6 +277,7 @@ INTERRUPTED = """
 import signal
 from numba.core.registry import cpu_target
 from tsdyn._kernel import entry
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 engine = cpu_target.target_context.codegen()._engine._ee
 found = engine._object_cache_notify
 def notify(*arguments):

@@ -417,7 +417,7 @@ def test_wrong_arguments():
     for make, message in cases:
         with pytest.raises(ts.InvalidForce, match=message):
             make()
-    with pytest.raises(TypeError, match=r"RevoluteFriction\(\) has no argument slip; it has .*slip_velocity"):
+    with pytest.raises(TypeError, match=r"RevoluteFriction\(\) has no argument slip. It has .*slip_velocity"):
         F.RevoluteFriction(pin, radius=0.1, kinetic=0.1, slip=0.1)
     friction = F.RevoluteFriction(pin, radius=0.1, kinetic=0.1)
     with pytest.raises(ts.InvalidForce, match="another scene"):

@@ -11,8 +11,10 @@ from .assembly import set_time
 from .driven import expand_motions
 from .errors import Status
 from .expansion import begin, expand
+from .free import LARGEST_SHARE, SHARE
 from .free_accelerations import accelerate_bodies
 from .landing import find_drift, land, land_velocities, sum_series
+from .nearness import NEAR
 from .network import REDUCED
 from .poses import write_accelerations, write_positions, write_velocities
 from .rows import run_loops
@@ -47,7 +49,9 @@ def _expand(context, k, ahead):
     if k == 0:
         expand_motions(c.system, x)
         begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
-    expand(c.network, c.system, k, k > 0 and k + 1 == x.order[TOP], ahead, orders, x.order[REFINED], x, f)
+    near = f.sizes[SHARE] < NEAR * f.sizes[LARGEST_SHARE]  # there rounding of lam grows from order to order
+    refine = orders if near else x.order[REFINED]
+    expand(c.network, c.system, k, k > 0 and k + 1 == x.order[TOP], ahead, orders, refine, x, f)
     if k == 0:
         for b in range(c.network.bodies.shape[0]):
             at = b * orders * BODY_ROW

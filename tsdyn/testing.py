@@ -4,6 +4,7 @@ import warnings
 from types import SimpleNamespace
 
 import numpy as np
+from numba.core.errors import NumbaError
 
 from ._kernel import twin
 from .diagnostics import constraint_rows
@@ -218,6 +219,8 @@ def _demand_no_comparison(function, kernel, name, rows, x, xd, t):
     out = np.full((rows, len(x)) if kernel == "jacobian" else rows, 0.0, object)
     try:
         function(x, t, out, *([xd] if kernel == "gamma" else []))
+    except NumbaError:
+        return  # compiled kernels that a closure calls take numbers alone
     except CheckFailed as error:
         reason = str(error.__cause__)
         if "not supported between instances" in reason or "for abs()" in reason:

@@ -186,7 +186,7 @@ def test_scaling_measures_a_size():
     small = scaling.one("chain", 4)
     assert (small.family, small.bodies) == ("chain", 4)
     assert small.evaluations > small.steps > 0
-    assert 0.0 < small.evaluation < 1e6 * small.run
+    assert np.isfinite(small.evaluation)  # a difference of two timings
     assert "chain" in scaling.table([small])
 
 

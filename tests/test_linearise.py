@@ -17,6 +17,7 @@ from tsdyn.evaluate import constraint_arrays
 from tsdyn.force_check import evaluate_force_jacobian
 from tsdyn.force_pack import with_force_jacobians
 from tsdyn.frames import turn_block, turn_of_bodies, turn_of_directions
+from tsdyn.joint_load import JointLoad
 from tsdyn.linalg import lu, lu_solve
 from tsdyn.markers import PARAMETERS, POINT
 from tsdyn.system import with_curvatures
@@ -63,15 +64,31 @@ def test_jacobian_with_every_constraint(name, between, rng):
 
 
 @pytest.mark.parametrize(
-    "kind", [k for k in F.registered() if not issubclass(k, ts.JointFriction)], ids=lambda kind: kind.__name__
+    "kind",
+    [k for k in F.registered() if not issubclass(k, (ts.JointFriction, JointLoad))],
+    ids=lambda kind: kind.__name__,
 )
 def test_jacobian_with_every_force(kind, rng):
     """On a chain of two bodies, fast enough that stiffness and damping and what they do to joints all count.
 
-    But for friction of joints, of which the Jacobian holds the normal loads fixed.
+    But for friction of joints, of which the Jacobian holds the normal loads fixed, and for loads on joints, below.
     """
     scene = build(random_chain(rng, 2))
     scene.add(kind.example(rng, *scene.bodies))
+    demand_derivatives(scene, rng)
+
+
+def test_jacobian_with_loads_on_joints(rng):
+    """Of the angle and the displacement, not linear."""
+    scene = ts.Scene()
+    arm = scene.add_body(1.0, (1.0, 1.1, 1.2), (1.0, 0.0, 0.0), angular_velocity=(0.0, 0.7, 0.0), velocity=(0, 0, -0.7))
+    sled = scene.add_body(
+        0.5, (0.2, 0.3, 0.4), (2.0, 0.0, 0.0), angular_velocity=(0.0, 0.7, 0.0), velocity=(0, 0, -1.4)
+    )
+    hinge = scene.add(C.Revolute.at(scene.ground, arm, point=(0, 0, 0), axis=(0, 1, 0)))
+    slide = scene.add(C.Translational.at(arm, sled, point=(1.5, 0, 0), axis=(1, 0, 0)))
+    scene.add(F.JointTorque(hinge, function=lambda t, angle, rate: -3.0 * angle - 0.5 * rate * rate))
+    scene.add(F.JointForce(slide, function=lambda t, s, rate: -20.0 * s * s - 2.0 * rate * s))
     demand_derivatives(scene, rng)
 
 
@@ -290,7 +307,7 @@ def test_turn_block(code_row, code_column, rng):
 
 
 INTERNAL = [kind for kind in F.registered() if kind not in (F.PointForce, F.Torque, F.UserForce)]
-INTERNAL = [kind for kind in INTERNAL if kind.__module__.startswith("tsdyn.")]
+INTERNAL = [k for k in INTERNAL if k.__module__.startswith("tsdyn.") and not issubclass(k, JointLoad)]
 
 
 @pytest.mark.parametrize("swapped", [False, True], ids=["a to b", "b to a"])

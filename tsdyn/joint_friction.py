@@ -84,6 +84,7 @@ class JointFriction:
             raise unknown_argument(kind, unknown, [*self.quantities, "name"])
         self.__dict__["joint"] = joint
         super().__init__(joint.a, joint.b, self.coordinates, name or f"{kind}({joint.name})")
+        self.__dict__["named"] = bool(name)
         self.kinetic, self.static, self.preload = kinetic, static, preload
         self.slip_velocity, self.stribeck_velocity = slip_velocity, stribeck_velocity
         for key, value in geometry.items():

@@ -15,13 +15,14 @@ from .massless import axis_of
 from .network import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, network_of
 from .normal import gather, scatter
 from .poses import move_bodies, place_bodies, write_positions, write_velocities
-from .rank import check_rank
+from .rank import RANK_TOL, check_rank
 from .rows import run_loops
 from .selection import drop_rows, factor_rows, select
 from .still import keep_turning, settle, still
 from .workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 
 LARGE = 1 << 20  # entries of Phi_q from which on no dense one is made
+DENSE = 1 << 23  # where nothing else serves
 SHARES = 1e-3, 1e-6, 1e-9, 1e-12  # below which rows are taken for redundant, if they then hold near by, too
 WANDER, NEAR_BY = 1e-2, 1e-3  # how far to look whether they do, and at least: turns, and shares of the scene's size
 SHORTER, SHORTEST = 0.25, 1e-3  # a leg of the way from whose end Newton's method finds no place is cut; no shorter
@@ -256,6 +257,9 @@ class _Start:
             if self.hold_near_by(way.ravel()):
                 return rows
         self.refuse_axis(loose)
+        chosen = self.chosen_of_all()
+        if chosen.size and self.serve(chosen) and self.hold_near_by(way.ravel()):
+            return chosen
         which = ", ".join(names[i] for i in sorted(row[rows])[:8])
         count = int((row >= 0).sum())
         free = int(np.where(self.network.bodies[:, 1] == 7, 6, 3).sum()) - count + rows.size
@@ -265,6 +269,28 @@ class _Start:
             f"others), so {free} directions are free at this point and fewer next to it. Branches of the motion meet "
             "here, and which it takes is not determined: start from another configuration, on the branch that you mean."
         )
+
+    def chosen_of_all(self):
+        """The rows that follow from others by pivoted QR of all at once: for scenes that blocks part badly."""
+        network, q = self.network, self.q
+        joints = np.flatnonzero(network.row >= 0)
+        if q.size * joints.size > DENSE or network.welds.size:
+            return np.empty(0, int)
+        A = constraint_arrays(self.scene.system, q, self.qd, self.t)[1][network.row[joints]]
+        for at in self.at:  # without the changes of length of p, which the normalisations hold
+            A[:, at] -= np.outer(A[:, at] @ q[at], q[at])
+        A /= np.linalg.norm(A, axis=1)[:, None]
+        from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
+
+        r, order = qr(A.T, mode="r", pivoting=True)
+        size = np.abs(np.diag(r))
+        return joints[np.sort(order[int((size > RANK_TOL * size[0]).sum()) :])]
+
+    def serve(self, rows):
+        """Drop these rows; whether S of the others is regular."""
+        self.free.dropped[0] = rows.size
+        self.free.dropped[1 : 1 + rows.size] = rows
+        return _look(self.context, self.q, self.qd, self.t, self.rates) < 0 and self.loose_axis() < 0
 
     def hold_near_by(self, way):
         """Whether the rows that are dropped hold on the way to a place near by: in one go, or in shorter legs."""

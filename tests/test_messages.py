@@ -268,3 +268,10 @@ def test_bodies_by_name_beside_a_handle():
         C.Spherical(crank, "rood")
     with pytest.raises(ts.InvalidConstraint, match=r"'crank' is not a body; .* beside the handle of the other"):
         C.Spherical("crank", "rod")
+
+
+def test_directions_of_any_length():
+    body = ts.Scene().add_body(1.0, (1, 1, 1))
+    for length in (1e-300, 1e308):
+        given = C.Dot1(body, body.scene.ground, axis_a=(length, 0, 0), axis_b=(0, length, 0))
+        np.testing.assert_array_equal((given.axis_a, given.axis_b), np.eye(3)[:2])

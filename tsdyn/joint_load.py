@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .checks import positive
+from .checks import label, positive
 from .errors import InvalidForce
 from .markers import TURN
 from .state_function import arguments_of
@@ -33,6 +33,7 @@ class JointLoad:
 
     def __init__(self, joint, *, function, period=None, which=0, name=""):
         kind = self._kind()
+        name = label(name, kind, InvalidForce)
         geometries = self.geometries(joint) if hasattr(joint, "joint_coordinates") else []
         if not geometries:
             raise InvalidForce(f"{name or kind}: joint must be one with {self.coordinate}, got {joint!r}.")
@@ -44,7 +45,7 @@ class JointLoad:
         self.__dict__.update(joint=joint, which=int(which))
         own, other = self.geometry[:2]
         super().__init__(own, other, self.coordinates, name or f"{kind}({joint.name})")
-        self.__dict__["named"] = bool(str(name))
+        self.__dict__["named"] = bool(name)
         self.function, self.period = function, period
         self.check()
 

@@ -65,10 +65,11 @@ class Vector(Marker):
         """Check and normalise the direction."""
         value = super().coordinates(body, value, where, error)
         _needs_rotation(body, f"{where}: {self.argument}")
-        length = np.linalg.norm(value)
-        if not length > 0.0:
+        size = np.abs(value).max()
+        if not size > 0.0:
             raise error(f"{where}: {self.argument} has length zero; give a direction, such as (0, 0, 1).")
-        value = value / length
+        value = np.ldexp(value, -np.frexp(size)[1])  # by a power of two: no square overflows, no bit changes
+        value = value / np.linalg.norm(value)
         value.setflags(write=False)
         return value
 

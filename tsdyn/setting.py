@@ -97,7 +97,7 @@ def set_joint(
         given[_kind_of_rate(handles, joint, given)][1] = rate
     joint = handles.item(joint)
     _link(joint, given)
-    given = {kind: pair for kind, pair in given.items() if pair != [None, None]}
+    given = {kind: pair for kind, pair in given.items() if any(x is not None for x in pair)}
     if not given:
         raise InvalidArgument(f"set: nothing is said of {joint!r}; give angle=, displacement= or rate=.")
     goals = [goal for kind, pair in given.items() for goal in _goals(scene, handles, joint, kind, pair, t)]

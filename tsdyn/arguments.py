@@ -29,11 +29,12 @@ def output_times(t_eval, t0, t1):
     if t_eval is None:
         return np.empty(0)
     times = floats(t_eval)
-    if times.ndim == 1 and times.size and t0 <= times[0] and times[-1] <= t1 and (times[1:] > times[:-1]).all():
+    increasing = times.ndim == 1 and np.count_nonzero(times[1:] > times[:-1]) == max(times.size - 1, 0)
+    if increasing and times.size and t0 <= times[0] and times[-1] <= t1:
         return times
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
         raise InvalidArgument("t_eval must be a non-empty vector of finite times in s.")
-    if not (times[1:] > times[:-1]).all():
+    if not increasing:
         raise InvalidArgument("t_eval must increase from each time to the next.")
     if times[0] < t0 or times[-1] > t1:
         raise InvalidArgument(

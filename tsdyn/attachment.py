@@ -86,7 +86,7 @@ class Attachment:
                     "of one beside the handle of the other."
                 )
         self.named = bool(name)
-        self.name = name or f"{kind}({', '.join(body.name for body in bodies)})"
+        self.name = name or self._untitled(bodies)
         if all(body.dimension == 0 for body in bodies):
             raise self.error(f"{self.name}: one of the bodies must not be the ground.")
         if len(bodies) == 2 and a is b:
@@ -98,6 +98,10 @@ class Attachment:
             raise self.error(f"{self.name}: {len(self.markers)} markers, but {len(given)} coordinates.")
         self.coordinates = tuple(self._places(given))
         self.built = tuple(getattr(body, "values", {}).get("orientation") for body in (a, b))
+
+    def _untitled(self, bodies):
+        """The name of one that its user has given none."""
+        return f"{self._kind()}({', '.join(body.name for body in bodies)})"
 
     @Placing
     def at(cls, a, b=None, **arguments):

@@ -77,9 +77,14 @@ def counted(count, noun, nouns=None):
     return f"{count} {noun if count == 1 else nouns or noun + 's'}"
 
 
+def close(name, known):
+    """The names that are near to a wrong one, at most three."""
+    return difflib.get_close_matches(str(name), known, 3)
+
+
 def nearest(name, known):
     """The end of a sentence on a wrong name: the right ones that are near to it."""
-    near = difflib.get_close_matches(str(name), known, 3)
+    near = close(name, known)
     return f"; did you mean {' or '.join(near)}?" if near else "."
 
 

@@ -23,8 +23,12 @@ LARGEST_PILOT = 700  # coordinates: above that implicit methods, whose matrices 
 
 def explicit(prepared, rtol, atol, series):
     """The method that a run begins with; series: whether Taylor may be it."""
-    kind = Taylor if series and not prepared.refusal else DOP853
-    return kind(**tolerances(rtol, atol))
+    given, known = (rtol, atol, series), prepared.explicit
+    if not all(value is None or type(value) is float for value in given[:2]) or given not in known:
+        kind = Taylor if series and not prepared.refusal else DOP853
+        known.clear()
+        known[given] = kind(**tolerances(rtol, atol))
+    return known[given]
 
 
 def implicit(method):

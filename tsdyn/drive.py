@@ -43,7 +43,7 @@ class Recorded(NamedTuple):
     def log(self, charts):
         """The history of charts with those that are left at the end, or None."""
         if self.passed is not None:
-            self.passed.add(charts, self.steps.latest)
+            self.passed.add(charts, self.steps)
         return self.passed
 
 
@@ -154,9 +154,9 @@ def drive(memory, task, watch):
             status = Status.INTERRUPTED
     finally:
         task.report(None)
-    reason = reason or getattr(memory, "reason", "")
+    reason = reason or memory.reason
     _collect(numbers, record, chunks, per_step, dense, steps)
-    if not dense:
+    if not dense and numbers[CHART_ROWS] > CHART_ROOM:  # fewer are logged with the last one
         _pass_by(numbers, record.charts, record.points, steps, passed)
     out = _joined(record.out, chunks["out"]) if per_step else record.out[: numbers[ROWS]]
     blocks = _joined(record.blocks, chunks["blocks"]) if dense else record.blocks
@@ -180,7 +180,7 @@ def _pass_by(numbers, charts, points, steps, passed):
     """Log the charts that have been left, and let the present one be the first."""
     left = numbers[CHART_ROWS]
     if passed is not None:
-        passed.add(charts[:left], steps.latest)
+        passed.add(charts[:left], steps)
     charts[0], points[:1] = charts[left], points[left : left + 1]
     numbers[CHART_ROWS] = 0
 

@@ -101,7 +101,7 @@ def _with_friction(packed, t, q, qd, Phi_q, solve):
 
 def _of_independent_rows(M, Phi_q, load, gamma):
     """(qdd, lam) with NaN for rows of Phi_q that follow from others, and hold with them."""
-    dropped = _dependent(Phi_q)
+    dropped = dependent(Phi_q)
     if not dropped.size:
         raise SingularConfiguration(NOT_UNIQUE)
     kept = np.setdiff1d(np.arange(len(Phi_q)), dropped)
@@ -113,8 +113,8 @@ def _of_independent_rows(M, Phi_q, load, gamma):
     return _with_gaps(found, kept, Phi_q, gamma)
 
 
-def _dependent(Phi_q):
-    """Rows of a dense Phi_q that follow from others, by QR with pivoting."""
+def dependent(Phi_q):
+    """Rows of a dense Phi_q that follow from others, by QR with pivoting; those farthest from others are kept."""
     from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
 
     scaled = Phi_q / np.maximum(np.linalg.norm(Phi_q, axis=1), 1e-300)[:, None]

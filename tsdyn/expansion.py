@@ -9,6 +9,10 @@
 zero for every k, factorised once a step.
 """
 
+from fractions import Fraction
+
+import numpy as np
+
 from ._four import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times, total
 from ._kernel import kernel
 from .block_kernels import solve
@@ -19,6 +23,19 @@ from .normal import scatter, weigh
 from .poses import OMEGA, POSE, RD, R
 from .selection import drop
 from .series_loops import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R, S_SPIN, call_series
+
+MOST_ORDERS = 64
+
+
+def _inverse(n):
+    """1 / n as the sum of two floats."""
+    high = 1.0 / n
+    return high, float(Fraction(1, n) - Fraction(high))
+
+
+# What an integral, or two of them, divide order k by; in two floats
+ONE_INTEGRAL = np.array([_inverse(k + 1) for k in range(MOST_ORDERS)])
+TWO_INTEGRALS = np.array([_inverse((k + 1) * (k + 2)) for k in range(MOST_ORDERS)])
 
 
 @kernel
@@ -37,7 +54,7 @@ def begin(network, system, poses, orders, bodies, Z):
             put(bodies, at + 16, splat(0.0))
             put(bodies, at + 20, splat(0.0))
             _turn(bodies, at, 1, four(poses, p + OMEGA))
-            _turn_ahead(bodies, at, orders, 1, 0.5, 0.0)
+            _turn_ahead(bodies, at, orders, 1, False)
             put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, 0))
 
 
@@ -75,8 +92,8 @@ def _turn(bodies, at, k, change):
 
 
 @kernel
-def _turn_ahead(bodies, at, orders, k, share, low):
-    """A_{k+1} of (1) but for omega'_k; share + low = 1 / (k + 1)."""
+def _turn_ahead(bodies, at, orders, k, exact):
+    """A_{k+1} of (1) but for omega'_k."""
     x, y, z = splat(0.0), splat(0.0), splat(0.0)
     u, v, w = splat(0.0), splat(0.0), splat(0.0)
     o = at + S_OMEGA * orders + 4 * (k - 1)
@@ -87,10 +104,17 @@ def _turn_ahead(bodies, at, orders, k, share, low):
         y, v = fma(a2, w0, y), fma(a0, w2, v)
         z, w = fma(a0, w1, z), fma(a1, w0, w)
         o -= 4
-    o, f, l = at + 12 * (k + 1), splat(share), splat(low)
-    put(bodies, o, _product(sub(x, u), f, l))
-    put(bodies, o + 4, _product(sub(y, v), f, l))
-    put(bodies, o + 8, _product(sub(z, w), f, l))
+    o, f = at + 12 * (k + 1), splat(ONE_INTEGRAL[k, 0])
+    x, y, z = sub(x, u), sub(y, v), sub(z, w)
+    if exact:
+        low = splat(ONE_INTEGRAL[k, 1])
+        put(bodies, o, _product(x, f, low))
+        put(bodies, o + 4, _product(y, f, low))
+        put(bodies, o + 8, _product(z, f, low))
+    else:
+        put(bodies, o, times(x, f))
+        put(bodies, o + 4, times(y, f))
+        put(bodies, o + 8, times(z, f))
 
 
 @kernel
@@ -100,11 +124,12 @@ def _product(x, f, low):
 
 
 @kernel
-def _lacking(n, f):
-    """1 / n - f, f being 1 / n to rounding, n an integer up to 2^20."""
-    wide = 134217729.0 * f  # Dekker: f in two halves, whose products with n are exact
-    high = wide - (wide - f)
-    return ((1.0 - n * high) - n * (f - high)) * f
+def _put_product(array, o, x, f, low, exact):
+    """array[o : o + 4] = x (f + low), low being zero unless `exact`."""
+    if exact:
+        put(array, o, _product(x, f, low))
+    else:
+        put(array, o, times(x, f))
 
 
 @kernel
@@ -145,20 +170,17 @@ def expand(network, system, k, last, ahead, orders, refine, x, f):
     run_loops(network, system.reals, ADVANCE, k, orders, bodies, x.constraints, x.places, f.b, Z)
     run_forces(system.reals, x, k, orders, f.poses, Z)
     exact = refine > 1
-    share, half, ahead_share = 1.0 / (k + 1), 1.0 / ((k + 1) * (k + 2)), 1.0 / (k + 3)
-    share_low = half_low = ahead_low = 0.0
+    g, h, g_low, h_low = splat(ONE_INTEGRAL[k, 0]), splat(TWO_INTEGRALS[k, 0]), splat(0.0), splat(0.0)
     if exact:
-        share_low, half_low = _lacking(k + 1.0, share), _lacking((k + 1.0) * (k + 2.0), half)
-        ahead_low = _lacking(k + 3.0, ahead_share)
-    g, h, g_low, h_low = splat(share), splat(half), splat(share_low), splat(half_low)
+        g_low, h_low = splat(ONE_INTEGRAL[k, 1]), splat(TWO_INTEGRALS[k, 1])
     for b in range(nb):
         at = b * size
         if ahead:
             _fetch_next(bodies, at + size, orders, 12, k + 2)
         weigh(network.inverse, b, Z, 8 * b, Z, 8 * b)
-        put(bodies, at + S_R * orders + 4 * (k + 2), _product(four(Z, 8 * b), h, h_low))
+        _put_product(bodies, at + S_R * orders + 4 * (k + 2), four(Z, 8 * b), h, h_low, exact)
         if network.bodies[b, 1] == 7:
-            put(bodies, at + S_OMEGA * orders + 4 * (k + 1), _product(four(Z, 8 * b + 4), g, g_low))
+            _put_product(bodies, at + S_OMEGA * orders + 4 * (k + 1), four(Z, 8 * b + 4), g, g_low, exact)
             _turn(bodies, at, k + 2, _product(four(Z, 8 * b + 4), h, h_low))
     refined = k < refine
     if refined:
@@ -180,7 +202,7 @@ def expand(network, system, k, last, ahead, orders, refine, x, f):
         put(Z, 8 * b, splat(0.0))
         if network.bodies[b, 1] == 7 and not last:
             put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, k + 1))
-            _turn_ahead(bodies, at, orders, k + 2, ahead_share, ahead_low)
+            _turn_ahead(bodies, at, orders, k + 2, exact)
 
 
 @kernel

@@ -1,6 +1,11 @@
-"""Histories of steps and charts in little memory: eight bytes a step, and none for charts that are made every step."""
+"""Histories of steps and charts in little memory: eight bytes a step, and none for charts that are made every step.
+
+The few of a short run are kept as they are: a run of 0.1 ms has no time for more.
+"""
 
 import numpy as np
+
+FEW_ROWS, FEW_CHUNKS = 256, 4
 
 
 class StepLog:
@@ -11,6 +16,9 @@ class StepLog:
 
     def add(self, rows):
         """Add rows (k, 3): start and length, s, and whether the step was accepted."""
+        if _few(rows, self.chunks):
+            self.chunks.append(rows.copy())
+            return
         accepted = rows[:, 2] == 1.0
         t, other = rows[accepted, 0].copy(), np.flatnonzero(~accepted)
         ends = np.append(t[1:], np.nan)
@@ -20,12 +28,19 @@ class StepLog:
     @property
     def latest(self):
         """Starts (k,) of the steps accepted among the rows added last."""
-        return self.chunks[-1][0] if self.chunks else np.empty(0)
+        if not self.chunks:
+            return np.empty(0)
+        last = self.chunks[-1]
+        return last[last[:, 2] == 1.0, 0] if isinstance(last, np.ndarray) else last[0]
 
     def arrays(self):
         """Start and length of each step (k,), s, and whether it was accepted."""
         parts = [np.empty((0, 3))]
-        for t, odd, lengths, other, tried in self.chunks:
+        for chunk in self.chunks:
+            if isinstance(chunk, np.ndarray):
+                parts.append(chunk)
+                continue
+            t, odd, lengths, other, tried = chunk
             rows, accepted = np.empty((t.size + other.size, 3)), np.ones(t.size + other.size, bool)
             accepted[other] = False
             h = np.diff(t, append=np.nan)
@@ -43,18 +58,30 @@ class ChartLog:
     def __init__(self, parts=()):
         self.chunks = [chunk for part in parts for chunk in part.chunks]
 
-    def add(self, rows, starts):
-        """Add rows (k, 5) as of `Record.charts`; the instants are not copied where they are these `starts`."""
+    def add(self, rows, steps):
+        """Add rows (k, 5) as of `Record.charts`; instants that are the starts of the latest `steps` are not copied."""
+        if _few(rows, self.chunks):
+            self.chunks.append(rows.copy())
+            return
         if not len(rows):
             return
+        starts = steps.latest
         same = np.array_equal(rows[:, 0], starts)
         columns = [_compact(column) for column in (rows[:, 1].astype(np.uint8), rows[:, 2], rows[:, 3])]
         self.chunks.append((starts if same else rows[:, 0].copy(), *columns, _compact(rows[:, 4].astype(np.uint32))))
 
     def arrays(self):
         """Instant, s, number of the reason, condition, contraction and steps of each chart, (k,) each."""
-        columns = zip(*([np.broadcast_to(x, chunk[0].shape) for x in chunk] for chunk in self.chunks), strict=True)
+        columns = zip(*map(_columns, self.chunks), strict=True)
         return [np.concatenate(column) for column in columns]
+
+
+def _few(rows, chunks):
+    return len(rows) < FEW_ROWS and len(chunks) < FEW_CHUNKS
+
+
+def _columns(chunk):
+    return chunk.T if isinstance(chunk, np.ndarray) else [np.broadcast_to(x, chunk[0].shape) for x in chunk]
 
 
 def _compact(column):

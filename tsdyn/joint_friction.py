@@ -83,13 +83,15 @@ class JointFriction:
         for unknown in geometry.keys() - self.quantities.keys():
             raise unknown_argument(kind, unknown, [*self.quantities, "name"])
         self.__dict__["joint"] = joint
-        super().__init__(joint.a, joint.b, self.coordinates, name or f"{kind}({joint.name})")
-        self.__dict__["named"] = bool(name)
+        super().__init__(joint.a, joint.b, self.coordinates, name)
         self.kinetic, self.static, self.preload = kinetic, static, preload
         self.slip_velocity, self.stribeck_velocity = slip_velocity, stribeck_velocity
         for key, value in geometry.items():
             setattr(self, key, value)
         self.check()
+
+    def _untitled(self, bodies):
+        return f"{self._kind()}({self.joint.name})"
 
     @property
     def coordinates(self):

@@ -44,10 +44,12 @@ class JointLoad:
             )
         self.__dict__.update(joint=joint, which=int(which))
         own, other = self.geometry[:2]
-        super().__init__(own, other, self.coordinates, name or f"{kind}({joint.name})")
-        self.__dict__["named"] = bool(name)
+        super().__init__(own, other, self.coordinates, name)
         self.function, self.period = function, period
         self.check()
+
+    def _untitled(self, bodies):
+        return f"{self._kind()}({self.joint.name})"
 
     @property
     def geometry(self):

@@ -55,6 +55,8 @@ def stops_of(parameters, instants, t0, t1):
     is whether a function is asked there, in Python.
     """
     found = [joints(motion, t0, t1) for given in parameters for motion in given.motions if motion.pieces]
+    if not (instants.size or found):
+        return np.empty((0, 2))
     times = np.concatenate([instants, *found])
     order = np.argsort(times, kind="stable")
     times, asked = times[order], np.where(order < instants.size, 1.0, 0.0)

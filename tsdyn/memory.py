@@ -57,6 +57,8 @@ class Memory:
         Floats of the method's numbers, of its memory and of its interpolant.
     """
 
+    reason = ""  # of the end of a run: told by its status
+
     def __init__(self, prepared, network, joint_rows, implicit, kept, nx, ny, tableau, scratch, width):
         n, m, self.packed = prepared.n, prepared.m, prepared.packed
         self.implicit, self.basis_free = implicit, joint_rows is not None

@@ -1,7 +1,6 @@
 """Names in place of handles: the body, constraint or force that a user means."""
 
-import difflib
-
+from .checks import close
 from .errors import InvalidArgument
 
 
@@ -22,7 +21,7 @@ def named(things, name, what, error=InvalidArgument):
             "each a name of its own."
         )
     known = list(dict.fromkeys(thing.name for thing in things))
-    near = difflib.get_close_matches(name, known, 3)
+    near = close(name, known)
     there = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {_some(known)}."
     raise error(f"no {what} is named {name!r}; {there}")
 

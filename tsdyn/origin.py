@@ -18,15 +18,23 @@ from .state_function import Kernels
 from .system import FIRST_REAL, REALS, classes
 
 FAR = 100.0  # sizes of a scene: its distance from the origin above which it has one of its own
-LOCAL, POINTS = "local origin", "points"  # in Packed.shared
+LOCAL, POINTS, LAST = "local origin", "points", "last origin"  # in Packed.shared
 
 
 def origin_of(packed, q):
     """The origin (3,) for a run from positions q (n,), or None for that of the scene."""
+    of, origin = packed.shared.get(LAST, (None, None))
+    if of is not q:
+        origin = _origin(packed, q)
+        packed.shared[LAST] = q, origin
+    return origin
+
+
+def _origin(packed, q):
     if POINTS not in packed.shared:
         packed.shared[POINTS] = _points(packed)
     grounded, longest = packed.shared[POINTS]
-    if np.abs(q).max() <= FAR * longest:
+    if np.maximum.reduce(np.abs(q)) <= FAR * longest:
         return None
     places = np.concatenate((q[packed.system.bodies[:, :1] + np.arange(3)], grounded))
     low, high = places.min(axis=0), places.max(axis=0)

@@ -161,6 +161,11 @@ class Carrier:
                 clock[T_END] = self.grid = self._next()
         return Status.SLICE_DONE
 
+    @property
+    def reason(self):
+        """What there is to say of how the run ended."""
+        return self.memory.reason
+
     def _is_regular(self):
         sizes = self.context.free.sizes
         return sizes[SHARE] >= max(REGULAR * sizes[LARGEST_SHARE], self.share)

@@ -38,7 +38,7 @@ class Prepared:
     def __init__(self, scene, packed):
         self.packed, self.motions = packed, scene.motions()
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
-        self._start = None, None
+        self._start, self.explicit = (None, None), {}  # `explicit`: the method last chosen, see choice.py
         every = scene.__dict__.setdefault("_spare", {})
         if len(every) >= KINDS:
             every.clear()

@@ -67,7 +67,8 @@ class Record(NamedTuple):
 
 def enter_joints(run, handles, remembered):
     """Let a run count the angles of a scene's joints from those remembered on."""
-    run.joints[:], run.frames[:], run.remembered[:] = handles.joints, handles.frames, remembered
+    if remembered.size:
+        run.joints[:], run.frames[:], run.remembered[:] = handles.joints, handles.frames, remembered
 
 
 def lay_out(n, nx, ny, tableau, memory, warm, block, slots, angles):

@@ -114,7 +114,7 @@ def is_due(t, period):
 
 def instants_of(packed, t0, t1):
     """The instants within (t0, t1) at which a function is asked, s, increasing."""
-    found = [np.empty(0)]
+    found = []
     for load in sampled(packed):
         period = load.force.period
         count = (t1 - t0) / period
@@ -125,4 +125,4 @@ def instants_of(packed, t0, t1):
             )
         times = np.arange(math.floor(t0 / period), math.ceil(t1 / period) + 1) * period
         found.append(times[(times > t0) & (times < t1)])
-    return np.unique(np.concatenate(found))
+    return np.unique(np.concatenate(found)) if found else np.empty(0)

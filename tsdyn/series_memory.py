@@ -69,6 +69,8 @@ class SeriesMemory:
         The highest order that there is room for.
     """
 
+    reason = ""  # of the end of a run: told by its status
+
     def __init__(self, prepared, highest):
         self.series, self.packed, self.weight = prepared.series, prepared.packed, prepared.n
         packed = self.packed
@@ -114,8 +116,10 @@ class SeriesMemory:
         numbers[ADAPTIVE], numbers[DENSE] = method.step is None, dense
         numbers[STEPS_WANTED] = step_count(*task.span, method.step) if method.step else 2**62
         numbers[LEAVE_WHEN_STIFF] = task.choose is not None
-        self.context.expansion.order[[TOP, NEXT, LOWEST, HIGHEST]] = order[0], *order
-        self.context.expansion.order[REFINED] = max(method.refined, int(len(self.series.network.bodies) > MANY))
+        orders = self.context.expansion.order
+        orders[TOP] = order[0]
+        orders[NEXT], orders[LOWEST], orders[HIGHEST] = order
+        orders[REFINED] = max(method.refined, int(len(self.series.network.bodies) > MANY))
 
     def load(self):
         """Load the driver, where this process has not called it yet."""

@@ -24,7 +24,6 @@ from .rigid_shift import RigidShift
 
 STEP, SHARE = 0.25, 0.05  # of a joint in a loop: rad; of the scene's size
 LEAST = 2.0**-8  # of the way, of a step that is halved where it can't be assembled
-TURN_ROUND = 2.0 * math.pi
 
 
 class Goal:
@@ -129,15 +128,19 @@ def _link(joint, given):
 def _kind_of_rate(handles, joint, given):
     """What `rate` is the rate of: the kind that is given, or the only one that the joint has."""
     asked = [kind for kind, pair in given.items() if pair[0] is not None]
-    declared = getattr(handles.item(joint), "joint_coordinates", ())
-    has = list(dict.fromkeys("angle" if isinstance(each, Angle) else "displacement" for each in declared))
-    kinds = asked if len(asked) == 1 else has
+    kinds = asked if len(asked) == 1 else _kinds(handles, joint)
     if len(kinds) > 1:
         raise InvalidArgument(f"set: {joint!r} has two kinds of rates; give angle_rate= or displacement_rate=.")
-    kind = kinds[0] if kinds else "angle"  # refused by name later
+    kind = kinds[0]
     if given[kind][1] is not None:
         raise InvalidArgument(f"set: give rate= or {kind}_rate=, not both.")
     return kind
+
+
+def _kinds(handles, joint):
+    """The kinds of coordinates that a joint has; of what has none "angle", which is refused by name later."""
+    declared = getattr(handles.item(joint), "joint_coordinates", ())
+    return list(dict.fromkeys("angle" if isinstance(each, Angle) else "displacement" for each in declared)) or ["angle"]
 
 
 def _goals(scene, handles, joint, kind, pair, t):
@@ -151,7 +154,7 @@ def _goals(scene, handles, joint, kind, pair, t):
         bodies = handles.motions(geometry, (q, qd))
         value, rate = (float(evaluate(geometry, *bodies, level)) for level in (0, 1))
         if kind == "angle":
-            value += TURN_ROUND * round((near[row.first + i] - value) / TURN_ROUND)
+            value = float(joint_motion.counted(value, near[row.first + i]))
         goals.append(Goal(geometry, value, rate, *new))
     return goals
 
@@ -169,9 +172,7 @@ def _numbers(joint, name, value, count):
 
 def _present(scene, handles, joint, t):
     """All coordinates of a joint, to stay as they are."""
-    declared = getattr(handles.item(joint), "joint_coordinates", ())
-    kinds = dict.fromkeys("angle" if isinstance(each, Angle) else "displacement" for each in declared)
-    return [goal for kind in kinds or ("angle",) for goal in _goals(scene, handles, joint, kind, (None, None), t)]
+    return [goal for kind in _kinds(handles, joint) for goal in _goals(scene, handles, joint, kind, (None, None), t)]
 
 
 def _drive(scene, joint, goals, held, t):
@@ -181,7 +182,7 @@ def _drive(scene, joint, goals, held, t):
     shift = RigidShift.of(scene, joint)
     for goal in goals:
         if goal.turns and not threaded:  # whole turns move nothing
-            goal.value += TURN_ROUND * round((goal.new_value - goal.value) / TURN_ROUND)
+            goal.value = float(joint_motion.counted(goal.value, goal.new_value))
         way = abs(goal.new_value - goal.value) / (STEP if goal.turns else SHARE * size)
         steps = max(steps, math.ceil(way)) if shift is None else 1
     share, step, before = 0.0, 1.0 / steps, scene.start

@@ -166,7 +166,7 @@ def simulate(
     driver, origin, said = DRIVERS.get(method.driver, method.driver), origin_of(kept.packed, q), ""
     if origin is None:
         limited, said = within_rounding(method, kept.packed, q)
-        outcome = driver(task._replace(method=limited))
+        outcome = driver(task if limited is method else task._replace(method=limited))
     else:
         outcome = run_near(driver, task, scene, origin, initial_tol)
     ended = time.perf_counter()

@@ -80,9 +80,9 @@ class Solution(Kinematics):
         self.handles = task.prepared.handles
         rows, n, angles = outcome.rows, task.q.size, self.handles.count
         self.t = rows[:, 0].copy()
-        self.q, self.qd, self.qdd = (rows[:, 1 + i * n : 1 + (i + 1) * n].copy() for i in range(3))
-        self.anchor = Anchor(rows[:, 1 + 3 * n : 1 + 3 * n + angles].copy())
-        self._remembers = rows[:, 1 + 3 * n + angles :].copy()  # (k, slots), what forces remember
+        self.q, self.qd, self.qdd = rows[:, 1 : 1 + 3 * n].reshape(-1, 3, n).swapaxes(0, 1).copy()
+        rest = rows[:, 1 + 3 * n :].copy()
+        self.anchor, self._remembers = Anchor(rest[:, :angles]), rest[:, angles:]  # (k, slots), what forces remember
         self._reached, self._last = outcome.reached, outcome.last
         self._angles, self._remembered = outcome.remembered[:angles], outcome.remembered[angles:]
         self._step_log, self._chart_log = outcome.steps, outcome.charts
@@ -179,7 +179,7 @@ class Solution(Kinematics):
     def charts(self):
         """History of the charts, a `Charts`; raises InvalidArgument if the run kept none."""
         t, reasons, condition, contraction, steps = self._kept(self._chart_log).arrays()
-        return Charts(t, tuple(REASONS[i] for i in reasons.tolist()), condition, contraction, steps.astype(int))
+        return Charts(t, tuple(REASONS[int(i)] for i in reasons.tolist()), condition, contraction, steps.astype(int))
 
     @staticmethod
     def _kept(log):

@@ -7,7 +7,7 @@ from .assembly import set_time
 from .axis_rows import is_axis
 from .block_kernels import solve
 from .errors import RedundantConstraints, SingularConfiguration, Status
-from .evaluate import constraint_arrays
+from .evaluate import constraint_arrays, dependent
 from .free_memory import allocate_free
 from .initial import ROUNDING, demand_finite, demand_small
 from .landing import PIVOT_LIMIT, factorise, find_drift, gather_speeds, land, land_velocities, move_by
@@ -15,7 +15,7 @@ from .massless import axis_of
 from .network import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, network_of
 from .normal import gather, scatter
 from .poses import move_bodies, place_bodies, write_positions, write_velocities
-from .rank import RANK_TOL, check_rank
+from .rank import check_rank
 from .rows import run_loops
 from .selection import drop_rows, factor_rows, select
 from .still import keep_turning, settle, still
@@ -279,12 +279,7 @@ class _Start:
         A = constraint_arrays(self.scene.system, q, self.qd, self.t)[1][network.row[joints]]
         for at in self.at:  # without the changes of length of p, which the normalisations hold
             A[:, at] -= np.outer(A[:, at] @ q[at], q[at])
-        A /= np.linalg.norm(A, axis=1)[:, None]
-        from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
-
-        r, order = qr(A.T, mode="r", pivoting=True)
-        size = np.abs(np.diag(r))
-        return joints[np.sort(order[int((size > RANK_TOL * size[0]).sum()) :])]
+        return joints[np.sort(dependent(A))]
 
     def serve(self, rows):
         """Drop these rows; whether S of the others is regular."""

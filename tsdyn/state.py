@@ -44,6 +44,8 @@ class RememberingState(Kinematics, State):
 def remembered(state, prepared, t, q):
     """What a run from a state given to `simulate`, or None, goes on from: joints' angles, then what forces remember."""
     slots, memory = prepared.packed.system.memory.size, getattr(state, "memory", None)
+    if state is None and not (slots or prepared.handles.count):
+        return np.empty(0)
     if memory is None and state is not None and slots:
         raise InvalidArgument(
             "parts of the scene count turns or hold a load, and this state doesn't say how many: give solution.state, "
@@ -62,4 +64,4 @@ def remembered(state, prepared, t, q):
         if getattr(load.force, "remembers_angle", False):
             row = prepared.handles.row(load.force.joint, "angle")
             memory[load.slot] = angles[row.first + load.force.which]
-    return np.append(angles, memory)
+    return np.concatenate((angles, memory))

@@ -42,8 +42,9 @@ class Task(NamedTuple):
     @property
     def within(self):
         """Whether anything is asked for between the ends of steps."""
-        inside = (self.times > self.span[0]) & (self.times < self.span[1])
-        return self.dense_output or self.events is not None or bool(inside.any())
+        times, (t0, t1) = self.times, self.span
+        inside = times.size > 2 or any(t0 < t < t1 for t in times.tolist())
+        return self.dense_output or self.events is not None or inside
 
 
 class Outcome(NamedTuple):

@@ -1,25 +1,32 @@
 """Constraints, one file each: primitives and the joints made of them; a new file in this folder is found by itself."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from .._discovery import export_all
+
+if TYPE_CHECKING:
+    from ..hints import Joint, Primitive
 
 __all__ = export_all(__name__, __path__, globals(), "Primitive", "Joint")
 __all__ += ["registered", "registered_joints"]
 
 
-def registered():
+def registered() -> tuple[type[Primitive], ...]:
     """Return every primitive class known, built in or plugged in."""
     from ..primitive import registered as known
 
     return tuple(known().values())
 
 
-def registered_joints():
+def registered_joints() -> tuple[type[Joint], ...]:
     """Return every joint class known, built in or plugged in."""
     from ..joint import registered as known
 
     return tuple(known().values())
 
 
-def __dir__():
+def __dir__() -> list[str]:
     """What users use, for completion."""
     return sorted(__all__)

@@ -10,12 +10,19 @@
 Holds after half a turn, too: a start there is refused. Singular where h is along the axis f x g.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..markers import Vector
 from ..motion import Motion
 from ..primitive import Primitive
 from ..recurrences import dot, product, scaled, sine_cosine
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class AngleDriver(Primitive):
@@ -46,7 +53,17 @@ class AngleDriver(Primitive):
     prescribed = "angle"
     slots = 14
 
-    def __init__(self, a, b, *, reference_a=None, across_a=None, reference_b=None, angle=0.0, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        reference_a: ArrayLike | None = None,
+        across_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        angle: Prescribed = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (reference_a, across_a, reference_b), name)
         self.angle = angle
 
@@ -55,7 +72,7 @@ class AngleDriver(Primitive):
         super().__setattr__(name, Motion.always(value, f"{self.name}: angle") if name == "angle" else value)
 
     @property
-    def opposed(self):
+    def opposed(self) -> tuple[Any, ...]:
         """The directions that must not be opposed: that at the angle, and reference_b."""
         return (((self.a, Turned(self.reference_a, self.across_a, self.angle)), (self.b, self.reference_b)),)
 
@@ -137,7 +154,7 @@ class AngleDriver(Primitive):
 class Turned:
     """The direction at a motion's angle between two that are at right angles: a function of time."""
 
-    def __init__(self, f, g, angle):
+    def __init__(self, f: float, g: float, angle: Prescribed) -> None:
         self.f, self.g, self.angle = f, g, angle
 
     def __call__(self, t):

@@ -5,7 +5,10 @@
 Singular where a and b are parallel (an angle of 0 or pi): Parallel keeps them so.
 """
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +19,9 @@ from ..joint import Joint
 from ..markers import Vector
 from ..motions import Smooth
 from .dot1 import Dot1
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class ConstantAngle(Joint):
@@ -44,7 +50,16 @@ class ConstantAngle(Joint):
 
     markers = (Vector("a"), Vector("b"))
 
-    def __init__(self, a, b, *, axis_a=None, axis_b=None, angle=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        angle: Prescribed | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (axis_a, axis_b), name)
         if angle is None:
             u, v = (rotation_matrix(body.orientation) @ s for body, s in zip((a, b), self.coordinates, strict=True))

@@ -9,6 +9,10 @@
 Singular where x_a = x_b: a distance of zero is a Spherical joint.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..bodies import rotation_matrix
@@ -17,6 +21,9 @@ from ..markers import Point
 from ..motion import Motion
 from ..primitive import Primitive
 from ..recurrences import square
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class Distance(Primitive):
@@ -42,7 +49,16 @@ class Distance(Primitive):
     markers = (Point("a"), Point("b"))
     prescribed = "length"
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), length=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        length: Prescribed | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b), name)
         if length is None:
             ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]

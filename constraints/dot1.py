@@ -8,10 +8,17 @@
 Singular where a and b are parallel (c = 1 or -1): two Dot1 rows with directions across make axes parallel.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..errors import InvalidConstraint
 from ..markers import Vector
 from ..motion import Motion
 from ..primitive import Primitive
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class Dot1(Primitive):
@@ -37,7 +44,16 @@ class Dot1(Primitive):
     markers = (Vector("a"), Vector("b"))
     prescribed = "value"
 
-    def __init__(self, a, b, *, axis_a=None, axis_b=None, value=0.0, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        value: Prescribed = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (axis_a, axis_b), name)
         self.value = value
         self.check()

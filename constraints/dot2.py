@@ -9,9 +9,16 @@
 Never singular by itself.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..markers import Point, Vector
 from ..motion import Motion
 from ..primitive import Primitive
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class Dot2(Primitive):
@@ -39,7 +46,17 @@ class Dot2(Primitive):
     markers = (Vector("a"), Point("a"), Point("b"))
     prescribed = "value"
 
-    def __init__(self, a, b, *, axis_a=None, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), value=0.0, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        axis_a: ArrayLike | None = None,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        value: Prescribed = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (axis_a, point_a, point_b), name)
         self.value = value
 

@@ -7,8 +7,15 @@
 Every rigid body of a scene has one by itself.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..markers import Parameters
 from ..primitive import Primitive
+
+if TYPE_CHECKING:
+    from ..hints import Body
 
 
 class EulerNormalization(Primitive):
@@ -31,7 +38,7 @@ class EulerNormalization(Primitive):
     markers = (Parameters("a"),)
     normalises = True
 
-    def __init__(self, a, *, name=""):
+    def __init__(self, a: Body, *, name: str = "") -> None:
         super().__init__(a, None, (None,), name)
 
     @staticmethod

@@ -8,12 +8,19 @@ f_a and f_b are the references made perpendicular to the axes, g = axis x f. Hol
 axis, too: a start there is refused. Never singular.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Self
+
 from ..bodies import Ground, PointMass, rotation_matrix
 from ..calls import Placing
 from ..framed_joint import FramedJoint
 from .dot1 import Dot1
 from .parallel import Parallel
 from .spherical import Spherical
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 DEFAULT = (0.0, 0.0, 1.0)  # the axis in a's frame; any would do
 
@@ -45,22 +52,22 @@ class Fixed(FramedJoint):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        axis_a=None,
-        axis_b=None,
-        reference_a=None,
-        reference_b=None,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        reference_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
         self.check()
 
     @Placing
-    def at(cls, a, b=None, *, point=None, **arguments):
+    def at(cls, a: BodyLike, b: BodyLike | None = None, *, point: ArrayLike | None = None, **arguments: Any) -> Self:
         """Make one from points and directions in the ground frame; none are needed."""
         bodies = [body for body in (b, a) if isinstance(body, (PointMass, Ground))]
         if point is None and len(bodies) == 2 and not {"point_a", "point_b"} & arguments.keys():

@@ -11,6 +11,10 @@ The line of centres turns with whatever carries the wheels, so a planet gear nee
 the last accepted step, so a step must turn less than half a turn. Singular where l, f or h is along the axis.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._kernel import kernel
@@ -24,6 +28,9 @@ from ..markers import Point, Vector
 from ..primitive import Primitive
 from ..recurrences import cross, dot, quotient, scaled, square
 from .thread import place
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Gear(Primitive):
@@ -65,18 +72,18 @@ class Gear(Primitive):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        axis_a=None,
-        reference_a=None,
-        reference_b=None,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        ratio=None,
-        offset=None,
-        name="",
-    ):
+        axis_a: ArrayLike | None = None,
+        reference_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        ratio: float | None = None,
+        offset: float | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (axis_a, reference_a, reference_b, point_a, point_b), name)
         self.ratio = ratio
         u, f, h, l = self._now()

@@ -6,10 +6,17 @@ The two rows are orthonormal in terms of small relative rotations. They hold wit
 refused. Never singular.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..joint import Joint, across
 from ..joint_coordinates import Angle
 from ..markers import Vector
 from .dot1 import Dot1
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Parallel(Joint):
@@ -36,7 +43,15 @@ class Parallel(Joint):
     markers = (Vector("a"), Vector("b"))
     joint_coordinates = (Angle(),)
 
-    def __init__(self, a, b, *, axis_a=None, axis_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (axis_a, axis_b), name)
 
     def compose(self):

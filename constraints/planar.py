@@ -6,11 +6,18 @@
 Holds with the normals opposed, too: a start there is refused. Never singular.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..joint import Joint
 from ..joint_coordinates import Angle
 from ..markers import Point, Vector
 from .dot2 import Dot2
 from .parallel import Parallel
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Planar(Joint):
@@ -40,7 +47,17 @@ class Planar(Joint):
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(),)
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
 
     def compose(self):

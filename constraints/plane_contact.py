@@ -8,8 +8,15 @@
 Never singular by itself.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..markers import Point, Vector
 from ..primitive import Primitive
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class PlaneContact(Primitive):
@@ -40,7 +47,16 @@ class PlaneContact(Primitive):
     rows = 1
     markers = (Point("a"), Point("b"), Vector("b", "normal_b"))
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), normal_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        normal_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, normal_b), name)
 
     @staticmethod

@@ -5,6 +5,10 @@
 Never singular.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import InvalidConstraint
@@ -13,6 +17,9 @@ from ..markers import Point
 from ..motion import Motion
 from ..table import is_data
 from .dot2 import Dot2
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Path
 
 
 class PointDriver(Joint):
@@ -43,7 +50,16 @@ class PointDriver(Joint):
 
     markers = (Point("a"), Point("b"))
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), path=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        path: Path | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b), name)
         self.path = path
         self.check()

@@ -5,10 +5,17 @@
 Never singular.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..joint import Joint, across
 from ..joint_coordinates import Displacement
 from ..markers import Point, Vector
 from .dot2 import Dot2
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class PointOnLine(Joint):
@@ -39,7 +46,16 @@ class PointOnLine(Joint):
     markers = (Point("a"), Point("b"), Vector("b"))
     joint_coordinates = (Displacement("axis_b"),)
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_b), name)
 
     def compose(self):

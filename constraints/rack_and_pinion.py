@@ -6,6 +6,10 @@ e is the rack's direction, h a direction of the pinion made perpendicular to its
 are, and counts no turns. Singular where the axis of the pinion is along the rack: joints keep it across.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import InvalidConstraint
@@ -14,6 +18,9 @@ from ..joint import Joint
 from ..joint_coordinates import Angle, Displacement
 from ..markers import Point, Vector
 from .thread import Thread, demand_lead, travel
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class RackAndPinion(Joint):
@@ -62,18 +69,18 @@ class RackAndPinion(Joint):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        axis_a=None,
-        axis_b=None,
-        direction_a=None,
-        reference_b=None,
-        radius=None,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        direction_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        radius: float | None = None,
+        name: str = "",
+    ) -> None:
         given = reference_b if reference_b is not None else direction_a
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b, direction_a, given), name)
         self.radius = demand_lead(self, "radius", radius)

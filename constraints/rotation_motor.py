@@ -6,6 +6,10 @@ f_a and f_b are the references made perpendicular to the axes. Holds after half 
 Singular where the axes are at right angles: a joint keeps them together.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Self
+
 import numpy as np
 
 from ..calls import fitting
@@ -14,6 +18,9 @@ from ..framed_joint import FramedJoint, beside, turned_about
 from ..joint_coordinates import Angle
 from ..motion import Motion
 from .angle_driver import AngleDriver
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Joint, Prescribed
 
 
 class RotationMotor(FramedJoint):
@@ -51,18 +58,18 @@ class RotationMotor(FramedJoint):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        axis_a=None,
-        axis_b=None,
-        reference_a=None,
-        reference_b=None,
-        angle=0.0,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        reference_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        angle: Prescribed = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
         self.angle = angle
         set_apart(self, reference_a is None, reference_b is None, Motion.at_start(self.angle))
@@ -78,7 +85,7 @@ class RotationMotor(FramedJoint):
 
     @classmethod
     @fitting
-    def of(cls, joint, *, angle, name=""):
+    def of(cls, joint: Joint, *, angle: Prescribed, name: str = "") -> Self:
         """Make the motor that turns b of a joint against a, about its axis, from where the bodies stand now."""
         return cls(*geometry(joint), **axes(joint), angle=angle, name=name)
 

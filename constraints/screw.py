@@ -8,12 +8,19 @@ f_a and f_b are the references made perpendicular to the axes. (1) holds with th
 refused. (3) is periodic as the thread is, and counts no turns. Never singular.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..framed_joint import FramedJoint
 from ..joint_coordinates import Angle, Displacement
 from .parallel import Parallel
 from .point_on_line import PointOnLine
 from .rotation_motor import set_apart
 from .thread import Thread, demand_lead, travel
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Screw(FramedJoint):
@@ -50,18 +57,18 @@ class Screw(FramedJoint):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        axis_a=None,
-        axis_b=None,
-        reference_a=None,
-        reference_b=None,
-        lead=None,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        reference_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        lead: float | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
         self.lead = demand_lead(self, "lead", lead)
         turn = travel(a, b, self.axis_a, self.point_a, self.point_b) / self.lead
@@ -94,7 +101,7 @@ class Screw(FramedJoint):
         )
 
     @property
-    def travel_per_radian(self):
+    def travel_per_radian(self) -> float:
         """The lead, m/rad: its angle and its displacement are one freedom."""
         return self.lead
 

@@ -7,8 +7,15 @@
 Never singular by itself.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..markers import Point
 from ..primitive import Primitive
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Spherical(Primitive):
@@ -35,7 +42,15 @@ class Spherical(Primitive):
     rows = 3
     markers = (Point("a"), Point("b"))
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b), name)
 
     @staticmethod

@@ -13,6 +13,10 @@ It is periodic as a thread is, so no turns are counted; the neighbouring solutio
 Singular where h is along f x g.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..bodies import rotation_matrix
@@ -21,6 +25,9 @@ from ..errors import InvalidConstraint
 from ..markers import Point, Vector
 from ..primitive import Primitive
 from ..recurrences import dot, product, scaled, sine_cosine
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Thread(Primitive):
@@ -61,18 +68,18 @@ class Thread(Primitive):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        reference_a=None,
-        across_a=None,
-        axis_a=None,
-        reference_b=None,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        lead=None,
-        name="",
-    ):
+        reference_a: ArrayLike | None = None,
+        across_a: ArrayLike | None = None,
+        axis_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        lead: float | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (reference_a, across_a, axis_a, reference_b, point_a, point_b), name)
         self.lead = lead
         self.check()

@@ -5,6 +5,10 @@
 Never singular by itself.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Self
+
 from ..calls import fitting
 from ..joint import Joint
 from ..joint_coordinates import Displacement
@@ -12,6 +16,9 @@ from ..markers import Point, Vector
 from ..motion import Motion
 from .dot2 import Dot2
 from .rotation_motor import axes, geometry
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class TranslationMotor(Joint):
@@ -45,8 +52,16 @@ class TranslationMotor(Joint):
     joint_coordinates = (Displacement(),)
 
     def __init__(
-        self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, displacement=0.0, name=""
-    ):
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        displacement: Prescribed = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a), name)
         self.displacement = displacement
         self.check()
@@ -59,7 +74,7 @@ class TranslationMotor(Joint):
 
     @classmethod
     @fitting
-    def of(cls, joint, *, displacement, name=""):
+    def of(cls, joint: Joint, *, displacement: Prescribed, name: str = "") -> Self:
         """Make the motor that moves b of a joint against a, along its axis, measured between the joint's points."""
         bodies, given = geometry(joint), axes(joint)
         given.pop("axis_b")

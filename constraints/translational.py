@@ -8,11 +8,18 @@ f_a and f_b are the references made perpendicular to the axes, g = axis x f. Hol
 is refused. Never singular.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..framed_joint import FramedJoint
 from ..joint_coordinates import Displacement
 from .dot1 import Dot1
 from .parallel import Parallel
 from .point_on_line import PointOnLine
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Translational(FramedJoint):
@@ -46,17 +53,17 @@ class Translational(FramedJoint):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        axis_a=None,
-        axis_b=None,
-        reference_a=None,
-        reference_b=None,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        reference_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
         self.check()
 

@@ -7,6 +7,10 @@ Never singular. Shafts at an angle beta turn at the same speed on average only: 
 sin(theta)^2), theta being the turn of the shaft of a from where its arm is across both.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Self
+
 import numpy as np
 
 from ..attachment import in_frame
@@ -17,6 +21,9 @@ from ..joint_coordinates import Angle
 from ..markers import Point, Vector
 from .dot1 import Dot1
 from .spherical import Spherical
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 ALONG = 1e-6  # sine of the angle below which an arm would lie along the shaft
 
@@ -48,11 +55,30 @@ class Universal(Joint):
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(direction="axis_b"), Angle("axis_b", direction="axis_a"))
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
 
     @Placing
-    def at(cls, a, b=None, *, point=None, axis=None, axis_b=None, **arguments):
+    def at(
+        cls,
+        a: BodyLike,
+        b: BodyLike | None = None,
+        *,
+        point: ArrayLike | None = None,
+        axis: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        **arguments: Any,
+    ) -> Self:
         """Make one from its point and axes in the ground frame, the bodies being where they stand now.
 
         Parameters

@@ -5,7 +5,10 @@ where a step's inside is wanted, give an interpolant of order seven. E. Hairer, 
 Ordinary Differential Equations I, 2nd ed., II.5, II.6 and II.10. The coefficients are those that SciPy carries.
 """
 
+from __future__ import annotations
+
 from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +16,9 @@ from ..integrator import ExplicitRungeKutta
 from ..interpolation import DOP853 as INTERPOLANT
 from ..stepping import embedded_error, second_embedded_error
 from ..tableau import RungeKuttaTableau
+
+if TYPE_CHECKING:
+    from ..hints import StepKernel
 
 
 @cache
@@ -59,14 +65,14 @@ class DOP853(ExplicitRungeKutta):
     errors = (embedded_error, second_embedded_error)
 
     @property
-    def tableau(self):
+    def tableau(self) -> RungeKuttaTableau:
         """The `RungeKuttaTableau`."""
         return _coefficients()[0]
 
-    def kernel(self, first_order):
+    def kernel(self, first_order: bool) -> StepKernel:
         """The step kernel; the interpolant's numbers after the tableau's, and room for its four derivatives."""
         return super().kernel(first_order)[0], _coefficients()[1], lambda nx, ny: 17 * (nx + ny)
 
-    def interpolant(self, first_order):
+    def interpolant(self, first_order: bool) -> Any:
         """Its own, of order seven, for either form."""
         return INTERPOLANT

@@ -1,5 +1,7 @@
 """ImplicitTrapezoid: the trapezoidal rule, order 2, A-stable, without damping; its Jacobian is kept and used again."""
 
+from __future__ import annotations
+
 from ..implicit import trapezoid_error
 from ..integrator import DiagonallyImplicit
 from ..interpolation import linear_second
@@ -28,6 +30,6 @@ class ImplicitTrapezoid(DiagonallyImplicit):
     tableau = ImplicitTableau(a=((0,), (1 / 2, 1 / 2)), c=(0, 1), order=2, embedded_order=2)
     errors, second = (trapezoid_error,), linear_second
 
-    def step_tolerances(self):
+    def step_tolerances(self) -> tuple[float, float]:
         """A step's error has order 3 and a run's order 2: the power makes the latter follow the tolerance."""
         return tuple(min(tol / 100.0, (tol / 100.0) * (tol / 1e-3) ** 0.5) for tol in (self.rtol, self.atol))

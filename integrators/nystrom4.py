@@ -11,6 +11,8 @@ Stages 2 and 3 share their position, so a step places the system three times (th
 Nystrom 1925; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.14, Eq. (14.13).
 """
 
+from __future__ import annotations
+
 from ..integrator import ExplicitNystrom
 from ..tableau import NystromTableau, RungeKuttaTableau
 
@@ -46,5 +48,5 @@ class Nystrom4(ExplicitNystrom):
         a=((), (1 / 2,), (0, 1 / 2), (0, 0, 1)), b=(1 / 6, 1 / 3, 1 / 3, 1 / 6), c=(0, 1 / 2, 1 / 2, 1), order=4
     )
 
-    def __init__(self, step=1e-3):
+    def __init__(self, step: float = 1e-3) -> None:
         super().__init__(step)

@@ -4,6 +4,8 @@ The coefficients of r, A, omega' and the multipliers follow order by order from 
 tsdyn.expansion); at a step's end positions and velocities are put back on the constraints.
 """
 
+from __future__ import annotations
+
 import math
 
 from ..checks import positive, whole
@@ -46,7 +48,17 @@ class Taylor(Integrator):
     driver = "series"
     margin = 1000.0
 
-    def __init__(self, tol=1e-15, order=None, *, rtol=None, atol=None, step=None, max_step=None, first_step=None):
+    def __init__(
+        self,
+        tol: float = 1e-15,
+        order: int | None = None,
+        *,
+        rtol: float | None = None,
+        atol: float | None = None,
+        step: float | None = None,
+        max_step: float | None = None,
+        first_step: float | None = None,
+    ) -> None:
         self.tol = positive(tol, "Taylor: tol")
         self.rtol = self.tol if rtol is None else positive(rtol, "Taylor: rtol")
         self.atol = self.tol if atol is None else positive(atol, "Taylor: atol")
@@ -59,7 +71,7 @@ class Taylor(Integrator):
         if self.fixed is not None:
             self.order = self.embedded_order = self.fixed
 
-    def step_tolerances(self):
+    def step_tolerances(self) -> tuple[float, float]:
         """Return (rtol, atol) that each step's error is held to.
 
         Truncation has one sign for many steps and adds up, rounding has either. So below TIGHT the margin grows, until
@@ -75,11 +87,11 @@ class Taylor(Integrator):
         return 0.5 * (self.rtol + self.atol) < TIGHT
 
     @property
-    def refined(self):
+    def refined(self) -> int:
         """How many orders of the multipliers are refined, from zero on."""
         return REFINED if self._tight else 0
 
-    def orders(self):
+    def orders(self) -> tuple[int, int, int]:
         """Return the first step's order, and the lowest and highest of all."""
         if self.fixed is not None:
             return self.fixed, self.fixed, self.fixed
@@ -88,11 +100,11 @@ class Taylor(Integrator):
         return first, LOWEST, min(first + 8, HIGHEST)
 
     @property
-    def stages(self):
+    def stages(self) -> int:
         """Orders of a step, each of which costs about an evaluation."""
         return self.orders()[0]
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         tolerance = (
             f"tol={self.tol:g}" if self.rtol == self.atol == self.tol else (f"rtol={self.rtol:g}, atol={self.atol:g}")
         )

@@ -104,7 +104,7 @@ profiling
 tables plots
 benchmark_plot
 profile_plot
-cli __init__
+cli __init__ hints
 __main__
 """
 

@@ -1,6 +1,9 @@
 """`scene.assemble`: the nearest consistent positions, then the nearest consistent velocities."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +17,11 @@ from .folds import Folds
 from .initial import ROUNDING, demand_finite
 from .kinetic import Metric, least_step, row_lengths
 from .names import named
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .hints import PointMass, Scene
 
 STIFFER = (0.1, 0.01, 0.001)  # softness of what keeps a fold, from try to try
 
@@ -47,7 +55,13 @@ class AssemblyReport:
 
 
 @fitting
-def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
+def assemble(
+    scene: Scene,
+    tol: float = 1e-12,
+    fixed: Sequence[PointMass | str] = (),
+    t: float = 0.0,
+    folds: Folds = "keep",
+) -> AssemblyReport:
     """Move the bodies to the nearest consistent positions, then to the nearest consistent velocities.
 
     Parameters

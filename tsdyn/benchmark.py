@@ -1,9 +1,12 @@
 """`benchmark`: run time against error of integration methods on a scene of the user's."""
 
+from __future__ import annotations
+
 import contextlib
 import signal
 import threading
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,23 +20,28 @@ from .integrator import Integrator, registered
 from .scene import Scene
 from .simulate import simulate
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from .hints import ArrayLike, Formulation, Methods, Span
+
 
 @fitting
 def benchmark(
-    scene,
-    methods=None,
-    tolerances=(1e-4, 1e-6, 1e-8, 1e-10),
-    t_span=(0.0, 10.0),
+    scene: Scene,
+    methods: Methods | None = None,
+    tolerances: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10),
+    t_span: Span = (0.0, 10.0),
     *,
-    steps=(),
-    t_eval=None,
-    repeats=3,
-    formulation="tangent",
-    constraint_tol=1e-12,
-    max_steps=200_000,
-    reference=None,
-    progress=None,
-):
+    steps: Sequence[float] = (),
+    t_eval: ArrayLike | None = None,
+    repeats: int = 3,
+    formulation: Formulation = "tangent",
+    constraint_tol: float = 1e-12,
+    max_steps: int = 200_000,
+    reference: Reference | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> Benchmark:
     """Measure run time against error of integration methods on a scene; the scene is not changed.
 
     Parameters

@@ -4,7 +4,9 @@ Nothing here calls the solver's kernels. Constraint errors carry each marker's v
 the primitive's phi as a truncated Taylor series, so neither its jacobian nor its gamma is used.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,15 +16,18 @@ from .jet import Jet
 from .markers import PARAMETERS, POINT, TURN
 from .motion import Motion
 
+if TYPE_CHECKING:
+    from .hints import Floats
+
 AT_ONCE = 1 << 16  # numbers in an array: constraints and bodies are taken together up to that
 
 
 class ConstraintError(NamedTuple):
     """Maximum norms of the left-hand sides of Eqs. 1, 2 and 3 at every output, shapes (k,)."""
 
-    position: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
 
 
 def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0, memory=None):

@@ -1,6 +1,9 @@
 """Scenes that change: a body, constraint or force taken out again, and a copy of the whole."""
 
+from __future__ import annotations
+
 from copy import deepcopy
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -9,11 +12,14 @@ from .bodies import Ground, PointMass
 from .errors import InvalidArgument, InvalidBody
 from .names import named
 
+if TYPE_CHECKING:
+    from .hints import Scene
+
 SHOWN = 5  # in a message
 WHAT = "body, constraint or force"  # has a name
 
 
-def remove(scene, item):
+def remove(scene: Scene, item: Any) -> Any:
     """Take a body, constraint, joint or force out of the scene; solutions made before go on to serve.
 
     Parameters
@@ -90,7 +96,7 @@ def _users(scene, item):
     ]
 
 
-def copy(scene):
+def copy(scene: Scene) -> Scene:
     """An independent scene with handles of its own: `copy[handle]` is that of a handle of this one.
 
     Returns

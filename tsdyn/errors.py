@@ -1,6 +1,12 @@
 """What can go wrong: exceptions for what is refused before a run, a status for how a run ended."""
 
+from __future__ import annotations
+
 from enum import IntEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .hints import Solution
 
 
 class TsdynError(Exception):
@@ -50,7 +56,7 @@ class MissingDependency(TsdynError, ImportError):
 class StepFailure(TsdynError, ArithmeticError):
     """A run ended early; raised by `Solution.raise_if_failed`, with the solution so far as `.solution`."""
 
-    def __init__(self, message, solution=None):
+    def __init__(self, message: str, solution: Solution | None = None) -> None:
         super().__init__(message)
         self.solution = solution
 
@@ -81,19 +87,19 @@ class Status(IntEnum):
     PASSAGE = 16
     SAMPLING_FAILED = 17
 
-    def __str__(self):
+    def __str__(self) -> str:
         return self.name.lower()
 
-    def __format__(self, spec):
+    def __format__(self, spec: str) -> str:
         return format(str(self), spec)
 
     @property
-    def sentence(self):
+    def sentence(self) -> str:
         """What happened, without the place."""
         return _SENTENCES[self][0]
 
     @property
-    def remedy(self):
+    def remedy(self) -> str:
         """What to try."""
         return _SENTENCES[self][1]
 

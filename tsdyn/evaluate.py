@@ -1,6 +1,8 @@
 """What the solver sees at one state, in plain NumPy, exactly as the paper writes it: `scene.evaluate(q, qd, t)`."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,6 +14,9 @@ from .errors import InvalidArgument, SingularConfiguration
 from .independent import dependent_rows
 from .loads import applied_loads, velocity_forces
 from .sparse_rows import WIDTH, as_csr, with_short_rows
+
+if TYPE_CHECKING:
+    from .hints import ArrayLike, Floats, Matrix, Scene
 
 NOT_UNIQUE = (
     "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
@@ -28,19 +33,19 @@ LARGE = 1000  # coordinates from which on matrices are sparse
 class Evaluation(NamedTuple):
     """Everything in the equations of motion at one state; n coordinates, m rows."""
 
-    Phi: np.ndarray  # (m,) constraints, Eq. 1
-    Phi_q: np.ndarray  # (m, n) their Jacobian
-    Phi_t: np.ndarray  # (m,) their explicit time derivative
-    gamma: np.ndarray  # (m,) Phi_q qdd + gamma = 0, Eq. 3
-    M: np.ndarray  # (n, n) mass matrix
-    Q_A: np.ndarray  # (n,) applied forces
-    S: np.ndarray  # (n,) velocity terms, on the right-hand side
-    multipliers: np.ndarray  # (m,) M qdd + Phi_q^T lam = Q_A + S
-    qdd: np.ndarray  # (n,) accelerations
+    Phi: Floats  # (m,) constraints, Eq. 1
+    Phi_q: Matrix  # (m, n) their Jacobian
+    Phi_t: Floats  # (m,) their explicit time derivative
+    gamma: Floats  # (m,) Phi_q qdd + gamma = 0, Eq. 3
+    M: Matrix  # (n, n) mass matrix
+    Q_A: Floats  # (n,) applied forces
+    S: Floats  # (n,) velocity terms, on the right-hand side
+    multipliers: Floats  # (m,) M qdd + Phi_q^T lam = Q_A + S
+    qdd: Floats  # (n,) accelerations
 
 
 @fitting
-def evaluate(scene, q=None, qd=None, t=0.0):
+def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = None, t: float = 0.0) -> Evaluation:
     """Evaluate constraints, masses, forces, multipliers and accelerations at one state.
 
     Parameters

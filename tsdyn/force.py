@@ -19,7 +19,10 @@ where that is impossible: then central differences do it. `potential` and `dissi
 `series` gets the coefficients k of x and xd, and fills column k of the scratch array s[slots, k].
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
 
@@ -32,6 +35,11 @@ from .errors import InvalidForce
 from .markers import PARAMETERS, TURN, Marker, Point
 from .primitive import SIGNATURE
 from .signal import Signal
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from .hints import AnyBody, ArrayLike, BodyLike, Random
 
 _registry = {}
 _KERNELS = {"law": 5}  # and their numbers of arguments
@@ -80,7 +88,7 @@ class Force(Attachment):
         {}
     )  # force, jacobian, remember -> Callback, compiled when a scene first uses the kind
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         where = f"force {cls.__name__}"
         markers = cls.markers if isinstance(cls.markers, (tuple, list)) else ()
@@ -103,30 +111,32 @@ class Force(Attachment):
         if not cls.__name__.startswith("_"):
             _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
-    def __init__(self, a, b=None, coordinates=(), name=""):
+    def __init__(
+        self, a: BodyLike, b: BodyLike | None = None, coordinates: Sequence[ArrayLike | None] = (), name: str = ""
+    ) -> None:
         """Attach the force to its bodies; coordinates has an entry for each marker, in the body frame."""
         if not self.markers:
             raise InvalidForce("Force is the base of forces and has no law; use one of them, or a subclass.")
         super().__init__(a, b, coordinates, name)
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked by `quantities`."""
         if name in self.quantities:
             value = self.quantities[name](value, f"{self.name}: {name}", self.error)
         super().__setattr__(name, value)
 
     @property
-    def kernels(self):
+    def kernels(self) -> Mapping[str, Any]:
         """The callbacks that run it; forces with the same ones are run together."""
         return self.own_kernels
 
-    def demand_any(self, *names):
+    def demand_any(self, *names: str) -> None:
         """Refuse a force all of whose attributes of these names are zero."""
         if all(Signal.is_zero(getattr(self, name)) for name in names):
             raise InvalidForce(f"{self.name}: it is zero at all times; set {' or '.join(names)}.")
 
     @classmethod
-    def example(cls, rng, a, b):
+    def example(cls, rng: Random, a: AnyBody, b: AnyBody) -> Self:
         """Return a random valid instance between two bodies, for tests."""
         places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code not in (PARAMETERS, TURN)}
         return cls(a, b, **places) if any(m.body == "b" for m in cls.markers) else cls(a, **places)
@@ -166,7 +176,7 @@ def vector_load(value, what, error):
     return Signal.wrap(value, 3, what, error)
 
 
-def registered():
+def registered() -> Mapping[str, type[Force]]:
     """Return every force class known, built in or plugged in, by its full name."""
     return MappingProxyType(_registry)
 

@@ -1,5 +1,9 @@
 """The checker of forces: `tsdyn.testing.check_force`."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ._kernel import entry, twin
@@ -12,6 +16,11 @@ from .power import load_powers, marker_states
 from .scene import Scene
 from .series_check import check_force_series
 from .signal import Signal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .hints import AnyBody
 
 SPACING = 4e-3  # of central differences of sixth order
 QUOTIENT = 1e-8  # what they leave, relative to the size of the Jacobian
@@ -36,7 +45,7 @@ def jacobians(packed, q, qd, t):
     return Q_q, Q_qd
 
 
-def check_force(kind, *, seed=0, states=3):
+def check_force(kind: type[Force] | Callable[[AnyBody, AnyBody], Force], *, seed: int = 0, states: int = 3) -> None:
     """Check a force's kernels; return None, or raise naming the wrong entry.
 
     Parameters

@@ -1,14 +1,22 @@
 """What an integrator is: a small object that holds its settings and names the kernel that makes a step."""
 
+from __future__ import annotations
+
 from copy import copy
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
 
 from .calls import fitting
 from .checks import positive
 from .implicit import implicit_step
 from .interpolation import HERMITE, HERMITE_FIRST_ORDER, hermite_second
 from .stepping import embedded_error, nystrom_step, runge_kutta_step, second_embedded_error, second_order_step
-from .tableau import RungeKuttaTableau
+from .tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from .hints import StepKernel
 
 _registry = {}
 
@@ -36,10 +44,15 @@ class Integrator:
     implicit = False
     driver = "steps"  # which one runs it; see tsdyn.task
     stability_limit = 0.0  # h |lambda| that its last stage and the step's end, of one time, may show; 0: not watched
-    rtol = atol = max_step = first_step = None
-    margin, errors = 30.0, (embedded_error,)
+    rtol: float | None = None
+    atol: float | None = None
+    step: float | None
+    max_step: float | None = None
+    first_step: float | None = None
+    margin: float = 30.0
+    errors: tuple[Any, ...] = (embedded_error,)
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         if "__init__" in vars(cls):
             cls.__init__ = fitting(cls.__init__)
@@ -47,35 +60,35 @@ class Integrator:
             _registry[cls.__name__.lower().replace("_", "")] = cls
 
     @fitting
-    def __init__(self, step):
+    def __init__(self, step: float) -> None:
         self.step = positive(step, f"{type(self).__name__}: step (s)")
 
-    def bounded(self, longest):
+    def bounded(self, longest: float) -> Self:
         """Return the method with steps of at most `longest`, s."""
         method = copy(self)
         method.max_step = min(self.max_step or longest, longest)
         method.step = None if self.step is None else min(self.step, longest)
         return method
 
-    def kernel(self, first_order):
+    def kernel(self, first_order: bool) -> StepKernel:
         """Return (step kernel, its numbers (float64), floats of memory it needs for systems of sizes nx, ny)."""
         raise NotImplementedError
 
-    def interpolant(self, first_order):
+    def interpolant(self, first_order: bool) -> Any:
         """Return the `Interpolant` of its steps; the one for every method uses their two ends alone."""
         return HERMITE_FIRST_ORDER if first_order else HERMITE
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"{type(self).__name__}(step={self.step:g})"
 
 
 class ExplicitNystrom(Integrator):
     """A method that is a `NystromTableau`, with the Runge-Kutta tableau of its first-order equivalent."""
 
-    tableau = None
-    first_order = None
+    tableau: NystromTableau | None = None
+    first_order: RungeKuttaTableau | None = None
 
-    def kernel(self, first_order):
+    def kernel(self, first_order: bool) -> StepKernel:
         """The numbers of the tableau, and the kernel that steps by it."""
         tableau = self.first_order if first_order else self.tableau
         stages = len(tableau.c)
@@ -87,7 +100,14 @@ class ExplicitNystrom(Integrator):
 class Adaptive(Integrator):
     """A method that chooses its steps by an error estimate, unless it is given a fixed one."""
 
-    def __init__(self, rtol=1e-6, atol=1e-8, step=None, max_step=None, first_step=None):
+    def __init__(
+        self,
+        rtol: float = 1e-6,
+        atol: float = 1e-8,
+        step: float | None = None,
+        max_step: float | None = None,
+        first_step: float | None = None,
+    ) -> None:
         what = type(self).__name__
         self.rtol, self.atol = positive(rtol, f"{what}: rtol"), positive(atol, f"{what}: atol")
         self.step = None if step is None else positive(step, f"{what}: step (s)")
@@ -95,15 +115,15 @@ class Adaptive(Integrator):
         self.first_step = None if first_step is None else positive(first_step, f"{what}: first_step (s)")
 
     @property
-    def stages(self):
+    def stages(self) -> int:
         """Evaluations that a step takes."""
         return len(self.tableau.c)
 
-    def step_tolerances(self):
+    def step_tolerances(self) -> tuple[float, float]:
         """Return (rtol, atol) that each step's error is held to."""
         return self.rtol / self.margin, self.atol / self.margin
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         settings = f"rtol={self.rtol:g}, atol={self.atol:g}" if self.step is None else f"step={self.step:g}"
         return f"{type(self).__name__}({settings})"
 
@@ -111,15 +131,15 @@ class Adaptive(Integrator):
 class ExplicitRungeKutta(Adaptive):
     """A method that is a `RungeKuttaTableau` with an error estimate, applied to (v, vd)."""
 
-    tableau = None
+    tableau: Any = None  # RungeKuttaTableau, or a property that makes one
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         if isinstance(cls.tableau, RungeKuttaTableau):  # and not one that is made when first used
             cls.embedded_order = cls.tableau.embedded_order
             cls.errors = (embedded_error, second_embedded_error)[: 2 if cls.tableau.second_error else 1]
 
-    def kernel(self, first_order):
+    def kernel(self, first_order: bool) -> StepKernel:
         """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
         step = runge_kutta_step if first_order else second_order_step
@@ -133,20 +153,20 @@ class DiagonallyImplicit(Adaptive):
     charts until the measured contraction says otherwise.
     """
 
-    tableau = None
+    tableau: ImplicitTableau | None = None
     implicit = True
     second = hermite_second  # accelerations between the ends of a step
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         cls.embedded_order = cls.tableau.embedded_order
 
-    def kernel(self, first_order):
+    def kernel(self, first_order: bool) -> StepKernel:
         """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
         return implicit_step, self.tableau.numbers, lambda nx, ny: (stages + 1) * (nx + ny) + 6 * nx + 1
 
 
-def registered():
+def registered() -> Mapping[str, type[Integrator]]:
     """Return every integrator class known, by its name in lower case."""
     return MappingProxyType(_registry)

@@ -1,6 +1,8 @@
 """`check_integrator`: what every integration method has to keep, tried on scenes with known solutions."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -10,6 +12,9 @@ from .formulation import FORMULATIONS
 from .integrator import Integrator
 from .integrator_scenes import GRID, cases, distance, mean_distance
 from .simulate import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 EPS = np.finfo(float).eps
 LEVELS = (50.0, 500.0, 5000.0)  # of eps: position, velocity, acceleration
@@ -33,7 +38,9 @@ class Finding(NamedTuple):
     errors: tuple  # (tolerance, error) of an adaptive method
 
 
-def check_integrator(method, *, order=None, dense_order=None):
+def check_integrator(
+    method: type[Integrator] | Callable[..., Integrator], *, order: int | None = None, dense_order: int | None = None
+) -> tuple[Finding, ...]:
     """Check an integration method on scenes with known solutions; raise naming what failed and by how much.
 
     Parameters

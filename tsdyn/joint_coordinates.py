@@ -8,8 +8,10 @@ The own body is the one that the axis belongs to. f, g and the axis are right-ha
 reversed, so that theta is the angle of b against a about the axis (right hand) in either case.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from . import vectors
 from ._kernel import twin
@@ -42,7 +44,7 @@ class Angle:
     reference: str = ""
     direction: str = ""
 
-    def of(self, item):
+    def of(self, item: Any) -> AngleGeometry:
         """The `AngleGeometry` of an item."""
         own, other, A, B = _bodies(item, self.axis)
         axis = unit(getattr(item, self.axis))
@@ -70,7 +72,7 @@ class Displacement:
 
     axis: str = "axis_a"
 
-    def of(self, item):
+    def of(self, item: Any) -> DisplacementGeometry:
         """The `DisplacementGeometry` of an item."""
         own, other, _, _ = _bodies(item, self.axis)
         points = [tuple(item.point_a.tolist()), tuple(item.point_b.tolist())]

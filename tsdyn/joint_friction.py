@@ -6,7 +6,10 @@
 The normal load depends on multipliers, and those on the friction: the solver finds both together (friction_solve.py).
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
 
@@ -15,6 +18,9 @@ from .checks import label, number
 from .errors import InvalidForce
 from .force import not_negative, positive_number
 from .markers import TURN, Point, Turn, Vector
+
+if TYPE_CHECKING:
+    from .hints import AnyBody, Attachment, Floats, Random
 
 AXIS = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("a"))
 
@@ -65,16 +71,16 @@ class JointFriction:
     @fitting
     def __init__(
         self,
-        joint,
+        joint: Attachment,
         *,
-        kinetic,
-        static=None,
-        slip_velocity=1e-3,
-        stribeck_velocity=None,
-        preload=0.0,
-        name="",
-        **geometry,
-    ):
+        kinetic: float,
+        static: float | None = None,
+        slip_velocity: float = 1e-3,
+        stribeck_velocity: float | None = None,
+        preload: float = 0.0,
+        name: str = "",
+        **geometry: Any,
+    ) -> None:
         kind = self._kind()
         name = label(name, kind, InvalidForce)
         if not isinstance(joint, self.joints):
@@ -94,13 +100,13 @@ class JointFriction:
         return f"{self._kind()}({self.joint.name})"
 
     @property
-    def coordinates(self):
+    def coordinates(self) -> tuple[Floats, ...]:
         """Where the markers are, (3,) each: where the joint's are."""
         return tuple(
             np.zeros(3) if marker.code == TURN else getattr(self.joint, marker.argument) for marker in self.markers
         )
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; where it acts is the joint's."""
         if name == "coordinates":
             return
@@ -108,7 +114,7 @@ class JointFriction:
             raise self.error(f"{self.name}: {name} is that of its joint {self.joint.name!r}; set it there.")
         super().__setattr__(name, value)
 
-    def check(self):
+    def check(self) -> None:
         """It must do something, and be no smaller at rest than sliding."""
         if not self.joint.added:
             raise self.error(f"{self.name}: add its joint {self.joint.name!r} to the scene first.")
@@ -120,24 +126,24 @@ class JointFriction:
         if self.kinetic == 0.0 and not self.static:
             raise self.error(f"{self.name}: it is zero at all times; set kinetic.")
 
-    def parameters(self):
+    def parameters(self) -> tuple[Any, ...]:
         """(mu, mu_s, v_s, v_0, preload), then the geometry."""
         static = self.kinetic if self.static is None else self.static
         stribeck = 10.0 * self.slip_velocity if self.stribeck_velocity is None else self.stribeck_velocity
         return self.kinetic, static, stribeck, self.slip_velocity, self.preload, *self.geometry()
 
-    def geometry(self):
+    def geometry(self) -> tuple[float, ...]:
         """What `law` and `normal_load` need besides, floats."""
         return ()
 
-    def __getattr__(self, name):
+    def __getattr__(self, name: str) -> Any:
         """The body-frame coordinates of a marker, by its argument: those of the joint."""
         if name in [marker.argument for marker in self.markers] and "joint" in self.__dict__:
             return getattr(self.joint, name)
         return super().__getattr__(name)
 
     @classmethod
-    def example(cls, rng, a, b):
+    def example(cls, rng: Random, a: AnyBody, b: AnyBody) -> Self:
         """A random one, on a joint that is added to the scene, regularised over the velocities of a test."""
         kind = cls.joints[0]
         places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code != TURN}
@@ -147,7 +153,7 @@ class JointFriction:
         return cls(joint, kinetic=mu, static=mu + more, slip_velocity=v0, stribeck_velocity=vs, **cls.sizes(rng))
 
     @classmethod
-    def sizes(cls, rng):
+    def sizes(cls, rng: Random) -> dict[str, float]:
         """Random arguments of the geometry, for tests."""
         return {}
 

@@ -1,11 +1,18 @@
 """What JointTorque and JointForce share: a function of time, joint coordinate and rate, continuous or sampled."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .checks import label, positive
 from .errors import InvalidForce
 from .markers import TURN
 from .state_function import arguments_of
+
+if TYPE_CHECKING:
+    from .hints import Attachment, JointLaw
 
 
 def instants(value, what, error):
@@ -31,7 +38,9 @@ class JointLoad:
     coordinate = ""  # "angle" or "displacement"
     remembers_angle = False  # of its joint, from the start of a run on
 
-    def __init__(self, joint, *, function, period=None, which=0, name=""):
+    def __init__(
+        self, joint: Attachment, *, function: JointLaw, period: float | None = None, which: int = 0, name: str = ""
+    ) -> None:
         kind = self._kind()
         name = label(name, kind, InvalidForce)
         geometries = self.geometries(joint) if hasattr(joint, "joint_coordinates") else []

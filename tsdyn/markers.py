@@ -9,7 +9,10 @@ x and xd are in the ground frame, s in the body frame. On the ground x = s, or p
 point mass has r only.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +20,9 @@ from ._kernel import kernel, stack
 from .checks import vector3
 from .errors import InvalidBody, InvalidConstraint
 from .rotation import rotate, rotate_gradient, rotate_rate
+
+if TYPE_CHECKING:
+    from .hints import AnyBody, ArrayLike, Floats, TsdynError
 
 POINT, VECTOR, PARAMETERS, TURN = 0, 1, 2, 3  # codes in kernels
 
@@ -31,13 +37,15 @@ class Marker:
     size = 3
     prefix = "point_"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.body not in ("a", "b"):
             raise InvalidConstraint(f"a marker belongs to body 'a' or 'b', not to {self.body!r}.")
         if not self.argument:
             object.__setattr__(self, "argument", self.prefix + self.body)
 
-    def coordinates(self, body, value, where, error=InvalidConstraint):
+    def coordinates(
+        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
+    ) -> Floats:
         """Check the body-frame coordinates that a user gave, return them as an array (3,)."""
         place = vector3(value, f"{where}: {self.argument}", error)
         place.setflags(write=False)
@@ -47,7 +55,9 @@ class Marker:
 class Point(Marker):
     """A point of a body, by its coordinates in the body frame, m."""
 
-    def coordinates(self, body, value, where, error=InvalidConstraint):
+    def coordinates(
+        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
+    ) -> Floats:
         """Check the coordinates; a point mass has no other point than itself."""
         value = super().coordinates(body, value, where, error)
         if body.dimension == 3 and value.any():
@@ -61,7 +71,9 @@ class Vector(Marker):
     code = VECTOR
     prefix = "axis_"
 
-    def coordinates(self, body, value, where, error=InvalidConstraint):
+    def coordinates(
+        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
+    ) -> Floats:
         """Check and normalise the direction."""
         value = super().coordinates(body, value, where, error)
         _needs_rotation(body, f"{where}: {self.argument}")
@@ -81,7 +93,9 @@ class Parameters(Marker):
     size = 4
     prefix = "parameters_"
 
-    def coordinates(self, body, value, where, error=InvalidConstraint):
+    def coordinates(
+        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
+    ) -> Floats:
         """Nothing to place: the marker is p."""
         _needs_rotation(body, where)
         return np.zeros(3)
@@ -93,7 +107,9 @@ class Turn(Marker):
     code = TURN
     prefix = "turn_"
 
-    def coordinates(self, body, value, where, error=InvalidConstraint):
+    def coordinates(
+        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
+    ) -> Floats:
         """Nothing to place: all points of a body turn alike."""
         _needs_rotation(body, where)
         return np.zeros(3)

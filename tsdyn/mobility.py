@@ -1,9 +1,11 @@
 """`scene.mobility`: degrees of freedom, rank, and the rows that say nothing new; everywhere, or just here."""
 
+from __future__ import annotations
+
 import html
 from collections import Counter
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,6 +17,9 @@ from .errors import InvalidArgument
 from .initial import demand_finite, demand_small
 from .kinetic import Metric, unit_tangent
 
+if TYPE_CHECKING:
+    from .hints import ArrayLike, Attachment, Scene
+
 CONSISTENT = 1e-9  # of 1 + max |q|
 ASIDE = 0.02  # of the scene's size, and rad: how far the neighbours are at which the rank is compared
 TRIES = 3
@@ -25,8 +30,8 @@ class RedundantRow(NamedTuple):
     """A row of Phi_q that depends on others."""
 
     name: str
-    depends_on: tuple  # names of rows
-    constraint: object  # whose row it is
+    depends_on: tuple[str, ...]  # names of rows
+    constraint: Attachment  # whose row it is
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,8 +59,8 @@ class Mobility:
     coordinates: int
     rows: int
     rank: int
-    redundant: tuple
-    dependent_here: tuple
+    redundant: tuple[RedundantRow, ...]
+    dependent_here: tuple[RedundantRow, ...]
     singular: bool
 
     def _facts(self):
@@ -86,7 +91,7 @@ class Mobility:
                 heads = list(dict.fromkeys(map(_head, on)))
                 yield said + ending, sorted(on, key=lambda name: heads.index(_head(name)))
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         more = ", singular here" if self.singular else ""
         n, r = self.degrees_of_freedom, len(self.redundant)
         return (
@@ -94,7 +99,7 @@ class Mobility:
             f"{r or 'no'} redundant row{'' if r == 1 else 's'}{more}>"
         )
 
-    def __str__(self):
+    def __str__(self) -> str:
         facts = self._facts()
         width = max(map(len, facts))
         lines = [f"  {name:{width}}  {fact}" for name, fact in facts.items()]
@@ -109,7 +114,7 @@ class Mobility:
 
 
 @fitting
-def mobility(scene, q=None, t=0.0):
+def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobility:
     """Count degrees of freedom, and name the rows that are redundant.
 
     Parameters

@@ -8,9 +8,11 @@ A motion is a graph of operations. Its value and two derivatives follow in Pytho
 `motion_program`; neither knows of the other.
 """
 
+from __future__ import annotations
+
 import math
 import operator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +23,9 @@ from .errors import InvalidArgument
 from .jet import Jet
 from .table import Table, is_data, pieces_of
 from .truncated import Truncated
+
+if TYPE_CHECKING:
+    from .hints import ArrayLike, Data, Floats, Value
 
 
 class Operation(NamedTuple):
@@ -60,35 +65,35 @@ class Smooth:
     """Base of all smooth motions: one operation on others, or a polynomial of the time, whole or in pieces."""
 
     @fitting
-    def __init__(self, operation, operands=(), numbers=()):
+    def __init__(self, operation: str, operands: tuple[Smooth, ...] = (), numbers: Any = ()) -> None:
         self._operation, self._operands, self._numbers = operation, operands, numbers
 
     def _become(self, other):
         Smooth.__init__(self, other._operation, other._operands, other._numbers)
 
-    def __call__(self, t):
+    def __call__(self, t: ArrayLike) -> Value:
         """The value at a time or times, s."""
         return self._on(t)
 
-    def rate(self, t):
+    def rate(self, t: ArrayLike) -> Value:
         """The first derivative at a time or times."""
         return self._jet(t).xd + 0.0 * t
 
-    def acceleration(self, t):
+    def acceleration(self, t: ArrayLike) -> Value:
         """The second derivative at a time or times."""
         return self._jet(t).xdd + 0.0 * t
 
-    def jerk(self, t):
+    def jerk(self, t: ArrayLike) -> Value:
         """The third derivative at a time or times."""
         series = [self._on(Truncated([time, 1.0, 0.0, 0.0])) for time in np.ravel(t).tolist()]
         return 6.0 * np.reshape([x.c[3] for x in series], np.shape(t))[()]
 
     @property
-    def pieces(self):
+    def pieces(self) -> list[Any]:
         """The `Pieces` that it is made of."""
         return [node._numbers for node in self._order() if node._operation == "piecewise"]
 
-    def sides(self, t):
+    def sides(self, t: ArrayLike) -> Floats:
         """Value and rate at times t (k,), by the pieces that end there and by those that begin: (2, 2, k)."""
         found = [Jet.of(self._on(Jet(t, 1.0), left)) for left in (True, False)]
         return np.array([[x.x + 0.0 * t, x.xd + 0.0 * t] for x in found])
@@ -126,7 +131,7 @@ class Smooth:
                 waiting += [(operand, False) for operand in node._operands]
         return ready
 
-    def program(self):
+    def program(self) -> list[float]:
         """The numbers that `motion_program` runs, with room for its rows."""
         row, constants, instructions, rows = {}, [], [], 0
         for node in self._order():
@@ -145,37 +150,37 @@ class Smooth:
         head = [0.0, len(instructions) // code.STEP, *places, rows, row[id(self)]]
         return [float(x) for x in (*head, *instructions, *constants)] + [0.0] * (rows * code.WIDTH)
 
-    def __add__(self, other):
+    def __add__(self, other: Smooth | float) -> Smooth:
         return _binary("add", self, other)
 
-    def __radd__(self, other):
+    def __radd__(self, other: Smooth | float) -> Smooth:
         return _binary("add", other, self)
 
-    def __sub__(self, other):
+    def __sub__(self, other: Smooth | float) -> Smooth:
         return _binary("subtract", self, other)
 
-    def __rsub__(self, other):
+    def __rsub__(self, other: Smooth | float) -> Smooth:
         return _binary("subtract", other, self)
 
-    def __mul__(self, other):
+    def __mul__(self, other: Smooth | float) -> Smooth:
         return _binary("multiply", self, other)
 
-    def __rmul__(self, other):
+    def __rmul__(self, other: Smooth | float) -> Smooth:
         return _binary("multiply", other, self)
 
-    def __truediv__(self, other):
+    def __truediv__(self, other: Smooth | float) -> Smooth:
         return _binary("divide", self, other)
 
-    def __rtruediv__(self, other):
+    def __rtruediv__(self, other: Smooth | float) -> Smooth:
         return _binary("divide", other, self)
 
-    def __neg__(self):
+    def __neg__(self) -> Smooth:
         return _binary("multiply", -1.0, self)
 
-    def __pos__(self):
+    def __pos__(self) -> Smooth:
         return self
 
-    def __pow__(self, n):
+    def __pow__(self, n: float) -> Smooth:
         n = _plain(n)
         if n != int(n) or n < 0:
             return Smooth("power", (self,), (n,))
@@ -184,10 +189,10 @@ class Smooth:
         half = self ** (n // 2)
         return half * half * self if n % 2 else half * half
 
-    def __bool__(self):
+    def __bool__(self) -> bool:
         raise TypeError("a motion is neither true nor false: it has no branches.")
 
-    def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **keywords: Any) -> Any:
         """NumPy's functions of a motion, and its arithmetic with one on the right."""
         if method == "__call__" and not keywords:
             if len(inputs) == 1 and ufunc.__name__ in FUNCTIONS:
@@ -198,7 +203,7 @@ class Smooth:
                 return _binary(ufunc.__name__, *inputs)
         raise TypeError(f"np.{ufunc.__name__} of a motion is not known here; there are {', '.join(FUNCTIONS)}.")
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self(0.0):g} at t = 0>"
 
 
@@ -217,7 +222,7 @@ class Polynomial(Smooth):
     """
 
     @fitting
-    def __init__(self, coefficients):
+    def __init__(self, coefficients: ArrayLike) -> None:
         c = floats(coefficients)
         if c.ndim != 1 or not c.size or not np.isfinite(c).all():
             raise InvalidArgument(
@@ -230,7 +235,7 @@ class Constant(Polynomial):
     """A value that stays."""
 
     @fitting
-    def __init__(self, value):
+    def __init__(self, value: float) -> None:
         super().__init__(_demand(self, value=value))
 
 
@@ -238,7 +243,7 @@ class Ramp(Polynomial):
     """start + rate t: uniform motion."""
 
     @fitting
-    def __init__(self, start=0.0, rate=1.0):
+    def __init__(self, start: float = 0.0, rate: float = 1.0) -> None:
         super().__init__(_demand(self, start=start, rate=rate))
 
 
@@ -263,7 +268,7 @@ class Piecewise(Smooth):
     """
 
     @fitting
-    def __init__(self, source):
+    def __init__(self, source: Data) -> None:
         if not is_data(source):
             raise InvalidArgument(
                 f"Piecewise: source must be a ts.Table, (times, values), or SciPy's CubicSpline, PPoly, BPoly or "
@@ -275,7 +280,7 @@ class Piecewise(Smooth):
         super().__init__("piecewise", (), parts[0])
 
     @classmethod
-    def each(cls, source):
+    def each(cls, source: Data) -> tuple[Piecewise, ...]:
         """One motion for each component of a source of vectors."""
         if not isinstance(source, Table):
             return tuple(cls._of(pieces) for pieces in pieces_of(source))
@@ -297,7 +302,7 @@ class Sine(Smooth):
     """offset + amplitude sin(frequency t + phase), frequency in rad/s and phase in rad."""
 
     @fitting
-    def __init__(self, amplitude, frequency, phase=0.0, offset=0.0):
+    def __init__(self, amplitude: float, frequency: float, phase: float = 0.0, offset: float = 0.0) -> None:
         a, w, phi, c = _demand(self, amplitude=amplitude, frequency=frequency, phase=phase, offset=offset)
         wave = a * np.sin(Ramp(phi, w))
         self._become(c + wave if c else wave)
@@ -307,7 +312,7 @@ class Exponential(Smooth):
     """offset + amplitude exp(rate t), rate in 1/s."""
 
     @fitting
-    def __init__(self, amplitude, rate, offset=0.0):
+    def __init__(self, amplitude: float, rate: float, offset: float = 0.0) -> None:
         a, r, c = _demand(self, amplitude=amplitude, rate=rate, offset=offset)
         growth = a * np.exp(Ramp(0.0, r))
         self._become(c + growth if c else growth)

@@ -1,5 +1,7 @@
 """The phases of a run, put together from what a `Timekeeper` has found and what parts of it cost alone."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 from .timers import (
@@ -31,7 +33,7 @@ class Phase(NamedTuple):
     seconds: float
 
     @property
-    def each(self):
+    def each(self) -> float:
         """Seconds a call; nan for what isn't called."""
         return self.seconds / self.calls if self.calls else float("nan")
 

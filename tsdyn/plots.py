@@ -4,13 +4,21 @@
 without pyplot and so without touching the caller's backend or figures.
 """
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import InvalidArgument, MissingDependency
 from .tables import DURATION, LEVELS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .hints import Solution
 
 ZERO = 1e-17  # what an error of exactly zero is drawn as: below any other
 POINTS = 400  # stretches of time, the largest error of each of which is drawn
@@ -20,7 +28,7 @@ BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
 GREY = "#6b6b6b"
 
 
-def constraint_error(solution, ax=None):
+def constraint_error(solution: Solution, ax: Any = None) -> Any:
     """Draw the constraint errors of a solution over time: position, velocity and acceleration, log scale.
 
     Of a long run the largest error in each of 400 stretches of time is drawn; zeros are drawn at 1e-17.
@@ -56,7 +64,7 @@ def constraint_error(solution, ax=None):
     return ax
 
 
-def tables_figure(tables):
+def tables_figure(tables: Sequence[Any]) -> Any:
     """Draw constraint errors over time at the tightest tolerance: scenes side by side, a panel for each level.
 
     Parameters
@@ -102,7 +110,7 @@ def tables_figure(tables):
     return figure
 
 
-def save(figure, path):
+def save(figure: Any, path: str | Path) -> Path:
     """Write a figure to a file, in the format that its suffix names, PNG if it has none; return the file's path.
 
     Raises

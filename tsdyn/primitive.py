@@ -17,7 +17,10 @@ and on truncated Taylor series: that is how they are checked. `series` gets the 
 where it has left them: in the scratch array s[slots, k], of which it fills column k.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Never, Self
 
 from . import body_loops, curvature, series_loops
 from ._kernel import ANY, Callback, caller, integers, specialised, stack, stack2, vector
@@ -25,6 +28,11 @@ from .attachment import Attachment, check_slots, inlined, layout, static_kernel
 from .errors import InvalidConstraint
 from .markers import PARAMETERS, TURN, Marker, chain_rule, motion, position
 from .motion import Motion
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from .hints import AnyBody, ArrayLike, BodyLike, Random
 
 # what the table of a kind holds for each instance
 AT, DIMENSION, BLOCK, ROW, STRIDE, INTS = 0, 2, 4, 6, 7, 8
@@ -68,7 +76,7 @@ class Primitive(Attachment):
     prescribed = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         where = f"primitive {cls.__name__}"
         if isinstance(cls.rows, bool) or not isinstance(cls.rows, int) or cls.rows < 1:
@@ -93,7 +101,9 @@ class Primitive(Attachment):
         cls.kernels = MappingProxyType(_compile(cls, functions))
         _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
-    def __init__(self, a, b=None, coordinates=(), name=""):
+    def __init__(
+        self, a: BodyLike, b: BodyLike | None = None, coordinates: Sequence[ArrayLike | None] = (), name: str = ""
+    ) -> None:
         """Attach the primitive to its bodies; coordinates has an entry for each marker, in the body frame."""
         if not self.rows:
             raise InvalidConstraint(
@@ -101,42 +111,42 @@ class Primitive(Attachment):
             )
         super().__init__(a, b, coordinates, name)
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; a prescribed one may be a number or three functions of time."""
         if name in self.quantities():
             value = Motion.wrap(value, f"{self.name}: {name}")
         super().__setattr__(name, value)
 
     @property
-    def parts(self):
+    def parts(self) -> tuple[Primitive, ...]:
         """The primitives that it is made of: itself."""
         return (self,)
 
     @property
-    def row_labels(self):
+    def row_labels(self) -> tuple[str, ...]:
         """What follows its title in the names of its rows."""
         return ("",) if self.rows == 1 else tuple(f"[{i}]" for i in range(self.rows))
 
     @property
-    def rheonomic(self):
+    def rheonomic(self) -> bool:
         """Whether it depends on time."""
         names = self.quantities()
         moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
         return moves and "phi_t" in self.kernels
 
     @classmethod
-    def quantities(cls):
+    def quantities(cls) -> tuple[str, ...]:
         """The names of what is prescribed."""
         return (cls.prescribed,) * bool(cls.prescribed) if isinstance(cls.prescribed, str) else cls.prescribed
 
     @classmethod
-    def example(cls, rng, a, b):
+    def example(cls, rng: Random, a: AnyBody, b: AnyBody) -> Self:
         """Return a random valid instance between two bodies, for tests."""
         places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code != PARAMETERS}
         return cls(a, b, **places) if any(m.body == "b" for m in cls.markers) else cls(a, **places)
 
 
-def registered():
+def registered() -> Mapping[str, type[Primitive]]:
     """Return every primitive class known, built in or plugged in, by its full name."""
     return MappingProxyType(_registry)
 

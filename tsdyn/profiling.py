@@ -1,8 +1,11 @@
 """`profile`: where the time of a call of `simulate` goes, phase by phase, and what to change."""
 
+from __future__ import annotations
+
 import copy
 import time
 from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,13 +27,16 @@ from .state import remembered
 from .timekeeper import Stopwatch, Timekeeper
 from .timers import own_cost
 
+if TYPE_CHECKING:
+    from .hints import Span
+
 SAMPLE, FEWEST, MOST = 1.0, 2, 40  # s of calls of each sort, and how many
 LONG = 5.0  # s, of calls that are made as few times as can be
 OUTPUTS = {"t_eval": "times of t_eval", "dense_output": "dense output", "events": "events"}
 
 
 @fitting
-def profile(scene, t_span=(0.0, 10.0), *, advice=True, **options):
+def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **options: Any) -> Profile:
     """Measure where the time of `simulate(scene, t_span, **options)` goes; the scene is not changed.
 
     The call is made several times as it is, and as often with its two ends as the only output, once with nothing but a

@@ -1,29 +1,37 @@
 """The scene: what a user assembles from bodies, constraints and forces, checked piece by piece."""
 
+from __future__ import annotations
+
 from collections import Counter
 from itertools import count
+from typing import TYPE_CHECKING, Any, Never
 
 import numpy as np
 
 from ._cache import deep_hash
-from .assemble import assemble
+from .assemble import assemble as _assemble
 from .bodies import IDENTITY, Body, Ground, PointMass
 from .calls import fitting, fitting_methods
 from .checks import counted, demand_known, label, vector3
 from .constraints.euler_normalization import EulerNormalization
-from .editing import WHAT, copy, demand_present, found, remove
+from .editing import WHAT, demand_present, found
+from .editing import copy as _copy
+from .editing import remove as _remove
 from .errors import InvalidArgument, InvalidBody, InvalidConstraint
-from .evaluate import evaluate
+from .evaluate import evaluate as _evaluate
 from .force import Force
 from .joint import Joint
 from .membership import admit, settle
-from .mobility import mobility
+from .mobility import mobility as _mobility
 from .motion import Motion
 from .names import named
 from .primitive import Primitive
 from .setting import set_joint
 from .signal import Signal
 from .system import pack, user_functions
+
+if TYPE_CHECKING:
+    from .hints import ArrayLike, Floats, Item, Orientation, Packed, System
 
 
 @fitting_methods
@@ -53,7 +61,7 @@ class Scene:
     """
 
     @fitting
-    def __init__(self, gravity=(0.0, 0.0, -9.81)):
+    def __init__(self, gravity: ArrayLike = (0.0, 0.0, -9.81)) -> None:
         self.ground = Ground(self)
         self._bodies, self._added, self._forces, self._normalisations = [], [], [], {}
         self._waiting, self._titles = {}, None  # see membership.py
@@ -61,53 +69,55 @@ class Scene:
         self._twins = None  # handle of the scene that this one is a copy of -> handle here
         self.gravity = gravity
 
-    def __setattr__(self, name, value):
+    ground: Ground
+
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute that there is; a misspelt one is refused."""
         demand_known(self, name, ("ground",))
         super().__setattr__(name, value)
 
     @property
-    def gravity(self):
+    def gravity(self) -> Floats:
         """Acceleration of free fall, ground frame, m/s^2, shape (3,)."""
         return self._gravity
 
     @gravity.setter
-    def gravity(self, value):
+    def gravity(self, value: ArrayLike) -> None:
         self._gravity = vector3(value, "gravity (m/s^2)", InvalidArgument)
         self._gravity.setflags(write=False)
         self.touch()
 
     @property
-    def bodies(self):
+    def bodies(self) -> tuple[PointMass, ...]:
         """The bodies, in the order added."""
         return tuple(self._bodies)
 
     @property
-    def constraints(self):
+    def constraints(self) -> tuple[Primitive | Joint, ...]:
         """The constraints, in the order of their rows; joints whole."""
         return (*self._added, *self._normalisations.values())
 
     @property
-    def primitives(self):
+    def primitives(self) -> tuple[Primitive, ...]:
         """The constraints, in the order of their rows; joints taken apart."""
         return tuple(part for constraint in self.constraints for part in constraint.parts)
 
     @property
-    def forces(self):
+    def forces(self) -> tuple[Force, ...]:
         """The forces, in the order added."""
         return tuple(self._forces)
 
     @fitting
     def add_body(
         self,
-        mass,
-        inertia,
-        position=(0.0, 0.0, 0.0),
-        orientation=IDENTITY,
-        velocity=(0.0, 0.0, 0.0),
-        angular_velocity=(0.0, 0.0, 0.0),
-        name="",
-    ):
+        mass: float,
+        inertia: ArrayLike,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        orientation: Orientation = IDENTITY,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+        name: str = "",
+    ) -> Body:
         """Add a rigid body and return its handle.
 
         Parameters
@@ -148,7 +158,9 @@ class Scene:
         return body
 
     @fitting
-    def add_point_mass(self, mass, position=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), name=""):
+    def add_point_mass(
+        self, mass: float, position: ArrayLike = (0.0, 0.0, 0.0), velocity: ArrayLike = (0.0, 0.0, 0.0), name: str = ""
+    ) -> PointMass:
         """Add a particle of three coordinates and return its handle; arguments as for `add_body`."""
         return self._admit(PointMass, name, {"mass": mass, "position": position, "velocity": velocity})
 
@@ -166,7 +178,7 @@ class Scene:
         self.touch()
         return body
 
-    def add(self, item):
+    def add(self, item: Item) -> Item:
         """Add a constraint or a force and return it; a second EulerNormalization of a body gives back the one it has.
 
         Raises
@@ -200,7 +212,7 @@ class Scene:
         self.touch()
         return item
 
-    def refresh(self):
+    def refresh(self) -> None:
         """Compile those functions of a user's again of which a global has changed since the scene was packed."""
         if self._packed is not None and self._users and _marks(self._users) != self._functions:
             for owner, _ in self._users:
@@ -212,12 +224,12 @@ class Scene:
         gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins"))
         return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
 
-    def touch(self):
+    def touch(self) -> None:
         """Forget the packed numbers: something has changed."""
         self._packed = self._start = self._prepared = None
 
     @property
-    def packed(self):
+    def packed(self) -> Packed:
         """Bodies, constraints and their numbers as they are now, a `Packed`; made again after a change only."""
         if not self._bodies:
             raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
@@ -228,30 +240,30 @@ class Scene:
         return self._packed
 
     @property
-    def system(self):
+    def system(self) -> System:
         """What the kernels see, a `System`."""
         return self.packed.system
 
-    def motions(self):
+    def motions(self) -> list[Any]:
         """The functions of time and tables that constraints and forces are given."""
         given = [*self.packed.parameters, *(load.parameters for load in self.packed.loads)]
         return [value for values in given for value in values if isinstance(value, (Motion, Signal))]
 
     @property
-    def start(self):
+    def start(self) -> tuple[Floats, Floats]:
         """(q, qd) that the bodies say, shapes (n,), (n,)."""
         if self._start is None:
             self._start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
         return tuple(array.copy() for array in self._start)
 
-    def body(self, name):
+    def body(self, name: str) -> PointMass:
         """Return the body of this name."""
         for body in self._bodies:
             if isinstance(name, str) and body.name == name:
                 return body
         raise InvalidBody(f"no body is named {name!r}; there are {', '.join(b.name for b in self._bodies) or 'none'}.")
 
-    def __getitem__(self, item):
+    def __getitem__(self, item: Any) -> Any:
         """The body, constraint or force of this name; in a copy also that of a handle of the scene it was made of."""
         if isinstance(item, str):
             return named([self.ground, *self._bodies, *self.constraints, *self._forces], item, WHAT)
@@ -259,7 +271,7 @@ class Scene:
         twin = self._twins.get(item) if self._twins is not None and known else None
         return found(self, item) if twin is None else twin
 
-    def row_names(self):
+    def row_names(self) -> list[str]:
         """Name the rows of Phi, in order: a constraint's title, with the row's label where it has several."""
         names, seen = [], Counter()
         for constraint in self.constraints:
@@ -269,22 +281,22 @@ class Scene:
             names += [f"{title}{again}{label}" for label in constraint.row_labels]
         return names
 
-    def place(self, q, qd):
+    def place(self, q: Floats, qd: Floats) -> None:
         """Write coordinates q (n,) and velocities qd (n,) into the bodies as their values at the start."""
         at = 0
         for body in self._bodies:
             span = slice(at, at := at + body.dimension)
             body.place(q[span], qd[span])
 
-    evaluate = evaluate
-    assemble = assemble
-    mobility = mobility
+    evaluate = _evaluate
+    assemble = _assemble
+    mobility = _mobility
     set = set_joint
-    remove = remove
-    copy = copy
-    __copy__ = copy
+    remove = _remove
+    copy = _copy
+    __copy__ = _copy
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         rows = sum(constraint.rows for constraint in self.constraints)
         n = sum(body.dimension for body in self._bodies)
         rigid = len(self._normalisations)

@@ -5,7 +5,10 @@ all other joints stay as they are. In a loop the joint is driven to its value in
 assembled, so that the mechanism stays on its branch.
 """
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +24,11 @@ from .joint_coordinates import Angle, AngleGeometry
 from .membership import settle
 from .motions import Polynomial
 from .rigid_shift import RigidShift
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .hints import ArrayLike, AssemblyReport, ItemLike, Scene
 
 STEP, SHARE = 0.25, 0.05  # of a joint in a loop: rad; of the scene's size
 LEAST = 2.0**-8  # of the way, of a step that is halved where it can't be assembled
@@ -47,8 +55,17 @@ class Goal:
 
 
 def set_joint(
-    scene, joint, *, angle=None, displacement=None, rate=None, angle_rate=None, displacement_rate=None, keep=(), t=0.0
-):
+    scene: Scene,
+    joint: ItemLike,
+    *,
+    angle: ArrayLike | None = None,
+    displacement: float | None = None,
+    rate: ArrayLike | None = None,
+    angle_rate: ArrayLike | None = None,
+    displacement_rate: float | None = None,
+    keep: Sequence[ItemLike] = (),
+    t: float = 0.0,
+) -> AssemblyReport:
     """Give a joint's coordinates and their rates at the start, and assemble the rest of the scene.
 
     Parameters

@@ -3,14 +3,20 @@
 box, sphere, cylinder, rod, from_mesh; +, moved and rotated make one body of several.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .checks import floats, number, positive, vector3
 from .errors import InvalidArgument
 from .mesh import moments
+
+if TYPE_CHECKING:
+    from .hints import ArrayLike, Axis, Floats, Rotation
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
@@ -29,21 +35,21 @@ class Shape:
     """
 
     mass: float
-    inertia: np.ndarray
-    centroid: np.ndarray
+    inertia: Floats
+    centroid: Floats
 
-    def keys(self):
+    def keys(self) -> tuple[str, str]:
         """What `add_body` is given."""
         return ("mass", "inertia")
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> Any:
         return {"mass": self.mass, "inertia": self.inertia}[name]
 
-    def moved(self, by):
+    def moved(self, by: ArrayLike) -> Shape:
         """The same shape elsewhere in its frame; by (3,), m."""
         return Shape(self.mass, self.inertia, self.centroid + vector3(by, "shape.moved: by (m)", InvalidArgument))
 
-    def rotated(self, rotation):
+    def rotated(self, rotation: ArrayLike | Rotation) -> Shape:
         """The shape turned about the origin of its frame, by a matrix (3, 3) or a scipy Rotation."""
         A = floats(rotation.as_matrix() if hasattr(rotation, "as_matrix") else rotation)
         if A.shape != (3, 3) or not np.abs(A @ A.T - np.eye(3)).max() < 1e-9 or np.linalg.det(A) < 0.0:
@@ -52,7 +58,7 @@ class Shape:
             )
         return Shape(self.mass, A @ self.inertia @ A.T, A @ self.centroid)
 
-    def __add__(self, other):
+    def __add__(self, other: Shape) -> Shape:
         if not isinstance(other, Shape):
             raise InvalidArgument(f"a shape can be added to a shape only, not to {other!r}.")
         mass = self.mass + other.mass
@@ -62,7 +68,7 @@ class Shape:
         return Shape(mass, inertia, centroid)
 
 
-def box(size, *, mass=None, density=None):
+def box(size: ArrayLike, *, mass: float | None = None, density: float | None = None) -> Shape:
     """A cuboid about its centre, edges along the axes.
 
     Parameters
@@ -90,7 +96,7 @@ def box(size, *, mass=None, density=None):
     return _shape(m, (m / 12.0) * (squares.sum() - squares))
 
 
-def sphere(radius, *, inner=0.0, mass=None, density=None):
+def sphere(radius: float, *, inner: float = 0.0, mass: float | None = None, density: float | None = None) -> Shape:
     """A ball about its centre; with an inner radius, m, a hollow one. Other arguments and errors as for `box`."""
     a, b = _radii("sphere", radius, inner)
     m = _mass("sphere", 4.0 / 3.0 * math.pi * (a - b) * (a * a + a * b + b * b), mass, density)
@@ -99,7 +105,15 @@ def sphere(radius, *, inner=0.0, mass=None, density=None):
     return _shape(m, np.full(3, 0.4 * m * a * a * share))
 
 
-def cylinder(radius, length, *, axis="z", inner=0.0, mass=None, density=None):
+def cylinder(
+    radius: float,
+    length: float,
+    *,
+    axis: Axis = "z",
+    inner: float = 0.0,
+    mass: float | None = None,
+    density: float | None = None,
+) -> Shape:
     """A cylinder about its centre, along the axis "x", "y" or "z"; with an inner radius, m, a tube.
 
     Other arguments and errors as for `box`.
@@ -110,7 +124,7 @@ def cylinder(radius, length, *, axis="z", inner=0.0, mass=None, density=None):
     return _round("cylinder", m, a * a + b * b, length, axis)
 
 
-def rod(length, *, axis="z", mass):
+def rod(length: float, *, axis: Axis = "z", mass: float) -> Shape:
     """A slender rod about its centre, along the axis "x", "y" or "z".
 
     It has no inertia about its axis: a joint must hold that turn. A rod with a thickness is a `cylinder`.
@@ -123,7 +137,9 @@ def rod(length, *, axis="z", mass):
     return _round("rod", positive(mass, "rod: mass (kg)"), 0.0, positive(length, "rod: length (m)"), axis)
 
 
-def from_mesh(vertices, faces, *, mass=None, density=None):
+def from_mesh(
+    vertices: ArrayLike, faces: ArrayLike, *, mass: float | None = None, density: float | None = None
+) -> Shape:
     """The solid that a closed mesh of triangles bounds; exact, but for rounding.
 
     Parameters

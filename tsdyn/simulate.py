@@ -1,6 +1,9 @@
 """`simulate`: check everything, hand a task to the method's driver, make a Solution of what it hands back."""
 
+from __future__ import annotations
+
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,31 +30,36 @@ from .solution import Solution
 from .state import remembered
 from .task import Task
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .hints import ArrayLike, Event, Formulation, Method, Progress, Redundancy, Span, State
+
 DRIVERS = {"steps": run_past, "series": run_series}  # by Integrator.driver, if it isn't one itself; see tsdyn.task
 
 
 @fitting
 def simulate(
-    scene,
-    t_span,
+    scene: Scene,
+    t_span: Span,
     *,
-    integrator=None,
-    rtol=None,
-    atol=None,
-    formulation="tangent",
-    constraint_tol=1e-12,
-    initial_tol=1e-9,
-    redundancy="drop",
-    t_eval=None,
-    dense_output=False,
-    events=None,
-    max_steps=None,
-    max_step=None,
-    history=True,
-    progress=None,
-    chart_interval=None,
-    state=None,
-):
+    integrator: Method | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    formulation: Formulation = "tangent",
+    constraint_tol: float = 1e-12,
+    initial_tol: float = 1e-9,
+    redundancy: Redundancy = "drop",
+    t_eval: ArrayLike | None = None,
+    dense_output: bool = False,
+    events: Event | Sequence[Event] | None = None,
+    max_steps: int | None = None,
+    max_step: float | None = None,
+    history: bool = True,
+    progress: Progress | None = None,
+    chart_interval: int | None = None,
+    state: State | None = None,
+) -> Solution:
     """Integrate a scene over an interval of time; the scene is not changed.
 
     Parameters

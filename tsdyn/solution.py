@@ -1,9 +1,11 @@
 """What a run hands back: the trajectory, how it went, and everything that follows from it."""
 
+from __future__ import annotations
+
 import html
 from functools import cached_property
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -20,27 +22,30 @@ from .state import RememberingState
 from .system import member_of
 from .work import work as integrate_work
 
+if TYPE_CHECKING:
+    from .hints import ArrayLike, BodyLike, Bools, ConstraintError, Floats, ItemLike, NDArray, Scene
+
 
 class Steps(NamedTuple):
     """Every step tried: where it began, s, its length, s, and whether it was accepted."""
 
-    t: np.ndarray
-    h: np.ndarray
-    accepted: np.ndarray
+    t: Floats
+    h: Floats
+    accepted: Bools
 
 
 class Charts(NamedTuple):
     """Every chart: its instant, s, why it was made, and on leaving it its condition, contraction and steps."""
 
-    t: np.ndarray
-    reason: tuple
-    condition: np.ndarray
-    contraction: np.ndarray
-    steps: np.ndarray
+    t: Floats
+    reason: tuple[str, ...]
+    condition: Floats
+    contraction: Floats
+    steps: NDArray[np.int64]
 
 
 @fitting_methods
-class Solution(Kinematics):
+class Solution(Kinematics["Floats"]):
     """The result of `simulate`; k outputs, n coordinates, m constraint rows.
 
     Attributes
@@ -71,7 +76,15 @@ class Solution(Kinematics):
         in such a run, of the largest kinetic energy, None where energy isn't constant.
     """
 
-    def __init__(self, scene, task, outcome, seconds):
+    status: Status
+    message: str
+    stats: SimpleNamespace
+    t: Floats
+    t_events: list[Floats] | None
+    q_events: list[Floats] | None
+    qd_events: list[Floats] | None
+
+    def __init__(self, scene: Scene, task: Any, outcome: Any, seconds: dict[str, float]) -> None:
         self.scene, self.packed = scene, task.prepared.packed
         self.method, self.formulation, self.span = repr(task.method), task.form.name, task.span
         self.system = self.packed.system
@@ -96,23 +109,23 @@ class Solution(Kinematics):
         self.__dict__.update(state, system=state["packed"].system)
 
     @property
-    def success(self):
+    def success(self) -> bool:
         """Whether the run reached the end of the interval, or a terminal event."""
         return self.status in (Status.SUCCESS, Status.EVENT)
 
-    def raise_if_failed(self):
+    def raise_if_failed(self) -> Self:
         """Raise StepFailure, with this solution as `.solution`, if the run ended early; return self otherwise."""
         if not self.success:
             raise StepFailure(self.message, self)
         return self
 
     @property
-    def reached(self):
+    def reached(self) -> float:
         """The time that the run has come to, s."""
         return self._reached
 
     @property
-    def state(self):
+    def state(self) -> RememberingState:
         """The last point reached, to go on from: simulate(scene, (state.t, t_end), state=state)."""
         q, qd, qdd = (a.copy() for a in self._last)
         t, memory = np.array([self._reached]), self._remembered[None]
@@ -120,7 +133,7 @@ class Solution(Kinematics):
         remembered = self.handles, self._remembered.copy(), Anchor(self._angles)
         return RememberingState.of(*remembered, self._reached, q, qd, qdd, lam)
 
-    def at(self, t):
+    def at(self, t: ArrayLike) -> RememberingState:
         """State at any time of a run with dense_output=True, on the manifold as the steps are.
 
         Parameters
@@ -171,12 +184,12 @@ class Solution(Kinematics):
         return Anchor(angles, t - start, (states[back, 0], states[back, 1]))
 
     @property
-    def steps(self):
+    def steps(self) -> Steps:
         """History of the steps, a `Steps`; raises InvalidArgument if the run kept none."""
         return Steps(*self._kept(self._step_log).arrays())
 
     @property
-    def charts(self):
+    def charts(self) -> Charts:
         """History of the charts, a `Charts`; raises InvalidArgument if the run kept none."""
         t, reasons, condition, contraction, steps = self._kept(self._chart_log).arrays()
         return Charts(t, tuple(REASONS[int(i)] for i in reasons.tolist()), condition, contraction, steps.astype(int))
@@ -193,16 +206,16 @@ class Solution(Kinematics):
         return with_normal_loads(self.packed, self.t, self.q, self.qd, self.qdd, self._remembers)
 
     @cached_property
-    def multipliers(self):
+    def multipliers(self) -> Floats:
         """Multipliers (k, m), computed when first asked for."""
         return reactions.multipliers(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
 
     @cached_property
-    def constraint_error(self):
+    def constraint_error(self) -> ConstraintError:
         """Maximum norms of Eqs. 1-3 at every output, recomputed by code that is not the solver's."""
         return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
 
-    def reaction(self, item, on=None):
+    def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
         """Force (N) and torque (N m) that a constraint, a joint as a whole, or a force exerts: (k, 3) each.
 
         Parameters
@@ -224,7 +237,7 @@ class Solution(Kinematics):
         member = self._member(item)
         return reactions.reaction(self, member, self._acted(item, on))
 
-    def reaction_unique(self, item, on=None):
+    def reaction_unique(self, item: ItemLike, on: BodyLike | None = None) -> Bools:
         """Whether what `reaction` gives is the only answer, at each output: bool (k,).
 
         Redundant constraints share their loads in many ways, all of which move the bodies alike; `reaction` is then
@@ -235,7 +248,7 @@ class Solution(Kinematics):
             return np.ones(self.t.size, bool)
         return uniqueness.unique(self, self._member(item).rows, self._acted(item, on))
 
-    def rows(self, constraint):
+    def rows(self, constraint: ItemLike) -> slice:
         """Which columns of `multipliers` are those of a constraint, a slice."""
         return self._member(self.handles.item(constraint)).rows
 
@@ -257,17 +270,17 @@ class Solution(Kinematics):
         raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
 
     @cached_property
-    def kinetic_energy(self):
+    def kinetic_energy(self) -> Floats:
         """Kinetic energy (k,), J."""
         return diagnostics.kinetic_energy(self.system, self.q, self.qd)
 
     @cached_property
-    def potential_energy(self):
+    def potential_energy(self) -> Floats:
         """Potential energy (k,), J, of gravity, zero at the ground's origin, and of springs; loads have none."""
         return diagnostics.potential_energy(self.system, self.q) + self._force_powers.potential
 
     @property
-    def energy(self):
+    def energy(self) -> Floats:
         """Kinetic and potential energy together (k,), J."""
         return self.kinetic_energy + self.potential_energy
 
@@ -276,17 +289,17 @@ class Solution(Kinematics):
         return power.force_powers(self)
 
     @cached_property
-    def power(self):
+    def power(self) -> Floats:
         """Power (k,), W, of applied forces, actuators and driven constraints: dE/dt = power - dissipation."""
         return self._force_powers.applied + power.driving_power(self)
 
     @property
-    def dissipation(self):
+    def dissipation(self) -> Floats:
         """Power (k,), W, that dampers and friction take; not negative."""
         return self._force_powers.dissipation
 
     @cached_property
-    def work(self):
+    def work(self) -> Floats:
         """Work (k,), J, since the start: of applied and driving forces, less what dampers and friction have taken.
 
         energy - work is constant but for the method's error. It is integrated over the dense output.
@@ -298,7 +311,7 @@ class Solution(Kinematics):
         """
         return self._integrated(None)
 
-    def power_of(self, item):
+    def power_of(self, item: ItemLike) -> Floats:
         """Power (k,), W, that one constraint or force, or that of a name, puts in: what dE/dt owes to it.
 
         Of a motor or a driver: of its force or torque along the motion prescribed. Of a force: of its loads and
@@ -306,7 +319,7 @@ class Solution(Kinematics):
         """
         return power.power_of(self, self._part(item))
 
-    def work_of(self, item):
+    def work_of(self, item: ItemLike) -> Floats:
         """Work (k,), J, since the start, of `power_of` one constraint or force: the energy that a motor has put in.
 
         Raises
@@ -328,12 +341,12 @@ class Solution(Kinematics):
         return integrate_work(self, self._trajectory, part)
 
     @cached_property
-    def linear_momentum(self):
+    def linear_momentum(self) -> Floats:
         """Linear momentum (k, 3), kg m/s, ground frame."""
         return diagnostics.linear_momentum(self.system, self.q, self.qd)
 
     @cached_property
-    def angular_momentum(self):
+    def angular_momentum(self) -> Floats:
         """Angular momentum about the ground's origin (k, 3), kg m^2/s, ground frame."""
         return diagnostics.angular_momentum(self.system, self.q, self.qd)
 
@@ -350,17 +363,17 @@ class Solution(Kinematics):
             "time": f"{s.seconds['run']:.3g} s, {s.seconds['prepare']:.2g} s to prepare",
         }
 
-    def __str__(self):
+    def __str__(self) -> str:
         lines = [f"  {name:8}{fact}" for name, fact in self._facts().items()]
         return "\n".join(["Solution", *lines, *([] if self.success else ["  " + self.message])])
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The same in a notebook."""
         facts = self._facts() | ({} if self.success else {"message": self.message})
         rows = "".join(f"<tr><th>{name}</th><td>{html.escape(fact)}</td></tr>" for name, fact in facts.items())
         return f"<table><caption>Solution</caption>{rows}</table>"
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         s = self.stats
         return (
             f"<Solution: {self.status.name.lower()} at t = {self._reached:g} s by {self.method}, {self.formulation}: "

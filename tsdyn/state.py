@@ -1,24 +1,53 @@
 """A state: what `solution.state` and `solution.at(t)` are, and what a run may start from."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from .errors import InvalidArgument
 from .kinematics import Kinematics
 
+if TYPE_CHECKING:
+    from .hints import Floats, Handles
 
-class State(NamedTuple):
-    """Time, positions, velocities, accelerations and multipliers at one instant."""
 
+class _Arrays(NamedTuple):
     t: float
-    q: np.ndarray
-    qd: np.ndarray
-    qdd: np.ndarray
-    multipliers: np.ndarray
+    q: Floats
+    qd: Floats
+    qdd: Floats
+    multipliers: Floats
 
 
-class RememberingState(Kinematics, State):
+class State(Kinematics["float | Any"], _Arrays):
+    """Time, positions, velocities, accelerations and multipliers at one instant.
+
+    Parameters
+    ----------
+    t : float, s
+    q, qd, qdd : ndarray (n,)
+    multipliers : ndarray (m,)
+
+    Notes
+    -----
+    A state that a run hands out (`solution.state`, `solution.at(t)`, what an event is given) knows its scene, so it can
+    be asked for the motion of bodies and joints, too.
+    """
+
+    __slots__ = ()
+
+    @property
+    def handles(self) -> Handles:
+        """The bodies and joints of its scene."""
+        raise InvalidArgument(
+            "this state is arrays alone and knows no bodies and joints: ask solution.state, solution.at(t), or the "
+            "state that an event is given."
+        )
+
+
+class RememberingState(State):
     """A State that knows the bodies and joints of its scene, and what forces remember, so that a run from it goes on.
 
     Attributes
@@ -29,6 +58,8 @@ class RememberingState(Kinematics, State):
     anchor : Anchor
         What the turns of joints are counted from.
     """
+
+    handles = memory = anchor = None
 
     @classmethod
     def of(cls, handles, memory, anchor, *parts):
@@ -57,7 +88,7 @@ def remembered(state, prepared, t, q):
         raise InvalidArgument(
             f"the state remembers {np.size(memory)} numbers and the scene has {slots}; use a state of this scene."
         )
-    angles = state.angles if isinstance(state, Kinematics) else np.empty(0)
+    angles = state.angles if getattr(state, "anchor", None) is not None else np.empty(0)
     if angles.size != prepared.handles.count:
         angles = prepared.handles.angles_at_start(t, q)
     for load in prepared.packed.loads if fresh else ():

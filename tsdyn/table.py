@@ -1,7 +1,10 @@
 """Motions and loads from data: tables, and SciPy's piecewise polynomials."""
 
+from __future__ import annotations
+
 import math
 import sys
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,6 +12,9 @@ from .calls import fitting
 from .checks import floats
 from .errors import InvalidArgument
 from .pieces import Pieces
+
+if TYPE_CHECKING:
+    from .hints import ArrayLike, Value
 
 
 class Table:
@@ -33,7 +39,7 @@ class Table:
     """
 
     @fitting
-    def __init__(self, times, values):
+    def __init__(self, times: ArrayLike, values: ArrayLike) -> None:
         self.times, self.values = floats(times), floats(values)
         k = self.times.size
         if self.times.ndim != 1 or k < 2 or not np.isfinite(self.times).all() or not (np.diff(self.times) > 0.0).all():
@@ -50,15 +56,15 @@ class Table:
         self.times.setflags(write=False)
         self.values.setflags(write=False)
 
-    def __call__(self, t):
+    def __call__(self, t: ArrayLike) -> Value:
         """The values at a time or times; NaN outside the table."""
         return self._spline(t)
 
-    def pieces(self):
+    def pieces(self) -> list[Any]:
         """One `Pieces` a component."""
         return pieces_of(self._spline)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<Table of {self.times.size} values, {self.times[0]:g} to {self.times[-1]:g} s>"
 
 

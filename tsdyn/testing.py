@@ -1,7 +1,10 @@
 """What authors of plug-ins, and the project's own tests, check their work with."""
 
+from __future__ import annotations
+
 import warnings
 from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba.core.errors import NumbaError
@@ -19,6 +22,11 @@ from .primitive import Primitive
 from .scene import Scene
 from .series_check import check_constraint_series
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .hints import AnyBody
+
 STEP = 1e-40  # of complex steps: no cancellation, so as small as can be
 TOLERANCE = 1e-11  # relative to the size of what is compared
 NOT_HOLONOMIC = (
@@ -27,7 +35,9 @@ NOT_HOLONOMIC = (
 _AXES = "xyz"
 
 
-def check_primitive(kind, *, seed=0, states=3):
+def check_primitive(
+    kind: type[Primitive | Joint] | Callable[[AnyBody, AnyBody], Primitive | Joint], *, seed: int = 0, states: int = 3
+) -> None:
     """Check a primitive's kernels against complex steps of its phi; return None, or raise naming the wrong entry.
 
     Parameters

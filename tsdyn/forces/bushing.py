@@ -11,7 +11,10 @@
 full turn.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +23,9 @@ from ..checks import floats
 from ..force import Force
 from ..markers import Parameters, Point, Turn
 from ..recurrences import cross, rotated, rotated_back, rotation
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 def _three(value, what, error):
@@ -62,17 +68,17 @@ class Bushing(Force):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        stiffness=0.0,
-        damping=0.0,
-        torsional_stiffness=0.0,
-        torsional_damping=0.0,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        stiffness: ArrayLike = 0.0,
+        damping: ArrayLike = 0.0,
+        torsional_stiffness: ArrayLike = 0.0,
+        torsional_damping: ArrayLike = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, None, None, None, None), name)
         self.stiffness, self.damping = stiffness, damping
         self.torsional_stiffness, self.torsional_damping = torsional_stiffness, torsional_damping

@@ -8,13 +8,19 @@
 Below the slip velocity v0 it is viscous: it does not hold a body at rest but lets it creep.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..force import Force, not_negative, positive_number
 from ..friction import act, demand_bodies, slip
 from ..markers import Point, Turn
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class CoulombFriction(Force):
@@ -52,16 +58,16 @@ class CoulombFriction(Force):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        force=0.0,
-        torque=0.0,
-        slip_velocity=1e-3,
-        slip_rate=1e-3,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        force: float = 0.0,
+        torque: float = 0.0,
+        slip_velocity: float = 1e-3,
+        slip_rate: float = 1e-3,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, None, (0.0, 0.0, 0.0), None), name)
         self.force, self.torque, self.slip_velocity, self.slip_rate = force, torque, slip_velocity, slip_rate
         self.check()

@@ -4,12 +4,18 @@ f = F             frame="ground"     (1)  [N], conjugate to x_a
 f = A(p_a) F      frame="body"       (2)
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from ..force import Force, vector_load
 from ..given_load import Given, GivenByState, GivenInBody
 from ..markers import Parameters, Point, Turn
 from ..state_function import arguments_of, state_load
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, Frame, PointMass, VectorLoad
 
 
 class PointForce(Given, Force):
@@ -52,7 +58,15 @@ class PointForce(Given, Force):
             cls = _BodyPointForce
         return super().__new__(cls)
 
-    def __init__(self, a, *, force=None, point_a=(0.0, 0.0, 0.0), frame="ground", name=""):
+    def __init__(
+        self,
+        a: PointMass | str,
+        *,
+        force: VectorLoad | None = None,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        frame: Frame = "ground",
+        name: str = "",
+    ) -> None:
         super().__init__(a, None, (point_a, *[None] * (len(self.markers) - 1)), name)
         self.take(force, frame, "(Fx, Fy, Fz) in N")
 

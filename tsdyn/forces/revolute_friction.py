@@ -9,7 +9,10 @@ F and T are the force and the torque that the joint exerts, at its point; mu is 
 that tilts the pin is carried by two forces, L apart.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -56,7 +59,16 @@ class RevoluteFriction(JointFriction, Force):
         }
     )
 
-    def __init__(self, joint, *, radius, kinetic, collar_radius=0.0, length=None, **given):
+    def __init__(
+        self,
+        joint: Revolute,
+        *,
+        radius: float,
+        kinetic: float,
+        collar_radius: float = 0.0,
+        length: float | None = None,
+        **given: Any,
+    ) -> None:
         super().__init__(joint, kinetic=kinetic, radius=radius, collar_radius=collar_radius, length=length, **given)
 
     def geometry(self):

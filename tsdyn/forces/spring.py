@@ -9,7 +9,10 @@
 Singular where l = 0: the run ends there.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +22,9 @@ from ..force import Force, load, not_negative
 from ..markers import Point
 from ..recurrences import dot, inverse_root, product, scaled, square
 from ..signal import Signal
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Load
 
 
 class Spring(Force):
@@ -53,17 +59,17 @@ class Spring(Force):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        stiffness=0.0,
-        damping=0.0,
-        free_length=None,
-        actuator=0.0,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        stiffness: float = 0.0,
+        damping: float = 0.0,
+        free_length: float | None = None,
+        actuator: Load = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b), name)
         ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
         length = np.linalg.norm(ends[0] - ends[1])

@@ -4,12 +4,18 @@ n = N             frame="ground"     (1)  [N m], conjugate to the turning of a
 n = A(p_a) N      frame="body"       (2)
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from ..force import Force, vector_load
 from ..given_load import Given, GivenByState, GivenInBody
 from ..markers import Parameters, Point, Turn
 from ..state_function import arguments_of, state_load
+
+if TYPE_CHECKING:
+    from ..hints import Body, Frame, VectorLoad
 
 
 class Torque(Given, Force):
@@ -52,7 +58,9 @@ class Torque(Given, Force):
             cls = _BodyTorque
         return super().__new__(cls)
 
-    def __init__(self, a, *, torque=None, frame="ground", name=""):
+    def __init__(
+        self, a: Body | str, *, torque: VectorLoad | None = None, frame: Frame = "ground", name: str = ""
+    ) -> None:
         places = [(0.0, 0.0, 0.0) if marker.code == Point.code else None for marker in self.markers]
         super().__init__(a, None, places, name)
         self.take(torque, frame, "(Nx, Ny, Nz) in N m")

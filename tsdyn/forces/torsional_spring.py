@@ -10,7 +10,10 @@ The turn counted is the one nearest to the angle at the last accepted step, so a
 Singular where f_b is parallel to u.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -26,6 +29,9 @@ from ..joint_coordinates import Angle
 from ..markers import Turn, Vector
 from ..recurrences import angle, cross, dot, scaled, square
 from ..signal import Signal
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Floats, Load
 
 PARALLEL = 1e-6  # sine of the angle below which a reference has no direction about the axis
 
@@ -71,19 +77,19 @@ class TorsionalSpring(Force):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        axis_a=None,
-        axis_b=None,
-        reference_a=None,
-        reference_b=None,
-        stiffness=0.0,
-        damping=0.0,
-        free_angle=0.0,
-        actuator=0.0,
-        name="",
-    ):
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        reference_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        stiffness: float = 0.0,
+        damping: float = 0.0,
+        free_angle: float = 0.0,
+        actuator: Load = 0.0,
+        name: str = "",
+    ) -> None:
         self.__dict__["_given"] = axis_b
         super().__init__(a, b, (axis_a, reference_a, reference_b, None, None), name)
         self.reference_a = self.coordinates[1]
@@ -97,7 +103,16 @@ class TorsionalSpring(Force):
         self.check()
 
     @Placing
-    def at(cls, a, b=None, *, axis=None, reference=None, axis_b=None, **arguments):
+    def at(
+        cls,
+        a: BodyLike,
+        b: BodyLike | None = None,
+        *,
+        axis: ArrayLike | None = None,
+        reference: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        **arguments: Any,
+    ) -> Self:
         """Make one from directions in the ground frame, the bodies being where they stand now.
 
         Parameters
@@ -138,7 +153,7 @@ class TorsionalSpring(Force):
         return rotation_matrix(other.orientation).T @ (rotation_matrix(body.orientation) @ direction)
 
     @property
-    def axis_b(self):
+    def axis_b(self) -> Floats:
         """The axis in the frame of b, as the bodies stand."""
         return self._carried(self.a, self.axis_a, self.b)
 

@@ -10,7 +10,10 @@ of friction.coefficient. A torque that tilts the slide is carried by two forces,
 W.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +52,15 @@ class TranslationalFriction(JointFriction, Force):
     markers = AXIS
     quantities = MappingProxyType({**JointFriction.quantities, "length": optional_length, "width": optional_length})
 
-    def __init__(self, joint, *, kinetic, length=None, width=None, **given):
+    def __init__(
+        self,
+        joint: Translational,
+        *,
+        kinetic: float,
+        length: float | None = None,
+        width: float | None = None,
+        **given: Any,
+    ) -> None:
         super().__init__(joint, kinetic=kinetic, length=length, width=width, **given)
 
     def geometry(self):

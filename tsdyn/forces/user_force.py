@@ -7,8 +7,11 @@
 so that b gets the opposite force at the same place x_a. Everything is in the ground frame.
 """
 
+from __future__ import annotations
+
 import math
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +21,11 @@ from ..errors import InvalidForce
 from ..force import Force
 from ..markers import Parameters, Point, Turn
 from ..state_function import ByState, arguments_of, fill_state
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..hints import ArrayLike, BodyLike, PointMass
 
 
 def _numbers(value, what, error):
@@ -66,15 +74,15 @@ class UserForce(ByState, Force):
 
     def __init__(
         self,
-        a,
-        b=None,
+        a: PointMass | str,
+        b: BodyLike | None = None,
         *,
-        function,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        parameters=(),
-        name="",
-    ):
+        function: Callable[..., object],
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        parameters: ArrayLike = (),
+        name: str = "",
+    ) -> None:
         if b is None:
             b = getattr(getattr(a, "scene", None), "ground", None)
         super().__init__(a, b, (point_a, None, None, point_b, None, None), name)

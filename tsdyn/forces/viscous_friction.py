@@ -7,12 +7,18 @@ N = -c_t w   on a, the opposite on b                              (2)
 dissipation = c v.v + c_t w.w                                     (3)
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from ..force import Force, not_negative
 from ..friction import act, demand_bodies, slip
 from ..markers import Point, Turn
 from ..recurrences import cross
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class ViscousFriction(Force):
@@ -39,7 +45,16 @@ class ViscousFriction(Force):
     slots = 9
     quantities = MappingProxyType({"damping": not_negative, "torsional_damping": not_negative})
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), damping=0.0, torsional_damping=0.0, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        damping: float = 0.0,
+        torsional_damping: float = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, None, (0.0, 0.0, 0.0), None), name)
         self.damping, self.torsional_damping = damping, torsional_damping
         self.check()

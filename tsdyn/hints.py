@@ -1,0 +1,148 @@
+"""Types of annotations: what public functions take and return, in terms of NumPy and of the scene's own classes.
+
+Imported by type checkers alone, so that annotations cost nothing at run time.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, Protocol, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .agreement import Reference
+from .assemble import AssemblyReport
+from .attachment import Attachment
+from .benchmark_report import Benchmark
+from .bodies import Attribute, Body, Ground, PointMass
+from .diagnostics import ConstraintError
+from .errors import TsdynError
+from .evaluate import Evaluation
+from .force import Force
+from .handles import Handles
+from .integrator import Integrator
+from .joint import Joint
+from .kinematics import Kinematics
+from .mobility import Mobility, RedundantRow
+from .motion import Motion
+from .phases import Phase
+from .primitive import Primitive
+from .profile_report import Profile
+from .scene import Scene
+from .solution import Charts, Solution, Steps
+from .state import RememberingState, State
+from .system import Packed, System
+from .table import Table
+
+
+class Rotation(Protocol):
+    """What is used of scipy.spatial.transform.Rotation."""
+
+    @property
+    def as_quat(self) -> Callable[..., Any]:
+        """The quaternion, scalar last."""
+
+    @property
+    def as_matrix(self) -> Callable[..., Any]:
+        """The matrix."""
+
+
+Floats: TypeAlias = NDArray[np.float64]
+Bools: TypeAlias = NDArray[np.bool_]
+Random: TypeAlias = np.random.Generator
+Matrix: TypeAlias = Any  # dense, or a sparse array of SciPy's
+Value: TypeAlias = np.float64 | Any  # of a function of time: a number at one time, an array at many
+
+AnyBody: TypeAlias = PointMass | Ground
+BodyLike: TypeAlias = PointMass | Ground | str  # a handle, or a name
+ItemLike: TypeAlias = Attachment | str
+Orientation: TypeAlias = ArrayLike | Rotation
+Span: TypeAlias = Sequence[float] | Floats
+
+TimeFunction: TypeAlias = Callable[[float], float]
+Data: TypeAlias = Table | Callable[[Any], Any] | tuple[ArrayLike, ArrayLike]  # callable: a spline of SciPy's
+Prescribed: TypeAlias = float | Motion | Data | Sequence[TimeFunction]  # one of ts.motions is callable
+Path: TypeAlias = Sequence[Prescribed] | Data | Floats
+Load: TypeAlias = float | Table | Callable[[Any], Any]
+VectorLoad: TypeAlias = ArrayLike | Table | Callable[..., Any]  # a function of t, or of t and state
+JointLaw: TypeAlias = Callable[[float, float, float], float]
+Event: TypeAlias = Callable[[float, State], float]
+Progress: TypeAlias = bool | Callable[[float], object]
+
+Formulation: TypeAlias = Literal["tangent", "null-space", "maggi-kane"]
+Redundancy: TypeAlias = Literal["drop", "refuse"]
+Folds: TypeAlias = Literal["keep", "free"]
+Frame: TypeAlias = Literal["ground", "body"]
+Axis: TypeAlias = Literal["x", "y", "z"]
+Method: TypeAlias = Integrator | type[Integrator] | str
+Methods: TypeAlias = Sequence[str | Callable[..., Integrator]] | Mapping[str, str | Callable[..., Integrator]]
+StepKernel: TypeAlias = tuple[Any, Floats, Callable[[int, int], int]]  # with its numbers, and floats of memory
+
+Item = TypeVar("Item", bound=Attachment)
+Class = TypeVar("Class", bound=type)
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+__all__ = [
+    "AnyBody",
+    "ArrayLike",
+    "AssemblyReport",
+    "Attachment",
+    "Attribute",
+    "Axis",
+    "Benchmark",
+    "Body",
+    "BodyLike",
+    "Bools",
+    "Charts",
+    "Class",
+    "ConstraintError",
+    "Data",
+    "Evaluation",
+    "Event",
+    "Floats",
+    "Folds",
+    "Force",
+    "Formulation",
+    "Frame",
+    "Function",
+    "Ground",
+    "Handles",
+    "Integrator",
+    "Item",
+    "ItemLike",
+    "Joint",
+    "JointLaw",
+    "Kinematics",
+    "Load",
+    "Matrix",
+    "Method",
+    "Methods",
+    "Mobility",
+    "Motion",
+    "Orientation",
+    "Packed",
+    "Path",
+    "Phase",
+    "PointMass",
+    "Prescribed",
+    "Primitive",
+    "Profile",
+    "Progress",
+    "Random",
+    "Redundancy",
+    "RedundantRow",
+    "Reference",
+    "RememberingState",
+    "Rotation",
+    "Scene",
+    "Solution",
+    "Span",
+    "State",
+    "StepKernel",
+    "Steps",
+    "System",
+    "Table",
+    "TimeFunction",
+    "TsdynError",
+    "Value",
+    "VectorLoad",
+]

@@ -14,14 +14,28 @@ __all__ += ["registered", "registered_joints"]
 
 
 def registered() -> tuple[type[Primitive], ...]:
-    """Return every primitive class known, built in or plugged in."""
+    """Return every primitive class known, built in or plugged in.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.constraints.Distance in ts.constraints.registered()
+    True
+    """
     from ..primitive import registered as known
 
     return tuple(known().values())
 
 
 def registered_joints() -> tuple[type[Joint], ...]:
-    """Return every joint class known, built in or plugged in."""
+    """Return every joint class known, built in or plugged in.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.constraints.Revolute in ts.constraints.registered_joints()
+    True
+    """
     from ..joint import registered as known
 
     return tuple(known().values())

@@ -46,6 +46,18 @@ class AngleDriver(Primitive):
     ------
     InvalidConstraint
         If a direction is missing or zero, or the angle is no motion, or a body is wrong.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> wheel = scene.add_body(mass=1.0, inertia=(1, 1, 2), angular_velocity=(0, 0, 3))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1)))
+    >>> directions = {"reference_a": (1, 0, 0), "across_a": (0, 1, 0), "reference_b": (1, 0, 0)}
+    >>> scene.add(ts.constraints.AngleDriver(scene.ground, wheel, **directions, angle=ts.motions.Ramp(0.0, 3.0)))
+    <AngleDriver 'AngleDriver(ground, body1)'>
+    >>> print(f"{ts.simulate(scene, (0, 5)).state.angle(hinge):.6f} rad")
+    15.000000 rad
     """
 
     rows = 1

@@ -46,6 +46,15 @@ class ConstantAngle(Joint):
     Notes
     -----
     One row: angle. `ConstantAngle.at(a, b, axis_a=, axis_b=)` takes both directions in the ground frame.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> mast = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> lean = scene.add(ts.constraints.ConstantAngle.at(mast, scene.ground, axis_a=(1, 0, 1), axis_b=(0, 0, 1)))
+    >>> print(f"{lean.angle:.4f} rad")
+    0.7854 rad
     """
 
     markers = (Vector("a"), Vector("b"))

@@ -42,6 +42,18 @@ class Cylindrical(Joint):
     -----
     Rows: axis[0], axis[1], line[0], line[1]. `Cylindrical.at(a, b, point=, axis=)` takes a point and the direction of
     the axis in the ground frame.
+
+    Examples
+    --------
+    A sleeve spins on a vertical shaft and falls along it:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> sleeve = scene.add_body(mass=1.0, inertia=(1, 1, 1), angular_velocity=(0, 0, 3))
+    >>> joint = scene.add(ts.constraints.Cylindrical.at(scene.ground, sleeve, point=(0, 0, 0), axis=(0, 0, 1)))
+    >>> state = ts.simulate(scene, (0, 1)).state
+    >>> print(f"{state.angle(joint):.3f} rad, {state.displacement(joint):.3f} m")
+    3.000 rad, -5.000 m
     """
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))

@@ -43,6 +43,20 @@ class Distance(Primitive):
     ------
     InvalidConstraint
         If the length is not positive and finite (at t = 0, for a function), or a point or body is wrong.
+
+    Examples
+    --------
+    A pendulum of 2 m, released from the horizontal:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(2, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground))
+    >>> def lowest(t, state):
+    ...     return state.position(bob)[0]
+    >>> solution = ts.simulate(scene, (0, 1), events=lowest)
+    >>> print(f"length {rod.length:g} m, lowest at {solution.t_events[0][0]:.4f} s")
+    length 2 m, lowest at 0.8292 s
     """
 
     rows = 1

@@ -38,6 +38,16 @@ class Dot1(Primitive):
     ------
     InvalidConstraint
         If an axis is missing or zero, or the value is no cosine.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 2, 2))
+    >>> scene.add(ts.constraints.Dot1(body, scene.ground, axis_a=(0, 0, 1), axis_b=(1, 0, 0)))
+    <Dot1 'Dot1(body1, ground)'>
+    >>> scene.mobility().degrees_of_freedom
+    5
     """
 
     rows = 1

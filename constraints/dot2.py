@@ -40,6 +40,19 @@ class Dot2(Primitive):
     ------
     InvalidConstraint
         If the axis is missing or zero, or a point, value or body is wrong.
+
+    Examples
+    --------
+    A point mass is kept 0.5 m above the plane z = 0:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> particle = scene.add_point_mass(mass=1.0, position=(1, 0, 0.4))
+    >>> scene.add(ts.constraints.Dot2(scene.ground, particle, axis_a=(0, 0, 1), value=0.5))
+    <Dot2 'Dot2(ground, body1)'>
+    >>> report = scene.assemble()
+    >>> print(particle.position, f"moved by {report.moved:.2f} m")
+    [1.  0.  0.5] moved by 0.10 m
     """
 
     rows = 1

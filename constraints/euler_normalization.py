@@ -32,6 +32,16 @@ class EulerNormalization(Primitive):
         If a is a point mass.
     InvalidConstraint
         If a is the ground.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1), name="top")
+    >>> scene.constraints
+    (<EulerNormalization 'EulerNormalization(top)'>,)
+    >>> float(scene.evaluate().Phi[0])
+    0.0
     """
 
     rows = 1

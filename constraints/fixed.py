@@ -48,6 +48,16 @@ class Fixed(FramedJoint):
     -----
     Rows: point[0] to point[2], axis[0], axis[1], turn. `Fixed.at(a, b)` takes the bodies as they stand now; the point,
     in the ground frame, is the centroid of b, or of a where b is the ground, unless `point=` says another.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> beam = scene.add_body(mass=2.0, inertia=(1, 1, 1), position=(1, 0, 0))
+    >>> clamp = scene.add(ts.constraints.Fixed.at(beam, scene.ground, point=(0, 0, 0)))
+    >>> force, torque = ts.simulate(scene, (0, 1)).reaction(clamp)
+    >>> print(force[-1].round(6) + 0.0, torque[-1].round(6) + 0.0)
+    [ 0.  0. 20.] [  0. -20.   0.]
     """
 
     def __init__(

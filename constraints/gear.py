@@ -63,6 +63,21 @@ class Gear(Primitive):
     -----
     `Gear.at(a, b, point_a=, point_b=, axis=, ratio=)` takes the centres and the axis in the ground frame. At a start
     theta_a lies in (-pi, pi], unless it goes on from the state of another run.
+
+    Examples
+    --------
+    A pinion drives a wheel of twice its radius:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> pinion = scene.add_body(mass=1.0, inertia=(1, 1, 1), angular_velocity=(0, 0, 2))
+    >>> wheel = scene.add_body(mass=1.0, inertia=(1, 1, 2), position=(0.3, 0, 0), angular_velocity=(0, 0, -1))
+    >>> hinges = [ts.constraints.Revolute.at(scene.ground, b, point=b.position, axis=(0, 0, 1)) for b in scene.bodies]
+    >>> fast, slow = map(scene.add, hinges)
+    >>> gear = scene.add(ts.constraints.Gear(pinion, wheel, axis_a=(0, 0, 1), ratio=-0.5))
+    >>> state = ts.simulate(scene, (0, 10)).state
+    >>> print(f"{state.angle(fast):.4f} rad, {state.angle(slow):.4f} rad")
+    20.0000 rad, -10.0000 rad
     """
 
     rows = 1

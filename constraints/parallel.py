@@ -38,6 +38,16 @@ class Parallel(Joint):
     Notes
     -----
     Rows: axis[0], axis[1]. `Parallel.at(a, b, axis=)` takes one direction in the ground frame.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> disc = scene.add_body(mass=1.0, inertia=(1, 1, 2), angular_velocity=(0, 0, 4))
+    >>> upright = scene.add(ts.constraints.Parallel.at(scene.ground, disc, axis=(0, 0, 1)))
+    >>> state = ts.simulate(scene, (0, 2)).state
+    >>> print(f"{state.angle(upright):.4f} rad")
+    8.0000 rad
     """
 
     markers = (Vector("a"), Vector("b"))

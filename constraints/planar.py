@@ -42,6 +42,18 @@ class Planar(Joint):
     -----
     Rows: axis[0], axis[1], plane. `Planar.at(a, b, point=, axis=)` takes a point and the normal of the plane in the
     ground frame. A single point on a plane is a PlaneContact.
+
+    Examples
+    --------
+    A plate slides over a table and spins on it:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> plate = scene.add_body(mass=1.0, inertia=(1, 1, 2), velocity=(1, 2, 0), angular_velocity=(0, 0, 1))
+    >>> table = scene.add(ts.constraints.Planar.at(scene.ground, plate, point=(0, 0, 0), axis=(0, 0, 1)))
+    >>> state = ts.simulate(scene, (0, 2)).state
+    >>> print(state.position(plate).round(6) + 0.0)
+    [2. 4. 0.]
     """
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))

@@ -42,6 +42,18 @@ class PlaneContact(Primitive):
     Notes
     -----
     The force on a is -lam n: the plane pushes where lam < 0.
+
+    Examples
+    --------
+    A particle slides down a plane at 45 degrees:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> block = scene.add_point_mass(mass=1.0, name="block")
+    >>> plane = scene.add(ts.constraints.PlaneContact(block, scene.ground, normal_b=(1, 0, 1)))
+    >>> solution = ts.simulate(scene, (0, 1))
+    >>> print(solution.position("block")[-1].round(3) + 0.0, solution.multipliers[0].round(3))
+    [ 2.5  0.  -2.5] [-7.071]
     """
 
     rows = 1

@@ -46,6 +46,20 @@ class PointDriver(Joint):
     Notes
     -----
     Three rows: path[0] to path[2]. The force that leads b is that of `solution.reaction(driver, on=b)`.
+
+    Examples
+    --------
+    The pivot of a pendulum goes round a circle:
+
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> scene, t = ts.Scene(), ts.motions.time
+    >>> bob = scene.add_body(mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.2, 0, -1), velocity=(0, 0.4, 0))
+    >>> path = (0.2 * np.cos(2.0 * t), 0.2 * np.sin(2.0 * t), 0.0)
+    >>> pivot = scene.add(ts.constraints.PointDriver(scene.ground, bob, point_b=(0, 0, 1), path=path))
+    >>> place = ts.simulate(scene, (0, 1)).state.position(bob, point=(0, 0, 1))
+    >>> print(place.round(6) + 0.0)
+    [-0.083229  0.181859  0.      ]
     """
 
     markers = (Point("a"), Point("b"))

@@ -41,6 +41,18 @@ class PointOnLine(Joint):
     Notes
     -----
     Rows: line[0], line[1]. `PointOnLine.at(a, b, point=, axis=)` takes the point and the direction in the ground frame.
+
+    Examples
+    --------
+    A bead on a straight wire at 45 degrees:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bead = scene.add_point_mass(mass=1.0)
+    >>> wire = scene.add(ts.constraints.PointOnLine(bead, scene.ground, axis_b=(1, 0, -1)))
+    >>> state = ts.simulate(scene, (0, 1)).state
+    >>> print(state.position(bead).round(6) + 0.0)
+    [ 2.5  0.  -2.5]
     """
 
     markers = (Point("a"), Point("b"), Vector("b"))

@@ -55,6 +55,22 @@ class RackAndPinion(Joint):
     -----
     One row: teeth. `RackAndPinion.at(a, b, point=, axis=, direction=, radius=)` takes a point on the pinion's axis,
     that axis and the rack's direction in the ground frame.
+
+    Examples
+    --------
+    A pinion of 0.1 m turns in the ground and moves a rack along x:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> rack = scene.add_body(mass=1.0, inertia=(1, 1, 1), velocity=(-0.2, 0, 0))
+    >>> pinion = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(0, 0.1, 0), angular_velocity=(0, 0, 2))
+    >>> slide = scene.add(ts.constraints.Translational.at(scene.ground, rack, point=(0, 0, 0), axis=(1, 0, 0)))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, pinion, point=(0, 0.1, 0), axis=(0, 0, 1)))
+    >>> teeth = {"point": (0, 0.1, 0), "axis": (0, 0, 1), "direction": (1, 0, 0), "radius": 0.1}
+    >>> scene.add(ts.constraints.RackAndPinion.at(rack, pinion, **teeth))
+    <RackAndPinion(body1, body2): 1 row>
+    >>> print(f"{ts.simulate(scene, (0, 1)).state.displacement(slide):.4f} m")
+    -0.2000 m
     """
 
     markers = (

@@ -42,6 +42,18 @@ class Revolute(Joint):
     -----
     Rows: point[0] to point[2], axis[0], axis[1]. `Revolute.at(a, b, point=, axis=)` takes the point and the axis in the
     ground frame, the bodies being where they stand now.
+
+    Examples
+    --------
+    A bar of 1 m, released from the horizontal:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bar = scene.add_body(**ts.shapes.rod(1.0, axis="x", mass=3.0), position=(0.5, 0, 0))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0)))
+    >>> solution = ts.simulate(scene, (0, 1))
+    >>> print(f"{solution.angle(hinge)[-1]:.6f} rad")
+    3.133418 rad
     """
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))

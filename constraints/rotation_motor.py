@@ -52,6 +52,20 @@ class RotationMotor(FramedJoint):
     One row: turn. `RotationMotor.of(joint, angle=)` drives a joint that has an axis; `RotationMotor.at(a, b, axis=,
     angle=)` takes the axis in the ground frame. The torque on b about the axis is that of `solution.reaction(motor,
     on=b)`, its power part of `solution.power`.
+
+    Examples
+    --------
+    A motor brings a flywheel of 2 kg m^2 up with 3 rad/s^2:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> wheel = scene.add_body(mass=1.0, inertia=(1, 1, 2))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1)))
+    >>> motor = scene.add(ts.constraints.RotationMotor.of(hinge, angle=1.5 * ts.motions.time**2))
+    >>> solution = ts.simulate(scene, (0, 1))
+    >>> _, torque = solution.reaction(motor, on=wheel)
+    >>> print(f"{torque[-1, 2]:.3f} N m, {solution.power_of(motor)[-1]:.3f} W")
+    6.000 N m, 18.000 W
     """
 
     joint_coordinates = (Angle(reference="reference_a", direction="reference_b"),)

@@ -51,6 +51,18 @@ class Screw(FramedJoint):
     -----
     Rows: axis[0], axis[1], line[0], line[1], thread. `Screw.at(a, b, point=, axis=, lead=)` takes a point and the
     direction of the axis in the ground frame. A thread of one pitch p in m has lead = p / (2 pi).
+
+    Examples
+    --------
+    A nut that may only turn on a vertical screw of 0.1 m/rad:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> nut = scene.add_body(mass=1.0, inertia=(1, 1, 0.99))
+    >>> screw = scene.add(ts.constraints.Screw.at(scene.ground, nut, point=(0, 0, 0), axis=(0, 0, 1), lead=0.1))
+    >>> state = ts.simulate(scene, (0, 1)).state
+    >>> print(f"{state.angle(screw):.4f} rad, {state.displacement(screw):.4f} m")
+    -0.5000 rad, -0.0500 m
     """
 
     joint_coordinates = (Angle(reference="reference_a", direction="reference_b"), Displacement())

@@ -37,6 +37,16 @@ class Spherical(Primitive):
     Notes
     -----
     The force on b is the multiplier itself, in the ground frame: -Phi_r^T lam = lam.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> pendulum = scene.add_body(mass=2.0, inertia=(1, 1, 1), position=(0, 0, -1))
+    >>> pivot = scene.add(ts.constraints.Spherical(pendulum, scene.ground, point_a=(0, 0, 1)))
+    >>> force, torque = ts.simulate(scene, (0, 1)).reaction(pivot)
+    >>> print(f"{force[0, 2]:.3f} N carry the pendulum at rest")
+    20.000 N carry the pendulum at rest
     """
 
     rows = 3

@@ -53,6 +53,18 @@ class Thread(Primitive):
     ------
     InvalidConstraint
         If the lead is zero or not finite, or a direction, point or body is wrong.
+
+    Examples
+    --------
+    One row; a `Screw` has those that keep the axes on one line, too:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> nut = scene.add_body(mass=1.0, inertia=(1, 1, 1), velocity=(0, 0, 0.2), angular_velocity=(0, 0, 2))
+    >>> directions = {"reference_a": (1, 0, 0), "across_a": (0, 1, 0), "axis_a": (0, 0, 1), "reference_b": (1, 0, 0)}
+    >>> thread = scene.add(ts.constraints.Thread(scene.ground, nut, **directions, lead=0.1))
+    >>> print(thread.rows, scene.mobility().degrees_of_freedom)
+    1 5
     """
 
     rows = 1

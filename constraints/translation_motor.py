@@ -46,6 +46,19 @@ class TranslationMotor(Joint):
     One row: travel. `TranslationMotor.of(joint, displacement=)` drives a joint between its points;
     `TranslationMotor.at(a, b, point=, axis=, displacement=)` takes a point (or `point_a=`, `point_b=`) and the axis in
     the ground frame. The force on b along the axis is that of `solution.reaction(motor, on=b)`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> table = scene.add_body(mass=2.0, inertia=(1, 1, 1), velocity=(0.5, 0, 0))
+    >>> slide = scene.add(ts.constraints.Translational.at(scene.ground, table, point=(0, 0, 0), axis=(1, 0, 0)))
+    >>> motion = 0.1 * np.sin(5.0 * ts.motions.time)
+    >>> drive = scene.add(ts.constraints.TranslationMotor.of(slide, displacement=motion))
+    >>> force, _ = ts.simulate(scene, (0, 1)).reaction(drive, on=table)
+    >>> print(f"{force[-1, 0]:.4f} N")
+    4.7946 N
     """
 
     markers = (Point("a"), Point("b"), Vector("a"))

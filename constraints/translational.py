@@ -47,6 +47,18 @@ class Translational(FramedJoint):
     -----
     Rows: axis[0], axis[1], turn, line[0], line[1]. `Translational.at(a, b, point=, axis=)` takes a point and the
     direction of the axis in the ground frame.
+
+    Examples
+    --------
+    A block slides down a guide at 45 degrees:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> block = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> guide = scene.add(ts.constraints.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, -1)))
+    >>> state = ts.simulate(scene, (0, 1)).state
+    >>> print(f"{state.displacement(guide):.4f} m, {state.displacement_rate(guide):.4f} m/s")
+    3.5355 m, 7.0711 m/s
     """
 
     joint_coordinates = (Displacement(),)

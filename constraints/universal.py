@@ -50,6 +50,18 @@ class Universal(Joint):
     Notes
     -----
     Rows: point[0] to point[2], cross. `Universal.at(a, b, point=, axis=, axis_b=)` takes them in the ground frame.
+
+    Examples
+    --------
+    The second axis of the cross follows from the centroid of the second shaft:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> one = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> other = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(1, 0, 0))
+    >>> cross = scene.add(ts.constraints.Universal.at(one, other, point=(0.5, 0, 0), axis=(0, 1, 0)))
+    >>> print(cross, cross.axis_b + 0.0)
+    <Universal(body1, body2): 4 rows> [ 0.  0. -1.]
     """
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))

@@ -14,7 +14,14 @@ __all__.append("registered")
 
 
 def registered() -> tuple[type[Integrator], ...]:
-    """Return every integrator class known, built in or plugged in."""
+    """Return every integrator class known, built in or plugged in.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.integrators.Taylor in ts.integrators.registered()
+    True
+    """
     from ..integrator import registered as known
 
     return tuple(known().values())

@@ -95,6 +95,17 @@ def assemble(
     Bodies hang on springs at their places in the sketch, in the metric of kinetic energy, and constraints are springs
     that stiffen until they hold; then Gauss-Newton steps. Redundant rows are welcome. The velocity correction is the
     smallest in kinetic energy.
+
+    Examples
+    --------
+    A ball is moved to the end of its rod:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> ball = scene.add_point_mass(mass=1.0, position=(1.2, 0, 0))
+    >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground, length=1.0))
+    >>> print(f"moved by {scene.assemble().moved:.2f} m to {ball.position.round(6) + 0.0}")
+    moved by 0.20 m to [1. 0. 0.]
     """
     tol = positive(tol, "tol")
     if not np.isfinite(number(t)):

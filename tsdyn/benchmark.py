@@ -79,6 +79,16 @@ def benchmark(
     ------
     TsdynError
         Before anything is measured, if an argument is wrong, the scene can't be run, or has no reference.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> report = ts.benchmark(scene, ["rk45", "taylor"], tolerances=(1e-6,), t_span=(0, 1), repeats=1)
+    >>> [(row.method, row.value, row.status) for row in report.rows]
+    [('RK45', 1e-06, 'success'), ('Taylor', 1e-06, 'success')]
     """
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")

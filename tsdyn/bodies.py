@@ -121,7 +121,16 @@ def _vector(what, unit):
 
 
 class PointMass:
-    """A particle: three coordinates, no orientation. Made by `Scene.add_point_mass`."""
+    """A particle: three coordinates, no orientation. Made by `Scene.add_point_mass`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bob = scene.add_point_mass(mass=1.0, position=(0, 0, -2), name="bob")
+    >>> bob, bob.position
+    (<PointMass 'bob'>, array([ 0.,  0., -2.]))
+    """
 
     dimension = 3
     mass: Attribute[float, float] = Attribute(_mass, "Mass, kg.")
@@ -168,7 +177,17 @@ class PointMass:
 
 
 class Body(PointMass):
-    """A rigid body: centroid r and Euler parameters p, seven coordinates. Made by `Scene.add_body`."""
+    """A rigid body: centroid r and Euler parameters p, seven coordinates. Made by `Scene.add_body`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> crank = scene.add_body(mass=2.0, inertia=(0.1, 0.2, 0.2), name="crank")
+    >>> crank.mass = 3.0  # for all runs from now on
+    >>> crank, float(crank.mass), crank.position
+    (<Body 'crank'>, 3.0, array([0., 0., 0.]))
+    """
 
     dimension = 7
     inertia: Attribute[ArrayLike, Floats] = Attribute(

@@ -36,6 +36,17 @@ def remove(scene: Scene, item: Any) -> Any:
     ------
     InvalidArgument
         If the scene has no such thing, the name is that of several, or a constraint or force refers to it.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bar = scene.add_body(**ts.shapes.cylinder(0.02, 1.0, axis="x", mass=1.0), position=(0.5, 0, 0))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    >>> scene.remove("hinge")
+    <Revolute 'hinge': 5 rows>
+    >>> scene.mobility().degrees_of_freedom
+    6
     """
     item = found(scene, item)
     users = _users(scene, item)
@@ -103,6 +114,17 @@ def copy(scene: Scene) -> Scene:
     -------
     Scene
         With the same names, numbers and functions; objects that are asked as controllers are copied, too.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bar = scene.add_body(**ts.shapes.cylinder(0.02, 1.0, axis="x", mass=1.0), position=(0.5, 0, 0))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    >>> heavy = scene.copy()
+    >>> heavy[bar].mass = 5.0
+    >>> float(bar.mass), heavy[hinge]
+    (1.0, <Revolute 'hinge': 5 rows>)
     """
     memo = {}
     twin = deepcopy(scene, memo)

@@ -10,51 +10,189 @@ if TYPE_CHECKING:
 
 
 class TsdynError(Exception):
-    """Any error that tsdyn raises on purpose; the message says what is wrong, where, and how to mend it."""
+    """Any error that tsdyn raises on purpose; the message says what is wrong, where, and how to mend it.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> try:
+    ...     ts.simulate(scene, (0, 1))
+    ... except ts.TsdynError as error:
+    ...     print(error)
+    the scene has no bodies; add one with scene.add_body(...).
+    """
 
 
 class InvalidArgument(TsdynError, ValueError):
-    """An argument that is neither a body nor a constraint has a wrong value, type or shape."""
+    """An argument that is neither a body nor a constraint has a wrong value, type or shape.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> try:
+    ...     ts.shapes.sphere(0.5)
+    ... except ts.InvalidArgument as error:
+    ...     print(error)
+    sphere: give either mass= in kg or density= in kg/m^3.
+    """
 
 
 class InvalidCall(InvalidArgument, TypeError):
-    """A call that the signature doesn't allow: an argument is misspelt, missing, given twice or one too many."""
+    """A call that the signature doesn't allow: an argument is misspelt, missing, given twice or one too many.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> try:
+    ...     ts.Table(time=(0, 1), values=(0, 1))
+    ... except ts.InvalidCall as error:
+    ...     print(error)
+    Table() has no argument time; did you mean times? It has times, values.
+    """
 
 
 class InvalidBody(TsdynError, ValueError):
-    """A body's mass, inertia, pose or velocity is impossible, or the body belongs to another scene."""
+    """A body's mass, inertia, pose or velocity is impossible, or the body belongs to another scene.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> try:
+    ...     scene.add_body(mass=-1.0, inertia=(1, 1, 1))
+    ... except ts.InvalidBody as error:
+    ...     print(error)
+    body1: mass (kg) must be a positive finite number, got -1.0.
+    """
 
 
 class InvalidConstraint(TsdynError, ValueError):
-    """A constraint's geometry, bodies or kernels are impossible."""
+    """A constraint's geometry, bodies or kernels are impossible.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> try:
+    ...     ts.constraints.Dot1(body, scene.ground, axis_a=(0, 0, 1), axis_b=(0, 0, 0))
+    ... except ts.InvalidConstraint as error:
+    ...     print(error)
+    Dot1(body1, ground): axis_b has length zero; give a direction, such as (0, 0, 1).
+    """
 
 
 class InvalidForce(TsdynError, ValueError):
-    """A force's numbers, functions, bodies or kernels are impossible."""
+    """A force's numbers, functions, bodies or kernels are impossible.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> try:
+    ...     ts.forces.Spring(body, scene.ground, point_b=(1, 0, 0), stiffness=-5.0)
+    ... except ts.InvalidForce as error:
+    ...     print(error)
+    Spring(body1, ground): stiffness must be a finite number that is not negative, got -5.0.
+    """
 
 
 class InconsistentState(TsdynError, ValueError):
-    """Positions or velocities break a constraint; the message names it and its residual."""
+    """Positions or velocities break a constraint; the message names it and its residual.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> rod = scene.add(ts.constraints.Distance(body, scene.ground, point_b=(1, 0, 0), length=1.5))
+    >>> try:
+    ...     ts.simulate(scene, (0, 1))
+    ... except ts.InconsistentState as error:
+    ...     print(error)
+    the initial position breaks 1 constraint row (allowed: 2e-09):
+      Distance(body1, ground): Phi = -0.416667
+    Correct the bodies' poses, or call scene.assemble() to move them to the nearest consistent ones.
+    """
 
 
 class RedundantConstraints(TsdynError, ValueError):
-    """Rows of Phi_q depend on each other; the message names them."""
+    """Rows of Phi_q depend on each other; the message names them.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> one, two = (scene.add(ts.constraints.Spherical(body, scene.ground)) for _ in range(2))
+    >>> try:
+    ...     ts.simulate(scene, (0, 1), redundancy="refuse")
+    ... except ts.RedundantConstraints as error:
+    ...     print(str(error).splitlines()[0])
+    3 of the 7 constraint rows are redundant, Phi_q has rank 4:
+    """
 
 
 class SingularConfiguration(TsdynError, ArithmeticError):
-    """The equations of motion have no unique solution here: Phi_q loses rank, or D^T M D is singular."""
+    """The equations of motion have no unique solution here: Phi_q loses rank, or D^T M D is singular.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> needle = scene.add_body(**ts.shapes.rod(1.0, mass=1.0), name="needle")  # no inertia about its axis
+    >>> try:
+    ...     ts.simulate(scene, (0, 1))
+    ... except ts.SingularConfiguration as error:
+    ...     print(str(error).partition(", so")[0])
+    needle: turning about the axis [0. 0. 1.] of its frame is free and carries no inertia
+    """
 
 
 class UnknownAttribute(TsdynError, AttributeError):
-    """An attribute that a body, constraint or scene does not have was set: a slip of the pen would change nothing."""
+    """An attribute that a body, constraint or scene does not have was set: a slip of the pen would change nothing.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> try:
+    ...     body.masss = 2.0
+    ... except ts.UnknownAttribute as error:
+    ...     print(error)
+    <Body 'body1'> has no attribute 'masss' to set; did you mean mass?
+    """
 
 
 class MissingDependency(TsdynError, ImportError):
-    """An optional package is needed for this and is not installed."""
+    """An optional package is needed for this and is not installed.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> issubclass(ts.MissingDependency, ImportError)
+    True
+    """
 
 
 class StepFailure(TsdynError, ArithmeticError):
-    """A run ended early; raised by `Solution.raise_if_failed`, with the solution so far as `.solution`."""
+    """A run ended early; raised by `Solution.raise_if_failed`, with the solution so far as `.solution`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> try:
+    ...     ts.simulate(scene, (0, 1), max_steps=2).raise_if_failed()
+    ... except ts.StepFailure as failure:
+    ...     print(failure.solution.stats.steps, failure.solution.status)
+    2 max_steps
+    """
 
     def __init__(self, message: str, solution: Solution | None = None) -> None:
         super().__init__(message)
@@ -62,11 +200,29 @@ class StepFailure(TsdynError, ArithmeticError):
 
 
 class CheckFailed(TsdynError, AssertionError):
-    """A check of a plug-in failed; the message says which entry, what it gave and what it should have given."""
+    """A check of a plug-in failed; the message says which entry, what it gave and what it should have given.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> issubclass(ts.testing.CheckFailed, ts.TsdynError)
+    True
+    """
 
 
 class Status(IntEnum):
-    """How a run ended, or the stop of one slice of it; `sentence` says it, `remedy` what to do."""
+    """How a run ended, or the stop of one slice of it; `sentence` says it, `remedy` what to do.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> solution = ts.simulate(scene, (0, 1), max_steps=2)
+    >>> solution.status == ts.Status.MAX_STEPS, solution.status.sentence
+    (True, 'The run reached max_steps.')
+    """
 
     SUCCESS = 0
     NEWTON_FAILED = 1

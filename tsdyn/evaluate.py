@@ -70,6 +70,16 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
     Notes
     -----
     Haug 2018, Eqs. 1-4. Multipliers and accelerations solve [M, Phi_q^T; Phi_q, 0] (qdd, lam) = (Q_A + S, -gamma).
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+    >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+    >>> at_start = scene.evaluate()
+    >>> print(at_start.Phi_q, at_start.qdd + 0.0)
+    [[1. 0. 0.]] [ 0.    0.   -9.81]
     """
     system = scene.system
     start = scene.start

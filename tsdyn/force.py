@@ -74,6 +74,29 @@ class Force(Attachment):
         Whether all but the loads' work is in potential and dissipation, however the bodies move.
     a, b : Body or ground
     name : str
+
+    Examples
+    --------
+    A point of a body is pulled back to the z axis by -k d:
+
+    >>> import tsdyn as ts
+    >>> class Pole(ts.Force):
+    ...     markers = (ts.Point("a"),)
+    ...     def __init__(self, a, *, point_a=(0, 0, 0), stiffness=1.0, name=""):
+    ...         super().__init__(a, None, (point_a,), name)
+    ...         self.stiffness = float(stiffness)
+    ...     def parameters(self):
+    ...         return (self.stiffness,)
+    ...     @staticmethod
+    ...     def law(x, xd, par, t, out):
+    ...         out[0], out[1] = -par[0] * x[0], -par[0] * x[1]
+    ...     @staticmethod
+    ...     def potential(x, par, t):
+    ...         return par[0] * (x[0] * x[0] + x[1] * x[1]) / 2
+    >>> scene = ts.Scene()
+    >>> ball = scene.add_point_mass(mass=1.0, position=(0.5, 0, 0))
+    >>> scene.add(Pole(ball, stiffness=8.0))
+    <Pole 'Pole(body1)'>
     """
 
     error = InvalidForce

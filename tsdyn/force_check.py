@@ -62,6 +62,11 @@ def check_force(kind: type[Force] | Callable[[AnyBody, AnyBody], Force], *, seed
     CheckFailed
         If the compiled force differs from the Python one, its Jacobians from differences of sixth order, dissipation is
         negative, or a force without loads gives or takes power that is in neither its potential nor its dissipation.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.testing.check_force(ts.forces.Spring, states=1)
     """
     rng = np.random.default_rng(seed)
     for arrangement in ("body to body", "body to ground", "ground to body"):

@@ -37,6 +37,12 @@ class Integrator:
         How far below the tolerances one step's error is kept: errors of many steps add up.
     errors : tuple of Callback
         The kernels of the error estimate; a second one tempers the first (Hairer's combination of two orders).
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> isinstance(ts.integrators.Nystrom4(step=0.01), ts.Integrator)
+    True
     """
 
     order = 0
@@ -83,7 +89,20 @@ class Integrator:
 
 
 class ExplicitNystrom(Integrator):
-    """A method that is a `NystromTableau`, with the Runge-Kutta tableau of its first-order equivalent."""
+    """A method that is a `NystromTableau`, with the Runge-Kutta tableau of its first-order equivalent.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> class Midpoint(ts.ExplicitNystrom):
+    ...     order = 2
+    ...     tableau = ts.NystromTableau(
+    ...         a=((), (1 / 2,)), abar=((), (1 / 8,)), b=(0, 1), bbar=(0, 1 / 2), c=(0, 1 / 2), order=2
+    ...     )
+    ...     first_order = ts.RungeKuttaTableau(a=((), (1 / 2,)), b=(0, 1), c=(0, 1 / 2), order=2)
+    >>> Midpoint(step=1e-3)
+    Midpoint(step=0.001)
+    """
 
     tableau: NystromTableau | None = None
     first_order: RungeKuttaTableau | None = None
@@ -98,7 +117,15 @@ class ExplicitNystrom(Integrator):
 
 
 class Adaptive(Integrator):
-    """A method that chooses its steps by an error estimate, unless it is given a fixed one."""
+    """A method that chooses its steps by an error estimate, unless it is given a fixed one.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> method = ts.integrators.RK45(rtol=1e-6, max_step=0.1)
+    >>> isinstance(method, ts.Adaptive), method
+    (True, RK45(rtol=1e-06, atol=1e-08))
+    """
 
     def __init__(
         self,
@@ -129,7 +156,20 @@ class Adaptive(Integrator):
 
 
 class ExplicitRungeKutta(Adaptive):
-    """A method that is a `RungeKuttaTableau` with an error estimate, applied to (v, vd)."""
+    """A method that is a `RungeKuttaTableau` with an error estimate, applied to (v, vd).
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> class BogackiShampine(ts.ExplicitRungeKutta):
+    ...     order = 3
+    ...     tableau = ts.RungeKuttaTableau(
+    ...         a=((), (1 / 2,), (0, 3 / 4)), b=(2 / 9, 1 / 3, 4 / 9), c=(0, 1 / 2, 3 / 4), order=3,
+    ...         error=(-5 / 72, 1 / 12, 1 / 9, -1 / 8), embedded_order=2,
+    ...     )
+    >>> BogackiShampine(rtol=1e-4)
+    BogackiShampine(rtol=0.0001, atol=1e-08)
+    """
 
     tableau: Any = None  # RungeKuttaTableau, or a property that makes one
 
@@ -151,6 +191,15 @@ class DiagonallyImplicit(Adaptive):
 
     One stiffness and damping, exact, and one factorised iteration matrix are kept over iterations, stages, steps and
     charts until the measured contraction says otherwise.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> class Trapezoid(ts.DiagonallyImplicit):
+    ...     order = 2
+    ...     tableau = ts.ImplicitTableau(a=((0,), (1 / 2, 1 / 2)), c=(0, 1), order=2, embedded_order=2)
+    >>> Trapezoid(step=1e-3)
+    Trapezoid(step=0.001)
     """
 
     tableau: ImplicitTableau | None = None

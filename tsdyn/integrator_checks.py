@@ -79,6 +79,23 @@ def check_integrator(
     - adaptive methods: errors below 100 tolerances, that follow the tolerance; number of steps that grows as the order
       of the estimate says; first_step and max_step; rejected steps leave no trace;
     - output times change no step, and a run repeated gives the same bits.
+
+    Examples
+    --------
+    A method of order 3 that claims order 4:
+
+    >>> import tsdyn as ts
+    >>> class Boaster(ts.ExplicitRungeKutta):
+    ...     order = 4
+    ...     tableau = ts.RungeKuttaTableau(
+    ...         a=((), (1 / 2,), (0, 3 / 4)), b=(2 / 9, 1 / 3, 4 / 9), c=(0, 1 / 2, 3 / 4), order=3,
+    ...         error=(-5 / 72, 1 / 12, 1 / 9, -1 / 8), embedded_order=2,
+    ...     )
+    >>> try:
+    ...     ts.testing.check_integrator(Boaster)
+    ... except ts.testing.CheckFailed:
+    ...     print("refused")
+    refused
     """
     kind = _make(method, step=1e-2)
     adaptive = kind.embedded_order > 0

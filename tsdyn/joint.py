@@ -45,6 +45,26 @@ class Joint(Attachment):
     a, b : Body or ground
     name : str
         What error messages call it.
+
+    Examples
+    --------
+    A pin in a slot along x, which slides and turns about z:
+
+    >>> import tsdyn as ts
+    >>> class PinInSlot(ts.Joint):
+    ...     markers = (ts.Point("a"), ts.Point("b"))
+    ...     def __init__(self, a, b, *, point_a=(0, 0, 0), point_b=(0, 0, 0), name=""):
+    ...         super().__init__(a, b, (point_a, point_b), name)
+    ...     def compose(self):
+    ...         points = {"point_a": self.point_a, "point_b": self.point_b}
+    ...         yield "axis", ts.constraints.Parallel(self.a, self.b, axis_a=(0, 0, 1), axis_b=(0, 0, 1))
+    ...         yield "slot", ts.constraints.PointOnLine(self.a, self.b, **points, axis_b=(1, 0, 0))
+    >>> scene = ts.Scene()
+    >>> pin = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> scene.add(PinInSlot(pin, scene.ground, name="pin"))
+    <PinInSlot 'pin': 4 rows>
+    >>> scene.mobility().degrees_of_freedom
+    2
     """
 
     def __init_subclass__(cls, **keywords: Any) -> None:

@@ -37,6 +37,12 @@ class Angle:
         as the bodies stood when the joint was made.
     direction : str, optional
         The direction of the other body whose angle it is. Left out: the one that was at the angle zero as built.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.constraints.Revolute.joint_coordinates
+    (Angle(axis='axis_a', other='axis_b', reference='', direction=''),)
     """
 
     axis: str = "axis_a"
@@ -68,6 +74,12 @@ class Displacement:
     ----------
     axis : str
         The direction, an attribute of the joint; its name ends with the letter of its body.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.constraints.Translational.joint_coordinates
+    (Displacement(axis='axis_a'),)
     """
 
     axis: str = "axis_a"

@@ -52,6 +52,16 @@ class JointFriction:
     ----------
     joints : tuple of classes
         The constraints whose friction it can be.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> block = scene.add_point_mass(mass=1.0)
+    >>> table = scene.add(ts.constraints.PlaneContact(block, scene.ground, normal_b=(0, 0, 1), name="table"))
+    >>> friction = scene.add(ts.forces.ContactFriction(table, kinetic=0.2, static=0.3))
+    >>> isinstance(friction, ts.JointFriction), friction
+    (True, <ContactFriction 'ContactFriction(table)'>)
     """
 
     joints = ()

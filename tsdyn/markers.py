@@ -53,7 +53,14 @@ class Marker:
 
 
 class Point(Marker):
-    """A point of a body, by its coordinates in the body frame, m."""
+    """A point of a body, by its coordinates in the body frame, m.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.Point("a").argument, ts.Point("b", "tip_b").argument
+    ('point_a', 'tip_b')
+    """
 
     def coordinates(
         self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
@@ -66,7 +73,14 @@ class Point(Marker):
 
 
 class Vector(Marker):
-    """A direction of a body, by its components in the body frame; scaled to unit length."""
+    """A direction of a body, by its components in the body frame; scaled to unit length.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.Vector("b").argument, ts.Vector("b", "normal_b").argument
+    ('axis_b', 'normal_b')
+    """
 
     code = VECTOR
     prefix = "axis_"
@@ -87,7 +101,14 @@ class Vector(Marker):
 
 
 class Parameters(Marker):
-    """The Euler parameters of a rigid body themselves; (1, 0, 0, 0) on the ground."""
+    """The Euler parameters of a rigid body themselves; (1, 0, 0, 0) on the ground.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.constraints.EulerNormalization.markers
+    (Parameters(body='a', argument='parameters_a'),)
+    """
 
     code = PARAMETERS
     size = 4
@@ -102,7 +123,14 @@ class Parameters(Marker):
 
 
 class Turn(Marker):
-    """The turning of a rigid body, for forces: xd is its angular velocity, conjugate is a torque, ground frame."""
+    """The turning of a rigid body, for forces: xd is its angular velocity, conjugate is a torque, ground frame.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.forces.Torque.markers
+    (Turn(body='a', argument='turn_a'),)
+    """
 
     code = TURN
     prefix = "turn_"

@@ -142,6 +142,17 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
     the largest. A row is called redundant if it depends on those of its joint and of joints added before it, so they
     gather in few joints. Whether a configuration is singular is told by consistent ones beside it. Above 1000
     coordinates, what hangs in open chains is put aside first and costs O(N); closed loops cost the cube of their rows.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bar = scene.add_body(**ts.shapes.cylinder(0.02, 1.0, axis="x", mass=1.0), position=(0.5, 0, 0))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    >>> again = scene.add(ts.constraints.Dot1(scene.ground, bar, axis_a=(0, 1, 0), axis_b=(1, 0, 0), name="again"))
+    >>> report = scene.mobility()
+    >>> report.degrees_of_freedom, len(report.redundant)
+    (1, 1)
     """
     packed, start = scene.packed, scene.start[0]
     q = finite_vector(start if q is None else q, start.size, "q").copy()

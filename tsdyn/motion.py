@@ -43,6 +43,14 @@ class Motion:
         `ts.motions`, for which nothing is compiled and Taylor has the series.
     what : str
         What error messages call it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> wave = ts.Motion(lambda t: 0.1 * np.sin(2.0 * t))
+    >>> print(wave.value(0.0))  # f, fd, fdd
+    (0.0, 0.2, 0.0)
     """
 
     @fitting

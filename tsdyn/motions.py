@@ -62,7 +62,17 @@ _OPERATIONS = {
 
 
 class Smooth:
-    """Base of all smooth motions: one operation on others, or a polynomial of the time, whole or in pieces."""
+    """Base of all smooth motions: one operation on others, or a polynomial of the time, whole or in pieces.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> t = ts.motions.time
+    >>> chirp = 0.1 * np.sin(3.0 * t + t**2)
+    >>> print(f"{chirp(0.0):.3f}, rate {chirp.rate(0.0):.3f}, acceleration {chirp.acceleration(0.0):.3f}")
+    0.000, rate 0.300, acceleration 0.200
+    """
 
     @fitting
     def __init__(self, operation: str, operands: tuple[Smooth, ...] = (), numbers: Any = ()) -> None:
@@ -219,6 +229,13 @@ class Polynomial(Smooth):
     ------
     InvalidArgument
         If they are no finite numbers.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> start_up = ts.motions.Polynomial((0.0, 1.0, 0.5))
+    >>> float(start_up(2.0)), float(start_up.rate(2.0))
+    (4.0, 3.0)
     """
 
     @fitting
@@ -232,7 +249,14 @@ class Polynomial(Smooth):
 
 
 class Constant(Polynomial):
-    """A value that stays."""
+    """A value that stays.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> float(ts.motions.Constant(2.5)(1.0))
+    2.5
+    """
 
     @fitting
     def __init__(self, value: float) -> None:
@@ -240,7 +264,14 @@ class Constant(Polynomial):
 
 
 class Ramp(Polynomial):
-    """start + rate t: uniform motion."""
+    """start + rate t: uniform motion.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> float(ts.motions.Ramp(start=1.0, rate=2.0)(3.0))
+    7.0
+    """
 
     @fitting
     def __init__(self, start: float = 0.0, rate: float = 1.0) -> None:
@@ -265,6 +296,14 @@ class Piecewise(Smooth):
     -----
     Steps of a run end at the knots, so a method keeps its order. A constraint follows no jump of value or rate, and a
     run over one is refused; jumps of acceleration are followed.
+
+    Examples
+    --------
+    >>> from scipy.interpolate import PchipInterpolator
+    >>> import tsdyn as ts
+    >>> lift = ts.motions.Piecewise(PchipInterpolator((0.0, 1.0, 2.0), (0.0, 0.3, 0.3)))
+    >>> print(f"{lift(1.0):.2f}, rate {lift.rate(1.5):.2f}")
+    0.30, rate 0.00
     """
 
     @fitting
@@ -299,7 +338,15 @@ class Piecewise(Smooth):
 
 
 class Sine(Smooth):
-    """offset + amplitude sin(frequency t + phase), frequency in rad/s and phase in rad."""
+    """offset + amplitude sin(frequency t + phase), frequency in rad/s and phase in rad.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> wave = ts.motions.Sine(amplitude=0.1, frequency=2.0)
+    >>> print(f"{wave(0.0):.2f}, rate {wave.rate(0.0):.2f}")
+    0.00, rate 0.20
+    """
 
     @fitting
     def __init__(self, amplitude: float, frequency: float, phase: float = 0.0, offset: float = 0.0) -> None:
@@ -309,7 +356,15 @@ class Sine(Smooth):
 
 
 class Exponential(Smooth):
-    """offset + amplitude exp(rate t), rate in 1/s."""
+    """offset + amplitude exp(rate t), rate in 1/s.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> decay = ts.motions.Exponential(amplitude=2.0, rate=-1.0)
+    >>> print(f"{decay(1.0):.4f}")
+    0.7358
+    """
 
     @fitting
     def __init__(self, amplitude: float, rate: float, offset: float = 0.0) -> None:

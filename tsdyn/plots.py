@@ -47,6 +47,18 @@ def constraint_error(solution: Solution, ax: Any = None) -> Any:
     ------
     MissingDependency
         If matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> from matplotlib.figure import Figure
+    >>> figure = Figure()
+    >>> axes = ts.plots.constraint_error(ts.simulate(scene, (0, 1)), figure.subplots())
+    >>> axes.get_yscale()
+    'log'
     """
     _matplotlib()
     if ax is None:
@@ -117,6 +129,16 @@ def save(figure: Any, path: str | Path) -> Path:
     ------
     InvalidArgument
         If the folder doesn't exist or can't be written to, or the format is unknown.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from matplotlib.figure import Figure
+    >>> import tsdyn as ts
+    >>> with TemporaryDirectory() as folder:
+    ...     ts.plots.save(Figure(), Path(folder) / "errors").name
+    'errors.png'
     """
     from matplotlib import style
 

@@ -67,6 +67,33 @@ class Primitive(Attachment):
         The bodies; b is None for a primitive that has markers on a only.
     name : str
         What error messages call it.
+
+    Examples
+    --------
+    A point of a body stays on the cylinder x^2 + y^2 = R^2:
+
+    >>> import tsdyn as ts
+    >>> class OnCylinder(ts.Primitive):
+    ...     rows, markers = 1, (ts.Point("a"),)
+    ...     def __init__(self, a, *, point_a=(0, 0, 0), radius=1.0, name=""):
+    ...         super().__init__(a, None, (point_a,), name)
+    ...         self.radius = float(radius)
+    ...     def parameters(self):
+    ...         return (self.radius,)
+    ...     @staticmethod
+    ...     def phi(x, par, t, out):
+    ...         out[0] = (x[0] * x[0] + x[1] * x[1] - par[0] * par[0]) / 2
+    ...     @staticmethod
+    ...     def jacobian(x, par, t, out):
+    ...         out[0, 0], out[0, 1] = x[0], x[1]
+    ...     @staticmethod
+    ...     def gamma(x, xd, par, t, out):
+    ...         out[0] = xd[0] * xd[0] + xd[1] * xd[1]
+    >>> scene = ts.Scene()
+    >>> bead = scene.add_point_mass(mass=1.0, position=(1, 0, 0), velocity=(0, 2, 0))
+    >>> scene.add(OnCylinder(bead))
+    <OnCylinder 'OnCylinder(body1)'>
+    >>> ts.testing.check_primitive(OnCylinder)  # doctest: +SKIP
     """
 
     rows = 0

@@ -58,6 +58,21 @@ class Scene:
     -----
     A scene can be run as often as you like; `simulate` never changes it. Set a body's mass, inertia, position,
     orientation or velocities and run again: nothing is rebuilt but the numbers that changed.
+
+    Examples
+    --------
+    A pendulum of 1 m, released from the horizontal:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> scene
+    <Scene of 1 point mass: 3 coordinates, 1 constraint row>
+    >>> scene.mobility().degrees_of_freedom
+    2
+    >>> print(f"{ts.simulate(scene, (0, 0.5)).position('bob')[-1, 2]:.6f} m")
+    -0.928200 m
     """
 
     @fitting
@@ -143,6 +158,14 @@ class Scene:
         ------
         InvalidBody
             If a value is impossible, not finite or of a wrong shape, or the name is taken.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene()
+        >>> top = scene.add_body(mass=30.0, inertia=(90, 90, 30), position=(0, 0, 1), angular_velocity=(0.5, 0, 12))
+        >>> print(top, top.inertia.diagonal())
+        <Body 'body1'> [90. 90. 30.]
         """
         values = {
             "mass": mass,
@@ -161,7 +184,16 @@ class Scene:
     def add_point_mass(
         self, mass: float, position: ArrayLike = (0.0, 0.0, 0.0), velocity: ArrayLike = (0.0, 0.0, 0.0), name: str = ""
     ) -> PointMass:
-        """Add a particle of three coordinates and return its handle; arguments as for `add_body`."""
+        """Add a particle of three coordinates and return its handle; arguments as for `add_body`.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene()
+        >>> ball = scene.add_point_mass(mass=1.0, position=(0, 0, 2), name="ball")
+        >>> print(ball, ball.q)
+        <PointMass 'ball'> [0. 0. 2.]
+        """
         return self._admit(PointMass, name, {"mass": mass, "position": position, "velocity": velocity})
 
     def _admit(self, kind, name, values):
@@ -185,6 +217,15 @@ class Scene:
         ------
         InvalidConstraint, InvalidForce
             If it is neither, belongs to another scene, or has been added before.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene(gravity=(0, 0, -10))
+        >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+        >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+        >>> scene["rod"] is rod
+        True
         """
         if not isinstance(item, (Primitive, Joint, Force)):
             raise InvalidConstraint(

@@ -102,6 +102,16 @@ def set_joint(
     What is not given stays as it is. In a tree of joints, the bodies beyond the joint follow as one: no other joint
     changes. In closed loops the joint goes to its value in small steps, on the branch of the configuration that the
     scene has; what is nearest in the metric of kinetic energy decides about other freedoms.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bar = scene.add_body(**ts.shapes.cylinder(0.02, 1.0, axis="x", mass=1.0), position=(0.5, 0, 0))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    >>> report = scene.set(hinge, angle=0.5, rate=2.0)
+    >>> print(bar.position.round(4) + 0.0, bar.angular_velocity.round(4) + 0.0)
+    [ 0.4388  0.     -0.2397] [0. 2. 0.]
     """
     if isinstance(keep, str) or not hasattr(keep, "__iter__"):
         raise InvalidArgument(f"set: keep must be a sequence of joints or names, such as (joint,), got {keep!r}.")

@@ -32,6 +32,18 @@ class Shape:
         About the centroid, in axes parallel to the shape's own frame: those of the body.
     centroid : ndarray (3,), m
         In the shape's own frame. A point p of that frame is p - centroid in the body's.
+
+    Examples
+    --------
+    A hammer, its handle along z:
+
+    >>> import tsdyn as ts
+    >>> handle = ts.shapes.cylinder(0.015, 0.3, density=700)
+    >>> head = ts.shapes.box((0.1, 0.03, 0.03), density=7850).moved((0, 0, 0.15))
+    >>> hammer = handle + head
+    >>> print(f"{hammer.mass:.3f} kg, centroid at z = {hammer.centroid[2]:.4f} m")
+    0.855 kg, centroid at z = 0.1240 m
+    >>> body = ts.Scene().add_body(**hammer)
     """
 
     mass: float
@@ -87,6 +99,13 @@ def box(size: ArrayLike, *, mass: float | None = None, density: float | None = N
     ------
     InvalidArgument
         If a length, mass or density is not positive and finite, or not one of mass and density is given.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> block = ts.shapes.box((1, 2, 3), mass=12.0)
+    >>> print(block.inertia.diagonal())
+    [13. 10.  5.]
     """
     edges = vector3(size, "box: size (m)", InvalidArgument)
     if not (edges > 0.0).all():
@@ -97,7 +116,14 @@ def box(size: ArrayLike, *, mass: float | None = None, density: float | None = N
 
 
 def sphere(radius: float, *, inner: float = 0.0, mass: float | None = None, density: float | None = None) -> Shape:
-    """A ball about its centre; with an inner radius, m, a hollow one. Other arguments and errors as for `box`."""
+    """A ball about its centre; with an inner radius, m, a hollow one. Other arguments and errors as for `box`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> print(ts.shapes.sphere(0.5, mass=10.0).inertia.diagonal().round(6))
+    [1. 1. 1.]
+    """
     a, b = _radii("sphere", radius, inner)
     m = _mass("sphere", 4.0 / 3.0 * math.pi * (a - b) * (a * a + a * b + b * b), mass, density)
     ratio = b / a  # (a^5 - b^5) / (a^3 - b^3), with a - b divided out
@@ -117,6 +143,12 @@ def cylinder(
     """A cylinder about its centre, along the axis "x", "y" or "z"; with an inner radius, m, a tube.
 
     Other arguments and errors as for `box`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> print(ts.shapes.cylinder(0.2, 1.0, axis="x", mass=6.0).inertia.diagonal().round(6))
+    [0.12 0.56 0.56]
     """
     a, b = _radii("cylinder", radius, inner)
     length = positive(length, "cylinder: length (m)")
@@ -133,6 +165,12 @@ def rod(length: float, *, axis: Axis = "z", mass: float) -> Shape:
     ------
     InvalidArgument
         If the length or mass is not positive and finite, or the axis is unknown.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> print(ts.shapes.rod(2.0, axis="x", mass=3.0).inertia.diagonal())
+    [0. 1. 1.]
     """
     return _round("rod", positive(mass, "rod: mass (kg)"), 0.0, positive(length, "rod: length (m)"), axis)
 
@@ -161,6 +199,17 @@ def from_mesh(
     InvalidArgument
         If the mesh is not closed, its triangles don't turn the same way or all face inward, it has no volume, or an
         index is out of range. A mesh that cuts through itself is not noticed.
+
+    Examples
+    --------
+    A tetrahedron:
+
+    >>> import tsdyn as ts
+    >>> vertices = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+    >>> faces = ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
+    >>> solid = ts.shapes.from_mesh(vertices, faces, density=600.0)
+    >>> print(f"{solid.mass:.3f} kg", solid.centroid.round(6))
+    100.000 kg [0.25 0.25 0.25]
     """
     volume, centroid, second = moments(vertices, faces)
     m = _mass("from_mesh", volume, mass, density)

@@ -122,6 +122,20 @@ def simulate(
     TsdynError
         One of its kinds, before anything runs: InvalidArgument, InvalidBody, InconsistentState, RedundantConstraints,
         SingularConfiguration.
+
+    Examples
+    --------
+    A pendulum of 1 m, released from the horizontal:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> solution = ts.simulate(scene, (0, 1), t_eval=[0.0, 0.5, 1.0])
+    >>> print(solution.position(bob)[:, 2].round(6) + 0.0)
+    [ 0.       -0.9282   -0.148328]
+    >>> bool(solution.constraint_error.position.max() < 1e-12)
+    True
     """
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")

@@ -74,6 +74,18 @@ class Solution(Kinematics["Floats"]):
         Of series: steps_near_singular, which began or ended next to a singular configuration; largest_landing, how far
         (m, rad) the constraints moved a body at the end of one of them; energy_error, the largest change of the energy
         in such a run, of the largest kinetic energy, None where energy isn't constant.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> solution = ts.simulate(scene, (0, 1), dense_output=True)
+    >>> solution.success, solution.message
+    (True, 'The run reached the end of the interval.')
+    >>> print(f"z = {solution.at(0.5).position(bob)[2]:.6f} m, tension {solution.multipliers[-1, 0]:.3f} N")
+    z = -0.928200 m, tension 4.450 N
     """
 
     status: Status
@@ -153,6 +165,16 @@ class Solution(Kinematics["Floats"]):
             If the run kept no dense output, or t isn't finite, one time or a vector of them, or is outside the run.
         StepFailure
             If the constraints can't be solved there.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene()
+        >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+        >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+        >>> solution = ts.simulate(scene, (0, 1), dense_output=True)
+        >>> print(solution.at([0.25, 0.75]).position(ball)[:, 2].round(4))
+        [-0.3009 -0.7823]
         """
         if self._trajectory is None:
             raise InvalidArgument("at(t) needs the steps' interpolants: simulate(..., dense_output=True) keeps them.")
@@ -229,6 +251,16 @@ class Solution(Kinematics["Floats"]):
         force, torque : ndarray (k, 3)
             In the ground frame; the torque is about the item's first point on that body (`point_a`), or the centroid
             where it has none.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene()
+        >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+        >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+        >>> force, torque = ts.simulate(scene, (0, 1)).reaction(rod)
+        >>> print(force[-1].round(3) + 0.0)
+        [4.79  0.    0.801]
         """
         item = self.handles.item(item)
         load = reactions.loads_of(self.packed).get(id(item))

@@ -34,6 +34,18 @@ class State(Kinematics["float | Any"], _Arrays):
     -----
     A state that a run hands out (`solution.state`, `solution.at(t)`, what an event is given) knows its scene, so it can
     be asked for the motion of bodies and joints, too.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> half = ts.simulate(scene, (0, 0.5)).state
+    >>> print(f"{half.t} s: {half.position(bob).round(4)} m")
+    0.5 s: [ 0.3721  0.     -0.9282] m
+    >>> print(ts.simulate(scene, (half.t, 1.0), state=half).state.position(bob).round(4))
+    [-0.9889  0.     -0.1483]
     """
 
     __slots__ = ()

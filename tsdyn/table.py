@@ -36,6 +36,13 @@ class Table:
     -----
     A run must stay within the times. For other joints between the values, or for values beyond the ends, give a SciPy
     object instead: CubicSpline, PchipInterpolator, make_interp_spline(...), any PPoly or BSpline.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> table = ts.Table(times=(0, 1, 2, 3), values=(0, 1, 4, 9))
+    >>> print(f"{table(1.5):.4f}")
+    2.2500
     """
 
     @fitting

@@ -45,7 +45,22 @@ def _demand(what, size=1.0, **conditions):
 
 @dataclass(frozen=True)
 class RungeKuttaTableau:
-    """An explicit Runge-Kutta method: stage times c, coefficients a (rows below the diagonal), weights b."""
+    """An explicit Runge-Kutta method: stage times c, coefficients a (rows below the diagonal), weights b.
+
+    Examples
+    --------
+    The classical method of order 4; a wrong coefficient is refused:
+
+    >>> import tsdyn as ts
+    >>> classical = {"a": ((), (1 / 2,), (0, 1 / 2), (0, 0, 1)), "b": (1 / 6, 1 / 3, 1 / 3, 1 / 6), "order": 4}
+    >>> len(ts.RungeKuttaTableau(**classical, c=(0, 1 / 2, 1 / 2, 1)).b)
+    4
+    >>> try:
+    ...     ts.RungeKuttaTableau(**classical, c=(0, 1 / 2, 1 / 3, 1))
+    ... except ts.InvalidArgument as error:
+    ...     print(error)
+    RungeKuttaTableau: the condition sum a = c fails by 0.167.
+    """
 
     a: Sequence[Sequence[float]]
     b: Sequence[float]
@@ -87,6 +102,14 @@ class ImplicitTableau:
 
     Such a method is stiffly accurate and begins with the derivative at the step's start; error holds the weights of
     the error estimate, one a stage, none where the method has an estimate of its own.
+
+    Examples
+    --------
+    The trapezoidal rule:
+
+    >>> import tsdyn as ts
+    >>> ts.ImplicitTableau(a=((0,), (1 / 2, 1 / 2)), c=(0, 1), order=2).order
+    2
     """
 
     a: Sequence[Sequence[float]]
@@ -139,6 +162,17 @@ class NystromTableau:
     Step:     v   += h vd + h^2 sum_i bbar_i k_i,            vd  += h sum_i b_i k_i
 
     Conditions up to order 4 are those of Hairer, Norsett, Wanner, Solving ODEs I, 2nd ed., II.14.
+
+    Examples
+    --------
+    The midpoint rule:
+
+    >>> import tsdyn as ts
+    >>> midpoint = ts.NystromTableau(
+    ...     a=((), (1 / 2,)), abar=((), (1 / 8,)), b=(0, 1), bbar=(0, 1 / 2), c=(0, 1 / 2), order=2
+    ... )
+    >>> midpoint.order
+    2
     """
 
     a: Sequence[Sequence[float]]

@@ -64,6 +64,11 @@ def check_primitive(
     difference quotients of the complex-step kind too), gamma with the complex step of Phi_x xd + Phi_t along (xd, 1):
     (Phi_x xd)_x xd + 2 Phi_xt xd + Phi_tt (Haug 2018, Eq. 3). Then the compiled, assembled arrays are compared with
     phi carried along the motion as a truncated Taylor series, which uses neither jacobian nor gamma.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.testing.check_primitive(ts.constraints.Distance, states=1)
     """
     rng = np.random.default_rng(seed)
     for arrangement in ("body to body", "body to ground", "ground to body"):

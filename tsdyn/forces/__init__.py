@@ -14,7 +14,14 @@ __all__.append("registered")
 
 
 def registered() -> tuple[type[Force], ...]:
-    """Return every force class known, built in or plugged in."""
+    """Return every force class known, built in or plugged in.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.forces.Spring in ts.forces.registered()
+    True
+    """
     from ..force import registered as known
 
     return tuple(known().values())

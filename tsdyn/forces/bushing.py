@@ -58,6 +58,18 @@ class Bushing(Force):
     ------
     InvalidForce
         If a number is negative or not finite, or all are zero.
+
+    Examples
+    --------
+    A machine of 100 kg on a rubber mount settles under its weight:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> machine = scene.add_body(mass=100.0, inertia=(8, 8, 8))
+    >>> mount = {"stiffness": 1e5, "damping": 4e3, "torsional_stiffness": 1e3, "torsional_damping": 1e2}
+    >>> bushing = scene.add(ts.forces.Bushing(machine, scene.ground, **mount))
+    >>> print(f"{ts.simulate(scene, (0, 2)).state.position(machine)[2]:.4f} m")
+    -0.0100 m
     """
 
     markers = (Point("a"), Point("b"), Parameters("a"), Parameters("b"), Turn("a"), Turn("b"))

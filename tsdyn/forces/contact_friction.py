@@ -37,6 +37,18 @@ class ContactFriction(JointFriction, Force):
         If joint is no PlaneContact of the scene, or a number is negative, not finite or impossible.
     RedundantConstraints
         When a run begins, if the reaction that it needs isn't unique.
+
+    Examples
+    --------
+    A block on a table, 10 N of normal load, slows down with 2 m/s^2:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> block = scene.add_point_mass(mass=1.0, velocity=(3, 0, 0))
+    >>> table = scene.add(ts.constraints.PlaneContact(block, scene.ground, normal_b=(0, 0, 1)))
+    >>> friction = scene.add(ts.forces.ContactFriction(table, kinetic=0.2))
+    >>> print(f"{ts.simulate(scene, (0, 1)).state.velocity(block)[0]:.3f} m/s")
+    1.000 m/s
     """
 
     joints = (PlaneContact,)

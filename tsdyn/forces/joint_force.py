@@ -42,6 +42,16 @@ class JointForce(JointLoad, Force):
     Notes
     -----
     Its power is applied power.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> table = scene.add_body(mass=2.0, inertia=(1, 1, 1))
+    >>> slide = scene.add(ts.constraints.Translational.at(scene.ground, table, point=(0, 0, 0), axis=(1, 0, 0)))
+    >>> drive = scene.add(ts.forces.JointForce(slide, function=lambda t, displacement, rate: 4.0, period=0.1))
+    >>> print(f"{ts.simulate(scene, (0, 1)).state.displacement(slide):.4f} m")
+    1.0000 m
     """
 
     markers = (Vector("a", "axis"), Point("a", "own_point"), Point("b", "other_point"))

@@ -50,6 +50,20 @@ class JointTorque(JointLoad, Force):
     -----
     Its power is applied power. Turns are counted as for `solution.angle(joint)`. What the function raises, or a value
     that is not finite, ends the run.
+
+    Examples
+    --------
+    A controller that is sampled every 10 ms holds a wheel at 1 rad:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> wheel = scene.add_body(mass=1.0, inertia=(1, 1, 2))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1)))
+    >>> def controller(t, angle, rate):
+    ...     return 50.0 * (1.0 - angle) - 20.0 * rate
+    >>> drive = scene.add(ts.forces.JointTorque(hinge, function=controller, period=0.01))
+    >>> print(f"{ts.simulate(scene, (0, 3)).state.angle(hinge):.3f} rad")
+    1.000 rad
     """
 
     markers = (Vector("a", "axis"), Turn("a"), Turn("b"))

@@ -43,6 +43,16 @@ class PointForce(Given, Force):
     -----
     Its power is applied power. Whether it is a function of state is settled when it is made; a new function of the same
     sort may be set.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, 0))
+    >>> puck = scene.add_body(mass=2.0, inertia=(1, 1, 1))
+    >>> push = scene.add(ts.forces.PointForce(puck, force=(4, 0, 0)))
+    >>> solution = ts.simulate(scene, (0, 1))
+    >>> print(f"{solution.position(puck)[-1, 0]:.4f} m, {solution.power[-1]:.4f} W")
+    1.0000 m, 8.0000 W
     """
 
     markers = (Point("a"),)

@@ -46,6 +46,18 @@ class RevoluteFriction(JointFriction, Force):
         If joint is no Revolute of the scene, or a number is negative, not finite or impossible.
     RedundantConstraints
         When a run begins, if the reaction that it needs isn't unique.
+
+    Examples
+    --------
+    A flywheel of 0.5 kg m^2 and 10 kg runs down in a journal bearing of 20 mm radius:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> wheel = scene.add_body(mass=10.0, inertia=(0.3, 0.5, 0.3), angular_velocity=(0, 8, 0))
+    >>> bearing = scene.add(ts.constraints.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 1, 0)))
+    >>> friction = scene.add(ts.forces.RevoluteFriction(bearing, radius=0.02, kinetic=0.1))
+    >>> print(f"{ts.simulate(scene, (0, 1)).state.angle_rate(bearing):.3f} rad/s")
+    7.600 rad/s
     """
 
     joints = (Revolute,)

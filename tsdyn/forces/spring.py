@@ -48,6 +48,19 @@ class Spring(Force):
     ------
     InvalidForce
         If a number is negative or not finite, the points coincide, or stiffness, damping and actuator are all zero.
+
+    Examples
+    --------
+    A mass of 1 kg hangs on a spring of 100 N/m and is released at its free length of 1 m:
+
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> mass = scene.add_point_mass(mass=1.0, position=(0, 0, -1))
+    >>> spring = scene.add(ts.forces.Spring(mass, scene.ground, stiffness=100.0))
+    >>> state = ts.simulate(scene, (0, np.pi / 10)).state
+    >>> print(f"lowest at {state.position(mass)[2]:.4f} m, free length {spring.free_length:g} m")
+    lowest at -1.2000 m, free length 1 m
     """
 
     markers = (Point("a"), Point("b"))

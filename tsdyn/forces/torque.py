@@ -43,6 +43,16 @@ class Torque(Given, Force):
     -----
     Its power is applied power. Whether it is a function of state is settled when it is made; a new function of the same
     sort may be set.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> rotor = scene.add_body(mass=1.0, inertia=(1, 1, 2))
+    >>> drive = scene.add(ts.forces.Torque(rotor, torque=(0, 0, 6), frame="body"))
+    >>> solution = ts.simulate(scene, (0, 1))
+    >>> print(f"{solution.angular_velocity(rotor)[-1, 2]:.4f} rad/s")
+    3.0000 rad/s
     """
 
     markers = (Turn("a"),)

@@ -63,6 +63,19 @@ class TorsionalSpring(Force):
     InvalidForce
         If a number is negative or not finite, a reference is parallel to the axis, or all of stiffness, damping and
         actuator are zero.
+
+    Examples
+    --------
+    A wheel of 2 kg m^2 on a torsional spring of 8 N m/rad oscillates with 2 rad/s:
+
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> wheel = scene.add_body(mass=1.0, inertia=(1, 1, 2), angular_velocity=(0, 0, 1))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1)))
+    >>> spring = scene.add(ts.forces.TorsionalSpring.at(scene.ground, wheel, axis=(0, 0, 1), stiffness=8.0))
+    >>> print(f"{ts.simulate(scene, (0, np.pi / 4)).state.angle(hinge):.4f} rad")
+    0.5000 rad
     """
 
     markers = (Vector("a"), Vector("a", "reference_a"), Vector("b", "reference_b"), Turn("a"), Turn("b"))

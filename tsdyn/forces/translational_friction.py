@@ -46,6 +46,16 @@ class TranslationalFriction(JointFriction, Force):
         If joint is no Translational of the scene, or a number is negative, not finite or impossible.
     RedundantConstraints
         When a run begins, if the reaction that it needs isn't unique.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> slider = scene.add_body(mass=1.0, inertia=(1, 1, 1), velocity=(3, 0, 0))
+    >>> guide = scene.add(ts.constraints.Translational.at(scene.ground, slider, point=(0, 0, 0), axis=(1, 0, 0)))
+    >>> friction = scene.add(ts.forces.TranslationalFriction(guide, kinetic=0.2))
+    >>> print(f"{ts.simulate(scene, (0, 1)).state.displacement_rate(guide):.3f} m/s")
+    1.000 m/s
     """
 
     joints = (Translational,)

@@ -64,6 +64,23 @@ class UserForce(ByState, Force):
     -----
     b gets the opposite force at the place x_a, so momentum is conserved. A point mass takes no torque: on one the
     force alone acts, and its Euler parameters are (1, 0, 0, 0). The power of the force is applied power.
+
+    Examples
+    --------
+    Gravity of a planet at the origin, G M = par[0], on a moon:
+
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, 0))
+    >>> moon = scene.add_point_mass(mass=1.0, position=(2, 0, 0), velocity=(0, 2, 0))
+    >>> def attraction(t, a, b, par, out):
+    ...     r = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
+    ...     for i in range(3):
+    ...         out[i] = -par[0] * a[i] / r**3
+    >>> force = scene.add(ts.forces.UserForce(moon, function=attraction, parameters=(8.0,)))
+    >>> force.values = (9.0,)  # from the next run on; nothing is compiled again
+    >>> print(force.values)
+    [9.]
     """
 
     markers = (Point("a"), Parameters("a"), Turn("a"), Point("b"), Parameters("b"), Turn("b"))

@@ -38,6 +38,16 @@ class ViscousFriction(Force):
     ------
     InvalidForce
         If a number is negative or not finite, or both are zero, or a torque would act on a point mass.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, 0))
+    >>> boat = scene.add_point_mass(mass=2.0, velocity=(1, 0, 0))
+    >>> drag = scene.add(ts.forces.ViscousFriction(boat, scene.ground, damping=4.0))
+    >>> solution = ts.simulate(scene, (0, 1))
+    >>> print(f"{solution.velocity(boat)[-1, 0]:.6f} m/s, {solution.dissipation[0]:.4f} W at the start")
+    0.135335 m/s, 4.0000 W at the start
     """
 
     markers = (Point("a"), Turn("a"), Point("b"), Turn("b"))

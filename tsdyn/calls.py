@@ -104,7 +104,7 @@ def complete_signature(cls):
 class Placing:
     """Decorate `at`: a classmethod whose signature has the arguments of the class that it is asked of.
 
-    A point or an axis that both bodies have, `point_a` and `point_b`, may be given once, as `point`.
+    A point or an axis is given once, as `point` for `point_a` and `point_b`, or by the name that it has on one body.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -140,9 +140,8 @@ class Placing:
         keywords = {name: p for name, p in own.items() if p.kind == KEYWORD}
         markers = [marker.argument for marker in owner.markers if marker.argument in whole]
         for name in markers:
-            common = name[:-2]
-            if name.endswith("_a") and f"{common}_b" in markers:
-                given = whole[name].annotation
-                keywords.setdefault(common, inspect.Parameter(common, KEYWORD, default=None, annotation=given))
+            if name.endswith(("_a", "_b")) and name[:-2] not in whole:
+                given = inspect.Parameter(name[:-2], KEYWORD, default=None, annotation=whole[name].annotation)
+                keywords.setdefault(given.name, given)
         keywords |= {name: p for name, p in whole.items() if p.kind in (KEYWORD, OPEN) and name not in keywords}
         return inspect.Signature([*first, *sorted(keywords.values(), key=lambda p: p.kind)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .hints import Solution
@@ -117,6 +117,8 @@ class InconsistentState(TsdynError, ValueError):
     Correct the bodies' poses, or call scene.assemble() to move them to the nearest consistent ones.
     """
 
+    constraints: tuple[Any, ...] = ()  # in conflict, where no state meets all of them
+
 
 class RedundantConstraints(TsdynError, ValueError):
     """Rows of Phi_q depend on each other; the message names them.
@@ -196,7 +198,7 @@ class StepFailure(TsdynError, ArithmeticError):
 
     def __init__(self, message: str, solution: Solution | None = None) -> None:
         super().__init__(message)
-        self.solution = solution
+        self.solution: Solution | Any = solution  # never None where `raise_if_failed` has raised it
 
 
 class CheckFailed(TsdynError, AssertionError):

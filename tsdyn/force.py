@@ -37,7 +37,7 @@ from .primitive import SIGNATURE
 from .signal import Signal
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from .hints import AnyBody, ArrayLike, BodyLike, Random
 
@@ -104,8 +104,8 @@ class Force(Attachment):
     slots = 0
     no_series = ""
     analytic = True
-    quantities = MappingProxyType({})
-    loads = ()
+    quantities: Mapping[str, Callable[..., Any]] = MappingProxyType({})
+    loads: tuple[str, ...] = ()
     conservative = True
     own_kernels = MappingProxyType(
         {}

@@ -17,9 +17,11 @@ from .calls import fitting, unknown_argument
 from .checks import label, number
 from .errors import InvalidForce
 from .force import not_negative, positive_number
-from .markers import TURN, Point, Turn, Vector
+from .markers import TURN, Marker, Point, Turn, Vector
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
     from .hints import AnyBody, Attachment, Floats, Random
 
 AXIS = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("a"))
@@ -64,11 +66,11 @@ class JointFriction:
     (True, <ContactFriction 'ContactFriction(table)'>)
     """
 
-    joints = ()
-    markers = ()
+    joints: tuple[type, ...] = ()
+    markers: tuple[Marker, ...] = ()
     particles = True
     no_series = "its size follows from a reaction, and its direction turns round too sharply for a series"
-    quantities = MappingProxyType(
+    quantities: Mapping[str, Callable[..., Any]] = MappingProxyType(
         {
             "kinetic": not_negative,
             "static": lambda value, *where: None if value is None else not_negative(value, *where),

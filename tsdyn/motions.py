@@ -412,7 +412,7 @@ FUNCTIONS = {
     "negative": lambda x: -x,
     "positive": lambda x: x,
 }
-time = Ramp(0.0, 1.0)
+time: Smooth = Ramp(0.0, 1.0)
 
 __all__ = ["Constant", "Exponential", "Piecewise", "Polynomial", "Ramp", "Sine", "Smooth", "time"]
 

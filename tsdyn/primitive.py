@@ -100,7 +100,7 @@ class Primitive(Attachment):
     slots = 0
     memory = 0
     normalises = False  # whether it does no more than keep the length of p
-    prescribed = ""
+    prescribed: str | tuple[str, ...] = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
 
     def __init_subclass__(cls, **keywords: Any) -> None:

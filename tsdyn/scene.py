@@ -31,7 +31,7 @@ from .signal import Signal
 from .system import pack, user_functions
 
 if TYPE_CHECKING:
-    from .hints import ArrayLike, Floats, Item, Orientation, Packed, System
+    from .hints import AnyBody, ArrayLike, Floats, Item, Orientation, Packed, System
 
 
 @fitting_methods
@@ -84,7 +84,7 @@ class Scene:
         self._twins = None  # handle of the scene that this one is a copy of -> handle here
         self.gravity = gravity
 
-    ground: Ground
+    ground: AnyBody
 
     def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute that there is; a misspelt one is refused."""
@@ -103,7 +103,7 @@ class Scene:
         self.touch()
 
     @property
-    def bodies(self) -> tuple[PointMass, ...]:
+    def bodies(self) -> tuple[Body | Any, ...]:
         """The bodies, in the order added."""
         return tuple(self._bodies)
 
@@ -297,7 +297,7 @@ class Scene:
             self._start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
         return tuple(array.copy() for array in self._start)
 
-    def body(self, name: str) -> PointMass:
+    def body(self, name: str) -> Body | Any:
         """Return the body of this name."""
         for body in self._bodies:
             if isinstance(name, str) and body.name == name:

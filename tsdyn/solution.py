@@ -92,9 +92,9 @@ class Solution(Kinematics["Floats"]):
     message: str
     stats: SimpleNamespace
     t: Floats
-    t_events: list[Floats] | None
-    q_events: list[Floats] | None
-    qd_events: list[Floats] | None
+    t_events: list[Floats] | Any  # None where no events were asked for
+    q_events: list[Floats] | Any
+    qd_events: list[Floats] | Any
 
     def __init__(self, scene: Scene, task: Any, outcome: Any, seconds: dict[str, float]) -> None:
         self.scene, self.packed = scene, task.prepared.packed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -71,7 +71,9 @@ class RememberingState(State):
         What the turns of joints are counted from.
     """
 
-    handles = memory = anchor = None
+    handles: Any = None
+    memory: Any = None
+    anchor: Any = None
 
     @classmethod
     def of(cls, handles, memory, anchor, *parts):

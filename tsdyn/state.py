@@ -82,7 +82,7 @@ class RememberingState(State):
         state.handles, state.memory, state.anchor = handles, memory, anchor
         return state
 
-    def _replace(self, **changes):
+    def _replace(self, **changes: Any) -> RememberingState:
         return self.of(self.handles, self.memory, self.anchor, *super()._replace(**changes))
 
 

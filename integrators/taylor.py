@@ -11,7 +11,7 @@ from ..plugins import Integrator, InvalidArgument, positive, whole
 LOWEST, HIGHEST = 4, 30
 TIGHT = 1e-12  # mean of rtol and atol: below it rounding counts
 FINEST = 4e-18  # of a step: truncation of one sign that stays below the rounding of a million steps
-REFINED = 2  # orders of the multipliers that are refined where rounding counts
+REFINED = 3  # orders of the multipliers that are refined where rounding counts
 
 
 class Taylor(Integrator):

@@ -22,7 +22,7 @@ def registered() -> tuple[type[Primitive], ...]:
     >>> ts.constraints.Distance in ts.constraints.registered()
     True
     """
-    from ..primitive import registered as known
+    from ..elements.primitive import registered as known
 
     return tuple(known().values())
 
@@ -36,7 +36,7 @@ def registered_joints() -> tuple[type[Joint], ...]:
     >>> ts.constraints.Revolute in ts.constraints.registered_joints()
     True
     """
-    from ..joint import registered as known
+    from ..elements.joint import registered as known
 
     return tuple(known().values())
 

@@ -16,10 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..markers import Vector
-from ..motion import Motion
-from ..primitive import Primitive
-from ..recurrences import dot, product, scaled, sine_cosine
+from ..plugins import Motion, Primitive, Vector, dot, product, scaled, sine_cosine
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Prescribed

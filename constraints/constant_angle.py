@@ -12,12 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bodies import rotation_matrix
-from ..checks import number
-from ..errors import InvalidConstraint
-from ..joint import Joint
-from ..markers import Vector
-from ..motions import Smooth
+from ..plugins import InvalidConstraint, Joint, Smooth, Vector, number, rotation_matrix
 from .dot1 import Dot1
 
 if TYPE_CHECKING:

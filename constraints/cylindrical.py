@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..joint import Joint
-from ..joint_coordinates import Angle, Displacement
-from ..markers import Point, Vector
+from ..plugins import Angle, Displacement, Joint, Point, Vector
 from .parallel import Parallel
 from .point_on_line import PointOnLine
 

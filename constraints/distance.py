@@ -15,12 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bodies import rotation_matrix
-from ..errors import InvalidConstraint
-from ..markers import Point
-from ..motion import Motion
-from ..primitive import Primitive
-from ..recurrences import square
+from ..plugins import InvalidConstraint, Motion, Point, Primitive, rotation_matrix, square
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Prescribed

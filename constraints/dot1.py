@@ -12,10 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..errors import InvalidConstraint
-from ..markers import Vector
-from ..motion import Motion
-from ..primitive import Primitive
+from ..plugins import InvalidConstraint, Motion, Primitive, Vector
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Prescribed

@@ -13,9 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..markers import Point, Vector
-from ..motion import Motion
-from ..primitive import Primitive
+from ..plugins import Motion, Point, Primitive, Vector
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Prescribed

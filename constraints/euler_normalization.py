@@ -11,8 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..markers import Parameters
-from ..primitive import Primitive
+from ..plugins import Parameters, Primitive
 
 if TYPE_CHECKING:
     from ..hints import Body

@@ -12,9 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Self
 
-from ..bodies import Ground, PointMass, rotation_matrix
-from ..calls import Placing
-from ..framed_joint import FramedJoint
+from ..plugins import FramedJoint, Ground, Placing, PointMass, rotation_matrix
 from .dot1 import Dot1
 from .parallel import Parallel
 from .spherical import Spherical

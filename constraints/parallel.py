@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..joint import Joint, across
-from ..joint_coordinates import Angle
-from ..markers import Vector
+from ..plugins import Angle, Joint, Vector, across
 from .dot1 import Dot1
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..markers import Point, Vector
-from ..primitive import Primitive
+from ..plugins import Point, Primitive, Vector
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike

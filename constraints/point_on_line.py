@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..joint import Joint, across
-from ..joint_coordinates import Displacement
-from ..markers import Point, Vector
+from ..plugins import Displacement, Joint, Point, Vector, across
 from .dot2 import Dot2
 
 if TYPE_CHECKING:

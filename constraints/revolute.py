@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..joint import Joint
-from ..joint_coordinates import Angle
-from ..markers import Point, Vector
+from ..plugins import Angle, Joint, Point, Vector
 from .parallel import Parallel
 from .spherical import Spherical
 

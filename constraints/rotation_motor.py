@@ -12,11 +12,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from ..calls import fitting
-from ..errors import InvalidConstraint
-from ..framed_joint import FramedJoint, beside, turned_about
-from ..joint_coordinates import Angle
-from ..motion import Motion
+from ..plugins import Angle, FramedJoint, InvalidConstraint, Motion, beside, fitting, turned_about
 from .angle_driver import AngleDriver
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..framed_joint import FramedJoint
-from ..joint_coordinates import Angle, Displacement
+from ..plugins import Angle, Displacement, FramedJoint
 from .parallel import Parallel
 from .point_on_line import PointOnLine
 from .rotation_motor import set_apart

@@ -11,8 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..markers import Point
-from ..primitive import Primitive
+from ..plugins import Point, Primitive
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike

@@ -9,11 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Self
 
-from ..calls import fitting
-from ..joint import Joint
-from ..joint_coordinates import Displacement
-from ..markers import Point, Vector
-from ..motion import Motion
+from ..plugins import Displacement, Joint, Motion, Point, Vector, fitting
 from .dot2 import Dot2
 from .rotation_motor import axes, geometry
 

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..framed_joint import FramedJoint
-from ..joint_coordinates import Displacement
+from ..plugins import Displacement, FramedJoint
 from .dot1 import Dot1
 from .parallel import Parallel
 from .point_on_line import PointOnLine

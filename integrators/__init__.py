@@ -22,7 +22,7 @@ def registered() -> tuple[type[Integrator], ...]:
     >>> ts.integrators.Taylor in ts.integrators.registered()
     True
     """
-    from ..integrator import registered as known
+    from ..methods.integrator import registered as known
 
     return tuple(known().values())
 

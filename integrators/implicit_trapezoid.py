@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from ..implicit import trapezoid_error
-from ..integrator import DiagonallyImplicit
-from ..interpolation import linear_second
-from ..tableau import ImplicitTableau
+from ..plugins import DiagonallyImplicit, ImplicitTableau, linear_second, trapezoid_error
 
 
 class ImplicitTrapezoid(DiagonallyImplicit):

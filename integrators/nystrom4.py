@@ -13,8 +13,7 @@ Nystrom 1925; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I
 
 from __future__ import annotations
 
-from ..integrator import ExplicitNystrom
-from ..tableau import NystromTableau, RungeKuttaTableau
+from ..plugins import ExplicitNystrom, NystromTableau, RungeKuttaTableau
 
 
 class Nystrom4(ExplicitNystrom):

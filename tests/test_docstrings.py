@@ -7,11 +7,11 @@ from io import StringIO
 import pytest
 
 import tsdyn as ts
-from tsdyn import force, integrator, joint, primitive
+from tsdyn.elements import force, joint, primitive
+from tsdyn.methods import integrator
 
-MODULES = (ts, ts.constraints, ts.forces, ts.integrators, ts.motions, ts.shapes, ts.testing)
+MODULES = (ts, ts.constraints, ts.forces, ts.integrators, ts.motions, ts.plots, ts.shapes, ts.testing)
 PUBLIC = {f"{module.__name__}.{name}": getattr(module, name) for module in MODULES for name in module.__all__}
-PUBLIC |= {f"tsdyn.plots.{name}": getattr(ts.plots, name) for name in ("constraint_error", "save")}
 METHODS = {
     f"tsdyn.{kind.__name__}.{name}": value
     for kind in (ts.Scene, ts.Solution)

@@ -15,7 +15,7 @@ import tsdyn as ts
 from tools.stubs import FILES, stub
 
 ROOT = Path(__file__).parents[1]
-MODULES = (ts, ts.constraints, ts.forces, ts.integrators, ts.motions, ts.shapes, ts.testing)
+MODULES = (ts, ts.constraints, ts.forces, ts.integrators, ts.motions, ts.plots, ts.shapes, ts.testing)
 PUBLIC = {f"{module.__name__}.{name}": getattr(module, name) for module in MODULES for name in module.__all__}
 CLASSES = {name: kind for name, kind in PUBLIC.items() if isinstance(kind, type)}
 FUNCTIONS = {name: f for name, f in PUBLIC.items() if inspect.isfunction(f) and f is not ts.kernel}

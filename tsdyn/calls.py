@@ -11,8 +11,8 @@ from functools import wraps
 from types import FunctionType, MethodType
 from typing import TYPE_CHECKING, Any
 
-from .checks import nearest
 from .errors import InvalidCall
+from .validation import nearest
 
 if TYPE_CHECKING:
     from collections.abc import Callable

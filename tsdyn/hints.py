@@ -9,29 +9,29 @@ from typing import Any, Literal, Protocol, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .agreement import Reference
-from .assemble import AssemblyReport
-from .attachment import Attachment
-from .benchmark_report import Benchmark
-from .bodies import Attribute, Body, Ground, PointMass
-from .diagnostics import ConstraintError
+from .benchmarking.reference_solution import Reference
+from .benchmarking.report import Benchmark
+from .configuration.assemble import AssemblyReport
+from .configuration.mobility import Mobility, RedundantRow
+from .elements.bodies import Attribute, Body, Ground, PointMass
+from .elements.element import Attachment
+from .elements.force import Force
+from .elements.joint import Joint
+from .elements.primitive import Primitive
 from .errors import TsdynError
-from .evaluate import Evaluation
-from .force import Force
-from .handles import Handles
-from .integrator import Integrator
-from .joint import Joint
-from .kinematics import Kinematics
-from .mobility import Mobility, RedundantRow
-from .motion import Motion
-from .phases import Phase
-from .primitive import Primitive
-from .profile_report import Profile
-from .scene import Scene
-from .solution import Charts, Solution, Steps
-from .state import RememberingState, State
-from .system import Packed, System
-from .table import Table
+from .methods.integrator import Integrator
+from .model.handles import Handles
+from .model.packed import Packed, System
+from .motions.prescribed import Motion
+from .motions.tables import Table
+from .observables.diagnostics import ConstraintError
+from .observables.evaluate import Evaluation
+from .observables.kinematics import Kinematics
+from .observables.state import RememberingState, State
+from .profiling.phases import Phase
+from .profiling.report import Profile
+from .simulation.scene import Scene
+from .simulation.solution import Charts, Solution, Steps
 
 
 class Rotation(Protocol):

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .checks import floats, number, positive, vector3
 from .errors import InvalidArgument
-from .mesh import moments
+from .maths.mesh_integrals import moments
+from .validation import floats, number, positive, vector3
 
 if TYPE_CHECKING:
     from .hints import ArrayLike, Axis, Floats, Rotation

@@ -22,7 +22,7 @@ def registered() -> tuple[type[Force], ...]:
     >>> ts.forces.Spring in ts.forces.registered()
     True
     """
-    from ..force import registered as known
+    from ..elements.force import registered as known
 
     return tuple(known().values())
 

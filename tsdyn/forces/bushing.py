@@ -18,11 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._kernel import kernel
-from ..checks import floats
-from ..force import Force
-from ..markers import Parameters, Point, Turn
-from ..recurrences import cross, rotated, rotated_back, rotation
+from ..plugins import Force, Parameters, Point, Turn, cross, floats, kernel, rotated, rotated_back, rotation
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike

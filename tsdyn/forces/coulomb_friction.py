@@ -15,9 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..force import Force, not_negative, positive_number
-from ..friction import act, demand_bodies, slip
-from ..markers import Point, Turn
+from ..plugins import Force, Point, Turn, act, demand_bodies, not_negative, positive_number, slip
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike

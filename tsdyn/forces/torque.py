@@ -9,10 +9,18 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from ..force import Force, vector_load
-from ..given_load import Given, GivenByState, GivenInBody
-from ..markers import Parameters, Point, Turn
-from ..state_function import arguments_of, state_load
+from ..plugins import (
+    Force,
+    Given,
+    GivenByState,
+    GivenInBody,
+    Parameters,
+    Point,
+    Turn,
+    arguments_of,
+    state_load,
+    vector_load,
+)
 
 if TYPE_CHECKING:
     from ..hints import Body, Frame, VectorLoad

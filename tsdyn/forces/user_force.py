@@ -15,12 +15,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._kernel import specialised, stack
-from ..checks import floats
-from ..errors import InvalidForce
-from ..force import Force
-from ..markers import Parameters, Point, Turn
-from ..state_function import ByState, arguments_of, fill_state
+from ..plugins import (
+    ByState,
+    Force,
+    InvalidForce,
+    Parameters,
+    Point,
+    Turn,
+    arguments_of,
+    fill_state,
+    floats,
+    specialised,
+    stack,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -12,10 +12,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from ..force import Force, not_negative
-from ..friction import act, demand_bodies, slip
-from ..markers import Point, Turn
-from ..recurrences import cross
+from ..plugins import Force, Point, Turn, act, cross, demand_bodies, not_negative, slip
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike

@@ -103,7 +103,7 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
     Phi, Phi_q, Phi_t = metric.arrays(q)
     A = metric.reduced(q, Phi_q[metric.own])
     _demand_regular(scene, metric, A)
-    demand_aligned(packed, q)
+    demand_aligned(packed, q, float(t))
     given, qd = _velocities(scene, metric, q, qd, A, Phi_t[metric.own])
     residual = Phi_q @ qd + Phi_t
     _demand_compatible(scene, residual, max(tol, 1e-9) * (1.0 + np.abs(qd).max()))

@@ -5,7 +5,7 @@ import numpy as np
 from ..elements.loops.body_poses import move_bodies, place_bodies, write_positions, write_velocities
 from ..errors import RedundantConstraints, SingularConfiguration, Status
 from ..formulations.locked_orientations import keep_turning, settle, still
-from ..formulations.projection import PIVOT_LIMIT, factorise, find_drift, gather_speeds, land, land_velocities, move_by
+from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
 from ..jit.kernels import entry, kernel, resident
 from ..model.equations import set_time
 from ..observables.evaluate import constraint_arrays, dependent
@@ -51,7 +51,7 @@ def _look(context, q, qd, t, velocity):
     gather(network, f.H, f.Z, velocity)
     for e in range(velocity.size):
         velocity[e] += f.gamma[e]
-    return factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 0)
+    return factor_rows(network, f, f.H, f.Y, f.S, 0)
 
 
 @entry
@@ -79,7 +79,7 @@ def _choose(context, share):
     f = c.free
     select(c.network, f, f.H, f.Y, f.S, -1, share)
     drop_rows(f.dropped, f.H)
-    return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 0) < 0 else -1
+    return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, 0) < 0 else -1
 
 
 @entry
@@ -90,7 +90,7 @@ def _hold_axes(context, q, t):
     set_time(c.system, t)
     place_bodies(network.bodies, q, f.poses)
     run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)
-    failed = factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 1)
+    failed = factor_rows(network, f, f.H, f.Y, f.S, 1)
     return failed if is_axis(network, f.S, failed) else -1
 
 

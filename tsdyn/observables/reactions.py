@@ -22,8 +22,6 @@ from ..workspaces.workspace import load_parts, parts
 from .friction_reactions import with_normal_loads
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
 
-RANK_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
-
 
 @entry
 def solve_multipliers(context, t, q, r, rows, out):
@@ -39,7 +37,7 @@ def solve_multipliers(context, t, q, r, rows, out):
         set_time(s, t[k])
         place_bodies(bodies, q[k], f.poses)
         run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
-        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, RANK_LIMIT, 0)
+        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, 0)
         constraint_jacobian(s, q[k], t[k], rows)
         copy(r[k], f.Q)
         take_loads(bodies, q[k], r[k], f.Z)

@@ -13,7 +13,7 @@ from ..rows.axis_rows import is_axis
 from ..rows.evaluation import run_loops
 from ..rows.schur_complement import gather, scatter
 from ..rows.selection import drop_rows, factor_rows, select
-from ..sparse.constraint_graph import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, network_of
+from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, drop, network_of
 from ..sparse.factorisation import solve
 from ..sparse.massless_axes import axis_of
 from ..workspaces.tangent_memory import allocate_free
@@ -143,7 +143,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         _refuse(scene, start, dependent)
         dependent = -1
     start.demand_velocities()
-    known = packed.shared.get(DROPPED)
+    known = packed.derived.dropped
     if dependent < 0:
         if known is not None:  # another start had too many rows
             drop(packed, None)
@@ -174,7 +174,7 @@ class _Start:
         system = system._replace(reals=system.reals.copy())
         self.m = len(system.segments)
         whole = parts(system, self.network, q.size)
-        if DROPPED in self.packed.shared:
+        if self.packed.derived.dropped is not None:
             whole = whole._replace(free=allocate_free(self.network, q.size, redundant=True))
         self.free, self.work, self.rates = whole.free, whole.work, np.zeros(len(self.network.row))
         self.context, *self._keep = resident(whole)

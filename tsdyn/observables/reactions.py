@@ -115,15 +115,15 @@ def reaction(solution, member, body):
 
 def only(packed, parts):
     """Of System.kinds what these primitives, a slice, need: a row each."""
-    if "within" not in packed.shared:
+    if packed.derived.places_within is None:
         seen, within = Counter(), []
         for constraint in packed.constraints:
             within.append(seen[type(constraint)])
             seen[type(constraint)] += 1
-        packed.shared["within"] = within
+        packed.derived.places_within = within
     rows = dict(zip(classes(packed), with_short_rows(packed).kinds, strict=True))
     kinds = np.array([rows[type(part)] for part in packed.constraints[parts]])
-    within = np.array(packed.shared["within"][parts])
+    within = np.array(packed.derived.places_within[parts])
     kinds[:, FIRST_INT] += INTS * within
     kinds[:, FIRST_REAL] += kinds[:, REALS] * within
     kinds[:, COUNT] = 1
@@ -132,9 +132,9 @@ def only(packed, parts):
 
 def loads_of(packed):
     """The loads by the id of their force."""
-    if "loads" not in packed.shared:
-        packed.shared["loads"] = {id(load.force): load for load in packed.loads}
-    return packed.shared["loads"]
+    if packed.derived.loads is None:
+        packed.derived.loads = {id(load.force): load for load in packed.loads}
+    return packed.derived.loads
 
 
 def force_reaction(solution, load, body):

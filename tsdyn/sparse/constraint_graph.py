@@ -26,7 +26,6 @@ P_LEFT, P_ROWS, P_RIGHT, P_COLUMNS, P_TARGET, P_STRIDE, P_SAME, P_WIDTH = range(
 H_LEFT, H_ROWS, H_RIGHT, H_COLUMNS, H_TARGET, H_STRIDE, H_KIND, H_BODY, H_WIDTH = range(9)
 ROWS, ROWS_WELD, WELD_ROWS, WELDS = range(4)
 W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
-DROPPED = "dropped"  # in Packed.shared: the rows of a network of its own that are redundant
 
 
 class Network(NamedTuple):
@@ -56,12 +55,12 @@ class Network(NamedTuple):
 
 def network_of(packed, *columns):
     """The network of a packed scene with the addresses of these loops, made and loaded once."""
-    kept = packed.shared
-    if columns not in kept:
-        if "network" not in kept:
-            kept["network"] = build(packed)
-        kept[columns] = with_loops(*kept["network"], *columns)
-    return kept[columns]
+    known = packed.derived
+    if columns not in known.networks:
+        if known.graph is None:
+            known.graph = build(packed)
+        known.networks[columns] = with_loops(*known.graph, *columns)
+    return known.networks[columns]
 
 
 def drop(packed, rows):
@@ -69,12 +68,14 @@ def drop(packed, rows):
 
     Hubs are left whole then: elimination may end with the row of a weld, which can't be left out.
     """
-    for key in [key for key in packed.shared if key == "network" or isinstance(key, tuple)]:
-        del packed.shared[key]
-    if rows is None:
-        packed.shared.pop(DROPPED, None)
-    else:
-        packed.shared[DROPPED] = rows
+    packed.derived.forget_graphs()
+    packed.derived.dropped = rows
+
+
+def dropped_rows(packed):
+    """Redundant rows of a scene's networks, int64 (k,)."""
+    rows = packed.derived.dropped
+    return np.zeros(0, np.int64) if rows is None else rows
 
 
 def no_network():
@@ -117,7 +118,9 @@ def build(packed, still=None):
         inside.append((node, sizes[node]))
         sizes[node] += constraint.rows
     degrees = np.where(rows[:, 1] == 7, 6, 3).tolist()
-    whole = DROPPED in packed.shared or packed.system.normals.size  # frictions couple the rows of a hub as they are
+    whole = (
+        packed.derived.dropped is not None or packed.system.normals.size
+    )  # frictions couple the rows of a hub as they are
     parts = [] if whole else cut([tuple(body if body < nb else -1 for body in pair) for pair in nodes], sizes, degrees)
     hubs, cliques = {part.body for part in parts}, [[] for _ in range(nb)]
     for pair, node in nodes.items():
@@ -227,7 +230,7 @@ def build(packed, still=None):
     frictions, friction_rows = frictions_of(
         packed, bodies, lambda part: range(firsts[index[id(part)]], firsts[index[id(part)]] + part.rows), sides
     )
-    dropped = np.array(packed.shared.get(DROPPED, ()), np.int64)
+    dropped = dropped_rows(packed).copy()
     if still is not None:
         dropped = np.flatnonzero(np.isin(places, still.dropped))
     network = Network(

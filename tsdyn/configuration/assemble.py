@@ -7,10 +7,11 @@ import numpy as np
 from ..calls import fitting
 from ..elements.names import named
 from ..errors import InconsistentState, InvalidArgument, InvalidBody, SingularConfiguration
+from ..maths.row_rank import row_lengths
 from ..validation import number, one_of, positive
 from .continuation import STAGES, Found, Kept, close, nearest, relax, settle, stuck
 from .infeasible_subset import refuse
-from .kinetic_metric import Metric, least_step, row_lengths
+from .kinetic_metric import Metric, least_step
 from .loop_folds import Folds
 from .mirrored_branches import demand_aligned
 from .start_violations import ROUNDING, demand_finite

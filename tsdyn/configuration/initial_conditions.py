@@ -7,8 +7,9 @@ from ..errors import RedundantConstraints, SingularConfiguration, Status
 from ..formulations.locked_orientations import keep_turning, settle, still
 from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
 from ..jit.kernels import entry, kernel, resident
+from ..maths.row_rank import dependent
 from ..model.equations import set_time
-from ..observables.evaluate import constraint_arrays, dependent
+from ..observables.evaluate import constraint_arrays
 from ..rows.axis_rows import is_axis
 from ..rows.evaluation import run_loops
 from ..rows.schur_complement import gather, scatter

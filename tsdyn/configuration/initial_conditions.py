@@ -14,9 +14,10 @@ from ..rows.axis_rows import is_axis
 from ..rows.evaluation import run_loops
 from ..rows.schur_complement import gather, scatter
 from ..rows.selection import drop_rows, factor_rows, select
-from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, drop, network_of
+from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.factorisation import solve
 from ..sparse.massless_axes import axis_of
+from ..sparse.networks import drop, network_of
 from ..workspaces.tangent_memory import allocate_free
 from ..workspaces.workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 from .rank import check_rank

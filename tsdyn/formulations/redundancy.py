@@ -8,7 +8,8 @@ from ..model.derived import Derived
 from ..model.equations import set_time
 from ..rows.evaluation import run_loops
 from ..rows.selection import select
-from ..sparse.constraint_graph import REDUCED, network_of
+from ..sparse.constraint_graph import REDUCED
+from ..sparse.networks import network_of
 from ..workspaces.tangent_memory import allocate_free
 from ..workspaces.workspace import load_parts, parts
 

@@ -6,7 +6,7 @@ from ..configuration.rank import weakest_row
 from ..errors import Status
 from ..formulations.redundancy import dependent_rows
 from ..observables.evaluate import constraint_arrays
-from ..sparse.constraint_graph import dropped_rows
+from ..sparse.networks import dropped_rows
 from ..taylor.layout import without_series
 from ..validation import counted
 

@@ -20,7 +20,7 @@ from ..elements.membership import settle
 from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
 from ..model import joint_motion
 from ..model.handles import handles_of
-from ..motions.expressions import Polynomial
+from ..motions.elementary import Polynomial
 from ..validation import floats, number
 from .assemble import assemble
 from .rigid_shift import RigidShift

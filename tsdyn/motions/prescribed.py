@@ -15,8 +15,8 @@ from ..errors import InvalidArgument, InvalidConstraint
 from ..jit.compiled_once import compiled_once
 from ..jit.kernels import Callback, caller, kernel, specialised
 from ..validation import number
-from . import expressions as motions
-from .expressions import Piecewise, Smooth
+from .elementary import Constant, Piecewise, time
+from .expressions import FUNCTIONS, Smooth
 from .knots import demand_covered, demand_followed
 from .program import run_program
 from .tables import is_data
@@ -100,7 +100,7 @@ class Motion:
     def always(cls, value: Prescribed, what: str) -> Motion:
         """Return a Motion, of a number too."""
         value = cls.wrap(value, what)
-        return value if isinstance(value, Motion) else cls(motions.Constant(value), what=what)
+        return value if isinstance(value, Motion) else cls(Constant(value), what=what)
 
     @classmethod
     def wrap(cls, value: Prescribed, what: str) -> Motion | float:
@@ -244,18 +244,18 @@ def _derived(f, what):
     known = {name: _of_motions(value) for name, value in plain.__globals__.items()}
     twin = FunctionType(plain.__code__, known, plain.__name__, plain.__defaults__, plain.__closure__)
     try:
-        result = twin(motions.time)
+        result = twin(time)
     except Exception as error:
         raise InvalidConstraint(
             f"{what}: its derivatives can't be derived from f alone ({type(error).__name__}: {error}). Give three "
             "functions of time (f, fd, fdd), or write f with arithmetic and "
-            f"{', '.join(motions.FUNCTIONS)} of NumPy, without branches."
+            f"{', '.join(FUNCTIONS)} of NumPy, without branches."
         ) from error
     if isinstance(result, Smooth):
         return result
     if not math.isfinite(number(result)):
         raise InvalidConstraint(f"{what}: the function must return a number, it gave {result!r} of the time.")
-    return motions.Constant(number(result))
+    return Constant(number(result))
 
 
 def _of_motions(value):

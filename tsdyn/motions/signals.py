@@ -11,7 +11,8 @@ from ..errors import InvalidArgument
 from ..jit.compiled_once import compiled_once
 from ..jit.kernels import Callback, caller, kernel, specialised, vector
 from ..validation import floats, number
-from .expressions import Constant, Piecewise, Smooth
+from .elementary import Constant, Piecewise
+from .expressions import Smooth
 from .knots import demand_covered
 from .program import run_program
 from .tables import is_data

@@ -61,8 +61,6 @@ class Scene:
 
     Examples
     --------
-    A pendulum of 1 m, released from the horizontal:
-
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))
     >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")

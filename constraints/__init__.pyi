@@ -20,7 +20,7 @@ class AngleDriver(Primitive):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -51,7 +51,7 @@ class ConstantAngle(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -80,7 +80,7 @@ class Cylindrical(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -109,7 +109,7 @@ class Distance(Primitive):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -136,7 +136,7 @@ class Dot1(Primitive):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -165,7 +165,7 @@ class Dot2(Primitive):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -182,7 +182,7 @@ class Dot2(Primitive):
 class EulerNormalization(Primitive):
     def __init__(self, a: Body, *, name: str = ...) -> None: ...
     @classmethod
-    def at(cls, a: Body, *, name: str = ...) -> Self: ...  # type: ignore[override]
+    def at(cls, a: Body, *, name: str = ...) -> Self: ...
 
 class Gear(Primitive):
     axis_a: Attribute[ArrayLike, Floats]
@@ -207,7 +207,7 @@ class Gear(Primitive):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -238,7 +238,7 @@ class Parallel(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -266,7 +266,7 @@ class Planar(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -295,7 +295,7 @@ class PlaneContact(Primitive):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -323,7 +323,7 @@ class PointDriver(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -350,7 +350,7 @@ class PointOnLine(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -386,7 +386,7 @@ class RackAndPinion(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -422,7 +422,7 @@ class Revolute(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -443,7 +443,7 @@ class Spherical(Primitive):
         self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., name: str = ...
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -477,7 +477,7 @@ class Thread(Primitive):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -513,7 +513,7 @@ class TranslationMotor(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -546,7 +546,7 @@ class Universal(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -581,7 +581,7 @@ class Fixed(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -623,7 +623,7 @@ class RotationMotor(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -668,7 +668,7 @@ class Screw(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -711,7 +711,7 @@ class Translational(Joint):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,

@@ -48,11 +48,13 @@ def _class(cls: type, public: set[str]) -> str:
     lines = [f"class {cls.__name__}({', '.join(base.__name__ for base in bases)}):", *_attributes(cls)]
     lines += _function("__init__", inspect.signature(cls.__init__))
     inherited = {name for base in bases for name in dir(base)} - {"at"}
+    inherited |= {name for base in cls.__mro__ for name in vars(base).get("__annotations__", ())}
+    inherited |= {*inspect.signature(cls).parameters}  # said by _attributes
     for name in [name for name in dir(cls) if not name.startswith("_") and name not in inherited]:
         value = inspect.getattr_static(cls, name)
         if name == "at":
             signature = inspect.signature(cls.at.__func__).replace(return_annotation="Self")
-            lines += ["    @classmethod", *_function(name, signature, "  # type: ignore[override]")]
+            lines += ["    @classmethod", *_function(name, signature)]
         elif isinstance(value, property) and "return" in value.fget.__annotations__:
             lines += _attribute(name, value.fget.__annotations__["return"], None)
         elif isinstance(value, classmethod) and "return" in value.__func__.__annotations__:
@@ -107,7 +109,7 @@ def _may_be_set(instance: object, name: str) -> bool:
     return True
 
 
-def _function(name: str, signature: inspect.Signature, comment: str = "") -> list[str]:
+def _function(name: str, signature: inspect.Signature) -> list[str]:
     """A method, defaults left out, on one line or with a line for each argument."""
     told = []
     for p in signature.parameters.values():
@@ -118,11 +120,11 @@ def _function(name: str, signature: inspect.Signature, comment: str = "") -> lis
     end = f") -> {signature.return_annotation}: ..."
     line = f"    def {name}({', '.join(told)}{end}"
     if len(line) <= LINE:
-        return [line + comment]
+        return [line]
     inner = ", ".join(told)
     if len(inner) <= LINE - 8:
-        return [f"    def {name}({comment}", f"        {inner}", f"    {end}"]
-    return [f"    def {name}({comment}", *(f"        {one}," for one in told), f"    {end}"]
+        return [f"    def {name}(", f"        {inner}", f"    {end}"]
+    return [f"    def {name}(", *(f"        {one}," for one in told), f"    {end}"]
 
 
 def _imports(body: str, own: set[str]) -> str:

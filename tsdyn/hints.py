@@ -48,6 +48,7 @@ class Rotation(Protocol):
 
 Floats: TypeAlias = NDArray[np.float64]
 Bools: TypeAlias = NDArray[np.bool_]
+Integers: TypeAlias = NDArray[np.int64]
 Random: TypeAlias = np.random.Generator
 Matrix: TypeAlias = Any  # dense, or a sparse array of SciPy's
 Value: TypeAlias = np.float64 | Any  # of a function of time: a number at one time, an array at many
@@ -106,6 +107,7 @@ __all__ = [
     "Function",
     "Ground",
     "Handles",
+    "Integers",
     "Integrator",
     "Item",
     "ItemLike",

@@ -27,7 +27,7 @@ class Bushing(Force):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -61,7 +61,7 @@ class CoulombFriction(Force):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -96,7 +96,7 @@ class Spring(Force):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -136,7 +136,7 @@ class TorsionalSpring(Force):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -153,8 +153,6 @@ class TorsionalSpring(Force):
         actuator: Load = ...,
         name: str = ...,
     ) -> Self: ...
-    @property
-    def axis_b(self) -> Floats: ...
 
 class ViscousFriction(Force):
     point_a: Attribute[ArrayLike, Floats]
@@ -171,7 +169,7 @@ class ViscousFriction(Force):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: BodyLike,
         b: BodyLike,
@@ -203,7 +201,7 @@ class ContactFriction(JointFriction, Force):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         joint: Attachment,
         *,
@@ -226,11 +224,9 @@ class JointForce(Force):
         self, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...
     ) -> Self: ...
-    @property
-    def coordinates(self) -> tuple[Floats, ...]: ...
     @property
     def geometry(self) -> Any: ...
 
@@ -245,11 +241,9 @@ class JointTorque(Force):
         self, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...
     ) -> Self: ...
-    @property
-    def coordinates(self) -> tuple[Floats, ...]: ...
     @property
     def geometry(self) -> Any: ...
 
@@ -267,7 +261,7 @@ class PointForce(Force):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: PointMass | str,
         *,
@@ -305,7 +299,7 @@ class RevoluteFriction(JointFriction, Force):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         joint: Revolute,
         *,
@@ -327,7 +321,7 @@ class Torque(Force):
         self, a: Body | str, *, torque: VectorLoad | None = ..., frame: Frame = ..., name: str = ...
     ) -> None: ...
     @classmethod
-    def at(cls, a: Body | str, *, torque: VectorLoad | None = ..., frame: Frame = ..., name: str = ...) -> Self: ...  # type: ignore[override]
+    def at(cls, a: Body | str, *, torque: VectorLoad | None = ..., frame: Frame = ..., name: str = ...) -> Self: ...
     def take(self, value: Any, frame: str, hint: str) -> None: ...
 
 class TranslationalFriction(JointFriction, Force):
@@ -354,7 +348,7 @@ class TranslationalFriction(JointFriction, Force):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         joint: Translational,
         *,
@@ -384,7 +378,7 @@ class UserForce(Force):
         name: str = ...,
     ) -> None: ...
     @classmethod
-    def at(  # type: ignore[override]
+    def at(
         cls,
         a: PointMass | str,
         b: BodyLike | None = ...,

@@ -23,7 +23,7 @@ from .conservation import energy_error
 from .termination import account
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Bools, ConstraintError, Floats, ItemLike, NDArray, Scene
+    from ..hints import ArrayLike, BodyLike, Bools, ConstraintError, Floats, Integers, ItemLike, Scene
 
 
 class Steps(NamedTuple):
@@ -41,7 +41,7 @@ class Charts(NamedTuple):
     reason: tuple[str, ...]
     condition: Floats
     contraction: Floats
-    steps: NDArray[np.int64]
+    steps: Integers
 
 
 @fitting_methods

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 class Derived:
     """Of one `Packed`: each entry is None, or empty, until the function named beside it has been called."""
 
-    dropped: object = None  # int64 (k,): redundant rows of the constraint graph; set by constraint_graph.drop
+    dropped: object = None  # int64 (k,): redundant rows of the constraint graph; set by constraint_graphs.drop
     turning: set = field(default_factory=set)  # bodies that count as turning; locked_orientations.keep_turning
     handles: object = None  # handles.handles_of
     body_indices: dict = None  # packed.index_of

@@ -4,7 +4,7 @@ It falls as the square of the distance from a singular configuration, and is com
 """
 
 from ..jit.kernels import kernel
-from .selection import weakest
+from .independent_rows import weakest
 from .tangent_workspace import LARGEST_SHARE, SHARE
 
 NEAR = 0.02  # of the largest share: a place with less is near a singular configuration

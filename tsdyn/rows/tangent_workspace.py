@@ -25,18 +25,20 @@ class Free(NamedTuple):
     """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
 
     poses: np.ndarray  # ((b + 1) * 28,)  see body_poses.py; landing, tangent
-    H: np.ndarray  # (m * 16,)  rows of [Phi_r, Phi_pi'] of bodies a and b; body_loops.reduced
+    H: np.ndarray  # (m * 16,)  rows of [Phi_r, Phi_pi'] of bodies a and b; constraint_rows.reduced
     Y: np.ndarray  # (m * 16,)  W H^T; normal.weigh_rows
-    S: np.ndarray  # H W H^T, then its factors; normal.multiply_rows, block_kernels.factor
+    S: np.ndarray  # H W H^T, then its factors; schur_complement.multiply_rows, factorisation.factor
     b: np.ndarray  # (m,)  right-hand sides and solutions
-    gamma: np.ndarray  # (m,)  acceleration bias in terms of omega'; body_loops.bias
+    gamma: np.ndarray  # (m,)  acceleration bias in terms of omega'; constraint_rows.bias
     Z: np.ndarray  # ((b + 1) * 8,)  forces, then accelerations of bodies
     a: np.ndarray  # ((b + 1) * 8,)  accelerations of bodies; taylor
     Q: np.ndarray  # (n,)  applied forces
     p: np.ndarray  # (4,)  scratch
     sizes: np.ndarray  # (SIZES,)  numbers about the last landing and choice of rows, below
-    dropped: np.ndarray  # int64 (m + 1,)  how many rows are dropped, and which; selection.select
-    chosen: np.ndarray  # int64 (m + 1,), order (m,), block (largest block, or m, squared)  scratch of selection.select
+    dropped: np.ndarray  # int64 (m + 1,)  how many rows are dropped, and which; independent_rows.select
+    chosen: (
+        np.ndarray
+    )  # int64 (m + 1,), order (m,), block (largest block, or m, squared)  scratch of independent_rows.select
     order: np.ndarray
     block: np.ndarray
     friction: Friction

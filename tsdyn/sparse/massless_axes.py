@@ -114,7 +114,7 @@ def axes_of(shares, lean, joints, inside, starts, where):
     starts : ndarray of int64
         Where each node's rows begin.
     where : callable
-        As `blocks.analyse` returns it.
+        As `symbolic.analyse` returns it.
     """
     rows, values, products, scales = [], [], [], []
     for share in shares:

@@ -1,4 +1,4 @@
-"""Integrators, one file each; a new file in this folder is found by itself."""
+"""Integrators, one file each; a new file in this folder is registered automatically."""
 
 from .._discovery import export_all
 

@@ -1,4 +1,4 @@
-"""How a run ended, in words: what happened, where, and what to try."""
+"""Termination report of a run: what happened, where, and what to try."""
 
 import numpy as np
 

@@ -1,7 +1,7 @@
-"""What to change about a call that has been profiled: each said from a number that was measured, with that number.
+"""Advice on a profiled call, each item with the measurement that supports it.
 
-Alternatives are tried, by calls of their own, and told of where they are quicker; with a change that may cost accuracy
-goes how far apart the two ends are.
+Alternatives are run in separate calls and reported only where they are faster. Where an alternative may cost accuracy,
+the difference between the two final states is reported with it.
 """
 
 import copy

@@ -1,4 +1,4 @@
-"""`scene.assemble`: the nearest consistent positions, then the nearest consistent velocities."""
+"""`scene.assemble`: nearest consistent positions, then nearest consistent velocities."""
 
 from dataclasses import dataclass
 

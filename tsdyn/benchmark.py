@@ -1,4 +1,4 @@
-"""`benchmark`: run time against error of integration methods on a scene of the user's."""
+"""`benchmark`: work-precision of integration methods on a user's scene."""
 
 import contextlib
 import signal

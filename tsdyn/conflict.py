@@ -1,8 +1,8 @@
-"""Which constraints contradict each other: the smallest set that can't be met, joints whole.
+"""Conflicting constraints: the minimal infeasible subset, joints taken as a whole.
 
-Where |Phi|^2 is least, Phi_q^T Phi = 0: the constraints that are left over there balance each other like the forces of
-a strained structure, and they alone can conflict. Of these, sets are tried from small to large, or, where they are
-many, what can be left out is left out piece by piece; each trial is an assembly from the sketch.
+At a minimum of |Phi|^2, Phi_q^T Phi = 0: the residuals balance like the forces of a prestressed structure, and only
+constraints with a non-zero residual can conflict. Subsets of these are assembled from the sketch in order of size; with
+many candidates, constraints are removed one at a time as long as the rest still fails.
 """
 
 from itertools import combinations

@@ -1,4 +1,4 @@
-"""A run slice by slice: the compiled driver is called, with room for what each slice records."""
+"""A run in slices: repeated calls of the compiled driver, with room for the records of each slice."""
 
 import time
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""The series of motions, for Taylor runs of scenes that they drive."""
+"""Taylor series of prescribed motions, for Taylor runs of driven scenes."""
 
 from ._kernel import kernel
 from .motion_program import call_smooth

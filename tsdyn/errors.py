@@ -1,4 +1,4 @@
-"""What can go wrong: exceptions for what is refused before a run, a status for how a run ended."""
+"""Exceptions for input refused before a run; the status with which a run ends."""
 
 from enum import IntEnum
 

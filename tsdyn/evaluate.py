@@ -1,4 +1,4 @@
-"""What the solver sees at one state, in plain NumPy, exactly as the paper writes it: `scene.evaluate(q, qd, t)`."""
+"""`scene.evaluate(q, qd, t)`: the paper's quantities at one state, in plain NumPy."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""The memory of a Taylor run, and which parts of a scene have no series."""
+"""Memory layout of a Taylor run, and the parts of a scene that have no series."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The scratch memory of the basis-free forms."""
+"""The tangent-form workspace: named arrays of the basis-free form."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Accelerations and multipliers at a place on the manifold, without a basis of its tangent space.
+"""Accelerations and multipliers on the constraint manifold, without a basis of the tangent space.
 
     (H W H^T) lam = H W (Q_A + S) + gamma,    qdd = W (Q_A + S - H^T lam)
 

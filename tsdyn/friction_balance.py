@@ -1,4 +1,4 @@
-"""Friction and reactions together at one state, in plain NumPy, for `scene.evaluate`."""
+"""Coupled friction and reactions at one state, in plain NumPy, for `scene.evaluate`."""
 
 import numpy as np
 

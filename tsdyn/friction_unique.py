@@ -1,4 +1,4 @@
-"""Among redundant constraints reactions may not be unique, and friction that follows from such a one is refused."""
+"""Refusal of joint friction that depends on a reaction which redundant constraints leave undetermined."""
 
 import numpy as np
 

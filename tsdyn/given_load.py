@@ -1,4 +1,4 @@
-"""What PointForce and Torque share: three numbers, a function of time, or of time and state, in either frame."""
+"""Applied loads, the base of PointForce and Torque: constant, f(t) or f(t, state), in the ground or body frame."""
 
 import math
 

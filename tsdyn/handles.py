@@ -1,4 +1,4 @@
-"""The bodies, constraints and forces of a packed scene, where their coordinates are, and which angles runs count."""
+"""Handles of a packed scene: bodies, constraints, forces, their coordinates, and the angles that runs count."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""`check_integrator`: what every integration method has to keep, tried on scenes with known solutions."""
+"""`check_integrator`: properties required of every integration method, tested on scenes with known solutions."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""`scene.mobility`: degrees of freedom, rank, and the rows that say nothing new; everywhere, or just here."""
+"""`scene.mobility`: degrees of freedom, rank, redundant rows, and whether the configuration is singular."""
 
 import html
 from collections import Counter

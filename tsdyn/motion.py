@@ -1,4 +1,4 @@
-"""A prescribed function of time with its two derivatives: compiled and reached by address, or a program of numbers."""
+"""A prescribed function of time with two derivatives: compiled and called by address, or a program of numbers."""
 
 import math
 from functools import partial

@@ -1,11 +1,11 @@
-"""Smooth motions: functions of time that know their derivatives and their Taylor series, and compile nothing.
+"""Smooth motions: functions of time with exact derivatives and Taylor series, without compilation.
 
     Polynomial, Constant, Ramp, Sine, Exponential, and time itself
     Piecewise, of data: tables and SciPy's splines
     + - * / of them and of numbers, powers, and np.sin, cos, tan, exp, log, sqrt, sinh, cosh, tanh, arctan of them
 
-A motion is a graph of operations. Its value and two derivatives follow in Python by `jet`, its series in a run by
-`motion_program`; neither knows of the other.
+A motion is a graph of operations. `jet` evaluates value and two derivatives in Python, `motion_program` the series in a
+run; the two are independent.
 """
 
 import math

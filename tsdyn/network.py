@@ -1,8 +1,7 @@
-"""The graph of a scene for the basis-free forms: which rows meet at which bodies, and where their products go.
+"""The constraint graph of a scene for the basis-free forms: rows, bodies, and the addresses of their products.
 
-Normalisation rows are no part of it: in terms of (dr, dpi') every body's is fulfilled (see body_loops). What is left
-of Phi_q W Phi_q^T, S = H W H^T, couples rows that share a body; its blocks, their order of elimination and all places
-are found once for a scene.
+It has no normalisation rows: displacements (dr, dpi') satisfy them (see body_loops). The Schur complement S = H W H^T
+couples rows that share a body; its blocks, their elimination order and all addresses are determined once for a scene.
 """
 
 from typing import NamedTuple

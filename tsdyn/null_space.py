@@ -1,4 +1,4 @@
-"""The tangent-space ODE in the paper's own form, with U, V, B and D (Haug 2018, Eqs. 19-29).
+"""The null-space form of the tangent-space ODE, with U, V, B and D (Haug 2018, Eqs. 19-29).
 
     q   = q0 + V v - U u                                             Eq. 19
     qd  = D vd - U B Phi_t                                           Eq. 23

@@ -1,4 +1,4 @@
-"""What a driver keeps of accepted states."""
+"""Outputs of a driver: the records of accepted states."""
 
 from ._kernel import kernel
 from .joint_turns import angle_after

@@ -1,4 +1,4 @@
-"""`profile`: where the time of a call of `simulate` goes, phase by phase, and what to change."""
+"""`profile`: run time of a call of `simulate` by phases, with advice."""
 
 import copy
 import time

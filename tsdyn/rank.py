@@ -1,4 +1,4 @@
-"""Rows of Phi_q that depend on each other: found, and named."""
+"""Redundant rows of Phi_q: detection, and their names."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Multipliers and the forces of constraints, from positions, velocities and accelerations."""
+"""Multipliers and constraint reactions, from positions, velocities and accelerations."""
 
 import math
 from collections import Counter

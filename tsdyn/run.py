@@ -1,4 +1,4 @@
-"""The driver: steps, outputs, charts. One kernel for every scene, method and formulation; it calls them by address."""
+"""The step driver: steps, outputs, charts. One kernel serves every scene, method and formulation by address."""
 
 import math
 

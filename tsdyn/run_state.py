@@ -1,4 +1,4 @@
-"""The memory of one run, as the driver's kernels see it: arrays, and what stands where in them."""
+"""The state of one run in the driver's kernels: arrays and their layout."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""The scene: what a user assembles from bodies, constraints and forces, checked piece by piece."""
+"""The scene: bodies, constraints and forces, validated as they are added."""
 
 from collections import Counter
 from itertools import count

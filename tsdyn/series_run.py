@@ -1,4 +1,4 @@
-"""The driver of Taylor series from Python's side; see tsdyn.task."""
+"""The Python side of the Taylor driver; see tsdyn.task."""
 
 import time
 

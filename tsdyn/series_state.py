@@ -1,4 +1,4 @@
-"""What a Taylor run works on: the series of one step, and with them all that its kernels use."""
+"""The Taylor workspace: the series of one step and everything else that the kernels use."""
 
 from typing import NamedTuple
 

@@ -1,8 +1,8 @@
 """`scene.set`: the coordinates of a joint at the start, and the rest of the scene assembled around it.
 
-Where the joint is the only link between two parts of the scene, one part is moved against the other as a rigid body:
-all other joints stay as they are. In a loop the joint is driven to its value in small steps, each of which is
-assembled, so that the mechanism stays on its branch.
+If the joint is the only link between two parts of the scene, one part is moved rigidly relative to the other; all other
+joints keep their values. In a loop the joint is driven to its value in small steps, each followed by an assembly, so
+that the mechanism stays on its branch.
 """
 
 import math

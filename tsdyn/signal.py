@@ -1,4 +1,4 @@
-"""A load as a function of time: a plain function of t, smooth motions, or data, evaluated once a time of a run."""
+"""Time-dependent inputs: a function of t, a motion or data, evaluated once for each time of a run."""
 
 import math
 from functools import partial

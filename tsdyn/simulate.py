@@ -1,4 +1,4 @@
-"""`simulate`: check everything, hand a task to the method's driver, make a Solution of what it hands back."""
+"""`simulate`: validate the arguments, pass a run request to the driver of the method, return a Solution."""
 
 import time
 

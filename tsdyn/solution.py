@@ -1,4 +1,4 @@
-"""What a run hands back: the trajectory, how it went, and everything that follows from it."""
+"""The result of a run: trajectory, termination, statistics and derived quantities."""
 
 import html
 from functools import cached_property

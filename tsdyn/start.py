@@ -1,4 +1,4 @@
-"""Initial conditions of scenes of any size: as in initial.py, by the network instead of matrices, at a cost of O(N)."""
+"""Initial conditions of scenes of any size, as in initial.py but with the constraint graph, in O(N)."""
 
 import numpy as np
 

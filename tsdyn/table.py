@@ -1,4 +1,4 @@
-"""Motions and loads from data: tables, and SciPy's piecewise polynomials."""
+"""Motions and loads from data: tables and SciPy's piecewise polynomials."""
 
 import math
 import sys

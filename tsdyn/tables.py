@@ -1,6 +1,6 @@
-"""The two tables of Haug (2018), measured here: constraint errors of the sliding top and of the two-body pendulum.
+"""The two tables of Haug (2018), reproduced: constraint errors of the sliding top and of the two-body pendulum.
 
-`reproduce` runs everything and returns data, `as_text` lays the data out. `tsdyn tables` prints it.
+`reproduce` makes the runs and returns data, `as_text` formats the data. `tsdyn tables` prints both tables.
 """
 
 import math

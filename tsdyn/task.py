@@ -1,7 +1,7 @@
-"""A run as its driver sees it: what is asked of it, and what it hands back.
+"""The run request (`Task`) that a driver receives, and the `Outcome` that it returns.
 
-A method has a driver, the attribute `driver`: a name in simulate.DRIVERS, or the driver itself, a function of a `Task`
-that returns an `Outcome`.
+The attribute `driver` of a method is a name in simulate.DRIVERS, or a driver function that takes a `Task` and returns
+an `Outcome`.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""The scratch memory of one run: every array laid out once, before the first step."""
+"""The workspace of a run: all arrays are laid out once, before the first step."""
 
 import math
 from typing import NamedTuple

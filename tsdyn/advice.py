@@ -134,7 +134,7 @@ def _alternatives(profile, run, plain, options, limit):
     if options.get("integrator") is not None:
         found = attempt(integrator=None, **tolerances)
         if found and found.method != solution.method:
-            yield f"Without a method named it is run by {found.method}, at {given}, {_quicker(found, limit)}."
+            yield f"The default method, {found.method} at {given}, is {_quicker(found, limit)}."
     if solution.stats.stiff and not method.implicit and adaptive and solution.q.shape[1] <= LARGEST_PILOT:
         found = attempt(integrator=SDIRK54(method.rtol, method.atol))
         if found:
@@ -163,9 +163,9 @@ def _alternatives(profile, run, plain, options, limit):
             yield f"Without chart_interval, which forces charts, it is {_quicker(found, limit)}."
     if astray:
         yield (
-            f"What would be quicker ends elsewhere, by up to {max(astray):.1e} (m, or of a rotation matrix): the end "
-            "of this run depends on the method and its tolerances more than they allow for. Tighten them, or shorten "
-            "the interval, until the end stays where it is."
+            f"Faster alternatives end elsewhere, by up to {max(astray):.1e} (m, or of a rotation matrix): the final "
+            "state depends on the method by more than the tolerances. Tighten them, or shorten the interval, until the "
+            "final state converges."
         )
 
 

@@ -42,18 +42,18 @@ def refuse(scene, metric, sketch, found, tol, held=()):
     if len(conflicting) > 8:
         lines.append(f"  ... and {len(conflicting) - 8} more")
     if len(conflicting) == 1:
-        story = "This one can't be met by itself"
+        story = "This constraint is infeasible on its own"
     elif minimal:
-        story = f"These {len(conflicting)} conflict, and without any one of them the rest of them can be met"
+        story = f"These {len(conflicting)} conflict; without any one of them, the others can be satisfied"
     else:
-        story = "These are left over"
+        story = "These have non-zero residuals"
     where = f" with {', '.join(body.name for body in held)} held fixed" if len(held) else ""
     error = InconsistentState(
-        f"no configuration that meets all constraints{where} was found in {found.iterations} iterations from the "
-        f"sketch and from others near it. {story}:\n"
+        f"no configuration that satisfies all constraints{where} was found in {found.iterations} iterations from the "
+        f"sketch and from perturbed ones. {story}:\n"
         + "\n".join(lines)
-        + "\nChange a length, point or axis of one of them, or drop one"
-        + ("; or hold fewer bodies." if len(held) else ". If they do fit, bring the bodies nearer to where they do.")
+        + "\nChange a length, point or axis of one of them, or remove one"
+        + ("; or hold fewer bodies." if len(held) else ". If they are compatible, improve the sketch of the bodies.")
     )
     error.constraints = tuple(member.constraint for member in conflicting)
     raise error

@@ -51,7 +51,7 @@ class JointFriction:
     joints = ()
     markers = ()
     particles = True
-    no_series = "its size follows from a reaction, and its direction turns round too sharply for a series"
+    no_series = "its magnitude depends on a reaction, and its direction reverses too sharply for a series"
     quantities = MappingProxyType(
         {
             "kinetic": not_negative,

@@ -194,8 +194,8 @@ def _core(metric, q, rows):
         rows = put_aside(A, owners)
         if len(rows) > MOST_ROWS:
             raise InvalidArgument(
-                f"mobility: the closed loops of this scene have {len(rows)} constraint rows; it is worked out for up "
-                f"to {MOST_ROWS}. Ask for a smaller scene of the same kind."
+                f"mobility: the closed loops of this scene have {len(rows)} constraint rows; the limit is "
+                f"{MOST_ROWS}. Analyse a smaller scene of the same kind."
             )
     left = A[rows]
     used = np.unique(left.indices) if len(rows) else np.zeros(0, int)

@@ -196,7 +196,7 @@ class Smooth:
                 return self ** inputs[1]
             if len(inputs) == 2 and ufunc.__name__ in ("add", "subtract", "multiply", "divide"):
                 return _binary(ufunc.__name__, *inputs)
-        raise TypeError(f"np.{ufunc.__name__} of a motion is not known here; there are {', '.join(FUNCTIONS)}.")
+        raise TypeError(f"np.{ufunc.__name__} of a motion is not supported; there are {', '.join(FUNCTIONS)}.")
 
     def __repr__(self):
         return f"<{type(self).__name__}: {self(0.0):g} at t = 0>"

@@ -98,7 +98,7 @@ def set_joint(
     _link(joint, given)
     given = {kind: pair for kind, pair in given.items() if any(x is not None for x in pair)}
     if not given:
-        raise InvalidArgument(f"set: nothing is said of {joint!r}; give angle=, displacement= or rate=.")
+        raise InvalidArgument(f"set: no value is given for {joint!r}; give angle=, displacement= or rate=.")
     goals = [goal for kind, pair in given.items() for goal in _goals(scene, handles, joint, kind, pair, t)]
     others = [other for other in map(handles.item, keep) if other is not joint]
     held = [(other, goal) for other in others for goal in _present(scene, handles, other, t)]

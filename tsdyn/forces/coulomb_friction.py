@@ -45,7 +45,7 @@ class CoulombFriction(Force):
 
     markers = (Point("a"), Turn("a"), Point("b"), Turn("b"))
     particles = True
-    no_series = "its force turns round within slip_velocity, too sharply for a series"
+    no_series = "its force reverses within slip_velocity, too sharply for a series"
     quantities = MappingProxyType(
         {"force": not_negative, "torque": not_negative, "slip_velocity": positive_number, "slip_rate": positive_number}
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import tsdyn as ts
+from docs import draw
 
 ROOT = Path(__file__).parents[1]
 PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
@@ -43,3 +44,24 @@ def test_version_has_one_source():
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__version__"
     ]
     assert literals == [ts.__version__]
+
+
+def test_the_architecture_page_names_every_package():
+    table = set(re.findall(r"^\| `(\w+)` \|", (ROOT / "docs" / "architecture.md").read_text(), re.MULTILINE))
+    assert table >= draw.packages().keys()
+
+
+def test_the_pictures_are_drawn_from_functions_that_exist(tmp_path):
+    draw.draw_packages(tmp_path / "packages.svg")
+    draw.draw_step(tmp_path / "step.svg")  # LookupError of a function that is gone
+    text = (tmp_path / "packages.svg").read_text()
+    assert all(f">{name}<" in text for name in draw.packages())
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_files_that_pages_name_exist(page):
+    if page.name == "CHANGELOG.md":
+        return  # of the past, too
+    folders = "tsdyn|constraints|integrators|tests|examples|benchmarks|docs"
+    for path in re.findall(rf"`((?:{folders})/[\w/.]*)`", page.read_text()):
+        assert (ROOT / path).exists(), f"{page.name}: {path}"

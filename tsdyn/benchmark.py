@@ -55,17 +55,17 @@ def benchmark(
     formulation, constraint_tol
         As for `simulate`. The reference is always by the tangent-space ODE.
     max_steps : int
-        A run that needs more is reported as such.
+        A run that needs more is reported as failed.
     reference : agreement.Reference, optional
-        Default made here, by two methods that agree, as far as they do.
+        By default two methods, refined until they agree, give the reference.
     progress : callable, optional
-        Given the fraction done, 0 to 1.
+        Receives the fraction done, 0 to 1.
 
     Returns
     -------
     Benchmark
-        Its `rows`, `table()` and `plot()`. A run that fails, or is refused, is a row that says so. After Ctrl-C it
-        holds what has been measured so far, and `interrupted` is True.
+        With `rows`, `table()` and `plot()`. A run that fails or is refused is reported in its row. After Ctrl-C the
+        result holds the measurements so far, and `interrupted` is True.
 
     Raises
     ------

@@ -34,8 +34,8 @@ class Evaluation(NamedTuple):
     gamma: np.ndarray  # (m,) Phi_q qdd + gamma = 0, Eq. 3
     M: np.ndarray  # (n, n) mass matrix
     Q_A: np.ndarray  # (n,) applied forces
-    S: np.ndarray  # (n,) velocity terms, on the right-hand side
-    multipliers: np.ndarray  # (m,) M qdd + Phi_q^T lam = Q_A + S
+    S: np.ndarray  # (n,) velocity forces, on the right-hand side: S of the paper, Q_v of docs/notation.md
+    multipliers: np.ndarray  # (m,) M qdd + Phi_q^T lam = Q_A + Q_v
     qdd: np.ndarray  # (n,) accelerations
 
 
@@ -64,7 +64,7 @@ def evaluate(scene, q=None, qd=None, t=0.0):
 
     Notes
     -----
-    Haug 2018, Eqs. 1-4. Multipliers and accelerations solve [M, Phi_q^T; Phi_q, 0] (qdd, lam) = (Q_A + S, -gamma).
+    Haug 2018, Eqs. 1-4. Multipliers and accelerations solve [M, Phi_q^T; Phi_q, 0] (qdd, lam) = (Q_A + Q_v, -gamma).
     """
     system = scene.system
     start = scene.start

@@ -6,7 +6,7 @@ Order k of the law needs x and xd up to k, hence x up to k + 1:
     x_k             = r_k + A_k s                                   Point; of a Vector without r_k
     (k+1) p_{k+1}   = 1/2 sum_j G(p_j)^T omega'_{k-j}               Parameters, x = p                   (1)
     xd_k            = (k+1) x_{k+1};  sum_j A_j omega'_{k-j}        all others; Turn                    (2)
-    T_k             = s x sum_j A_j^T f_{k-j}                       torque about the centroid, body     (3)
+    tau'_k          = s x sum_j A_j^T f_{k-j}                       torque about the centroid, body     (3)
                       sum_j A_j^T f_{k-j};  1/2 sum_j G(p_j) f_{k-j}    frame: of a Turn; of Parameters
 
 The series of an instance holds p and the forces (4 floats a marker and order each, p of Parameters only), then its own

@@ -4,10 +4,10 @@ With dq = D dv and, from Eqs. 2 and 3, Phi_q dqd = -G1 dq and Phi_q dqdd = -G2 d
 tsdyn.curvature), Eq. 4 gives (multipliers drop out because Phi_q D = 0)
 
     A f_v = -D^T K* D,    A f_vd = D^T C* D,    A = D^T M D
-    C* = Q_qd + S_qd + 2 M Y,                          Y = U B G1
-    K* = (M qdd - S - Q)_q + (Phi_q^T lam)_q - M Z + C* Y,    Z = U B G2
+    C* = Q_A,qd + Q_v,qd + 2 M Y,                             Y = U B G1
+    K* = (M qdd - Q_v - Q_A)_q + (Phi_q^T lam)_q - M Z + C* Y,  Z = U B G2
 
-One evaluation serves many steps and charts: K* and C* without the forces' Q_q and Q_qd are stored in body frames, the
+One evaluation serves many steps and charts: K* and C* without Q_A,q and Q_A,qd are stored in body frames, the
 derivatives of the force laws in corotated frames (tsdyn.frames). At the current configuration, `reduce` and
 `factorise` form P = A - g C_hat + g^2 K_hat, the iteration matrix of a stage with g = h a_ii.
 """

@@ -1,9 +1,9 @@
 """Axes of bodies with negligible inertia: an axis row for each keeps the mass matrix invertible and the motion exact.
 
-The moment of inertia j about such an axis e is raised to J. A multiplier mu removes the added inertia c^2 = J - j from
-the equation of motion:
+The moment of inertia j about such an axis e is raised to J. A multiplier lam_e removes the added inertia c^2 = J - j
+from the equation of motion:
 
-    (J' + c^2 e e^T) omega'd = n' - H^T lam - c e mu,        c e . omega'd + mu = 0
+    (J' + c^2 e e^T) omega'd = tau' - H^T lam - c e lam_e,        c e . omega'd + lam_e = 0
 
 The motion is that of J' for any J. The second equation is an axis row of S: products of c e with the other rows at the
 body, and -j / J on the diagonal. It is eliminated after those rows. Its pivot is minus the part of J that these rows

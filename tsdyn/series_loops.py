@@ -6,7 +6,7 @@ The kernel `series` of a primitive gives the series of Phi_x from that of x; the
     (Phi_x)_k       by the primitive's kernel `series`
     k Phi_k         = sum_j j (Phi_x)_{k-j} x_j          d/dt Phi = Phi_x xd                         (1)
     f_k             = - sum_j (Phi_x)_j^T lam_{k-j}      force on a marker                           (2)
-    T_k             = s x sum_j A_j^T f_{k-j}            its torque about the centroid, body frame   (3)
+    tau'_k          = s x sum_j A_j^T f_{k-j}            its torque about the centroid, body frame   (3)
 
 Series are stored order by order. The series of a body holds A (by columns, 4 floats each), omega', r, J' omega' (4
 each). An instance starts with order zero of x (4 a marker) and Phi_x (4 a row and marker), followed by the series f (4

@@ -113,7 +113,7 @@ def cylinder(radius, length, *, axis="z", inner=0.0, mass=None, density=None):
 def rod(length, *, axis="z", mass):
     """A slender rod about its centre, along the axis "x", "y" or "z".
 
-    It has no inertia about its axis: a joint must hold that turn. A rod with a thickness is a `cylinder`.
+    It has no inertia about its axis, so a joint must constrain that rotation. For a rod with thickness use `cylinder`.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def rod(length, *, axis="z", mass):
 
 
 def from_mesh(vertices, faces, *, mass=None, density=None):
-    """The solid that a closed mesh of triangles bounds; exact, but for rounding.
+    """The solid bounded by a closed triangle mesh; exact to rounding.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def from_mesh(vertices, faces, *, mass=None, density=None):
     ------
     InvalidArgument
         If the mesh is not closed, its triangles don't turn the same way or all face inward, it has no volume, or an
-        index is out of range. A mesh that cuts through itself is not noticed.
+        index is out of range. Self-intersections are not detected.
     """
     volume, centroid, second = moments(vertices, faces)
     m = _mass("from_mesh", volume, mass, density)

@@ -22,7 +22,7 @@ from .work import work as integrate_work
 
 
 class Steps(NamedTuple):
-    """Every step tried: where it began, s, its length, s, and whether it was accepted."""
+    """Every attempted step: its start, s, its length, s, and whether it was accepted."""
 
     t: np.ndarray
     h: np.ndarray
@@ -30,7 +30,7 @@ class Steps(NamedTuple):
 
 
 class Charts(NamedTuple):
-    """Every chart: its instant, s, why it was made, and on leaving it its condition, contraction and steps."""
+    """Every chart: its time, s, the reason for it, and at its end condition, contraction and number of steps."""
 
     t: np.ndarray
     reason: tuple
@@ -49,26 +49,26 @@ class Solution(Kinematics):
     q, qd, qdd : ndarray (k, n)
         7 coordinates a rigid body (r, then p) and 3 a point mass, in the order added.
     multipliers : ndarray (k, m)
-        M qdd + Phi_q^T lam = Q_A + S; rows in the order added, then the normalisations in body order. NaN for rows
+        M qdd + Phi_q^T lam = Q_A + Q_v; rows in the order added, then the normalisations in body order. NaN for rows
         that were left out as redundant, see `reaction_unique`.
     success : bool
         Whether the run reached the end of the interval, or a terminal event.
     status : Status
     message : str
-        What happened, where, and what to try.
+        What happened, where, and the remedy.
     t_events : list of ndarray (k_i,), s, or None
         Times of each event; q_events and qd_events are lists of (k_i, n).
     stats : SimpleNamespace
-        steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds; of
+        steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds; for
         implicit methods also jacobians, iteration_matrices, stage_iterations; stiff: whether an explicit adaptive
-        method has met its limit of stability for a while. What was not needed: solves_skipped, placements that lay on
-        the constraints to rounding already; checks_skipped, those whose last correction was known to suffice;
-        factorizations_skipped, for which older factors served or still contracted; gyroscopic_skipped, torques of
-        bodies whose inertia is a sphere's, rotations_skipped, of bodies that their joints never let turn, and
-        forces_skipped, of scenes without any, one an evaluation; columns_skipped, constant ones of series, an order.
-        Of series: steps_near_singular, which began or ended next to a singular configuration; largest_landing, how far
-        (m, rad) the constraints moved a body at the end of one of them; energy_error, the largest change of the energy
-        in such a run, of the largest kinetic energy, None where energy isn't constant.
+        method was limited by stability. Skipped work: solves_skipped, position solves that start at rounding;
+        checks_skipped, checks after a correction known to suffice; factorizations_skipped, where older factors still
+        serve; gyroscopic_skipped, gyroscopic torques of bodies with spherical inertia, rotations_skipped, rotations of
+        bodies with locked orientation, and forces_skipped, forces of scenes without any, each counted once an
+        evaluation; columns_skipped, series of constant columns, counted once an order. For Taylor runs near singular
+        configurations: steps_near_singular; largest_landing, the largest displacement (m, rad) of a body by the
+        projection at the end of such a step; energy_error, the largest change of energy relative to the largest
+        kinetic energy, None where energy isn't constant.
     """
 
     def __init__(self, scene, task, outcome, seconds):
@@ -108,12 +108,12 @@ class Solution(Kinematics):
 
     @property
     def reached(self):
-        """The time that the run has come to, s."""
+        """The time reached by the run, s."""
         return self._reached
 
     @property
     def state(self):
-        """The last point reached, to go on from: simulate(scene, (state.t, t_end), state=state)."""
+        """The last state reached, to continue from: simulate(scene, (state.t, t_end), state=state)."""
         q, qd, qdd = (a.copy() for a in self._last)
         t, memory = np.array([self._reached]), self._remembered[None]
         lam = reactions.multipliers(self.packed, t, q[None], qd[None], qdd[None], memory)[0]
@@ -199,7 +199,7 @@ class Solution(Kinematics):
 
     @cached_property
     def constraint_error(self):
-        """Maximum norms of Eqs. 1-3 at every output, recomputed by code that is not the solver's."""
+        """Maximum norms of Eqs. 1-3 at every output, recomputed independently of the solver."""
         return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
 
     def reaction(self, item, on=None):
@@ -209,7 +209,7 @@ class Solution(Kinematics):
         ----------
         item : constraint, force, or name of one
         on : Body or str, optional
-            Which of its bodies they act on; by default a, or b where a is the ground (`item.on`).
+            The body on which force and torque act; by default a, or b if a is the ground (`item.on`).
 
         Returns
         -------
@@ -225,10 +225,10 @@ class Solution(Kinematics):
         return reactions.reaction(self, member, self._acted(item, on))
 
     def reaction_unique(self, item, on=None):
-        """Whether what `reaction` gives is the only answer, at each output: bool (k,).
+        """Whether the `reaction` is statically determinate, at each output: bool (k,).
 
-        Redundant constraints share their loads in many ways, all of which move the bodies alike; `reaction` is then
-        one of them, with the multipliers of dropped rows, NaN in `multipliers`, taken as zero.
+        Redundant constraints can share their loads in many ways with the same motion; `reaction` is then one of them,
+        with the multipliers of dropped rows (NaN in `multipliers`) taken as zero.
         """
         item = self.handles.item(item)
         if id(item) in reactions.loads_of(self.packed):
@@ -236,7 +236,7 @@ class Solution(Kinematics):
         return uniqueness.unique(self, self._member(item).rows, self._acted(item, on))
 
     def rows(self, constraint):
-        """Which columns of `multipliers` are those of a constraint, a slice."""
+        """The columns of `multipliers` that belong to a constraint, as a slice."""
         return self._member(self.handles.item(constraint)).rows
 
     def _member(self, constraint):
@@ -282,14 +282,14 @@ class Solution(Kinematics):
 
     @property
     def dissipation(self):
-        """Power (k,), W, that dampers and friction take; not negative."""
+        """Power (k,), W, dissipated in dampers and friction; not negative."""
         return self._force_powers.dissipation
 
     @cached_property
     def work(self):
-        """Work (k,), J, since the start: of applied and driving forces, less what dampers and friction have taken.
+        """Work (k,), J, since the start: of applied and driving forces, less dissipation.
 
-        energy - work is constant but for the method's error. It is integrated over the dense output.
+        energy - work is constant to the accuracy of the method. Power is integrated over the dense output.
 
         Raises
         ------
@@ -299,15 +299,15 @@ class Solution(Kinematics):
         return self._integrated(None)
 
     def power_of(self, item):
-        """Power (k,), W, that one constraint or force, or that of a name, puts in: what dE/dt owes to it.
+        """Power (k,), W, supplied by one constraint or force: its contribution to dE/dt.
 
-        Of a motor or a driver: of its force or torque along the motion prescribed. Of a force: of its loads and
-        actuators, less what it dissipates; what a spring stores is energy, not power. Of any other constraint: zero.
+        For a motor or driver, the power of its reaction along the prescribed motion. For a force, the power of its
+        loads and actuators less dissipation; energy stored in a spring doesn't count. For other constraints, zero.
         """
         return power.power_of(self, self._part(item))
 
     def work_of(self, item):
-        """Work (k,), J, since the start, of `power_of` one constraint or force: the energy that a motor has put in.
+        """Work (k,), J, since the start, of `power_of` one constraint or force.
 
         Raises
         ------

@@ -12,10 +12,7 @@ The row also admits the angle half a turn away; such a start is refused. Singula
 
 import numpy as np
 
-from ..markers import Vector
-from ..motion import Motion
-from ..primitive import Primitive
-from ..recurrences import dot, product, scaled, sine_cosine
+from ..plugins import Motion, Primitive, Vector, dot, product, scaled, sine_cosine
 
 
 class AngleDriver(Primitive):

@@ -11,12 +11,7 @@ Singular if x_a = x_b: for zero distance use Spherical.
 
 import numpy as np
 
-from ..bodies import rotation_matrix
-from ..errors import InvalidConstraint
-from ..markers import Point
-from ..motion import Motion
-from ..primitive import Primitive
-from ..recurrences import square
+from ..plugins import InvalidConstraint, Motion, Point, Primitive, rotation_matrix, square
 
 
 class Distance(Primitive):

@@ -1,9 +1,6 @@
 """ImplicitTrapezoid: the trapezoidal rule, order 2, A-stable, no numerical damping, with a Jacobian kept over steps."""
 
-from ..implicit import trapezoid_error
-from ..integrator import DiagonallyImplicit
-from ..interpolation import linear_second
-from ..tableau import ImplicitTableau
+from ..plugins import DiagonallyImplicit, ImplicitTableau, linear_second, trapezoid_error
 
 
 class ImplicitTrapezoid(DiagonallyImplicit):

@@ -1,19 +1,17 @@
 """Taylor series of the motion, of variable order and step (Jorba and Zou, Experiment. Math. 14, 99, 2005).
 
-The coefficients of r, A, omega' and lam follow order by order from the equations of motion (see tsdyn.expansion). At
-the end of a step, positions and velocities are projected onto the constraint manifold.
+The coefficients of r, A, omega' and lam follow order by order from the equations of motion, see
+coefficients.py. At the end of a step, positions and velocities are projected onto the constraint manifold.
 """
 
 import math
 
-from ..checks import positive, whole
-from ..errors import InvalidArgument
-from ..integrator import Integrator
+from ..plugins import Integrator, InvalidArgument, positive, whole
 
 LOWEST, HIGHEST = 4, 30
 TIGHT = 1e-12  # mean of rtol and atol: below it rounding counts
 FINEST = 4e-18  # of a step: truncation of one sign that stays below the rounding of a million steps
-REFINED = 2  # orders of the multipliers that are refined where rounding counts
+REFINED = 3  # orders of the multipliers that are refined where rounding counts
 
 
 class Taylor(Integrator):

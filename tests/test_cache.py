@@ -17,7 +17,7 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX file per
 
 REPORT = """
 import json, tsdyn
-from tsdyn import _cache
+from tsdyn.jit import cache as _cache
 def report(**numbers):
     print(json.dumps({**numbers, **_cache.statistics, "folder": str(_cache.folder())}))
 """
@@ -34,7 +34,7 @@ report(Phi=float(scene.evaluate().Phi[0]))
 TINY = (
     REPORT
     + """
-from tsdyn._kernel import entry
+from tsdyn.jit.kernels import entry
 @entry
 def twice(x):
     return 2.0 * x
@@ -160,7 +160,7 @@ def test_forces_are_cached_and_only_those_used_are_loaded(warm):
 IMPLICIT = (
     REPORT
     + """
-from tsdyn import linearise
+from tsdyn.formulations import linearisation as linearise
 from benchmarks.stiff import hung, jointed
 def loaded(scene):
     kinds = {type(c): c.kernels["curvature"] for c in scene.constraints}.values()
@@ -279,7 +279,7 @@ def test_complete_cache_that_can_not_be_written_is_used(tmp_path):
 INTERRUPTED = """
 import signal
 from numba.core.registry import cpu_target
-from tsdyn._kernel import entry
+from tsdyn.jit.kernels import entry
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 engine = cpu_target.target_context.codegen()._engine._ee
 found = engine._object_cache_notify
@@ -469,7 +469,7 @@ def test_debug_mode_runs_plain_python():
         REPORT
         + """
 from examples import top
-from tsdyn import _kernel
+from tsdyn.jit import kernels as _kernel
 end = tsdyn.simulate(top.build(), (0.0, 0.01), t_eval=[0.0055, 0.01])
 report(q=end.q.tolist(), debug=_kernel.DEBUG)
 """
@@ -526,7 +526,7 @@ def test_a_scene_without_motions_loads_none_of_it():
         REPORT
         + """
 from examples import slider_crank
-from tsdyn.motion_program import run_program
+from tsdyn.motions.program import run_program
 for method in ("taylor", "dop853"):
     tsdyn.simulate(slider_crank.build(), (0.0, 0.01), integrator=method)
 kinds = [kind.kernels for kind in tsdyn.constraints.registered()]

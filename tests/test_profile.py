@@ -10,9 +10,9 @@ from test_cache import REPORT, run
 import tsdyn as ts
 from benchmarks import stiff
 from examples import drive_train, pendulum_chain, top
-from tsdyn.cli import main
-from tsdyn.prepare import prepared
-from tsdyn.timers import TIMERS
+from tsdyn.cli.command import main
+from tsdyn.profiling.timers import TIMERS
+from tsdyn.simulation.scene_cache import prepared
 
 I = ts.integrators
 OUTSIDE = ("Python", "outputs", "choice of the method")
@@ -150,7 +150,7 @@ def test_a_run_loads_no_timer():
 import sys
 from examples import top
 tsdyn.simulate(top.build(), (0.0, 0.01), integrator="dop853")
-report(timers="tsdyn.timers" in sys.modules)
+report(timers="tsdyn.profiling.timers" in sys.modules)
 """
     )
     assert run(code, {})[0]["timers"] is False

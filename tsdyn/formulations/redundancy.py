@@ -1,0 +1,43 @@
+"""Redundant rows of Phi_q at one configuration of a large scene, by sparse factorisation in O(N)."""
+
+import numpy as np
+
+from ..elements.loops.body_poses import place_bodies
+from ..jit.kernels import entry, resident
+from ..model.equations import set_time
+from ..rows.evaluation import run_loops
+from ..rows.selection import select
+from ..sparse.constraint_graph import DROPPED, REDUCED, network_of
+from ..workspaces.tangent_memory import allocate_free
+from ..workspaces.workspace import load_parts, parts
+
+KEPT = "network with redundant rows"  # in Packed.shared
+
+
+@entry
+def _choose(context, q, t, share):
+    """Choose the rows to drop, those that are left less than a share; how many they are, or -1."""
+    c = load_parts(context)
+    network, f = c.network, c.free
+    f.dropped[0] = 0
+    set_time(c.system, t)
+    place_bodies(network.bodies, q, f.poses)
+    run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)
+    return f.dropped[0] if select(network, f, f.H, f.Y, f.S, -1, share) else -1
+
+
+def dependent_rows(packed, q, t, share):
+    """Rows of Phi that are left less than a share of their diagonal entries of H W H^T by elimination, int64 (k,).
+
+    None where no choice among them is independent. Normalisations are none of them. See selection.py: of many rows
+    the choice is made within blocks, and may have one too many or too few.
+    """
+    own = packed
+    if DROPPED not in packed.shared:
+        own = packed.shared.setdefault(KEPT, packed._replace(shared={DROPPED: np.zeros(0, np.int64)}))
+    network = network_of(own, REDUCED)
+    whole = parts(packed.system._replace(reals=packed.system.reals.copy()), network, q.size)
+    free = allocate_free(network, q.size, redundant=True)
+    context, *_keep = resident(whole._replace(free=free))
+    count = _choose(context, q, t, share)
+    return None if count < 0 else np.sort(network.row[free.dropped[1 : 1 + count]])

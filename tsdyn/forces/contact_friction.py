@@ -5,7 +5,7 @@
     force  = -mu(|v|) N v / |v|     on a at its point, the opposite on b (2)
     dissipation = mu(|v|) N |v|                                          (3)
 
-F is the force that the contact exerts; mu is given by friction.coefficient.
+F is the force that the contact exerts; mu is given by friction_laws.coefficient.
 """
 
 import numpy as np

@@ -5,8 +5,8 @@
     torque = -mu(v) R N n     on a, the opposite on b                       (2)
     dissipation = mu(v) N v                                                 (3)
 
-F and T are the force and the torque that the joint exerts at its point; mu is given by friction.coefficient. A tilting
-torque on the pin is carried by a couple of two forces, L apart.
+F and T are the force and the torque that the joint exerts at its point; mu is given by friction_laws.coefficient. A
+tilting torque on the pin is carried by a couple of two forces, L apart.
 """
 
 from types import MappingProxyType

@@ -3,6 +3,6 @@
 Imports methods and below.
 
 Begin with registry.py (the forms, as addresses of kernels), then tangent.py (O(N), the default) and null_space.py
-(Haug's Eq. 26). projection.py puts positions and velocities back on the constraint manifold; chart_coordinates.py and
-chart_validity.py say where a chart leads and when it is left; friction_solve.py solves friction with its reactions.
+(Haug's Eq. 26). projection.py projects positions and velocities onto the constraint manifold. chart_coordinates.py
+has the retraction of a chart, chart_validity.py its criteria; friction_solve.py couples friction and reactions.
 """

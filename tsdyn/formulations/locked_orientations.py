@@ -16,7 +16,7 @@ from ..motions.prescribed import Motion
 from ..sparse.constraint_graph import DROPPED, N_COUNT, N_FIRST_REAL, N_REALS, build, network_of, with_loops
 from ..workspaces.tangent_memory import MOST_ROWS
 
-# in Packed.shared, as tuples: `network.drop` takes them out
+# in Packed.shared, as tuples: `constraint_graph.drop` takes them out
 STILL, PARTS, NETWORK = ("still",), ("still", "parts"), ("still", "network")
 TURNING = "turning"
 LEAST = 1e-12  # of the largest square of a singular value of its rows: with less they don't hold a body

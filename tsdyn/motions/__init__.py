@@ -2,9 +2,9 @@
 
 Imports jit and maths.
 
-Begin with expressions.py: smooth motions such as `Sine` and `Polynomial`. prescribed.py makes a `Motion` of whatever
-a driver is given, signals.py a load of time; tables.py and piecewise.py are data and splines, and program.py is what
-the kernels evaluate.
+Begin with expressions.py: smooth motions such as `Sine` and `Polynomial`. prescribed.py converts the arguments of
+drivers to a `Motion`, signals.py those of time-dependent loads; tables.py and piecewise.py hold data and splines, and
+program.py evaluates motions in kernels.
 """
 
 from .expressions import Constant, Exponential, Piecewise, Polynomial, Ramp, Sine, Smooth, time

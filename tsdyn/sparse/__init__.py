@@ -2,7 +2,7 @@
 
 Imports model and below.
 
-Begin with constraint_graph.py (which rows meet at which bodies), then symbolic.py (a fill-reducing order, and where
-every number goes) and factorisation.py (numeric block elimination and the solves). massless_axes.py adds a row for an
-axis about which a body has no inertia.
+Begin with constraint_graph.py (which rows meet at which bodies), then symbolic.py (fill-reducing ordering, and the
+address of every entry) and factorisation.py (numeric block elimination and the solves). massless_axes.py adds a row
+for an axis about which a body has no inertia.
 """

@@ -16,15 +16,15 @@ from ..jit.aligned_arrays import zeros
 class Local(NamedTuple):
     """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
 
-    base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; local_chart.touch
-    d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 of the present place; displacement.displace
+    base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; chart_validity.touch
+    d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 of the present place; chart_coordinates.displace
     x: np.ndarray  # ((b + 1) * 8,)  its coordinates; tangent.place
     y: np.ndarray  # ((b + 1) * 8,)  their rates; tangent.accelerate
-    H0: np.ndarray  # (m * 16,)  rows of [Phi_r, Phi_pi'] at q0; local_chart.touch
+    H0: np.ndarray  # (m * 16,)  rows of [Phi_r, Phi_pi'] at q0; chart_validity.touch
     Y0: np.ndarray  # (m * 16,)  W0 H0^T
     S0: np.ndarray  # factors of H0 W0 H0^T
-    X: np.ndarray  # (m * 16,)  C Y0, displacement.turn_rows
-    lower: np.ndarray  # factors of N = H C Y0; displacement.factorise_normal
+    X: np.ndarray  # (m * 16,)  C Y0; chart_coordinates.factorise_normal
+    lower: np.ndarray  # factors of N = H C Y0; chart_coordinates.factorise_normal
     upper: np.ndarray
     drift: np.ndarray  # (m,)  Phi_t
     numbers: np.ndarray  # (NUMBERS,)  below

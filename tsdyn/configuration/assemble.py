@@ -7,10 +7,11 @@ import numpy as np
 from ..calls import fitting
 from ..elements.names import named
 from ..errors import InconsistentState, InvalidArgument, InvalidBody, SingularConfiguration
+from ..maths.row_rank import row_lengths
 from ..validation import number, one_of, positive
 from .continuation import STAGES, Found, Kept, close, nearest, relax, settle, stuck
 from .infeasible_subset import refuse
-from .kinetic_metric import Metric, least_step, row_lengths
+from .kinetic_metric import Metric, least_step
 from .loop_folds import Folds
 from .mirrored_branches import demand_aligned
 from .start_violations import ROUNDING, demand_finite
@@ -103,7 +104,7 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
     Phi, Phi_q, Phi_t = metric.arrays(q)
     A = metric.reduced(q, Phi_q[metric.own])
     _demand_regular(scene, metric, A)
-    demand_aligned(packed, q)
+    demand_aligned(packed, q, float(t))
     given, qd = _velocities(scene, metric, q, qd, A, Phi_t[metric.own])
     residual = Phi_q @ qd + Phi_t
     _demand_compatible(scene, residual, max(tol, 1e-9) * (1.0 + np.abs(qd).max()))

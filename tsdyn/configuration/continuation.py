@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kinetic_metric import least_step, row_lengths, soft_step
+from ..maths.row_rank import row_lengths
+from .kinetic_metric import least_step, soft_step
 
 STAGES = ((1.0, 4), (0.3, 4), (0.1, 4), (0.03, 4), (0.01, 4), (1e-3, 5), (1e-4, 5), (1e-6, 5), (1e-8, 40))
 NEAR = 0.02  # of a link, or so: a sketch that is off by less takes the last stage only

@@ -12,7 +12,6 @@ from ..jit.kernels import twin
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import starts_of
 
-AGREED = "holonomic"  # in Packed.shared
 STEPS = (1e-2, 1e-4, 1e-6)  # of difference quotients, relative to x
 CLOSE = 1e-3  # relative; a wrong entry is further off
 TRIED = 3  # instances of each kind
@@ -20,7 +19,7 @@ TRIED = 3  # instances of each kind
 
 def demand_holonomic(packed, q, t, form):
     """Raise InvalidConstraint for a plug-in whose jacobian isn't the derivative of its phi at q (n,)."""
-    if AGREED in packed.shared:
+    if packed.derived.holonomic:
         return
     seen = {}
     for constraint, given, places in zip(packed.constraints, packed.parameters, packed.coordinates, strict=True):
@@ -38,7 +37,7 @@ def demand_holonomic(packed, q, t, form):
                 f"ts.testing.check_primitive({kind.__name__}); a row on velocities alone is served by "
                 "formulation='tangent' with an explicit method."
             )
-    packed.shared[AGREED] = True
+    packed.derived.holonomic = True
 
 
 def _markers(packed, constraint, places, q):

@@ -5,17 +5,19 @@ import numpy as np
 from ..elements.loops.body_poses import move_bodies, place_bodies, write_positions, write_velocities
 from ..errors import RedundantConstraints, SingularConfiguration, Status
 from ..formulations.locked_orientations import keep_turning, settle, still
-from ..formulations.projection import PIVOT_LIMIT, factorise, find_drift, gather_speeds, land, land_velocities, move_by
+from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
 from ..jit.kernels import entry, kernel, resident
+from ..maths.row_rank import dependent
 from ..model.equations import set_time
-from ..observables.evaluate import constraint_arrays, dependent
+from ..observables.evaluate import constraint_arrays
 from ..rows.axis_rows import is_axis
 from ..rows.evaluation import run_loops
 from ..rows.schur_complement import gather, scatter
 from ..rows.selection import drop_rows, factor_rows, select
-from ..sparse.constraint_graph import BIAS, DRIFT, DROPPED, REDUCED, VALUES, drop, network_of
+from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.factorisation import solve
 from ..sparse.massless_axes import axis_of
+from ..sparse.networks import drop, network_of
 from ..workspaces.tangent_memory import allocate_free
 from ..workspaces.workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 from .rank import check_rank
@@ -51,7 +53,7 @@ def _look(context, q, qd, t, velocity):
     gather(network, f.H, f.Z, velocity)
     for e in range(velocity.size):
         velocity[e] += f.gamma[e]
-    return factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 0)
+    return factor_rows(network, f, f.H, f.Y, f.S, 0)
 
 
 @entry
@@ -79,7 +81,7 @@ def _choose(context, share):
     f = c.free
     select(c.network, f, f.H, f.Y, f.S, -1, share)
     drop_rows(f.dropped, f.H)
-    return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 0) < 0 else -1
+    return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, 0) < 0 else -1
 
 
 @entry
@@ -90,7 +92,7 @@ def _hold_axes(context, q, t):
     set_time(c.system, t)
     place_bodies(network.bodies, q, f.poses)
     run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)
-    failed = factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 1)
+    failed = factor_rows(network, f, f.H, f.Y, f.S, 1)
     return failed if is_axis(network, f.S, failed) else -1
 
 
@@ -143,7 +145,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         _refuse(scene, start, dependent)
         dependent = -1
     start.demand_velocities()
-    known = packed.shared.get(DROPPED)
+    known = packed.derived.dropped
     if dependent < 0:
         if known is not None:  # another start had too many rows
             drop(packed, None)
@@ -174,7 +176,7 @@ class _Start:
         system = system._replace(reals=system.reals.copy())
         self.m = len(system.segments)
         whole = parts(system, self.network, q.size)
-        if DROPPED in self.packed.shared:
+        if self.packed.derived.dropped is not None:
             whole = whole._replace(free=allocate_free(self.network, q.size, redundant=True))
         self.free, self.work, self.rates = whole.free, whole.work, np.zeros(len(self.network.row))
         self.context, *self._keep = resident(whole)

@@ -9,6 +9,7 @@ Euler parameters stay normalised, so A has no normalisation rows.
 import numpy as np
 
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
+from ..maths.row_rank import row_lengths
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import LARGE, constraint_arrays
 
@@ -192,13 +193,6 @@ def least_step(A, residual, rcond=1e-10):
 
     unit = diags_array(1.0 / lengths[some]) @ A[some]
     return soft_step(unit, residual[some] / lengths[some], np.zeros(A.shape[1]), np.full(some.sum(), NEXT_TO_NOTHING))
-
-
-def row_lengths(A):
-    """Lengths of the rows, next to nothing counted as nothing."""
-    squares = (A * A).sum(axis=1) if isinstance(A, np.ndarray) else A.multiply(A).sum(axis=1)
-    lengths = np.sqrt(np.asarray(squares).ravel())
-    return np.where(lengths > 1e-12 * lengths.max(initial=0.0), lengths, 0.0)
 
 
 def unit_tangent(metric, q, rng):

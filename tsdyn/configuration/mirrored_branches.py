@@ -6,11 +6,11 @@ from ..elements.bodies import IDENTITY, rotation_matrix
 from ..errors import InconsistentState
 
 
-def demand_aligned(packed, q, t=0.0):
+def demand_aligned(packed, q, t):
     """Refuse positions q (n,) at t that meet the rows with directions opposed, by the joint's name."""
-    if "aligned" not in packed.shared:
-        packed.shared["aligned"] = _pairs(packed)
-    titles, places, directions, moving = packed.shared["aligned"]
+    if packed.derived.aligned is None:
+        packed.derived.aligned = _pairs(packed)
+    titles, places, directions, moving = packed.derived.aligned
     if not titles:
         return
     if moving:

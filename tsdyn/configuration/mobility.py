@@ -9,10 +9,11 @@ import numpy as np
 
 from ..calls import fitting
 from ..errors import InvalidArgument
+from ..maths.row_rank import rank_of
 from ..validation import counted, finite_vector, number
 from .continuation import close
 from .kinetic_metric import Metric, unit_tangent
-from .row_dependence import divide, partners, put_aside, rank_of
+from .row_dependence import divide, partners, put_aside
 from .start_violations import demand_finite, demand_small
 
 CONSISTENT = 1e-9  # of 1 + max |q|

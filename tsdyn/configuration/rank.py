@@ -4,8 +4,7 @@ import numpy as np
 
 from ..constraints.euler_normalization import EulerNormalization
 from ..errors import RedundantConstraints, SingularConfiguration
-
-RANK_TOL = 1e-7  # of the singular values of Phi_q, its rows scaled to unit length; charts work with their squares
+from ..maths.row_rank import RANK_TOL, farthest_first, singular_values, unit_rows
 
 
 def check_rank(scene, Phi_q):
@@ -21,7 +20,7 @@ def check_rank(scene, Phi_q):
             "Start from another configuration, or use a constraint that is regular here."
         )
     scaled = Phi_q / lengths[:, None]
-    size = np.linalg.svd(scaled, compute_uv=False)
+    size = singular_values(scaled)
     rank = int((size > RANK_TOL * size[0]).sum())
     if rank == m:
         return
@@ -47,8 +46,8 @@ def weakest_row(scene, Phi_q, redundant=0):
     """
     if not (Phi_q.size and np.isfinite(Phi_q).all()):
         return "", 1.0
-    scaled = Phi_q / np.maximum(np.linalg.norm(Phi_q, axis=1), 1e-300)[:, None]
-    size = np.linalg.svd(scaled, compute_uv=False)
+    scaled = unit_rows(Phi_q)
+    size = singular_values(scaled)
     last = -1 - redundant
     return scene.row_names()[_pivots(scene, scaled)[last]], size[last] / size[0]
 
@@ -58,10 +57,8 @@ def _pivots(scene, rows):
 
     Normalisations belong to the bodies: what depends on them is for the user's constraints to mend.
     """
-    from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
-
     own = np.array([type(c) is EulerNormalization for c in scene.constraints for _ in range(c.rows)])
     rest, first = np.flatnonzero(~own), np.flatnonzero(own)
-    basis = rows[first] / np.maximum(np.linalg.norm(rows[first], axis=1), 1e-300)[:, None]  # of different bodies
+    basis = unit_rows(rows[first])  # of different bodies
     left = rows[rest] - (rows[rest] @ basis.T) @ basis
-    return np.concatenate((first, rest[qr(left.T, mode="economic", pivoting=True)[2]])).astype(int)
+    return np.concatenate((first, rest[farthest_first(left)[0]])).astype(int)

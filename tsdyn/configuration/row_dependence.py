@@ -2,24 +2,10 @@
 
 import numpy as np
 
-from .kinetic_metric import row_lengths
-from .rank import RANK_TOL
+from ..maths.row_rank import RANK_TOL, farthest_first, rank_of, singular_values, unit_rows
 
 TAKES_PART = 1e-6  # weight from which on a row counts among those that another depends on
 FIRM = 1e-3  # singular values, of the largest, from which on rows of a body are put aside without more ado
-
-
-def rank_of(A):
-    """The rank of rows that are scaled to unit length, dense."""
-    unit = unit_rows(A)
-    size = np.linalg.svd(unit, compute_uv=False) if unit.size else np.zeros(0)
-    return int((size > RANK_TOL * size.max(initial=0.0)).sum())
-
-
-def unit_rows(A):
-    """The rows at length one; those of length zero stay so."""
-    lengths = row_lengths(A)
-    return A / np.where(lengths > 0.0, lengths, 1.0)[:, None]
 
 
 def divide(A, groups):
@@ -42,7 +28,7 @@ def divide(A, groups):
         kept += sorted(rows[order[:count]].tolist())
         redundant += sorted(rows[order[count:]].tolist())
     if len(kept) != rank:  # near the edge of what rank means: take the rows farthest from each other, wherever they are
-        order = qr(unit.T, mode="economic", pivoting=True)[2]
+        order, _ = farthest_first(unit)
         kept, redundant = sorted(order[:rank].tolist()), sorted(order[rank:].tolist())
     return kept, redundant
 
@@ -78,7 +64,7 @@ def put_aside(A, owners):
         if not 0 < len(rows) <= len(columns[body]):
             continue
         block = unit_rows(A[rows].toarray())[:, columns[body]]
-        size = np.linalg.svd(block, compute_uv=False)
+        size = singular_values(block)
         if size[-1] <= FIRM * size[0]:
             continue
         near = {int(other) for row in rows for other in of_row[row]} - {body}

@@ -37,7 +37,6 @@ TURN_LIMIT = 0.25
 TURN_SHARE = 0.55  # a turn alone, which no constraint minds, may go on to |d| = 0.9 in one step
 CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a turn of 60 degrees
 ROUNDING = 1e-15  # relative to the numbers that enter Phi: below this a residual says nothing
-PIVOT_LIMIT = 1e-15  # of S0: less of a diagonal entry than this is rounding
 SAME = 1e-6  # of N: factors that are off by less tell the contraction as well as new ones
 
 
@@ -56,7 +55,7 @@ def touch(network, system, w, f, l, t):
         run_loops(network, system.reals, REDUCED, f, t, f.b, l.H0)
         if f.b.size > 0:
             w.counters[FACTORIZATIONS] += 1
-            regular = factorise_rows(network, system.reals, f, t, f.b, l.H0, l.Y0, l.S0, PIVOT_LIMIT, 0)
+            regular = factorise_rows(network, system.reals, f, t, f.b, l.H0, l.Y0, l.S0, 0)
     for b in range(network.bodies.shape[0]):
         at, o = b * POSE, 8 * b
         for c in range(3):

@@ -13,12 +13,11 @@ import numpy as np
 from ..elements.markers import PARAMETERS, VECTOR
 from ..model.packed import FIRST_REAL, classes
 from ..motions.prescribed import Motion
-from ..sparse.constraint_graph import DROPPED, N_COUNT, N_FIRST_REAL, N_REALS, build, network_of, with_loops
+from ..sparse.constraint_graph import N_COUNT, N_FIRST_REAL, N_REALS
+from ..sparse.graph_builder import build
+from ..sparse.networks import dropped_rows, network_of, with_loops
 from ..workspaces.tangent_memory import MOST_ROWS
 
-# in Packed.shared, as tuples: `constraint_graph.drop` takes them out
-STILL, PARTS, NETWORK = ("still",), ("still", "parts"), ("still", "network")
-TURNING = "turning"
 LEAST = 1e-12  # of the largest square of a singular value of its rows: with less they don't hold a body
 
 
@@ -33,30 +32,27 @@ class Still(NamedTuple):
 
 def still(packed):
     """The `Still` of a packed scene with the rows that it drops now; where they hold is for `settle` to say."""
-    kept = packed.shared
-    if STILL not in kept:
-        kept[STILL] = _find(packed)
-    return kept[STILL]
+    if packed.derived.locked is None:
+        packed.derived.locked = _find(packed)
+    return packed.derived.locked
 
 
 def keep_turning(packed, bodies):
     """Take these bodies (their numbers) for no still ones from now on, whatever holds them."""
-    packed.shared.setdefault(TURNING, set()).update(bodies)
-    for key in [key for key in packed.shared if isinstance(key, tuple) and key[:1] == STILL]:
-        del packed.shared[key]
+    packed.derived.turning.update(bodies)
+    packed.derived.forget_locked()
 
 
 def moving_network(packed, *columns):
     """As `network_of`, without the rotations of bodies that are still; the same where there are none."""
-    found, kept = still(packed), packed.shared
+    found, known = still(packed), packed.derived
     if not found.bodies.size:
         return network_of(packed, *columns)
-    key = (*NETWORK, *columns)
-    if key not in kept:
-        if PARTS not in kept:
-            kept[PARTS] = build(packed, found)
-        kept[key] = with_loops(*kept[PARTS], *columns)
-    return kept[key]
+    if columns not in known.moving_networks:
+        if known.moving_graph is None:
+            known.moving_graph = build(packed, found)
+        known.moving_networks[columns] = with_loops(*known.moving_graph, *columns)
+    return known.moving_networks[columns]
 
 
 def moving_parts(packed):
@@ -111,7 +107,7 @@ def _find(packed):
     """From the ground outwards, body by body."""
     joints, held, holding = _joints(packed), {len(packed.bodies)}, {}
     ways = list(held) if joints[-1] else []
-    turning = packed.shared.get(TURNING, set()) | _rubbing(packed)
+    turning = packed.derived.turning | _rubbing(packed)
     while ways:
         for _, pair, rows in joints[ways.pop()]:
             for other in set(pair) - held - turning:
@@ -160,7 +156,7 @@ def _dropped(packed, omitted, spare):
     Where too few of those that the whole drops are left, some others: a run chooses anew. None where that can't be
     done.
     """
-    whole = packed.shared.get(DROPPED, ())
+    whole = dropped_rows(packed)
     if not len(whole):
         return () if spare == 0 else None
     gone, row, left, others = set(network_of(packed).row[whole].tolist()), 0, [], []

@@ -24,7 +24,6 @@ from ..workspaces.workspace import AT_ROUNDING, FACTORIZATIONS, FLOOR, NEWTON
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
 UNHELD = int(Status.UNHELD)
-PIVOT_LIMIT = 1e-13  # of S: less of a diagonal entry than this is rounding
 SWEEPS = 12
 MOST_PARTS = 100.0  # of a step on which p is followed
 LEAST_MOVE = 1e-15  # corrections above this are more than rounding: S is made anew
@@ -35,7 +34,7 @@ def factorise(network, system, w, f, t):
     """b = Phi, and H, W H^T and the factors of S, at the present poses. Status."""
     run_loops(network, system.reals, REDUCED, f, t, f.b, f.H)
     w.counters[FACTORIZATIONS] += 1
-    return OK if factorise_rows(network, system.reals, f, t, f.b, f.H, f.Y, f.S, PIVOT_LIMIT, 1) else SINGULAR
+    return OK if factorise_rows(network, system.reals, f, t, f.b, f.H, f.Y, f.S, 1) else SINGULAR
 
 
 @long_kernel

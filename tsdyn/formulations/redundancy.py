@@ -4,14 +4,14 @@ import numpy as np
 
 from ..elements.loops.body_poses import place_bodies
 from ..jit.kernels import entry, resident
+from ..model.derived import Derived
 from ..model.equations import set_time
 from ..rows.evaluation import run_loops
 from ..rows.selection import select
-from ..sparse.constraint_graph import DROPPED, REDUCED, network_of
+from ..sparse.constraint_graph import REDUCED
+from ..sparse.networks import network_of
 from ..workspaces.tangent_memory import allocate_free
 from ..workspaces.workspace import load_parts, parts
-
-KEPT = "network with redundant rows"  # in Packed.shared
 
 
 @entry
@@ -32,9 +32,11 @@ def dependent_rows(packed, q, t, share):
     None where no choice among them is independent. Normalisations are none of them. See selection.py: of many rows
     the choice is made within blocks, and may have one too many or too few.
     """
-    own = packed
-    if DROPPED not in packed.shared:
-        own = packed.shared.setdefault(KEPT, packed._replace(shared={DROPPED: np.zeros(0, np.int64)}))
+    own, known = packed, packed.derived
+    if known.dropped is None:
+        if known.undropped is None:
+            known.undropped = packed._replace(derived=Derived(dropped=np.zeros(0, np.int64)))
+        own = known.undropped
     network = network_of(own, REDUCED)
     whole = parts(packed.system._replace(reals=packed.system.reals.copy()), network, q.size)
     free = allocate_free(network, q.size, redundant=True)

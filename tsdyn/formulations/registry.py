@@ -3,7 +3,8 @@
 from dataclasses import dataclass, replace
 from types import ModuleType
 
-from ..sparse.constraint_graph import REDUCED, network_of
+from ..sparse.constraint_graph import REDUCED
+from ..sparse.networks import network_of
 from ..validation import unknown_name
 from . import friction_basis, friction_solve, maggi_kane, null_space, tangent
 from . import linearisation as linearise

@@ -58,7 +58,6 @@ NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
 CHART_LOST, UNHELD = int(Status.CHART_LOST), int(Status.UNHELD)
 COLUMNS = REDUCED, VALUES, BIAS, DRIFT  # the loops of a network that are called
 SWEEPS, RENEWALS = 24, 4
-PIVOT_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
 CURVATURE = 1.0  # 1 / m: what Newton's method leaves of an error, over its square, where none has been measured
 SPEED_ROUNDING = 2e-16
 
@@ -86,7 +85,7 @@ def place(context, t, x):
         return status
     if f.b.size > 0:
         w.counters[FACTORIZATIONS] += 1
-        failed = factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 1)
+        failed = factor_rows(network, f, f.H, f.Y, f.S, 1)
         if failed >= 0:
             return MASS_SINGULAR if is_axis(network, f.S, failed) else SINGULAR
     if s.forces.shape[0] > 0:

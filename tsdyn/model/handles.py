@@ -11,8 +11,6 @@ from ..elements.names import named
 from ..errors import InvalidBody, InvalidConstraint
 from .joint_motion import BodyMotion, displacement
 
-HANDLES = "handles"  # in Packed.shared; goes along with it in a pickle
-
 
 class Row(NamedTuple):
     """The joint coordinates of one constraint or force."""
@@ -113,6 +111,6 @@ def _begins(item):
 
 def handles_of(packed):
     """The `Handles` of a packed scene, made once."""
-    if HANDLES not in packed.shared:
-        packed.shared[HANDLES] = Handles(packed)
-    return packed.shared[HANDLES]
+    if packed.derived.handles is None:
+        packed.derived.handles = Handles(packed)
+    return packed.derived.handles

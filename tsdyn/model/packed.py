@@ -10,6 +10,7 @@ from ..elements.primitive import AT, BLOCK, DIMENSION, INTS, ROW, STRIDE
 from ..errors import InvalidConstraint
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
+from .derived import Derived
 from .packed_forces import FORCE_COLUMNS, SIGNAL_COLUMNS, find_forces, pack_forces
 
 # columns of System.kinds: four addresses, where a kind's instances are, the address that implicit methods need
@@ -58,17 +59,16 @@ class Packed(NamedTuple):
     loads: tuple  # a force_pack.Load for each force, in the order added
     members: tuple  # a Member for each constraint of the scene, in the order of their rows
     slots: tuple  # of System.memory, for each constraint; -1 for none
-    shared: dict  # what has been made of it, by name, for others to use
+    derived: Derived  # what has been worked out from it
 
     def __reduce__(self):
         """In another process the kernels have other addresses."""
-        kept = {name: self.shared[name] for name in ("dropped", "turning", "handles") if name in self.shared}
-        return _found_again, (os.getpid(), kept, *self[:-1])
+        return _found_again, (os.getpid(), *self)
 
 
-def _found_again(process, kept, *parts):
+def _found_again(process, *parts):
     """A `Packed` from a pickle, its addresses those of this process."""
-    packed = Packed(*parts, kept)
+    packed = Packed(*parts)
     if process == os.getpid():
         return packed
     system = packed.system
@@ -178,7 +178,9 @@ def pack(scene):
     members = tuple(_members(scene.constraints))
     order = {constraint: len(memory) + i for i, constraint in enumerate(kept)}
     slots = tuple(order.get(constraint, -1) for constraint in primitives)
-    return Packed(system, scene.bodies, primitives, parameters, coordinates, float(size), loads, members, slots, {})
+    return Packed(
+        system, scene.bodies, primitives, parameters, coordinates, float(size), loads, members, slots, Derived()
+    )
 
 
 def _members(constraints):
@@ -191,20 +193,22 @@ def _members(constraints):
 
 def index_of(packed, body):
     """Where a body stood among the others when the scene was packed; None where it was not there."""
-    if "indices" not in packed.shared:
-        packed.shared["indices"] = {id(one): i for i, one in enumerate(packed.bodies)}
-    return packed.shared["indices"].get(id(body))
+    known = packed.derived
+    if known.body_indices is None:
+        known.body_indices = {id(one): i for i, one in enumerate(packed.bodies)}
+    return known.body_indices.get(id(body))
 
 
 def member_of(packed, constraint):
     """The `Member` that a constraint, or a joint's part, is; None where it is not of that scene."""
-    if "members" not in packed.shared:
+    known = packed.derived
+    if known.members is None:
         found, row = {}, 0
         for i, part in enumerate(packed.constraints):
             found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + part.rows))
             row += part.rows
-        packed.shared["members"] = found | {id(member.constraint): member for member in packed.members}
-    return packed.shared["members"].get(id(constraint))
+        known.members = found | {id(member.constraint): member for member in packed.members}
+    return known.members.get(id(constraint))
 
 
 def classes(packed):

@@ -10,7 +10,8 @@ WIDTH = 14  # floats of a row; those of body b begin in the middle
 
 def with_short_rows(packed):
     """The system, to whose kernels Phi_q is an array (m, 14); made once."""
-    if "short rows" not in packed.shared:
+    known = packed.derived
+    if known.short_rows is None:
         system = packed.system
         table = system.table.copy()
         for kind in system.kinds:
@@ -19,8 +20,8 @@ def with_short_rows(packed):
             own[:, BLOCK] = WIDTH * own[:, ROW]
             own[:, BLOCK + 1] = WIDTH * own[:, ROW] + WIDTH // 2
             own[:, STRIDE] = WIDTH
-        packed.shared["short rows"] = system._replace(table=table)
-    return packed.shared["short rows"]
+        known.short_rows = system._replace(table=table)
+    return known.short_rows
 
 
 def places(packed):

@@ -105,9 +105,9 @@ def _parameter(given, t, rate):
 
 def starts_of(packed):
     """Where the coordinates of each body begin."""
-    if "starts" not in packed.shared:
-        packed.shared["starts"] = dict(zip(packed.bodies, packed.system.bodies[:, 0].tolist(), strict=True))
-    return packed.shared["starts"]
+    if packed.derived.coordinate_starts is None:
+        packed.derived.coordinate_starts = dict(zip(packed.bodies, packed.system.bodies[:, 0].tolist(), strict=True))
+    return packed.derived.coordinate_starts
 
 
 def marker_jets(starts, constraint, coordinates, q, qd, qdd):

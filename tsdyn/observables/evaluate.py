@@ -8,6 +8,7 @@ from ..calls import fitting
 from ..elements.bodies import transform_g
 from ..errors import InvalidArgument, SingularConfiguration
 from ..formulations.redundancy import dependent_rows
+from ..maths.row_rank import RANK_TOL, dependent, farthest_first
 from ..model.equations import evaluate_constraints
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..validation import finite_vector, number
@@ -17,7 +18,6 @@ NOT_UNIQUE = (
     "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
     "leave free carries no inertia."
 )
-DEPENDENT = 1e-7  # of rows of unit length: those that are left less follow from others
 LOST = 1e-13  # of the largest pivot of a sparse factorisation: less is rounding
 SHARES = 3e-2, 1e-3, 1e-6, 1e-9  # of what elimination leaves of rows that are kept, in turn
 ROUNDS, MOST_AT_ONCE = 8, 64  # of taking back rows that were left out wrongly; how many pushes tell which
@@ -113,21 +113,11 @@ def _of_independent_rows(M, Phi_q, load, gamma):
     return _with_gaps(found, kept, Phi_q, gamma)
 
 
-def dependent(Phi_q):
-    """Rows of a dense Phi_q that follow from others, by QR with pivoting; those farthest from others are kept."""
-    from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
-
-    scaled = Phi_q / np.maximum(np.linalg.norm(Phi_q, axis=1), 1e-300)[:, None]
-    R, order = qr(scaled.T, mode="r", pivoting=True)
-    size = np.abs(R.diagonal())
-    return order[(size > DEPENDENT * size.max(initial=0.0)).sum() :]
-
-
 def _with_gaps(found, kept, Phi_q, gamma):
     """(qdd, lam) of all rows, from that of the kept ones; refused where some row doesn't hold with them."""
     m, n = Phi_q.shape
     left = Phi_q @ found[:n] + gamma
-    if np.abs(left).max(initial=0.0) > DEPENDENT * (1.0 + np.abs(found[:n]).max()):
+    if np.abs(left).max(initial=0.0) > RANK_TOL * (1.0 + np.abs(found[:n]).max()):
         raise SingularConfiguration(NOT_UNIQUE)
     lam = np.full(m, np.nan)
     lam[kept] = found[n:]
@@ -181,16 +171,13 @@ def _independent(rows, solve, still):
 
     What the kept ones let move, pushed at random, leaves those at rest that follow from them; `still` is their gamma.
     """
-    from scipy.linalg import qr
-
     rng, n, count = np.random.default_rng(0), rows.shape[1], 1
     while True:
         moved = np.stack([solve(rng.normal(size=n), still)[:n] for _ in range(count)], axis=1)
         seen = rows @ (moved / np.abs(moved).max(axis=0))
-        if np.abs(seen).max() <= DEPENDENT:
+        if np.abs(seen).max() <= RANK_TOL:
             return np.zeros(0, int)
-        R, order = qr(seen.T, mode="r", pivoting=True)
-        size = np.abs(R.diagonal())
+        order, size = farthest_first(seen)
         rank = (size > INDEPENDENT * size.max()).sum()
         if rank < count or count >= MOST_AT_ONCE:
             return order[:rank]

@@ -8,11 +8,10 @@ from ..jit.kernels import entry, resident
 from ..model.equations import set_time
 from ..rows.evaluation import factorise_rows, run_loops
 from ..rows.schur_complement import weigh
-from ..sparse.constraint_graph import REDUCED, network_of
+from ..sparse.constraint_graph import REDUCED
+from ..sparse.networks import network_of
 from ..workspaces.workspace import load_parts, parts
 from .generalised_forces import applied_loads, inertial_forces, velocity_forces
-
-RANK_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
 
 
 @entry
@@ -28,7 +27,7 @@ def _solve(context, t, q, qd, r, out):
         set_time(s, t[k])
         place_bodies(bodies, q[k], f.poses)
         run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
-        found = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, RANK_LIMIT, 0)
+        found = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, 0)
         take_loads(bodies, q[k], r[k], f.Z)
         for b in range(bodies.shape[0]):
             weigh(network.inverse, b, f.Z, 8 * b, f.Z, 8 * b)

@@ -16,13 +16,12 @@ from ..model.packed import COUNT, FIRST_INT, FIRST_REAL, REALS, classes, index_o
 from ..model.sparse_jacobian import WIDTH, with_short_rows
 from ..rows.evaluation import factorise_rows, run_loops
 from ..rows.schur_complement import gather, scatter
-from ..sparse.constraint_graph import REDUCED, network_of
+from ..sparse.constraint_graph import REDUCED
 from ..sparse.factorisation import solve
+from ..sparse.networks import network_of
 from ..workspaces.workspace import load_parts, parts
 from .friction_reactions import with_normal_loads
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
-
-RANK_LIMIT = 1e-15  # of S: less of a diagonal entry than this is rounding
 
 
 @entry
@@ -39,7 +38,7 @@ def solve_multipliers(context, t, q, r, rows, out):
         set_time(s, t[k])
         place_bodies(bodies, q[k], f.poses)
         run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
-        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, RANK_LIMIT, 0)
+        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, 0)
         constraint_jacobian(s, q[k], t[k], rows)
         copy(r[k], f.Q)
         take_loads(bodies, q[k], r[k], f.Z)
@@ -117,15 +116,15 @@ def reaction(solution, member, body):
 
 def only(packed, parts):
     """Of System.kinds what these primitives, a slice, need: a row each."""
-    if "within" not in packed.shared:
+    if packed.derived.places_within is None:
         seen, within = Counter(), []
         for constraint in packed.constraints:
             within.append(seen[type(constraint)])
             seen[type(constraint)] += 1
-        packed.shared["within"] = within
+        packed.derived.places_within = within
     rows = dict(zip(classes(packed), with_short_rows(packed).kinds, strict=True))
     kinds = np.array([rows[type(part)] for part in packed.constraints[parts]])
-    within = np.array(packed.shared["within"][parts])
+    within = np.array(packed.derived.places_within[parts])
     kinds[:, FIRST_INT] += INTS * within
     kinds[:, FIRST_REAL] += kinds[:, REALS] * within
     kinds[:, COUNT] = 1
@@ -134,9 +133,9 @@ def only(packed, parts):
 
 def loads_of(packed):
     """The loads by the id of their force."""
-    if "loads" not in packed.shared:
-        packed.shared["loads"] = {id(load.force): load for load in packed.loads}
-    return packed.shared["loads"]
+    if packed.derived.loads is None:
+        packed.derived.loads = {id(load.force): load for load in packed.loads}
+    return packed.derived.loads
 
 
 def force_reaction(solution, load, body):

@@ -15,9 +15,9 @@ from ..model.equations import set_time
 from ..model.packed import index_of
 from ..rows.evaluation import factorise_rows, run_loops
 from ..rows.schur_complement import gather, weigh
-from ..rows.selection import LEAST
-from ..sparse.constraint_graph import REDUCED, network_of
+from ..sparse.constraint_graph import REDUCED
 from ..sparse.factorisation import solve
+from ..sparse.networks import network_of
 from ..workspaces.workspace import load_parts, parts
 
 NEXT_TO_NOTHING = 1e-7  # of the rows' own size
@@ -48,7 +48,7 @@ def find_rows(network, s, f, q, t, whole):
     set_time(s, t)
     place_bodies(network.bodies, q, f.poses)
     run_loops(network, s.reals, REDUCED, f, t, f.b, f.H)
-    regular = factorise_rows(network, s.reals, f, t, f.b, f.H, f.Y, f.S, LEAST, 0)
+    regular = factorise_rows(network, s.reals, f, t, f.b, f.H, f.Y, f.S, 0)
     count = f.dropped[0]
     f.dropped[0] = 0
     run_loops(network, s.reals, REDUCED, f, t, f.b, whole)

@@ -4,7 +4,6 @@ import time
 
 from ..formulations.chart_coordinates import factorise_normal
 from ..formulations.null_space import reduced_mass, velocities
-from ..formulations.projection import PIVOT_LIMIT
 from ..formulations.tangent import solve_velocities
 from ..jit.kernels import entry, kernel
 from ..maths.dense_linalg import copy
@@ -21,7 +20,7 @@ ROUNDS = 5
 @kernel
 def _system(network, f):
     """W H^T, H W H^T and its factors."""
-    factor_rows(network, f, f.H, f.Y, f.S, PIVOT_LIMIT, 1)
+    factor_rows(network, f, f.H, f.Y, f.S, 1)
 
 
 @entry

@@ -8,8 +8,9 @@ from ..elements.loops.constraint_rows import call_body_loop
 from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, vector
 from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS, REDUCED, Network, no_network
 from .axis_rows import clear_axes
-from .selection import LEAST, WORSE, drop, drop_rows, factor_rows, select, weakest
+from .selection import WORSE, drop, drop_rows, factor_rows, select, weakest
 from .tangent_workspace import UNHELD, WEAKEST, Free, no_free
+from .tolerances import ZERO_PIVOT
 
 HELD = 1e6  # times rounding: what dropped rows may be off by, as a start may
 
@@ -82,34 +83,34 @@ def choosing_anew(network, free):
 
 
 load_choice = loader(Choice(no_network(), no_free()))
-CHOOSE = "ppdppppdi"
+CHOOSE = "ppdppppi"
 call_choose = caller(CHOOSE)
 
 
 @kernel
-def _choose(network, f, reals, t, b, H, Y, S, limit, axes):
+def _choose(network, f, reals, t, b, H, Y, S, axes):
     """Choose others to drop, with b, H, Y = W H^T and the factors of S of the new choice; whether there are any."""
     count = f.dropped[0]
     f.dropped[0] = 0
     run_loops(network, reals, REDUCED, f, t, b, H)
-    found = select(network, f, H, Y, S, count, LEAST)
+    found = select(network, f, H, Y, S, count, ZERO_PIVOT)
     f.dropped[0] = count
     drop_rows(f.dropped, H)
     drop(f.dropped, b)
-    regular = factor_rows(network, f, H, Y, S, limit, axes) < 0
+    regular = factor_rows(network, f, H, Y, S, axes) < 0
     if found and regular:
         f.sizes[WEAKEST] = weakest(network, S)
     return regular
 
 
 @callback(CHOOSE)
-def choose_anew(choice, reals, t, b, H, Y, S, limit, axes):
+def choose_anew(choice, reals, t, b, H, Y, S, axes):
     """`_choose` by address: few scenes have redundant rows, and it is as long as all the rest. 1 or 0."""
     c = load_choice(choice)
     network, f = c.network, c.free
     m, size = network.row.size, network.pattern.shape[2]
     reals, b, H, Y, S = vector(reals, ANY), vector(b, m), vector(H, 16 * m), vector(Y, 16 * m), vector(S, size)
-    return 1 if _choose(network, f, reals, t, b, H, Y, S, limit, axes) else 0
+    return 1 if _choose(network, f, reals, t, b, H, Y, S, axes) else 0
 
 
 if DEBUG:
@@ -117,17 +118,17 @@ if DEBUG:
 else:
 
     @kernel
-    def _choose_by_address(network, f, reals, t, b, H, Y, S, limit, axes):
-        return call_choose(f.anew[0], f.anew[1], reals, t, b, H, Y, S, limit, axes) != 0
+    def _choose_by_address(network, f, reals, t, b, H, Y, S, axes):
+        return call_choose(f.anew[0], f.anew[1], reals, t, b, H, Y, S, axes) != 0
 
 
 @long_kernel
-def factorise_rows(network, reals, f, t, b, H, Y, S, limit, axes):
+def factorise_rows(network, reals, f, t, b, H, Y, S, axes):
     """Y = W H^T and the factors of S of the present H; of redundant rows others are chosen where these serve no more.
 
     Whether there are any. Then b and H are those of the new choice. `axes` (0 or 1) as in `selection.factor_rows`.
     """
-    regular = factor_rows(network, f, H, Y, S, limit, axes) < 0
+    regular = factor_rows(network, f, H, Y, S, axes) < 0
     if f.dropped[0] == 0 or f.anew[0] == 0 or (regular and serve_still(network, f, S)):
         return regular  # rows may be left out for a moment of a scene that has no redundant ones
-    return _choose_by_address(network, f, reals, t, b, H, Y, S, limit, axes)
+    return _choose_by_address(network, f, reals, t, b, H, Y, S, axes)

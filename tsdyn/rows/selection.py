@@ -17,8 +17,8 @@ from ..sparse.block_operations import eliminate, subtract_products
 from ..sparse.factorisation import factor, keep_diagonal, record
 from .axis_rows import leave_axes_out, multiply_axes, weigh_axes
 from .schur_complement import inner, multiply_rows, weigh_rows
+from .tolerances import ZERO_PIVOT
 
-LEAST = 1e-13  # of a diagonal entry: what elimination leaves of a row that is kept is more
 FIRST, FINER = 1e-3, 1e-2  # the share below which rows are dropped, at first; how it falls while those are too many
 WORSE = 0.1  # of what the weakest row has had since it was chosen: below it the choice is made anew
 
@@ -194,7 +194,7 @@ def select(network, f, H, Y, S, wanted, least):
     m, count = network.row.size, -1
     if f.block.size >= m * m and network.welds.shape[0] == 0:
         weigh_rows(network, H, Y)
-        count = _choose_of_all(network, H, Y, wanted, LEAST if wanted >= 0 else least, f.chosen, f.block, f.order)
+        count = _choose_of_all(network, H, Y, wanted, ZERO_PIVOT if wanted >= 0 else least, f.chosen, f.block, f.order)
         return _settle(f, count, wanted)
     share = FIRST if wanted >= 0 else least
     while True:
@@ -210,7 +210,7 @@ def select(network, f, H, Y, S, wanted, least):
 
 
 @kernel
-def factor_rows(network, f, H, Y, S, limit, axes):
+def factor_rows(network, f, H, Y, S, axes):
     """Y = W H^T and the factors of S = H W H^T, of H without the dropped rows; the row that fails, or -1.
 
     Without the `axes` W is that of the inertias given, which serves as a metric; accelerations need them.
@@ -224,4 +224,4 @@ def factor_rows(network, f, H, Y, S, limit, axes):
             multiply_axes(network, H, Y, S)
         else:
             leave_axes_out(network, S)
-    return factor(network.pattern, S, limit)
+    return factor(network.pattern, S, ZERO_PIVOT)

@@ -19,13 +19,21 @@ from .run_state import (
     STABLE,
     STIFF,
     T_END,
+    T_ORIGIN,
     H,
     T,
 )
 from .trajectory import A_ERROR, A_ERROR_2, A_NORM, evaluate
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
+SHORTEST = 4e-16  # of t, two units in the last place; of t = 0, of a thousandth of the interval
 STIFF_STEPS, MILD_STEPS = 15, 6  # at the limit of stability until a motion is called stiff; below it until forgotten
+
+
+@kernel
+def gets_on(r, t0, t1):
+    """Whether a step from t0 to t1 is more than the rounding of t."""
+    return t1 > t0 + SHORTEST * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN]))
 
 
 @kernel

@@ -12,28 +12,28 @@ import numpy as np
 from ..elements.bodies import Ground
 from ..elements.markers import POINT
 from ..elements.user_functions import Kernels
+from ..model.derived import Derived
 from ..model.packed import FIRST_REAL, REALS, classes
 from ..model.packed_forces import F_FIRST_REAL
 from ..runs.events import Instant
 from .scene_cache import Prepared
 
 FAR = 100.0  # sizes of a scene: its distance from the origin above which it has one of its own
-LOCAL, POINTS, LAST = "local origin", "points", "last origin"  # in Packed.shared
 
 
 def origin_of(packed, q):
     """The origin (3,) for a run from positions q (n,), or None for that of the scene."""
-    of, origin = packed.shared.get(LAST, (None, None))
+    of, origin = packed.derived.origin
     if of is not q:
         origin = _origin(packed, q)
-        packed.shared[LAST] = q, origin
+        packed.derived.origin = q, origin
     return origin
 
 
 def _origin(packed, q):
-    if POINTS not in packed.shared:
-        packed.shared[POINTS] = _points(packed)
-    grounded, longest = packed.shared[POINTS]
+    if packed.derived.grounded is None:
+        packed.derived.grounded = _points(packed)
+    grounded, longest = packed.derived.grounded
     if np.maximum.reduce(np.abs(q)) <= FAR * longest:
         return None
     places = np.concatenate((q[packed.system.bodies[:, :1] + np.arange(3)], grounded))
@@ -103,9 +103,9 @@ def run_near(driver, task, scene, origin, tol):
 
 def _local(prepared, scene, origin):
     """The `Prepared` of the scene with that origin; kept for the next run."""
-    kept = prepared.packed.shared.get(LOCAL)
+    kept = prepared.packed.derived.local
     if kept is None or (kept[0] != origin).any():
-        kept = prepared.packed.shared[LOCAL] = origin, Prepared(scene, _moved(prepared.packed, origin))
+        kept = prepared.packed.derived.local = origin, Prepared(scene, _moved(prepared.packed, origin))
     return kept[1]
 
 
@@ -137,7 +137,7 @@ def _moved(packed, origin):
         coordinates=coordinates,
         size=float(max((np.abs(s).max() for each in coordinates for s in each), default=0.0)),
         loads=loads,
-        shared={},
+        derived=Derived(),
     )
 
 

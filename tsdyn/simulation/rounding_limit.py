@@ -9,7 +9,6 @@ from ..sparse.massless_axes import levers
 
 NOISE = 4.0 * ROUNDING  # of a position, over the lever: what a placement leaves of a direction
 FAR = 1e4  # levers: below that no tolerance is touched
-ARMS = "levers"  # in Packed.shared
 
 
 def within_rounding(method, packed, q):
@@ -19,9 +18,9 @@ def within_rounding(method, packed, q):
     """
     if method.step is not None or method.driver != "steps":
         return method, ""
-    if ARMS not in packed.shared:
-        packed.shared[ARMS] = levers(packed)
-    arms = packed.shared[ARMS]
+    if packed.derived.levers is None:
+        packed.derived.levers = levers(packed)
+    arms = packed.derived.levers
     if np.abs(q).max() < FAR * arms.min(where=arms > 0.0, initial=np.inf):
         return method, ""
     far = np.abs(q[packed.system.bodies[:, :1] + np.arange(3)]).max(axis=1)

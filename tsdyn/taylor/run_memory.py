@@ -24,7 +24,8 @@ from ..runs.run_state import (
     lay_out,
 )
 from ..runs.trajectory import B_DATA
-from ..sparse import constraint_graph as graph
+from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
+from ..sparse.networks import with_loops
 from ..workspaces.tangent_memory import allocate_free, drop_as_at_first
 from ..workspaces.workspace import SIZE, U_TOL, plain_work
 from .layout import allocate_expansion, masks
@@ -55,7 +56,7 @@ class Series:
             raise InvalidArgument(found)
         network, self.kinds = moving_parts(packed)
         self.constant_columns = masks(network, packed)
-        self.network = graph.with_loops(network, self.kinds, graph.REDUCED, graph.VALUES, graph.BIAS, graph.DRIFT)
+        self.network = with_loops(network, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
         self.packed = packed
 
 

@@ -44,7 +44,7 @@ from ..runs.run_state import (
     T,
     load_run,
 )
-from ..runs.step_control import stretch
+from ..runs.step_control import gets_on, stretch
 from ..runs.stops import cut_fixed, is_sampled, next_stop, take_pieces
 from ..runs.trajectory import B_CHART, B_DATA, B_END, B_H, B_START
 from ..workspaces.workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
@@ -243,7 +243,7 @@ def advance_series(context, run, log, steps, most):
             done = r.numbers[STEPS] + 1 - r.numbers[CUTS]
             if not adaptive:
                 t1 = r.clock[T_ORIGIN] + done * r.clock[H]
-            if not t1 > t0 + 4e-16 * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN])):
+            if not gets_on(r, t0, t1):
                 return STEP_COLLAPSED
             if adaptive:
                 if t1 + stretch(h, r.clock[MAX_STEP]) >= end:

@@ -18,7 +18,7 @@ from ..model.equations import set_time
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..observables.diagnostics import starts_of
-from ..sparse.constraint_graph import build
+from ..sparse.graph_builder import build
 from ..taylor.coefficients import run_forces, run_loops
 from ..taylor.layout import allocate_expansion, masks
 from ..taylor.prescribed_series import expand_motions

@@ -83,7 +83,7 @@ def draw_packages(path):
     figure = Figure(figsize=(7.5, 0.62 * len(rows)))
     axes = figure.add_axes((0, 0, 1, 1))
     for name, targets in reduced(edges).items():
-        for other in targets:
+        for other in sorted(targets):
             (x0, y0), (x1, y1) = place[name], place[other]
             bend = 0.0 if y0 - y1 == 1 or x0 != x1 else 0.5
             arrow = {"arrowstyle": "-|>", "color": "0.55", "connectionstyle": f"arc3,rad={bend}", "lw": 0.8}

@@ -96,6 +96,6 @@ class _Trial:
         self.metric, self.sketch, self.also, self.tol = metric, sketch, (q,), tol
 
     def met(self, members):
-        """Whether they can be met together."""
+        """Return True if the constraints can be satisfied together."""
         rows = np.concatenate([np.arange(member.rows.start, member.rows.stop) for member in members])
         return nearest(self.metric, self.sketch, self.tol, rows, TRIAL_SHAKES, self.also).met

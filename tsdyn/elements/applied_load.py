@@ -81,7 +81,7 @@ class GivenByState(ByState):
     series = None  # nothing is known of a function
 
     def parameters(self):
-        """Whether the vector is in axes of the body."""
+        """One flag: the vector is given in the body frame."""
         return (float(self.frame == "body"),)
 
     @staticmethod

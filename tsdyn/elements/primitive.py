@@ -121,7 +121,7 @@ class Primitive(Attachment):
 
     @property
     def rheonomic(self):
-        """Whether it depends on time."""
+        """True if the constraint depends on time."""
         names = self.quantities()
         moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
         return moves and "phi_t" in self.kernels

@@ -172,7 +172,7 @@ def _dropped(packed, omitted, spare):
 
 
 def _holds(kind):
-    """Whether a kind of constraint is on directions alone, and no time enters it but by a Motion."""
+    """Return True if a kind of constraint is on directions alone, and depends on time through a Motion only."""
     return (
         all(marker.code in (VECTOR, PARAMETERS) for marker in kind.markers)
         and not (kind.normalises or kind.memory)

@@ -60,7 +60,7 @@ class Motion:
 
     @property
     def has_series(self):
-        """Whether it is one of `ts.motions`: of a user's own function no series is taken."""
+        """True for one of `ts.motions`; a user's function has no series."""
         return not self.given
 
     @property

@@ -92,7 +92,7 @@ class Signal:
 
     @staticmethod
     def is_zero(value):
-        """Whether a load is zero at all times."""
+        """Return True if a load is zero at all times."""
         return not isinstance(value, Signal) and not np.any(value)
 
     def value(self, t):

@@ -63,7 +63,7 @@ class Table:
 
 
 def is_data(value):
-    """Whether `pieces_of` takes it: a Table, a SciPy object, or (times, values)."""
+    """Return True for data that `pieces_of` accepts: a Table, a SciPy object, or (times, values)."""
     if isinstance(value, (tuple, list)):
         return len(value) == 2 and all(isinstance(part, (np.ndarray, list, tuple)) for part in value)
     return isinstance(value, (Table, *_scipy()))

@@ -77,7 +77,7 @@ def free_loads(context, t, q, rows, sides, whole, out):
 
 
 def unique(solution, rows, body):
-    """Whether the reaction of these rows, a slice, on a body is unique; bool (k,)."""
+    """Determine whether the reaction of these rows, a slice, on a body is unique: bool (k,)."""
     network = network_of(solution.packed, REDUCED)
     if not network.dropped.size:
         return np.ones(solution.t.size, bool)

@@ -41,7 +41,7 @@ class Task(NamedTuple):
 
     @property
     def within(self):
-        """Whether anything is asked for between the ends of steps."""
+        """True if output between the ends of steps is requested."""
         times, (t0, t1) = self.times, self.span
         inside = times.size > 2 or any(t0 < t < t1 for t in times.tolist())
         return self.dense_output or self.events is not None or inside

@@ -108,7 +108,7 @@ def sampled(packed):
 
 
 def is_due(t, period):
-    """Whether t is an instant of a period."""
+    """Return True if t is an instant of a period."""
     return abs(t - round(t / period) * period) <= SAME * period
 
 

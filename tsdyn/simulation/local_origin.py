@@ -61,7 +61,7 @@ def _points(packed):
 
 
 def _sees_differences(packed):
-    """Whether there are constraints or forces, and none that may depend on positions as they are."""
+    """Return True if there are constraints or forces, and none that may depend on positions as they are."""
     items = [*packed.constraints, *(load.force for load in packed.loads)]
     joined = packed.loads or not all(constraint.normalises for constraint in packed.constraints)
     own = joined and all(type(item).__module__.startswith("tsdyn.") for item in items)

@@ -97,7 +97,7 @@ class Solution(Kinematics):
 
     @property
     def success(self):
-        """Whether the run reached the end of the interval, or a terminal event."""
+        """True if the run reached the end of the interval, or a terminal event."""
         return self.status in (Status.SUCCESS, Status.EVENT)
 
     def raise_if_failed(self):
@@ -225,7 +225,7 @@ class Solution(Kinematics):
         return reactions.reaction(self, member, self._acted(item, on))
 
     def reaction_unique(self, item, on=None):
-        """Whether the `reaction` is statically determinate, at each output: bool (k,).
+        """Determine whether the `reaction` is unique (statically determinate) at each output: bool (k,).
 
         Redundant constraints can share their loads in many ways with the same motion; `reaction` is then one of them,
         with the multipliers of dropped rows (NaN in `multipliers`) taken as zero.

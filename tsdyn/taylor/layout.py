@@ -83,7 +83,7 @@ def room(highest):
 
 
 def is_far(network, highest):
-    """Whether the series are so long that each loop finds nothing in the caches near by."""
+    """Return True if the series exceed the near caches."""
     return len(network.bodies) * room(highest) > FAR
 
 

@@ -137,7 +137,7 @@ def _finished(solution, where):
 
 
 def _serves(case, method, form):
-    """Whether the method takes this formulation."""
+    """Return True if the method takes this formulation."""
     try:
         _run(case, method, form, max_steps=1)
     except InvalidArgument:

@@ -23,7 +23,7 @@ STEP = (
     (4, "formulations.tangent", "place"),
     (5, "formulations.chart_coordinates", "displace"),
     (5, "rows.evaluation", "run_loops"),
-    (5, "rows.selection", "factor_rows"),
+    (5, "rows.evaluation", "factor_rows"),
     (4, "formulations.tangent", "accelerate"),
     (5, "formulations.accelerations", "solve_accelerations"),
     (3, "runs.step_control", "accept"),

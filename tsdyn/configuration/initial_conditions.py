@@ -11,13 +11,13 @@ from ..maths.row_rank import dependent
 from ..model.equations import set_time
 from ..observables.evaluate import constraint_arrays
 from ..rows.axis_rows import is_axis
-from ..rows.evaluation import run_loops
+from ..rows.evaluation import factor_rows, run_loops
+from ..rows.independent_rows import drop_rows, select
 from ..rows.schur_complement import gather, scatter
-from ..rows.selection import drop_rows, factor_rows, select
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
+from ..sparse.constraint_graphs import drop, network_of
 from ..sparse.factorisation import solve
 from ..sparse.massless_axes import axis_of
-from ..sparse.networks import drop, network_of
 from ..workspaces.tangent_memory import allocate_free
 from ..workspaces.workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 from .rank import check_rank

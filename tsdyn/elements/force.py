@@ -28,10 +28,8 @@ from ..jit.kernels import Callback, kernel, specialised
 from ..motions.signals import Signal
 from ..validation import number
 from .element import Attachment, check_slots, inlined, layout, static_kernel
-from .loops import constraint_series as series_loops
-from .loops import force_series
+from .loops import constraint_series, force_series, friction
 from .loops import forces as loops
-from .loops import friction as friction_loops
 from .markers import PARAMETERS, TURN, Marker, Point
 from .primitive import SIGNATURE
 
@@ -199,11 +197,11 @@ def callbacks(cls, functions, owner=None):
         home = getattr(functions["series"], "py_func", functions["series"])
         names.update(kernel_series=inlined(functions["series"]), SLOTS=cls.slots)
         copy = specialised(force_series.series, f"{label}.series_loop", home, **names)
-        result["series"] = Callback(copy, series_loops.SIGNATURE)
+        result["series"] = Callback(copy, constraint_series.SIGNATURE)
     if "normal_load" in functions:
         home = getattr(functions["normal_load"], "py_func", functions["normal_load"])
         names["kernel_normal_load"] = inlined(functions["normal_load"])
         for name in ("unit_friction", "normal_load"):
-            copy = specialised(getattr(friction_loops, name), f"{label}.{name}_loop", home, **names)
-            result[name] = Callback(copy, getattr(friction_loops, name.upper()))
+            copy = specialised(getattr(friction, name), f"{label}.{name}_loop", home, **names)
+            result[name] = Callback(copy, getattr(friction, name.upper()))
     return MappingProxyType(result)

@@ -23,7 +23,7 @@ def law_of_joint(value, what, error):
 class JointLoad:
     """Mixed into forces of one joint coordinate; the load does its work on that coordinate.
 
-    With a period the load is held between instants and is what such a force remembers: see tsdyn/sampling.py.
+    With a period the load is held between instants and is what such a force remembers: see runs/sampling.py.
     """
 
     loads = ("function",)

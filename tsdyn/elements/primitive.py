@@ -23,9 +23,7 @@ from ..errors import InvalidConstraint
 from ..jit.kernels import ANY, Callback, caller, integers, specialised, stack, stack2, vector
 from ..motions.prescribed import Motion
 from .element import Attachment, check_slots, inlined, layout, static_kernel
-from .loops import constraint_hessians as curvature
-from .loops import constraint_rows as body_loops
-from .loops import constraint_series as series_loops
+from .loops import constraint_hessians, constraint_rows, constraint_series
 from .markers import PARAMETERS, TURN, Marker, chain_rule, motion, position
 
 # what the table of a kind holds for each instance
@@ -156,14 +154,14 @@ def _compile(cls, functions):
         "jacobian": (_jacobian, "jacobian", SIGNATURE),
         "gamma": (_gamma, "gamma", SIGNATURE),
         "remember": (_remembers, "remember", SIGNATURE),
-        "values": (body_loops.values, "phi", body_loops.SIGNATURE),
-        "drift": (body_loops.values, "phi_t", body_loops.SIGNATURE),
-        "reduced": (body_loops.reduced, "jacobian", body_loops.SIGNATURE),
-        "bias": (body_loops.bias, "gamma", body_loops.SIGNATURE),
-        "series": (series_loops.series, "series", series_loops.SIGNATURE),
-        "far_series": (series_loops.series, "series", series_loops.SIGNATURE),
-        "driven_series": (series_loops.series, "series_t", series_loops.SIGNATURE),
-        "far_driven_series": (series_loops.series, "series_t", series_loops.SIGNATURE),
+        "values": (constraint_rows.values, "phi", constraint_rows.SIGNATURE),
+        "drift": (constraint_rows.values, "phi_t", constraint_rows.SIGNATURE),
+        "reduced": (constraint_rows.reduced, "jacobian", constraint_rows.SIGNATURE),
+        "bias": (constraint_rows.bias, "gamma", constraint_rows.SIGNATURE),
+        "series": (constraint_series.series, "series", constraint_series.SIGNATURE),
+        "far_series": (constraint_series.series, "series", constraint_series.SIGNATURE),
+        "driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
+        "far_driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
     }
     result = {}
     for name, (template, whose, signature) in loops.items():
@@ -177,8 +175,10 @@ def _compile(cls, functions):
             result[name] = Callback(copy, signature)
     owner = getattr(functions["gamma"], "py_func", functions["gamma"])
     places = {"AT": AT, "DIMENSION": DIMENSION, "ROW": ROW, "INTS": INTS}
-    copy = specialised(curvature.loop, f"{cls.__qualname__}.curvature_loop", owner, **constants, **inner, **places)
-    result["curvature"] = Callback(copy, curvature.SIGNATURE)
+    copy = specialised(
+        constraint_hessians.loop, f"{cls.__qualname__}.curvature_loop", owner, **constants, **inner, **places
+    )
+    result["curvature"] = Callback(copy, constraint_hessians.SIGNATURE)
     return result
 
 

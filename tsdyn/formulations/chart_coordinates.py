@@ -11,8 +11,8 @@ from ..elements.loops.body_poses import OMEGA, POSE, RD, R, orient
 from ..jit.kernels import kernel, stack
 from ..jit.simd import add, cross, first, fma, four, lanes, put, second, splat, sub, third, times, total
 from ..rows.axis_rows import leave_axes_out
+from ..rows.independent_rows import drop_diagonal
 from ..rows.schur_complement import inner, more, multiply_both
-from ..rows.selection import drop_diagonal
 from ..sparse.constraint_graph import (
     H_BODY,
     H_COLUMNS,

@@ -25,8 +25,8 @@ from ..model.packed_forces import F_FIRST_INT, F_FIRST_REAL, F_REALS
 from ..model.packed_friction import FR_BODY, FR_COUNT, FR_FIRST, FR_INDEX, FR_KIND, FR_NORMAL, FR_ON, FR_UNIT
 from ..rows.axis_rows import gather_axes, multiply_axes_both
 from ..rows.evaluation import run_loops
+from ..rows.independent_rows import drop, drop_diagonal
 from ..rows.schur_complement import gather, inner, multiply_both, scatter, weigh
-from ..rows.selection import drop, drop_diagonal
 from ..sparse.constraint_graph import BIAS
 from ..sparse.factorisation import factor_lu, solve_lu
 from ..sparse.massless_axes import AXIS_ROW

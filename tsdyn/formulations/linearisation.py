@@ -17,7 +17,7 @@ from ..maths.dense_linalg import lu, lu_solve, transposed_times
 from ..maths.euler_parameters import matrix_a, matrix_g
 from ..model.equations import applied_forces, constraint_curvature, force_jacobian
 from ..workspaces.workspace import ITERATION_MATRICES, JACOBIANS, load
-from .newton import NOT_FINITE, OK, SINGULAR
+from .newton_iterations import NOT_FINITE, OK, SINGULAR
 
 
 @kernel

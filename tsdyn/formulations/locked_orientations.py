@@ -14,8 +14,8 @@ from ..elements.markers import PARAMETERS, VECTOR
 from ..model.packed import FIRST_REAL, classes
 from ..motions.prescribed import Motion
 from ..sparse.constraint_graph import N_COUNT, N_FIRST_REAL, N_REALS
+from ..sparse.constraint_graphs import dropped_rows, network_of, with_loops
 from ..sparse.graph_builder import build
-from ..sparse.networks import dropped_rows, network_of, with_loops
 from ..workspaces.tangent_memory import MOST_ROWS
 
 LEAST = 1e-12  # of the largest square of a singular value of its rows: with less they don't hold a body

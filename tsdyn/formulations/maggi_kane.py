@@ -13,7 +13,7 @@ from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import set_time
 from ..workspaces.chart_workspace import TIME
 from ..workspaces.workspace import PLACEMENTS, load
-from .newton import NOT_FINITE, OK
+from .newton_iterations import NOT_FINITE, OK
 from .null_space import frictional_acceleration, look, project, reduced_mass, velocities, weighted_square
 from .null_space_chart import new_chart, tangent_map
 

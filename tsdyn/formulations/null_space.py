@@ -23,7 +23,7 @@ from ..workspaces.chart_workspace import TIME
 from ..workspaces.workspace import EVALUATIONS, FACTORIZATIONS, FLOOR, PLACEMENTS, load
 from .chart_validity import measure_turns, turning
 from .friction_solve import call_rub, forget_loads
-from .newton import NOT_FINITE, OK, leave_out, solve_positions, subtract_normal
+from .newton_iterations import NOT_FINITE, OK, leave_out, solve_positions, subtract_normal
 from .null_space_chart import new_chart, tangent_map
 
 PIVOT_LIMIT = 1e-14  # of D^T M D: less than this is rounding

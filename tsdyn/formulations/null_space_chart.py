@@ -1,4 +1,4 @@
-"""Charts with bases U and V (Eqs. 5-9, 27), made at q0; `local_chart` decides when a chart is abandoned.
+"""Charts with bases U and V (Eqs. 5-9, 27), made at q0; chart_validity.py decides when a chart is abandoned.
 
 U spans W0 Phi_q0^T, W0 being the inverse of the mass matrix with p p^T added: the normal space in the metric of kinetic
 energy, which weights lengths and angles by inertia. (The paper takes U = Phi_q0^T.) Columns are scaled so that Phi_q0 U
@@ -13,7 +13,7 @@ from ..maths.dense_linalg import null_space
 from ..model.equations import constraint_jacobian
 from ..workspaces.workspace import FACTORIZATIONS, KEPT, RATE
 from .chart_validity import touch
-from .newton import OK, SINGULAR, invert_normal_matrix, leave_rows_out, normal_matrix, update_b
+from .newton_iterations import OK, SINGULAR, invert_normal_matrix, leave_rows_out, normal_matrix, update_b
 
 RANK_LIMIT = 1e-14  # smallest singular value of Phi_q, rows scaled to length one: less is rounding; S, in the metric
 # of the masses, says what is independent: rows of points that are a nanometre apart differ by 1e-9

@@ -13,8 +13,8 @@ from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import add, fma, four, put, splat
 from ..maths.dense_linalg import largest
 from ..rows.evaluation import factorise_rows, held, run_loops
+from ..rows.independent_rows import weakest
 from ..rows.schur_complement import gather, scatter
-from ..rows.selection import weakest
 from ..rows.singularity import NEAR
 from ..rows.tangent_workspace import LARGEST_SHARE, MOVED, RESIDUAL
 from ..sparse.constraint_graph import DRIFT, REDUCED, VALUES

@@ -20,9 +20,8 @@ from ..maths.dense_linalg import copy, is_finite, largest
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.axis_rows import is_axis
-from ..rows.evaluation import held, run_loops
+from ..rows.evaluation import factor_rows, held, run_loops
 from ..rows.schur_complement import gather, scatter
-from ..rows.selection import factor_rows
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.factorisation import solve, solve_lu
 from ..workspaces.chart_workspace import END, FACTORED, OFF, TIME

@@ -1,7 +1,7 @@
 """A kernel cache on disk that never answers with a stale or damaged kernel.
 
 Each file holds one compiled function. The file name contains a hash of everything that determines the machine code
-(`_code_hash`); the file starts with a checksum of its content. Writes are atomic. A file that fails its checksum is
+(code_hash.py); the file starts with a checksum of its content. Writes are atomic. A file that fails its checksum is
 deleted and its function is compiled again. A complete cache in a read-only folder is used in place. Numba's own
 settings and classes are not modified.
 """

@@ -2,6 +2,7 @@
 
 Imports workspaces and below. integrators/ is written on this package, a file a method.
 
-Begin with integrator.py (the interface of a method), then explicit.py and diagonally_implicit.py (step kernels) and
-interpolants.py (dense output within a step, in chart coordinates).
+Begin with integrator.py (what a method is), then explicit.py and diagonally_implicit.py (the kernels that make a
+step) and interpolants.py (polynomials within a step, in chart coordinates; runs/trajectory.py puts them on the
+manifold).
 """

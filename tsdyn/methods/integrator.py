@@ -34,7 +34,7 @@ class Integrator:
     order = 0
     embedded_order = 0  # of the error estimate; zero for a method that has none
     implicit = False
-    driver = "steps"  # which one runs it; see request.py
+    driver = "steps"  # which one runs it; see task.py
     stability_limit = 0.0  # h |lambda| that its last stage and the step's end, of one time, may show; 0: not watched
     rtol = atol = max_step = first_step = None
     margin, errors = 30.0, (embedded_error,)

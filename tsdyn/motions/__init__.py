@@ -2,9 +2,9 @@
 
 Imports jit and maths.
 
-Begin with expressions.py: smooth motions such as `Sine` and `Polynomial`. prescribed.py converts the arguments of
-drivers to a `Motion`, signals.py those of time-dependent loads; tables.py and piecewise.py hold data and splines, and
-program.py evaluates motions in kernels.
+Begin with expressions.py: smooth motions such as `Sine` and `Polynomial`. prescribed.py makes a `Motion` of whatever
+a driver is given, plain Python functions included, signals.py a load of time; those of time and state are in
+elements/user_functions.py. tables.py and piecewise.py are data and splines, program.py is what kernels evaluate.
 """
 
 from .expressions import Constant, Exponential, Piecewise, Polynomial, Ramp, Sine, Smooth, time

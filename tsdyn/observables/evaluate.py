@@ -7,7 +7,7 @@ import numpy as np
 from ..calls import fitting
 from ..elements.bodies import transform_g
 from ..errors import InvalidArgument, SingularConfiguration
-from ..formulations.redundancy import dependent_rows
+from ..formulations.dependent_rows import dependent_rows
 from ..maths.row_rank import RANK_TOL, dependent, farthest_first
 from ..model.equations import evaluate_constraints
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows

@@ -7,7 +7,7 @@ from ..formulations.friction_solve import normal_load
 from ..jit.kernels import entry, resident, stack
 from ..model.packed_friction import FR_COUNT, FR_FIRST
 from ..sparse.constraint_graph import REDUCED
-from ..sparse.networks import network_of
+from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
 from .uniqueness import NEXT_TO_NOTHING, find_rows, find_stress
 

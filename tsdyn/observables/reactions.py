@@ -17,8 +17,8 @@ from ..model.sparse_jacobian import WIDTH, with_short_rows
 from ..rows.evaluation import factorise_rows, run_loops
 from ..rows.schur_complement import gather, scatter
 from ..sparse.constraint_graph import REDUCED
+from ..sparse.constraint_graphs import network_of
 from ..sparse.factorisation import solve
-from ..sparse.networks import network_of
 from ..workspaces.workspace import load_parts, parts
 from .friction_reactions import with_normal_loads
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces

@@ -16,8 +16,8 @@ from ..model.packed import index_of
 from ..rows.evaluation import factorise_rows, run_loops
 from ..rows.schur_complement import gather, weigh
 from ..sparse.constraint_graph import REDUCED
+from ..sparse.constraint_graphs import network_of
 from ..sparse.factorisation import solve
-from ..sparse.networks import network_of
 from ..workspaces.workspace import load_parts, parts
 
 NEXT_TO_NOTHING = 1e-7  # of the rows' own size

@@ -13,7 +13,7 @@ from ..jit.cache import statistics
 from ..jit.kernels import DEBUG
 from ..observables.state import remembered
 from ..runs.arguments import interval, method_of, state_arrays
-from ..simulation import method_choice as choice
+from ..simulation import method_choice
 from ..simulation.scene import Scene
 from ..simulation.scene_cache import prepared
 from ..simulation.simulate import DRIVERS, simulate
@@ -122,7 +122,7 @@ def _without(options):
 def _first(scene, options):
     """The method that a call begins with where none is named."""
     series = options.get("formulation", "tangent") == "tangent" and options.get("chart_interval") is None
-    return choice.explicit(prepared(scene), options.get("rtol"), options.get("atol"), series)
+    return method_choice.explicit(prepared(scene), options.get("rtol"), options.get("atol"), series)
 
 
 def _method(scene, solution, options):
@@ -130,7 +130,7 @@ def _method(scene, solution, options):
     if options.get("integrator") is not None:
         return method_of(options["integrator"], options.get("rtol"), options.get("atol"))
     method = _first(scene, options)
-    return method if repr(method) == solution.method else choice.implicit(method)
+    return method if repr(method) == solution.method else method_choice.implicit(method)
 
 
 def _observed(method, observer):

@@ -5,7 +5,7 @@ in the run.
 """
 
 from ..jit.kernels import kernel
-from .selection import weakest
+from .independent_rows import weakest
 from .tangent_workspace import LARGEST_SHARE, SHARE
 
 NEAR = 0.02  # of the largest share: a place with less is near a singular configuration

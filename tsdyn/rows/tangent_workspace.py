@@ -35,8 +35,10 @@ class Free(NamedTuple):
     Q: np.ndarray  # (n,)  applied forces
     p: np.ndarray  # (4,)  scratch
     sizes: np.ndarray  # (SIZES,)  numbers about the last landing and choice of rows, below
-    dropped: np.ndarray  # int64 (m + 1,)  how many rows are dropped, and which; selection.select
-    chosen: np.ndarray  # int64 (m + 1,), order (m,), block (largest block, or m, squared)  scratch of selection.select
+    dropped: np.ndarray  # int64 (m + 1,)  how many rows are dropped, and which; independent_rows.select
+    chosen: (
+        np.ndarray
+    )  # int64 (m + 1,), order (m,), block (largest block, or m, squared)  scratch of independent_rows.select
     order: np.ndarray
     block: np.ndarray
     friction: Friction

@@ -2,7 +2,7 @@
 
 Imports observables and below.
 
-Begin with request.py (the request and the outcome of a run), then slices.py (the Python side: slices of calls of the
-compiled driver) and stepper.py (the compiled driver: a step is proposed, attempted, rejected or accepted).
-step_control.py chooses step sizes, trajectory.py evaluates dense output, event_search.py locates events in steps.
+Begin with task.py (what is asked of a run, and what it hands back), then slices.py (Python's side: the compiled
+driver called slice by slice) and stepper.py (the compiled driver: a step is proposed, tried, rejected or accepted).
+step_control.py chooses steps, trajectory.py evaluates dense output, event_search.py finds events inside steps.
 """

@@ -8,7 +8,7 @@ import numpy as np
 from ..calls import fitting, fitting_methods
 from ..configuration.assemble import assemble
 from ..configuration.mobility import mobility
-from ..configuration.setting import set_joint
+from ..configuration.set_joint_coordinates import set_joint
 from ..constraints.euler_normalization import EulerNormalization
 from ..elements.bodies import IDENTITY, Body, Ground, PointMass
 from ..elements.force import Force

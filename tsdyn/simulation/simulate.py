@@ -14,11 +14,11 @@ from ..motions.knots import stops_of
 from ..observables.state import remembered
 from ..runs.arguments import interval, method_of, output_times, state_arrays
 from ..runs.events import prepare
-from ..runs.request import Task
 from ..runs.sampling import Sampling, instants_of, sampled
+from ..runs.task import Task
 from ..taylor.series_run import run_series
 from ..validation import one_of, positive, whole
-from . import method_choice as choice
+from . import method_choice
 from .local_origin import origin_of, run_near
 from .progress import reporter
 from .rounding_limit import within_rounding
@@ -30,7 +30,7 @@ from .solution import Solution
 DRIVERS = {
     "steps": run_past,
     "series": run_series,
-}  # by Integrator.driver, if it isn't one itself; see request.py
+}  # by Integrator.driver, if it isn't one itself; see task.py
 
 
 @fitting
@@ -127,7 +127,7 @@ def simulate(
     chart_interval = whole(chart_interval, "chart_interval")
     kept = prepared(scene)
     if integrator is None:
-        method = choice.explicit(kept, rtol, atol, form.name == "tangent" and chart_interval is None)
+        method = method_choice.explicit(kept, rtol, atol, form.name == "tangent" and chart_interval is None)
     else:
         method = method_of(integrator, rtol, atol)
     if method.implicit and form.first_order:
@@ -162,7 +162,7 @@ def simulate(
     choose = None
     if integrator is None and sampling is None:  # what is asked in Python is asked once
         options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol, "max_step": max_step}
-        choose = choice.chooser(simulate, scene, method, span[1], options)
+        choose = method_choice.chooser(simulate, scene, method, span[1], options)
     task = Task(
         kept, method, form, span, q, qd, memory, times, bool(dense_output),
         watched, constraint_tol, max_steps, chart_interval or 0, report, bool(history), choose, stops, sampling,
@@ -178,7 +178,7 @@ def simulate(
         return simulate(
             scene,
             t_span,
-            integrator=choice.implicit(method),
+            integrator=method_choice.implicit(method),
             formulation=formulation,
             constraint_tol=constraint_tol,
             initial_tol=initial_tol,

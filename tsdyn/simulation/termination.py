@@ -4,9 +4,9 @@ import numpy as np
 
 from ..configuration.rank import weakest_row
 from ..errors import Status
-from ..formulations.redundancy import dependent_rows
+from ..formulations.dependent_rows import dependent_rows
 from ..observables.evaluate import constraint_arrays
-from ..sparse.networks import dropped_rows
+from ..sparse.constraint_graphs import dropped_rows
 from ..taylor.layout import without_series
 from ..validation import counted
 

@@ -18,8 +18,8 @@ from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OM
 from ..jit.kernels import kernel
 from ..jit.simd import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times, total
 from ..maths.dense_linalg import copy
+from ..rows.independent_rows import drop
 from ..rows.schur_complement import scatter, weigh
-from ..rows.selection import drop
 from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS
 from ..sparse.factorisation import solve
 from ..sparse.massless_axes import AXIS_BODY, AXIS_H, AXIS_ROW

@@ -13,7 +13,7 @@ from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import is_finite
 from ..model.equations import set_time
 from ..rows.evaluation import run_loops
-from ..rows.selection import select, weakest
+from ..rows.independent_rows import select, weakest
 from ..rows.singularity import NEAR
 from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
 from ..sparse.constraint_graph import REDUCED

@@ -54,7 +54,7 @@ class SeriesReader:
     size : float
         Of the numbers in the constraints.
     steps : ndarray
-        Addresses, series_steps.EXPAND ... WITHIN.
+        Addresses, step_parts.EXPAND ... WITHIN.
     """
 
     shift = 0

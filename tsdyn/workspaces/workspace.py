@@ -19,25 +19,25 @@ class Work(NamedTuple):
     "computed by" names the kernel. What belongs to a row that is left out is zero, on the diagonal of N and B one.
     """
 
-    q: np.ndarray  # (n,)    positions; computed by newton.solve_positions
+    q: np.ndarray  # (n,)    positions; computed by newton_iterations.solve_positions
     qd: np.ndarray  # (n,)   velocities; computed by null_space.velocities
     qdd: np.ndarray  # (n,)  accelerations; computed by null_space.complete
-    Phi: np.ndarray  # (m,)  constraints at q; newton.solve_positions, and scratch of null_space.complete
+    Phi: np.ndarray  # (m,)  constraints at q; newton_iterations.solve_positions, and scratch of null_space.complete
     Phi_t: np.ndarray  # (m,)  their time derivative; null_space.velocities
     gamma: np.ndarray  # (m,)  acceleration bias; null_space.reduced_acceleration
-    z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; newton.solve_positions, null_space; scratch elsewhere
+    z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; newton_iterations, null_space; scratch elsewhere
     Phi_q: np.ndarray  # (m, n)  Jacobian at q; null_space_chart.tangent_map, new_chart
-    q0: np.ndarray  # (n,)   where the chart touches; null_space_chart.new_chart
+    q0: np.ndarray  # (n,)   base point of the chart; null_space_chart.new_chart
     U: np.ndarray  # (n, m)  spans W0 Phi_q(q0)^T, in place of Eq. 5; null_space_chart.new_chart
     V: np.ndarray  # (n, k)  orthonormal basis of ker Phi_q(q0); null_space_chart.new_chart
     L: np.ndarray  # (n, k)  transposed: V^T P0, P0 the projection along U; null_space_chart.new_chart
-    B: np.ndarray  # (m, m)  (Phi_q U)^-1, Eqs. 7, 28, warm-started; newton.update_b
-    u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; newton.solve_positions, tangent.place
+    B: np.ndarray  # (m, m)  (Phi_q U)^-1, Eqs. 7, 28, warm-started; newton_iterations.update_b
+    u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; newton_iterations, tangent.place
     T: np.ndarray  # (m, k)  B Phi_q V = du/dv; null_space_chart.tangent_map
-    v: np.ndarray  # (k,)    tangent coordinates of the latest u; newton.solve_positions
-    base: np.ndarray  # (n,)   q0 + V v; newton.solve_positions
+    v: np.ndarray  # (k,)    tangent coordinates of the latest u; newton_iterations.solve_positions
+    base: np.ndarray  # (n,)   q0 + V v; newton_iterations.solve_positions
     N: np.ndarray  # (m, m)  Phi_q U; null_space_chart.tangent_map
-    R: np.ndarray  # (m, m)  residual of Eq. 28, and scratch of factorisations; newton.update_b
+    R: np.ndarray  # (m, m)  residual of Eq. 28, and scratch of factorisations; newton_iterations.update_b
     X: np.ndarray  # (m, k)  Phi_q V, or U^T V; null_space_chart.tangent_map, new_chart
     D: np.ndarray  # (n, k)  (I - U B Phi_q) V, Eq. 9; null_space_chart.tangent_map
     E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.reduced_mass

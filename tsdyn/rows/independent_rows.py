@@ -14,8 +14,8 @@ import math
 from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import put, splat
 from ..sparse.block_operations import eliminate, subtract_products
-from ..sparse.factorisation import factor, keep_diagonal, record
-from .axis_rows import leave_axes_out, multiply_axes, weigh_axes
+from ..sparse.factorisation import keep_diagonal, record
+from .axis_rows import leave_axes_out
 from .schur_complement import inner, multiply_rows, weigh_rows
 from .tolerances import ZERO_PIVOT
 
@@ -140,7 +140,7 @@ def _choose(size, width, panel, kept, joints, share, A, order):
 def _eliminate_choosing(network, values, share, dropped, A, order):
     """Factor S in place but for the rows that are left less than a share of their diagonal entry; how many they are.
 
-    As block_kernels.factor; what is left in `values` serves nothing. Negative where a row that must be kept can't be.
+    As factorisation.factor; what is left in `values` serves nothing. Negative where a row that must be kept can't be.
     """
     pattern = network.pattern
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
@@ -207,21 +207,3 @@ def select(network, f, H, Y, S, wanted, least):
         share *= FINER
         if count < wanted or share < least:
             return False
-
-
-@kernel
-def factor_rows(network, f, H, Y, S, axes):
-    """Y = W H^T and the factors of S = H W H^T, of H without the dropped rows; the row that fails, or -1.
-
-    Without the `axes` W is that of the inertias given, which serves as a metric; accelerations need them.
-    """
-    weigh_rows(network, H, Y)
-    multiply_rows(network, H, Y, S)
-    drop_diagonal(network, f.dropped, S)
-    if network.axes.rows.shape[0] > 0:
-        weigh_axes(network, Y)
-        if axes:
-            multiply_axes(network, H, Y, S)
-        else:
-            leave_axes_out(network, S)
-    return factor(network.pattern, S, ZERO_PIVOT)

@@ -1,4 +1,4 @@
-"""How long a new process takes: importing, and a first and a second process to a finished 10 s run of the top.
+"""Cold start: import time, and the time of a first and a second process to the end of a 10 s run of the top.
 
 Run it: python -m benchmarks.cold_start (the first compilation goes to a temporary folder)
 """

@@ -1,4 +1,4 @@
-"""Constraints, one file each: primitives and the joints made of them; a new file in this folder is found by itself."""
+"""Constraints, one file each: primitives, and joints composed of them; a new file here is registered automatically."""
 
 from __future__ import annotations
 

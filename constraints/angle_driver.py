@@ -1,4 +1,4 @@
-"""A driven turn: the row of a motor, which needs no count of turns.
+"""Prescribed angle: the row of a motor, valid over any number of turns without counting.
 
     E = f.h,  F = g.h              f, g of body a, h of body b: at an angle theta, E = cos(theta), F = sin(theta)
     Phi   = cos(c) F - sin(c) E                             (1)  sin(theta - c); c(t) is the angle prescribed
@@ -7,7 +7,7 @@
     gamma = 2 cos(c) gd.hd - 2 sin(c) fd.hd - 2 cd (sin(c) Fd + cos(c) Ed)
             - cdd (sin(c) F + cos(c) E) - cd^2 Phi          (4)
 
-Holds after half a turn, too: a start there is refused. Singular where h is along the axis f x g.
+The row also admits the angle half a turn away; such a start is refused. Singular if h is along the axis f x g.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Constant angle between a direction of each body; all else stays free.
+"""Constant angle between a direction of each body; all other motion is free.
 
     a.b = cos(angle)     (1)  Dot1
 
-Singular where a and b are parallel (an angle of 0 or pi): Parallel keeps them so.
+Singular if a and b are parallel (an angle of 0 or pi): use Parallel.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Cylindrical joint: a common axis; one rotation about it and one displacement along it stay free.
+"""Cylindrical joint: a common axis; rotation about it and displacement along it are free.
 
     f_a.b = 0,  g_a.b = 0                           (1)  two rows, Parallel
     f_a.(x_b - x_a) = 0,  g_a.(x_b - x_a) = 0       (2)  two rows, PointOnLine: x_b on the axis of a
 
-Holds with the axes opposed, too: a start there is refused. Never singular.
+The rows also admit opposed axes; such a start is refused. Never singular.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@
     Phi_t = -L Ld / L0                      (3)
     gamma = (dd.dd - Ld^2 - L Ldd) / L0     (4)  dd = d/dt d
 
-Singular where x_a = x_b: a distance of zero is a Spherical joint.
+Singular if x_a = x_b: for zero distance use Spherical.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
     Phi_t = -cd                    (3)
     gamma = 2 ad.bd - cdd          (4)
 
-Singular where a and b are parallel (c = 1 or -1): two Dot1 rows with directions across make axes parallel.
+Singular if a and b are parallel (c = 1 or -1): Parallel uses two rows on perpendicular directions instead.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
     Phi_x = p^T               (2)  x = p
     gamma = pd.pd             (3)
 
-Every rigid body of a scene has one by itself.
+Every rigid body of a scene has one automatically.
 """
 
 from __future__ import annotations

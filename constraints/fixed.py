@@ -1,11 +1,11 @@
-"""Fixed joint: nothing stays free.
+"""Fixed joint: no relative motion.
 
     x_a - x_b = 0            (1)  three rows, Spherical
     f_a.b = 0,  g_a.b = 0    (2)  two rows, Parallel
     f_a.g_b = 0              (3)  Dot1
 
-f_a and f_b are the references made perpendicular to the axes, g = axis x f. Holds after half a turn about f, g or the
-axis, too: a start there is refused. Never singular.
+f_a and f_b are the references, made perpendicular to the axes; g = axis x f. The rows also admit half a turn about f, g
+or the axis; such a start is refused. Never singular.
 """
 
 from __future__ import annotations

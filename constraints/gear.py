@@ -1,4 +1,4 @@
-"""Gear pair: two wheels on parallel axes turn in a fixed ratio, against the line of their centres.
+"""Gear pair: wheels on parallel axes rotate in a fixed ratio, relative to the line of centres.
 
     l = x_b - x_a;  for w = f of a, and w = h of b:  X = l.w,  Y = u.(l x w),  S = X^2 + Y^2
     theta = atan2(Y, X)                                              (1)  from the line of centres to w, about u
@@ -7,8 +7,8 @@
     thetadd = (X Ydd - Y Xdd) / S - 2 (X Xd + Y Yd) (X Yd - Y Xd) / S^2                               (4)
               with Xdd = 2 ld.wd, Ydd = 2 (ud.(ld x w) + ud.(l x wd) + u.(ld x wd))
 
-The line of centres turns with whatever carries the wheels, so a planet gear needs nothing more. Turns are counted from
-the last accepted step, so a step must turn less than half a turn. Singular where l, f or h is along the axis.
+The line of centres rotates with the carrier of the wheels, so planetary gears are covered. Turns are counted from the
+last accepted step, so a step must rotate by less than half a turn. Singular if l, f or h is along the axis.
 """
 
 from __future__ import annotations

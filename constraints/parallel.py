@@ -1,8 +1,8 @@
-"""Parallel axes: a direction of each body stay parallel; three displacements and one rotation stay free.
+"""Parallel axes: one direction of each body; three displacements and one rotation are free.
 
     f_a.b = 0,  g_a.b = 0     (1)  two Dot1; f, g, a a right-handed orthonormal frame of body a
 
-The two rows are orthonormal in terms of small relative rotations. They hold with a and b opposed, too: a start there is
+The two rows are orthonormal in terms of small relative rotations. They also admit a and b opposed; such a start is
 refused. Never singular.
 """
 

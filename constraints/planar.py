@@ -1,9 +1,9 @@
-"""Planar joint: a face of each body stay in one plane; two displacements in it and one rotation stay free.
+"""Planar joint: a face of each body in a common plane; two displacements and one rotation are free.
 
     f_a.b = 0,  g_a.b = 0    (1)  two rows, Parallel: a and b are the normals
     a.(x_b - x_a) = 0        (2)  Dot2
 
-Holds with the normals opposed, too: a start there is refused. Never singular.
+The rows also admit opposed normals; such a start is refused. Never singular.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Point on plane: a point of a stays in a plane of b, on either side (two-sided).
+"""Point on plane: a point of a stays in a plane of b (bilateral).
 
     d     = x_a - x_b,  n = normal of b in the ground frame
     Phi   = n.d                       (1)  [m]

@@ -1,4 +1,4 @@
-"""Point driver: a point of a body follows a path, given in the frame of another.
+"""Point driver: a point of a body follows a prescribed path in the frame of another body.
 
     e_i.(x_b - x_a) = path_i(t)     (1)  three rows, Dot2; e_i are the axes of body a's frame
 

@@ -1,4 +1,4 @@
-"""Point on line: a point of a stays on a line of b; one displacement and three rotations stay free.
+"""Point on line: a point of a stays on a line of b; one displacement and three rotations are free.
 
     f_b.(x_a - x_b) = 0,  g_b.(x_a - x_b) = 0     (1)  two Dot2; f, g, b a right-handed orthonormal frame of body b
 

@@ -1,9 +1,9 @@
-"""Rack and pinion: a wheel that turns about its axis moves along a rack in proportion.
+"""Rack and pinion: displacement along a rack in proportion to rotation of a wheel.
 
     radius sin(theta - e.(x_b - x_a) / radius) = 0     (1)  Thread; theta about the axis, from e to h
 
-e is the rack's direction, h a direction of the pinion made perpendicular to its axis. The row is periodic as the teeth
-are, and counts no turns. Singular where the axis of the pinion is along the rack: joints keep it across.
+e is the direction of the rack, h a direction of the pinion, made perpendicular to its axis. The row is periodic and
+counts no turns. Singular if the axis of the pinion is along the rack, which its joints exclude.
 """
 
 from __future__ import annotations

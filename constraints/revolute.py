@@ -1,9 +1,9 @@
-"""Revolute joint: a common point and a common axis; one rotation stays free.
+"""Revolute joint: a common point and a common axis; one rotation is free.
 
     x_a - x_b = 0            (1)  three rows, Spherical
     f_a.b = 0,  g_a.b = 0    (2)  two rows, Parallel
 
-Holds with the axes opposed, too: a start there is refused. Never singular.
+The rows also admit opposed axes; such a start is refused. Never singular.
 """
 
 from __future__ import annotations

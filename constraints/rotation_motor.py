@@ -1,9 +1,9 @@
-"""Rotation motor: the angle about an axis is a function of time; counts any number of turns by itself.
+"""Rotation motor: the angle about an axis is a prescribed function of time, over any number of turns.
 
     sin(theta - angle(t)) = 0     (1)  AngleDriver; theta from f_a to f_b about the axis
 
-f_a and f_b are the references made perpendicular to the axes. Holds after half a turn, too: a start there is refused.
-Singular where the axes are at right angles: a joint keeps them together.
+f_a and f_b are the references, made perpendicular to the axes. The row also admits the angle half a turn away; such a
+start is refused. Singular if the two axes are perpendicular, which the joint excludes.
 """
 
 from __future__ import annotations

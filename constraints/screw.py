@@ -1,11 +1,11 @@
-"""Screw joint: a common axis, and a turn about it for every travel along it.
+"""Screw joint: a common axis; rotation in proportion to displacement along it.
 
     f_a.b = 0,  g_a.b = 0                           (1)  two rows, Parallel
     f_a.(x_b - x_a) = 0,  g_a.(x_b - x_a) = 0       (2)  two rows, PointOnLine: x_b on the axis of a
     lead sin(theta - a.(x_b - x_a) / lead) = 0      (3)  Thread; theta from f_a to f_b about the axis
 
-f_a and f_b are the references made perpendicular to the axes. (1) holds with the axes opposed, too: a start there is
-refused. (3) is periodic as the thread is, and counts no turns. Never singular.
+f_a and f_b are the references, made perpendicular to the axes. (1) also admits opposed axes; such a start is refused.
+(3) is periodic and counts no turns. Never singular.
 """
 
 from __future__ import annotations

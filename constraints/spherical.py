@@ -1,8 +1,8 @@
-"""Spherical joint: a point of each body coincide.
+"""Spherical joint: a point of each body coincides.
 
     Phi   = x_a - x_b         (1)  [m], 3 rows, ground frame
     Phi_x = [ I, -I ]         (2)
-    gamma = 0                 (3)  what remains is the markers' own acceleration
+    gamma = 0                 (3)  the acceleration of the markers is added by the core
 
 Never singular by itself.
 """

@@ -1,4 +1,4 @@
-"""A turn in proportion to a travel: the thread of a screw, or the teeth of a rack.
+"""Rotation in proportion to displacement: the thread of a screw, the teeth of a rack.
 
     E = f.h,  F = g.h,  d = x_b - x_a         f, g, e of body a, h of body b: E = cos(theta), F = sin(theta)
     s     = e.d / L                                                 (1)  L is the lead, m/rad
@@ -9,8 +9,8 @@
     gamma = L cos(s) (Fdd - sd^2 F - sdd E - 2 sd Ed) - L sin(s) (Edd - sd^2 E + sdd F + 2 sd Fd)
             with Edd = 2 fd.hd, Fdd = 2 gd.hd, sdd = 2 ed.dd / L    (5)
 
-It is periodic as a thread is, so no turns are counted; the neighbouring solutions are half a turn or half a pitch away.
-Singular where h is along f x g.
+The row is periodic, so no turns are counted; the neighbouring solutions are half a turn or half a pitch away. Singular
+if h is along f x g.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Translation motor: the displacement along an axis is a function of time.
+"""Translation motor: the displacement along an axis is a prescribed function of time.
 
     a.(x_b - x_a) = displacement(t)     (1)  Dot2
 

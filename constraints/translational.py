@@ -1,11 +1,11 @@
-"""Translational joint: one displacement along an axis stays free.
+"""Translational joint: displacement along one axis is free.
 
     f_a.b = 0,  g_a.b = 0                           (1)  two rows, Parallel
-    f_a.g_b = 0                                     (2)  Dot1: no turn about the axis
+    f_a.g_b = 0                                     (2)  Dot1: no rotation about the axis
     f_a.(x_b - x_a) = 0,  g_a.(x_b - x_a) = 0       (3)  two rows, PointOnLine: x_b on the axis of a
 
-f_a and f_b are the references made perpendicular to the axes, g = axis x f. Holds after half a turn, too: a start there
-is refused. Never singular.
+f_a and f_b are the references, made perpendicular to the axes; g = axis x f. The rows also admit half a turn; such a
+start is refused. Never singular.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Universal joint (Hooke, Cardan): a common point and a cross of two arms; two rotations stay free.
+"""Universal joint (Hooke, Cardan): a common point and a cross of two arms; two rotations are free.
 
     x_a - x_b = 0     (1)  three rows, Spherical
     a.b = 0           (2)  Dot1: a is the arm of the cross that turns in body a, b the one that turns in body b
 
-Never singular. Shafts at an angle beta turn at the same speed on average only: w_b / w_a = cos(beta) / (1 - sin(beta)^2
-sin(theta)^2), theta being the turn of the shaft of a from where its arm is across both.
+Never singular. Shafts at an angle beta have equal mean speeds only: w_b / w_a = cos(beta) / (1 - sin(beta)^2
+sin(theta)^2), with theta the rotation of shaft a from where its arm is perpendicular to both shafts.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Integrators, one file each; a new file in this folder is found by itself."""
+"""Integrators, one file each; a new file in this folder is registered automatically."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """DOP853: the explicit Runge-Kutta method of order 8 of Dormand and Prince, in Hairer's form, adaptive.
 
-Twelve stages; the step's error is estimated at orders five and three, which Hairer combines; three more stages, made
-where a step's inside is wanted, give an interpolant of order seven. E. Hairer, S. P. Norsett, G. Wanner, Solving
-Ordinary Differential Equations I, 2nd ed., II.5, II.6 and II.10. The coefficients are those that SciPy carries.
+Twelve stages; Hairer's error estimate combines embedded formulas of orders five and three. Three further stages, made
+only where dense output is needed, give an interpolant of order seven. E. Hairer, S. P. Norsett, G. Wanner, Solving
+Ordinary Differential Equations I, 2nd ed., II.5, II.6 and II.10. The coefficients are SciPy's.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""ImplicitTrapezoid: the trapezoidal rule, order 2, A-stable, without damping; its Jacobian is kept and used again."""
+"""ImplicitTrapezoid: the trapezoidal rule, order 2, A-stable, no numerical damping, with a Jacobian kept over steps."""
 
 from __future__ import annotations
 

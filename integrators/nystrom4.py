@@ -1,4 +1,4 @@
-"""Nystrom4: explicit Nystrom, four stages, order 4, the acceleration may depend on the velocity.
+"""Nystrom4: explicit Nystrom method of order 4, four stages, for accelerations that depend on velocity.
 
     stage   c     v                              vd
     1       0     v                              vd
@@ -7,7 +7,7 @@
     4       1     v + h vd + h^2/2 k3            vd + h k3
     step          v + h vd + h^2/6 (k1+k2+k3)    vd + h/6 (k1 + 2 k2 + 2 k3 + k4)
 
-Stages 2 and 3 share their position, so a step places the system three times (the end included) for four accelerations.
+Stages 2 and 3 share one position: a step has three position solves, its end included, and four accelerations.
 Nystrom 1925; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.14, Eq. (14.13).
 """
 

@@ -1,7 +1,7 @@
 """RK45: the embedded pair 5(4) of Dormand and Prince, adaptive.
 
 J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, J. Comput. Appl. Math. 6, 19-26 (1980); applied
-to (v, vd). The seventh stage is the evaluation at the step's end, which the driver makes anyway.
+to (v, vd). First same as last: the seventh stage is the evaluation at the step's end.
 """
 
 from ..plugins import ExplicitRungeKutta, RungeKuttaTableau

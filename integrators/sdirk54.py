@@ -1,4 +1,4 @@
-"""SDIRK54: L-stable, stiffly accurate, order 5(4), one implicit stage after the other: ESDIRK5(4)7L[2]SA2.
+"""SDIRK54: diagonally implicit, L-stable, stiffly accurate, order 5(4): ESDIRK5(4)7L[2]SA2.
 
 C. A. Kennedy, M. H. Carpenter, Diagonally implicit Runge-Kutta methods for stiff ODEs, Appl. Numer. Math. 146, 221-244
 (2019). Seven stages with the same diagonal, the first explicit; stage order 2; the error estimate is of order 4.

@@ -1,7 +1,7 @@
 """Taylor series of the motion, of variable order and step (Jorba and Zou, Experiment. Math. 14, 99, 2005).
 
-The coefficients of r, A, omega' and the multipliers follow order by order from the equations of motion (see
-coefficients.py); at a step's end positions and velocities are put back on the constraints.
+The coefficients of r, A, omega' and lam follow order by order from the equations of motion, see
+coefficients.py. At the end of a step, positions and velocities are projected onto the constraint manifold.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Calls of public functions and classes: one that doesn't fit the signature says what would.
+"""Calls of public functions and classes: a call that doesn't match the signature is answered with the nearest match.
 
-`fitting` wraps a function and costs nothing where a call fits; `Placing` is the descriptor of `.at`, which gives every
-class a signature of its own.
+`fitting` wraps a function and costs nothing for a valid call; `Placing` is the descriptor of `.at`, which gives every
+class its own signature.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What can go wrong: exceptions for what is refused before a run, a status for how a run ended."""
+"""Exceptions for input refused before a run; the status with which a run ends."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 class TsdynError(Exception):
-    """Any error that tsdyn raises on purpose; the message says what is wrong, where, and how to mend it.
+    """Base of all errors that tsdyn raises; the message says what is wrong, where, and how to fix it.
 
     Examples
     --------
@@ -25,7 +25,7 @@ class TsdynError(Exception):
 
 
 class InvalidArgument(TsdynError, ValueError):
-    """An argument that is neither a body nor a constraint has a wrong value, type or shape.
+    """An argument has an invalid value, type or shape.
 
     Examples
     --------
@@ -39,7 +39,7 @@ class InvalidArgument(TsdynError, ValueError):
 
 
 class InvalidCall(InvalidArgument, TypeError):
-    """A call that the signature doesn't allow: an argument is misspelt, missing, given twice or one too many.
+    """A call doesn't match the signature: an argument is misspelt, missing, duplicate or superfluous.
 
     Examples
     --------
@@ -53,7 +53,7 @@ class InvalidCall(InvalidArgument, TypeError):
 
 
 class InvalidBody(TsdynError, ValueError):
-    """A body's mass, inertia, pose or velocity is impossible, or the body belongs to another scene.
+    """The mass, inertia, pose or velocity of a body is inadmissible, or the body belongs to another scene.
 
     Examples
     --------
@@ -68,7 +68,7 @@ class InvalidBody(TsdynError, ValueError):
 
 
 class InvalidConstraint(TsdynError, ValueError):
-    """A constraint's geometry, bodies or kernels are impossible.
+    """The geometry, bodies or kernels of a constraint are inadmissible.
 
     Examples
     --------
@@ -84,7 +84,7 @@ class InvalidConstraint(TsdynError, ValueError):
 
 
 class InvalidForce(TsdynError, ValueError):
-    """A force's numbers, functions, bodies or kernels are impossible.
+    """The parameters, functions, bodies or kernels of a force are inadmissible.
 
     Examples
     --------
@@ -100,7 +100,7 @@ class InvalidForce(TsdynError, ValueError):
 
 
 class InconsistentState(TsdynError, ValueError):
-    """Positions or velocities break a constraint; the message names it and its residual.
+    """Positions or velocities violate a constraint; the message names the row and its residual.
 
     Examples
     --------
@@ -121,7 +121,7 @@ class InconsistentState(TsdynError, ValueError):
 
 
 class RedundantConstraints(TsdynError, ValueError):
-    """Rows of Phi_q depend on each other; the message names them.
+    """Rows of Phi_q are linearly dependent; the message names them.
 
     Examples
     --------
@@ -138,7 +138,7 @@ class RedundantConstraints(TsdynError, ValueError):
 
 
 class SingularConfiguration(TsdynError, ArithmeticError):
-    """The equations of motion have no unique solution here: Phi_q loses rank, or D^T M D is singular.
+    """The equations of motion have no unique solution: Phi_q loses rank, or D^T M D is singular.
 
     Examples
     --------
@@ -154,7 +154,7 @@ class SingularConfiguration(TsdynError, ArithmeticError):
 
 
 class UnknownAttribute(TsdynError, AttributeError):
-    """An attribute that a body, constraint or scene does not have was set: a slip of the pen would change nothing.
+    """Assignment to an attribute that a body, constraint, force or scene doesn't have.
 
     Examples
     --------
@@ -170,7 +170,7 @@ class UnknownAttribute(TsdynError, AttributeError):
 
 
 class MissingDependency(TsdynError, ImportError):
-    """An optional package is needed for this and is not installed.
+    """A feature needs an optional package that is not installed.
 
     Examples
     --------
@@ -181,7 +181,7 @@ class MissingDependency(TsdynError, ImportError):
 
 
 class StepFailure(TsdynError, ArithmeticError):
-    """A run ended early; raised by `Solution.raise_if_failed`, with the solution so far as `.solution`.
+    """A run ended early; raised by `Solution.raise_if_failed`, with the partial solution as `.solution`.
 
     Examples
     --------
@@ -202,7 +202,7 @@ class StepFailure(TsdynError, ArithmeticError):
 
 
 class CheckFailed(TsdynError, AssertionError):
-    """A check of a plug-in failed; the message says which entry, what it gave and what it should have given.
+    """A check of a plug-in failed; the message names the entry, its value and the expected value.
 
     Examples
     --------
@@ -213,7 +213,7 @@ class CheckFailed(TsdynError, AssertionError):
 
 
 class Status(IntEnum):
-    """How a run ended, or the stop of one slice of it; `sentence` says it, `remedy` what to do.
+    """Reason for the end of a run or of a slice of it; `sentence` states it, `remedy` what to do.
 
     Examples
     --------
@@ -253,7 +253,7 @@ class Status(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """What happened, without the place."""
+        """What happened, without the location."""
         return _SENTENCES[self][0]
 
     @property
@@ -265,53 +265,55 @@ class Status(IntEnum):
 _SENTENCES = {
     Status.SUCCESS: ("The run reached the end of the interval.", ""),
     Status.NEWTON_FAILED: (
-        "Newton's method for the position constraints (Eq. 29) did not converge, not even on a fresh chart.",
+        "Newton's method for the position constraints (Eq. 29) did not converge, even on a new chart.",
         "Take a smaller step.",
     ),
     Status.NOT_FINITE: (
-        "A number stopped being finite.",
-        "Look for a motion, a force or a plug-in that returns inf or nan here, or take a smaller step.",
+        "A number is no longer finite.",
+        "Check for a motion, force or plug-in that returns inf or nan here, or take a smaller step.",
     ),
     Status.SINGULAR: (
         "The constraint Jacobian Phi_q has lost rank: this is a singular configuration.",
-        "Taylor series pass such a place where the motion is smooth, if every part of the scene has one; else start "
-        "elsewhere, or remove the constraint that has become dependent.",
+        "The Taylor integrator passes a singular configuration if the motion is smooth and every part of the scene has "
+        "a series; else start from another configuration, or remove the constraint that has become dependent.",
     ),
     Status.MASS_SINGULAR: (
-        "The reduced mass matrix D^T M D is not positive definite: a direction that the constraints leave free "
-        "carries no inertia.",
-        "Give the body inertia about its free axis, or add the constraint that holds it.",
+        "The reduced mass matrix D^T M D is not positive definite: a free direction has no inertia.",
+        "Give the body inertia about its free axis, or constrain that axis.",
     ),
     Status.CHART_LOST: (
-        "The motion left its chart within a single step, so which branch of the constraints it is on is not certain.",
+        "The motion left its chart within one step, so its branch of the constraints is uncertain.",
         "Take a smaller step.",
     ),
     Status.STEP_COLLAPSED: (
-        "The step that the tolerances ask for is down to rounding of the time.",
-        "Look for a singular configuration, a jump in a motion or stiff parts near this time; or loosen rtol and atol.",
+        "The step size that the tolerances require has reached the rounding of the time.",
+        "Check for a singular configuration, a jump in a motion or stiffness near this time, or loosen rtol and atol.",
     ),
     Status.STAGE_FAILED: (
-        "Newton's method for a stage of the implicit method did not converge, or went far from its prediction.",
-        "Take a smaller step, or an adaptive one.",
+        "Newton's method for an implicit stage did not converge, or ended far from its prediction.",
+        "Take a smaller step, or an adaptive method.",
     ),
     Status.MAX_STEPS: ("The run reached max_steps.", "Raise max_steps, or take a larger step."),
-    Status.INTERRUPTED: ("The run was interrupted.", "Go on with simulate(scene, (t, t_end), state=solution.state)."),
+    Status.INTERRUPTED: (
+        "The run was interrupted.",
+        "Continue with simulate(scene, (t, t_end), state=solution.state).",
+    ),
     Status.EVENT: ("A terminal event ended the run.", ""),
-    Status.EVENT_FAILED: ("An event function gave no number.", "Mend it, or return a finite float for every state."),
+    Status.EVENT_FAILED: ("An event function returned no number.", "It must return a finite float for every state."),
     Status.UNHELD: (
-        "Constraint rows that followed from the others at the start hold no longer: together they can't be met here.",
-        "Remove one of the constraints that contradict each other, or correct their points and axes.",
+        "Constraint rows that were redundant at the start no longer hold: the constraints are incompatible here.",
+        "Remove one of the conflicting constraints, or correct their points and axes.",
     ),
     Status.JAMMED: (
-        "No reactions could be found with which the joints' friction is in balance.",
-        "The coefficients may be so large that the mechanism jams, so that no motion follows from rigid bodies; else "
-        "take a smaller step.",
+        "No reactions are consistent with the friction of the joints.",
+        "The mechanism may jam: with large friction coefficients rigid-body dynamics has no solution. Otherwise take a "
+        "smaller step.",
     ),
-    Status.STIFF: ("The motion is stiff, and an implicit method is cheaper.", "Use SDIRK54."),
+    Status.STIFF: ("The motion is stiff; an implicit method is cheaper.", "Use SDIRK54."),
     Status.SLICE_DONE: ("A slice of the run is done.", ""),
     Status.SAMPLING_FAILED: (
-        "A function that is sampled gave no number.",
-        "Mend it, or return a finite float for every angle and rate.",
+        "The function of a sampled load returned no number.",
+        "It must return a finite float for every coordinate and rate.",
     ),
-    Status.PASSAGE: ("A singular configuration is near, and there is a way past it.", ""),
+    Status.PASSAGE: ("A singular configuration is near; the Taylor integrator takes over.", ""),
 }

@@ -1,7 +1,7 @@
-"""Figures (matplotlib, an optional dependency, is imported when one is drawn).
+"""Figures; matplotlib, an optional dependency, is imported on first use.
 
-`constraint_error` draws one solution into axes of the caller's; `tables_figure` draws what `tables.reproduce` measured,
-without pyplot and so without touching the caller's backend or figures.
+`constraint_error` draws one solution into the caller's axes; `tables_figure` draws the result of
+`haug_tables.reproduce` without pyplot, so it affects neither the caller's backend nor open figures.
 """
 
 from __future__ import annotations

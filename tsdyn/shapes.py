@@ -159,7 +159,7 @@ def cylinder(
 def rod(length: float, *, axis: Axis = "z", mass: float) -> Shape:
     """A slender rod about its centre, along the axis "x", "y" or "z".
 
-    It has no inertia about its axis: a joint must hold that turn. A rod with a thickness is a `cylinder`.
+    It has no inertia about its axis, so a joint must constrain that rotation. For a rod with thickness use `cylinder`.
 
     Raises
     ------
@@ -178,7 +178,7 @@ def rod(length: float, *, axis: Axis = "z", mass: float) -> Shape:
 def from_mesh(
     vertices: ArrayLike, faces: ArrayLike, *, mass: float | None = None, density: float | None = None
 ) -> Shape:
-    """The solid that a closed mesh of triangles bounds; exact, but for rounding.
+    """The solid bounded by a closed triangle mesh; exact to rounding.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def from_mesh(
     ------
     InvalidArgument
         If the mesh is not closed, its triangles don't turn the same way or all face inward, it has no volume, or an
-        index is out of range. A mesh that cuts through itself is not noticed.
+        index is out of range. Self-intersections are not detected.
 
     Examples
     --------

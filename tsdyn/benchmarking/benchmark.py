@@ -1,4 +1,4 @@
-"""`benchmark`: run time against error of integration methods on a scene of the user's."""
+"""`benchmark`: work-precision of integration methods on a user's scene."""
 
 from __future__ import annotations
 
@@ -63,17 +63,17 @@ def benchmark(
     formulation, constraint_tol
         As for `simulate`. The reference is always by the tangent-space ODE.
     max_steps : int
-        A run that needs more is reported as such.
-    reference : agreement.Reference, optional
-        Default made here, by two methods that agree, as far as they do.
+        A run that needs more is reported as failed.
+    reference : reference_solution.Reference, optional
+        By default two methods, refined until they agree, give the reference.
     progress : callable, optional
-        Given the fraction done, 0 to 1.
+        Receives the fraction done, 0 to 1.
 
     Returns
     -------
     Benchmark
-        Its `rows`, `table()` and `plot()`. A run that fails, or is refused, is a row that says so. After Ctrl-C it
-        holds what has been measured so far, and `interrupted` is True.
+        With `rows`, `table()` and `plot()`. A run that fails or is refused is reported in its row. After Ctrl-C the
+        result holds the measurements so far, and `interrupted` is True.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def benchmark(
     if progress is not None and not callable(progress):
         raise InvalidArgument(f"progress must be a callable that is given the fraction done, got {progress!r}.")
     if reference is not None and not isinstance(reference, Reference):
-        raise InvalidArgument(f"reference must be a tsdyn.agreement.Reference, got {reference!r}.")
+        raise InvalidArgument(f"reference must be a reference_solution.Reference of benchmarking, got {reference!r}.")
     plan = _plan(methods, tolerances, steps, form)
     t_span = _span(t_span)
     times = _times(t_eval, t_span) if reference is None else reference.t

@@ -1,4 +1,4 @@
-"""A scene's own reference solution: two methods of different kinds, refined until they agree or as far as they do."""
+"""Reference solution of a scene: two unrelated methods, refined until they agree as far as they can."""
 
 from __future__ import annotations
 

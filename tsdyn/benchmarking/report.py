@@ -1,4 +1,4 @@
-"""What `benchmark` hands back: rows, the table they make, and the figure."""
+"""The result of `benchmark`: rows, their table, and the figure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), and where a scene's time goes."""
+"""The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), and the profile of a scene."""
 
 import argparse
 import sys

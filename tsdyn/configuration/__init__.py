@@ -1,4 +1,4 @@
-"""Configurations at one instant: initial conditions, assembly, rank and redundancy, mobility, contradictions.
+"""Configurations at one instant: initial conditions, assembly, rank and redundancy, mobility, conflicts.
 
 Imports taylor and below.
 

@@ -1,4 +1,4 @@
-"""`scene.assemble`: the nearest consistent positions, then the nearest consistent velocities."""
+"""`scene.assemble`: nearest consistent positions, then nearest consistent velocities."""
 
 from __future__ import annotations
 
@@ -189,10 +189,10 @@ def _unfolded(scene, metric, sketch, found, links, drawn, tol):
         for k in first[:8]
     ]
     raise InconsistentState(
-        "the configurations found fold links to the other side than the sketch does, which is another branch:\n"
+        "the configurations found are on another branch than the sketch: links are folded to the other side:\n"
         + "\n".join(stories)
-        + '\nDraw the links there further from straight, or on the other side; or pass folds="free" to take the '
-        "nearest configuration whatever its branch."
+        + '\nDraw these links further from straight, or on the other side; or pass folds="free" to accept the '
+        "nearest configuration on any branch."
     )
 
 
@@ -214,13 +214,13 @@ def _velocities(scene, metric, q, qd, A, Phi_t):
 
 
 def _demand_direction(scene, metric, found):
-    """Refuse a constraint whose derivative vanishes where it isn't met: nothing says which way to go."""
+    """Refuse a constraint whose derivative vanishes where it isn't met: no correction is determined."""
     still = stuck(metric, found.q, found.Phi)
     if still.size and metric.columns.size == metric.size:
         name = scene.row_names()[metric.own[still[0]]]
         raise InconsistentState(
-            f"{name}: Phi = {found.Phi[still[0]]:.3g}, and its derivative vanishes, so nothing says which way to go. "
-            "Move its bodies a little towards where they should be."
+            f"{name}: Phi = {found.Phi[still[0]]:.3g} and its derivative vanishes, so the direction of a correction is "
+            "undetermined. Move its bodies a little in the right direction."
         )
 
 
@@ -241,6 +241,6 @@ def _demand_compatible(scene, residual, tol):
         names = scene.row_names()
         rows = ", ".join(f"{names[i]} ({residual[i]:.3g})" for i in sorted(bad, key=lambda i: -abs(residual[i]))[:8])
         raise InconsistentState(
-            f"no velocities meet all constraints in the configuration found; Phi_q qd + Phi_t left over: {rows}. "
-            "Rows that say the same must also move the same: give their motions equal rates, or drop one."
+            f"no velocities satisfy all constraints in the configuration found; residuals of Phi_q qd + Phi_t: {rows}. "
+            "Redundant driven rows must have equal rates: correct their motions, or remove one."
         )

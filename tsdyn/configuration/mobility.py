@@ -1,4 +1,4 @@
-"""`scene.mobility`: degrees of freedom, rank, and the rows that say nothing new; everywhere, or just here."""
+"""`scene.mobility`: degrees of freedom, rank, redundant rows, and whether the configuration is singular."""
 
 from __future__ import annotations
 
@@ -211,8 +211,8 @@ def _core(metric, q, rows):
         rows = put_aside(A, owners)
         if len(rows) > MOST_ROWS:
             raise InvalidArgument(
-                f"mobility: the closed loops of this scene have {len(rows)} constraint rows; it is worked out for up "
-                f"to {MOST_ROWS}. Ask for a smaller scene of the same kind."
+                f"mobility: the closed loops of this scene have {len(rows)} constraint rows; the limit is "
+                f"{MOST_ROWS}. Analyse a smaller scene of the same kind."
             )
     left = A[rows]
     used = np.unique(left.indices) if len(rows) else np.zeros(0, int)

@@ -1,8 +1,8 @@
 """`scene.set`: the coordinates of a joint at the start, and the rest of the scene assembled around it.
 
-Where the joint is the only link between two parts of the scene, one part is moved against the other as a rigid body:
-all other joints stay as they are. In a loop the joint is driven to its value in small steps, each of which is
-assembled, so that the mechanism stays on its branch.
+If the joint is the only link between two parts of the scene, one part is moved rigidly relative to the other; all other
+joints keep their values. In a loop the joint is driven to its value in small steps, each followed by an assembly, so
+that the mechanism stays on its branch.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def set_joint(
     _link(joint, given)
     given = {kind: pair for kind, pair in given.items() if any(x is not None for x in pair)}
     if not given:
-        raise InvalidArgument(f"set: nothing is said of {joint!r}; give angle=, displacement= or rate=.")
+        raise InvalidArgument(f"set: no value is given for {joint!r}; give angle=, displacement= or rate=.")
     goals = [goal for kind, pair in given.items() for goal in _goals(scene, handles, joint, kind, pair, t)]
     others = [other for other in map(handles.item, keep) if other is not joint]
     held = [(other, goal) for other in others for goal in _present(scene, handles, other, t)]

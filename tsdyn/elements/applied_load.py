@@ -1,4 +1,4 @@
-"""What PointForce and Torque share: three numbers, a function of time, or of time and state, in either frame."""
+"""Applied loads, the base of PointForce and Torque: constant, f(t) or f(t, state), in the ground or body frame."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class GivenByState(ByState):
     series = None  # nothing is known of a function
 
     def parameters(self):
-        """Whether the vector is in axes of the body."""
+        """One flag: the vector is given in the body frame."""
         return (float(self.frame == "body"),)
 
     @staticmethod

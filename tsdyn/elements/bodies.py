@@ -1,4 +1,4 @@
-"""Rigid bodies, point masses and the ground: what the user sets, checked when it is set."""
+"""Rigid bodies, point masses and the ground, with attributes that are validated when set."""
 
 from __future__ import annotations
 

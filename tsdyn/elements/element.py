@@ -1,4 +1,4 @@
-"""What constraints and forces share: two bodies, a name, markers, and attributes that are checked when they are set."""
+"""Base of constraints and forces: two bodies, a name, markers, and attributes that are validated when set."""
 
 from __future__ import annotations
 

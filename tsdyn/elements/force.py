@@ -1,4 +1,4 @@
-"""What a force is: a class whose kernel is compiled once and reached by address.
+"""The interface of a force: a class whose kernel is compiled once and called by address.
 
 A force works on marker coordinates x and their rates xd (ground frame) and never sees Euler parameters:
 
@@ -10,13 +10,13 @@ A force works on marker coordinates x and their rates xd (ground frame) and neve
     normal_load(x, f, par)         optional, of friction: what par[-1] is, from a reaction f, see joint_friction.py
 
 x is the concatenation of the force's markers, par the floats that `parameters()` returns, functions of time among them
-evaluated at t. Conjugate to a Point is a force, to a Turn a torque, both in the ground frame. What does its work by a
-potential or takes it as dissipation says so; the rest of out . xd is applied power.
+evaluated at t. A Point is conjugate to a force, a Turn to a torque, both in the ground frame. Work that belongs to
+`potential` or `dissipation` is declared by these methods; the remainder of out . xd counts as applied power.
 
 `law` uses arithmetic and NumPy functions of scalars and is analytic in x and xd (no comparison, abs or norm), since
-complex steps of it are the Jacobians of implicit methods; write products instead of powers of x. Set analytic = False
-where that is impossible: then central differences do it. `potential` and `dissipation` are run by NumPy on arrays.
-`series` gets the coefficients k of x and xd, and fills column k of the scratch array s[slots, k].
+complex steps of it give the Jacobians of implicit methods; write products instead of powers of x. Where that is
+impossible, set analytic = False for central differences. `potential` and `dissipation` are evaluated by NumPy on
+arrays. `series` receives coefficient k of x and xd and fills column k of the scratch array s[slots, k].
 """
 
 from __future__ import annotations

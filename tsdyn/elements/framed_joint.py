@@ -1,4 +1,4 @@
-"""Joints that hold an orientation: on each body an axis and a direction across it, by default as the bodies stand."""
+"""Base of joints that hold an orientation: an axis and a perpendicular direction on each body, by default as built."""
 
 from __future__ import annotations
 

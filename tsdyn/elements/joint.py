@@ -1,4 +1,4 @@
-"""What a joint is: a constraint composed of others, which has no kernels and costs what its rows cost."""
+"""The interface of a joint: a constraint composed of primitives, with no kernels of its own."""
 
 from __future__ import annotations
 

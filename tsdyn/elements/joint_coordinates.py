@@ -4,8 +4,8 @@
     theta = atan2(g.v, f.v)           (1)  f, g: directions of the own body at right angles; modulo 2 pi
     s     = e.(x_other - x_own)       (2)  e: a direction of the own body
 
-The own body is the one that the axis belongs to. f, g and the axis are right-handed; where the axis belongs to b, g is
-reversed, so that theta is the angle of b against a about the axis (right hand) in either case.
+The own body is the body of the axis. f, g and the axis are right-handed; if the axis belongs to b, g is reversed, so
+that theta is the angle of b relative to a about the axis (right-hand rule) in either case.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Friction of a constraint from its own reaction: what the laws of joints and contacts share.
+"""Base of joint friction: laws in proportion to the reaction of their own joint or contact.
 
-    friction on a   = par[-1] times what `law` gives for a normal load of one
+    friction on a   = par[-1] times `law` for unit normal load
     par[-1]         = normal_load(x, f, par), f (6,) the force and torque that the constraint exerts
 
-The normal load depends on multipliers, and those on the friction: the solver finds both together (friction_solve.py).
+The normal load depends on the multipliers and they on the friction: both are solved for together (friction_solve.py).
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class JointFriction:
     joints: tuple[type, ...] = ()
     markers: tuple[Marker, ...] = ()
     particles = True
-    no_series = "its size follows from a reaction, and its direction turns round too sharply for a series"
+    no_series = "its magnitude depends on a reaction, and its direction reverses too sharply for a series"
     quantities: Mapping[str, Callable[..., Any]] = MappingProxyType(
         {
             "kinetic": not_negative,

@@ -1,4 +1,4 @@
-"""What JointTorque and JointForce share: a function of time, joint coordinate and rate, continuous or sampled."""
+"""Base of JointTorque and JointForce: a function of time, joint coordinate and rate, continuous or sampled."""
 
 from __future__ import annotations
 

@@ -5,8 +5,8 @@
     Parameters  x = p             xd = pd                             xdd = 0
     Turn        x = 0             xd = 2 E(p) pd, the angular velocity; for forces only
 
-x and xd are in the ground frame, s in the body frame. On the ground x = s, or p = (1, 0, 0, 0), and nothing moves; a
-point mass has r only.
+x and xd are in the ground frame, s in the body frame. On the ground x = s or p = (1, 0, 0, 0), at rest; a point mass
+has r only.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a constraint primitive is: a class whose kernels are compiled once and reached by address.
+"""The interface of a constraint primitive: a class whose kernels are compiled once and called by address.
 
 A primitive works on marker coordinates x (3-vectors in the ground frame) and never sees Euler parameters:
 
@@ -10,11 +10,11 @@ A primitive works on marker coordinates x (3-vectors in the ground frame) and ne
     series_t(x, par, k, s, out)  out[rows]          and of Phi_t, where it has what is `prescribed`; after `series`
     remember(x, par, t)          optional, with memory = 1: what the last of par is after each accepted step
 
-x is the concatenation of the primitive's markers, par the floats that `parameters()` returns; a motion among them takes
-three places, its value, rate and acceleration at t. The loops below apply the chain rule x(q) (Haug 2018, Eqs. 2-3).
-Kernels use arithmetic and NumPy functions, no comparison, abs or norm of x, so that they also run on complex numbers
-and on truncated Taylor series: that is how they are checked. `series` gets the coefficients k of x, those before being
-where it has left them: in the scratch array s[slots, k], of which it fills column k.
+x is the concatenation of the primitive's markers, par the floats that `parameters()` returns; a motion among them
+occupies three: value, rate and acceleration at t. The loops below apply the chain rule x(q) (Haug 2018, Eqs. 2-3).
+Kernels use arithmetic and NumPy functions, no comparison, abs or norm of x, so that checks can run them on complex
+numbers and truncated Taylor series. `series` receives coefficient k of x and fills column k of the scratch array
+s[slots, k], where earlier coefficients remain.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ class Primitive(Attachment):
 
     @property
     def rheonomic(self) -> bool:
-        """Whether it depends on time."""
+        """True if the constraint depends on time."""
         names = self.quantities()
         moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
         return moves and "phi_t" in self.kernels

@@ -1,4 +1,4 @@
-"""Functions of time and state that users write, as kernels of forces; each gives callbacks of its own, once."""
+"""Users' functions of time and state as force kernels, with one set of callbacks for each function."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Forces, one file each; a new file in this folder is found by itself."""
+"""Forces, one file each; a new file in this folder is registered automatically."""
 
 from __future__ import annotations
 

@@ -7,8 +7,8 @@
     U = (d.K d + phi.K_t phi) / 2                                                (3)
     dissipation = dd.C dd + w.C_t w                                              (4)
 
-(1) and (2) are minus the derivatives of U: phid = e0 w + w x e. U is largest at half a turn; beyond, it pulls on to the
-full turn.
+(1) and (2) are minus the derivatives of U, since phid = e0 w + w x e. U has its maximum at half a turn; beyond it the
+restoring torque acts towards the full turn.
 """
 
 from __future__ import annotations

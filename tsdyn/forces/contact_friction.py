@@ -1,11 +1,11 @@
-"""Friction of a plane contact from its own reaction: of a point that slides over a plane.
+"""Friction of a plane contact (a point sliding on a plane), in proportion to the reaction of the contact.
 
     n      normal, v = velocity of a's point over b, less its part along n
     N      = N_0 + |n.F|                                                 (1)
     force  = -mu(|v|) N v / |v|     on a at its point, the opposite on b (2)
     dissipation = mu(|v|) N |v|                                          (3)
 
-F is the force that the contact exerts; mu is that of friction.coefficient.
+F is the force that the contact exerts; mu is given by friction_laws.coefficient.
 """
 
 import numpy as np

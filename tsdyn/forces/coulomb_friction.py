@@ -1,11 +1,11 @@
-"""Coulomb friction of constant size between two bodies, of a point and of their turning, smooth at rest.
+"""Coulomb friction of constant magnitude between two bodies, in translation and rotation, regularised at rest.
 
-    v, w as for ViscousFriction: relative velocity at the place of a's point, relative angular velocity
-    F = -R v / sqrt(v.v + v0^2)     on a at x_a, the opposite on b at the same place     (1)
+    v, w as for ViscousFriction: relative velocity at a's point, relative angular velocity
+    F = -R v / sqrt(v.v + v0^2)     on a at x_a, the opposite on b at the same point     (1)
     N = -N0 w / sqrt(w.w + w0^2)    on a, the opposite on b                              (2)
     dissipation = -F.v - N.w                                                             (3)
 
-Below the slip velocity v0 it is viscous: it does not hold a body at rest but lets it creep.
+Below the slip velocity v0 the law is viscous: a body that should stick creeps.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class CoulombFriction(Force):
 
     markers = (Point("a"), Turn("a"), Point("b"), Turn("b"))
     particles = True
-    no_series = "its force turns round within slip_velocity, too sharply for a series"
+    no_series = "its force reverses within slip_velocity, too sharply for a series"
     quantities = MappingProxyType(
         {"force": not_negative, "torque": not_negative, "slip_velocity": positive_number, "slip_rate": positive_number}
     )

@@ -1,11 +1,11 @@
-"""A force along a joint's axis by time, displacement and rate: a linear drive with its law of control.
+"""Force along a joint's axis as a function of time, displacement and rate: a linear actuator with a control law.
 
     f = F e at x_b on b, -F e there on a             (1)  [N]  e: the axis, in the ground frame
     s = e.(x_b - x_a)                                (2)  the displacement
     F = function(t, s, sd)                           (3)  continuous
     F = function(t_k, s(t_k), sd(t_k))               (4)  from t_k = k period to t_{k+1}
 
-The power of (1) is F sd, however the bodies move.
+The power of (1) is F sd for any motion of the bodies.
 """
 
 import math

@@ -1,10 +1,10 @@
-"""A torque about a joint's axis by time, angle and rate: a motor with its law of control, continuous or sampled.
+"""Torque about a joint's axis as a function of time, angle and rate: a motor with a control law.
 
     N = T u on b, -T u on a                          (1)  [N m]  u: the axis, in the ground frame
     T = function(t, angle, rate)                     (2)  continuous
     T = function(t_k, angle(t_k), rate(t_k))         (3)  from t_k = k period to t_{k+1}
 
-The power of (1) is T times the rate of the angle, where the joint holds the axis.
+The power of (1) is T times the rate of the angle if the joint holds the axis.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""A force on a point of one body: constant, a function of time, or of time and state.
+"""Force on a point of one body: constant, a function of time, or of time and state.
 
 f = F             frame="ground"     (1)  [N], conjugate to x_a
 f = A(p_a) F      frame="body"       (2)

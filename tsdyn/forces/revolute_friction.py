@@ -1,12 +1,12 @@
-"""Friction of a revolute joint, a pin in a bearing, from the joint's own reaction.
+"""Friction of a revolute joint (a pin in a bearing), in proportion to the reaction of the joint.
 
     n      axis, w = n.(omega_a - omega_b),  v = R w
     N      = N_0 + |F - n n.F| + (R_c / R) |n.F| + (2 / L) |T - n n.T|      (1)
     torque = -mu(v) R N n     on a, the opposite on b                       (2)
     dissipation = mu(v) N v                                                 (3)
 
-F and T are the force and the torque that the joint exerts, at its point; mu is that of friction.coefficient. A torque
-that tilts the pin is carried by two forces, L apart.
+F and T are the force and the torque that the joint exerts at its point; mu is given by friction_laws.coefficient. A
+tilting torque on the pin is carried by a couple of two forces, L apart.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@
     U = k (l - l0)^2 / 2                 (3)
     dissipation = c ld^2                 (4)
 
-Singular where l = 0: the run ends there.
+Singular at l = 0: a run ends there.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""A torque on one body: constant, a function of time, or of time and state.
+"""Torque on one body: constant, a function of time, or of time and state.
 
-n = N             frame="ground"     (1)  [N m], conjugate to the turning of a
+n = N             frame="ground"     (1)  [N m], conjugate to the rotation of a
 n = A(p_a) N      frame="body"       (2)
 """
 

@@ -1,4 +1,4 @@
-"""Torsional spring, damper and actuator about an axis of body a; its angle is counted over full turns.
+"""Torsional spring, damper and actuator about an axis of body a; the angle counts full turns.
 
     u = A_a axis_a,  f_a = A_a reference_a (perpendicular to u),  f_b = A_b reference_b
     angle = atan2(f_b.(u x f_a), f_b.f_a) + 2 pi turns                     (1)
@@ -6,7 +6,7 @@
     U = k (angle - free_angle)^2 / 2                                       (3)
     dissipation = c (u.(omega_b - omega_a))^2                              (4)
 
-The turn counted is the one nearest to the angle at the last accepted step, so a step must turn less than half a turn.
+The turn is the one nearest to the angle at the last accepted step, so a step must rotate by less than half a turn.
 Singular where f_b is parallel to u.
 """
 

@@ -1,13 +1,13 @@
-"""Friction of a translational joint, a slide in its guide, from the joint's own reaction.
+"""Friction of a translational joint (a slide in a guide), in proportion to the reaction of the joint.
 
     n      axis, v = n.(velocity of a's point over b)
     N      = N_0 + |F - n n.F| + |n.T| / W + (2 / L) |T - n n.T|     (1)
     force  = -mu(v) N n     on a along the axis, the opposite on b   (2)
     dissipation = mu(v) N v                                          (3)
 
-F and T are the force and the torque that the joint exerts, at its point on a (on b where a is the ground); mu is that
-of friction.coefficient. A torque that tilts the slide is carried by two forces, L apart; one about the axis at the arm
-W.
+F and T are the force and the torque that the joint exerts at its point on a (on b if a is the ground); mu is given by
+friction_laws.coefficient. A tilting torque on the slide is carried by a couple of two forces, L apart; a torque about
+the axis by a force with lever arm W.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""A force between two bodies by any function of time and both states.
+"""Force and torque between two bodies as a function of time and both states.
 
     function(t, a, b, par, out)   a, b (13,): point, Euler parameters, velocity of the point, angular velocity
                                   out (6,): force on a at x_a, torque on a
-    f = [F, 0, T; -F, 0, -T - (x_a - x_b) x F]    conjugate to x_a, p_a, turning of a; x_b, p_b, turning of b   (1)
+    f = [F, 0, T; -F, 0, -T - (x_a - x_b) x F]    conjugate to x_a, p_a, rotation of a; x_b, p_b, rotation of b   (1)
 
-so that b gets the opposite force at the same place x_a. Everything is in the ground frame.
+so that the opposite force acts on b at x_a. All components are in the ground frame.
 """
 
 from __future__ import annotations

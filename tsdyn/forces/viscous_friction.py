@@ -1,8 +1,8 @@
-"""Viscous friction between two bodies, of a point and of their turning.
+"""Viscous friction between two bodies, in translation and rotation.
 
-v = xd_a - xd_b - omega_b x (x_a - x_b)    velocity of a's point relative to the material of b at its place
+v = xd_a - xd_b - omega_b x (x_a - x_b)    velocity of a's point relative to the material point of b there
 w = omega_a - omega_b
-F = -c v     on a at x_a, the opposite on b at the same place     (1)
+F = -c v     on a at x_a, the opposite on b at the same point     (1)
 N = -c_t w   on a, the opposite on b                              (2)
 dissipation = c v.v + c_t w.w                                     (3)
 """

@@ -1,8 +1,8 @@
-"""From coordinates of a chart on the network to poses and their velocities, and back from accelerations.
+"""Chart coordinates to body poses and velocities (the retraction), and accelerations back to chart coordinates.
 
 omega'  = C etad,                           C = d0 I - d~ + d d^T / d0
 etadd   = (d0 I + d~) omega'd - |omega'|^2 d / 2
-N       = H(q) C Y0                         what Phi changes by, with -u
+N       = H(q) C Y0                         derivative of Phi with respect to -u
 """
 
 import math

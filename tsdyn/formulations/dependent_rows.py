@@ -1,4 +1,4 @@
-"""Which rows of Phi_q follow from the others at one configuration of a large scene, at a cost of O(N)."""
+"""Redundant rows of Phi_q at one configuration of a large scene, by sparse factorisation in O(N)."""
 
 import numpy as np
 

@@ -1,15 +1,15 @@
-"""Friction and reactions together, without a basis of the tangent space: a joint's friction follows from its reaction.
+"""Coupled friction and reactions in the tangent form: friction of a joint depends on the reaction of the joint.
 
-    (r'', omega'') = W (F + sum_i g_i N_i(lam) - H^T lam)
-    S lam = H W (F + sum_i g_i N_i(lam)) + gamma
+    (r'', omega'') = W (F + sum_i g_i F_n,i(lam) - H^T lam)
+    S lam = H W (F + sum_i g_i F_n,i(lam)) + gamma
 
-g_i is what friction i does for a normal load of one, N_i its normal load. Newton's method, from the multipliers of the
-evaluation before:
+g_i is the generalised force of friction i for unit normal load, F_n,i the normal load. Newton's method starts from the
+multipliers of the previous evaluation; its matrix is
 
-    N~ = H (W (H^T - sum_i g_i N_i,lam))^T
+    N~ = H (W (H^T - sum_i g_i F_n,i,lam))^T
 
-g_i acts on the two bodies of its joint and N_i,lam has that joint's rows, so N~ has the blocks of S and costs about as
-much.
+g_i acts on the two bodies of its joint and F_n,i,lam has entries in the rows of that joint, so N~ has the block
+pattern of S and a factorisation of comparable cost.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The formulations of the equations of motion, as the addresses of their kernels."""
+"""The formulations of the equations of motion and the addresses of their kernels."""
 
 from dataclasses import dataclass, replace
 from types import ModuleType

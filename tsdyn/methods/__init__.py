@@ -1,4 +1,4 @@
-"""Integration methods without their tables of coefficients: tableaus, step kernels, interpolants.
+"""Integration methods, coefficients aside: tableaus, step kernels, interpolants.
 
 Imports workspaces and below. integrators/ is written on this package, a file a method.
 

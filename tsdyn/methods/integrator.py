@@ -1,4 +1,4 @@
-"""What an integrator is: a small object that holds its settings and names the kernel that makes a step."""
+"""The interface of an integrator: an object that holds the settings and names the step kernel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tableaus of Runge-Kutta, diagonally implicit and Nystrom methods: data that checks itself."""
+"""Tableaus of Runge-Kutta, diagonally implicit and Nystrom methods, with checks of their order conditions."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ class Derived:
     locked: object = None  # a `Still`: locked_orientations.still
     moving_graph: tuple = None  # locked_orientations.moving_network, and by the loops asked for:
     moving_networks: dict = field(default_factory=dict)
-    undropped: object = None  # a `Packed` none of whose rows is dropped: redundancy.dependent_rows
+    undropped: object = None  # a `Packed` none of whose rows is dropped: dependent_rows.dependent_rows
     aligned: tuple = None  # mirrored_branches.demand_aligned
     holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
     loads: dict = None  # reactions.loads_of

@@ -1,11 +1,11 @@
-"""Smooth motions: functions of time that know their derivatives and their Taylor series, and compile nothing.
+"""Smooth motions: functions of time with exact derivatives and Taylor series, without compilation.
 
     Polynomial, Constant, Ramp, Sine, Exponential, and time itself
     Piecewise, of data: tables and SciPy's splines
     + - * / of them and of numbers, powers, and np.sin, cos, tan, exp, log, sqrt, sinh, cosh, tanh, arctan of them
 
-A motion is a graph of operations. Its value and two derivatives follow in Python by `jet`, its series in a run by
-`motion_program`; neither knows of the other.
+A motion is a graph of operations. `jet` evaluates value and two derivatives in Python, `motion_program` the series in a
+run; the two are independent.
 """
 
 from __future__ import annotations
@@ -210,7 +210,7 @@ class Smooth:
                 return self ** inputs[1]
             if len(inputs) == 2 and ufunc.__name__ in ("add", "subtract", "multiply", "divide"):
                 return _binary(ufunc.__name__, *inputs)
-        raise TypeError(f"np.{ufunc.__name__} of a motion is not known here; there are {', '.join(FUNCTIONS)}.")
+        raise TypeError(f"np.{ufunc.__name__} of a motion is not supported; there are {', '.join(FUNCTIONS)}.")
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self(0.0):g} at t = 0>"

@@ -1,4 +1,4 @@
-"""A prescribed function of time with its two derivatives: compiled and reached by address, or a program of numbers."""
+"""A prescribed function of time with two derivatives: compiled and called by address, or a program of numbers."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Motion:
 
     @property
     def has_series(self) -> bool:
-        """Whether it is one of `ts.motions`: of a user's own function no series is taken."""
+        """True for one of `ts.motions`; a user's function has no series."""
         return not self.given
 
     @property

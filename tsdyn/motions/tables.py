@@ -1,4 +1,4 @@
-"""Motions and loads from data: tables, and SciPy's piecewise polynomials."""
+"""Motions and loads from data: tables and SciPy's piecewise polynomials."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Table:
 
 
 def is_data(value):
-    """Whether `pieces_of` takes it: a Table, a SciPy object, or (times, values)."""
+    """Return True for data that `pieces_of` accepts: a Table, a SciPy object, or (times, values)."""
     if isinstance(value, (tuple, list)):
         return len(value) == 2 and all(isinstance(part, (np.ndarray, list, tuple)) for part in value)
     return isinstance(value, (Table, *_scipy()))

@@ -1,7 +1,7 @@
-"""Constraint errors, energy and momentum of a trajectory, recomputed in NumPy from nothing but t, q, qd, qdd.
+"""Constraint errors, energy and momentum of a trajectory, recomputed in NumPy from t, q, qd, qdd alone.
 
-Nothing here calls the solver's kernels. Constraint errors carry each marker's value, velocity and acceleration through
-the primitive's phi as a truncated Taylor series, so neither its jacobian nor its gamma is used.
+The solver's kernels are not used. Constraint errors come from each primitive's phi, evaluated on second-order Taylor
+numbers of the marker coordinates, so neither its jacobian nor its gamma enters.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the solver sees at one state, in plain NumPy, exactly as the paper writes it: `scene.evaluate(q, qd, t)`."""
+"""`scene.evaluate(q, qd, t)`: the paper's quantities at one state, in plain NumPy."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class Evaluation(NamedTuple):
     gamma: Floats  # (m,) Phi_q qdd + gamma = 0, Eq. 3
     M: Matrix  # (n, n) mass matrix
     Q_A: Floats  # (n,) applied forces
-    S: Floats  # (n,) velocity terms, on the right-hand side
-    multipliers: Floats  # (m,) M qdd + Phi_q^T lam = Q_A + S
+    S: Floats  # (n,) velocity forces, on the right-hand side: S of the paper, Q_v of docs/notation.md
+    multipliers: Floats  # (m,) M qdd + Phi_q^T lam = Q_A + Q_v
     qdd: Floats  # (n,) accelerations
 
 
@@ -69,7 +69,7 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
 
     Notes
     -----
-    Haug 2018, Eqs. 1-4. Multipliers and accelerations solve [M, Phi_q^T; Phi_q, 0] (qdd, lam) = (Q_A + S, -gamma).
+    Haug 2018, Eqs. 1-4. Multipliers and accelerations solve [M, Phi_q^T; Phi_q, 0] (qdd, lam) = (Q_A + Q_v, -gamma).
 
     Examples
     --------

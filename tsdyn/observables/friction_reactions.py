@@ -1,4 +1,4 @@
-"""The normal loads of joints' frictions, from positions, velocities and accelerations."""
+"""Normal loads of joint friction, from positions, velocities and accelerations."""
 
 import numpy as np
 

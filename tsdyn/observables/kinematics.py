@@ -1,4 +1,4 @@
-"""Motion of bodies, of their points and of joints, at one instant or along a run: what states and solutions share."""
+"""Kinematics of bodies, points and joints at one instant or along a run: common to states and solutions."""
 
 from __future__ import annotations
 

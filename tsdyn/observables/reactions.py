@@ -1,4 +1,4 @@
-"""Multipliers and the forces of constraints, from positions, velocities and accelerations."""
+"""Multipliers and constraint reactions, from positions, velocities and accelerations."""
 
 import math
 from collections import Counter
@@ -71,7 +71,7 @@ def solve_multipliers(context, t, q, r, rows, out):
 
 
 def multipliers(packed, t, q, qd, qdd, memory=None):
-    """Multipliers (k, m) of M qdd + Phi_q^T lam = Q_A + S; NaN where Phi_q has lost rank.
+    """Multipliers (k, m) of M qdd + Phi_q^T lam = Q_A + Q_v; NaN where Phi_q has lost rank.
 
     memory (k, slots) is what forces remember, zeros by default.
     """

@@ -1,4 +1,4 @@
-"""A state: what `solution.state` and `solution.at(t)` are, and what a run may start from."""
+"""A state: the type of `solution.state` and `solution.at(t)`, and a possible start of a run."""
 
 from __future__ import annotations
 

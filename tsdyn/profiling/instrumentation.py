@@ -1,4 +1,4 @@
-"""Timers in the memory of a run: put in before it, read after it."""
+"""Instrumentation of a run: timers installed in its workspace before the run and read afterwards."""
 
 import time
 from typing import NamedTuple

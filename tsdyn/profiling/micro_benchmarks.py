@@ -1,4 +1,4 @@
-"""What parts of a placement and an evaluation cost, that no address parts: they are run again at a run's last state."""
+"""Micro-benchmarks, at the final state of a run, of costs that timers can't separate."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""The phases of a run, put together from what a `Timekeeper` has found and what parts of it cost alone."""
+"""The phases of a profiled run, from the readings of a `Timekeeper` and from micro-benchmarks of its parts."""
 
 from __future__ import annotations
 

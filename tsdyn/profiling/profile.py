@@ -1,4 +1,4 @@
-"""`profile`: where the time of a call of `simulate` goes, phase by phase, and what to change."""
+"""`profile`: run time of a call of `simulate` by phases, with advice."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ OUTPUTS = {"t_eval": "times of t_eval", "dense_output": "dense output", "events"
 
 @fitting
 def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **options: Any) -> Profile:
-    """Measure where the time of `simulate(scene, t_span, **options)` goes; the scene is not changed.
+    """Measure the run time of `simulate(scene, t_span, **options)` by phases; the scene is not changed.
 
-    The call is made several times as it is, and as often with its two ends as the only output, once with nothing but a
-    stopwatch around the compiled driver and once with timers in place of what the driver calls by address. So no run
-    but those pays for it, and the sum of the phases can be held against the time of the call as it is.
+    The call is repeated unchanged, and with its two ends as the only output; once more with a stopwatch around the
+    compiled driver, and once with timers in place of the addresses that the driver calls. Other runs pay nothing, and
+    the sum of the phases is compared with the time of the unchanged call.
 
     Parameters
     ----------
     scene : Scene
     t_span : (float, float), s
     advice : bool
-        Whether to try what might be quicker: another method, looser tolerances. Those calls take time of their own.
+        Whether to run alternatives that may be faster, such as another method or looser tolerances.
     **options
         As for `simulate`, but progress.
 

@@ -1,4 +1,4 @@
-"""What `profile` hands back: phases, the table they make, what was skipped, what to change, and the figure."""
+"""The result of `profile`: phases and their table, skipped work, advice, and the figure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The constraint rows at a configuration: evaluate, factorise, solve, redundant rows left out.
+"""The constraint rows at a configuration: evaluate, factorise, solve, without redundant rows.
 
 Imports sparse and below. The rows themselves come from elements/loops/constraint_rows.py, Phi of each kind from
 constraints/.

@@ -1,4 +1,4 @@
-"""The rows of H at the poses, with those left out that are dropped, and S from them."""
+"""Row evaluation: H at the current poses with redundant rows zeroed, and S = H W H^T."""
 
 from typing import NamedTuple
 

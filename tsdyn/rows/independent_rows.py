@@ -1,12 +1,12 @@
-"""Independent rows of H among redundant ones: chosen by elimination that reveals the rank, the others left out.
+"""Selection of independent rows of H among redundant ones, by rank-revealing elimination of S.
 
-Rows that depend on the others hold by themselves wherever those do. Such a row is dropped: its H and its right-hand
-sides are zero and its diagonal entry of S and N is one, so that its multiplier is zero and every pattern stays as it
-is. Which rows are dropped is chosen anew where those that were kept have come close to depending on one another.
+A redundant row holds wherever the rows that it depends on hold. It is dropped: its row of H and its right-hand sides
+are zero and its diagonal entry of S and N is one, so its multiplier is zero and every sparsity pattern is unchanged.
+The selection is renewed when the kept rows come close to dependence.
 
-The row that elimination has left the largest share of its diagonal entry goes first (Cholesky with diagonal pivoting),
-and rows that are left less than a share are dropped. With many rows that holds within the blocks of the pattern, whose
-order is that of little fill: a choice that is independent, but further from the best.
+Rows are ordered by diagonally pivoted Cholesky, pivots relative to the diagonal entry; rows with negligible pivots are
+dropped. In large scenes pivoting is confined to the blocks of the fill-reducing order: the selection is independent,
+but not the best conditioned.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The driver of step methods: step, judge, record, change charts; events, stops, dense output.
+"""The driver of step methods: attempt, accept or reject, record, change charts; events, stops, dense output.
 
 Imports observables and below.
 

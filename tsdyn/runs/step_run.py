@@ -1,4 +1,4 @@
-"""The driver of methods that go step by step with a kernel of theirs: memory, drive, and what a run leaves."""
+"""Front end of the step driver, for methods with a step kernel: memory, driver loop, outcome."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""The driver: steps, outputs, charts. One kernel for every scene, method and formulation; it calls them by address.
+"""The step driver: steps, outputs, charts. One kernel serves every scene, method and formulation by address.
 
 A step is proposed (where it ends), attempted (x and y at its end, from the method), and rejected or accepted.
 """

@@ -1,7 +1,7 @@
-"""A run as its driver sees it: what is asked of it, and what it hands back.
+"""The run request (`Task`) that a driver receives, and the `Outcome` that it returns.
 
-A method has a driver, the attribute `driver`: a name in simulate.DRIVERS, or the driver itself, a function of a `Task`
-that returns an `Outcome`.
+The attribute `driver` of a method is a name in simulate.DRIVERS, or a driver function that takes a `Task` and returns
+an `Outcome`.
 """
 
 from typing import NamedTuple
@@ -41,7 +41,7 @@ class Task(NamedTuple):
 
     @property
     def within(self):
-        """Whether anything is asked for between the ends of steps."""
+        """True if output between the ends of steps is requested."""
         times, (t0, t1) = self.times, self.span
         inside = times.size > 2 or any(t0 < t < t1 for t in times.tolist())
         return self.dense_output or self.events is not None or inside

@@ -1,4 +1,4 @@
-"""Scenes that change: a body, constraint or force taken out again, and a copy of the whole."""
+"""Editing of scenes: removal of bodies, constraints and forces, and copies of a scene."""
 
 from __future__ import annotations
 

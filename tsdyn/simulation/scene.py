@@ -1,4 +1,4 @@
-"""The scene: what a user assembles from bodies, constraints and forces, checked piece by piece."""
+"""The scene: bodies, constraints and forces, validated as they are added."""
 
 from __future__ import annotations
 
@@ -48,16 +48,16 @@ class Scene:
     ground : Ground
         The inertial frame, to attach constraints to.
     bodies, constraints : tuple
-        In the order added, joints whole; the normalisations of the rigid bodies come last, in body order.
+        In the order added, joints as a whole; normalisation rows of the rigid bodies are last, in body order.
     primitives : tuple
-        The constraints in the order of their rows, joints taken apart.
+        The primitives in the order of their rows, those of joints included.
     forces : tuple
         In the order added.
 
     Notes
     -----
-    A scene can be run as often as you like; `simulate` never changes it. Set a body's mass, inertia, position,
-    orientation or velocities and run again: nothing is rebuilt but the numbers that changed.
+    `simulate` never changes a scene, so a scene may be run repeatedly. After an attribute of a body (mass, inertia,
+    position, orientation, velocity) is set, the next run updates the changed numbers only.
 
     Examples
     --------
@@ -107,12 +107,12 @@ class Scene:
 
     @property
     def constraints(self) -> tuple[Primitive | Joint, ...]:
-        """The constraints, in the order of their rows; joints whole."""
+        """The constraints in the order of their rows, joints as a whole."""
         return (*self._added, *self._normalisations.values())
 
     @property
     def primitives(self) -> tuple[Primitive, ...]:
-        """The constraints, in the order of their rows; joints taken apart."""
+        """The primitives in the order of their rows, those of joints included."""
         return tuple(part for constraint in self.constraints for part in constraint.parts)
 
     @property
@@ -146,7 +146,7 @@ class Scene:
         angular_velocity : array_like (3,), rad/s
             Body frame.
         name : str, optional
-            What messages call it; default "body1", "body2", ...
+            Name in messages and lookups; default "body1", "body2", ...
 
         Returns
         -------
@@ -155,7 +155,7 @@ class Scene:
         Raises
         ------
         InvalidBody
-            If a value is impossible, not finite or of a wrong shape, or the name is taken.
+            If a value is inadmissible, not finite or of a wrong shape, or the name is in use.
 
         Examples
         --------
@@ -209,7 +209,7 @@ class Scene:
         return body
 
     def add(self, item: Item) -> Item:
-        """Add a constraint or a force and return it; a second EulerNormalization of a body gives back the one it has.
+        """Add a constraint or a force and return it; a second EulerNormalization of a body returns the existing one.
 
         Raises
         ------

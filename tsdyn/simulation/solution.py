@@ -1,4 +1,4 @@
-"""What a run hands back: the trajectory, how it went, and everything that follows from it."""
+"""The result of a run: trajectory, termination, statistics and derived quantities."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Steps(NamedTuple):
-    """Every step tried: where it began, s, its length, s, and whether it was accepted."""
+    """Every attempted step: its start, s, its length, s, and whether it was accepted."""
 
     t: Floats
     h: Floats
@@ -35,7 +35,7 @@ class Steps(NamedTuple):
 
 
 class Charts(NamedTuple):
-    """Every chart: its instant, s, why it was made, and on leaving it its condition, contraction and steps."""
+    """Every chart: its time, s, the reason for it, and at its end condition, contraction and number of steps."""
 
     t: Floats
     reason: tuple[str, ...]
@@ -54,26 +54,26 @@ class Solution(Balances, Kinematics["Floats"]):
     q, qd, qdd : ndarray (k, n)
         7 coordinates a rigid body (r, then p) and 3 a point mass, in the order added.
     multipliers : ndarray (k, m)
-        M qdd + Phi_q^T lam = Q_A + S; rows in the order added, then the normalisations in body order. NaN for rows
+        M qdd + Phi_q^T lam = Q_A + Q_v; rows in the order added, then the normalisations in body order. NaN for rows
         that were left out as redundant, see `reaction_unique`.
     success : bool
         Whether the run reached the end of the interval, or a terminal event.
     status : Status
     message : str
-        What happened, where, and what to try.
+        What happened, where, and the remedy.
     t_events : list of ndarray (k_i,), s, or None
         Times of each event; q_events and qd_events are lists of (k_i, n).
     stats : SimpleNamespace
-        steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds; of
+        steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds; for
         implicit methods also jacobians, iteration_matrices, stage_iterations; stiff: whether an explicit adaptive
-        method has met its limit of stability for a while. What was not needed: solves_skipped, placements that lay on
-        the constraints to rounding already; checks_skipped, those whose last correction was known to suffice;
-        factorizations_skipped, for which older factors served or still contracted; gyroscopic_skipped, torques of
-        bodies whose inertia is a sphere's, rotations_skipped, of bodies that their joints never let turn, and
-        forces_skipped, of scenes without any, one an evaluation; columns_skipped, constant ones of series, an order.
-        Of series: steps_near_singular, which began or ended next to a singular configuration; largest_landing, how far
-        (m, rad) the constraints moved a body at the end of one of them; energy_error, the largest change of the energy
-        in such a run, of the largest kinetic energy, None where energy isn't constant.
+        method was limited by stability. Skipped work: solves_skipped, position solves that start at rounding;
+        checks_skipped, checks after a correction known to suffice; factorizations_skipped, where older factors still
+        serve; gyroscopic_skipped, gyroscopic torques of bodies with spherical inertia, rotations_skipped, rotations of
+        bodies with locked orientation, and forces_skipped, forces of scenes without any, each counted once an
+        evaluation; columns_skipped, series of constant columns, counted once an order. For Taylor runs near singular
+        configurations: steps_near_singular; largest_landing, the largest displacement (m, rad) of a body by the
+        projection at the end of such a step; energy_error, the largest change of energy relative to the largest
+        kinetic energy, None where energy isn't constant.
 
     Examples
     --------
@@ -122,7 +122,7 @@ class Solution(Balances, Kinematics["Floats"]):
 
     @property
     def success(self) -> bool:
-        """Whether the run reached the end of the interval, or a terminal event."""
+        """True if the run reached the end of the interval, or a terminal event."""
         return self.status in (Status.SUCCESS, Status.EVENT)
 
     def raise_if_failed(self) -> Self:
@@ -133,12 +133,12 @@ class Solution(Balances, Kinematics["Floats"]):
 
     @property
     def reached(self) -> float:
-        """The time that the run has come to, s."""
+        """The time reached by the run, s."""
         return self._reached
 
     @property
     def state(self) -> RememberingState:
-        """The last point reached, to go on from: simulate(scene, (state.t, t_end), state=state)."""
+        """The last state reached, to continue from: simulate(scene, (state.t, t_end), state=state)."""
         q, qd, qdd = (a.copy() for a in self._last)
         t, memory = np.array([self._reached]), self._remembered[None]
         lam = reactions.multipliers(self.packed, t, q[None], qd[None], qdd[None], memory)[0]
@@ -234,7 +234,7 @@ class Solution(Balances, Kinematics["Floats"]):
 
     @cached_property
     def constraint_error(self) -> ConstraintError:
-        """Maximum norms of Eqs. 1-3 at every output, recomputed by code that is not the solver's."""
+        """Maximum norms of Eqs. 1-3 at every output, recomputed independently of the solver."""
         return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
 
     def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
@@ -244,7 +244,7 @@ class Solution(Balances, Kinematics["Floats"]):
         ----------
         item : constraint, force, or name of one
         on : Body or str, optional
-            Which of its bodies they act on; by default a, or b where a is the ground (`item.on`).
+            The body on which force and torque act; by default a, or b if a is the ground (`item.on`).
 
         Returns
         -------
@@ -272,8 +272,8 @@ class Solution(Balances, Kinematics["Floats"]):
     def reaction_unique(self, item: ItemLike, on: BodyLike | None = None) -> Bools:
         """Whether what `reaction` gives is the only answer, at each output: bool (k,).
 
-        Redundant constraints share their loads in many ways, all of which move the bodies alike; `reaction` is then
-        one of them, with the multipliers of dropped rows, NaN in `multipliers`, taken as zero.
+        Redundant constraints can share their loads in many ways with the same motion; `reaction` is then one of them,
+        with the multipliers of dropped rows (NaN in `multipliers`) taken as zero.
         """
         item = self.handles.item(item)
         if id(item) in reactions.loads_of(self.packed):
@@ -281,7 +281,7 @@ class Solution(Balances, Kinematics["Floats"]):
         return uniqueness.unique(self, self._member(item).rows, self._acted(item, on))
 
     def rows(self, constraint: ItemLike) -> slice:
-        """Which columns of `multipliers` are those of a constraint, a slice."""
+        """The columns of `multipliers` that belong to a constraint, as a slice."""
         return self._member(self.handles.item(constraint)).rows
 
     def _member(self, constraint):

@@ -1,8 +1,8 @@
-"""The graph of a scene for the basis-free forms: which rows meet at which bodies, and where their products go.
+"""The constraint graph of a scene for the basis-free forms: rows, bodies, and the addresses of their products.
 
-Normalisation rows are no part of it: in (dr, dpi') every one of them is fulfilled (constraint_rows.py). What is left of
-Phi_q W Phi_q^T, S = H W H^T, couples rows that share a body; its blocks, their order of elimination and all places
-are found once for a scene.
+It has no normalisation rows: displacements (dr, dpi') satisfy them (constraint_rows.py). The Schur complement S =
+H W H^T couples rows that share a body; its blocks, their elimination order and all addresses are determined once for a
+scene.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Stops of a run by series: what follows a step that has been cut at one."""
+"""Stops of a Taylor run: continuation after a step that ends at a stop."""
 
 from ..errors import Status
 from ..jit.kernels import kernel

@@ -1,4 +1,4 @@
-"""The memory that one Taylor run writes to, made once for a scene and used by one run after the other."""
+"""Run workspace of the Taylor driver, allocated once a scene and reused by successive runs."""
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class Series:
     ----------
     packed : Packed
     found : str
-        Its `expansion_pack.refusal`.
+        Its `layout.refusal`.
 
     Raises
     ------

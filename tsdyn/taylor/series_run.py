@@ -1,4 +1,4 @@
-"""The driver of Taylor series from Python's side; see task.py."""
+"""The Python side of the Taylor driver; see task.py."""
 
 import time
 

@@ -1,6 +1,6 @@
-"""The parts of a Taylor step as callbacks: each is compiled once, and loaded where a run needs it.
+"""The parts of a Taylor step as callbacks, each compiled once and loaded only if a run needs it.
 
-They get the address of a `SeriesContext`.
+Their argument is the address of a `SeriesContext`.
 """
 
 from ..elements.loops.body_poses import write_accelerations, write_positions, write_velocities

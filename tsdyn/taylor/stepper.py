@@ -1,7 +1,7 @@
-"""The driver of the Taylor integrator: series, step length, landing. One kernel for every scene.
+"""The Taylor driver: series, step length, projection. One kernel serves every scene.
 
-Each step is a chart of its own: the series gives q and qd at its end up to the truncation error, and landing puts both
-back on the manifold along W Phi_q^T.
+Each step has its own chart: the series gives q and qd at the end of the step to truncation error, and a projection
+along W Phi_q^T returns both to the constraint manifold.
 """
 
 import math

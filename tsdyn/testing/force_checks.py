@@ -1,4 +1,4 @@
-"""The checker of forces: `tsdyn.testing.check_force`."""
+"""The check of a force plug-in: `tsdyn.testing.check_force`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`check_integrator`: what every integration method has to keep, tried on scenes with known solutions."""
+"""`check_integrator`: properties required of every integration method, tested on scenes with known solutions."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def _finished(solution, where):
 
 
 def _serves(case, method, form):
-    """Whether the method takes this formulation."""
+    """Return True if the method takes this formulation."""
     try:
         _run(case, method, form, max_steps=1)
     except InvalidArgument:
@@ -261,12 +261,12 @@ def _repeats(make, case, form, where):
     first = _finished(_run(case, method, form), where)
     again = _run(case, make(), form)
     if not all(_same(a, b) for a, b in zip(_bits(first), _bits(again), strict=True)):
-        raise CheckFailed(f"{where}: {method!r} gives other numbers when it is run again.")
+        raise CheckFailed(f"{where}: {method!r} is not reproducible: a second run gives other numbers.")
     other = _run(case, make(), form, t_eval=case.inner, dense_output=True)
     if not (_same(first.steps.t, other.steps.t) and _same(first.steps.h, other.steps.h)):
-        raise CheckFailed(f"{where}: {method!r} makes other steps when output is asked for between them.")
+        raise CheckFailed(f"{where}: {method!r} takes other steps when output between the steps is requested.")
     if not (_same(first.state.q, other.state.q) and _same(first.state.qd, other.state.qd)):
-        raise CheckFailed(f"{where}: {method!r} ends elsewhere when output is asked for between its steps.")
+        raise CheckFailed(f"{where}: {method!r} ends elsewhere when output between the steps is requested.")
 
 
 def _bits(solution):

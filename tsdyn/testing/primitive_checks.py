@@ -1,4 +1,4 @@
-"""What authors of plug-ins, and the project's own tests, check their work with."""
+"""Checks of plug-ins, for their authors and for the project's tests."""
 
 from __future__ import annotations
 

@@ -19,7 +19,6 @@ METHODS = {
     if not name.startswith("_") and "Examples\n" in (value.__doc__ or "")
 }
 OBJECTS = {name: value for name, value in PUBLIC.items() if isinstance(value, type) or inspect.isroutine(value)}
-del OBJECTS["tsdyn.kernel"]
 
 
 @pytest.fixture

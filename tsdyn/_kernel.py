@@ -12,6 +12,7 @@ import dis
 import os
 import platform
 import threading
+from hashlib import sha256
 
 import numba
 import numpy as np
@@ -25,6 +26,7 @@ from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, mod
 from numba.np.arrayobj import populate_array
 
 from ._cache import KernelCache
+from ._callees import Callee, Compiler
 from ._interrupts import prompt_interrupts
 from .errors import InvalidConstraint
 
@@ -50,6 +52,7 @@ def kernel(function, allocates=False, inline=True):
         )
     else:
         options = {**_OPTIONS, "forceinline": inline}
+        return function if DEBUG else Callee(function, options)
     return function if DEBUG else numba.njit(**options)(function)
 
 
@@ -62,7 +65,7 @@ def entry(function):
     """Compile a function that Python calls with arrays; cached, and run without the GIL."""
     if DEBUG:
         return function
-    dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
+    dispatcher = numba.njit(nogil=True, pipeline_class=Compiler, **_OPTIONS)(function)
     dispatcher._cache = KernelCache(function)
     dispatcher.compile = prompt_interrupts()(dispatcher.compile)
     return dispatcher
@@ -115,7 +118,9 @@ class Callback:
 
     def _compile(self):
         arguments = tuple(_letters[c] for c in self.signature)
-        cfunc = CFunc(self.py_func, (arguments, _letters[self.result]), locals={}, options=self.options)
+        cfunc = CFunc(
+            self.py_func, (arguments, _letters[self.result]), locals={}, options=self.options, pipeline_class=Compiler
+        )
         cfunc._cache = cache = KernelCache(self.py_func)
         try:
             with prompt_interrupts():
@@ -272,7 +277,7 @@ class _Seen(types.Type):
 
     def __init__(self, kind):
         self.kind = kind
-        super().__init__(name=f"Seen({kind})")
+        super().__init__(name=f"Seen({kind.instance_class.__name__} {sha256(str(kind).encode()).hexdigest()[:12]})")
 
 
 @register_model(_Seen)

@@ -20,7 +20,7 @@ import numba
 from llvmlite import ir
 
 _LIBRARIES = ("numpy", "numba", "math", "cmath", "scipy")  # their versions say all about them
-_GENERATORS = ("_kernel.py", "_four.py")  # code that no function names: types and their lowering
+_GENERATORS = ("_compiler.py", "_kernel.py", "_four.py")  # code that no function names: types and their lowering
 _known = {}  # function: hash; the function is kept alive, so that the key stays its own
 
 

@@ -66,6 +66,7 @@ from .run_state import (
     H,
     T,
     load_run,
+    no_record,
 )
 from .stepping import call_step
 from .stops import SHORT, amend, cut_fixed, is_sampled, next_stop, take_pieces
@@ -229,7 +230,7 @@ def _go_back(r):
     copy(r.y_low_old, r.y_low)
 
 
-@entry
+@entry("pp", no_record(), "wi")
 def advance(context, run, log, at, most):
     """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or why it stopped.
 

@@ -11,6 +11,7 @@ from .checks import one_of, positive, whole
 from .digits import within_rounding
 from .errors import InvalidArgument, Status
 from .events import prepare
+from .first_run import prepare_first_run
 from .formulation import formulation as find_formulation
 from .holonomic import demand_holonomic
 from .integrator import registered
@@ -121,11 +122,11 @@ def simulate(
     span = interval(t_span)
     form = find_formulation(formulation)
     chart_interval = whole(chart_interval, "chart_interval")
+    method = None if integrator is None else method_of(integrator, rtol, atol)
+    prepare_first_run(scene, method, form, t_eval is not None or dense_output or events is not None)
     kept = prepared(scene)
-    if integrator is None:
+    if method is None:
         method = choice.explicit(kept, rtol, atol, form.name == "tangent" and chart_interval is None)
-    else:
-        method = method_of(integrator, rtol, atol)
     if method.implicit and form.first_order:
         others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
         raise InvalidArgument(

@@ -44,6 +44,7 @@ from .run_state import (
     H,
     T,
     load_run,
+    no_record,
 )
 from .selection import weakest
 from .series_length import is_near, is_next_to, longest, loosest, radius, step_length, weights
@@ -195,7 +196,7 @@ def _watch(c, r, h):
     return False
 
 
-@entry
+@entry("pp", no_record(), "wi")
 def advance_series(context, run, log, steps, most):
     """Make up to `most` steps, as `run.advance` does; context is the address of a `SeriesContext`. Status."""
     c, r = load_series(context), load_run(run)

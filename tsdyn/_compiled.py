@@ -97,6 +97,11 @@ def callback(signature, result="i"):
     return lambda function: Callback(function, signature, result)
 
 
+def is_declared(value):
+    """Whether it is a kernel whose signature is known before the first call."""
+    return isinstance(value, Callback) or getattr(value, "py_func", None) in _entries
+
+
 def is_loaded(kernel):
     """Whether this process has the machine code."""
     return kernel._address is not None if isinstance(kernel, Callback) else bool(kernel.overloads)

@@ -6,7 +6,7 @@ such a kernel is lowered and left at that, operators are typed once for the same
 serve no kernel of tsdyn's are left out.
 """
 
-from functools import cache, cached_property
+from functools import cache, cached_property, update_wrapper
 
 import numba
 from numba.core import typed_passes, types, untyped_passes
@@ -132,21 +132,37 @@ class _CalleeCompiler(Compiler):
     lowering = _CalleeLowering
 
 
-class Callee(CPUDispatcher):
-    """A kernel that kernels call. Called from Python it is compiled a second time, for that."""
-
-    def __init__(self, py_func, locals=None, targetoptions=None, pipeline_class=_CalleeCompiler):
-        super().__init__(py_func, locals or {}, {"nopython": True, **(targetoptions or {})}, pipeline_class)
-
-    @cached_property
-    def _from_python(self):
-        options = {name: value for name, value in self.targetoptions.items() if name != "nopython"}
-        return numba.njit(**options)(self.py_func)
-
-    def __call__(self, *arguments):
-        """For whoever tries a kernel."""
-        return self._from_python(*arguments)
-
+class _Dispatcher(CPUDispatcher):
     def add_overload(self, found):
         """Keep it from Numba's table of what Python can call."""
         self.overloads[tuple(found.signature.args)] = found
+
+
+class Callee:
+    """A kernel that kernels call; what Numba needs to compile it is made when a caller is compiled."""
+
+    def __init__(self, py_func, options):
+        self.py_func, self.targetoptions = py_func, options
+        update_wrapper(self, py_func)
+
+    @cached_property
+    def _dispatcher(self):
+        options = {"nopython": True, **self.targetoptions}
+        return _Dispatcher(self.py_func, {}, options, pipeline_class=_CalleeCompiler)
+
+    @property
+    def _numba_type_(self):
+        """The type that kernels see."""
+        return types.Dispatcher(self._dispatcher)
+
+    @cached_property
+    def _from_python(self):
+        return numba.njit(**self.targetoptions)(self.py_func)
+
+    def __call__(self, *arguments):
+        """For whoever tries a kernel: it is compiled once more, for Python."""
+        return self._from_python(*arguments)
+
+    def __reduce__(self):
+        """By name, as functions are."""
+        return self.__qualname__

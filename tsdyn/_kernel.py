@@ -44,7 +44,7 @@ def kernel(function, allocates=False, inline=True):
         )
     else:
         options = {**OPTIONS, "forceinline": inline}
-        return function if DEBUG else Callee(function, targetoptions=options)
+        return function if DEBUG else Callee(function, options)
     return function if DEBUG else numba.njit(**options)(function)
 
 

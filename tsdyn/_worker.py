@@ -7,27 +7,30 @@ not. It ends when there is nothing more to read.
 import gc
 import signal
 import sys
-from collections.abc import Mapping
+from functools import cache
 from importlib import import_module
 
-from ._compiled import Callback, load
+from . import force, primitive
+from ._compiled import is_declared, load
+
+PACKAGE = __package__.partition(".")[0]
 
 
 def find(module, name):
-    """The kernel of this name: an attribute of the module, or a callback of one of its classes. None if there is none.
-
-    Only of tsdyn's own modules: to import others may have effects.
-    """
-    if module.partition(".")[0] != __package__.partition(".")[0]:
+    """The kernel of this module and name, of tsdyn's own; None where there is none."""
+    if module.partition(".")[0] != PACKAGE:
         return None
-    value = import_module(module)
-    for part in name.split("."):
-        for kernels in (getattr(value, "kernels", None), getattr(value, "own_kernels", None)):
-            for kernel in kernels.values() if isinstance(kernels, Mapping) else ():
-                if kernel.py_func.__qualname__ == name:
-                    return kernel
-        value = getattr(value, part, None)
-    return value if isinstance(value, Callback) or hasattr(value, "overloads") else None
+    found = _loops().get((module, name)) or getattr(import_module(module), name, None)
+    return found if is_declared(found) else None
+
+
+@cache
+def _loops():
+    """{(module, name): kernel} of constraints and forces."""
+    kinds = {**primitive.registered(), **force.registered()}.values()
+    ours = [kind for kind in kinds if kind.__module__.partition(".")[0] == PACKAGE]
+    kernels = [kernel for kind in ours for kernel in getattr(kind, "own_kernels", kind.kernels).values()]
+    return {(kernel.py_func.__module__, kernel.py_func.__qualname__): kernel for kernel in kernels}
 
 
 def main():

@@ -4,6 +4,7 @@ The processes (`_worker`) fill the cache on disk. What they can't compile, for w
 is needed, as if there were none of them: they make a first run faster, and nothing depends on them.
 """
 
+import contextlib
 import multiprocessing
 import os
 import queue
@@ -17,7 +18,7 @@ import numba
 from . import _cache
 from ._compiled import DEBUG, is_loaded, is_stored, load
 from ._waiting import Waiting
-from ._worker import find
+from ._worker import PACKAGE, find
 
 MOST = 16  # processes: each takes some 300 MB
 _turn = threading.Lock()
@@ -31,8 +32,8 @@ def compile_ahead(kernels, asked=False):
     if DEBUG:
         return {}
     with _turn:  # threads that begin together
-        missing = {name: kernel for kernel in kernels if not is_loaded(kernel) and (name := name_of(kernel))}
-        missing = {name: kernel for name, kernel in missing.items() if not is_stored(kernel)}
+        ours = [kernel for kernel in kernels if not is_loaded(kernel) and kernel.py_func.__module__.startswith(PACKAGE)]
+        missing = {name: kernel for kernel in ours if not is_stored(kernel) and (name := name_of(kernel))}
         if not missing:
             return {}
         order = sorted(missing, key=lambda name: -weight(missing[name].py_func))
@@ -53,7 +54,7 @@ def compile_ahead(kernels, asked=False):
 
 
 def name_of(kernel):
-    """ "module name" by which another process finds the kernel; empty where none can."""
+    """Module and name by which another process finds the kernel; empty where none can."""
     function = kernel.py_func
     module, name = function.__module__ or "", function.__qualname__
     return f"{module} {name}" if find(module, name) is kernel else ""
@@ -119,7 +120,9 @@ def _in_processes(order, count, waiting):
             worker.kill()
         for worker in workers:
             worker.wait()
-            worker.stdin.close()
+            for pipe in (worker.stdin, worker.stdout):
+                with contextlib.suppress(OSError):  # what was to be written still
+                    pipe.close()
             _cache.remove_partial_files(worker.pid)
 
 

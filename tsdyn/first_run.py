@@ -3,7 +3,9 @@
 from . import friction_basis, friction_solve, linearise, motion_program, null_space, series_steps, start
 from ._compiled import DEBUG
 from ._workers import compile_ahead
+from .arguments import tolerances
 from .expansion_pack import FAR, room
+from .formulation import FORMULATIONS
 from .integrators import DOP853, Taylor
 from .run import advance
 from .signal import Signal
@@ -12,63 +14,68 @@ from .taylor import advance_series
 _known = set()  # what this process has made sure of: methods and forms, each with or without what is between steps
 
 
-def prepare_first_run(scene, method, form, within):
+def prepare_first_run(scene, method, form, within, rtol=None, atol=None):
     """Have compiled what a run of the scene needs, if any of it is missing on disk.
 
-    method is None for the default; within: whether anything is asked for between the steps.
+    method is None for the default, to these tolerances; within: whether anything is asked for between the steps.
     """
     key = type(method), form.name, within
-    if DEBUG or (scene._packed is not None and key in _known):
+    if DEBUG or not scene.bodies or (scene._packed is not None and key in _known):
         return
-    compile_ahead(dict.fromkeys([*of_scene(scene, method, form), *of_method(scene, method, form, within)]))
+    method = method or _default_method(scene, form, rtol, atol)
+    far = isinstance(method, Taylor) and len(scene.bodies) * room(method.orders()[2]) > FAR
+    compile_ahead(dict.fromkeys([*of_scene(scene, method, form, far), *of_method(method, form, within, far)]))
     _known.add(key)
 
 
-def of_scene(scene, method, form):
+def of_scene(scene, method, form, far):
     """The kernels of constraints and forces."""
-    series = _series(scene, method, form)
-    far = "far_" if series and _is_far(scene, series) else ""
+    series, implicit = isinstance(method, Taylor), method.implicit
     for kind, moving in _kinds(scene).items():
-        names = ["phi", "jacobian", "gamma", *["phi_t"] * moving, *["remember"] * bool(kind.memory)]
-        if not kind.normalises:
-            names += ["reduced", "values", "bias", *["drift"] * moving]
-            names += [f"{far}driven_series" if moving else f"{far}series"] * bool(series)
-        if method is not None and method.implicit:
-            names.append("curvature")
-        yield from (kind.kernels[name] for name in names if name in kind.kernels)
+        yield from of_constraint(kind, moving, series, far, implicit)
     for force in scene.forces:
-        names = ["force", "remember", *["series"] * bool(series)]
-        if method is not None and method.implicit:
-            names.append("jacobian")
-        if "normal_load" in force.kernels:
-            names += ["normal_load", "unit_friction"]
-            yield (friction_solve if form.basis_free else friction_basis).rub
-        yield from (force.kernels[name] for name in names if name in force.kernels)
+        yield from of_force(force.kernels, series, implicit, form)
         if any(isinstance(value, Signal) and value.motions for value in vars(force).values()):
             yield motion_program.run_program
 
 
-def of_method(scene, method, form, within):
-    """The kernels of a start, of the method and of the form."""
+def of_constraint(kind, moving, series=True, far=False, implicit=False):
+    """The loops over constraints of a class; moving: whether one of them depends on time."""
+    names = ["phi", "jacobian", "gamma", *["phi_t"] * moving, *["remember"] * bool(kind.memory)]
+    if not kind.normalises:
+        names += ["reduced", "values", "bias", *["drift"] * moving]
+        names += ["far_" * far + "driven_" * moving + "series"] * series
+    names += ["curvature"] * implicit
+    return [kind.kernels[name] for name in names if name in kind.kernels]
+
+
+def of_force(kernels, series=True, implicit=False, form=FORMULATIONS["tangent"]):
+    """The loops over forces that have these kernels."""
+    names = ["force", "remember", "normal_load", "unit_friction", *["series"] * series, *["jacobian"] * implicit]
+    found = [kernels[name] for name in names if name in kernels]
+    if "normal_load" in kernels:
+        found.append((friction_solve if form.basis_free else friction_basis).rub)
+    return found
+
+
+def of_method(method, form, within, far=False):
+    """The kernels of a start, of the method and of the form; far: of series that are too long for caches near by."""
     yield start._look
-    series = _series(scene, method, form)
-    if series:
-        yield series_steps.expand_far_series if _is_far(scene, series) else series_steps.expand_series
-        yield from (series_steps.reach, advance_series)
+    if isinstance(method, Taylor):
+        yield from (series_steps.expand_far_series if far else series_steps.expand_series, series_steps.reach)
+        yield advance_series
         yield from (series_steps.accelerate_here, series_steps.pass_singular) if within else ()
         return
-    method = method or DOP853()
     form = form.serving(method)
     kernels = form.kernels
     yield from (kernels.place, kernels.accelerate, (kernels if form.basis_free else null_space).complete)
-    yield from (kernels.check, kernels.start_chart, advance)
+    yield from (kernels.check, kernels.start_chart, kernels.error_norm, advance)
     if method.driver == "steps":
         yield method.kernel(form.first_order)[0]
     if method.step is None:
-        yield from (*method.errors, kernels.error_norm)
+        yield from method.errors
     if method.implicit:
         yield from (linearise.linearise, linearise.reduce, linearise.factorise, linearise.solve, linearise.soften)
-        yield kernels.error_norm
     if within:
         interpolant = method.interpolant(form.first_order)
         yield from (interpolant.fill, interpolant.value)
@@ -84,18 +91,9 @@ def _kinds(scene):
     return kinds
 
 
-def _series(scene, method, form):
-    """The Taylor method that will run the scene, or None."""
-    if method is not None:
-        return method if isinstance(method, Taylor) else None
-    serves = form.name == "tangent" and all("series" in part.kernels for part in _parts(scene))
-    return Taylor(1e-8) if serves else None
-
-
-def _parts(scene):
-    yield from (kind for kind in _kinds(scene) if not kind.normalises)
-    yield from scene.forces
-
-
-def _is_far(scene, method):
-    return len(scene.bodies) * room(method.orders()[2]) > FAR
+def _default_method(scene, form, rtol, atol):
+    """The default method, as `choice.explicit` will find it."""
+    kinds = (kind.kernels for kind in _kinds(scene) if not kind.normalises)
+    forces = (force.kernels for force in scene.forces)
+    serves = form.name == "tangent" and all("series" in kernels for kernels in (*kinds, *forces))
+    return (Taylor if serves else DOP853)(**tolerances(rtol, atol))

@@ -26,7 +26,7 @@ from .scene import Scene
 from .series_run import run_series
 from .solution import Solution
 from .state import remembered
-from .task import Task
+from .task import Task, between
 
 DRIVERS = {"steps": run_past, "series": run_series}  # by Integrator.driver, if it isn't one itself; see tsdyn.task
 
@@ -123,18 +123,13 @@ def simulate(
     form = find_formulation(formulation)
     chart_interval = whole(chart_interval, "chart_interval")
     method = None if integrator is None else method_of(integrator, rtol, atol)
-    prepare_first_run(scene, method, form, t_eval is not None or dense_output or events is not None)
-    kept = prepared(scene)
-    if method is None:
-        method = choice.explicit(kept, rtol, atol, form.name == "tangent" and chart_interval is None)
-    if method.implicit and form.first_order:
+    if method is not None and method.implicit and form.first_order:
         others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
         raise InvalidArgument(
             f"{type(method).__name__} solves its stages in the tangent-space form only; formulation={form.name!r} is "
             f"served by {others}."
         )
-    if max_step is not None:
-        method = method.bounded(positive(max_step, "max_step (s)"))
+    longest = None if max_step is None else positive(max_step, "max_step (s)")
     constraint_tol = positive(constraint_tol, "constraint_tol")
     initial_tol = positive(initial_tol, "initial_tol")
     one_of(redundancy, ("drop", "refuse"), "redundancy")
@@ -144,6 +139,13 @@ def simulate(
     watched = prepare(events)
     times = output_times(t_eval, *span)
     max_steps = whole(max_steps, "max_steps")
+    within = bool(dense_output) or watched is not None or between(times, span)
+    prepare_first_run(scene, method, form, within, rtol, atol)
+    kept = prepared(scene)
+    if method is None:
+        method = choice.explicit(kept, rtol, atol, form.name == "tangent" and chart_interval is None)
+    if longest is not None:
+        method = method.bounded(longest)
     report = reporter(progress)
 
     started = time.perf_counter()

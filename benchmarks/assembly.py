@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 import tsdyn as ts
-from tsdyn.approach import close
-from tsdyn.kinetic import Metric
+from tsdyn.configuration.continuation import close
+from tsdyn.configuration.kinetic_metric import Metric
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from sketches import CLEAR, MECHANISMS

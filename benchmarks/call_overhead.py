@@ -11,7 +11,7 @@ import numpy as np
 import tsdyn as ts
 from benchmarks.scenes import SCENES
 from examples import driven_pivot
-from tsdyn import memory
+from tsdyn.runs import run_memory as memory
 
 SPAN, CALLS, ROUNDS = (0.0, 1e-4), 30, 15
 TOLERANCES = {"rtol": 1e-8, "atol": 1e-8}

@@ -8,7 +8,7 @@ import time
 import numpy as np
 
 import tsdyn as ts
-from tsdyn.still import keep_turning
+from tsdyn.formulations.locked_orientations import keep_turning
 
 C, F = ts.constraints, ts.forces
 X, Y, Z = np.eye(3)

@@ -8,14 +8,14 @@ __all__ += ["registered", "registered_joints"]
 
 def registered():
     """Return every primitive class known, built in or plugged in."""
-    from ..primitive import registered as known
+    from ..elements.primitive import registered as known
 
     return tuple(known().values())
 
 
 def registered_joints():
     """Return every joint class known, built in or plugged in."""
-    from ..joint import registered as known
+    from ..elements.joint import registered as known
 
     return tuple(known().values())
 

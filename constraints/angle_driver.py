@@ -12,10 +12,7 @@ Holds after half a turn, too: a start there is refused. Singular where h is alon
 
 import numpy as np
 
-from ..markers import Vector
-from ..motion import Motion
-from ..primitive import Primitive
-from ..recurrences import dot, product, scaled, sine_cosine
+from ..plugins import Motion, Primitive, Vector, dot, product, scaled, sine_cosine
 
 
 class AngleDriver(Primitive):

@@ -9,12 +9,7 @@ import math
 
 import numpy as np
 
-from ..bodies import rotation_matrix
-from ..checks import number
-from ..errors import InvalidConstraint
-from ..joint import Joint
-from ..markers import Vector
-from ..motions import Smooth
+from ..plugins import InvalidConstraint, Joint, Smooth, Vector, number, rotation_matrix
 from .dot1 import Dot1
 
 

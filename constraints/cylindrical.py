@@ -6,9 +6,7 @@
 Holds with the axes opposed, too: a start there is refused. Never singular.
 """
 
-from ..joint import Joint
-from ..joint_coordinates import Angle, Displacement
-from ..markers import Point, Vector
+from ..plugins import Angle, Displacement, Joint, Point, Vector
 from .parallel import Parallel
 from .point_on_line import PointOnLine
 

@@ -11,12 +11,7 @@ Singular where x_a = x_b: a distance of zero is a Spherical joint.
 
 import numpy as np
 
-from ..bodies import rotation_matrix
-from ..errors import InvalidConstraint
-from ..markers import Point
-from ..motion import Motion
-from ..primitive import Primitive
-from ..recurrences import square
+from ..plugins import InvalidConstraint, Motion, Point, Primitive, rotation_matrix, square
 
 
 class Distance(Primitive):

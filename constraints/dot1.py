@@ -8,10 +8,7 @@
 Singular where a and b are parallel (c = 1 or -1): two Dot1 rows with directions across make axes parallel.
 """
 
-from ..errors import InvalidConstraint
-from ..markers import Vector
-from ..motion import Motion
-from ..primitive import Primitive
+from ..plugins import InvalidConstraint, Motion, Primitive, Vector
 
 
 class Dot1(Primitive):

@@ -9,9 +9,7 @@
 Never singular by itself.
 """
 
-from ..markers import Point, Vector
-from ..motion import Motion
-from ..primitive import Primitive
+from ..plugins import Motion, Point, Primitive, Vector
 
 
 class Dot2(Primitive):

@@ -7,8 +7,7 @@
 Every rigid body of a scene has one by itself.
 """
 
-from ..markers import Parameters
-from ..primitive import Primitive
+from ..plugins import Parameters, Primitive
 
 
 class EulerNormalization(Primitive):

@@ -8,9 +8,7 @@ f_a and f_b are the references made perpendicular to the axes, g = axis x f. Hol
 axis, too: a start there is refused. Never singular.
 """
 
-from ..bodies import Ground, PointMass, rotation_matrix
-from ..calls import Placing
-from ..framed_joint import FramedJoint
+from ..plugins import FramedJoint, Ground, Placing, PointMass, rotation_matrix
 from .dot1 import Dot1
 from .parallel import Parallel
 from .spherical import Spherical

@@ -13,16 +13,24 @@ the last accepted step, so a step must turn less than half a turn. Singular wher
 
 import numpy as np
 
-from .._kernel import kernel
-from ..angle import angle_near
-from ..bodies import rotation_matrix
-from ..checks import number
-from ..errors import InvalidConstraint
-from ..framed_joint import PARALLEL, beside
-from ..joint import across
-from ..markers import Point, Vector
-from ..primitive import Primitive
-from ..recurrences import cross, dot, quotient, scaled, square
+from ..plugins import (
+    PARALLEL,
+    InvalidConstraint,
+    Point,
+    Primitive,
+    Vector,
+    across,
+    angle_near,
+    beside,
+    cross,
+    dot,
+    kernel,
+    number,
+    quotient,
+    rotation_matrix,
+    scaled,
+    square,
+)
 from .thread import place
 
 

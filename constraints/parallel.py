@@ -6,9 +6,7 @@ The two rows are orthonormal in terms of small relative rotations. They hold wit
 refused. Never singular.
 """
 
-from ..joint import Joint, across
-from ..joint_coordinates import Angle
-from ..markers import Vector
+from ..plugins import Angle, Joint, Vector, across
 from .dot1 import Dot1
 
 

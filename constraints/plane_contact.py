@@ -8,8 +8,7 @@
 Never singular by itself.
 """
 
-from ..markers import Point, Vector
-from ..primitive import Primitive
+from ..plugins import Point, Primitive, Vector
 
 
 class PlaneContact(Primitive):

@@ -7,11 +7,7 @@ Never singular.
 
 import numpy as np
 
-from ..errors import InvalidConstraint
-from ..joint import Joint
-from ..markers import Point
-from ..motion import Motion
-from ..table import is_data
+from ..plugins import InvalidConstraint, Joint, Motion, Point, is_data
 from .dot2 import Dot2
 
 

@@ -5,9 +5,7 @@
 Never singular.
 """
 
-from ..joint import Joint, across
-from ..joint_coordinates import Displacement
-from ..markers import Point, Vector
+from ..plugins import Displacement, Joint, Point, Vector, across
 from .dot2 import Dot2
 
 

@@ -8,11 +8,18 @@ are, and counts no turns. Singular where the axis of the pinion is along the rac
 
 import numpy as np
 
-from ..errors import InvalidConstraint
-from ..framed_joint import PARALLEL, beside, carried, turned_about
-from ..joint import Joint
-from ..joint_coordinates import Angle, Displacement
-from ..markers import Point, Vector
+from ..plugins import (
+    PARALLEL,
+    Angle,
+    Displacement,
+    InvalidConstraint,
+    Joint,
+    Point,
+    Vector,
+    beside,
+    carried,
+    turned_about,
+)
 from .thread import Thread, demand_lead, travel
 
 

@@ -8,11 +8,7 @@ Singular where the axes are at right angles: a joint keeps them together.
 
 import numpy as np
 
-from ..calls import fitting
-from ..errors import InvalidConstraint
-from ..framed_joint import FramedJoint, beside, turned_about
-from ..joint_coordinates import Angle
-from ..motion import Motion
+from ..plugins import Angle, FramedJoint, InvalidConstraint, Motion, beside, fitting, turned_about
 from .angle_driver import AngleDriver
 
 

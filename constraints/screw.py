@@ -8,8 +8,7 @@ f_a and f_b are the references made perpendicular to the axes. (1) holds with th
 refused. (3) is periodic as the thread is, and counts no turns. Never singular.
 """
 
-from ..framed_joint import FramedJoint
-from ..joint_coordinates import Angle, Displacement
+from ..plugins import Angle, Displacement, FramedJoint
 from .parallel import Parallel
 from .point_on_line import PointOnLine
 from .rotation_motor import set_apart

@@ -7,8 +7,7 @@
 Never singular by itself.
 """
 
-from ..markers import Point
-from ..primitive import Primitive
+from ..plugins import Point, Primitive
 
 
 class Spherical(Primitive):

@@ -15,12 +15,18 @@ Singular where h is along f x g.
 
 import numpy as np
 
-from ..bodies import rotation_matrix
-from ..checks import number
-from ..errors import InvalidConstraint
-from ..markers import Point, Vector
-from ..primitive import Primitive
-from ..recurrences import dot, product, scaled, sine_cosine
+from ..plugins import (
+    InvalidConstraint,
+    Point,
+    Primitive,
+    Vector,
+    dot,
+    number,
+    product,
+    rotation_matrix,
+    scaled,
+    sine_cosine,
+)
 
 
 class Thread(Primitive):

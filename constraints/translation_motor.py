@@ -5,11 +5,7 @@
 Never singular by itself.
 """
 
-from ..calls import fitting
-from ..joint import Joint
-from ..joint_coordinates import Displacement
-from ..markers import Point, Vector
-from ..motion import Motion
+from ..plugins import Displacement, Joint, Motion, Point, Vector, fitting
 from .dot2 import Dot2
 from .rotation_motor import axes, geometry
 

@@ -8,8 +8,7 @@ f_a and f_b are the references made perpendicular to the axes, g = axis x f. Hol
 is refused. Never singular.
 """
 
-from ..framed_joint import FramedJoint
-from ..joint_coordinates import Displacement
+from ..plugins import Displacement, FramedJoint
 from .dot1 import Dot1
 from .parallel import Parallel
 from .point_on_line import PointOnLine

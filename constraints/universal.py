@@ -9,12 +9,7 @@ sin(theta)^2), theta being the turn of the shaft of a from where its arm is acro
 
 import numpy as np
 
-from ..attachment import in_frame
-from ..calls import Placing
-from ..errors import InvalidConstraint
-from ..joint import Joint
-from ..joint_coordinates import Angle
-from ..markers import Point, Vector
+from ..plugins import Angle, InvalidConstraint, Joint, Placing, Point, Vector, in_frame
 from .dot1 import Dot1
 from .spherical import Spherical
 

@@ -10,7 +10,7 @@ Run it: python examples/plug_in_integrator.py
 import numpy as np
 
 import tsdyn as ts
-from tsdyn.stepping import call_accelerate, call_place, error_kernel, step_kernel, vector
+from tsdyn.plugins import call_accelerate, call_place, error_kernel, step_kernel, vector
 
 
 class BogackiShampine(ts.ExplicitRungeKutta):

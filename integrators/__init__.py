@@ -8,7 +8,7 @@ __all__.append("registered")
 
 def registered():
     """Return every integrator class known, built in or plugged in."""
-    from ..integrator import registered as known
+    from ..methods.integrator import registered as known
 
     return tuple(known().values())
 

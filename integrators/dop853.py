@@ -9,10 +9,8 @@ from functools import cache
 
 import numpy as np
 
-from ..integrator import ExplicitRungeKutta
-from ..interpolation import DOP853 as INTERPOLANT
-from ..stepping import embedded_error, second_embedded_error
-from ..tableau import RungeKuttaTableau
+from ..plugins import DOP853_INTERPOLANT as INTERPOLANT
+from ..plugins import ExplicitRungeKutta, RungeKuttaTableau, embedded_error, second_embedded_error
 
 
 @cache

@@ -1,9 +1,6 @@
 """ImplicitTrapezoid: the trapezoidal rule, order 2, A-stable, without damping; its Jacobian is kept and used again."""
 
-from ..implicit import trapezoid_error
-from ..integrator import DiagonallyImplicit
-from ..interpolation import linear_second
-from ..tableau import ImplicitTableau
+from ..plugins import DiagonallyImplicit, ImplicitTableau, linear_second, trapezoid_error
 
 
 class ImplicitTrapezoid(DiagonallyImplicit):

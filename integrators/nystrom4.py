@@ -11,8 +11,7 @@ Stages 2 and 3 share their position, so a step places the system three times (th
 Nystrom 1925; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.14, Eq. (14.13).
 """
 
-from ..integrator import ExplicitNystrom
-from ..tableau import NystromTableau, RungeKuttaTableau
+from ..plugins import ExplicitNystrom, NystromTableau, RungeKuttaTableau
 
 
 class Nystrom4(ExplicitNystrom):

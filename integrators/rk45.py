@@ -4,8 +4,7 @@ J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, J. Compu
 to (v, vd). The seventh stage is the evaluation at the step's end, which the driver makes anyway.
 """
 
-from ..integrator import ExplicitRungeKutta
-from ..tableau import RungeKuttaTableau
+from ..plugins import ExplicitRungeKutta, RungeKuttaTableau
 
 
 class RK45(ExplicitRungeKutta):

@@ -6,8 +6,7 @@ C. A. Kennedy, M. H. Carpenter, Diagonally implicit Runge-Kutta methods for stif
 
 from fractions import Fraction as F
 
-from ..integrator import DiagonallyImplicit
-from ..tableau import ImplicitTableau
+from ..plugins import DiagonallyImplicit, ImplicitTableau
 
 _G = F(23, 125)
 _C = (

@@ -1,19 +1,17 @@
 """Taylor series of the motion, of variable order and step (Jorba and Zou, Experiment. Math. 14, 99, 2005).
 
 The coefficients of r, A, omega' and the multipliers follow order by order from the equations of motion (see
-tsdyn.expansion); at a step's end positions and velocities are put back on the constraints.
+coefficients.py); at a step's end positions and velocities are put back on the constraints.
 """
 
 import math
 
-from ..checks import positive, whole
-from ..errors import InvalidArgument
-from ..integrator import Integrator
+from ..plugins import Integrator, InvalidArgument, positive, whole
 
 LOWEST, HIGHEST = 4, 30
 TIGHT = 1e-12  # mean of rtol and atol: below it rounding counts
 FINEST = 4e-18  # of a step: truncation of one sign that stays below the rounding of a million steps
-REFINED = 2  # orders of the multipliers that are refined where rounding counts
+REFINED = 3  # orders of the multipliers that are refined where rounding counts
 
 
 class Taylor(Integrator):

@@ -3,7 +3,7 @@
 import numpy as np
 
 import tsdyn as ts
-from tsdyn.recurrences import dot, exponential, inverse_root, product, quotient, scaled, square
+from tsdyn.plugins import dot, exponential, inverse_root, product, quotient, scaled, square
 
 
 class Rod(ts.Primitive):

@@ -8,7 +8,7 @@ import numpy as np
 from scenes import EPS, build
 
 import tsdyn as ts
-from tsdyn.diagnostics import constraint_error
+from tsdyn.observables.diagnostics import constraint_error
 
 FOLDER = Path(__file__).parent / "references"
 NAMES = tuple(sorted(path.stem for path in FOLDER.glob("*.json")))

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from tsdyn._kernel import caller, entry, resident
-from tsdyn.assembly import constraint_curvature, set_time
-from tsdyn.evaluate import mass_matrix
-from tsdyn.force_pack import with_force_jacobians
-from tsdyn.formulation import formulation
-from tsdyn.stepping import call_accelerate, call_place
-from tsdyn.system import with_curvatures
-from tsdyn.workspace import Context, allocate, allocate_linear, basis_free_parts
+from tsdyn.formulations.registry import formulation
+from tsdyn.jit.kernels import caller, entry, resident
+from tsdyn.methods.explicit import call_accelerate, call_place
+from tsdyn.model.equations import constraint_curvature, set_time
+from tsdyn.model.packed import with_curvatures
+from tsdyn.model.packed_forces import with_force_jacobians
+from tsdyn.observables.evaluate import mass_matrix
+from tsdyn.workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
 
 WEIGHTS = {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}  # central differences of sixth order
 
@@ -53,7 +53,7 @@ def _soften(context, at, ex, g, ey):
 
 @entry
 def evaluate_curvature(s, q, qd, qdd, t, lam, K, G1, G2):
-    """K += (Phi_q^T lam)_q, G1 and G2 of tsdyn.curvature; s is from `with_curvatures`."""
+    """K += (Phi_q^T lam)_q, G1 and G2 of tsdyn.elements.loops.constraint_hessians; s is from `with_curvatures`."""
     set_time(s, t)
     constraint_curvature(s, q, qd, qdd, t, lam, K, G1, G2)
 

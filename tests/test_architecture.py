@@ -3,147 +3,143 @@
 import ast
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = {
-    "tsdyn": ROOT / "tsdyn",
-    "constraints": ROOT / "constraints",
-    "forces": ROOT / "tsdyn" / "forces",
-    "integrators": ROOT / "integrators",
-}
-FILES = {
-    (f"{name}.{file.stem}" if name != "tsdyn" else file.stem): file
-    for name, folder in FOLDERS.items()
-    for file in sorted(folder.glob("*.py"))
-}
-# lowest first; a module imports from lines above its own, or from its own line
-LAYERS = """
-_code_hash _interrupts _cache _compiler _compiled _waiting errors _discovery jet truncated checks aligned chebyshev history mesh shapes
-calls membership compiled_once names
-_kernel
-_four rotation linalg pieces table knots motion motions motion_program signal angle recurrences
-blocks block_steps block_kernels hubs
-vectors
-markers bodies tableau friction joint_coordinates joint_turns
-joint_motion
-poses axis_rows massless
-attachment marker_forces frames curvature body_loops
-series_loops
-force_series
-force_loops
-friction_loops force_pack
-friction_pack
-network local
-free normal
-selection
-rows nearness
-free_memory
-primitive
-joint
-framed_joint
-force
-joint_friction
-state_function
-joint_load
-given_load
-rigid_shift system stepping progress
-handles
-still
-sparse_rows
-assembly interpolation constraints.* forces.*
-expansion
-workspace run_state
-outputs independent
-stops
-series_state
-implicit
-integrator
-integrators.* constraints.__init__ forces.__init__ integrators.__init__
-arguments
-loads
-landing displacement free_accelerations uniqueness
-friction_solve
-friction_basis friction_reactions friction_unique
-local_chart
-newton evaluate diagnostics
-kinematics
-state
-reactions power dense friction_balance conservation
-control turning holonomic
-chart rank
-branch initial start kinetic
-approach folds dependence
-conflict mobility
-assemble
-setting null_space tangent editing
-scene
-maggi_kane linearise driven
-series_steps
-series_stops
-series_length
-taylor expansion_pack
-series_memory
-series_dense
-formulation run
-_worker
-_workers
-first_run
-memory prepare task sampling
-sign_search events drive work account
-inside
-watch
-relay
-series_run steps solution
-passage origin digits
-series_check timers
-timekeeper replay phases
-simulate choice force_check
-integrator_scenes integrator_checks agreement profile_report scene_file
-testing benchmark_report benchmark advice
-profiling
-compile_command
-tables plots
-benchmark_plot
-profile_plot
-cli __init__
-__main__
-"""
+PLACES = {"tsdyn": ROOT / "tsdyn", "tsdyn.constraints": ROOT / "constraints", "tsdyn.integrators": ROOT / "integrators"}
+# lowest first: a module imports from its own package and those (or modules that lie flat in tsdyn/) before it
+ORDER = [
+    "errors",
+    "_discovery",
+    "_moved",
+    "_version",
+    "validation",
+    "calls",
+    "drawing",
+    "jit",
+    "maths",
+    "shapes",
+    "motions",
+    "elements",
+    "model",
+    "sparse",
+    "rows",
+    "workspaces",
+    "methods",
+    "plugins",
+    "constraints",
+    "forces",
+    "integrators",
+    "formulations",
+    "observables",
+    "runs",
+    "taylor",
+    "configuration",
+    "ahead",
+    "simulation",
+    "benchmarking",
+    "profiling",
+    "plots",
+    "testing",
+    "cli",
+    "__init__",
+    "__main__",
+]
+FLAT = 14  # modules at most that lie flat in tsdyn/
+LONGEST = 400  # lines of a file
 
 
-def layer_of(module):
-    for level, line in enumerate(LAYERS.split("\n")):
-        names = line.split()
-        if module in names or (module.count(".") and f"{module.split('.')[0]}.*" in names and "__init__" not in module):
-            return level
-    return pytest.fail(f"{module} has no layer: give it one in test_architecture.py")
+def _modules():
+    """Every module by its dotted name, and its file."""
+    found = {}
+    for package, folder in PLACES.items():
+        for file in sorted(folder.rglob("*.py")):
+            parts = [*package.split("."), *file.relative_to(folder).with_suffix("").parts]
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
+    return found
 
 
-def imports(module, file, everywhere=False):
-    """The package's modules that a module imports: at its top, or anywhere in it."""
-    tree = ast.parse(file.read_text())
-    nodes = ast.walk(tree) if everywhere else tree.body
-    for node in nodes:
-        if isinstance(node, ast.ImportFrom) and node.level:
-            inside = "." in module and node.level == 1
-            base = module.split(".")[0] + "." if inside else ""
-            target = node.module or ""
-            names = [f"{base}{target}"] if target else [f"{base}{alias.name}" for alias in node.names]
-            for name in names:
-                yield f"{name}.__init__" if name in ("constraints", "forces", "integrators") else name
+FILES = _modules()
+PACKAGES = {name for name, file in FILES.items() if file.name == "__init__.py"}
+
+
+def _district(module):
+    """The package, or the module that lies flat in tsdyn/, that a module belongs to."""
+    return module.split(".")[1] if "." in module else "__init__"
+
+
+def imports(module):
+    """The modules of tsdyn that a module imports, lazily or at its top."""
+    here = module.split(".") if module in PACKAGES else module.split(".")[:-1]
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if not isinstance(node, ast.ImportFrom) or not node.level:
+            continue
+        base = [*here[: len(here) - node.level + 1], *(node.module or "").split(".")]
+        base = ".".join(part for part in base if part)
+        for alias in node.names:
+            name = f"{base}.{alias.name}"
+            yield name if name in FILES else base
+
+
+EDGES = {module: sorted(set(imports(module)) - {module}) for module in FILES}
 
 
 @pytest.mark.parametrize("module", FILES, ids=str)
-def test_imports_run_one_way(module):
-    for target in imports(module, FILES[module]):
-        assert layer_of(target) <= layer_of(module), f"{module} imports {target}, which is above it"
-        assert target != module
+def test_packages_import_one_way(module):
+    for target in EDGES[module]:
+        assert target in FILES, f"{module} imports {target}, which is no module"
+        assert ORDER.index(_district(target)) <= ORDER.index(_district(module)), f"{module} imports {target}, above it"
 
 
-@pytest.mark.parametrize("module", [m for m in FILES if "." in m], ids=str)
-def test_plug_in_folders_import_relatively(module):
+def test_no_modules_import_each_other_in_a_circle():
+    left = {module: set(targets) - PACKAGES for module, targets in EDGES.items() if module not in PACKAGES}
+    while left:
+        free = [module for module, targets in left.items() if not targets & left.keys()]
+        assert free, f"a circle among {sorted(left)}"
+        for module in free:
+            del left[module]
+
+
+@pytest.mark.parametrize("package", sorted(PACKAGES - {"tsdyn"}), ids=str)
+def test_packages_say_what_they_are_for(package):
+    text = ast.get_docstring(ast.parse(FILES[package].read_text()))
+    if package in ("tsdyn.constraints", "tsdyn.integrators", "tsdyn.forces"):
+        return  # a class a file
+    assert 3 <= len(text.splitlines()) <= 10
+    assert "Imports " in text
+    assert "Begin with " in text
+
+
+def test_few_modules_lie_flat():
+    assert len(list((ROOT / "tsdyn").glob("*.py"))) <= FLAT
+    assert {_district(module) for module in FILES} == set(ORDER) - {"__main__"} | {_district("tsdyn.__main__")}
+
+
+def test_the_wheel_has_every_package():
+    listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    assert sorted(listed) == sorted(PACKAGES)
+
+
+def test_built_in_classes_are_written_with_what_plug_ins_have():
+    for name, file in FILES.items():
+        if _district(name) in ("constraints", "forces", "integrators") and file.name != "__init__.py":
+            districts = {_district(target) for target in EDGES[name]}
+            assert districts <= {"plugins", "constraints", "forces", "integrators"}, name
+
+
+@pytest.mark.parametrize("module", ["recurrences", "stepping", "joint", "force"])
+def test_modules_of_former_plug_ins_say_where_they_are(module):
+    code = f"from tsdyn.{module} import x"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode != 0
+    assert "tsdyn.plugins" in result.stderr
+
+
+@pytest.mark.parametrize("module", FILES, ids=str)
+def test_modules_import_each_other_relatively(module):
     for node in ast.walk(ast.parse(FILES[module].read_text())):
         if isinstance(node, ast.ImportFrom) and not node.level:
             assert not node.module.startswith("tsdyn")
@@ -153,7 +149,7 @@ def test_plug_in_folders_import_relatively(module):
 
 @pytest.mark.parametrize("module", FILES, ids=str)
 def test_numba_is_used_in_one_place(module):
-    if module in ("_cache", "_code_hash", "_compiler", "_compiled", "_kernel", "_four", "_workers"):
+    if _district(module) == "jit":
         return
     names = {
         alias.name
@@ -167,7 +163,7 @@ def test_numba_is_used_in_one_place(module):
 
 @pytest.mark.parametrize("module", FILES, ids=str)
 def test_files_stay_short(module):
-    assert len(FILES[module].read_text().splitlines()) <= 400
+    assert len(FILES[module].read_text().splitlines()) <= LONGEST
 
 
 @pytest.mark.parametrize("folder", ["constraints", "integrators"])

@@ -270,6 +270,24 @@ def test_all_fixed():
     assert_same(poses, [parts[::2] for parts in snapshot(scene)])
 
 
+def motorised(angle):
+    """An arm on a hinge, turned by 1 rad/s from zero at t = 0; drawn at an angle."""
+    scene, half = ts.Scene(), 0.5 * angle
+    arm = scene.add_body(1.0, (0.1, 0.1, 0.1), orientation=(np.cos(half), 0.0, 0.0, np.sin(half)))
+    axes = {"axis_a": (0, 0, 1), "axis_b": (0, 0, 1)}
+    scene.add(C.Revolute(scene.ground, arm, point_a=(0, 0, 0), point_b=(0, 0, 0), **axes))
+    sides = {"reference_a": (1, 0, 0), "reference_b": (1, 0, 0)}
+    scene.add(C.RotationMotor(scene.ground, arm, **axes, **sides, angle=ts.motions.Ramp(0.0, 1.0), name="motor"))
+    return scene
+
+
+def test_a_motor_is_judged_by_where_it_has_turned_to():
+    """More than a quarter of a turn from where it began; and its mirrored branch, there."""
+    assert motorised(2.9).assemble(t=3.0).residual <= 1e-14
+    with pytest.raises(ts.InconsistentState, match=r"motor.*opposite ways"):
+        motorised(-0.1).assemble(t=3.0)
+
+
 @pytest.mark.parametrize("t", [0.0, 0.7, 2.0, -1.5])
 def test_constraints_that_depend_on_time_are_met_at_t(t):
     scene = mechanism(np.random.default_rng(3))

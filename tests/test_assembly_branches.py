@@ -5,8 +5,8 @@ import pytest
 from sketches import MECHANISMS, Builder, polar, turned
 
 import tsdyn as ts
-from tsdyn.folds import Folds
-from tsdyn.kinetic import Metric
+from tsdyn.configuration.kinetic_metric import Metric
+from tsdyn.configuration.loop_folds import Folds
 
 C = ts.constraints
 COUNT = 20

@@ -74,7 +74,7 @@ def test_a_motion_needs_phi_t():
 
 
 def test_scenes_and_solutions_survive_pickling_and_compile_nothing():
-    from tsdyn.run import advance
+    from tsdyn.runs.stepper import advance
 
     solution = ts.simulate(top.build(), (0.0, 0.1))
     count = len(advance.signatures)

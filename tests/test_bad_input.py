@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
-from tsdyn import _cache
+from tsdyn.jit import cache as _cache
 
 C = ts.constraints
 NAN, INF = math.nan, math.inf

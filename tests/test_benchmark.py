@@ -8,8 +8,9 @@ import pytest
 from reference import load
 
 import tsdyn as ts
-from tsdyn import agreement, benchmark_report
-from tsdyn.integrator_scenes import sliding_top, two_body_pendulum
+from tsdyn.benchmarking import reference_solution as agreement
+from tsdyn.benchmarking import report as benchmark_report
+from tsdyn.testing.integrator_scenes import sliding_top, two_body_pendulum
 
 I = ts.integrators
 SPAN = (0.0, 0.5)
@@ -124,7 +125,7 @@ def test_interrupt_before_there_is_a_reference(monkeypatch):
     def interrupted(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sys.modules["tsdyn.benchmark"], "agreed", interrupted)
+    monkeypatch.setattr(sys.modules["tsdyn.benchmarking.benchmark"], "agreed", interrupted)
     found = ts.benchmark(sliding_top(), ["rk45"], (1e-4,), SPAN)
     assert (found.rows, found.interrupted, found.reference_digits) == ((), True, 0.0)
     assert "interrupted" in str(found)

@@ -14,7 +14,7 @@ from benchmarks.by_hand import contenders as by_hand
 from benchmarks.contender import Contender, Outcome, rotation
 from benchmarks.measure import Measured, Row, measure
 from benchmarks.scenes import SCENES
-from tsdyn.integrator_scenes import sliding_top
+from tsdyn.testing.integrator_scenes import sliding_top
 
 PEERS = peers.contenders()
 SMALL = ("sliding top", "two-body pendulum", "two-body pendulum in space", "chain of 4", "tree of 7", "loop of 4")

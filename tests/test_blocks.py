@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tsdyn.block_kernels import factor, factor_lu, solve, solve_lu, solve_lu_transposed
-from tsdyn.blocks import Pattern, analyse
+from tsdyn.sparse.factorisation import factor, factor_lu, solve, solve_lu, solve_lu_transposed
+from tsdyn.sparse.symbolic import Pattern, analyse
 
 ROOT = Path(__file__).parents[1]
 EPS = np.finfo(float).eps
@@ -183,11 +183,11 @@ def test_chains_cost_the_same_for_each_body(size):
 
 def test_nothing_but_loops_of_many_nodes_needs_scipy():
     code = """
-import sys, tsdyn.blocks
-tsdyn.blocks.analyse([3] * 1000, [[i, i + 1] for i in range(999)])
-tsdyn.blocks.analyse([3] * 100, [[i, (i + 1) % 100] for i in range(100)])
+import sys, tsdyn.sparse.symbolic
+tsdyn.sparse.symbolic.analyse([3] * 1000, [[i, i + 1] for i in range(999)])
+tsdyn.sparse.symbolic.analyse([3] * 100, [[i, (i + 1) % 100] for i in range(100)])
 print("scipy.sparse" in sys.modules)
-tsdyn.blocks.analyse([3] * 1000, [[i, (i + 1) % 1000] for i in range(1000)])
+tsdyn.sparse.symbolic.analyse([3] * 1000, [[i, (i + 1) % 1000] for i in range(1000)])
 print("scipy.sparse" in sys.modules)
 """
     result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 
 REPORT = """
 import json, tsdyn
-from tsdyn import _cache
+from tsdyn.jit import cache as _cache
 def report(**numbers):
     print(json.dumps({**numbers, **_cache.statistics, "folder": str(_cache.folder())}))
 """
@@ -33,7 +33,7 @@ report(Phi=float(scene.evaluate().Phi[0]))
 TINY = (
     REPORT
     + """
-from tsdyn._kernel import entry
+from tsdyn.jit.kernels import entry
 @entry
 def twice(x):
     return 2.0 * x
@@ -159,7 +159,7 @@ def test_forces_are_cached_and_only_those_used_are_loaded(warm):
 IMPLICIT = (
     REPORT
     + """
-from tsdyn import linearise
+from tsdyn.formulations import linearisation as linearise
 from benchmarks.stiff import hung, jointed
 def loaded(scene):
     kinds = {type(c): c.kernels["curvature"] for c in scene.constraints}.values()
@@ -218,10 +218,10 @@ def test_kernels_in_a_sub_package_follow_an_edit_of_their_callees(package):
     folder.mkdir()
     (folder / "__init__.py").touch()
     (folder / "inner.py").write_text(
-        "from .._kernel import kernel\nLEVEL = 3.0\n@kernel\ndef level(x):\n    return LEVEL * x\n"
+        "from ..jit.kernels import kernel\nLEVEL = 3.0\n@kernel\ndef level(x):\n    return LEVEL * x\n"
     )
     (folder / "outer.py").write_text(
-        "from .._kernel import entry\nfrom . import inner\n@entry\ndef twice(x):\n    return 2.0 * inner.level(x)\n"
+        "from ..jit.kernels import entry\nfrom . import inner\n@entry\ndef twice(x):\n    return 2.0 * inner.level(x)\n"
     )
     environment = {"NUMBA_CACHE_DIR": str(package / "cache")}
     code = REPORT + "\nfrom tsdyn.below.outer import twice\nreport(value=twice(1.0))\n"
@@ -276,7 +276,7 @@ def test_complete_cache_that_can_not_be_written_is_used(tmp_path):
 INTERRUPTED = """
 import signal
 from numba.core.registry import cpu_target
-from tsdyn._kernel import entry
+from tsdyn.jit.kernels import entry
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 engine = cpu_target.target_context.codegen()._engine._ee
 found = engine._object_cache_notify
@@ -464,7 +464,7 @@ def test_debug_mode_runs_plain_python():
         REPORT
         + """
 from examples import top
-from tsdyn import _kernel
+from tsdyn.jit import kernels as _kernel
 end = tsdyn.simulate(top.build(), (0.0, 0.01), t_eval=[0.0055, 0.01])
 report(q=end.q.tolist(), debug=_kernel.DEBUG)
 """
@@ -521,7 +521,7 @@ def test_a_scene_without_motions_loads_none_of_it():
         REPORT
         + """
 from examples import slider_crank
-from tsdyn.motion_program import run_program
+from tsdyn.motions.program import run_program
 for method in ("taylor", "dop853"):
     tsdyn.simulate(slider_crank.build(), (0.0, 0.01), integrator=method)
 kinds = [kind.kernels for kind in tsdyn.constraints.registered()]

@@ -11,7 +11,8 @@ from scenes import random_chain
 
 import tsdyn as ts
 from examples import driven_pivot, top
-from tsdyn import drive, prepare
+from tsdyn.runs import slices as drive
+from tsdyn.simulation import scene_cache as prepare
 
 I = ts.integrators
 SPAN = (0.0, 0.3)

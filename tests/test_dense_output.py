@@ -11,7 +11,7 @@ from reference import load
 from scenes import EPS
 
 import tsdyn as ts
-from tsdyn.diagnostics import constraint_error
+from tsdyn.observables.diagnostics import constraint_error
 
 C, I = ts.constraints, ts.integrators
 FORMS = ("tangent", "maggi-kane")
@@ -231,7 +231,7 @@ def test_a_solution_outlives_a_change_of_its_scene():
 def test_a_method_loads_its_own_interpolant_only():
     code = """
 import tsdyn as ts
-from tsdyn import interpolation
+from tsdyn.methods import interpolants as interpolation
 scene = ts.Scene()
 scene.add(ts.constraints.Distance(scene.add_point_mass(1.0, (1.0, 0.0, 0.0)), scene.ground))
 ts.simulate(scene, (0.0, 0.1))

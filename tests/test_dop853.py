@@ -9,7 +9,7 @@ import pytest
 from reference import load, run
 
 import tsdyn as ts
-from tsdyn.tableau import RungeKuttaTableau
+from tsdyn.methods.tableau import RungeKuttaTableau
 
 DOP853, RK45 = ts.integrators.DOP853, ts.integrators.RK45
 SCENES = ("sliding_top", "two_body_pendulum", "two_body_pendulum_spatial")

@@ -7,7 +7,7 @@ import pytest
 from scenes import EPS
 
 import tsdyn as ts
-from tsdyn import expansion_pack
+from tsdyn.taylor import layout as expansion_pack
 
 C, M = ts.constraints, ts.motions
 X, Y, Z = np.eye(3)

@@ -6,7 +6,7 @@ from closed_forms import LENGTH, compound_pendulum, heavy_top, point_pendulum
 from scenes import EPS
 
 import tsdyn as ts
-from tsdyn.diagnostics import constraint_error
+from tsdyn.observables.diagnostics import constraint_error
 
 I = ts.integrators
 END = 3.0  # s

@@ -5,7 +5,7 @@ import pytest
 from closed_forms import point_pendulum
 
 import tsdyn as ts
-from tsdyn.sign_search import Search
+from tsdyn.maths.root_isolation import Search
 
 I = ts.integrators
 METHODS = [None, I.Taylor(), I.DOP853(1e-9, 1e-9), I.RK45(1e-6, 1e-6), I.Nystrom4(1e-2)]
@@ -220,7 +220,7 @@ def test_an_interrupt_in_the_last_step_is_no_success(method):
 
 
 def test_a_function_with_too_many_turns_says_so(monkeypatch):
-    monkeypatch.setattr("tsdyn.sign_search.MOST", 1000)
+    monkeypatch.setattr("tsdyn.maths.root_isolation.MOST", 1000)
     solution = ts.simulate(thrown(), (0.0, 1.0), events=hum())
     assert solution.status == ts.Status.EVENT_FAILED
     assert "too fast" in solution.message

@@ -12,12 +12,13 @@ import pytest
 
 import tsdyn as ts
 from examples import top
-from tsdyn import _waiting, _workers, compile_command, first_run
-from tsdyn._compiled import _types, is_loaded
+from tsdyn.ahead import all_kernels, first_run, workers
 from tsdyn.cli import main
-from tsdyn.run import advance
-from tsdyn.start import _look
-from tsdyn.taylor import advance_series
+from tsdyn.configuration.initial_conditions import _look
+from tsdyn.jit import waiting
+from tsdyn.jit.compiled import _types
+from tsdyn.runs.stepper import advance
+from tsdyn.taylor.stepper import advance_series
 
 ROOT = Path(__file__).parents[1]
 SMALL = """
@@ -25,18 +26,19 @@ import os
 with open("ran", "a") as file:
     file.write("once ")
 import tsdyn
-from tsdyn import _cache, _compiled, _workers
+from tsdyn.ahead import workers
+from tsdyn.jit import cache
 from tsdyn.constraints import EulerNormalization
-_workers.processors = lambda: 2
+workers.processors = lambda: 2
 started = []
-start = _workers._start
-_workers._start = lambda: started.append(start()) or started[-1]
+start = workers._start
+workers._start = lambda: started.append(start()) or started[-1]
 kernels = [EulerNormalization.kernels[name] for name in ("phi", "jacobian", "gamma")]
 # CHANGED
-failed = _workers.compile_ahead(kernels)
+failed = workers.compile_ahead(kernels)
 for kernel in kernels:
     kernel.address
-counts = _cache.statistics
+counts = cache.statistics
 print(failed, len(started), counts["misses"], counts["hits"], any(worker.poll() is None for worker in started))
 """
 
@@ -91,10 +93,10 @@ def test_workers_fill_the_cache_without_running_the_program_again(tmp_path, way)
 @pytest.mark.parametrize(
     ("change", "started"),
     [
-        ("_workers.processors = lambda: 1", 0),
+        ("workers.processors = lambda: 1", 0),
         ("import sys; sys.executable = '/nowhere/python'", 0),
         ("import sys; sys.executable = sys._base_executable = os.path.realpath('/bin/false')", 2),
-        ("_workers._start = lambda: (started.append(start()), started[-1].kill())[0] or started[-1]", 2),
+        ("workers._start = lambda: (started.append(start()), started[-1].kill())[0] or started[-1]", 2),
         ("os.environ['TSDYN_WORKER'] = '1'", 0),
     ],
     ids=["one processor", "no Python", "not Python", "killed", "a worker itself"],
@@ -124,17 +126,17 @@ def test_debug_mode_starts_and_compiles_nothing(tmp_path):
 INTERRUPTED = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
-from tsdyn import _workers
-from tsdyn.series_steps import expand_series, reach
-_workers.processors = lambda: 2
-start = _workers._start
+from tsdyn.ahead import workers
+from tsdyn.taylor.step_parts import expand_series, reach
+workers.processors = lambda: 2
+start = workers._start
 def noted():
     worker = start()
     print(worker.pid, flush=True)
     return worker
-_workers._start = noted
+workers._start = noted
 try:
-    _workers.compile_ahead([expand_series, reach])
+    workers.compile_ahead([expand_series, reach])
 except KeyboardInterrupt:
     print("interrupted", flush=True)
 """
@@ -146,16 +148,16 @@ def test_interrupt_ends_the_workers_and_leaves_no_halves(tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-c", INTERRUPTED], env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
-    workers = [int(process.stdout.readline()) for _ in range(2)]
+    left = [int(process.stdout.readline()) for _ in range(2)]
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert (out, process.returncode) == ("interrupted\n", 0)
     assert "tsdyn: 0 of 2 kernels compiled." in err
     assert not [file for file in tmp_path.rglob("*") if file.is_file() and file.suffix != ".lock"]
     deadline = time.monotonic() + 10.0
-    while workers and time.monotonic() < deadline:
-        workers = [pid for pid in workers if Path(f"/proc/{pid}").exists()]
-    assert workers == []
+    while left and time.monotonic() < deadline:
+        left = [pid for pid in left if Path(f"/proc/{pid}").exists()]
+    assert left == []
 
 
 class Height(ts.Primitive):
@@ -179,22 +181,22 @@ class Height(ts.Primitive):
 
 def test_plug_ins_are_left_to_this_process():
     for kernel in Height.kernels.values():
-        assert _workers.name_of(kernel) == ""
+        assert workers.name_of(kernel) == ""
     scene = ts.Scene()
     load_ = scene.add(ts.forces.UserForce(scene.add_point_mass(1.0), function=lambda t, a, b, par, out: None))
-    assert {_workers.name_of(kernel) for kernel in load_.kernels.values()} == {""}
+    assert {workers.name_of(kernel) for kernel in load_.kernels.values()} == {""}
 
 
 def test_every_kernel_of_the_package_is_found_by_its_name():
-    kernels = list(compile_command._all())
+    kernels = list(all_kernels._all())
     assert len(kernels) > 150
-    assert [kernel.py_func.__qualname__ for kernel in kernels if not _workers.name_of(kernel)] == []
-    assert {*compile_command._default()} <= {*kernels}
+    assert [kernel.py_func.__qualname__ for kernel in kernels if not workers.name_of(kernel)] == []
+    assert {*all_kernels._default()} <= {*kernels}
 
 
 def test_longest_first():
-    names = _workers.weight(advance_series.py_func), _workers.weight(_look.py_func)
-    small = [_workers.weight(kernel.py_func) for kernel in ts.constraints.EulerNormalization.kernels.values()]
+    names = workers.weight(advance_series.py_func), workers.weight(_look.py_func)
+    small = [workers.weight(kernel.py_func) for kernel in ts.constraints.EulerNormalization.kernels.values()]
     assert min(names) > max(small)
 
 
@@ -205,17 +207,17 @@ def loaded(kernels):
 RUN = """
 import importlib, sys
 import tsdyn as ts
-from tsdyn import _cache, first_run
+from tsdyn.ahead import first_run
 asked = set()
 first_run.compile_ahead = asked.update
 name, method, form, times = sys.argv[1:]
 scene = importlib.import_module(f"examples.{name}").build()
 times = [0.0, 0.005, 0.01] if times else None
 ts.simulate(scene, (0.0, 0.01), integrator=method or None, formulation=form, t_eval=times)
-from tsdyn import compile_command
-from tsdyn._compiled import is_loaded
+from tsdyn.ahead import all_kernels
+from tsdyn.jit.compiled import is_loaded
 label = lambda kernel: kernel.py_func.__module__ + ":" + kernel.py_func.__qualname__
-used = {kernel for kernel in compile_command._all() if is_loaded(kernel)}
+used = {kernel for kernel in all_kernels._all() if is_loaded(kernel)}
 print(sorted(map(label, used - asked)), sorted(map(label, {kernel for kernel in asked if not is_loaded(kernel)})))
 """
 
@@ -275,32 +277,32 @@ class Terminal:
 def test_one_line_counts_on_a_terminal(monkeypatch):
     monkeypatch.setattr(sys, "stderr", Terminal())
     monkeypatch.setenv("COLUMNS", "100")
-    with _waiting.Waiting(2) as waiting:
-        for name in ("tsdyn.start _look", "tsdyn.constraints.distance Distance.phi_loop"):
-            waiting.begin(name)
-            waiting.end(name)
+    with waiting.Waiting(2) as line:
+        for name in ("tsdyn.configuration.initial_conditions _look", "tsdyn.constraints.distance Distance.phi_loop"):
+            line.begin(name)
+            line.end(name)
     lines = sys.stderr.text.split("\r")[1:]
     assert {len(line.rstrip("\n")) for line in lines} == {99}
-    assert lines[0].split(":")[-1].strip() == "0 of 2, 0 s (start._look)"
+    assert lines[0].split(":")[-1].strip() == "0 of 2, 0 s (initial_conditions._look)"
     assert lines[-1].strip() == "tsdyn: 2 of 2 kernels compiled in 0 s."
     assert sys.stderr.text.count("\n") == 1
 
 
 def test_quiet(monkeypatch, capsys):
     monkeypatch.setenv("TSDYN_QUIET", "1")
-    with _waiting.Waiting(1) as waiting:
-        waiting.begin("tsdyn.start _look")
-        waiting.end("tsdyn.start _look")
+    with waiting.Waiting(1) as line:
+        line.begin("tsdyn.configuration.initial_conditions _look")
+        line.end("tsdyn.configuration.initial_conditions _look")
     assert capsys.readouterr() == ("", "")
 
 
 COMMAND = """
 import sys
-from tsdyn import _workers, compile_command
+from tsdyn.ahead import all_kernels, workers
 from tsdyn.cli import main
 from tsdyn.constraints import EulerNormalization
-_workers.processors = lambda: 2
-compile_command._default = lambda: [EulerNormalization.kernels["phi"], EulerNormalization.kernels["gamma"]]
+workers.processors = lambda: 2
+all_kernels._default = lambda: [EulerNormalization.kernels["phi"], EulerNormalization.kernels["gamma"]]
 # CHANGED
 print(main(["compile"]))
 """
@@ -327,7 +329,7 @@ def test_compile_command_that_can_not_store_says_so(tmp_path):
 
 
 def test_compile_command_in_debug_mode(monkeypatch, capsys):
-    monkeypatch.setattr(compile_command, "DEBUG", True)
+    monkeypatch.setattr(all_kernels, "DEBUG", True)
     assert main(["compile"]) == 1
     assert "TSDYN_DEBUG" in capsys.readouterr().err
 
@@ -335,7 +337,7 @@ def test_compile_command_in_debug_mode(monkeypatch, capsys):
 def test_kernels_can_be_tried_from_python_and_pickled():
     import pickle
 
-    from tsdyn.linalg import largest
+    from tsdyn.maths.dense_linalg import largest
 
     assert largest(np.array([1.0, -3.0])) == 3.0
     assert pickle.loads(pickle.dumps(largest)) is largest
@@ -345,11 +347,12 @@ def test_kernels_can_be_tried_from_python_and_pickled():
 def test_first_run_leaves_nothing_to_its_own_process(tmp_path):
     code = """
 import tsdyn
-from tsdyn import _cache, _workers
+from tsdyn.ahead import workers
+from tsdyn.jit import cache
 from examples import top
-_workers.processors = lambda: 2
+workers.processors = lambda: 2
 end = tsdyn.simulate(top.build(), (0.0, 0.1)).q[-1]
-print(_cache.statistics["misses"], end.tobytes().hex())
+print(cache.statistics["misses"], end.tobytes().hex())
 """
     out, _ = python("-c", code, folder=tmp_path, TSDYN_QUIET="1")
     expected = ts.simulate(top.build(), (0.0, 0.1)).q[-1]

@@ -7,8 +7,8 @@ import pytest
 from scenes import rotation, unit
 
 import tsdyn as ts
-from tsdyn.diagnostics import kinetic_energy, potential_energy
-from tsdyn.power import load_powers
+from tsdyn.observables.diagnostics import kinetic_energy, potential_energy
+from tsdyn.observables.power import load_powers
 
 C, F = ts.constraints, ts.forces
 RK45 = ts.integrators.RK45

@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
-from tsdyn.loads import force_loads
+from tsdyn.observables.generalised_forces import force_loads
 
 F = ts.forces
 BUILT_IN = [kind for kind in F.registered() if kind.__module__.startswith("tsdyn.forces.")]

@@ -5,7 +5,7 @@ import pytest
 from closed_forms import point_pendulum
 
 import tsdyn as ts
-from tsdyn.history import ChartLog, StepLog
+from tsdyn.runs.history import ChartLog, StepLog
 
 I = ts.integrators
 METHODS = [None, I.Taylor(), I.DOP853(1e-9, 1e-9), I.RK45(1e-6, 1e-6), I.Nystrom4(1e-2)]

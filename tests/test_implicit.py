@@ -13,7 +13,7 @@ from test_dense_output import driven
 
 import tsdyn as ts
 from benchmarks.stiff import hung, jointed
-from tsdyn.tableau import ImplicitTableau
+from tsdyn.methods.tableau import ImplicitTableau
 
 I = ts.integrators
 SDIRK54, ImplicitTrapezoid, RK45 = I.SDIRK54, I.ImplicitTrapezoid, I.RK45

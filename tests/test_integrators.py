@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tsdyn import integrator, integrator_checks, integrator_scenes
-from tsdyn.interpolation import HERMITE, VALUE, Interpolant
-from tsdyn.linalg import copy
-from tsdyn.primitive import ANY
-from tsdyn.stepping import call_accelerate, call_place, callback, step_kernel, vector
+from tsdyn.elements.primitive import ANY
+from tsdyn.maths.dense_linalg import copy
+from tsdyn.methods import integrator
+from tsdyn.methods.explicit import call_accelerate, call_place, callback, step_kernel, vector
+from tsdyn.methods.interpolants import HERMITE, VALUE, Interpolant
+from tsdyn.testing import integrator_checks, integrator_scenes
 
 I = ts.integrators
 BUILT_IN = [kind for kind in I.registered() if kind.__module__.startswith("tsdyn.")]

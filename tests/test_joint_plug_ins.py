@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tsdyn.joint import across
+from tsdyn.elements.joint import across
 
 C = ts.constraints
 

@@ -11,8 +11,8 @@ from scenes import EPS
 from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
-from tsdyn.evaluate import constraint_arrays
-from tsdyn.joint import across
+from tsdyn.elements.joint import across
+from tsdyn.observables.evaluate import constraint_arrays
 
 C = ts.constraints
 JOINTS = [kind for kind in C.registered_joints() if kind.__module__.startswith("tsdyn.")]

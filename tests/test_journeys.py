@@ -131,7 +131,7 @@ def test_snippets_run(blocks, request, tmp_path, monkeypatch):
 
 def test_commands_of_the_docs_exist():
     """Modules and verbs that README and docs name in commands."""
-    from tsdyn.cli import main
+    from tsdyn.cli.command import main
 
     for file in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
         for command in re.findall(r"`([^`\n]+)`", file.read_text()):

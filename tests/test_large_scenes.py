@@ -10,11 +10,14 @@ from test_constraints_hold import check
 
 import tsdyn as ts
 from benchmarks import mechanisms
-from tsdyn import expansion_pack, hubs, kinetic, start
-from tsdyn.diagnostics import constraint_rows
+from tsdyn.configuration import initial_conditions as start
+from tsdyn.configuration import kinetic_metric as kinetic
 from tsdyn.errors import RedundantConstraints, Status
-from tsdyn.evaluate import constraint_arrays
-from tsdyn.prepare import prepared
+from tsdyn.observables.diagnostics import constraint_rows
+from tsdyn.observables.evaluate import constraint_arrays
+from tsdyn.simulation.scene_cache import prepared
+from tsdyn.sparse import body_splitting as hubs
+from tsdyn.taylor import layout as expansion_pack
 
 C = ts.constraints
 FAMILIES = {

@@ -11,16 +11,16 @@ import tsdyn as ts
 from benchmarks.stiff import hung, jointed
 from examples.bead_on_surface import OnEllipsoid
 from examples.driven_pivot import DrivenPivot
-from tsdyn._kernel import entry, twin
+from tsdyn.elements.joint_load import JointLoad
+from tsdyn.elements.loops.corotated_frames import turn_block, turn_of_bodies, turn_of_directions
+from tsdyn.elements.markers import PARAMETERS, POINT
 from tsdyn.errors import TsdynError
-from tsdyn.evaluate import constraint_arrays
-from tsdyn.force_check import evaluate_force_jacobian
-from tsdyn.force_pack import with_force_jacobians
-from tsdyn.frames import turn_block, turn_of_bodies, turn_of_directions
-from tsdyn.joint_load import JointLoad
-from tsdyn.linalg import lu, lu_solve
-from tsdyn.markers import PARAMETERS, POINT
-from tsdyn.system import with_curvatures
+from tsdyn.jit.kernels import entry, twin
+from tsdyn.maths.dense_linalg import lu, lu_solve
+from tsdyn.model.packed import with_curvatures
+from tsdyn.model.packed_forces import with_force_jacobians
+from tsdyn.observables.evaluate import constraint_arrays
+from tsdyn.testing.force_checks import evaluate_force_jacobian
 
 C, F = ts.constraints, ts.forces
 SPACING = 1e-3  # of differences of f

@@ -6,8 +6,8 @@ from sketches import MECHANISMS, Builder, polar
 
 import tsdyn as ts
 from benchmarks import mechanisms
-from tsdyn import kinetic
-from tsdyn.evaluate import constraint_arrays
+from tsdyn.configuration import kinetic_metric as kinetic
+from tsdyn.observables.evaluate import constraint_arrays
 
 C = ts.constraints
 Z = np.array([0.0, 0.0, 1.0])
@@ -148,6 +148,6 @@ def test_large_scenes(monkeypatch):
     assert (found.degrees_of_freedom, found.redundant) == (3 * 511, ())
     loop = mechanisms.build(mechanisms.loop(150))
     assert loop.mobility().degrees_of_freedom == 3 * 150 - 3
-    monkeypatch.setattr("tsdyn.mobility.MOST_ROWS", 400)
+    monkeypatch.setattr("tsdyn.configuration.mobility.MOST_ROWS", 400)
     with pytest.raises(ts.InvalidArgument, match="closed loops of this scene have 453"):
         loop.mobility()

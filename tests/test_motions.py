@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tsdyn._kernel import entry
-from tsdyn.motion_program import call_smooth, run_program
-from tsdyn.truncated import Truncated
+from tsdyn.jit.kernels import entry
+from tsdyn.maths.power_series import Truncated
+from tsdyn.motions.program import call_smooth, run_program
 
 M = ts.motions
 ORDER = 20

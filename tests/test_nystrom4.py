@@ -10,7 +10,7 @@ from scenes import EPS
 from scipy.integrate import solve_ivp
 
 import tsdyn as ts
-from tsdyn.tableau import NystromTableau, RungeKuttaTableau
+from tsdyn.methods.tableau import NystromTableau, RungeKuttaTableau
 
 SCENES = ("sliding_top", "two_body_pendulum", "two_body_pendulum_spatial")
 END = 10.0  # s

@@ -8,7 +8,7 @@ import pytest
 import tsdyn as ts
 from examples.bead_on_surface import OnEllipsoid
 from examples.driven_pivot import DrivenPivot
-from tsdyn.series_check import check_constraint_series
+from tsdyn.testing.series_checks import check_constraint_series
 
 C = ts.constraints
 BUILT_IN = [kind for kind in C.registered() if kind.__module__.startswith("tsdyn.")]

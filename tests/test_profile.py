@@ -9,10 +9,10 @@ from test_cache import REPORT, run
 
 import tsdyn as ts
 from benchmarks import stiff
-from examples import drive_train, pendulum_chain, top
-from tsdyn.cli import main
-from tsdyn.prepare import prepared
-from tsdyn.timers import TIMERS
+from examples import drive_train, pendulum_chain, top, two_body_pendulum
+from tsdyn.cli.command import main
+from tsdyn.profiling.timers import TIMERS
+from tsdyn.simulation.scene_cache import prepared
 
 I = ts.integrators
 OUTSIDE = ("Python", "outputs", "choice of the method")
@@ -150,7 +150,7 @@ def test_a_run_loads_no_timer():
 import sys
 from examples import top
 tsdyn.simulate(top.build(), (0.0, 0.01), integrator="dop853")
-report(timers="tsdyn.timers" in sys.modules)
+report(timers="tsdyn.profiling.timers" in sys.modules)
 """
     )
     assert run(code, {})[0]["timers"] is False
@@ -176,6 +176,13 @@ def test_what_refuses_series_and_what_it_costs():
     scene = drive_train.build()
     prepared(scene)
     assert len(scene.forces) == 4
+
+
+def test_no_advice_ruins_the_answer():
+    """The end of a chaotic motion to few digits is metres away by any other method or tolerance."""
+    said = advice(two_body_pendulum.build(), (0.0, 60.0), integrator="rk45", rtol=1e-3, atol=1e-3)
+    assert "times as quick" not in said
+    assert "What would be quicker ends elsewhere" in said
 
 
 def test_outputs_that_cost():

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scenes import rotation as matrix_of
 
-from tsdyn import recurrences as R
-from tsdyn._kernel import twin
-from tsdyn.truncated import Truncated
+from tsdyn.jit.kernels import twin
+from tsdyn.maths import recurrences as R
+from tsdyn.maths.power_series import Truncated
 
 K = 12
 EPS = np.finfo(float).eps

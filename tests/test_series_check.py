@@ -9,9 +9,9 @@ import pytest
 from plug_ins import Rod, Soft
 
 import tsdyn as ts
-from tsdyn._kernel import twin
-from tsdyn.expansion_pack import refusal, without_series
-from tsdyn.series_check import check_constraint_series, check_force_series
+from tsdyn.jit.kernels import twin
+from tsdyn.taylor.layout import refusal, without_series
+from tsdyn.testing.series_checks import check_constraint_series, check_force_series
 
 C, F = ts.constraints, ts.forces
 SMOOTH = {

@@ -249,7 +249,7 @@ def test_series_are_not_loaded_before_they_are_needed():
     code = """
 import closed_loops
 import tsdyn as ts
-from tsdyn.series_steps import expand_series, pass_singular, reach
+from tsdyn.taylor.step_parts import expand_series, pass_singular, reach
 loaded = lambda: [kernel._address is not None for kernel in (expand_series, reach, pass_singular)]
 scene = closed_loops.parallelogram(0.2, gravity=(0.0, 0.0, 0.0))
 print(ts.simulate(scene, (0.0, 0.4), integrator="nystrom4").success, *loaded())

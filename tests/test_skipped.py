@@ -115,9 +115,9 @@ import gc
 import numpy as np
 import tsdyn as ts
 from examples import pendulum_chain, drive_train, driven_pivot, top
-from tsdyn._kernel import Callback
-from tsdyn.run import advance
-from tsdyn.taylor import advance_series
+from tsdyn.jit.kernels import Callback
+from tsdyn.runs.stepper import advance
+from tsdyn.taylor.stepper import advance_series
 def everything_else():
     ts.simulate(drive_train.build(), (0.0, 0.1), t_eval=[0.0, 0.05], events=lambda t, state: t - 0.02)
     ts.simulate(drive_train.build(), (0.0, 0.1), integrator="sdirk54", dense_output=True).at(0.05)

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from still_scenes import SCENES, C, F, X, Y, Z, block, floating, slider_crank, slides, welded
 
 import tsdyn as ts
-from tsdyn.network import network_of
-from tsdyn.still import keep_turning, moving_network, still
+from tsdyn.formulations.locked_orientations import keep_turning, moving_network, still
+from tsdyn.sparse.networks import network_of
 
 I = ts.integrators
 END = 1.0

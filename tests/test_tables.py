@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tsdyn import plots, tables
-from tsdyn.cli import main
+from tsdyn import plots
+from tsdyn.benchmarking import haug_tables as tables
+from tsdyn.cli.command import main
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

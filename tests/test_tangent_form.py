@@ -10,8 +10,8 @@ from test_constraints_hold import chains, check
 
 import tsdyn as ts
 from examples import pendulum_chain
-from tsdyn.formulation import formulation
-from tsdyn.network import network_of
+from tsdyn.formulations.registry import formulation
+from tsdyn.sparse.networks import network_of
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 FORMS = ("tangent", "null-space")

@@ -7,9 +7,9 @@ from scenes import BETWEEN, PRIMITIVES, build, product, random_body, random_chai
 from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
-from tsdyn.bodies import transform_g
-from tsdyn.dense import B_DATA, B_H
-from tsdyn.series_loops import BODY_ROW, S_OMEGA, S_R
+from tsdyn.elements.bodies import transform_g
+from tsdyn.elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
+from tsdyn.runs.trajectory import B_DATA, B_H
 
 C, F = ts.constraints, ts.forces
 ORDER = 16

@@ -6,10 +6,16 @@ _here = _Path(__file__).parent
 if not (_here / "constraints").is_dir():  # a checkout: they stand beside this folder
     __path__.append(str(_here.parent))
 
-from . import constraints, forces, integrators, motions, shapes, testing  # noqa: E402
-from ._kernel import kernel  # noqa: E402
-from .benchmark import benchmark  # noqa: E402
-from .bodies import Body, PointMass  # noqa: E402
+from . import _moved, constraints, forces, integrators, motions, shapes, testing  # noqa: E402
+from ._version import __version__ as __version__  # noqa: E402
+from .benchmarking.benchmark import benchmark  # noqa: E402
+from .elements.bodies import Body, PointMass  # noqa: E402
+from .elements.force import Force  # noqa: E402
+from .elements.joint import Joint  # noqa: E402
+from .elements.joint_coordinates import Angle, Displacement  # noqa: E402
+from .elements.joint_friction import JointFriction  # noqa: E402
+from .elements.markers import Parameters, Point, Turn, Vector  # noqa: E402
+from .elements.primitive import Primitive  # noqa: E402
 from .errors import (  # noqa: E402
     InconsistentState,
     InvalidArgument,
@@ -25,28 +31,23 @@ from .errors import (  # noqa: E402
     TsdynError,
     UnknownAttribute,
 )
-from .force import Force  # noqa: E402
-from .integrator import (  # noqa: E402
+from .jit.kernels import kernel  # noqa: E402
+from .methods.integrator import (  # noqa: E402
     Adaptive,
     DiagonallyImplicit,
     ExplicitNystrom,
     ExplicitRungeKutta,
     Integrator,
 )
-from .joint import Joint  # noqa: E402
-from .joint_coordinates import Angle, Displacement  # noqa: E402
-from .joint_friction import JointFriction  # noqa: E402
-from .markers import Parameters, Point, Turn, Vector  # noqa: E402
-from .motion import Motion  # noqa: E402
-from .primitive import Primitive  # noqa: E402
-from .scene import Scene  # noqa: E402
-from .simulate import simulate  # noqa: E402
-from .solution import Solution  # noqa: E402
-from .state import State  # noqa: E402
-from .table import Table  # noqa: E402
-from .tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau  # noqa: E402
+from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau  # noqa: E402
+from .motions.prescribed import Motion  # noqa: E402
+from .motions.tables import Table  # noqa: E402
+from .observables.state import State  # noqa: E402
+from .simulation.scene import Scene  # noqa: E402
+from .simulation.simulate import simulate  # noqa: E402
+from .simulation.solution import Solution  # noqa: E402
 
-__version__ = "0.1.0"
+_moved.install()
 
 __all__ = [
     "Adaptive",
@@ -108,7 +109,7 @@ def __getattr__(name):
 
         return import_module(".plots", __name__)
     if name == "profile":
-        from .profiling import profile
+        from .profiling.profile import profile
 
         return profile
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

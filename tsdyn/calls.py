@@ -8,8 +8,8 @@ import inspect
 from functools import wraps
 from types import FunctionType, MethodType
 
-from .checks import nearest
 from .errors import InvalidCall
+from .validation import nearest
 
 KEYWORD, OPEN = inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.VAR_KEYWORD
 BY_POSITION = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)

@@ -5,19 +5,15 @@ without pyplot and so without touching the caller's backend or figures.
 """
 
 import math
-from pathlib import Path
 
 import numpy as np
 
-from .errors import InvalidArgument, MissingDependency
-from .tables import DURATION, LEVELS
+from .benchmarking.haug_tables import DURATION, LEVELS
+from .drawing import BLUE, GREEN, GREY, VERMILION, demand_matplotlib, save
 
 ZERO = 1e-17  # what an error of exactly zero is drawn as: below any other
 POINTS = 400  # stretches of time, the largest error of each of which is drawn
 UNITS = ("m", "m/s", "m/s²")
-# from the palette of Okabe and Ito, told apart whatever the colour vision
-BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
-GREY = "#6b6b6b"
 
 
 def constraint_error(solution, ax=None):
@@ -40,7 +36,7 @@ def constraint_error(solution, ax=None):
     MissingDependency
         If matplotlib is not installed.
     """
-    _matplotlib()
+    demand_matplotlib()
     if ax is None:
         from matplotlib import pyplot
 
@@ -73,7 +69,7 @@ def tables_figure(tables):
     MissingDependency
         If matplotlib is not installed.
     """
-    _matplotlib()
+    demand_matplotlib()
     from matplotlib import style
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -100,28 +96,6 @@ def tables_figure(tables):
             low, high = row[0].get_ylim()
             row[0].set(ylim=(low / 2.0, 20.0 * high), ylabel=f"{level} ({unit})")  # room for the words over the curves
     return figure
-
-
-def save(figure, path):
-    """Write a figure to a file, in the format that its suffix names, PNG if it has none; return the file's path.
-
-    Raises
-    ------
-    InvalidArgument
-        If the folder doesn't exist or can't be written to, or the format is unknown.
-    """
-    from matplotlib import style
-
-    path = Path(path)
-    if not path.suffix:
-        path = path.with_suffix(".png")
-    try:
-        with style.context("default"):
-            figure.savefig(path)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InvalidArgument(f"the figure can't be written to {path}: {reason}") from error
-    return path
 
 
 def _title(ax, table):
@@ -177,8 +151,4 @@ def _draw(ax, t, error, colour, label=None):
     ax.plot(t[at], np.maximum(error[at], ZERO), color=colour, linewidth=1.3, label=label)
 
 
-def _matplotlib():
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise MissingDependency("the figure needs matplotlib: pip install 'tsdyn[plot]'") from error
+__all__ = ["constraint_error", "save", "tables_figure"]

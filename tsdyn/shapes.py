@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .checks import floats, number, positive, vector3
 from .errors import InvalidArgument
-from .mesh import moments
+from .maths.mesh_integrals import moments
+from .validation import floats, number, positive, vector3
 
 AXES = {"x": 0, "y": 1, "z": 2}
 

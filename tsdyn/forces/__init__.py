@@ -8,7 +8,7 @@ __all__.append("registered")
 
 def registered():
     """Return every force class known, built in or plugged in."""
-    from ..force import registered as known
+    from ..elements.force import registered as known
 
     return tuple(known().values())
 

@@ -15,11 +15,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .._kernel import kernel
-from ..checks import floats
-from ..force import Force
-from ..markers import Parameters, Point, Turn
-from ..recurrences import cross, rotated, rotated_back, rotation
+from ..plugins import Force, Parameters, Point, Turn, cross, floats, kernel, rotated, rotated_back, rotation
 
 
 def _three(value, what, error):

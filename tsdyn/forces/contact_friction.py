@@ -11,10 +11,7 @@ F is the force that the contact exerts; mu is that of friction.coefficient.
 import numpy as np
 
 from ..constraints.plane_contact import PlaneContact
-from ..force import Force
-from ..friction import act, coefficient, slip
-from ..joint_friction import JointFriction
-from ..markers import Point, Turn, Vector
+from ..plugins import Force, JointFriction, Point, Turn, Vector, act, coefficient, slip
 
 
 class ContactFriction(JointFriction, Force):

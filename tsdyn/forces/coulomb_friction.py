@@ -12,9 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..force import Force, not_negative, positive_number
-from ..friction import act, demand_bodies, slip
-from ..markers import Point, Turn
+from ..plugins import Force, Point, Turn, act, demand_bodies, not_negative, positive_number, slip
 
 
 class CoulombFriction(Force):

@@ -11,12 +11,7 @@ The power of (1) is F sd, however the bodies move.
 import math
 from types import MappingProxyType
 
-from .._kernel import specialised
-from ..force import Force
-from ..joint_coordinates import displacements
-from ..joint_load import JointLoad, instants, law_of_joint
-from ..markers import Point, Vector
-from ..state_function import ByState
+from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements, instants, law_of_joint, specialised
 
 
 class JointForce(JointLoad, Force):

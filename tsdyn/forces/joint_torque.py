@@ -12,13 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .._kernel import specialised
-from ..angle import angle_near
-from ..force import Force
-from ..joint_coordinates import angles
-from ..joint_load import JointLoad, instants, law_of_joint
-from ..markers import Turn, Vector
-from ..state_function import ByState
+from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_near, angles, instants, law_of_joint, specialised
 
 
 class JointTorque(JointLoad, Force):

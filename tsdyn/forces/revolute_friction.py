@@ -14,9 +14,16 @@ from types import MappingProxyType
 import numpy as np
 
 from ..constraints.revolute import Revolute
-from ..force import Force, not_negative, positive_number
-from ..friction import along_and_across, coefficient
-from ..joint_friction import AXIS, JointFriction, optional_length
+from ..plugins import (
+    AXIS,
+    Force,
+    JointFriction,
+    along_and_across,
+    coefficient,
+    not_negative,
+    optional_length,
+    positive_number,
+)
 
 
 class RevoluteFriction(JointFriction, Force):

@@ -13,12 +13,20 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..bodies import rotation_matrix
-from ..errors import InvalidForce
-from ..force import Force, load, not_negative
-from ..markers import Point
-from ..recurrences import dot, inverse_root, product, scaled, square
-from ..signal import Signal
+from ..plugins import (
+    Force,
+    InvalidForce,
+    Point,
+    Signal,
+    dot,
+    inverse_root,
+    load,
+    not_negative,
+    product,
+    rotation_matrix,
+    scaled,
+    square,
+)
 
 
 class Spring(Force):

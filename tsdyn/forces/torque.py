@@ -6,10 +6,18 @@ n = A(p_a) N      frame="body"       (2)
 
 from types import MappingProxyType
 
-from ..force import Force, vector_load
-from ..given_load import Given, GivenByState, GivenInBody
-from ..markers import Parameters, Point, Turn
-from ..state_function import arguments_of, state_load
+from ..plugins import (
+    Force,
+    Given,
+    GivenByState,
+    GivenInBody,
+    Parameters,
+    Point,
+    Turn,
+    arguments_of,
+    state_load,
+    vector_load,
+)
 
 
 class Torque(Given, Force):

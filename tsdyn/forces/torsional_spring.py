@@ -14,18 +14,28 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..angle import angle_near
-from ..attachment import in_frame
-from ..bodies import rotation_matrix
-from ..calls import Placing
-from ..checks import vector3
-from ..errors import InvalidForce
-from ..force import Force, finite, load, not_negative
-from ..joint import across
-from ..joint_coordinates import Angle
-from ..markers import Turn, Vector
-from ..recurrences import angle, cross, dot, scaled, square
-from ..signal import Signal
+from ..plugins import (
+    Angle,
+    Force,
+    InvalidForce,
+    Placing,
+    Signal,
+    Turn,
+    Vector,
+    across,
+    angle,
+    angle_near,
+    cross,
+    dot,
+    finite,
+    in_frame,
+    load,
+    not_negative,
+    rotation_matrix,
+    scaled,
+    square,
+    vector3,
+)
 
 PARALLEL = 1e-6  # sine of the angle below which a reference has no direction about the axis
 

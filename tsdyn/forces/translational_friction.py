@@ -15,9 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..constraints.translational import Translational
-from ..force import Force
-from ..friction import act, along_and_across, coefficient, slip
-from ..joint_friction import AXIS, JointFriction, optional_length
+from ..plugins import AXIS, Force, JointFriction, act, along_and_across, coefficient, optional_length, slip
 
 
 class TranslationalFriction(JointFriction, Force):

@@ -12,12 +12,19 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .._kernel import specialised, stack
-from ..checks import floats
-from ..errors import InvalidForce
-from ..force import Force
-from ..markers import Parameters, Point, Turn
-from ..state_function import ByState, arguments_of, fill_state
+from ..plugins import (
+    ByState,
+    Force,
+    InvalidForce,
+    Parameters,
+    Point,
+    Turn,
+    arguments_of,
+    fill_state,
+    floats,
+    specialised,
+    stack,
+)
 
 
 def _numbers(value, what, error):

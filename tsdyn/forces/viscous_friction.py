@@ -9,10 +9,7 @@ dissipation = c v.v + c_t w.w                                     (3)
 
 from types import MappingProxyType
 
-from ..force import Force, not_negative
-from ..friction import act, demand_bodies, slip
-from ..markers import Point, Turn
-from ..recurrences import cross
+from ..plugins import Force, Point, Turn, act, cross, demand_bodies, not_negative, slip
 
 
 class ViscousFriction(Force):

@@ -1,0 +1,127 @@
+"""The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), where a scene's time goes, and compiling."""
+
+import argparse
+import sys
+import time
+
+from ..errors import MissingDependency, TsdynError
+
+DEFAULT_FIGURE = "tables.png"
+
+
+def main(arguments=None):
+    """Run the command line; returns the exit code (wrong arguments exit with 2, as argparse does)."""
+    parsed = _parser().parse_args(arguments)
+    try:
+        return parsed.run(parsed)
+    except TsdynError as error:
+        print(f"tsdyn: {error}", file=sys.stderr)
+        return 1
+
+
+def _parser():
+    from .._version import __version__
+
+    parser = argparse.ArgumentParser(
+        prog="tsdyn", description="Constrained rigid-body dynamics by Haug's tangent-space ODE."
+    )
+    parser.add_argument("--version", action="version", version=f"tsdyn {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    tables = commands.add_parser(
+        "tables",
+        help="measure the constraint errors of Haug (2018), Tables 1 and 2, and draw them over time",
+        description="Run the sliding top and the two-body pendulum of Haug (2018), print the largest constraint errors "
+        "beside the published ones, and draw them over time. The exit code is 1 where a bound is broken.",
+    )
+    figure = tables.add_mutually_exclusive_group()
+    figure.add_argument(
+        "--figure", metavar="PATH", help=f"where to write the figure (default {DEFAULT_FIGURE}); the suffix says how"
+    )
+    figure.add_argument("--no-figure", action="store_true", help="print the tables only")
+    tables.set_defaults(run=_tables)
+    profile = commands.add_parser(
+        "profile",
+        help="measure where the time of a run of a scene goes, and what to change",
+        description="Run a scene several times, print the time of each phase of a run, what was skipped, and what to "
+        "change. Options that are not given are those of ts.simulate.",
+    )
+    profile.add_argument(
+        "scene",
+        metavar="SCENE",
+        help="a Python file with a function build(), or a scene; file.py:name takes another one; or an example's name",
+    )
+    profile.add_argument("--t-start", type=float, default=0.0, metavar="S", help="start of the run (default 0)")
+    profile.add_argument("--t-end", type=float, default=10.0, metavar="S", help="end of the run (default 10)")
+    profile.add_argument("--method", metavar="NAME", help="an integrator, such as dop853")
+    profile.add_argument("--rtol", type=float, metavar="TOL", help="relative tolerance")
+    profile.add_argument("--atol", type=float, metavar="TOL", help="absolute tolerance")
+    profile.add_argument("--formulation", default="tangent", metavar="NAME", help="tangent, null-space or maggi-kane")
+    profile.add_argument("--outputs", type=int, metavar="N", help="so many output times instead of every step")
+    profile.add_argument("--no-advice", action="store_true", help="don't try other methods and tolerances")
+    profile.add_argument("--figure", metavar="PATH", help="where to draw it; the suffix says how")
+    profile.set_defaults(run=_profile)
+    kernels = commands.add_parser(
+        "compile",
+        help="compile kernels ahead of the first run, on all processors",
+        description="Fill the cache on disk with the kernels of the default method and of every built-in constraint "
+        "and force, or with all of them. What is there already is left alone. The exit code is 1 where a kernel can't "
+        "be compiled or stored.",
+    )
+    kernels.add_argument("--all", action="store_true", help="of every method, formulation and result, too")
+    kernels.set_defaults(run=_compile)
+    return parser
+
+
+def _tables(parsed):
+    # imported here: the command line answers without what a run needs
+    from ..benchmarking.haug_tables import as_text, reproduce
+
+    tables = reproduce()
+    print(as_text(tables), flush=True)
+    if not parsed.no_figure:
+        _draw(tables, parsed.figure)
+    return 0 if all(table.within for table in tables) else 1
+
+
+def _profile(parsed):
+    import numpy as np
+
+    from ..profiling.profile import profile
+    from ..validation import whole
+    from .scene_file import load_scene
+
+    began = time.perf_counter()
+    scene = load_scene(parsed.scene)
+    print(f"{scene!r}, built in {1e3 * (time.perf_counter() - began):.3g} ms", flush=True)
+    span, count = (parsed.t_start, parsed.t_end), whole(parsed.outputs, "--outputs")
+    found = profile(
+        scene, span, advice=not parsed.no_advice, integrator=parsed.method, rtol=parsed.rtol, atol=parsed.atol,
+        formulation=parsed.formulation, t_eval=None if count is None else np.linspace(*span, max(count, 2)),
+    )  # fmt: skip
+    print(found)
+    if parsed.figure:
+        found.plot(parsed.figure)
+        print(f"Figure: {parsed.figure}")
+    return 0
+
+
+def _compile(parsed):
+    from ..ahead.all_kernels import compile_kernels
+
+    count, folder, failed = compile_kernels(parsed.all)
+    for name, problem in failed.items():
+        print(f"tsdyn: {name} was not compiled: {problem}", file=sys.stderr)
+    if not failed:
+        print(f"{count} kernels are in {folder}.")
+    return 1 if failed else 0
+
+
+def _draw(tables, path):
+    from ..plots import save, tables_figure
+
+    try:
+        print(f"Figure: {save(tables_figure(tables), path or DEFAULT_FIGURE)}")
+    except MissingDependency as error:
+        if path:  # asked for by name: then it is a failure
+            raise
+        print(f"No figure: {error}", file=sys.stderr)

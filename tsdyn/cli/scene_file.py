@@ -1,0 +1,74 @@
+"""A scene from a Python file, for the command line."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+from ..errors import InvalidArgument
+from ..simulation.scene import Scene
+
+
+def load_scene(where):
+    """The scene of a file's `build()`, or its `scene`.
+
+    Parameters
+    ----------
+    where : str
+        A path, or the name of an example; a name behind a colon is of another function, or scene, in the file.
+
+    Raises
+    ------
+    InvalidArgument
+        If there is no such file or name, it can't be run, or what it gives is no scene.
+    """
+    path, _, name = where.partition(":") if not Path(where).exists() else (where, "", "")
+    file = _file(path)
+    module = _module(file)
+    given = next(
+        (getattr(module, word) for word in ([name] if name else ["build", "scene"]) if hasattr(module, word)), None
+    )
+    if given is None:
+        wanted = f"no {name!r}" if name else "neither build() nor scene"
+        raise InvalidArgument(f"{file} has {wanted}; write a function build() that returns a ts.Scene.")
+    if callable(given):
+        try:
+            given = given()
+        except TypeError as error:
+            raise InvalidArgument(f"{file}: {name or 'build'}() must need no argument: {error}") from error
+    if not isinstance(given, Scene):
+        raise InvalidArgument(f"{file}: {name or 'build'} must give a ts.Scene, got {given!r}.")
+    return given
+
+
+def _file(where):
+    """A path as it is given, or an example's."""
+    examples = Path(__file__).resolve().parents[2] / "examples"
+    tried = [Path(where), examples / f"{where}.py", Path("examples") / f"{where}.py"]
+    for path in tried:
+        if path.is_file():
+            return path.resolve()
+    known = sorted(path.stem for path in examples.glob("*.py") if not path.stem.startswith("_"))
+    raise InvalidArgument(
+        f"no file {where!r}; give the path of a Python file that has a function build()"
+        + (f", or an example: {', '.join(known)}." if known else ".")
+    )
+
+
+def _module(file):
+    """The file's module, found again under its name as kernels in it need to be."""
+    if not file.suffix == ".py":
+        raise InvalidArgument(f"{file} is no Python file.")
+    spec = importlib.util.spec_from_file_location(file.stem, file)
+    module = importlib.util.module_from_spec(spec)
+    before = sys.modules.get(file.stem)
+    sys.modules[file.stem] = module
+    sys.path.insert(0, str(file.parent))  # as where the file is run itself
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        if before is not None:
+            sys.modules[file.stem] = before
+        raise InvalidArgument(f"{file} can't be run: {type(error).__name__}: {error}") from error
+    finally:
+        sys.path.remove(str(file.parent))
+    return module

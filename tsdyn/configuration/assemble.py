@@ -1,0 +1,221 @@
+"""`scene.assemble`: the nearest consistent positions, then the nearest consistent velocities."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..calls import fitting
+from ..elements.names import named
+from ..errors import InconsistentState, InvalidArgument, InvalidBody, SingularConfiguration
+from ..maths.row_rank import row_lengths
+from ..validation import number, one_of, positive
+from .continuation import STAGES, Found, Kept, close, nearest, relax, settle, stuck
+from .infeasible_subset import refuse
+from .kinetic_metric import Metric, least_step
+from .loop_folds import Folds
+from .mirrored_branches import demand_aligned
+from .start_violations import ROUNDING, demand_finite
+
+STIFFER = (0.1, 0.01, 0.001)  # softness of what keeps a fold, from try to try
+
+
+@dataclass(frozen=True)
+class AssemblyReport:
+    """What `scene.assemble` did.
+
+    Attributes
+    ----------
+    moved : float
+        Largest change of a coordinate: m for positions, 1 for Euler parameters.
+    residual : float
+        Largest |Phi| left.
+    velocity_changed : float
+        Largest change of a velocity coordinate.
+    velocity_residual : float
+        Largest |Phi_q qd + Phi_t| left.
+    iterations : int
+    folded : tuple of str
+        Joints of closed loops whose links are folded to the other side than the sketch shows, by 0.1 rad or more: by
+        less than is sure (see `folds` of `assemble`), or because of `folds="free"`.
+    """
+
+    moved: float
+    residual: float
+    velocity_changed: float
+    velocity_residual: float
+    iterations: int
+    folded: tuple = ()
+
+
+@fitting
+def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
+    """Move the bodies to the nearest consistent positions, then to the nearest consistent velocities.
+
+    Parameters
+    ----------
+    tol : float
+        Largest |Phi| accepted at the end, relative to 1 + max |q|.
+    fixed : sequence of Body, or names
+        Bodies whose pose (not velocity) must stay as it is.
+    t : float, s
+        The time at which constraints that depend on time are met.
+    folds : "keep" or "free"
+        Whether the links of closed loops must fold the way they are drawn, where that is clear: by 0.2 rad or more, by
+        the directions of the links and by the places of their joints. "free" takes the nearest configuration, whatever
+        its branch. Whatever is folded over is in the report.
+
+    Returns
+    -------
+    AssemblyReport
+        `.moved`, `.residual` and more; the bodies hold the new values.
+
+    Raises
+    ------
+    InconsistentState
+        If the constraints can't be met, which names the smallest set of them that conflicts (`.constraints` of the
+        error), or if what was found is a mirrored joint or another branch than the sketch's. The bodies are as before.
+    SingularConfiguration
+        If a row of Phi_q vanishes at the configuration found.
+
+    Notes
+    -----
+    Bodies hang on springs at their places in the sketch, in the metric of kinetic energy, and constraints are springs
+    that stiffen until they hold; then Gauss-Newton steps. Redundant rows are welcome. The velocity correction is the
+    smallest in kinetic energy.
+    """
+    tol = positive(tol, "tol")
+    if not np.isfinite(number(t)):
+        raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
+    one_of(folds, ("keep", "free"), "folds")
+    packed, (sketch, qd) = scene.packed, scene.start
+    held = _held(scene, fixed)
+    metric = Metric(packed, held, float(t))
+    demand_finite(scene, *metric.arrays(sketch))
+    found = nearest(metric, sketch, tol)
+    if not found.met:
+        _demand_direction(scene, metric, found)
+        refuse(scene, metric, sketch, found, tol, fixed)
+    links = Folds(packed)
+    drawn = links.drawn(metric, sketch)
+    if folds == "keep":
+        found = _unfolded(scene, metric, sketch, found, links, drawn, tol)
+    q = found.q
+    metric = Metric(packed, None, float(t))
+    Phi, Phi_q, Phi_t = metric.arrays(q)
+    A = metric.reduced(q, Phi_q[metric.own])
+    _demand_regular(scene, metric, A)
+    demand_aligned(packed, q, float(t))
+    given, qd = _velocities(scene, metric, q, qd, A, Phi_t[metric.own])
+    residual = Phi_q @ qd + Phi_t
+    _demand_compatible(scene, residual, max(tol, 1e-9) * (1.0 + np.abs(qd).max()))
+    over = links.turned(metric, q, links.shown(metric, sketch))
+    scene.place(q, qd)
+    return AssemblyReport(
+        moved=float(np.abs(q - sketch).max()),
+        residual=float(np.abs(Phi).max(initial=0.0)),
+        velocity_changed=float(np.abs(qd - given).max()),
+        velocity_residual=float(np.abs(residual).max(initial=0.0)),
+        iterations=found.iterations,
+        folded=tuple(dict.fromkeys(links.folds[k].title for k in over)),
+    )
+
+
+def _held(scene, fixed):
+    """Which coordinates stay, (n,)."""
+    if isinstance(fixed, str) or not hasattr(fixed, "__iter__"):
+        raise InvalidBody(f"fixed must be a sequence of bodies, such as (body,), got {fixed!r}.")
+    bodies = scene.system.bodies
+    held = np.zeros(int(bodies[:, 1].sum()), bool)
+    for body in fixed:
+        body = named(scene.bodies, body, "body to be fixed", InvalidBody) if isinstance(body, str) else body
+        if not any(body is known for known in scene.bodies):
+            raise InvalidBody(f"fixed: {body!r} is not a body of this scene.")
+        at = int(bodies[body.index, 0])
+        held[at : at + body.dimension] = True
+    return held
+
+
+def _unfolded(scene, metric, sketch, found, links, drawn, tol):
+    """The configuration found, or one beside it that folds the links as the sketch does."""
+    turned = links.turned(metric, found.q, drawn)
+    kept, total, first = set(), found.iterations, turned
+    for softness in STIFFER:
+        if not turned.size:
+            return found
+        kept |= set(turned.tolist())
+        pairs = np.array(list(dict.fromkeys(tuple(sorted(links.folds[k].bodies)) for k in sorted(kept))))
+        q, steps = relax(metric, sketch, sketch, kept=Kept(pairs, softness), stages=STAGES)
+        q, Phi, more = close(metric, q)
+        total += steps + more
+        met = bool(np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max()))
+        turned = links.turned(metric, q, drawn)
+        if not met:
+            turned = first
+        elif not turned.size:
+            freed, Phi_freed, more = settle(metric, sketch, q)
+            total += more
+            fits = np.abs(Phi_freed).max() <= tol * (1.0 + np.abs(freed).max())
+            if fits and not links.turned(metric, freed, drawn).size:
+                q, Phi = freed, Phi_freed
+            return Found(q, Phi, total, True)
+    stories = [
+        f"  {links.folds[k].title}: {np.degrees(links.angle(metric, sketch, k)):.0f} degrees from straight in the "
+        f"sketch, {np.degrees(links.angle(metric, found.q, k)):.0f} when assembled"
+        for k in first[:8]
+    ]
+    raise InconsistentState(
+        "the configurations found fold links to the other side than the sketch does, which is another branch:\n"
+        + "\n".join(stories)
+        + '\nDraw the links there further from straight, or on the other side; or pass folds="free" to take the '
+        "nearest configuration whatever its branch."
+    )
+
+
+def _velocities(scene, metric, q, qd, A, Phi_t):
+    """qd with the angular velocities that the user set, however bodies have been turned, and the nearest that fits."""
+    rigid = [body for body in scene.bodies if body.dimension == 7]
+    turning = np.array([body.angular_velocity for body in rigid]).reshape(-1, 3)
+    x = metric.speeds(qd[metric.r], turning)
+    given = qd.copy()
+    given[metric.p] = metric.rates(q, x)[metric.p]
+    fitted = given
+    for _ in range(3):
+        residual = A @ x + Phi_t
+        if np.abs(residual).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(fitted).max()):
+            break
+        x = x + least_step(A, residual)
+        fitted = metric.rates(q, x)
+    return given, fitted
+
+
+def _demand_direction(scene, metric, found):
+    """Refuse a constraint whose derivative vanishes where it isn't met: nothing says which way to go."""
+    still = stuck(metric, found.q, found.Phi)
+    if still.size and metric.columns.size == metric.size:
+        name = scene.row_names()[metric.own[still[0]]]
+        raise InconsistentState(
+            f"{name}: Phi = {found.Phi[still[0]]:.3g}, and its derivative vanishes, so nothing says which way to go. "
+            "Move its bodies a little towards where they should be."
+        )
+
+
+def _demand_regular(scene, metric, A):
+    """Refuse rows that vanish."""
+    zero = np.flatnonzero(row_lengths(A) == 0.0)
+    if zero.size:
+        raise SingularConfiguration(
+            f"the row of {scene.row_names()[metric.own[zero[0]]]} in Phi_q is zero in this configuration: the "
+            "constraint is singular here. Start from another configuration, or use a constraint that is regular here."
+        )
+
+
+def _demand_compatible(scene, residual, tol):
+    """Refuse velocities that can't be met, by name: of redundant rows that depend on time differently."""
+    bad = np.flatnonzero(~(np.abs(residual) <= tol))
+    if bad.size:
+        names = scene.row_names()
+        rows = ", ".join(f"{names[i]} ({residual[i]:.3g})" for i in sorted(bad, key=lambda i: -abs(residual[i]))[:8])
+        raise InconsistentState(
+            f"no velocities meet all constraints in the configuration found; Phi_q qd + Phi_t left over: {rows}. "
+            "Rows that say the same must also move the same: give their motions equal rates, or drop one."
+        )

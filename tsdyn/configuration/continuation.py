@@ -1,0 +1,230 @@
+"""The way from a sketch to the nearest configuration that meets the constraints.
+
+Each body hangs on a spring at its place in the sketch, by the metric of kinetic energy, and each constraint is a spring
+of stiffness 1 / s. The equilibrium is followed from s = 1, where the sketch is hardly strained, to s = 1e-8, where
+the constraints are met but for that: so bodies give way together, and links fold the way they are drawn. Dependent rows
+need no care, for springs may share a load. What is left is taken away by Gauss-Newton steps of least change, and by
+steps along the constraints to where the distance is least.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..maths.row_rank import row_lengths
+from .kinetic_metric import least_step, soft_step
+
+STAGES = ((1.0, 4), (0.3, 4), (0.1, 4), (0.03, 4), (0.01, 4), (1e-3, 5), (1e-4, 5), (1e-6, 5), (1e-8, 40))
+NEAR = 0.02  # of a link, or so: a sketch that is off by less takes the last stage only
+MOST_TURN = 0.5  # rad a step
+MOST_CLOSING, MOST_SETTLING = 60, 60
+SETTLED = 1e-11  # what is left of the slope, of the distance
+ROUNDING = 1e-15
+DEPENDENT = 1e-6  # singular values of unit rows that small are left alone while the constraints aren't met
+MANY = 200  # coordinates from which on fewer starts are tried
+SHAKES = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.0)
+
+
+class Found(NamedTuple):
+    """Where an approach ended."""
+
+    q: np.ndarray  # (n,)
+    Phi: np.ndarray  # (rows,)
+    iterations: int
+    met: bool
+
+
+class Kept(NamedTuple):
+    """Pairs of bodies whose relative orientation is to stay as in the sketch, as springs of a softness."""
+
+    pairs: np.ndarray  # (k, 2) body numbers, the ground's is the last
+    softness: float
+
+
+def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
+    """The configuration near a sketch (n,) that meets some rows to tol (1 + max |q|), or the nearest thing to it.
+
+    Where the way from the sketch ends elsewhere, other starts are tried: `also`, and the sketch shaken at random.
+    """
+    rng, best, total = np.random.default_rng(0), None, 0
+    shakes = shakes[:2] if metric.n > MANY else shakes
+    Phi = metric.linear(sketch, rows)[0]
+    if np.abs(Phi).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(sketch).max()):
+        return Found(sketch, Phi, 0, True)
+    for attempt in range(2 + len(also) + len(shakes)):
+        if attempt == 0:
+            q, count = relax(metric, sketch, sketch, rows)
+        elif attempt == 1:
+            q, count = sketch, 0
+        else:
+            shaken = attempt - 2 - len(also)
+            start = also[attempt - 2] if shaken < 0 else metric.shaken(sketch, rng, shakes[shaken])
+            q, count = relax(metric, sketch, start, rows)
+        q, Phi, more = close(metric, q, rows)
+        total += count + more
+        met = bool(np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max()))
+        if best is None or met or np.linalg.norm(Phi) < np.linalg.norm(best.Phi):
+            best = Found(q, Phi, total, met)
+        if met or (attempt == 1 and stuck(metric, q, Phi, rows).size):
+            break
+    if best.met:
+        q, Phi, more = settle(metric, sketch, best.q, rows)
+        if np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max()):
+            best = best._replace(q=q, Phi=Phi)
+        total += more
+    return best._replace(iterations=total)
+
+
+def settle(metric, sketch, q, rows=None):
+    """Go along the constraints to where the distance from the sketch has no slope. Returns q, Phi, how many steps."""
+    steps, last = 0, np.inf
+    Phi, A = metric.linear(q, rows)
+    while steps < MOST_SETTLING and metric.columns.size:
+        wish = metric.towards(q, sketch)[1]
+        step = wish + least_step(A, A @ wish, DEPENDENT)
+        size = np.linalg.norm(step)
+        if size <= SETTLED * np.linalg.norm(wish) or size >= 0.9 * last:
+            break
+        turn = metric.largest_turn(step)
+        trial, residual, more = close(metric, metric.moved(q, min(1.0, 0.2 / max(turn, 1e-300)) * step), rows)
+        steps += 1 + more
+        allowed = 10.0 * np.abs(Phi).max(initial=0.0) + ROUNDING * (1.0 + np.abs(q).max())
+        if np.abs(residual).max(initial=0.0) > allowed:
+            break
+        last, q = size, trial
+        Phi, A = metric.linear(q, rows)
+    return q, Phi, steps
+
+
+def stuck(metric, q, Phi, rows=None):
+    """Rows that are not met and whose derivative vanishes."""
+    size = np.abs(Phi)
+    return np.flatnonzero((row_lengths(metric.linear(q, rows)[1]) == 0.0) & (size > 1e-6 * size.max(initial=0.0)))
+
+
+def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
+    """Follow the equilibrium as the constraints' springs stiffen, from q. Returns q and how many steps it took."""
+    Phi, A = metric.linear(q, rows)
+    if not (Phi.size and metric.columns.size):
+        return q, 0
+    steps, relative = 0, None if kept is None else _Relative(metric, sketch, kept)
+    lengths = row_lengths(A)
+    if kept is None and q is sketch and _strain(Phi, lengths) < NEAR * metric.reach(q) * metric.root.min():
+        stages = stages[-1:]
+
+    def strained(q):
+        """Unit rows with what is left of them, the wish, softness and energy."""
+        Phi, A = metric.linear(q, rows)
+        residual, A = Phi * weights, _weighed(A, weights)
+        soft = np.full(residual.size, softness)
+        if relative is not None:
+            extra, B = relative.rows(q)
+            residual, soft = (
+                np.concatenate((residual, extra)),
+                np.concatenate((soft, np.full(extra.size, kept.softness))),
+            )
+            A = _stacked(A, B)
+        far, wish = metric.towards(q, sketch)
+        return residual, A, wish, soft, far + 0.5 * residual @ (residual / soft)
+
+    for softness, most in stages:
+        lengths = row_lengths(metric.linear(q, rows)[1])
+        weights = np.where(lengths > 0.0, 1.0 / np.where(lengths > 0.0, lengths, 1.0), 0.0)
+        now = strained(q)
+        for _ in range(most):
+            *arrays, energy = now
+            step = soft_step(arrays[1], arrays[0], arrays[2], arrays[3])
+            turn = metric.largest_turn(step)
+            factor = min(1.0, MOST_TURN / turn) if turn > 0.0 else 1.0
+            steps += 1
+            for _ in range(10):
+                trial = metric.moved(q, factor * step)
+                after = strained(trial)
+                if after[-1] < energy:
+                    break
+                factor /= 2.0
+            else:
+                break
+            q, now = trial, after
+            size = np.linalg.norm(step)
+            if size <= (1e-9 if softness == stages[-1][0] else 0.03) * (np.linalg.norm(now[2]) + 1e-300):
+                break
+    return q, steps
+
+
+def close(metric, q, rows=None):
+    """Gauss-Newton steps, smallest in kinetic energy, down to rounding. Returns q, Phi of those rows, how many."""
+    Phi, A = metric.linear(q, rows)
+    steps = 0
+    while steps < MOST_CLOSING and Phi.size and metric.columns.size:
+        if np.abs(Phi).max() <= ROUNDING * (1.0 + np.abs(q).max()):
+            break
+        steps += 1
+        step = least_step(A, Phi, DEPENDENT)
+        turn = metric.largest_turn(step)
+        factor = min(1.0, MOST_TURN / turn) if turn > 0.0 else 1.0
+        size = np.linalg.norm(Phi)
+        for _ in range(12):
+            trial = metric.moved(q, factor * step)
+            arrays = metric.linear(trial, rows)
+            if np.linalg.norm(arrays[0]) < size:
+                break
+            factor /= 2.0
+        else:
+            break
+        q, (Phi, A) = trial, arrays
+    return q, Phi, steps
+
+
+class _Relative:
+    """Rows that keep relative orientations: the log of A_a^T A_b (A_a^T A_b of the sketch)^T, in the frame of a."""
+
+    def __init__(self, metric, sketch, kept):
+        self.metric, self.pairs = metric, kept.pairs
+        a, b = kept.pairs.T
+        R = metric.rotations(sketch)
+        self.drawn = R[a].swapaxes(1, 2) @ R[b]
+        self.places, self.rise = metric.turns()
+
+    def rows(self, q):
+        """What is left (3 k,) and unit rows (3 k, free columns)."""
+        R, (a, b) = self.metric.rotations(q), self.pairs.T
+        between = R[a].swapaxes(1, 2) @ R[b]
+        residual = np.array([_logarithm(E) for E in between @ self.drawn.swapaxes(1, 2)])
+        B = np.zeros((3 * len(a), self.metric.size))
+        for k in range(len(a)):
+            for body, block in ((a[k], -self.rise[a[k]]), (b[k], between[k] @ self.rise[b[k]])):
+                if self.places[body][0] >= 0:
+                    B[3 * k : 3 * k + 3, self.places[body]] = block
+        B = B[:, self.metric.columns]
+        lengths = np.maximum(row_lengths(B), 1e-300)
+        some = row_lengths(B) > 0.0
+        return np.where(some, residual.ravel() / lengths, 0.0), B / lengths[:, None]
+
+
+def _logarithm(E):
+    """The rotation vector of a rotation matrix, (3,), of less than half a turn."""
+    v = np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]]) / 2.0
+    sine = np.linalg.norm(v)
+    return v * (np.arctan2(sine, (np.trace(E) - 1.0) / 2.0) / sine) if sine > 1e-12 else v
+
+
+def _strain(Phi, lengths):
+    some = lengths > 0.0
+    return np.abs(Phi[some] / lengths[some]).max(initial=0.0)
+
+
+def _weighed(A, weights):
+    if isinstance(A, np.ndarray):
+        return A * weights[:, None]
+    from scipy.sparse import diags_array
+
+    return diags_array(weights) @ A
+
+
+def _stacked(A, B):
+    if isinstance(A, np.ndarray):
+        return np.vstack((A, B))
+    from scipy.sparse import csr_array, vstack
+
+    return vstack((A, csr_array(B)), format="csr")

@@ -1,0 +1,76 @@
+"""Whether the rows of plug-ins are holonomic: their jacobian is the derivative of their phi.
+
+The tangent form takes a row on velocities for what it says. The forms with a basis solve for positions by Phi and
+Phi_q together, and go wrong, without a sign of it, where the one isn't the derivative of the other.
+"""
+
+import numpy as np
+
+from ..elements.loops.marker_jacobians import state
+from ..errors import InvalidConstraint
+from ..jit.kernels import twin
+from ..motions.prescribed import Motion
+from ..observables.diagnostics import starts_of
+
+STEPS = (1e-2, 1e-4, 1e-6)  # of difference quotients, relative to x
+CLOSE = 1e-3  # relative; a wrong entry is further off
+TRIED = 3  # instances of each kind
+
+
+def demand_holonomic(packed, q, t, form):
+    """Raise InvalidConstraint for a plug-in whose jacobian isn't the derivative of its phi at q (n,)."""
+    if packed.derived.holonomic:
+        return
+    seen = {}
+    for constraint, given, places in zip(packed.constraints, packed.parameters, packed.coordinates, strict=True):
+        kind = type(constraint)
+        seen[kind] = seen.get(kind, 0) + 1
+        if kind.__module__.startswith("tsdyn.") or seen[kind] > TRIED:
+            continue
+        par = [x for value in given for x in (value.value(t) if isinstance(value, Motion) else (value,))]
+        par += [0.0] * kind.memory
+        row = _wrong_row(constraint, par, _markers(packed, constraint, places, q), t)
+        if row is not None:
+            raise InvalidConstraint(
+                f"{constraint.name}: row {row} of its jacobian is not the derivative of its phi: it is not holonomic, "
+                f"which {form!r} with this method would run wrongly. Correct the kernels with the help of "
+                f"ts.testing.check_primitive({kind.__name__}); a row on velocities alone is served by "
+                "formulation='tangent' with an explicit method."
+            )
+    packed.derived.holonomic = True
+
+
+def _markers(packed, constraint, places, q):
+    """x of a constraint."""
+    starts, parts = starts_of(packed), []
+    for marker, s in zip(constraint.markers, places, strict=True):
+        body, x = constraint.body_of(marker), np.zeros(marker.size)
+        twin(state)(marker.code, body.dimension, starts.get(body, 0), q, np.zeros_like(q), s, x, np.zeros(marker.size))
+        parts.append(x)
+    return np.concatenate(parts)
+
+
+def _wrong_row(constraint, par, x, t):
+    """A row in which no difference quotient of phi is the jacobian's; None where there is none, or none can be had."""
+    kind = type(constraint)
+    phi, jacobian = twin(kind.phi), twin(kind.jacobian)
+
+    def value(x):
+        out = np.zeros(kind.rows)
+        phi(x, par, t, out)
+        return out
+
+    direction = np.random.default_rng(0).normal(size=x.size)
+    Phi_x = np.zeros((kind.rows, x.size))
+    try:
+        jacobian(x, par, t, Phi_x)
+        rate, size = Phi_x @ direction, np.abs(Phi_x) @ np.abs(direction)
+        off = np.full(kind.rows, np.inf)
+        for step in STEPS:
+            h = step * max(np.abs(x).max(), 1e-6) * direction
+            quotient = (value(x + h) - value(x - h)) * np.abs(direction).max() / (2.0 * np.abs(h).max())
+            off = np.fmin(off, np.abs(quotient - rate))
+    except Exception:  # the compiled kernels will say
+        return None
+    wrong = np.flatnonzero(off > CLOSE * size)
+    return int(wrong[0]) if wrong.size else None

@@ -1,0 +1,101 @@
+"""Which constraints contradict each other: the smallest set that can't be met, joints whole.
+
+Where |Phi|^2 is least, Phi_q^T Phi = 0: the constraints that are left over there balance each other like the forces of
+a strained structure, and they alone can conflict. Of these, sets are tried from small to large, or, where they are
+many, what can be left out is left out piece by piece; each trial is an assembly from the sketch.
+"""
+
+from itertools import combinations
+
+import numpy as np
+
+from ..errors import InconsistentState
+from .continuation import nearest
+
+LEFT_OVER = 1e-4  # of the largest |Phi|
+FEW = 6  # constraints of which all sets are tried
+MOST = 60  # constraints among which a conflict is looked for
+TRIAL_SHAKES = (0.1, 0.3, 0.6, 1.0)
+
+
+def refuse(scene, metric, sketch, found, tol, held=()):
+    """Raise InconsistentState that names the constraints in conflict; the error has them as `.constraints`."""
+    packed = scene.packed
+    members = [member for member in packed.members if not getattr(member.constraint, "normalises", False)]
+    left = np.zeros(len(packed.system.segments))
+    left[metric.own] = np.abs(found.Phi)
+    sizes = np.array([left[member.rows].max() for member in members])
+    suspects = [member for member, size in zip(members, sizes, strict=True) if size > LEFT_OVER * sizes.max()]
+    trial = _Trial(metric, sketch, found.q, tol)
+    told = False
+    while len(suspects) <= MOST and not told:
+        told = not trial.met(suspects)
+        wider = suspects if told else _wider(suspects, members)
+        if not told and len(wider) == len(suspects):
+            break
+        suspects = wider
+    conflicting, minimal = smallest(suspects, trial) if told else (suspects, False)
+    names, lines = scene.row_names(), []
+    for member in sorted(conflicting, key=lambda member: -left[member.rows].max())[:8]:
+        row = member.rows.start + int(np.argmax(left[member.rows]))
+        lines.append(f"  {member.constraint.title}: |Phi| = {left[row]:.3g} in {names[row]}")
+    if len(conflicting) > 8:
+        lines.append(f"  ... and {len(conflicting) - 8} more")
+    if len(conflicting) == 1:
+        story = "This one can't be met by itself"
+    elif minimal:
+        story = f"These {len(conflicting)} conflict, and without any one of them the rest of them can be met"
+    else:
+        story = "These are left over"
+    where = f" with {', '.join(body.name for body in held)} held fixed" if len(held) else ""
+    error = InconsistentState(
+        f"no configuration that meets all constraints{where} was found in {found.iterations} iterations from the "
+        f"sketch and from others near it. {story}:\n"
+        + "\n".join(lines)
+        + "\nChange a length, point or axis of one of them, or drop one"
+        + ("; or hold fewer bodies." if len(held) else ". If they do fit, bring the bodies nearer to where they do.")
+    )
+    error.constraints = tuple(member.constraint for member in conflicting)
+    raise error
+
+
+def _wider(suspects, members):
+    """Those that share a body with these: where a derivative vanishes, more are needed for a conflict."""
+    bodies = {id(body) for member in suspects for body in (member.constraint.a, member.constraint.b)}
+    bodies -= {id(None), id(suspects[0].constraint.scene.ground)}
+    return [member for member in members if bodies & {id(member.constraint.a), id(member.constraint.b)}]
+
+
+def smallest(suspects, trial):
+    """A smallest set of members that can't be met, and whether it is known that each is needed."""
+    if len(suspects) <= FEW:
+        for size in range(1, len(suspects)):
+            for chosen in combinations(suspects, size):
+                if not trial.met(chosen):
+                    return list(chosen), True
+        return list(suspects), True
+    needed, chunk = list(suspects), (len(suspects) + 1) // 2
+    while True:
+        at = 0
+        while at < len(needed):
+            rest = needed[:at] + needed[at + chunk :]
+            if rest and not trial.met(rest):
+                needed = rest
+            else:
+                at += chunk
+        if chunk == 1:
+            break
+        chunk = (chunk + 1) // 2
+    return smallest(needed, trial) if len(needed) <= FEW < len(suspects) else (needed, True)
+
+
+class _Trial:
+    """Assemblies of some of the constraints."""
+
+    def __init__(self, metric, sketch, q, tol):
+        self.metric, self.sketch, self.also, self.tol = metric, sketch, (q,), tol
+
+    def met(self, members):
+        """Whether they can be met together."""
+        rows = np.concatenate([np.arange(member.rows.start, member.rows.stop) for member in members])
+        return nearest(self.metric, self.sketch, self.tol, rows, TRIAL_SHAKES, self.also).met

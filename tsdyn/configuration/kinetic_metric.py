@@ -1,0 +1,206 @@
+"""Changes of a configuration in coordinates x that measure kinetic energy: six a rigid body, three a point mass.
+
+    r + x_r / sqrt(m),    p (x) exp(w' / 2),  w' = L^-T x_w,  J' = L L^T        so  2 T = |xd|^2
+    Phi + A x = 0                                                               A = Phi_q q_x
+
+Normalisations hold by themselves, so they are no rows of A.
+"""
+
+import numpy as np
+
+from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
+from ..maths.row_rank import row_lengths
+from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
+from ..observables.evaluate import LARGE, constraint_arrays
+
+NEXT_TO_NOTHING = 1e-13  # of rows of length one
+THIN = 1e-6  # of the mean moment of inertia: what an axis without inertia is given
+
+
+class Metric:
+    """Constraints of a packed scene at time t as rows (m', x), dense or (above 1000 coordinates) sparse.
+
+    held (n,) says which coordinates must stay.
+    """
+
+    def __init__(self, packed, held=None, t=0.0):
+        system = packed.system
+        rigid = system.bodies[:, 1] == 7
+        self.packed, self.t, self.n = packed, t, int(system.bodies[:, 1].sum())
+        self.sparse = self.n > LARGE
+        self.system = with_short_rows(packed) if self.sparse else system
+        starts = np.cumsum([0, *np.where(rigid, 6, 3)])
+        self.size = int(starts[-1])
+        self.rigid, self.at = rigid, system.bodies[:, 0]
+        self.r, self.move = self.at[:, None] + np.arange(3), starts[:-1, None] + np.arange(3)
+        self.p, self.turn = self.at[rigid, None] + np.arange(3, 7), starts[:-1][rigid, None] + np.arange(3, 6)
+        self.root = np.sqrt(system.mass)[:, None]
+        J = system.inertia[rigid].reshape(-1, 3, 3)
+        mean = np.trace(J, axis1=1, axis2=2) / 3.0
+        thin = np.linalg.eigvalsh(J)[:, 0] < THIN * mean
+        self.fall = np.linalg.cholesky(J + (THIN * mean * thin)[:, None, None] * np.eye(3)).swapaxes(1, 2)  # L^T
+        self.rise = np.linalg.inv(self.fall)
+        own = [not part.normalises for part in packed.constraints for _ in range(part.rows)]
+        self.own = np.flatnonzero(np.array(own, bool))
+        free = np.ones(self.size, bool)
+        if held is not None:
+            free[self.move[held[self.r[:, 0]]]] = False
+            free[self.turn[held[self.p[:, 0]]]] = False
+        self.columns = np.flatnonzero(free)
+
+    def arrays(self, q):
+        """Phi (m,), Phi_q (m, n), Phi_t (m,), all rows."""
+        Phi, rows, Phi_t, _ = constraint_arrays(
+            self.system, q, np.zeros(q.size), self.t, WIDTH if self.sparse else None
+        )
+        return Phi, as_csr(self.packed, rows) if self.sparse else rows, Phi_t
+
+    def linear(self, q, rows=None):
+        """Phi (m',) and A (m', free columns) of some rows; None takes all but normalisations."""
+        Phi, Phi_q, _ = self.arrays(q)
+        rows = self.own if rows is None else rows
+        return Phi[rows], self.reduced(q, Phi_q[rows])[:, self.columns]
+
+    def reduced(self, q, Phi_q):
+        """A of rows of Phi_q, all columns."""
+        blocks = 0.5 * transform_g(q[self.p]).swapaxes(1, 2) @ self.rise
+        if not self.sparse:
+            A = np.zeros((Phi_q.shape[0], self.size))
+            A[:, self.move] = Phi_q[:, self.r] / self.root
+            A[:, self.turn] = np.einsum("mbi,bij->mbj", Phi_q[:, self.p], blocks)
+            return A
+        from scipy.sparse import csr_array
+
+        i, j = np.broadcast_arrays(self.p[:, :, None], self.turn[:, None, :])
+        values = np.concatenate((np.broadcast_to(1.0 / self.root, self.r.shape).ravel(), blocks.ravel()))
+        places = [np.concatenate((a.ravel(), b.ravel())) for a, b in ((self.r, i), (self.move, j))]
+        return Phi_q @ csr_array((values, places), (self.n, self.size))
+
+    def towards(self, q, target):
+        """Half the squared distance of q from a target, and minus its gradient by the free coordinates.
+
+        The distance is that of straight lines and of turns v about fixed axes: |v|^2 = v.J' v. A turn d of the body
+        changes v by -W d, W = I - v~/2 + c v~ v~, c = (1 - a/2 cot(a/2)) / a^2, a = |v|.
+        """
+        x, v = np.zeros(self.size), rotation_vectors(q[self.p], target[self.p])
+        shift, turn = self.root * (target[self.r] - q[self.r]), np.einsum("bij,bj->bi", self.fall, v)
+        Jv, a = np.einsum("bji,bj->bi", self.fall, turn), np.linalg.norm(v, axis=1)[:, None]
+        small = a < 1e-3
+        a = np.where(small, 1.0, a)
+        c = np.where(small, 1.0 / 12.0, (1.0 - a / 2.0 / np.tan(a / 2.0)) / a**2)
+        across = np.cross(v, Jv)
+        x[self.move] = shift
+        x[self.turn] = np.einsum("bji,bj->bi", self.rise, Jv + 0.5 * across + c * np.cross(v, across))
+        return 0.5 * float((shift * shift).sum() + (turn * turn).sum()), x[self.columns]
+
+    def moved(self, q, x):
+        """The configuration after a change of the free coordinates."""
+        whole, q = self._whole(x), q.copy()
+        q[self.r] += whole[self.move] / self.root
+        w = np.einsum("bij,bj->bi", self.rise, whole[self.turn])
+        p, angle = q[self.p], np.linalg.norm(w, axis=1)[:, None]
+        sine = np.sinc(angle / (2.0 * np.pi)) / 2.0  # sin(angle / 2) / angle
+        p = np.cos(angle / 2.0) * p + sine * np.einsum("bij,bi->bj", transform_g(p), w)
+        q[self.p] = p / np.linalg.norm(p, axis=1)[:, None]
+        return q
+
+    def largest_turn(self, x):
+        """Rad, of a change of the free coordinates."""
+        w = np.einsum("bij,bj->bi", self.rise, self._whole(x)[self.turn])
+        return float(np.linalg.norm(w, axis=1).max(initial=0.0))
+
+    def speeds(self, velocity, omega):
+        """xd (size,) of velocities (bodies, 3) and angular velocities (rigid bodies, 3), body frames."""
+        x = np.zeros(self.size)
+        x[self.move] = self.root * velocity
+        x[self.turn] = np.einsum("bij,bj->bi", self.fall, omega)
+        return x
+
+    def rates(self, q, x):
+        """qd of xd (size,)."""
+        qd = np.zeros(self.n)
+        qd[self.r] = x[self.move] / self.root
+        w = np.einsum("bij,bj->bi", self.rise, x[self.turn])
+        qd[self.p] = 0.5 * np.einsum("bij,bi->bj", transform_g(q[self.p]), w)
+        return qd
+
+    def reach(self, q):
+        """A length of the scene's, m: of its joints from the centroids, or of its bodies from each other."""
+        return float(self.packed.size) or float(np.ptp(q[self.r], axis=0).max()) or 1.0
+
+    def extent(self, x):
+        """The largest displacement, m, and turn, rad, of a change (size,) of all coordinates."""
+        moved = np.linalg.norm(x[self.move] / self.root, axis=1).max(initial=0.0)
+        return float(moved), self.largest_turn(x[self.columns])
+
+    def shaken(self, q, rng, size):
+        """The configuration with its free bodies moved by `size` of the scene's and turned by `size` rad, at random."""
+        x = self.speeds(self.reach(q) * rng.normal(size=self.r.shape), rng.normal(size=(len(self.p), 3)))
+        return self.moved(q, size * x[self.columns])
+
+    def rotations(self, q):
+        """Rotation matrices of all bodies and, last, of the ground, (bodies + 1, 3, 3)."""
+        p = np.tile(IDENTITY, (len(self.at) + 1, 1))
+        p[:-1][self.rigid] = q[self.p]
+        return rotation_matrix(p)
+
+    def turns(self):
+        """For each body, and the ground, where its turn is in x, -1 for those that don't turn; and L^-T, (., 3, 3)."""
+        places, rise = np.full((len(self.at) + 1, 3), -1), np.zeros((len(self.at) + 1, 3, 3))
+        places[:-1][self.rigid], rise[:-1][self.rigid] = self.turn, self.rise
+        return places, rise
+
+    def _whole(self, x):
+        whole = np.zeros(self.size)
+        whole[self.columns] = x
+        return whole
+
+
+def rotation_vectors(p, target):
+    """The turns (b, 3) that take orientations p (b, 4) to others, in the frames of p, at most half a turn."""
+    e = np.einsum("bij,bj->bi", transform_g(p), target)
+    e0, size = np.einsum("bi,bi->b", p, target), np.linalg.norm(e, axis=1)
+    angle = 2.0 * np.arctan2(size, np.abs(e0))
+    factor = np.where(size > 0.0, angle / np.maximum(size, 1e-300), 0.0)
+    return (np.where(e0 < 0.0, -1.0, 1.0) * factor)[:, None] * e
+
+
+def soft_step(A, residual, wish, softness):
+    """The x nearest to a wish that meets residual + A x = 0, rows being springs of stiffness 1 / softness (rows,)."""
+    if not A.shape[0]:
+        return wish
+    if isinstance(A, np.ndarray):
+        K = A @ A.T
+        K.flat[:: len(K) + 1] += softness
+        return wish - A.T @ np.linalg.solve(K, residual + A @ wish)
+    from scipy.sparse import block_array, diags_array
+    from scipy.sparse.linalg import splu
+
+    matrix = block_array([[diags_array(np.ones(wish.size)), A.T], [A, -diags_array(softness)]], format="csc")
+    return splu(matrix).solve(np.concatenate((wish, -residual)))[: wish.size]
+
+
+def least_step(A, residual, rcond=1e-10):
+    """The smallest x with residual + A x = 0, by least squares; rcond: singular values of unit rows that are none."""
+    lengths = row_lengths(A)
+    some = lengths > 0.0
+    if not some.any():
+        return np.zeros(A.shape[1])
+    if isinstance(A, np.ndarray):
+        unit = A[some] / lengths[some, None]
+        return np.linalg.lstsq(unit, -residual[some] / lengths[some], rcond=rcond)[0]
+    from scipy.sparse import diags_array
+
+    unit = diags_array(1.0 / lengths[some]) @ A[some]
+    return soft_step(unit, residual[some] / lengths[some], np.zeros(A.shape[1]), np.full(some.sum(), NEXT_TO_NOTHING))
+
+
+def unit_tangent(metric, q, rng):
+    """A random direction that the constraints leave, moving the scene by its size or turning it by 1 rad; or None."""
+    _, A = metric.linear(q)
+    reach = metric.reach(q)
+    wish = metric.speeds(reach * rng.normal(size=metric.r.shape), rng.normal(size=(len(metric.p), 3)))
+    wish = wish + least_step(A, A @ wish, 1e-7)
+    shift, turn = metric.extent(wish)
+    size = max(shift / reach, turn)
+    return wish / size if size > 1e-9 else None

@@ -1,0 +1,51 @@
+"""Mirrored joints: rows that make directions parallel hold with them opposed, too, and no start is taken there."""
+
+import numpy as np
+
+from ..elements.bodies import IDENTITY, rotation_matrix
+from ..errors import InconsistentState
+
+
+def demand_aligned(packed, q, t):
+    """Refuse positions q (n,) at t that meet the rows with directions opposed, by the joint's name."""
+    if packed.derived.aligned is None:
+        packed.derived.aligned = _pairs(packed)
+    titles, places, directions, moving = packed.derived.aligned
+    if not titles:
+        return
+    if moving:
+        directions = directions.copy()
+        for i, direction in moving:
+            directions[0, i] = direction(t)
+    p = np.append(q, IDENTITY)[places]
+    one, other = np.einsum("skij,skj->ski", rotation_matrix(p), directions)
+    opposed = np.flatnonzero(~((one * other).sum(axis=1) > 0.0))
+    if opposed.size:
+        names = list(dict.fromkeys(titles[i] for i in opposed))
+        more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+        raise InconsistentState(
+            f"{', '.join(names[:8])}{more}: directions that the joint keeps parallel point opposite ways here. Its "
+            "rows hold so, too, but it is the mirrored joint. Give one of the axes (or references) the other sign, or "
+            "turn a body half a turn."
+        )
+
+
+def _pairs(packed):
+    """Titles; where the Euler parameters of both bodies are in (q, 1, 0, 0, 0), (2, k, 4); directions (2, k, 3).
+
+    Then the places of first directions that are functions of time, with them.
+    """
+    starts = {id(body): int(at) + 3 for body, (at, _) in zip(packed.bodies, packed.system.bodies, strict=True)}
+    ground = int(packed.system.bodies[:, 1].sum())
+    titles, places, directions, moving = [], [], [], []
+    for member in packed.members:
+        for pair in getattr(member.constraint, "opposed", ()):
+            titles.append(member.constraint.title)
+            places.append([starts.get(id(body), ground) for body, _ in pair])
+            (_, first), (_, second) = pair
+            if callable(first):
+                moving.append((len(directions), first))
+                first = first(0.0)
+            directions.append([first, second])
+    places = np.array(places, np.int64).reshape(-1, 2).T[..., None] + np.arange(4)
+    return titles, places, np.array(directions).reshape(-1, 2, 3).swapaxes(0, 1), moving

@@ -1,0 +1,242 @@
+"""`scene.mobility`: degrees of freedom, rank, and the rows that say nothing new; everywhere, or just here."""
+
+import html
+from collections import Counter
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..calls import fitting
+from ..errors import InvalidArgument
+from ..maths.row_rank import rank_of
+from ..validation import counted, finite_vector, number
+from .continuation import close
+from .kinetic_metric import Metric, unit_tangent
+from .row_dependence import divide, partners, put_aside
+from .start_violations import demand_finite, demand_small
+
+CONSISTENT = 1e-9  # of 1 + max |q|
+ASIDE = 0.02  # of the scene's size, and rad: how far the neighbours are at which the rank is compared
+TRIES = 3
+MOST_ROWS = 3000  # of closed loops, which take a dense factorisation
+
+
+class RedundantRow(NamedTuple):
+    """A row of Phi_q that depends on others."""
+
+    name: str
+    depends_on: tuple  # names of rows
+    constraint: object  # whose row it is
+
+
+@dataclass(frozen=True, repr=False)
+class Mobility:
+    """How a scene can move at one configuration.
+
+    Attributes
+    ----------
+    degrees_of_freedom : int
+        Coordinates less rank: of the velocities that the constraints leave, here.
+    generic_degrees_of_freedom : int
+        The same at configurations near this one; it is smaller where this one is singular.
+    coordinates, rows, rank : int
+        Of Phi_q, normalisations included: n, m and the rank.
+    redundant : tuple of RedundantRow
+        Rows that depend on others here and nearby: what constrains too much. Never a normalisation.
+    dependent_here : tuple of RedundantRow
+        Rows that depend on others in this configuration only.
+    singular : bool
+        Whether the rank is lower here than nearby.
+    """
+
+    degrees_of_freedom: int
+    generic_degrees_of_freedom: int
+    coordinates: int
+    rows: int
+    rank: int
+    redundant: tuple
+    dependent_here: tuple
+    singular: bool
+
+    def _facts(self):
+        freedom = f"{self.degrees_of_freedom}"
+        if self.singular:
+            freedom += f" here, {self.generic_degrees_of_freedom} nearby: this configuration is singular"
+        facts = {
+            "degrees of freedom": freedom,
+            "coordinates": f"{self.coordinates}",
+            "rows": f"{self.rows}, of rank {self.rank}",
+        }
+        for title, found in (("redundant rows", self.redundant), ("dependent just here", self.dependent_here)):
+            if found or title.startswith("redundant"):
+                facts[title] = f"{len(found) or 'none'}"
+        return facts
+
+    def _stories(self):
+        """(rows of a constraint, what they depend on), joint by joint."""
+        for found, ending in ((self.redundant, ""), (self.dependent_here, " (just here)")):
+            groups = {}
+            for row in found:
+                groups.setdefault(id(row.constraint), []).append(row)
+            for rows in groups.values():
+                whole = len(rows) == rows[0].constraint.rows
+                title = rows[0].constraint.title
+                said = f"all of {title}" if whole and len(rows) > 1 else ", ".join(row.name for row in rows)
+                on = dict.fromkeys(name for row in rows for name in row.depends_on)
+                heads = list(dict.fromkeys(map(_head, on)))
+                yield said + ending, sorted(on, key=lambda name: heads.index(_head(name)))
+
+    def __repr__(self):
+        more = ", singular here" if self.singular else ""
+        n, r = self.degrees_of_freedom, len(self.redundant)
+        return (
+            f"<Mobility: {counted(n, 'degree')} of freedom, rank {self.rank} of {self.rows} rows, "
+            f"{r or 'no'} redundant row{'' if r == 1 else 's'}{more}>"
+        )
+
+    def __str__(self):
+        facts = self._facts()
+        width = max(map(len, facts))
+        lines = [f"  {name:{width}}  {fact}" for name, fact in facts.items()]
+        lines += [f"  {said} depend{'s' if _single(said) else ''} on {_listed(on)}" for said, on in self._stories()]
+        return "\n".join(["Mobility", *lines])
+
+    def _repr_html_(self):
+        """The same in a notebook."""
+        facts = self._facts() | {said: f"on {_listed(on)}" for said, on in self._stories()}
+        rows = "".join(f"<tr><th>{html.escape(a)}</th><td>{html.escape(b)}</td></tr>" for a, b in facts.items())
+        return f"<table><caption>Mobility</caption>{rows}</table>"
+
+
+@fitting
+def mobility(scene, q=None, t=0.0):
+    """Count degrees of freedom, and name the rows that are redundant.
+
+    Parameters
+    ----------
+    q : array_like (n,), optional
+        Positions, which must meet the constraints to 1e-9; default the start values of the bodies.
+    t : float, s
+        The time at which constraints that depend on time are looked at.
+
+    Returns
+    -------
+    Mobility
+        Print it for a table: `.degrees_of_freedom`, `.redundant`, `.singular` and more.
+
+    Raises
+    ------
+    InvalidArgument
+        If q is not n finite numbers, t is not finite, or closed loops have more than 3000 rows.
+    InconsistentState
+        If q breaks a constraint, for dependent rows look independent there; it names the rows.
+
+    Notes
+    -----
+    The rank is that of Phi_q with rows of unit length in the metric of kinetic energy: singular values above 1e-7 of
+    the largest. A row is called redundant if it depends on those of its joint and of joints added before it, so they
+    gather in few joints. Whether a configuration is singular is told by consistent ones beside it. Above 1000
+    coordinates, what hangs in open chains is put aside first and costs O(N); closed loops cost the cube of their rows.
+    """
+    packed, start = scene.packed, scene.start[0]
+    q = finite_vector(start if q is None else q, start.size, "q").copy()
+    if not np.isfinite(number(t)):
+        raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
+    metric = Metric(packed, None, float(t))
+    Phi, Phi_q, Phi_t = metric.arrays(q)
+    demand_finite(scene, Phi, Phi_q, Phi_t)
+    demand_small(scene, Phi, CONSISTENT * (1.0 + np.abs(q).max()), "position", "Phi")
+    rows, A = _core(metric, q, None)
+    here = rank_of(A)
+    beside, generic = A, here
+    if here < min(A.shape):
+        for other in _neighbours(metric, q, A):
+            found = _core(metric, other, rows)[1]
+            rank = rank_of(found)
+            if rank > generic:
+                beside, generic = found, rank
+    groups = _groups(packed, metric, rows)
+    _, redundant = divide(beside, groups)
+    rest = [np.array([row for row in group if row not in set(redundant)], int) for group in groups]
+    kept, dependent = divide(A, [group for group in rest if group.size]) if generic > here else (None, [])
+    always = sorted(set(range(len(rows))) - set(redundant))
+    names, owners = (
+        scene.row_names(),
+        [member.constraint for member in packed.members for _ in range(member.constraint.rows)],
+    )
+
+    def told(found, among, matrix):
+        for row, others in zip(found, partners(matrix, among, found), strict=True):
+            place = metric.own[rows[row]]
+            yield RedundantRow(names[place], tuple(names[metric.own[rows[i]]] for i in others), owners[place])
+
+    aside = len(metric.own) - len(rows) + len(packed.system.segments) - len(metric.own)
+    n = q.size
+    return Mobility(
+        degrees_of_freedom=n - aside - here,
+        generic_degrees_of_freedom=n - aside - generic,
+        coordinates=n,
+        rows=len(packed.system.segments),
+        rank=aside + here,
+        redundant=tuple(told(redundant, always, beside)),
+        dependent_here=tuple(told(dependent, kept, A)) if dependent else (),
+        singular=generic > here,
+    )
+
+
+def _core(metric, q, rows):
+    """Numbers (among those that are no normalisations) of rows that may depend on each other, and the rows, dense."""
+    _, A = metric.linear(q)
+    if not metric.sparse:
+        return (np.arange(A.shape[0]), A) if rows is None else (rows, A[rows])
+    if rows is None:
+        owners = np.repeat(np.arange(len(metric.at)), np.where(metric.rigid, 6, 3))
+        rows = put_aside(A, owners)
+        if len(rows) > MOST_ROWS:
+            raise InvalidArgument(
+                f"mobility: the closed loops of this scene have {len(rows)} constraint rows; it is worked out for up "
+                f"to {MOST_ROWS}. Ask for a smaller scene of the same kind."
+            )
+    left = A[rows]
+    used = np.unique(left.indices) if len(rows) else np.zeros(0, int)
+    return rows, left[:, used].toarray()
+
+
+def _neighbours(metric, q, A):
+    """Consistent configurations beside q, along directions that the constraints leave, at random."""
+    rng = np.random.default_rng(0)
+    for _ in range(TRIES):
+        step = unit_tangent(metric, q, rng)
+        if step is None:
+            return
+        other, Phi, _ = close(metric, metric.moved(q, ASIDE * step))
+        if np.abs(Phi).max(initial=0.0) <= 1e-10 * (1.0 + np.abs(q).max()):
+            yield other
+
+
+def _groups(packed, metric, rows):
+    """Numbers of `rows` constraint by constraint."""
+    owner = np.repeat(np.arange(len(packed.members)), [member.constraint.rows for member in packed.members])
+    whose = owner[metric.own[rows]] if len(rows) else np.zeros(0, int)
+    return [np.flatnonzero(whose == member) for member in np.unique(whose)]
+
+
+def _listed(names):
+    """Names of rows, those of one constraint together."""
+    if not names:
+        return "nothing else: it vanishes"
+    heads = Counter(map(_head, names))
+    if len(names) > 8:
+        return ", ".join(f"{head} ({count})" if count > 1 else head for head, count in heads.items())
+    return ", ".join(names)
+
+
+def _head(name):
+    """A row's name without its label."""
+    head, _, label = name.rpartition(" ")
+    return name.partition("[")[0] if "'" in label or not head else head
+
+
+def _single(said):
+    return "," not in said and not said.startswith("all of")

@@ -1,0 +1,82 @@
+"""Which rows say nothing that others don't say already: one joint after the other, in the order added."""
+
+import numpy as np
+
+from ..maths.row_rank import RANK_TOL, farthest_first, rank_of, singular_values, unit_rows
+
+TAKES_PART = 1e-6  # weight from which on a row counts among those that another depends on
+FIRM = 1e-3  # singular values, of the largest, from which on rows of a body are put aside without more ado
+
+
+def divide(A, groups):
+    """Kept and redundant rows of A (rows, x): those of a group that depend on it and on the groups before it.
+
+    groups is a list of arrays of row numbers. Within a group the rows kept are those farthest from the rest.
+    """
+    from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
+
+    unit, rank = unit_rows(A), rank_of(A)
+    basis, kept, redundant = np.zeros((0, A.shape[1])), [], []
+    for rows in groups:
+        left = unit[rows]
+        for _ in range(2):
+            left = left - (left @ basis.T) @ basis
+        Q, R, order = qr(left.T, mode="economic", pivoting=True)
+        size = np.abs(np.diagonal(R))
+        count = int((size > RANK_TOL * np.sqrt(max(len(unit), 1))).sum())
+        basis = np.vstack((basis, Q.T[:count]))
+        kept += sorted(rows[order[:count]].tolist())
+        redundant += sorted(rows[order[count:]].tolist())
+    if len(kept) != rank:  # near the edge of what rank means: take the rows farthest from each other, wherever they are
+        order, _ = farthest_first(unit)
+        kept, redundant = sorted(order[:rank].tolist()), sorted(order[rank:].tolist())
+    return kept, redundant
+
+
+def partners(A, kept, redundant):
+    """For each redundant row, the rows among those kept of which it is a combination."""
+    unit = unit_rows(A)
+    if not (kept and redundant):
+        return [[] for _ in redundant]
+    weights = np.linalg.lstsq(unit[kept].T, unit[redundant].T, rcond=None)[0]
+    return [[row for row, weight in zip(kept, column, strict=True) if abs(weight) > TAKES_PART] for column in weights.T]
+
+
+def put_aside(A, owners):
+    """Rows of a sparse A that are independent of all others for sure: those of bodies that all their rows hold firmly.
+
+    owners (x,) is the body of each column. A body whose rows, restricted to its columns, are independent takes them
+    away with it, as the links of an open chain do from the end. Returns the rows that are left.
+    """
+    from scipy.sparse import csr_array
+
+    A = csr_array(A)
+    of_row = [np.unique(owners[A.indices[A.indptr[i] : A.indptr[i + 1]]]) for i in range(A.shape[0])]
+    rows_of = [set() for _ in range(int(owners.max(initial=-1)) + 1)]
+    for row, bodies in enumerate(of_row):
+        for body in bodies:
+            rows_of[body].add(row)
+    columns = [np.flatnonzero(owners == body) for body in range(len(rows_of))] if len(rows_of) < 2 else _columns(owners)
+    left, queue = set(range(A.shape[0])), list(range(len(rows_of)))
+    while queue:
+        body = queue.pop()
+        rows = sorted(rows_of[body])
+        if not 0 < len(rows) <= len(columns[body]):
+            continue
+        block = unit_rows(A[rows].toarray())[:, columns[body]]
+        size = singular_values(block)
+        if size[-1] <= FIRM * size[0]:
+            continue
+        near = {int(other) for row in rows for other in of_row[row]} - {body}
+        for row in rows:
+            for other in of_row[row]:
+                rows_of[other].discard(row)
+        left -= set(rows)
+        queue += sorted(near)
+    return np.array(sorted(left), int)
+
+
+def _columns(owners):
+    order = np.argsort(owners, kind="stable")
+    cuts = np.searchsorted(owners[order], np.arange(1, owners.max() + 1))
+    return np.split(order, cuts)

@@ -1,0 +1,228 @@
+"""`scene.set`: the coordinates of a joint at the start, and the rest of the scene assembled around it.
+
+Where the joint is the only link between two parts of the scene, one part is moved against the other as a rigid body:
+all other joints stay as they are. In a loop the joint is driven to its value in small steps, each of which is
+assembled, so that the mechanism stays on its branch.
+"""
+
+import math
+
+import numpy as np
+
+from ..constraints.angle_driver import AngleDriver
+from ..constraints.dot2 import Dot2
+from ..constraints.thread import Thread
+from ..elements.joint_coordinates import Angle, AngleGeometry
+from ..elements.membership import settle
+from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
+from ..model import joint_motion
+from ..model.handles import handles_of
+from ..motions.expressions import Polynomial
+from ..validation import floats, number
+from .assemble import assemble
+from .rigid_shift import RigidShift
+
+STEP, SHARE = 0.25, 0.05  # of a joint in a loop: rad; of the scene's size
+LEAST = 2.0**-8  # of the way, of a step that is halved where it can't be assembled
+
+
+class Goal:
+    """A coordinate of a joint: where it is as the bodies stand now, and where it is to go."""
+
+    def __init__(self, geometry, value, rate, new_value, new_rate):
+        self.geometry, self.turns = geometry, isinstance(geometry, AngleGeometry)
+        self.value, self.rate = value, rate
+        self.new_value = value if new_value is None else new_value
+        self.new_rate = rate if new_rate is None else new_rate
+
+    def driver(self, share, t, joint):
+        """The constraint that holds it after a share of the way, with its new rate, at t."""
+        g, value = self.geometry, self.value + share * (self.new_value - self.value)
+        motion = Polynomial((value - self.new_rate * t, self.new_rate))
+        name = f"{joint.name} at {value:.6g} {'rad' if self.turns else 'm'}, {self.new_rate:.6g} a second"
+        if self.turns:
+            return AngleDriver(g.own, g.other, reference_a=g.f, across_a=g.g, reference_b=g.h, angle=motion, name=name)
+        points = {"point_a": g.s_own, "point_b": g.s_other}
+        return Dot2(g.own, g.other, axis_a=g.e, **points, value=motion, name=name)
+
+
+def set_joint(
+    scene, joint, *, angle=None, displacement=None, rate=None, angle_rate=None, displacement_rate=None, keep=(), t=0.0
+):
+    """Give a joint's coordinates and their rates at the start, and assemble the rest of the scene.
+
+    Parameters
+    ----------
+    joint : joint or str
+        With an angle or a displacement, such as Revolute or Translational; or its name.
+    angle : float, rad; optional
+        Of b against a, as of `solution.angle`; any number of turns, which a run counts on from. Two for Universal.
+    displacement : float, m; optional
+        As of `solution.displacement`.
+    rate : float, rad/s or m/s; optional
+        Of the joint's only coordinate, or of its only angle where one is given.
+    angle_rate, displacement_rate : float, rad/s and m/s; optional
+        The same by name, for joints that have both.
+    keep : sequence of joints, or names; optional
+        In closed loops: other joints whose coordinates and rates are to stay as they are.
+    t : float, s
+        The time at which constraints that depend on time are met.
+
+    Returns
+    -------
+    AssemblyReport
+        Of the last step.
+
+    Raises
+    ------
+    InvalidConstraint, InvalidArgument
+        If the joint has no such coordinate, or a number is not finite.
+    InconsistentState
+        If the scene can't be assembled so. The bodies are as before.
+
+    Notes
+    -----
+    What is not given stays as it is. In a tree of joints, the bodies beyond the joint follow as one: no other joint
+    changes. In closed loops the joint goes to its value in small steps, on the branch of the configuration that the
+    scene has; what is nearest in the metric of kinetic energy decides about other freedoms.
+    """
+    if isinstance(keep, str) or not hasattr(keep, "__iter__"):
+        raise InvalidArgument(f"set: keep must be a sequence of joints or names, such as (joint,), got {keep!r}.")
+    if not np.isfinite(number(t)):
+        raise InvalidArgument(f"set: t must be a finite time in s, got {t!r}.")
+    handles = handles_of(scene.packed)
+    given = {"angle": [angle, angle_rate], "displacement": [displacement, displacement_rate]}
+    if rate is not None:
+        given[_kind_of_rate(handles, joint, given)][1] = rate
+    joint = handles.item(joint)
+    _link(joint, given)
+    given = {kind: pair for kind, pair in given.items() if any(x is not None for x in pair)}
+    if not given:
+        raise InvalidArgument(f"set: nothing is said of {joint!r}; give angle=, displacement= or rate=.")
+    goals = [goal for kind, pair in given.items() for goal in _goals(scene, handles, joint, kind, pair, t)]
+    others = [other for other in map(handles.item, keep) if other is not joint]
+    held = [(other, goal) for other in others for goal in _present(scene, handles, other, t)]
+    before = scene.start
+    try:
+        report = _drive(scene, joint, goals, held, t)
+    except BaseException:
+        scene.place(*before)
+        raise
+    turns = tuple(goal.new_value for goal in goals if goal.turns)
+    if turns:
+        joint.__dict__["angle_near"] = turns
+    return report
+
+
+def _link(joint, given):
+    """Where a joint has a lead, its angle says its displacement, and the other way round."""
+    lead = getattr(joint, "travel_per_radian", None)
+    if lead is not None:
+        for i, (turn, travel) in enumerate(zip(*given.values(), strict=True)):
+            if turn is not None and travel is None:
+                given["displacement"][i] = lead * number(turn)
+            elif travel is not None and turn is None:
+                given["angle"][i] = number(travel) / lead
+
+
+def _kind_of_rate(handles, joint, given):
+    """What `rate` is the rate of: the kind that is given, or the only one that the joint has."""
+    asked = [kind for kind, pair in given.items() if pair[0] is not None]
+    kinds = asked if len(asked) == 1 else _kinds(handles, joint)
+    if len(kinds) > 1:
+        raise InvalidArgument(f"set: {joint!r} has two kinds of rates; give angle_rate= or displacement_rate=.")
+    kind = kinds[0]
+    if given[kind][1] is not None:
+        raise InvalidArgument(f"set: give rate= or {kind}_rate=, not both.")
+    return kind
+
+
+def _kinds(handles, joint):
+    """The kinds of coordinates that a joint has; of what has none "angle", which is refused by name later."""
+    declared = getattr(handles.item(joint), "joint_coordinates", ())
+    return list(dict.fromkeys("angle" if isinstance(each, Angle) else "displacement" for each in declared)) or ["angle"]
+
+
+def _goals(scene, handles, joint, kind, pair, t):
+    """A `Goal` for each coordinate of a kind, from what is given of it: (value, rate)."""
+    row = handles.row(joint, kind)
+    geometries, (q, qd) = getattr(row, f"{kind}s"), scene.start
+    evaluate, near = getattr(joint_motion, kind), handles.angles_at_start(t, q)
+    goals = []
+    wanted = [_numbers(joint, name, value, len(geometries)) for name, value in zip((kind, "rate"), pair, strict=True)]
+    for i, (geometry, *new) in enumerate(zip(geometries, *wanted, strict=True)):
+        bodies = handles.motions(geometry, (q, qd))
+        value, rate = (float(evaluate(geometry, *bodies, level)) for level in (0, 1))
+        if kind == "angle":
+            value = float(joint_motion.counted(value, near[row.first + i]))
+        goals.append(Goal(geometry, value, rate, *new))
+    return goals
+
+
+def _numbers(joint, name, value, count):
+    """The numbers given for some coordinates; None for each that is left as it is."""
+    if value is None:
+        return [None] * count
+    numbers = np.atleast_1d(floats(value))
+    if numbers.shape != (count,) or not np.isfinite(numbers).all():
+        many = "a finite number" if count == 1 else f"{count} finite numbers"
+        raise InvalidArgument(f"set: {name} of {joint!r} must be {many}, got {value!r}.")
+    return numbers.tolist()
+
+
+def _present(scene, handles, joint, t):
+    """All coordinates of a joint, to stay as they are."""
+    return [goal for kind in _kinds(handles, joint) for goal in _goals(scene, handles, joint, kind, (None, None), t)]
+
+
+def _drive(scene, joint, goals, held, t):
+    """Bring a joint to its goals; the report of the last assembly."""
+    threaded = any(isinstance(part, Thread) for part in scene.primitives)
+    size, steps = _size(scene), 1
+    shift = RigidShift.of(scene, joint)
+    for goal in goals:
+        if goal.turns and not threaded:  # whole turns move nothing
+            goal.value = float(joint_motion.counted(goal.value, goal.new_value))
+        way = abs(goal.new_value - goal.value) / (STEP if goal.turns else SHARE * size)
+        steps = max(steps, math.ceil(way)) if shift is None else 1
+    share, step, before = 0.0, 1.0 / steps, scene.start
+    if shift is not None:
+        shift.gain(goals)
+    while True:
+        ahead = min(share + step, 1.0) if share + 1.5 * step < 1.0 else 1.0
+        drivers = [goal.driver(ahead, t, joint) for goal in goals]
+        drivers += [goal.driver(1.0, t, other) for other, goal in held]
+        if shift is not None:
+            shift.move(goals, ahead - share)
+        try:
+            report = _assembled(scene, drivers, t)
+        except (InconsistentState, SingularConfiguration) as error:
+            scene.place(*before)
+            step *= 0.5
+            if shift is not None or step * steps < LEAST:
+                raise InconsistentState(
+                    f"{joint.title} can't be set so: the scene can be assembled {share:.0%} of the way. {error}"
+                ) from error
+            continue
+        share, before = ahead, scene.start
+        if share == 1.0:
+            return report
+
+
+def _assembled(scene, drivers, t):
+    """Assemble the scene with some constraints that it does not keep."""
+    for driver in drivers:
+        settle(driver)
+    scene._added.extend(drivers)
+    scene.touch()
+    try:
+        return assemble(scene, t=t, folds="free")
+    finally:
+        del scene._added[-len(drivers) :]
+        scene.touch()
+
+
+def _size(scene):
+    """How far the scene reaches, m."""
+    places = np.array([body.position for body in scene.bodies])
+    return max(float(np.ptp(places, axis=0).max()), scene.packed.size, 1e-300)

@@ -1,0 +1,36 @@
+"""Initial conditions that break constraints: refused by the names of the rows."""
+
+import numpy as np
+
+from ..errors import InconsistentState
+
+ROUNDING = 2e-16
+
+
+def demand_finite(scene, *arrays):
+    """Refuse rows that are not finite, by name."""
+    for array in arrays:
+        bad = np.flatnonzero(~np.isfinite(array if array.ndim == 1 else array.sum(axis=1)))
+        if bad.size:
+            raise InconsistentState(
+                f"{scene.row_names()[bad[0]]}: its constraint or a derivative of it is not finite at the start. Look "
+                "at its parameters, its motion, or its kernels."
+            )
+
+
+def demand_small(scene, residual, tol, level, formula):
+    """Refuse residuals (m,) above tol, by name."""
+    bad = np.flatnonzero(~(np.abs(residual) <= tol))
+    if bad.size == 0:
+        return
+    names = scene.row_names()
+    worst = sorted(bad, key=lambda i: -abs(residual[i]))
+    lines = [f"  {names[i]}: {formula} = {residual[i]:.6g}" for i in worst[:8]]
+    if bad.size > 8:
+        lines.append(f"  ... and {bad.size - 8} more rows")
+    raise InconsistentState(
+        f"the initial {level} breaks {bad.size} constraint row{'s' if bad.size > 1 else ''} (allowed: {tol:.2g}):\n"
+        + "\n".join(lines)
+        + f"\nCorrect the bodies' {'poses' if level == 'position' else 'velocities'}, or call scene.assemble() to move "
+        "them to the nearest consistent ones."
+    )

@@ -1,0 +1,113 @@
+"""What PointForce and Torque share: three numbers, a function of time, or of time and state, in either frame."""
+
+import math
+
+from ..errors import InvalidForce
+from ..jit.kernels import specialised, stack
+from ..maths.euler_parameters import rotate
+from ..maths.recurrences import rotation
+from ..motions.signals import Signal
+from ..validation import one_of
+from .user_functions import ByState, fill_state
+
+function = None  # filled in by `GivenByState.wrap`
+FIRST = 0
+
+
+class Given:
+    """Mixed into forces of one vector, the attribute `given`, conjugate to their first marker."""
+
+    given = ""
+
+    def take(self, value, frame, hint):
+        """Take the vector over, and the frame that it is in; hint is how to write it, with its unit."""
+        self.frame = one_of(frame, ("ground", "body"), f"{self.name}: frame", InvalidForce)
+        if value is None:
+            raise InvalidForce(f"{self.name}: no {self.given} given; set {self.given}={hint}, or a function of time.")
+        setattr(self, self.given, value)
+        self.check()
+
+    def check(self):
+        """It must do something."""
+        self.demand_any(self.given)
+
+    def parameters(self):
+        """The vector."""
+        return Signal.places(getattr(self, self.given))
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """The vector as it is."""
+        for i in range(3):
+            out[i] = par[i] + 0.0 * x[i]
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """The vector at order zero."""
+        if k == 0:
+            for i in range(3):
+                out[i] = par[i]
+
+
+class GivenInBody:
+    """Mixed in before `Given`, with the markers' Parameters second: in axes of the body."""
+
+    slots = 13
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """A(p_a) times the vector."""
+        rotate(x[3:], par, out)
+        for i in range(4):
+            out[3 + i] = 0.0 * x[3 + i]
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of A(p) times the vector; rows of p, then of A."""
+        for i in range(4):
+            s[i, k] = x[3 + i]
+        rotation(s, 0, 4, k)
+        for i in range(3):
+            out[i] = s[4 + i, k] * par[0] + s[7 + i, k] * par[1] + s[10 + i, k] * par[2]
+
+
+class GivenByState(ByState):
+    """Mixed in before `Given`, with the markers Point, Parameters, Turn: a function of time and state.
+
+    `first` is where in out the vector goes: 0 for a force, 7 for a torque.
+    """
+
+    first = 0
+    series = None  # nothing is known of a function
+
+    def parameters(self):
+        """Whether the vector is in axes of the body."""
+        return (float(self.frame == "body"),)
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Of no function: what instances replace."""
+        for i in range(10):
+            out[i] = math.nan
+
+    @classmethod
+    def wrap(cls, inner, owner):
+        """The kernel of a user's function."""
+        return specialised(_law, f"{owner.__qualname__}.{cls.given}", owner, function=inner, FIRST=cls.first)
+
+
+def _law(x, xd, par, t, out):
+    state, given = stack(13), stack(3)
+    fill_state(x, xd, 0, state)
+    try:
+        value = function(t, state)
+        given[0], given[1], given[2] = value[0], value[1], value[2]
+    except Exception:
+        given[0], given[1], given[2] = math.nan, math.nan, math.nan
+    for i in range(10):
+        out[i] = 0.0
+    if par[0] == 0.0:
+        for i in range(3):
+            out[FIRST + i] = given[i]
+    else:
+        rotate(x[3:], given, out[FIRST:])

@@ -1,0 +1,188 @@
+"""Rigid bodies, point masses and the ground: what the user sets, checked when it is set."""
+
+import numpy as np
+
+from ..errors import InvalidBody
+from ..validation import demand_known, floats, positive, vector3
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+class Ground:
+    """The inertial frame, as a body that constraints attach to."""
+
+    dimension = 0
+    name = "ground"
+
+    def __init__(self, scene):
+        self.scene = scene
+
+    position = property(lambda self: np.zeros(3))
+    orientation = property(lambda self: IDENTITY.copy())
+
+    def __repr__(self):
+        return "<ground>"
+
+
+class _Attribute:
+    """A checked, read-only attribute of a body; setting it tells the scene that its packed numbers are out of date."""
+
+    def __init__(self, check, what):
+        self.check, self.__doc__ = check, what
+
+    def __set_name__(self, owner, name):
+        self.name = name
+
+    def __get__(self, body, owner=None):
+        return self if body is None else body.values[self.name]
+
+    def __set__(self, body, value):
+        value = self.check(value, body)
+        value.setflags(write=False)  # a change of one component would not reach the packed numbers
+        body.values[self.name] = value
+        body.scene.touch()
+
+
+def _mass(value, body):
+    return np.float64(positive(value, f"{body.name}: mass (kg)", InvalidBody))
+
+
+def _inertia(value, body):
+    given = floats(value)
+    if given.shape == (3,):
+        given = np.diag(given)
+    if given.shape != (3, 3) or not np.isfinite(given).all():
+        raise InvalidBody(
+            f"{body.name}: inertia must be 3 principal values or a symmetric 3 x 3 matrix, finite, kg m^2, "
+            f"got {value!r}."
+        )
+    scale = np.abs(given).max()
+    unit = given / (scale or 1.0)  # no square or sum of its entries overflows
+    skew = np.abs(unit - unit.T).max()
+    if skew > 1e-12:
+        raise InvalidBody(f"{body.name}: the inertia matrix is not symmetric; J - J^T is up to {skew * scale:.3g}.")
+    principal = np.linalg.eigvalsh(unit / 2.0 + unit.T / 2.0)
+    with np.errstate(over="ignore"):
+        moments = principal * scale
+    if principal[0] < -1e-12 or scale == 0.0:
+        raise InvalidBody(
+            f"{body.name}: the principal moments of inertia {moments} kg m^2 must not be negative, nor all "
+            "zero; a body without extent is scene.add_point_mass(...)."
+        )
+    if principal[2] > (principal[0] + principal[1]) * (1.0 + 1e-9):
+        raise InvalidBody(
+            f"{body.name}: no body has the principal moments {moments} kg m^2: the largest exceeds the sum "
+            "of the others (triangle inequality). Are products of inertia or units mixed up?"
+        )
+    return given / 2.0 + given.T / 2.0
+
+
+def _orientation(value, body):
+    if hasattr(value, "as_quat") and not isinstance(value, type):  # a SciPy Rotation has the scalar last
+        p = np.roll(value.as_quat(), 1, axis=-1)
+    else:
+        p = floats(value)
+    if p.shape != (4,) or not np.isfinite(p).all():
+        raise InvalidBody(
+            f"{body.name}: orientation must be four finite Euler parameters (e0, e1, e2, e3), scalar first, or one "
+            f"scipy Rotation, got {value!r}."
+        )
+    length = np.sqrt(p @ p)
+    if abs(length - 1.0) > 1e-6:
+        raise InvalidBody(
+            f"{body.name}: orientation {p} has length {length:.9g} and Euler parameters have 1; divide by it"
+            + (", or give a rotation: they are zero." if length == 0.0 else ".")
+        )
+    return p / length
+
+
+def _vector(what, unit):
+    return lambda value, body: vector3(value, f"{body.name}: {what} ({unit})", InvalidBody)
+
+
+class PointMass:
+    """A particle: three coordinates, no orientation. Made by `Scene.add_point_mass`."""
+
+    dimension = 3
+    mass = _Attribute(_mass, "Mass, kg.")
+    position = _Attribute(_vector("position", "m"), "Position at the start, ground frame, m, shape (3,).")
+    velocity = _Attribute(_vector("velocity", "m/s"), "Velocity at the start, ground frame, m/s, shape (3,).")
+
+    def __init__(self, scene, index, name, **values):
+        self.scene, self.index, self.name, self.values = scene, index, name, {}
+        for attribute, value in values.items():
+            setattr(self, attribute, value)
+
+    def __setattr__(self, name, value):
+        """Set an attribute that there is; a misspelt one is refused."""
+        demand_known(self, name, ("scene", "index", "name", "values"))
+        if name == "name" and "name" in self.__dict__:
+            self.scene._names = None
+        super().__setattr__(name, value)
+
+    @property
+    def orientation(self):
+        """A point mass has none."""
+        raise InvalidBody(f"{self.name}: a point mass has no orientation; use scene.add_body for a rigid body.")
+
+    @property
+    def q(self):
+        """Coordinates at the start, shape (3,) or (7,)."""
+        return self.values["position"]
+
+    @property
+    def qd(self):
+        """Velocities at the start."""
+        return self.values["velocity"]
+
+    def place(self, q, qd):
+        """Take over coordinates and velocities as the values at the start."""
+        self.position, self.velocity = q, qd
+
+    def __repr__(self):
+        return f"<{type(self).__name__} {self.name!r}>"
+
+
+class Body(PointMass):
+    """A rigid body: centroid r and Euler parameters p, seven coordinates. Made by `Scene.add_body`."""
+
+    dimension = 7
+    inertia = _Attribute(_inertia, "Inertia about the centroid, body frame, kg m^2, shape (3, 3).")
+    orientation = _Attribute(_orientation, "Euler parameters at the start, body to ground, scalar first, shape (4,).")
+    angular_velocity = _Attribute(
+        _vector("angular velocity", "rad/s"), "Angular velocity at the start, body frame, rad/s, shape (3,)."
+    )
+
+    @property
+    def q(self):
+        """Coordinates (r, p) at the start, shape (7,)."""
+        return np.concatenate((self.values["position"], self.values["orientation"]))
+
+    @property
+    def qd(self):
+        """Velocities (rd, pd), pd = G(p)^T omega' / 2, shape (7,)."""
+        p, w = self.values["orientation"], self.values["angular_velocity"]
+        return np.concatenate((self.values["velocity"], 0.5 * (transform_g(p).T @ w)))
+
+    def place(self, q, qd):
+        """Take over coordinates and velocities as the values at the start."""
+        self.position, self.velocity, self.orientation = q[:3], qd[:3], q[3:]
+        self.angular_velocity = 2.0 * (transform_g(q[3:]) @ qd[3:])
+
+
+def transform_g(p):
+    """G(p) = [-e, -e~ + e0 I], shape (3, 4), or (..., 3, 4) for p of shape (..., 4)."""
+    e0, e1, e2, e3 = np.moveaxis(np.asarray(p), -1, 0)
+    rows = [[-e1, e0, e3, -e2], [-e2, -e3, e0, e1], [-e3, e2, -e1, e0]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def rotation_matrix(p):
+    """A(p), homogeneous, shape (3, 3), or (..., 3, 3) for p of shape (..., 4)."""
+    e0, e1, e2, e3 = np.moveaxis(np.asarray(p), -1, 0)
+    rows = [
+        [e0 * e0 + e1 * e1 - e2 * e2 - e3 * e3, 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)],
+        [2 * (e1 * e2 + e0 * e3), e0 * e0 - e1 * e1 + e2 * e2 - e3 * e3, 2 * (e2 * e3 - e0 * e1)],
+        [2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), e0 * e0 - e1 * e1 - e2 * e2 + e3 * e3],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

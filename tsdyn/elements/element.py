@@ -1,0 +1,276 @@
+"""What constraints and forces share: two bodies, a name, markers, and attributes that are checked when they are set."""
+
+from functools import wraps
+from inspect import CO_VARKEYWORDS, signature, unwrap
+from types import MethodType
+
+import numpy as np
+from numba.core.errors import NumbaError
+
+from ..calls import Placing, complete_signature, fitting
+from ..errors import InvalidConstraint
+from ..jit.kernels import kernel
+from ..validation import demand_known, floats, label, number
+from .bodies import Ground, PointMass, rotation_matrix
+from .markers import PARAMETERS, POINT, TURN
+from .membership import note
+from .names import named
+
+
+def by_name(function):
+    """Wrap an `__init__`: a or b may be the name of a body in the scene of the other."""
+
+    @wraps(function)
+    def call(self, *arguments, **keywords):
+        arguments, keywords = _meant(self.error, arguments, keywords)
+        return function(self, *arguments, **keywords)
+
+    return call
+
+
+def _meant(error, arguments, keywords):
+    """The arguments of a call, with the bodies a and b that are given by name."""
+    bodies = [*arguments[:2], keywords.get("a"), keywords.get("b")]
+    if any(isinstance(body, str) for body in bodies):
+        for scene in (body.scene for body in bodies if isinstance(body, (PointMass, Ground))):
+            known = (scene.ground, *scene.bodies)
+            here = [named(known, body, "body", error) if isinstance(body, str) else body for body in bodies]
+            given = len(arguments[:2])
+            found = {key: body for key, body in zip("ab", here[-2:], strict=True) if key in keywords}
+            return (*here[:given], *arguments[2:]), {**keywords, **found}
+    return arguments, keywords
+
+
+class Attachment:
+    """Base of Primitive, Joint and Force: attached to one or two bodies of a scene by markers.
+
+    Attributes
+    ----------
+    a, b : Body or ground
+        The bodies; b is None where there are markers on a only. Where one is given by its handle, the name of the
+        other serves: Revolute(crank, "rod").
+    name : str
+        What error messages call it.
+    coordinates : tuple of ndarray (3,)
+        Where each marker is, body frame.
+    """
+
+    markers = ()
+    error = InvalidConstraint
+    particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
+    joint_coordinates = ()  # Angle and Displacement, see tsdyn/joint_coordinates.py
+    angle_near = 0.0  # on which turn its angles begin: set by `Scene.set`
+    added = False  # to its scene
+    named = False  # by its user
+    owner = None  # the joint that it is a part of
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        cls.__init__ = fitting(by_name(cls.__init__), then=note)
+        if unwrap(cls.__init__).__code__.co_flags & CO_VARKEYWORDS:
+            cls.__init__.__signature__ = complete_signature(cls)
+        if "__new__" in vars(cls):  # else the signature would be that of __new__
+            cls.__signature__ = signature(MethodType(cls.__init__, cls))
+
+    def __init__(self, a, b=None, coordinates=(), name=""):
+        """Attach it to its bodies; coordinates has an entry for each marker, in the body frame."""
+        self.a, self.b = a, b
+        kind = self._kind()
+        name = label(name, kind, self.error)
+        needed = {marker.body for marker in self.markers} | {"a"}
+        bodies = [body for body, letter in ((a, "a"), (b, "b")) if body is not None or letter in needed]
+        for body in bodies:
+            if not isinstance(body, (PointMass, Ground)):
+                raise self.error(
+                    f"{name or kind}: {body!r} is not a body; pass one that add_body returned, the ground, or the name "
+                    "of one beside the handle of the other."
+                )
+        self.named = bool(name)
+        self.name = name or self._untitled(bodies)
+        if all(body.dimension == 0 for body in bodies):
+            raise self.error(f"{self.name}: one of the bodies must not be the ground.")
+        if len(bodies) == 2 and a is b:
+            raise self.error(f"{self.name}: it joins {a.name!r} to itself; pass two different bodies.")
+        if len({id(body.scene) for body in bodies}) != 1:
+            raise self.error(f"{self.name}: {a.name!r} and {b.name!r} belong to different scenes.")
+        given = list(coordinates) or [None] * len(self.markers)
+        if len(given) != len(self.markers):
+            raise self.error(f"{self.name}: {len(self.markers)} markers, but {len(given)} coordinates.")
+        self.coordinates = tuple(self._places(given))
+        self.built = tuple(getattr(body, "values", {}).get("orientation") for body in (a, b))
+
+    def _untitled(self, bodies):
+        """The name of one that its user has given none."""
+        return f"{self._kind()}({', '.join(body.name for body in bodies)})"
+
+    @Placing
+    def at(cls, a, b=None, **arguments):
+        """Make one from points and directions in the ground frame, the bodies being where they stand now.
+
+        Parameters
+        ----------
+        a, b : Body or ground
+            As for the class itself.
+        **arguments
+            Those of the class, its points (m) and directions in the ground frame: `point_a=` is carried into the frame
+            of a, `point=` into those of both bodies, and so with every other pair. All else is passed on.
+        """
+        (a, b), _ = _meant(cls.error, (a, b), {})
+        given = {}
+        for name, value in arguments.items():
+            common = [marker for marker in cls.markers if marker.argument == f"{name}_{marker.body}"]
+            own = [marker for marker in cls.markers if marker.argument == name]
+            for marker in common or own:
+                if own or marker.argument not in arguments:
+                    given[marker.argument] = in_frame(a if marker.body == "a" else b, marker, value)
+            if not common and not own:
+                given[name] = value
+        alone = b is None and all(marker.body == "a" for marker in cls.markers)
+        return cls(*((a,) if alone else (a, b)), **given)
+
+    def _places(self, given):
+        """Where the markers are, (3,) each, in the order of `markers`."""
+        return [self._place(*pair) for pair in zip(self.markers, given, strict=True)]
+
+    @classmethod
+    def _kind(cls):
+        """The name of the class that users know: a private one is a variant of it."""
+        return next(c.__name__ for c in cls.__mro__ if issubclass(c, Attachment) and not c.__name__.startswith("_"))
+
+    def _place(self, marker, value):
+        body = self.body_of(marker)
+        if self.particles and body.dimension == 3 and marker.code in (PARAMETERS, TURN):
+            return np.zeros(3)
+        return marker.coordinates(body, value, self.name, self.error)
+
+    def __setattr__(self, name, value):
+        """Set an attribute, checked; the scene packs its numbers again.
+
+        A marker's argument (`point_a`, ...) may be set too. Once it is in its scene, a name that it does not have is
+        refused.
+        """
+        if self.owner is not None:
+            raise self.error(f"{self.name}: it follows from its joint; set {name} there.")
+        slots = [marker.argument for marker in self.markers]
+        if name in slots and "coordinates" in self.__dict__:
+            i = slots.index(name)
+            place = self._place(self.markers[i], value)
+            name, value = "coordinates", (*self.coordinates[:i], place, *self.coordinates[i + 1 :])
+        if not self.added:
+            super().__setattr__(name, value)
+            return
+        demand_known(self, name, (*self.__dict__, *slots))
+        if name == "name":
+            self.scene._titles = None
+        before = self.__dict__[name]
+        super().__setattr__(name, value)
+        try:
+            self.check()
+        except self.error:
+            super().__setattr__(name, before)
+            raise
+        self.scene.touch()
+
+    def __getattr__(self, name):
+        """The body-frame coordinates of a marker, by its argument."""
+        for marker, place in zip(self.markers, self.__dict__.get("coordinates", ()), strict=False):
+            if marker.argument == name:
+                return place
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    def check(self):
+        """Raise an error where an attribute has an impossible value; asked again when one is set."""
+
+    @property
+    def scene(self):
+        """The scene of its bodies."""
+        return self.a.scene
+
+    @property
+    def on(self):
+        """The body that its reaction is given on: a, or b where a is the ground."""
+        return self.a if self.a.dimension else self.b
+
+    @property
+    def title(self):
+        """What its rows are called by."""
+        return self.name
+
+    def body_of(self, marker):
+        """The body that a marker is on."""
+        return self.a if marker.body == "a" else self.b
+
+    def counted_from(self, t, *displacements):
+        """The angle, or angles, near which a run that begins at t counts turns: zero, or what `Scene.set` has set."""
+        return self.angle_near
+
+    def parameters(self):
+        """What the kernels get as `par`: floats, and functions of time."""
+        return ()
+
+    def __repr__(self):
+        return f"<{self._kind()} {self.name!r}>"
+
+
+def in_frame(body, marker, value):
+    """The body-frame coordinates of what a marker is in the ground frame now; what is no vector is left as it is."""
+    x = floats(value)
+    if x.shape != (3,) or not np.isfinite(x).all() or not isinstance(body, (PointMass, Ground)):
+        return value  # to be refused where it is placed
+    if marker.code == POINT:
+        x = x - body.position
+    return x if body.dimension != 7 else rotation_matrix(body.orientation).T @ x
+
+
+def layout(markers):
+    """Constants of the loops over all instances of a kind: where each marker is in x, and on which body."""
+    owners = [0 if m.body == "a" else 1 for m in markers]
+    sizes = [m.size for m in markers]
+    return {
+        "MARKERS": len(markers),
+        "CODES": tuple(m.code for m in markers),
+        "OWNERS": tuple(owners),
+        "STARTS": tuple(sum(sizes[:i]) for i in range(len(sizes))),
+        "FIRST": tuple(int(owner not in owners[:i]) for i, owner in enumerate(owners)),
+        "SIZE": sum(sizes),
+        "ROOM": sum(sizes) + 1,  # for a store of four floats at the last marker
+    }
+
+
+def check_slots(cls, where, error):
+    """Refuse a class whose `slots` is no number of rows."""
+    if isinstance(cls.slots, bool) or not isinstance(cls.slots, int) or cls.slots < 0:
+        raise error(f"{where}: slots must be the number of rows of scratch memory of series, 0 or more.")
+
+
+def inlined(function):
+    """A kernel of a function that may be one already."""
+    return function if hasattr(function, "py_func") else kernel(function)
+
+
+def address(kernels, name, what, error):
+    """The address of a kernel; `what` is whose it is, `error` what it raises where Numba can't compile it."""
+    try:
+        return kernels[name].address
+    except NumbaError as reason:
+        raise error(
+            f"{what}: Numba can't compile {name}; use plain arithmetic, NumPy functions of scalars and constants in "
+            f"it, and allocate nothing.\n{reason}"
+        ) from reason
+
+
+def checked_parameters(item, kind, kinds):
+    """What `item.parameters()` gives, as a tuple of finite numbers and instances of `kind`, `kinds` in messages."""
+    given = item.parameters()
+    if isinstance(given, (tuple, list)) and all(isinstance(p, kind) or np.isfinite(number(p)) for p in given):
+        return tuple(given)
+    raise item.error(f"{item.name}: parameters() must return a tuple of finite numbers and {kinds}, it gave {given!r}.")
+
+
+def static_kernel(cls, name, arguments, where, error):
+    """The static method that a class has as a kernel, or an error that says how to write it."""
+    function = getattr(cls, name, None)
+    code = getattr(getattr(function, "py_func", function), "__code__", None)
+    if code is None or code.co_argcount != arguments:
+        raise error(f"{where}: write {name} as a static method with {arguments} arguments.")
+    return function

@@ -1,0 +1,209 @@
+"""What a force is: a class whose kernel is compiled once and reached by address.
+
+A force works on marker coordinates x and their rates xd (ground frame) and never sees Euler parameters:
+
+    law(x, xd, par, t, out)        out[len(x)]  the force conjugate to x: its power is out . xd
+    potential(x, par, t)           optional; the potential energy, J
+    dissipation(x, xd, par, t)     optional; the power that dampers or friction take, W, >= 0
+    remember(x, xd, par, t)        optional, with memory = 1: what par[-1] is after each accepted step
+    series(x, xd, par, k, s, out)  optional; out[len(x)]  coefficient k of the law's Taylor series, see recurrences.py
+    normal_load(x, f, par)         optional, of friction: what par[-1] is, from a reaction f, see joint_friction.py
+
+x is the concatenation of the force's markers, par the floats that `parameters()` returns, functions of time among them
+evaluated at t. Conjugate to a Point is a force, to a Turn a torque, both in the ground frame. What does its work by a
+potential or takes it as dissipation says so; the rest of out . xd is applied power.
+
+`law` uses arithmetic and NumPy functions of scalars and is analytic in x and xd (no comparison, abs or norm), since
+complex steps of it are the Jacobians of implicit methods; write products instead of powers of x. Set analytic = False
+where that is impossible: then central differences do it. `potential` and `dissipation` are run by NumPy on arrays.
+`series` gets the coefficients k of x and xd, and fills column k of the scratch array s[slots, k].
+"""
+
+from types import MappingProxyType
+
+import numpy as np
+
+from ..errors import InvalidForce
+from ..jit.kernels import Callback, kernel, specialised
+from ..motions.signals import Signal
+from ..validation import number
+from .element import Attachment, check_slots, inlined, layout, static_kernel
+from .loops import constraint_series as series_loops
+from .loops import force_series
+from .loops import forces as loops
+from .loops import friction as friction_loops
+from .markers import PARAMETERS, TURN, Marker, Point
+from .primitive import SIGNATURE
+
+_registry = {}
+_KERNELS = {"law": 5}  # and their numbers of arguments
+_OPTIONAL = {"potential": 3, "dissipation": 4, "remember": 4, "series": 6, "normal_load": 3}
+
+
+class Force(Attachment):
+    """Base class of all forces.
+
+    Subclass it in one file of your own: set `markers`, write `law` as a static method, and pass the bodies and the
+    marker coordinates on in `__init__`. `tsdyn.testing.check_force` checks the result.
+
+    Attributes
+    ----------
+    markers : tuple of Point, Vector, Parameters, Turn
+        What x is made of, each on body "a" or "b".
+    memory : int
+        1 for a force that remembers a number from step to step: it is the last of par, and zero at first.
+    slots : int
+        Rows of scratch memory that `series` uses.
+    no_series : str
+        Why there is none.
+    analytic : bool
+        Whether `law` can be run on complex numbers.
+    particles : bool
+        Whether Parameters and Turn may be on a point mass, as (1, 0, 0, 0) and zero.
+    quantities : mapping
+        Attribute -> function (value, what, error) that checks a value that is set and returns it.
+    loads : tuple of str
+        The attributes whose work is applied power.
+    conservative : bool
+        Whether all but the loads' work is in potential and dissipation, however the bodies move.
+    a, b : Body or ground
+    name : str
+    """
+
+    error = InvalidForce
+    memory = 0
+    slots = 0
+    no_series = ""
+    analytic = True
+    quantities = MappingProxyType({})
+    loads = ()
+    conservative = True
+    own_kernels = MappingProxyType(
+        {}
+    )  # force, jacobian, remember -> Callback, compiled when a scene first uses the kind
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        where = f"force {cls.__name__}"
+        markers = cls.markers if isinstance(cls.markers, (tuple, list)) else ()
+        if not markers or not all(isinstance(m, Marker) for m in markers):
+            raise InvalidForce(f"{where}: markers must be a tuple of Point, Vector, Parameters or Turn.")
+        if cls.memory not in (0, 1) or (cls.memory == 1) != (getattr(cls, "remember", None) is not None):
+            raise InvalidForce(f"{where}: memory = 1 needs a kernel remember, and remember needs memory = 1.")
+        check_slots(cls, where, InvalidForce)
+        functions = {}
+        for name, arguments in {**_KERNELS, **_OPTIONAL}.items():
+            if name in _OPTIONAL and getattr(cls, name, None) is None:
+                continue
+            functions[name] = static_kernel(cls, name, arguments, where, InvalidForce)
+        try:
+            cls.own_kernels = callbacks(cls, functions)
+        except InvalidForce:
+            raise
+        except Exception as error:
+            raise InvalidForce(f"{where}: {error}") from error
+        if not cls.__name__.startswith("_"):
+            _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
+
+    def __init__(self, a, b=None, coordinates=(), name=""):
+        """Attach the force to its bodies; coordinates has an entry for each marker, in the body frame."""
+        if not self.markers:
+            raise InvalidForce("Force is the base of forces and has no law; use one of them, or a subclass.")
+        super().__init__(a, b, coordinates, name)
+
+    def __setattr__(self, name, value):
+        """Set an attribute, checked by `quantities`."""
+        if name in self.quantities:
+            value = self.quantities[name](value, f"{self.name}: {name}", self.error)
+        super().__setattr__(name, value)
+
+    @property
+    def kernels(self):
+        """The callbacks that run it; forces with the same ones are run together."""
+        return self.own_kernels
+
+    def demand_any(self, *names):
+        """Refuse a force all of whose attributes of these names are zero."""
+        if all(Signal.is_zero(getattr(self, name)) for name in names):
+            raise InvalidForce(f"{self.name}: it is zero at all times; set {' or '.join(names)}.")
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """Return a random valid instance between two bodies, for tests."""
+        places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code not in (PARAMETERS, TURN)}
+        return cls(a, b, **places) if any(m.body == "b" for m in cls.markers) else cls(a, **places)
+
+
+def not_negative(value, what, error):
+    """A finite float >= 0."""
+    result = number(value)
+    if not (np.isfinite(result) and result >= 0.0):
+        raise error(f"{what} must be a finite number that is not negative, got {value!r}.")
+    return result
+
+
+def positive_number(value, what, error):
+    """A finite float > 0."""
+    result = number(value)
+    if not (np.isfinite(result) and result > 0.0):
+        raise error(f"{what} must be a positive finite number, got {value!r}.")
+    return result
+
+
+def finite(value, what, error):
+    """A finite float."""
+    result = number(value)
+    if not np.isfinite(result):
+        raise error(f"{what} must be a finite number, got {value!r}.")
+    return result
+
+
+def load(value, what, error):
+    """A finite float, a function of time or a Table."""
+    return Signal.wrap(value, 1, what, error)
+
+
+def vector_load(value, what, error):
+    """Three finite floats, a function of time that returns three, or a Table."""
+    return Signal.wrap(value, 3, what, error)
+
+
+def registered():
+    """Return every force class known, built in or plugged in, by its full name."""
+    return MappingProxyType(_registry)
+
+
+def callbacks(cls, functions, owner=None):
+    """Make the callbacks of a kind, each runs over all its instances; `owner` says where they are cached.
+
+    With an owner, a function of a user's, the kernels may allocate and raise.
+    """
+    constants = layout(cls.markers)
+    make = (lambda f: kernel(f, allocates=True)) if owner else inlined
+    home = owner or getattr(functions["law"], "py_func", functions["law"])
+    label = f"{owner.__qualname__}.{cls.__name__}" if owner else cls.__qualname__
+    names = {**constants, "kernel_law": make(functions["law"])}
+    steps = loops.complex_steps if cls.analytic else loops.central_differences
+    names["kernel_derivatives"] = make(specialised(steps, f"{label}.derivatives", home, **names))
+    names["KEPT"] = loops.kept_size(cls.markers)
+    names["ALONG"] = 3 if [type(m) for m in cls.markers] == [Point, Point] else -1  # a frame along its two points
+    result = {}
+    for name, template, signature in (("force", loops.forces, SIGNATURE), ("jacobian", loops.jacobian, loops.JACOBIAN)):
+        copy = specialised(template, f"{label}.{name}_loop", home, **names)
+        result[name] = Callback(copy, signature, allocates=owner is not None)
+    if "remember" in functions:
+        home = getattr(functions["remember"], "py_func", functions["remember"])
+        names["kernel_remember"] = inlined(functions["remember"])
+        result["remember"] = Callback(specialised(loops.remembers, f"{label}.remember_loop", home, **names), SIGNATURE)
+    if "series" in functions:
+        home = getattr(functions["series"], "py_func", functions["series"])
+        names.update(kernel_series=inlined(functions["series"]), SLOTS=cls.slots)
+        copy = specialised(force_series.series, f"{label}.series_loop", home, **names)
+        result["series"] = Callback(copy, series_loops.SIGNATURE)
+    if "normal_load" in functions:
+        home = getattr(functions["normal_load"], "py_func", functions["normal_load"])
+        names["kernel_normal_load"] = inlined(functions["normal_load"])
+        for name in ("unit_friction", "normal_load"):
+            copy = specialised(getattr(friction_loops, name), f"{label}.{name}_loop", home, **names)
+            result[name] = Callback(copy, getattr(friction_loops, name.upper()))
+    return MappingProxyType(result)

@@ -1,0 +1,160 @@
+"""What a joint is: a constraint composed of others, which has no kernels and costs what its rows cost."""
+
+from collections import Counter
+from functools import cached_property
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InvalidConstraint
+from ..validation import counted
+from .element import Attachment
+from .markers import TURN, Marker
+from .membership import settle
+from .primitive import Primitive
+
+_registry = {}
+
+
+class Composition(NamedTuple):
+    """What a joint is made of."""
+
+    parts: tuple  # Primitives, in the order of their rows
+    labels: tuple  # of each row
+    aligned: tuple  # ((body, direction), (body, direction)) pairs that must not be opposed, body frames
+
+
+class Joint(Attachment):
+    """Base class of all constraints that are composed of others.
+
+    Subclass it in one file of your own: set `markers`, pass the bodies and the marker coordinates on in `__init__`, and
+    yield the parts in `compose`. `tsdyn.testing.check_primitive` checks the result.
+
+    Attributes
+    ----------
+    markers : tuple of Point, Vector
+        Where the joint is, each on body "a" or "b"; the first point on a body is what reactions on it are taken about.
+    a, b : Body or ground
+    name : str
+        What error messages call it.
+    """
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        if "compose" not in vars(cls):
+            return
+        where = f"joint {cls.__name__}"
+        if not isinstance(cls.markers, (tuple, list)) or not all(
+            isinstance(m, Marker) and m.code != TURN for m in cls.markers
+        ):
+            raise InvalidConstraint(f"{where}: markers must be a tuple of Point or Vector.")
+        _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
+
+    def compose(self):
+        """Yield (label, part), part a Primitive or another Joint on the same bodies, in the order of their rows.
+
+        The label is what a message calls the part's rows. Parts are new ones each time: `compose` is asked again when
+        an attribute has been set.
+        """
+        raise InvalidConstraint("Joint is the base of joints and has no parts; use one of them, or a subclass.")
+
+    def aligned(self):
+        """Return the pairs of directions (of a, of b; body frames) that the rows make parallel and never opposed.
+
+        A row knows no sign, so it holds after half a turn, too: a start there is refused. What the parts say counts
+        anyway.
+        """
+        return ()
+
+    def __setattr__(self, name, value):
+        """Set an attribute, checked; the parts follow."""
+        super().__setattr__(name, value)
+        self.__dict__.pop("_composition", None)
+
+    @cached_property
+    def _composition(self):
+        self.check()
+        parts, labels, aligned = [], [], [((self.a, u), (self.b, v)) for u, v in self.aligned()]
+        for pair in self.compose():
+            label, part = pair if isinstance(pair, tuple) and len(pair) == 2 else (None, None)
+            self._demand_fit(part, pair)
+            settle(part)
+            aligned += getattr(part, "opposed", ())
+            parts += part.parts
+            labels += [str(label)] * part.rows
+        total, seen = Counter(labels), Counter()
+        for i, label in enumerate(labels):
+            labels[i] = f" {label}" if total[label] == 1 else f" {label}[{seen[label]}]"
+            seen[label] += 1
+        row = 0
+        for part in parts:
+            label = labels[row] if part.rows == 1 else labels[row].partition("[")[0]
+            part.__dict__.update(owner=self, name=f"{self.title}{label}")
+            row += part.rows
+        return Composition(tuple(parts), tuple(labels), tuple(aligned))
+
+    def _demand_fit(self, part, given):
+        """Refuse what is no part of this joint."""
+        if not isinstance(part, (Primitive, Joint)):
+            raise InvalidConstraint(
+                f"{self.title}: compose() must yield (label, part), part a constraint; it gave {given!r}."
+            )
+        if getattr(part, "normalises", False) or part.added or part.owner is not None:
+            raise InvalidConstraint(
+                f"{self.title}: {part.name} can't be a part of it; compose() makes new constraints each time, and no "
+                "EulerNormalization."
+            )
+        if not {id(part.a), id(part.b)} <= {id(self.a), id(self.b), id(None)}:
+            raise InvalidConstraint(f"{self.title}: {part.name} is a part of it and must be on its own two bodies.")
+
+    @property
+    def parts(self):
+        """The primitives that it is made of, in the order of their rows."""
+        return self._composition.parts
+
+    @property
+    def rows(self):
+        """Number of scalar constraints."""
+        return len(self._composition.labels)
+
+    @property
+    def row_labels(self):
+        """What follows its title in the names of its rows."""
+        return self._composition.labels
+
+    @property
+    def opposed(self):
+        """((body, direction), (body, direction)) pairs that must not be opposed, its parts' included."""
+        return self._composition.aligned
+
+    @property
+    def title(self):
+        """Its kind and name."""
+        kind = self._kind()
+        return self.name if self.name.startswith(kind) else f"{kind} {self.name!r}"
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """Return a random instance between two bodies, for tests; it need not hold where they are."""
+        places = {m.argument: rng.normal(size=3) for m in cls.markers}
+        return cls(a, b, **places)
+
+    def __repr__(self):
+        return f"<{self.title}: {counted(self.rows, 'row')}>"
+
+
+def registered():
+    """Return every joint class known, built in or plugged in, by its full name."""
+    return MappingProxyType(_registry)
+
+
+def across(axis):
+    """f, g (3,): with a direction they make a right-handed orthonormal frame f, g, axis.
+
+    f is across the coordinate axis that is furthest from the direction, so nothing is lost to rounding.
+    """
+    axis = np.asarray(axis) / np.linalg.norm(axis)
+    f = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
+    f /= np.linalg.norm(f)
+    return f, np.cross(axis, f)

@@ -1,0 +1,160 @@
+"""Friction of a constraint from its own reaction: what the laws of joints and contacts share.
+
+    friction on a   = par[-1] times what `law` gives for a normal load of one
+    par[-1]         = normal_load(x, f, par), f (6,) the force and torque that the constraint exerts
+
+The normal load depends on multipliers, and those on the friction: the solver finds both together (friction_solve.py).
+"""
+
+from types import MappingProxyType
+
+import numpy as np
+
+from ..calls import fitting, unknown_argument
+from ..errors import InvalidForce
+from ..validation import label, number
+from .force import not_negative, positive_number
+from .markers import TURN, Point, Turn, Vector
+
+AXIS = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("a"))
+
+
+class JointFriction:
+    """Mixed in before `Force`: friction that follows from the reaction of a constraint.
+
+    Set `joints` and `markers` (Point a, Turn a, Point b, Turn b, then what the law needs, all of them arguments of the
+    constraint), write `law`, linear in par[-1], and `normal_load`, in one file of your own.
+
+    Parameters
+    ----------
+    joint : constraint
+        It must have been added to its scene; where it is follows from it.
+    kinetic : float
+        Coefficient of friction while sliding.
+    static : float, optional
+        That near rest, at least the kinetic one, which it is by default.
+    slip_velocity : float, m/s
+        Regularisation: at this velocity the friction is 71% of its size. What should stick creeps, slower than this.
+    stribeck_velocity : float, m/s, optional
+        At this velocity what the static coefficient is above the kinetic one has fallen to 37%; by default ten times
+        slip_velocity.
+    preload : float, N
+        Normal load besides that of the reaction.
+    name : str, optional
+
+    Attributes
+    ----------
+    joints : tuple of classes
+        The constraints whose friction it can be.
+    """
+
+    joints = ()
+    markers = ()
+    particles = True
+    no_series = "its size follows from a reaction, and its direction turns round too sharply for a series"
+    quantities = MappingProxyType(
+        {
+            "kinetic": not_negative,
+            "static": lambda value, *where: None if value is None else not_negative(value, *where),
+            "slip_velocity": positive_number,
+            "stribeck_velocity": lambda value, *where: None if value is None else positive_number(value, *where),
+            "preload": not_negative,
+        }
+    )
+
+    @fitting
+    def __init__(
+        self,
+        joint,
+        *,
+        kinetic,
+        static=None,
+        slip_velocity=1e-3,
+        stribeck_velocity=None,
+        preload=0.0,
+        name="",
+        **geometry,
+    ):
+        kind = self._kind()
+        name = label(name, kind, InvalidForce)
+        if not isinstance(joint, self.joints):
+            names = " or ".join(cls.__name__ for cls in self.joints)
+            raise InvalidForce(f"{name or kind}: joint must be a {names} of the scene, got {joint!r}.")
+        for unknown in geometry.keys() - self.quantities.keys():
+            raise unknown_argument(kind, unknown, [*self.quantities, "name"])
+        self.__dict__["joint"] = joint
+        super().__init__(joint.a, joint.b, self.coordinates, name)
+        self.kinetic, self.static, self.preload = kinetic, static, preload
+        self.slip_velocity, self.stribeck_velocity = slip_velocity, stribeck_velocity
+        for key, value in geometry.items():
+            setattr(self, key, value)
+        self.check()
+
+    def _untitled(self, bodies):
+        return f"{self._kind()}({self.joint.name})"
+
+    @property
+    def coordinates(self):
+        """Where the markers are, (3,) each: where the joint's are."""
+        return tuple(
+            np.zeros(3) if marker.code == TURN else getattr(self.joint, marker.argument) for marker in self.markers
+        )
+
+    def __setattr__(self, name, value):
+        """Set an attribute, checked; where it acts is the joint's."""
+        if name == "coordinates":
+            return
+        if name == "joint" or name in [marker.argument for marker in self.markers if marker.code != TURN]:
+            raise self.error(f"{self.name}: {name} is that of its joint {self.joint.name!r}; set it there.")
+        super().__setattr__(name, value)
+
+    def check(self):
+        """It must do something, and be no smaller at rest than sliding."""
+        if not self.joint.added:
+            raise self.error(f"{self.name}: add its joint {self.joint.name!r} to the scene first.")
+        if self.__dict__.get("static") is not None and self.static < self.kinetic:
+            raise self.error(
+                f"{self.name}: static must be at least kinetic = {self.kinetic:g}, got {self.static:g}; leave it out "
+                "where they are the same."
+            )
+        if self.kinetic == 0.0 and not self.static:
+            raise self.error(f"{self.name}: it is zero at all times; set kinetic.")
+
+    def parameters(self):
+        """(mu, mu_s, v_s, v_0, preload), then the geometry."""
+        static = self.kinetic if self.static is None else self.static
+        stribeck = 10.0 * self.slip_velocity if self.stribeck_velocity is None else self.stribeck_velocity
+        return self.kinetic, static, stribeck, self.slip_velocity, self.preload, *self.geometry()
+
+    def geometry(self):
+        """What `law` and `normal_load` need besides, floats."""
+        return ()
+
+    def __getattr__(self, name):
+        """The body-frame coordinates of a marker, by its argument: those of the joint."""
+        if name in [marker.argument for marker in self.markers] and "joint" in self.__dict__:
+            return getattr(self.joint, name)
+        return super().__getattr__(name)
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A random one, on a joint that is added to the scene, regularised over the velocities of a test."""
+        kind = cls.joints[0]
+        places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code != TURN}
+        places |= {m.argument: rng.normal(size=3) for m in kind.markers if m.argument.startswith("axis")}
+        joint = a.scene.add(kind(a, b, **places))
+        (mu, more), (v0, vs) = rng.uniform(0.5, 1.0, 2), rng.uniform(4.0, 6.0, 2)
+        return cls(joint, kinetic=mu, static=mu + more, slip_velocity=v0, stribeck_velocity=vs, **cls.sizes(rng))
+
+    @classmethod
+    def sizes(cls, rng):
+        """Random arguments of the geometry, for tests."""
+        return {}
+
+
+def optional_length(value, what, error):
+    """A positive finite float, m, or None."""
+    result = None if value is None else number(value)
+    if result is not None and not (np.isfinite(result) and result > 0.0):
+        raise error(f"{what} must be a positive finite number, or None, got {value!r}.")
+    return result

@@ -1,0 +1,196 @@
+"""Poses: what the basis-free forms know of each body, one row of floats, and the markers on it in those terms.
+
+    A      12   the columns of A(p), four floats each, the fourth 0
+    r       4   centroid
+    rd      4
+    omega   4   omega', body frame
+    p       4   Euler parameters
+
+The ground is the last row, A = I and all else 0, so no kernel asks which body is the ground. A point mass never turns,
+nor does a rigid body whose length in the network is STILL: where bodies are placed, its orientation is taken as it is.
+"""
+
+from ...jit.kernels import kernel
+from ...jit.simd import add, cross, fma, four, lanes, put, splat, times
+from ..markers import PARAMETERS, POINT
+
+A, R, RD, OMEGA, P, POSE = 0, 12, 16, 20, 24, 28
+STILL = 4  # in place of a body's length, 7 or 3: a rigid body that never turns
+
+
+@kernel
+def set_pose(poses, at, p):
+    """A(p) and p of the pose that begins at poses[at]; p (4,)."""
+    orient(poses, at, p[0], p[1], p[2], p[3])
+
+
+@kernel
+def orient(poses, at, e0, e1, e2, e3):
+    """The same of p = (e0, e1, e2, e3)."""
+    a = e0 * e0 - e1 * e1 - e2 * e2 - e3 * e3
+    e, twice = lanes(e1, e2, e3), 2.0 * e0
+    put(poses, at, fma(e, splat(2.0 * e1), lanes(a, twice * e3, -twice * e2)))
+    put(poses, at + 4, fma(e, splat(2.0 * e2), lanes(-twice * e3, a, twice * e1)))
+    put(poses, at + 8, fma(e, splat(2.0 * e3), lanes(twice * e2, -twice * e1, a)))
+    poses[at + P], poses[at + P + 1], poses[at + P + 2], poses[at + P + 3] = e0, e1, e2, e3
+
+
+@kernel
+def add_torque(p, at, Q, i, out, o):
+    """out[o : o + 3] += G(p) Q_p / 2, the body torque; p is p[at : at + 4], Q_p is Q[i : i + 4]."""
+    e0, e1, e2, e3 = 0.5 * p[at], 0.5 * p[at + 1], 0.5 * p[at + 2], 0.5 * p[at + 3]
+    q0, q1, q2, q3 = Q[i], Q[i + 1], Q[i + 2], Q[i + 3]
+    out[o] += -e1 * q0 + e0 * q1 + e3 * q2 - e2 * q3
+    out[o + 1] += -e2 * q0 - e3 * q1 + e0 * q2 + e1 * q3
+    out[o + 2] += -e3 * q0 + e2 * q1 - e1 * q2 + e0 * q3
+
+
+@kernel
+def take_loads(bodies, q, r, Z):
+    """Z = generalised forces r (n,) as forces and body torques."""
+    for b in range(bodies.shape[0]):
+        i, o = bodies[b, 0], 8 * b
+        put(Z, o, lanes(r[i], r[i + 1], r[i + 2]))
+        put(Z, o + 4, splat(0.0))
+        if bodies[b, 1] == 7:
+            add_torque(q, i + 3, r, i + 3, Z, o + 4)
+
+
+@kernel
+def place_bodies(bodies, q, poses):
+    """The poses at q (n,)."""
+    for b in range(bodies.shape[0]):
+        at, i = b * POSE, bodies[b, 0]
+        put(poses, at + R, lanes(q[i], q[i + 1], q[i + 2]))
+        if bodies[b, 1] == 7 or bodies[b, 1] == STILL:
+            set_pose(poses, at, q[i + 3 : i + 7])
+        if bodies[b, 1] == STILL:
+            put(poses, at + OMEGA, splat(0.0))
+
+
+@kernel
+def move_bodies(bodies, q, qd, poses):
+    """rd and omega' = 2 G(p) pd of the poses."""
+    for b in range(bodies.shape[0]):
+        at, i = b * POSE, bodies[b, 0]
+        put(poses, at + RD, lanes(qd[i], qd[i + 1], qd[i + 2]))
+        if bodies[b, 1] == 7:
+            e0, e1, e2, e3 = 2.0 * q[i + 3], 2.0 * q[i + 4], 2.0 * q[i + 5], 2.0 * q[i + 6]
+            d0, d1, d2, d3 = qd[i + 3], qd[i + 4], qd[i + 5], qd[i + 6]
+            x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3
+            y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
+            z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
+            put(poses, at + OMEGA, lanes(x, y, z))
+
+
+@kernel
+def write_positions(bodies, poses, q):
+    """q (n,) of the poses."""
+    for b in range(bodies.shape[0]):
+        at, i = b * POSE, bodies[b, 0]
+        for c in range(3):
+            q[i + c] = poses[at + R + c]
+        if bodies[b, 1] == 7:
+            for c in range(4):
+                q[i + 3 + c] = poses[at + P + c]
+
+
+@kernel
+def write_velocities(bodies, poses, qd):
+    """qd (n,) of the poses: rd, and pd = G^T omega' / 2."""
+    for b in range(bodies.shape[0]):
+        at, i = b * POSE, bodies[b, 0]
+        for c in range(3):
+            qd[i + c] = poses[at + RD + c]
+        if bodies[b, 1] == 7:
+            x, y, z = poses[at + OMEGA], poses[at + OMEGA + 1], poses[at + OMEGA + 2]
+            _turn(poses, at, 0.5 * x, 0.5 * y, 0.5 * z, qd, i + 3)
+
+
+@kernel
+def write_accelerations(bodies, poses, accelerations, qdd):
+    """qdd (n,) of accelerations (b, 8): r'', and pdd = G^T omega'' / 2 - |omega'|^2 p / 4."""
+    for b in range(bodies.shape[0]):
+        at, i, k = b * POSE, bodies[b, 0], 8 * b
+        for c in range(3):
+            qdd[i + c] = accelerations[k + c]
+        if bodies[b, 1] == 7:
+            x, y, z = accelerations[k + 4], accelerations[k + 5], accelerations[k + 6]
+            _turn(poses, at, 0.5 * x, 0.5 * y, 0.5 * z, qdd, i + 3)
+            x, y, z = poses[at + OMEGA], poses[at + OMEGA + 1], poses[at + OMEGA + 2]
+            f = 0.25 * (x * x + y * y + z * z)
+            for c in range(4):
+                qdd[i + 3 + c] -= f * poses[at + P + c]
+
+
+@kernel
+def _turn(poses, at, x, y, z, out, i):
+    """out[i : i + 4] = G(p)^T (x, y, z)."""
+    e0, e1, e2, e3 = poses[at + P], poses[at + P + 1], poses[at + P + 2], poses[at + P + 3]
+    out[i] = -e1 * x - e2 * y - e3 * z
+    out[i + 1] = e0 * x - e3 * y + e2 * z
+    out[i + 2] = e3 * x + e0 * y - e1 * z
+    out[i + 3] = -e2 * x + e1 * y + e0 * z
+
+
+@kernel
+def turned(poses, at, s0, s1, s2):
+    """A s."""
+    f = times(four(poses, at), splat(s0))
+    return fma(four(poses, at + 8), splat(s2), fma(four(poses, at + 4), splat(s1), f))
+
+
+@kernel
+def marker_position(code, poses, at, s, x, i):
+    """x[i : i + 3] of a marker (of Parameters 4), and whatever is after it."""
+    if code == PARAMETERS:
+        put(x, i, four(poses, at + P))
+        return
+    f = turned(poses, at, s[0], s[1], s[2])
+    if code == POINT:
+        f = add(f, four(poses, at + R))
+    put(x, i, f)
+
+
+@kernel
+def marker_motion(code, poses, at, s, x, xd, xdd, i):
+    """x, xd, and xdd at r'' = omega'' = 0, of a marker."""
+    if code == PARAMETERS:
+        p, w = poses[at + P : at + P + 4], poses[at + OMEGA : at + OMEGA + 3]
+        square = -0.25 * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+        for c in range(4):
+            x[i + c], xdd[i + c] = p[c], square * p[c]
+        _turn(poses, at, 0.5 * w[0], 0.5 * w[1], 0.5 * w[2], xd, i)
+        return
+    b = turned(poses, at, s[0], s[1], s[2])
+    w0, w1, w2 = poses[at + OMEGA], poses[at + OMEGA + 1], poses[at + OMEGA + 2]
+    w = turned(poses, at, w0, w1, w2)
+    bd = cross(w, b)
+    put(xdd, i, cross(w, bd))
+    if code == POINT:
+        b, bd = add(b, four(poses, at + R)), add(bd, four(poses, at + RD))
+    put(x, i, b)
+    put(xd, i, bd)
+
+
+@kernel
+def add_gradient(code, poses, at, s, f, i, H, h):
+    """H[h : h + 8] += f x_(r, pi') of a marker, f = f[i : i + 3] (of Parameters 4); a force, then a body torque."""
+    if code == PARAMETERS:
+        e0, e1, e2, e3 = 0.5 * poses[at + P], 0.5 * poses[at + P + 1], 0.5 * poses[at + P + 2], 0.5 * poses[at + P + 3]
+        f0, f1, f2, f3 = f[i], f[i + 1], f[i + 2], f[i + 3]
+        H[h + 4] += -e1 * f0 + e0 * f1 + e3 * f2 - e2 * f3
+        H[h + 5] += -e2 * f0 - e3 * f1 + e0 * f2 + e1 * f3
+        H[h + 6] += -e3 * f0 + e2 * f1 - e1 * f2 + e0 * f3
+        return
+    f0, f1, f2 = f[i], f[i + 1], f[i + 2]
+    if code == POINT:
+        H[h] += f0
+        H[h + 1] += f1
+        H[h + 2] += f2
+    y0 = poses[at] * f0 + poses[at + 1] * f1 + poses[at + 2] * f2  # A^T f
+    y1 = poses[at + 4] * f0 + poses[at + 5] * f1 + poses[at + 6] * f2
+    y2 = poses[at + 8] * f0 + poses[at + 9] * f1 + poses[at + 10] * f2
+    H[h + 4] += s[1] * y2 - s[2] * y1
+    H[h + 5] += s[2] * y0 - s[0] * y2
+    H[h + 6] += s[0] * y1 - s[1] * y0

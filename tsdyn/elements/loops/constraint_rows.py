@@ -1,0 +1,79 @@
+"""The loops over all constraints of a kind in terms of poses: rows of [Phi_r, Phi_pi'], 2 x 8 floats, instead of Phi_q.
+
+A virtual displacement of a body is (dr, dpi'), dpi' = 2 G dp in the body frame, so six numbers do and no normalisation
+is needed; a row of H holds those of body a, then those of body b, each as (force, 0, body torque, 0).
+"""
+
+from ...jit.kernels import ANY, caller, integers, stack, stack2, vector
+from .body_poses import POSE, add_gradient, marker_motion, marker_position
+
+SIGNATURE = "iippppdpp"  # count, reals per instance, table, reals, poses, unused, t, out, H
+call_body_loop = caller(SIGNATURE)
+# what Network.table holds for each instance: places of its two bodies among the poses, its first row, a mask of markers
+BODY, ROW, MASK, INTS = 0, 2, 3, 4
+
+# The names in capitals and kernel_* are filled in by primitive._compile.
+ROWS = MARKERS = SIZE = ROOM = 1
+CODES = OWNERS = STARTS = (0,)
+kernel_phi = kernel_value = kernel_jacobian = kernel_gamma = None
+
+
+def values(count, stride, table, reals, poses, unused, t, out, H):
+    """out = Phi, or Phi_t."""
+    table, reals, poses, out = integers(table, ANY), vector(reals, ANY), vector(poses, ANY), vector(out, ANY)
+    x, f = stack(ROOM), stack(ROWS)
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        for j in range(MARKERS):
+            marker_position(CODES[j], poses, own[OWNERS[j]] * POSE, real[3 * j : 3 * j + 3], x, STARTS[j])
+        kernel_value(x, real[3 * MARKERS :], t, f)
+        for r in range(ROWS):
+            out[own[ROW] + r] = f[r]
+    return 0
+
+
+def reduced(count, stride, table, reals, poses, unused, t, out, H):
+    """out = Phi, and H = [Phi_r, Phi_pi'] of bodies a and b."""
+    table, reals, poses, out = integers(table, ANY), vector(reals, ANY), vector(poses, ANY), vector(out, ANY)
+    H = vector(H, ANY)
+    x, f, g = stack(ROOM), stack(ROWS), stack2(ROWS, SIZE)
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        for j in range(MARKERS):
+            marker_position(CODES[j], poses, own[OWNERS[j]] * POSE, real[3 * j : 3 * j + 3], x, STARTS[j])
+        kernel_phi(x, real[3 * MARKERS :], t, f)
+        for r in range(ROWS):
+            for c in range(SIZE):
+                g[r, c] = 0.0
+        kernel_jacobian(x, real[3 * MARKERS :], t, g)
+        for r in range(ROWS):
+            out[own[ROW] + r] = f[r]
+            h = 16 * (own[ROW] + r)
+            for c in range(16):
+                H[h + c] = 0.0
+            for j in range(MARKERS):
+                k, s = OWNERS[j], real[3 * j : 3 * j + 3]
+                add_gradient(CODES[j], poses, own[k] * POSE, s, g[r], STARTS[j], H, h + 8 * k)
+    return 0
+
+
+def bias(count, stride, table, reals, poses, unused, t, out, H):
+    """out: what (Phi_r, Phi_pi') (r'', omega'') + out = 0 has on its left, Eq. 3 in these terms."""
+    table, reals, poses, out = integers(table, ANY), vector(reals, ANY), vector(poses, ANY), vector(out, ANY)
+    x, xd, xdd = stack(ROOM), stack(ROOM), stack(ROOM)
+    f, g = stack2(ROWS, SIZE), stack(ROWS)
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        for j in range(MARKERS):
+            marker_motion(CODES[j], poses, own[OWNERS[j]] * POSE, real[3 * j : 3 * j + 3], x, xd, xdd, STARTS[j])
+        for r in range(ROWS):
+            for c in range(SIZE):
+                f[r, c] = 0.0
+        kernel_jacobian(x, real[3 * MARKERS :], t, f)
+        kernel_gamma(x, xd, real[3 * MARKERS :], t, g)
+        for r in range(ROWS):
+            total = g[r]
+            for c in range(SIZE):
+                total += f[r, c] * xdd[c]
+            out[own[ROW] + r] = total
+    return 0

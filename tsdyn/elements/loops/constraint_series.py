@@ -1,0 +1,179 @@
+"""Taylor series of constraints: one loop a kind, over all its instances, order by order.
+
+A primitive says how its Jacobian's series follows from that of x; the rest is the same for all:
+
+    x_k             = r_k + A_k s                        markers
+    (Phi_x)_k       by the primitive's kernel `series`
+    k Phi_k         = sum_j j (Phi_x)_{k-j} x_j          d/dt Phi = Phi_x xd                         (1)
+    f_k             = - sum_j (Phi_x)_j^T lam_{k-j}      force on a marker                           (2)
+    T_k             = s x sum_j A_j^T f_{k-j}            its torque about the centroid, body frame   (3)
+
+A series lies in memory order by order. That of a body is A (its columns, 4 floats each), omega', r, J' omega' (4 each).
+An instance begins with order zero of x (4 a marker) and Phi_x (4 a row and marker); then come the series f (4 a
+marker), lam (1 a row), x and Phi_x, and its own scratch. A marker whose columns of Phi_x are constant, as all of
+Spherical's, takes no part in (1) beyond order zero, nor in (2); that of the ground has no force. Where no instance of a
+kind has others, they end with f.
+
+What is prescribed (a length that is a motion) adds its own part to (1): the coefficients of Phi_t, by the kernel
+`series_t`. The motions' own series are the last rows of the scratch, written there when a step begins.
+"""
+
+from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, stack, stack2, vector
+from ...jit.simd import add, cross, fetch, fma, four, lanes, put, splat, times, total
+from ..markers import POINT
+from .body_poses import turned
+from .constraint_rows import INTS, MASK, ROW
+
+# where the parts of a body's series begin, times the number of orders; floats of an order of all of them
+S_OMEGA, S_R, S_SPIN, BODY_ROW = 12, 16, 20, 24
+# mode, k, orders, count, reals and floats per instance, table, reals, bodies, series, b, Z
+SIGNATURE = "iiiiiipppppp"
+call_series = caller(SIGNATURE)
+ADVANCE, RESIDUAL = range(2)
+# bits of the mask: from 0 on the markers whose columns vary, from 16 on those that are on the ground, from 32 on those
+# whose body has no use for a torque
+GROUND, UNTURNED = 16, 32
+
+
+def instance_width(markers, rows, slots, orders, varies, driven=False):
+    """Floats of an instance; whether any column of Phi_x of the kind varies, or it has scratch memory."""
+    if not (varies or slots or driven):
+        return scratch_at(markers, rows, orders, False)
+    room = slots * orders + (rows if driven else 0)
+    return scratch_at(markers, rows, orders, True) + 4 * ((room + 3) // 4)
+
+
+def scratch_at(markers, rows, orders, varies):
+    """Where the scratch of an instance begins."""
+    width = 4 * markers * (1 + rows) + 4 * markers * orders
+    return width + (4 * ((rows * orders + 3) // 4) + 4 * (markers + markers * rows) * orders if varies else 0)
+
+
+@kernel
+def torque(bodies, at, k, forces, first):
+    """sum_j A_j^T f_{k-j}; A_0 is at bodies[at], f_0 at forces[first]."""
+    x, y, z = splat(0.0), splat(0.0), splat(0.0)
+    u, v, w = splat(0.0), splat(0.0), splat(0.0)
+    c, f = at, first + 4 * k
+    for _ in range((k + 1) // 2):  # two at a time, on accumulators of their own: each waits for its last sum
+        g, h = four(forces, f), four(forces, f - 4)
+        x, u = fma(four(bodies, c), g, x), fma(four(bodies, c + 12), h, u)
+        y, v = fma(four(bodies, c + 4), g, y), fma(four(bodies, c + 16), h, v)
+        z, w = fma(four(bodies, c + 8), g, z), fma(four(bodies, c + 20), h, w)
+        c += 24
+        f -= 8
+    if k % 2 == 0:
+        g = four(forces, first)
+        x = fma(four(bodies, c), g, x)
+        y = fma(four(bodies, c + 4), g, y)
+        z = fma(four(bodies, c + 8), g, z)
+    return lanes(total(add(x, u)), total(add(y, v)), total(add(z, w)))
+
+
+# The names in capitals and kernel_series are filled in by primitive._compile.
+ROWS = MARKERS = SIZE = ROOM = SLOTS = 1
+AHEAD = False  # whether each instance has the next one's numbers brought into the cache
+DRIVEN = False  # whether it depends on time
+CODES = OWNERS = STARTS = (0,)
+kernel_series = kernel_series_t = None
+
+
+def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b, Z):
+    """ADVANCE: lam_{k-1} from b, x_{k+1}, (Phi_x)_{k+1}, and f_k, but for lam_k, onto the bodies' Z.
+
+    RESIDUAL: b = (k + 1)(k + 2) Phi_{k+2} as the bodies' series have it.
+    """
+    table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
+    values, b, Z = vector(values, ANY), vector(b, ANY), vector(Z, ANY)
+    x, f, g = stack(ROOM), stack2(ROWS, SIZE), stack(ROWS)
+    wide, body_size = 4 * orders, BODY_ROW * orders
+    F = 4 * MARKERS * (1 + ROWS)
+    L = F + MARKERS * wide
+    X = L + 4 * ((ROWS * orders + 3) // 4)
+    J, own_scratch = X + MARKERS * wide, X + MARKERS * (1 + ROWS) * wide
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        first, mask = i * size, own[MASK]
+        if AHEAD and i + 1 < count:
+            fetch(values, first + size, F)
+            for j in range(MARKERS):
+                body = table[(i + 1) * INTS + OWNERS[j]] * body_size
+                if mode == ADVANCE:
+                    fetch(bodies, body, 12 * (k + 1))
+                    fetch(values, first + size + F + j * wide, 4 * (k + 1))
+                else:
+                    fetch(bodies, body + 12 * (k + 2), 12)
+                    fetch(bodies, body + S_R * orders + 4 * (k + 2), 4)
+        varies = mask & ((1 << GROUND) - 1) != 0
+        if mode == ADVANCE:
+            for r in range(ROWS if k > 0 and varies else 0):
+                values[first + L + r * orders + k - 1] = b[own[ROW] + r]
+            for now in range(0 if k == 0 else k + 1, k + 2 if varies or DRIVEN else 1):
+                places, gradients, step = first, first + 4 * MARKERS, 4
+                if now > 0:
+                    places, gradients, step = first + X + 4 * now, first + J + 4 * now, wide
+                for j in range(MARKERS):
+                    body, s = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3]
+                    place = turned(bodies, body + 12 * now, s[0], s[1], s[2])
+                    if CODES[j] == POINT:
+                        place = add(place, four(bodies, body + S_R * orders + 4 * now))
+                    put(values, places + j * step, place)
+                    put(x, STARTS[j], place)
+                for r in range(ROWS):
+                    for c in range(SIZE):
+                        f[r, c] = 0.0
+                scratch = matrix(data_of(values[first + own_scratch :]), SLOTS, orders)
+                kernel_series(x, real[3 * MARKERS :], now, scratch, f)
+                if DRIVEN:
+                    kernel_series_t(x, real[3 * MARKERS :], now, scratch, g)
+                    for r in range(ROWS):
+                        values[first + own_scratch + SLOTS * orders + r] = g[r]
+                for j in range(MARKERS):
+                    if now == 0 or mask >> j & 1:
+                        for r in range(ROWS):
+                            c, at = STARTS[j], gradients + (r * MARKERS + j) * step
+                            put(values, at, lanes(f[r, c], f[r, c + 1], f[r, c + 2]))
+            for j in range(MARKERS if k > 0 else 0):
+                if mask >> (GROUND + j) & 1:
+                    continue
+                forces, force = first + F + j * wide, splat(0.0)
+                done = four(values, forces + 4 * k - 4) if k > 1 else splat(0.0)
+                for r in range(ROWS):
+                    at = first + 4 * (MARKERS + r * MARKERS + j)
+                    done = fma(four(values, at), splat(-b[own[ROW] + r]), done)
+                    if mask >> j & 1:
+                        at, multipliers = first + J + (r * MARKERS + j) * wide, first + L + r * orders + k
+                        for l in range(1, k + 1):
+                            force = fma(four(values, at + 4 * l), splat(-values[multipliers - l]), force)
+                put(values, forces + 4 * k - 4, done)
+                put(values, forces + 4 * k, force)
+                body, s = own[OWNERS[j]], real[3 * j : 3 * j + 3]
+                if mask >> (UNTURNED + j) & 1 == 0:
+                    y = torque(bodies, body * body_size, k, values, forces)
+                    put(Z, 8 * body + 4, add(four(Z, 8 * body + 4), cross(lanes(s[0], s[1], s[2]), y)))
+                if CODES[j] == POINT:
+                    put(Z, 8 * body, add(four(Z, 8 * body), force))
+        else:
+            for j in range(MARKERS):
+                if mask >> (GROUND + j) & 1:
+                    continue
+                s, body = real[3 * j : 3 * j + 3], own[OWNERS[j]] * body_size
+                place = turned(bodies, body + 12 * (k + 2), s[0], s[1], s[2])
+                if CODES[j] == POINT:
+                    place = add(place, four(bodies, body + S_R * orders + 4 * (k + 2)))
+                put(x, STARTS[j], place)
+            for r in range(ROWS):
+                highest, lower = splat(0.0), splat(0.0)
+                for j in range(MARKERS):
+                    if mask >> (GROUND + j) & 1:
+                        continue
+                    highest = fma(four(values, first + 4 * (MARKERS + r * MARKERS + j)), four(x, STARTS[j]), highest)
+                    if mask >> j & 1:
+                        places = first + X + j * wide
+                        gradients = first + J + (r * MARKERS + j) * wide + 4 * (k + 2)
+                        for l in range(1, k + 2):
+                            gradient = times(four(values, gradients - 4 * l), splat(float(l)))
+                            lower = fma(gradient, four(values, places + 4 * l), lower)
+                drift = values[first + own_scratch + SLOTS * orders + r] if DRIVEN else 0.0
+                b[own[ROW] + r] = (k + 1.0) * ((k + 2.0) * total(highest) + total(lower) + drift)
+    return 0

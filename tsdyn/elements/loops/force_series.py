@@ -1,0 +1,137 @@
+"""Taylor series of forces: one loop a kind, over all its instances, order by order.
+
+A force says how the series of its law follows from those of x and xd, by its kernel `series`; the rest is the same for
+all. Order k of the law needs x up to k and xd up to k, which is x up to k + 1:
+
+    x_k             = r_k + A_k s                                   Point; of a Vector without r_k
+    (k+1) p_{k+1}   = 1/2 sum_j G(p_j)^T omega'_{k-j}               Parameters, x = p                   (1)
+    xd_k            = (k+1) x_{k+1};  sum_j A_j omega'_{k-j}        all others; Turn                    (2)
+    T_k             = s x sum_j A_j^T f_{k-j}                       torque about the centroid, body     (3)
+                      sum_j A_j^T f_{k-j};  1/2 sum_j G(p_j) f_{k-j}    frame: of a Turn; of Parameters
+
+The series of an instance holds p and the forces (4 floats a marker and order each, p of Parameters only), then its own
+scratch, then for each marker the last order at which its force is not zero: (3) ends there, at once for what is
+constant. What a law makes no use of isn't stored, so that the compiler leaves it out.
+"""
+
+from ...jit.kernels import ANY, data_of, integers, kernel, matrix, stack, vector
+from ...jit.simd import add, cross, fma, four, lanes, put, splat, times
+from ..markers import PARAMETERS, POINT, TURN
+from .body_poses import POSE, P, turned
+from .constraint_series import BODY_ROW, S_OMEGA, S_R, torque
+
+BODY, MASK, INTS = 0, 2, 3  # of the table: the two bodies, and which of them are the ground
+
+
+def instance_width(markers, slots, orders):
+    """Floats of an instance."""
+    return 8 * markers * orders + 4 * ((slots * orders + markers + 3) // 4)
+
+
+@kernel
+def _turning(bodies, at, orders, k):
+    """Order k of A omega'."""
+    f = splat(0.0)
+    for j in range(k + 1):
+        c, o = at + 12 * j, at + S_OMEGA * orders + 4 * (k - j)
+        f = fma(four(bodies, c), splat(bodies[o]), f)
+        f = fma(four(bodies, c + 4), splat(bodies[o + 1]), f)
+        f = fma(four(bodies, c + 8), splat(bodies[o + 2]), f)
+    return f
+
+
+@kernel
+def _place(code, bodies, at, orders, k, s):
+    """Order k of the x of a Point or Vector; its body's series begins at bodies[at]."""
+    f = turned(bodies, at + 12 * k, s[0], s[1], s[2])
+    return add(f, four(bodies, at + S_R * orders + 4 * k)) if code == POINT else f
+
+
+@kernel
+def _parameters_rate(bodies, omega, k, values, p, out, c):
+    """out[c : c + 4] = order k of pd, Eq. (1); p_0 is at values[p], omega'_0 at bodies[omega]."""
+    d0, d1, d2, d3 = 0.0, 0.0, 0.0, 0.0
+    for j in range(k + 1):
+        e, o = p + 4 * j, omega + 4 * (k - j)
+        e0, e1, e2, e3 = values[e], values[e + 1], values[e + 2], values[e + 3]
+        x, y, z = bodies[o], bodies[o + 1], bodies[o + 2]
+        d0 -= e1 * x + e2 * y + e3 * z
+        d1 += e0 * x - e3 * y + e2 * z
+        d2 += e3 * x + e0 * y - e1 * z
+        d3 += e1 * y - e2 * x + e0 * z
+    out[c], out[c + 1], out[c + 2], out[c + 3] = 0.5 * d0, 0.5 * d1, 0.5 * d2, 0.5 * d3
+
+
+@kernel
+def _parameters_torque(values, p, f, k, last):
+    """1/2 sum_j G(p_{k-j}) f_j, j up to last; p_0 is at values[p], f_0 at values[f]."""
+    x, y, z = 0.0, 0.0, 0.0
+    for j in range(last + 1):
+        e, g = p + 4 * (k - j), f + 4 * j
+        e0, e1, e2, e3 = values[e], values[e + 1], values[e + 2], values[e + 3]
+        f0, f1, f2, f3 = values[g], values[g + 1], values[g + 2], values[g + 3]
+        x += e0 * f1 - e1 * f0 + e3 * f2 - e2 * f3
+        y += e0 * f2 - e2 * f0 - e3 * f1 + e1 * f3
+        z += e0 * f3 - e3 * f0 + e2 * f1 - e1 * f2
+    return lanes(0.5 * x, 0.5 * y, 0.5 * z)
+
+
+# The names in capitals and kernel_series are filled in by force.callbacks.
+MARKERS = SIZE = ROOM = SLOTS = 1
+CODES = OWNERS = STARTS = (0,)
+kernel_series = None
+
+
+def series(mode, k, orders, count, stride, size, table, reals, bodies, values, poses, Z):
+    """Order k of the forces, onto the bodies' Z; p_0 from the poses."""
+    table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
+    values, poses, Z = vector(values, ANY), vector(poses, ANY), vector(Z, ANY)
+    x, xd, f = stack(ROOM), stack(ROOM), stack(ROOM)
+    wide, body_size = 4 * orders, BODY_ROW * orders
+    own_scratch = 2 * MARKERS * wide
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        first = i * size
+        for j in range(MARKERS):
+            at, s, c = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3], STARTS[j]
+            if CODES[j] == PARAMETERS:
+                p = first + j * wide
+                if k == 0:
+                    put(values, p, four(poses, own[OWNERS[j]] * POSE + P))
+                _parameters_rate(bodies, at + S_OMEGA * orders, k, values, p, xd, c)
+                put(values, p + 4 * k + 4, times(four(xd, c), splat(1.0 / (k + 1))))
+                put(x, c, four(values, p + 4 * k))
+            elif CODES[j] == TURN:
+                put(x, c, splat(0.0))
+                put(xd, c, _turning(bodies, at, orders, k))
+            else:
+                put(x, c, _place(CODES[j], bodies, at, orders, k, s))
+                put(xd, c, times(_place(CODES[j], bodies, at, orders, k + 1, s), splat(k + 1.0)))
+        for c in range(SIZE):
+            f[c] = 0.0
+        scratch = matrix(data_of(values[first + own_scratch :]), SLOTS, orders)
+        kernel_series(x, xd, real[3 * MARKERS :], k, scratch, f)
+        for j in range(MARKERS):
+            if own[MASK] >> OWNERS[j] & 1:
+                continue
+            c, s, z = STARTS[j], real[3 * j : 3 * j + 3], 8 * own[OWNERS[j]]
+            at, forces = own[OWNERS[j]] * body_size, first + (MARKERS + j) * wide
+            ends = first + own_scratch + SLOTS * orders + j
+            wider = CODES[j] == PARAMETERS
+            some = f[c] != 0.0 or f[c + 1] != 0.0 or f[c + 2] != 0.0 or (wider and f[c + 3] != 0.0)
+            if some or k == 0:
+                values[ends] = float(k) if some else -1.0
+            put(values, forces + 4 * k, four(f, c) if wider else lanes(f[c], f[c + 1], f[c + 2]))
+            last = int(values[ends])
+            if last < 0:
+                continue
+            if wider:
+                y = _parameters_torque(values, first + j * wide, forces, k, last)
+            else:
+                y = torque(bodies, at + 12 * (k - last), last, values, forces)
+                if CODES[j] != TURN:
+                    y = cross(lanes(s[0], s[1], s[2]), y)
+            put(Z, z + 4, add(four(Z, z + 4), y))
+            if CODES[j] == POINT:
+                put(Z, z, add(four(Z, z), four(values, forces + 4 * k)))
+    return 0

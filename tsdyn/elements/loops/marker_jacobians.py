@@ -1,0 +1,112 @@
+"""What forces need of markers: x and xd, the way of a force back to the coordinates, and the derivatives of both.
+
+W = xd_qd is what a force f conjugate to the marker is carried back by, Q = W^T f. X = x_q is W, but zero for a Turn.
+
+    Point, Vector   A(p) s is quadratic in p: (A s)_p pd = 2 A(p, pd) s, symmetric and bilinear
+    Parameters      W = I
+    Turn            xd = 2 E(p) pd = -2 E(pd) p,   E = [-e, e~ + e0 I]
+"""
+
+from ...jit.kernels import kernel, stack
+from ...maths.euler_parameters import rotate_gradient, rotate_rate
+from ..markers import PARAMETERS, POINT, TURN, chain_rule, position, rate
+
+
+@kernel
+def turning(p, pd, out):
+    """out = 2 E(p) pd, the angular velocity in the ground frame; p, pd (4,), out (3,)."""
+    e0, e1, e2, e3 = 2.0 * p[0], 2.0 * p[1], 2.0 * p[2], 2.0 * p[3]
+    out[0] = -e1 * pd[0] + e0 * pd[1] - e3 * pd[2] + e2 * pd[3]
+    out[1] = -e2 * pd[0] + e3 * pd[1] + e0 * pd[2] - e1 * pd[3]
+    out[2] = -e3 * pd[0] - e2 * pd[1] + e1 * pd[2] + e0 * pd[3]
+
+
+@kernel
+def torque_on_parameters(p, n0, n1, n2, out):
+    """out = 2 E(p)^T n; n (3,) by components in the ground frame, out (4,)."""
+    e0, e1, e2, e3 = 2.0 * p[0], 2.0 * p[1], 2.0 * p[2], 2.0 * p[3]
+    out[0] = -e1 * n0 - e2 * n1 - e3 * n2
+    out[1] = e0 * n0 + e3 * n1 - e2 * n2
+    out[2] = -e3 * n0 + e0 * n1 + e1 * n2
+    out[3] = e2 * n0 - e1 * n1 + e0 * n2
+
+
+@kernel
+def state(code, dimension, at, q, qd, s, x, xd):
+    """x and xd of one marker; its body's coordinates begin at q[at]."""
+    position(code, dimension, at, q, s, x)
+    if code != TURN:
+        rate(code, dimension, at, q, qd, s, xd)
+    elif dimension == 7:
+        turning(q[at + 3 : at + 7], qd[at + 3 : at + 7], xd)
+    else:
+        for i in range(3):
+            xd[i] = 0.0
+
+
+@kernel
+def carry_back(code, dimension, at, q, s, f, Q):
+    """Q (n,) += W^T f; f (3,) or (4,)."""
+    if code != TURN:
+        chain_rule(code, dimension, at, q, s, f, 0, Q[at:])
+    elif dimension == 7:
+        g = stack(4)
+        torque_on_parameters(q[at + 3 : at + 7], f[0], f[1], f[2], g)
+        for i in range(4):
+            Q[at + 3 + i] += g[i]
+
+
+@kernel
+def derivatives(code, dimension, at, q, qd, s, row, column, W, X, Y):
+    """W = xd_qd, X = x_q and Y = xd_q of one marker, from [row, column] on; zero on entry."""
+    if dimension != 0 and code == POINT:
+        for i in range(3):
+            W[row + i, column + i] = 1.0
+            X[row + i, column + i] = 1.0
+    if dimension != 7:
+        return
+    p, pd = q[at + 3 : at + 7], qd[at + 3 : at + 7]
+    e, f = stack(4), stack(3)
+    for i in range(4):
+        e[i] = 0.0
+    for j in range(4):
+        c = column + 3 + j
+        if code == PARAMETERS:
+            W[row + j, c] = 1.0
+            X[row + j, c] = 1.0
+            continue
+        e[j] = 1.0
+        if code == TURN:
+            turning(p, e, f)
+        else:
+            rotate_rate(p, e, s, f)
+        for i in range(3):
+            W[row + i, c] = f[i]
+            if code != TURN:
+                X[row + i, c] = f[i]
+        if code == TURN:
+            turning(e, pd, f)
+        else:
+            rotate_rate(e, pd, s, f)
+        for i in range(3):
+            Y[row + i, c] = f[i]
+        e[j] = 0.0
+
+
+@kernel
+def carry_back_derivative(code, dimension, at, s, f, n, Q_q):
+    """Q_q (n, n) += (W^T f)_q at constant f; W is linear in p."""
+    if dimension != 7 or code == PARAMETERS:
+        return
+    e, g = stack(4), stack(4)
+    for i in range(4):
+        e[i] = 0.0
+    for j in range(4):
+        e[j] = 1.0
+        if code == TURN:
+            torque_on_parameters(e, f[0], f[1], f[2], g)
+        else:
+            rotate_gradient(e, s, f[0], f[1], f[2], g)
+        for i in range(4):
+            Q_q[(at + 3 + i) * n + at + 3 + j] += g[i]
+        e[j] = 0.0

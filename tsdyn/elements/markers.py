@@ -1,0 +1,182 @@
+"""Markers: the points, vectors and Euler parameters of a body on which constraints and forces are written.
+
+    Point       x = r + A(p) s    xd = rd + (A s)_p pd    at qdd = 0: xdd = 2 A(pd) s
+    Vector      x = A(p) s        xd = (A s)_p pd                     xdd = 2 A(pd) s
+    Parameters  x = p             xd = pd                             xdd = 0
+    Turn        x = 0             xd = 2 E(p) pd, the angular velocity; for forces only
+
+x and xd are in the ground frame, s in the body frame. On the ground x = s, or p = (1, 0, 0, 0), and nothing moves; a
+point mass has r only.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InvalidBody, InvalidConstraint
+from ..jit.kernels import kernel, stack
+from ..maths.euler_parameters import rotate, rotate_gradient, rotate_rate
+from ..validation import vector3
+
+POINT, VECTOR, PARAMETERS, TURN = 0, 1, 2, 3  # codes in kernels
+
+
+@dataclass(frozen=True)
+class Marker:
+    """What one slot of a constraint or force is on: body "a" or "b", and the argument that places it there."""
+
+    body: str
+    argument: str = ""
+    code = POINT
+    size = 3
+    prefix = "point_"
+
+    def __post_init__(self):
+        if self.body not in ("a", "b"):
+            raise InvalidConstraint(f"a marker belongs to body 'a' or 'b', not to {self.body!r}.")
+        if not self.argument:
+            object.__setattr__(self, "argument", self.prefix + self.body)
+
+    def coordinates(self, body, value, where, error=InvalidConstraint):
+        """Check the body-frame coordinates that a user gave, return them as an array (3,)."""
+        place = vector3(value, f"{where}: {self.argument}", error)
+        place.setflags(write=False)
+        return place
+
+
+class Point(Marker):
+    """A point of a body, by its coordinates in the body frame, m."""
+
+    def coordinates(self, body, value, where, error=InvalidConstraint):
+        """Check the coordinates; a point mass has no other point than itself."""
+        value = super().coordinates(body, value, where, error)
+        if body.dimension == 3 and value.any():
+            raise error(f"{where}: {self.argument} must be (0, 0, 0) on the point mass {body.name!r}.")
+        return value
+
+
+class Vector(Marker):
+    """A direction of a body, by its components in the body frame; scaled to unit length."""
+
+    code = VECTOR
+    prefix = "axis_"
+
+    def coordinates(self, body, value, where, error=InvalidConstraint):
+        """Check and normalise the direction."""
+        value = super().coordinates(body, value, where, error)
+        _needs_rotation(body, f"{where}: {self.argument}")
+        size = np.abs(value).max()
+        if not size > 0.0:
+            raise error(f"{where}: {self.argument} has length zero; give a direction, such as (0, 0, 1).")
+        value = np.ldexp(value, -np.frexp(size)[1])  # by a power of two: no square overflows, no bit changes
+        value = value / np.linalg.norm(value)
+        value.setflags(write=False)
+        return value
+
+
+class Parameters(Marker):
+    """The Euler parameters of a rigid body themselves; (1, 0, 0, 0) on the ground."""
+
+    code = PARAMETERS
+    size = 4
+    prefix = "parameters_"
+
+    def coordinates(self, body, value, where, error=InvalidConstraint):
+        """Nothing to place: the marker is p."""
+        _needs_rotation(body, where)
+        return np.zeros(3)
+
+
+class Turn(Marker):
+    """The turning of a rigid body, for forces: xd is its angular velocity, conjugate is a torque, ground frame."""
+
+    code = TURN
+    prefix = "turn_"
+
+    def coordinates(self, body, value, where, error=InvalidConstraint):
+        """Nothing to place: all points of a body turn alike."""
+        _needs_rotation(body, where)
+        return np.zeros(3)
+
+
+def _needs_rotation(body, where):
+    if body.dimension == 3:
+        raise InvalidBody(f"{where}: the point mass {body.name!r} has no orientation; use add_body.")
+
+
+@kernel
+def position(code, dimension, at, q, s, x):
+    """x of one marker; its body's coordinates begin at q[at]."""
+    if code == TURN:
+        for i in range(3):
+            x[i] = 0.0
+    elif code == PARAMETERS and dimension != 7:
+        x[0] = 1.0
+        for i in range(1, 4):
+            x[i] = 0.0
+    elif dimension == 7:
+        if code == PARAMETERS:
+            for i in range(4):
+                x[i] = q[at + 3 + i]
+            return
+        rotate(q[at + 3 : at + 7], s, x)
+        if code == POINT:
+            for i in range(3):
+                x[i] += q[at + i]
+    elif dimension == 3:
+        for i in range(3):
+            x[i] = q[at + i]
+    else:
+        for i in range(3):
+            x[i] = s[i]
+
+
+@kernel
+def rate(code, dimension, at, q, qd, s, xd):
+    """xd = x_q qd of one marker that is no Turn."""
+    for i in range(4 if code == PARAMETERS else 3):
+        xd[i] = 0.0
+    if dimension == 7:
+        if code == PARAMETERS:
+            for i in range(4):
+                xd[i] = qd[at + 3 + i]
+            return
+        rotate_rate(q[at + 3 : at + 7], qd[at + 3 : at + 7], s, xd)
+    if dimension != 0 and code == POINT:
+        for i in range(3):
+            xd[i] += qd[at + i]
+
+
+@kernel
+def motion(code, dimension, at, q, qd, s, x, xd, xdd):
+    """x, xd, and xdd at qdd = 0, of one marker."""
+    position(code, dimension, at, q, s, x)
+    rate(code, dimension, at, q, qd, s, xd)
+    for i in range(4 if code == PARAMETERS else 3):
+        xdd[i] = 0.0
+    if dimension == 7 and code != PARAMETERS:
+        rotate(qd[at + 3 : at + 7], s, xdd)
+        for i in range(3):
+            xdd[i] *= 2.0
+
+
+@kernel
+def chain_rule(code, dimension, at, q, s, f, first, out):
+    """out (+)= f x_q, one row over the coordinates of the marker's body; f (3,) or (4,), out (7,) or (3,)."""
+    if dimension == 0:
+        return
+    if first:
+        for i in range(dimension):
+            out[i] = 0.0
+    if code == PARAMETERS:
+        for i in range(4):
+            out[3 + i] += f[i]
+        return
+    if code == POINT:
+        for i in range(3):
+            out[i] += f[i]
+    if dimension == 7:
+        g = stack(4)
+        rotate_gradient(q[at + 3 : at + 7], s, f[0], f[1], f[2], g)
+        for i in range(4):
+            out[3 + i] += g[i]

@@ -1,0 +1,259 @@
+"""What a constraint primitive is: a class whose kernels are compiled once and reached by address.
+
+A primitive works on marker coordinates x (3-vectors in the ground frame) and never sees Euler parameters:
+
+    phi(x, par, t, out)          out[rows]          Phi
+    jacobian(x, par, t, out)     out[rows, len(x)]  Phi_x, zero on entry
+    gamma(x, xd, par, t, out)    out[rows]          (Phi_x xd)_x xd + 2 Phi_xt xd + Phi_tt
+    phi_t(x, par, t, out)        out[rows]          Phi_t; only for a primitive that depends on time
+    series(x, par, k, s, out)    out[rows, len(x)]  optional: coefficient k of Phi_x, zero on entry; see recurrences.py
+    series_t(x, par, k, s, out)  out[rows]          and of Phi_t, where it has what is `prescribed`; after `series`
+    remember(x, par, t)          optional, with memory = 1: what the last of par is after each accepted step
+
+x is the concatenation of the primitive's markers, par the floats that `parameters()` returns; a motion among them takes
+three places, its value, rate and acceleration at t. The loops below apply the chain rule x(q) (Haug 2018, Eqs. 2-3).
+Kernels use arithmetic and NumPy functions, no comparison, abs or norm of x, so that they also run on complex numbers
+and on truncated Taylor series: that is how they are checked. `series` gets the coefficients k of x, those before being
+where it has left them: in the scratch array s[slots, k], of which it fills column k.
+"""
+
+from types import MappingProxyType
+
+from ..errors import InvalidConstraint
+from ..jit.kernels import ANY, Callback, caller, integers, specialised, stack, stack2, vector
+from ..motions.prescribed import Motion
+from .element import Attachment, check_slots, inlined, layout, static_kernel
+from .loops import constraint_hessians as curvature
+from .loops import constraint_rows as body_loops
+from .loops import constraint_series as series_loops
+from .markers import PARAMETERS, TURN, Marker, chain_rule, motion, position
+
+# what the table of a kind holds for each instance
+AT, DIMENSION, BLOCK, ROW, STRIDE, INTS = 0, 2, 4, 6, 7, 8
+SIGNATURE = "iippppdp"  # count, reals per instance, table, reals, q, qd, t, out
+call_kind = caller(SIGNATURE)
+
+_registry = {}
+_KERNELS = {"phi": 4, "jacobian": 4, "gamma": 5}  # and their numbers of arguments
+_OPTIONAL = {"phi_t": 4, "series": 5, "series_t": 5, "remember": 3}
+
+
+class Primitive(Attachment):
+    """Base class of all constraints that have rows of their own.
+
+    Subclass it in one file of your own: set `rows` and `markers`, write the kernels as static methods, and pass the
+    bodies and the marker coordinates on in `__init__`. `tsdyn.testing.check_primitive` checks the result.
+
+    Attributes
+    ----------
+    rows : int
+        Number of scalar constraints.
+    markers : tuple of Point, Vector, Parameters
+        What x is made of, each on body "a" or "b".
+    slots : int
+        Rows of scratch memory that `series` uses.
+    prescribed : str or tuple of str, optional
+        The attributes that are numbers or Motions, where nothing else makes it depend on time. With `series_t` they
+        come first in `parameters()`, and their series are the rows of scratch memory from `slots` on.
+    memory : int
+        1 for a primitive that keeps a number from step to step, the last of par: an angle that counts turns.
+    a, b : Body or ground
+        The bodies; b is None for a primitive that has markers on a only.
+    name : str
+        What error messages call it.
+    """
+
+    rows = 0
+    slots = 0
+    memory = 0
+    normalises = False  # whether it does no more than keep the length of p
+    prescribed = ""
+    kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        where = f"primitive {cls.__name__}"
+        if isinstance(cls.rows, bool) or not isinstance(cls.rows, int) or cls.rows < 1:
+            raise InvalidConstraint(f"{where}: rows must be the number of its scalar constraints, 1 or more.")
+        markers = cls.markers if isinstance(cls.markers, (tuple, list)) else ()
+        if not markers or not all(isinstance(m, Marker) and m.code != TURN for m in markers):
+            raise InvalidConstraint(f"{where}: markers must be a tuple of Point, Vector or Parameters.")
+        check_slots(cls, where, InvalidConstraint)
+        if getattr(cls, "series", None) is not None and any(m.code == PARAMETERS for m in markers):
+            raise InvalidConstraint(f"{where}: series are for primitives on Points and Vectors only.")
+        if getattr(cls, "series_t", None) is not None and not cls.quantities():
+            raise InvalidConstraint(f"{where}: series_t is of what is `prescribed`; name its attributes there.")
+        if cls.memory not in (0, 1) or (cls.memory == 1) != (getattr(cls, "remember", None) is not None):
+            raise InvalidConstraint(f"{where}: memory = 1 needs a kernel remember, and remember needs memory = 1.")
+        functions = {}
+        for name, arguments in {**_KERNELS, **_OPTIONAL}.items():
+            if getattr(cls, name, None) is None and name in _OPTIONAL:
+                continue
+            if name == "series_t" and not {"phi_t", "series"} <= functions.keys():
+                continue  # of a subclass that has dropped one of them
+            functions[name] = static_kernel(cls, name, arguments, where, InvalidConstraint)
+        cls.kernels = MappingProxyType(_compile(cls, functions))
+        _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
+
+    def __init__(self, a, b=None, coordinates=(), name=""):
+        """Attach the primitive to its bodies; coordinates has an entry for each marker, in the body frame."""
+        if not self.rows:
+            raise InvalidConstraint(
+                "Primitive is the base of constraints and has no rows; use one of them, or a subclass."
+            )
+        super().__init__(a, b, coordinates, name)
+
+    def __setattr__(self, name, value):
+        """Set an attribute, checked; a prescribed one may be a number or three functions of time."""
+        if name in self.quantities():
+            value = Motion.wrap(value, f"{self.name}: {name}")
+        super().__setattr__(name, value)
+
+    @property
+    def parts(self):
+        """The primitives that it is made of: itself."""
+        return (self,)
+
+    @property
+    def row_labels(self):
+        """What follows its title in the names of its rows."""
+        return ("",) if self.rows == 1 else tuple(f"[{i}]" for i in range(self.rows))
+
+    @property
+    def rheonomic(self):
+        """Whether it depends on time."""
+        names = self.quantities()
+        moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
+        return moves and "phi_t" in self.kernels
+
+    @classmethod
+    def quantities(cls):
+        """The names of what is prescribed."""
+        return (cls.prescribed,) * bool(cls.prescribed) if isinstance(cls.prescribed, str) else cls.prescribed
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """Return a random valid instance between two bodies, for tests."""
+        places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code != PARAMETERS}
+        return cls(a, b, **places) if any(m.body == "b" for m in cls.markers) else cls(a, **places)
+
+
+def registered():
+    """Return every primitive class known, built in or plugged in, by its full name."""
+    return MappingProxyType(_registry)
+
+
+def _compile(cls, functions):
+    """Make the callbacks of a kind: each runs over all its instances."""
+    constants = {"ROWS": cls.rows, **layout(cls.markers)}
+    try:
+        inner = {f"kernel_{name}": inlined(function) for name, function in functions.items()}
+    except InvalidConstraint as error:
+        raise InvalidConstraint(f"primitive {cls.__name__}: {error}") from error
+    loops = {  # name: template, whose kernel it is cached with, signature
+        "phi": (_values, "phi", SIGNATURE),
+        "phi_t": (_values, "phi_t", SIGNATURE),
+        "jacobian": (_jacobian, "jacobian", SIGNATURE),
+        "gamma": (_gamma, "gamma", SIGNATURE),
+        "remember": (_remembers, "remember", SIGNATURE),
+        "values": (body_loops.values, "phi", body_loops.SIGNATURE),
+        "drift": (body_loops.values, "phi_t", body_loops.SIGNATURE),
+        "reduced": (body_loops.reduced, "jacobian", body_loops.SIGNATURE),
+        "bias": (body_loops.bias, "gamma", body_loops.SIGNATURE),
+        "series": (series_loops.series, "series", series_loops.SIGNATURE),
+        "far_series": (series_loops.series, "series", series_loops.SIGNATURE),
+        "driven_series": (series_loops.series, "series_t", series_loops.SIGNATURE),
+        "far_driven_series": (series_loops.series, "series_t", series_loops.SIGNATURE),
+    }
+    result = {}
+    for name, (template, whose, signature) in loops.items():
+        if whose in functions:
+            owner = getattr(functions[whose], "py_func", functions[whose])
+            names = {**constants, **inner, "SLOTS": cls.slots, "kernel_value": inner[f"kernel_{whose}"]}
+            names["AHEAD"], names["DRIVEN"] = name.startswith("far"), whose == "series_t"
+            names.setdefault("kernel_series_t", names.get("kernel_series"))
+            names["SLOTS"] += len(cls.quantities()) if names["DRIVEN"] else 0
+            copy = specialised(template, f"{cls.__qualname__}.{name}_loop", owner, **names)
+            result[name] = Callback(copy, signature)
+    owner = getattr(functions["gamma"], "py_func", functions["gamma"])
+    places = {"AT": AT, "DIMENSION": DIMENSION, "ROW": ROW, "INTS": INTS}
+    copy = specialised(curvature.loop, f"{cls.__qualname__}.curvature_loop", owner, **constants, **inner, **places)
+    result["curvature"] = Callback(copy, curvature.SIGNATURE)
+    return result
+
+
+# The loops over all instances of a kind. The names in capitals and kernel_* are filled in by `_compile`.
+ROWS = MARKERS = SIZE = 1
+CODES = OWNERS = STARTS = FIRST = (0,)
+kernel_value = kernel_jacobian = kernel_gamma = None
+
+
+def _values(count, stride, table, reals, q, qd, t, out):
+    table, reals, q, out = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(out, ANY)
+    x, f = stack(SIZE), stack(ROWS)
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        for j in range(MARKERS):
+            k = OWNERS[j]
+            position(CODES[j], own[DIMENSION + k], own[AT + k], q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
+        kernel_value(x, real[3 * MARKERS :], t, f)
+        for r in range(ROWS):
+            out[own[ROW] + r] = f[r]
+    return 0
+
+
+def _remembers(count, stride, table, reals, q, qd, t, out):
+    table, reals, q = integers(table, ANY), vector(reals, ANY), vector(q, ANY)
+    x = stack(SIZE)
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        for j in range(MARKERS):
+            k = OWNERS[j]
+            position(CODES[j], own[DIMENSION + k], own[AT + k], q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
+        real[stride - 1] = kernel_value(x, real[3 * MARKERS :], t)
+    return 0
+
+
+def _jacobian(count, stride, table, reals, q, qd, t, out):
+    table, reals, q, out = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(out, ANY)
+    x, f = stack(SIZE), stack2(ROWS, SIZE)
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        for j in range(MARKERS):
+            k = OWNERS[j]
+            position(CODES[j], own[DIMENSION + k], own[AT + k], q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
+        for r in range(ROWS):
+            for c in range(SIZE):
+                f[r, c] = 0.0
+        kernel_jacobian(x, real[3 * MARKERS :], t, f)
+        for r in range(ROWS):
+            for j in range(MARKERS):
+                k = OWNERS[j]
+                block = own[BLOCK + k] + r * own[STRIDE]
+                s, row = real[3 * j : 3 * j + 3], f[r, STARTS[j] :]
+                chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, row, FIRST[j], out[block:])
+    return 0
+
+
+def _gamma(count, stride, table, reals, q, qd, t, out):
+    table, reals, q, out = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(out, ANY)
+    qd = vector(qd, ANY)
+    x, xd, xdd = stack(SIZE), stack(SIZE), stack(SIZE)
+    f, g = stack2(ROWS, SIZE), stack(ROWS)
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        for j in range(MARKERS):
+            k, c = OWNERS[j], STARTS[j]
+            s = real[3 * j : 3 * j + 3]
+            motion(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:], xdd[c:])
+        for r in range(ROWS):
+            for c in range(SIZE):
+                f[r, c] = 0.0
+        kernel_jacobian(x, real[3 * MARKERS :], t, f)
+        kernel_gamma(x, xd, real[3 * MARKERS :], t, g)
+        for r in range(ROWS):
+            total = g[r]
+            for c in range(SIZE):
+                total += f[r, c] * xdd[c]
+            out[own[ROW] + r] = total
+    return 0

@@ -1,0 +1,86 @@
+"""Functions of time and state that users write, as kernels of forces; each gives callbacks of its own, once."""
+
+from functools import partial
+from types import FunctionType
+
+from ..jit.compiled_once import compiled_once
+from ..jit.kernels import kernel
+from .force import callbacks
+
+STATE = 13  # position, Euler parameters, velocity, angular velocity
+
+
+class Kernels(dict):
+    """The callbacks of one kind with one function; pickled as the two."""
+
+    def __init__(self, kind, function):
+        functions = {"law": kind.wrap(kernel(function, allocates=True), function)}
+        if kind.memory:
+            functions["remember"] = kind.remember
+        super().__init__(callbacks(kind, functions, function))
+        self.made_of = kind, function
+
+    __hash__ = object.__hash__
+
+    def __reduce__(self):
+        return kernels_of, self.made_of
+
+
+def kernels_of(kind, function):
+    """The kernels of a kind with a user's function; the same ones for the same two."""
+    function = getattr(function, "py_func", function)
+    return compiled_once(kind, function, partial(Kernels, kind, function))
+
+
+def arguments_of(function):
+    """The number of arguments of a plain Python function; 0 for anything else."""
+    plain = getattr(function, "py_func", function)
+    return plain.__code__.co_argcount if isinstance(plain, FunctionType) else 0
+
+
+@kernel
+def fill_state(x, xd, first, out):
+    """out (13,) from the markers Point, Parameters, Turn that begin at `first`."""
+    for i in range(7):
+        out[i] = x[first + i]
+    for i in range(3):
+        out[7 + i] = xd[first + i]
+        out[10 + i] = xd[first + 7 + i]
+
+
+def state_load(value, what, error):
+    """A plain function of (t, state)."""
+    if arguments_of(value) != 2:
+        raise error(f"{what} must stay a plain Python function of two arguments (t, state), got {value!r}.")
+    return value
+
+
+class ByState:
+    """Mixed into forces that are given by a user's function, which the attribute named by `given` holds."""
+
+    analytic = False
+    no_series = "it is a function of the state, of which only values are known"
+
+    @property
+    def kernels(self):
+        """The callbacks of the present function."""
+        function = self.function_of_state
+        if self.__dict__.get("_of") is not function:
+            self.__dict__["_kernels"], self.__dict__["_of"] = kernels_of(type(self), function), function
+        return self.__dict__["_kernels"]
+
+    @property
+    def function_of_state(self):
+        """The user's function."""
+        return getattr(self, self.given)
+
+    def forget(self):
+        """Drop its compiled form; it is made again when asked for."""
+        self.__dict__.pop("_of", None)
+
+    def check(self):
+        """Nothing is known of a function."""
+
+    def parameters(self):
+        """None: the function has its own constants."""
+        return ()

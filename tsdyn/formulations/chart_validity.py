@@ -1,0 +1,116 @@
+"""Charts on the network: where they touch, and the signs on which they are left, the same in every form.
+
+A chart is left at the end of a step, on signs that have no dimension and don't depend on units, scales of constraints
+or levers, the metric being that of the masses:
+
+    contraction    the largest |1 - n / s|, n and s the pivots of N = H C Y0 and of S0 = H0 W0 H0^T: how much of what
+                   elimination leaves of a row is gone; 1 where the normal space of q0 meets the manifold
+    turn           |d|, the sine of half the angle that a body has turned since q0
+"""
+
+import math
+
+from ..elements.loops.body_poses import POSE, P, R, place_bodies
+from ..jit.kernels import kernel
+from ..jit.simd import get
+from ..maths.dense_linalg import copy
+from ..rows.evaluation import factorise_rows, run_loops, serve_still
+from ..sparse.constraint_graph import REDUCED
+from ..workspaces.chart_workspace import END, FACTORED, OFF, TIME
+from ..workspaces.workspace import CHARTS, CONDITION, CONTRACTION, FACTORIZATIONS, FLOOR, KEPT, PLACEMENTS, SIZE
+from .chart_coordinates import factorise_normal, turned_most
+
+# reasons to leave a chart, as stored; REASONS names them
+STAY, BY_CONTRACTION, BY_TURN, BY_INTERVAL, BY_FAILURE, AT_START, BY_SERIES = range(7)
+REASONS = (
+    "",
+    "contraction",
+    "turn of a body",
+    "chart_interval",
+    "failed step",
+    "start",
+    "step of a series",
+)
+
+CONTRACTION_LIMIT = 0.15
+TURN_LIMIT = 0.25
+TURN_SHARE = 0.55  # a turn alone, which no constraint minds, may go on to |d| = 0.9 in one step
+CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a turn of 60 degrees
+ROUNDING = 1e-15  # relative to the numbers that enter Phi: below this a residual says nothing
+SAME = 1e-6  # of N: factors that are off by less tell the contraction as well as new ones
+
+
+@kernel
+def touch(network, system, w, f, l, t):
+    """The chart at w.q: base, H0, Y0, the factors of S0. Whether the rows of H0 are independent."""
+    regular = True
+    last = l.numbers[END] > 0.0 and l.numbers[END] == w.counters[PLACEMENTS] and network.axes.rows.shape[0] == 0
+    if last and serve_still(network, f, f.S):  # the place that was left last
+        copy(f.H, l.H0)
+        copy(f.Y, l.Y0)
+        copy(f.S, l.S0)
+        w.counters[KEPT] += 1 if f.b.size > 0 else 0
+    else:
+        place_bodies(network.bodies, w.q, f.poses)
+        run_loops(network, system.reals, REDUCED, f, t, f.b, l.H0)
+        if f.b.size > 0:
+            w.counters[FACTORIZATIONS] += 1
+            regular = factorise_rows(network, system.reals, f, t, f.b, l.H0, l.Y0, l.S0, 0)
+    for b in range(network.bodies.shape[0]):
+        at, o = b * POSE, 8 * b
+        for c in range(3):
+            l.base[o + c] = f.poses[at + R + c]
+            l.d[4 * b + c] = 0.0
+        for c in range(4):
+            l.base[o + 4 + c] = f.poses[at + P + c]
+        l.d[4 * b + 3] = 0.0
+    size = 0.0
+    for i in range(w.q.size):
+        size = max(size, abs(w.q[i]))
+    w.counters[CHARTS] += 1
+    w.control[FLOOR] = ROUNDING * (w.control[SIZE] + size)
+    w.control[CONTRACTION], w.control[CONDITION] = 0.0, 1.0
+    l.numbers[TIME], l.numbers[FACTORED], l.numbers[END] = t, 0.0, 0.0
+    return regular
+
+
+@kernel
+def measure_turns(network, q, l):
+    """l.d of positions q; (d0, d) = p0* o p."""
+    for b in range(network.bodies.shape[0]):
+        if network.bodies[b, 1] == 7:
+            i, o = network.bodies[b, 0] + 3, 8 * b + 4
+            e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
+            p0, p1, p2, p3 = q[i], q[i + 1], q[i + 2], q[i + 3]
+            l.d[4 * b] = -e1 * p0 + e0 * p1 + e3 * p2 - e2 * p3
+            l.d[4 * b + 1] = -e2 * p0 - e3 * p1 + e0 * p2 + e1 * p3
+            l.d[4 * b + 2] = -e3 * p0 + e2 * p1 - e1 * p2 + e0 * p3
+            l.d[4 * b + 3] = e0 * p0 + e1 * p1 + e2 * p2 + e3 * p3 - 1.0
+
+
+@kernel
+def turning(network, w, f, l):
+    """Reason to leave the chart at the place that l.d and f.H belong to, or STAY; records contraction and condition."""
+    turn, contraction = turned_most(l), 0.0
+    if f.b.size > 0:
+        known = l.numbers[FACTORED] > 0.0 and l.numbers[OFF] < SAME
+        w.counters[KEPT] += 1 if known else 0
+        contraction = _contraction(network, l) if known or factorise_normal(network, w, f, l) else math.inf
+    l.numbers[FACTORED] = 0.0  # dense output, if there is any, would come between
+    w.control[CONTRACTION] = max(contraction, TURN_SHARE * turn)
+    w.control[CONDITION] = (1.0 + w.control[CONTRACTION]) / max(1.0 - w.control[CONTRACTION], 1e-300)
+    if not contraction < CONTRACTION_LIMIT:
+        return BY_CONTRACTION
+    return STAY if turn < TURN_LIMIT else BY_TURN
+
+
+@kernel
+def _contraction(network, l):
+    """From the reciprocal pivots of both."""
+    pattern, worst = network.pattern, 0.0
+    for j in range(pattern.heads.size):
+        at, step = pattern.heads[j], pattern.widths[j] + 1
+        for _ in range(pattern.starts[j + 1] - pattern.starts[j]):
+            worst = max(worst, abs(1.0 - get(l.S0, at) / get(l.upper, at)))
+            at += step
+    return worst

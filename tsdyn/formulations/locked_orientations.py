@@ -1,0 +1,181 @@
+"""Bodies that a scene never turns, and its network without their rotations.
+
+A row on directions of two bodies alone, which no time enters, holds an orientation. Where three such rows join a body
+to the ground, or to bodies that are held already, and are independent there, the orientations that they allow are
+isolated: the body keeps the one that it has for as long as it moves. So those rows hold by themselves, and neither they
+nor the body's rotation need be in the equations. What is left has as many redundant rows as there were, but for those
+among the rows that are left out.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.markers import PARAMETERS, VECTOR
+from ..model.packed import FIRST_REAL, classes
+from ..motions.prescribed import Motion
+from ..sparse.constraint_graph import N_COUNT, N_FIRST_REAL, N_REALS
+from ..sparse.graph_builder import build
+from ..sparse.networks import dropped_rows, network_of, with_loops
+from ..workspaces.tangent_memory import MOST_ROWS
+
+LEAST = 1e-12  # of the largest square of a singular value of its rows: with less they don't hold a body
+
+
+class Still(NamedTuple):
+    """What of a scene never turns."""
+
+    bodies: np.ndarray  # int64 (h,)
+    holding: np.ndarray  # int64 (k, 2): which of these bodies a row of Phi holds
+    omitted: frozenset  # places in Packed.constraints: what joins these bodies to each other and the ground so
+    dropped: np.ndarray  # int64: rows of Phi, redundant ones of those that are left
+
+
+def still(packed):
+    """The `Still` of a packed scene with the rows that it drops now; where they hold is for `settle` to say."""
+    if packed.derived.locked is None:
+        packed.derived.locked = _find(packed)
+    return packed.derived.locked
+
+
+def keep_turning(packed, bodies):
+    """Take these bodies (their numbers) for no still ones from now on, whatever holds them."""
+    packed.derived.turning.update(bodies)
+    packed.derived.forget_locked()
+
+
+def moving_network(packed, *columns):
+    """As `network_of`, without the rotations of bodies that are still; the same where there are none."""
+    found, known = still(packed), packed.derived
+    if not found.bodies.size:
+        return network_of(packed, *columns)
+    if columns not in known.moving_networks:
+        if known.moving_graph is None:
+            known.moving_graph = build(packed, found)
+        known.moving_networks[columns] = with_loops(*known.moving_graph, *columns)
+    return known.moving_networks[columns]
+
+
+def moving_parts(packed):
+    """The same network without addresses of loops, and the classes of its kinds; a network of the caller's own."""
+    found = still(packed)
+    return build(packed, found if found.bodies.size else None)
+
+
+def settle(packed, network, H):
+    """Have bodies turn, from now on, that the rows H of the whole network, (m 16,), don't hold where they stand."""
+    while (found := still(packed)).bodies.size:
+        place, real = np.full(len(packed.system.segments), -1), network.row >= 0
+        place[network.row[real]] = np.flatnonzero(real)
+        which, rows = found.holding[:, 0], place[found.holding[:, 1]]
+        side = np.where(network.sides[rows, 0] == found.bodies[which], 0, 1)
+        torques, squares = H.reshape(-1, 2, 8)[rows, side, 4:7], np.zeros((len(found.bodies), 3, 3))
+        np.add.at(squares, which, torques[:, :, None] * torques[:, None, :])
+        sizes = np.linalg.eigvalsh(squares)
+        loose = ~(sizes[:, 0] > LEAST * sizes[:, 2])
+        if not loose.any():
+            return
+        keep_turning(packed, found.bodies[loose].tolist())
+
+
+def hold(packed, q, qd):
+    """Positions and velocities with what never turns at rest to the last digit, its Euler parameters of length one."""
+    first = packed.system.bodies[still(packed).bodies, 0]
+    if not first.size:
+        return q, qd
+    at = first[:, None] + np.arange(3, 7)
+    p, q, qd = q[at], q.copy(), qd.copy()
+    square = (p * p).sum(axis=1)
+    q[at] = np.where((np.abs(square - 1.0) > 1e-15)[:, None], p / np.sqrt(square)[:, None], p)
+    qd[at] = 0.0
+    return q, qd
+
+
+def instances(packed, network):
+    """For each row of Network.kinds its class, and of its instances each constraint with its parameters."""
+    groups = {kind: [] for kind in classes(packed)}
+    for pair in zip(packed.constraints, packed.parameters, strict=True):
+        groups[type(pair[0])].append(pair)
+    kinds, begins, found = list(groups), packed.system.kinds[:, FIRST_REAL], []
+    for row in network.kinds:
+        i = int(np.searchsorted(begins, row[N_FIRST_REAL], side="right")) - 1
+        first = int((row[N_FIRST_REAL] - begins[i]) // row[N_REALS])
+        found.append((kinds[i], groups[kinds[i]][first : first + int(row[N_COUNT])]))
+    return found
+
+
+def _find(packed):
+    """From the ground outwards, body by body."""
+    joints, held, holding = _joints(packed), {len(packed.bodies)}, {}
+    ways = list(held) if joints[-1] else []
+    turning = packed.derived.turning | _rubbing(packed)
+    while ways:
+        for _, pair, rows in joints[ways.pop()]:
+            for other in set(pair) - held - turning:
+                mine = holding.setdefault(other, [])
+                mine += rows
+                if len(mine) >= 3:
+                    held.add(other)
+                    ways.append(other)
+    omitted = {i: rows for body in held for i, pair, rows in joints[body] if held.issuperset(pair)}
+    bodies = sorted(held - {len(packed.bodies)})
+    dropped = _dropped(packed, omitted, sum(map(len, omitted.values())) - 3 * len(bodies))
+    if dropped is None:
+        bodies = omitted = dropped = ()
+    holding = [(i, row) for i, body in enumerate(bodies) for row in holding[body]]
+    return Still(
+        np.array(bodies, np.int64),
+        np.array(holding, np.int64).reshape(-1, 2),
+        frozenset(omitted),
+        np.array(dropped, np.int64),
+    )
+
+
+def _rubbing(packed):
+    """The bodies whose joints have friction, which needs their whole reactions."""
+    bodies = {id(body): i for i, body in enumerate(packed.bodies)}
+    forces = [load.force for load in packed.loads if load.normal >= 0]
+    return {bodies[id(body)] for force in forces for body in (force.a, force.b) if id(body) in bodies}
+
+
+def _joints(packed):
+    """For each body and, last, the ground: (place in Packed.constraints, both bodies, rows) of what may hold it."""
+    bodies, nb = {id(body): i for i, body in enumerate(packed.bodies)}, len(packed.bodies)
+    holds, found, row = {kind: _holds(kind) for kind in classes(packed)}, [[] for _ in range(nb + 1)], 0
+    for i, (constraint, given) in enumerate(zip(packed.constraints, packed.parameters, strict=True)):
+        if holds[type(constraint)] and not any(isinstance(value, Motion) for value in given):
+            pair = tuple(bodies.get(id(body), nb) for body in (constraint.a, constraint.b))
+            for body in set(pair):
+                found[body].append((i, pair, range(row, row + constraint.rows)))
+        row += constraint.rows
+    return found
+
+
+def _dropped(packed, omitted, spare):
+    """Of the rows that are left those to drop: as many as the whole drops but for the `spare` ones that are omitted.
+
+    Where too few of those that the whole drops are left, some others: a run chooses anew. None where that can't be
+    done.
+    """
+    whole = dropped_rows(packed)
+    if not len(whole):
+        return () if spare == 0 else None
+    gone, row, left, others = set(network_of(packed).row[whole].tolist()), 0, [], []
+    for i, constraint in enumerate(packed.constraints):
+        if i not in omitted and not constraint.normalises:
+            for one in range(row, row + constraint.rows):
+                (left if one in gone else others).append(one)
+        row += constraint.rows
+    wanted = len(gone) - spare - len(left)
+    if wanted < 0 or (wanted > 0 and len(left) + len(others) > MOST_ROWS):
+        return None
+    return sorted(left + others[len(others) - wanted :])
+
+
+def _holds(kind):
+    """Whether a kind of constraint is on directions alone, and no time enters it but by a Motion."""
+    return (
+        all(marker.code in (VECTOR, PARAMETERS) for marker in kind.markers)
+        and not (kind.normalises or kind.memory)
+        and ("phi_t" not in kind.kernels or bool(kind.quantities()))
+    )

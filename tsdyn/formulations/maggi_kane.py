@@ -1,0 +1,75 @@
+"""The Maggi/Kane equations, the baseline that drifts: a first-order system in (w, q) (Haug 2018, Eqs. 17-18).
+
+    D^T M D wd = D^T (M U B gamma + Q_A + S),   qd = D w - U B Phi_t
+
+q is integrated as it stands and nothing puts it back on Phi(q) = 0. D, B, V and U are those of the tangent-space form.
+"""
+
+import math
+
+from ..jit.kernels import callback, vector
+from ..maths.dense_linalg import copy
+from ..methods.explicit import ACCELERATE, NORM, PLACE
+from ..model.equations import set_time
+from ..workspaces.chart_workspace import TIME
+from ..workspaces.workspace import PLACEMENTS, load
+from .newton import NOT_FINITE, OK
+from .null_space import frictional_acceleration, look, project, reduced_mass, velocities, weighted_square
+from .null_space_chart import new_chart, tangent_map
+
+
+@callback(PLACE)
+def place(context, t, q):
+    """Take the positions q as they are: Phi_q, B, D and the factor of D^T M D. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    w.counters[PLACEMENTS] += 1
+    c.local.numbers[TIME] = t
+    if not set_time(s, t):
+        return NOT_FINITE
+    copy(vector(q, w.q.size), w.q)
+    status = tangent_map(s, w, t)
+    return reduced_mass(s, w) if status == OK else status
+
+
+@callback(ACCELERATE)
+def accelerate(context, t, velocity, wd, qd):
+    """Take the kinematic velocities w at the place last taken: qd and wd. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    velocities(s, w, t, vector(velocity, w.v.size))
+    status = frictional_acceleration(context, c, t, vector(wd, w.v.size))
+    copy(w.qd, vector(qd, w.q.size))
+    return status
+
+
+@callback("p")
+def check(context):
+    """Reason to choose a new V, or zero."""
+    return look(load(context))
+
+
+@callback(NORM, "d")
+def error_norm(context, eq, ew, old, rtol, atol):
+    """Root mean square of the errors eq of q and V ew of qd, over atol + rtol times the larger end of the step."""
+    w = load(context).work
+    n, k = w.q.size, w.v.size
+    eq, old = vector(eq, n), vector(old, 3 * n)
+    total = weighted_square(w, w.qd, n, vector(ew, k), old, rtol, atol)
+    for i in range(n):
+        x = eq[i] / (atol + rtol * max(abs(w.q[i]), abs(old[i])))
+        total += x * x
+    return math.sqrt(total / (2 * n))
+
+
+@callback("pdpppp")
+def start_chart(context, t, q, velocity, wd, qd):
+    """Choose U and V anew at the present q; w = V^T P0 qd, wd = V^T P0 qdd. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    set_time(s, t)
+    status = new_chart(s, w, c.free, c.local, c.network, t)
+    copy(w.q, vector(q, w.q.size))
+    copy(w.qd, vector(qd, w.q.size))
+    project(w, vector(velocity, w.v.size), vector(wd, w.v.size))
+    return status

@@ -1,0 +1,297 @@
+"""The tangent-space ODE in the paper's own form, with U, V, B and D (Haug 2018, Eqs. 19-29).
+
+    q   = q0 + V v - U u                                             Eq. 19
+    qd  = D vd - U B Phi_t                                           Eq. 23
+    D^T M D vdd = D^T (M U B gamma + Q_A + S)                        Eq. 26
+    qdd = D vdd - U B gamma                                          Eq. 24
+
+M_r = m I and M_p = 4 G^T J' G give D^T M D = sum m D_r^T D_r + E^T J' E with E = 2 G D_p, the body's angular velocity
+per vd; S_p = 8 Gd^T J' Gd p.
+"""
+
+import math
+
+from ..elements.loops.body_poses import place_bodies
+from ..errors import Status
+from ..jit.kernels import callback, kernel, vector
+from ..maths.dense_linalg import cholesky, cholesky_solve, transposed_times
+from ..methods.explicit import ACCELERATE, NORM, PLACE
+from ..model.equations import acceleration_bias, applied_forces, is_rheonomic, set_time, time_derivative
+from ..rows.evaluation import held, run_loops
+from ..sparse.constraint_graph import REDUCED
+from ..workspaces.chart_workspace import TIME
+from ..workspaces.workspace import EVALUATIONS, FACTORIZATIONS, FLOOR, PLACEMENTS, load
+from .chart_validity import measure_turns, turning
+from .friction_solve import call_rub, forget_loads
+from .newton import NOT_FINITE, OK, leave_out, solve_positions, subtract_normal
+from .null_space_chart import new_chart, tangent_map
+
+PIVOT_LIMIT = 1e-14  # of D^T M D: less than this is rounding
+MASS_SINGULAR, UNHELD = int(Status.MASS_SINGULAR), int(Status.UNHELD)
+
+
+@kernel
+def reduced_mass(s, w):
+    """E and the Cholesky factor of D^T M D at the present q. Status."""
+    k = w.v.size
+    for i in range(k):
+        for j in range(i + 1):
+            w.A[i, j] = 0.0
+    for b in range(s.mass.size):
+        at, mass = s.bodies[b, 0], s.mass[b]
+        for c in range(at, at + 3):
+            for i in range(k):
+                f = mass * w.D[c, i]
+                if f != 0.0:
+                    for j in range(i + 1):
+                        w.A[i, j] += f * w.D[c, j]
+        if s.bodies[b, 1] == 7:
+            e0, e1, e2, e3 = 2.0 * w.q[at + 3], 2.0 * w.q[at + 4], 2.0 * w.q[at + 5], 2.0 * w.q[at + 6]
+            x, y, z = w.E[3 * b], w.E[3 * b + 1], w.E[3 * b + 2]
+            d0, d1, d2, d3 = w.D[at + 3], w.D[at + 4], w.D[at + 5], w.D[at + 6]
+            for j in range(k):
+                x[j] = -e1 * d0[j] + e0 * d1[j] + e3 * d2[j] - e2 * d3[j]
+                y[j] = -e2 * d0[j] - e3 * d1[j] + e0 * d2[j] + e1 * d3[j]
+                z[j] = -e3 * d0[j] + e2 * d1[j] - e1 * d2[j] + e0 * d3[j]
+            J = s.inertia[b]
+            for i in range(k):
+                f = J[0] * x[i] + J[1] * y[i] + J[2] * z[i]
+                g = J[3] * x[i] + J[4] * y[i] + J[5] * z[i]
+                h = J[6] * x[i] + J[7] * y[i] + J[8] * z[i]
+                for j in range(i + 1):
+                    w.A[i, j] += f * x[j] + g * y[j] + h * z[j]
+    w.counters[FACTORIZATIONS] += 1
+    return OK if cholesky(w.A, k, PIVOT_LIMIT) else MASS_SINGULAR
+
+
+@kernel
+def velocities(s, w, t, vd):
+    """qd = D vd - U B Phi_t, Eq. 23."""
+    n, k = w.q.size, vd.size
+    for i in range(n):
+        x = 0.0
+        for j in range(k):
+            x += w.D[i, j] * vd[j]
+        w.qd[i] = x
+    if is_rheonomic(s):
+        time_derivative(s, w.q, t, w.Phi_t)
+        leave_out(w, w.Phi_t)
+        _correct(w, w.Phi_t, w.qd)
+
+
+@kernel
+def _refine_velocities(s, w):
+    """qd -= U B (Phi_q qd + Phi_t)."""
+    driven = is_rheonomic(s)
+    for i in range(w.Phi.size):
+        w.Phi[i] = (w.Phi_t[i] if driven else 0.0) + _row_times(s, w, i, w.qd)
+    _correct(w, w.Phi, w.qd)
+
+
+@kernel
+def _row_times(s, w, i, x):
+    """Row i of Phi_q x."""
+    total = 0.0
+    for part in range(0, 4, 2):
+        begin = s.segments[i, part]
+        for j in range(begin, begin + s.segments[i, part + 1]):
+            total += w.Phi_q[i, j] * x[j]
+    return total
+
+
+@kernel
+def _correct(w, f, out):
+    """out -= U B f, by z = B f."""
+    m = f.size
+    for i in range(m):
+        x = 0.0
+        for j in range(m):
+            x += w.B[i, j] * f[j]
+        w.z[i] = x
+    subtract_normal(w, out)
+
+
+@kernel
+def reduced_acceleration(s, w, t, vdd):
+    """vdd of Eq. 26 at the present q and qd. Status."""
+    n, k = w.q.size, vdd.size
+    acceleration_bias(s, w.q, w.qd, t, w.gamma)
+    leave_out(w, w.gamma)
+    for i in range(n):
+        w.h[i] = 0.0
+    _correct(w, w.gamma, w.h)  # h = -U B gamma, what qdd is at vdd = 0
+    for j in range(k):
+        vdd[j] = 0.0
+    for b in range(s.mass.size):
+        at, mass = s.bodies[b, 0], s.mass[b]
+        for c in range(3):
+            f = mass * (s.gravity[c] - w.h[at + c])
+            for j in range(k):
+                vdd[j] += f * w.D[at + c, j]
+        if s.bodies[b, 1] == 7:
+            e0, e1, e2, e3 = w.q[at + 3], w.q[at + 4], w.q[at + 5], w.q[at + 6]
+            d0, d1, d2, d3 = w.qd[at + 3], w.qd[at + 4], w.qd[at + 5], w.qd[at + 6]
+            a0, a1, a2, a3 = -2.0 * w.h[at + 3], -2.0 * w.h[at + 4], -2.0 * w.h[at + 5], -2.0 * w.h[at + 6]
+            J = s.inertia[b]
+            x = -e1 * a0 + e0 * a1 + e3 * a2 - e2 * a3  # 2 G (U B gamma)_p
+            y = -e2 * a0 - e3 * a1 + e0 * a2 + e1 * a3
+            z = -e3 * a0 + e2 * a1 - e1 * a2 + e0 * a3
+            f0 = J[0] * x + J[1] * y + J[2] * z
+            f1 = J[3] * x + J[4] * y + J[5] * z
+            f2 = J[6] * x + J[7] * y + J[8] * z
+            x = -d1 * e0 + d0 * e1 + d3 * e2 - d2 * e3  # Gd p
+            y = -d2 * e0 - d3 * e1 + d0 * e2 + d1 * e3
+            z = -d3 * e0 + d2 * e1 - d1 * e2 + d0 * e3
+            g0 = 8.0 * (J[0] * x + J[1] * y + J[2] * z)
+            g1 = 8.0 * (J[3] * x + J[4] * y + J[5] * z)
+            g2 = 8.0 * (J[6] * x + J[7] * y + J[8] * z)
+            s0 = -d1 * g0 - d2 * g1 - d3 * g2  # S_p = 8 Gd^T J' Gd p
+            s1 = d0 * g0 - d3 * g1 + d2 * g2
+            s2 = d3 * g0 + d0 * g1 - d1 * g2
+            s3 = -d2 * g0 + d1 * g1 + d0 * g2
+            for j in range(k):
+                vdd[j] += (
+                    f0 * w.E[3 * b, j]
+                    + f1 * w.E[3 * b + 1, j]
+                    + f2 * w.E[3 * b + 2, j]
+                    + s0 * w.D[at + 3, j]
+                    + s1 * w.D[at + 4, j]
+                    + s2 * w.D[at + 5, j]
+                    + s3 * w.D[at + 6, j]
+                )
+    if s.forces.shape[0] > 0:
+        for c in range(n):
+            w.Q[c] = 0.0
+        applied_forces(s, w.q, w.qd, t, w.Q)
+        for c in range(n):
+            f = w.Q[c]
+            if f != 0.0:
+                for j in range(k):
+                    vdd[j] += f * w.D[c, j]
+    cholesky_solve(w.A, vdd, k)
+    total = 0.0
+    for j in range(k):
+        total += abs(vdd[j])
+    w.counters[EVALUATIONS] += 1
+    return OK if total < math.inf else NOT_FINITE
+
+
+@kernel
+def frictional_acceleration(context, c, t, vdd):
+    """`reduced_acceleration`, then what the frictions of joints change. Status."""
+    s, network = c.system, c.network
+    frictions = network.frictions.shape[0] > 0
+    if frictions:
+        forget_loads(s)
+    status = reduced_acceleration(s, c.work, t, vdd)
+    return call_rub(network.rub[0], context, t, vdd) if frictions and status == OK else status
+
+
+@callback(PLACE)
+def place(context, t, v):
+    """Take the position coordinates v: q, Phi_q, B, D and the factor of D^T M D. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    w.counters[PLACEMENTS] += 1
+    c.local.numbers[TIME] = t
+    if not set_time(s, t):
+        return NOT_FINITE
+    status = solve_positions(s, w, t, vector(v, w.v.size))
+    if status == OK:
+        status = tangent_map(s, w, t)
+    return reduced_mass(s, w) if status == OK else status
+
+
+@callback(ACCELERATE)
+def accelerate(context, t, vd, vdd, unused):
+    """Take the velocity coordinates vd at the place last taken: qd and vdd. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    velocities(s, w, t, vector(vd, w.v.size))
+    if c.linear.K.size > 0:  # of implicit methods, whose long steps leave B less exact
+        _refine_velocities(s, w)
+    return frictional_acceleration(context, c, t, vector(vdd, w.v.size))
+
+
+@callback("pp")
+def complete(context, vdd):
+    """Accelerations qdd = D vdd - U B gamma, Eq. 24, after `accelerate`, refined once by Phi_q qdd + gamma."""
+    c = load(context)
+    s, w = c.system, c.work
+    vdd = vector(vdd, w.v.size)
+    for i in range(w.q.size):
+        x = w.h[i]
+        for j in range(vdd.size):
+            x += w.D[i, j] * vdd[j]
+        w.qdd[i] = x
+    for i in range(w.gamma.size):
+        x = w.gamma[i]
+        for part in range(0, 4, 2):
+            begin = s.segments[i, part]
+            for j in range(begin, begin + s.segments[i, part + 1]):
+                x += w.Phi_q[i, j] * w.qdd[j]
+        w.Phi[i] = x
+    _correct(w, w.Phi, w.qdd)
+    return OK
+
+
+@callback("p")
+def check(context):
+    """Reason to leave the chart, or zero."""
+    return look(load(context))
+
+
+@kernel
+def look(c):
+    """Reason to leave the chart at the present q, or zero."""
+    w, f, l, network = c.work, c.free, c.local, c.network
+    place_bodies(network.bodies, w.q, f.poses)
+    measure_turns(network, w.q, l)
+    run_loops(network, c.system.reals, REDUCED, f, l.numbers[TIME], f.b, f.H)
+    return turning(network, w, f, l)
+
+
+@kernel
+def weighted_square(w, values, at, e, old, rtol, atol):
+    """((V e)_i / (atol + rtol |value|))^2 summed over the coordinates; old begins at old[at]."""
+    total = 0.0
+    for i in range(values.size):
+        x = 0.0
+        for j in range(e.size):
+            x += w.V[i, j] * e[j]
+        x /= atol + rtol * max(abs(values[i]), abs(old[at + i]))
+        total += x * x
+    return total
+
+
+@callback(NORM, "d")
+def error_norm(context, ev, evd, old, rtol, atol):
+    """Root mean square of the errors V ev of q and V evd of qd, over atol + rtol times the larger end of the step."""
+    w = load(context).work
+    n, k = w.q.size, w.v.size
+    old = vector(old, 3 * n)
+    total = weighted_square(w, w.q, 0, vector(ev, k), old, rtol, atol)
+    total += weighted_square(w, w.qd, n, vector(evd, k), old, rtol, atol)
+    return math.sqrt(total / (2 * n))
+
+
+@callback("pdpppp")
+def start_chart(context, t, v, vd, vdd, unused):
+    """Make a chart at the present q; v = 0, vd = V^T P0 qd, vdd = V^T P0 qdd, Eq. 27. Status."""
+    c = load(context)
+    s, w = c.system, c.work
+    set_time(s, t)
+    status = new_chart(s, w, c.free, c.local, c.network, t)
+    k = w.v.size
+    v = vector(v, k)
+    for j in range(k):
+        v[j] = 0.0
+    project(w, vector(vd, k), vector(vdd, k))
+    return UNHELD if status == OK and not held(c.free, w.control[FLOOR]) else status
+
+
+@kernel
+def project(w, vd, vdd):
+    """vd = V^T P0 qd and vdd = V^T P0 qdd."""
+    transposed_times(w.L, w.qd, vd)
+    transposed_times(w.L, w.qdd, vdd)

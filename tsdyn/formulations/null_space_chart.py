@@ -1,0 +1,160 @@
+"""Charts in the paper's own form (Eqs. 5-9, 27): made at q0, with U and V, and used; `local_chart` says when to leave.
+
+U spans W0 Phi_q0^T, W0 the inverse of the mass matrix with p p^T added: the normal space in the metric of kinetic
+energy, so that lengths and angles are weighed as the motion weighs them. Columns are scaled so that Phi_q0 U has a
+diagonal of ones; those of normalisation rows are p0. V is orthonormal. L^T is V^T P0, with P0 = I - U (Phi_q0 U)^-1
+Phi_q0 the projection along U: L^T V = I, L^T U = 0.
+"""
+
+import math
+
+from ..jit.kernels import kernel
+from ..maths.dense_linalg import null_space
+from ..model.equations import constraint_jacobian
+from ..workspaces.workspace import FACTORIZATIONS, KEPT, RATE
+from .chart_validity import touch
+from .newton import OK, SINGULAR, invert_normal_matrix, leave_rows_out, normal_matrix, update_b
+
+RANK_LIMIT = 1e-14  # smallest singular value of Phi_q, rows scaled to length one: less is rounding; S, in the metric
+# of the masses, says what is independent: rows of points that are a nanometre apart differ by 1e-9
+
+
+@kernel
+def new_chart(s, w, f, l, network, t):
+    """Make a chart at the present q: q0, U, V by SVD, B, L; u = 0, v = 0. Status."""
+    n, m, k = w.q.size, w.u.size, w.v.size
+    regular = touch(network, s, w, f, l, t)
+    w.left_out[0] = f.dropped[0]
+    for i in range(f.dropped[0]):
+        w.left_out[1 + i] = network.row[f.dropped[1 + i]]
+    constraint_jacobian(s, w.q, t, w.Phi_q)
+    leave_rows_out(w)
+    kept = 0
+    for i in range(n):
+        w.q0[i] = w.q[i]
+    for i in range(m):
+        x = 0.0
+        for c in range(n):
+            x += w.Phi_q[i, c] * w.Phi_q[i, c]
+        w.u[i] = 0.0
+        if x > 0.0:
+            x = 1.0 / math.sqrt(x)
+            for c in range(n):
+                w.householder[c, kept] = w.Phi_q[i, c] * x
+            kept += 1
+    if kept != n - k:
+        return SINGULAR
+    for j in range(k):
+        w.v[j] = 0.0
+    low, high = null_space(w.householder, n, kept, w.V, w.R, w.z)
+    if m > 0 and not (regular and low > RANK_LIMIT * high):
+        return SINGULAR
+    _normal_space(network, w, l)
+    normal_matrix(s, w)
+    if not invert_normal_matrix(w) or update_b(w) != OK:
+        return SINGULAR
+    _left_inverse(w)
+    w.control[RATE] = 0.1
+    return OK
+
+
+@kernel
+def _normal_space(network, w, l):
+    """U from Y0 and p0."""
+    for i in range(w.U.shape[0]):
+        for j in range(w.U.shape[1]):
+            w.U[i, j] = 0.0
+    diagonal = l.S0[network.pattern.shape[1] :]
+    for b in range(network.bodies.shape[0]):
+        if network.normals[b] >= 0:
+            for c in range(4):
+                w.U[network.bodies[b, 0] + 3 + c, network.normals[b]] = l.base[8 * b + 4 + c]
+    for e in range(network.row.size):
+        if network.row[e] < 0:
+            continue
+        j, scale = network.row[e], 1.0 / diagonal[e]
+        for side in range(2):
+            b, y = network.sides[e, side], 16 * e + 8 * side
+            if b == network.bodies.shape[0]:
+                continue
+            i, o = network.bodies[b, 0], 8 * b + 4
+            for c in range(3):
+                w.U[i + c, j] = scale * l.Y0[y + c]
+            if network.bodies[b, 1] == 7:
+                e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
+                f = 0.5 * scale
+                a0, a1, a2 = f * l.Y0[y + 4], f * l.Y0[y + 5], f * l.Y0[y + 6]
+                w.U[i + 3, j] = -e1 * a0 - e2 * a1 - e3 * a2
+                w.U[i + 4, j] = e0 * a0 - e3 * a1 + e2 * a2
+                w.U[i + 5, j] = e3 * a0 + e0 * a1 - e1 * a2
+                w.U[i + 6, j] = -e2 * a0 + e1 * a1 + e0 * a2
+
+
+@kernel
+def _left_inverse(w):
+    """L = V - Phi_q^T B^T U^T V at q0; T and X are scratch, T zero at the end, as it is at q0."""
+    n, m, k = w.q.size, w.u.size, w.v.size
+    for i in range(m):
+        for j in range(k):
+            w.T[i, j] = 0.0
+            w.X[i, j] = 0.0
+        for c in range(n):
+            f = w.U[c, i]
+            if f != 0.0:
+                for j in range(k):
+                    w.T[i, j] += f * w.V[c, j]
+    for i in range(m):
+        for c in range(m):
+            f = w.B[c, i]
+            for j in range(k):
+                w.X[i, j] += f * w.T[c, j]
+    for i in range(n):
+        for j in range(k):
+            w.L[i, j] = w.V[i, j]
+        for c in range(m):
+            f = w.Phi_q[c, i]
+            if f != 0.0:
+                for j in range(k):
+                    w.L[i, j] -= f * w.X[c, j]
+    for i in range(m):
+        for j in range(k):
+            w.T[i, j] = 0.0
+
+
+@kernel
+def tangent_map(s, w, t):
+    """Phi_q, N, B, T = B Phi_q V and D = V - U T at the present q, Eqs. 7, 9, 28. Status."""
+    n, m, k = w.q.size, w.u.size, w.v.size
+    constraint_jacobian(s, w.q, t, w.Phi_q)
+    leave_rows_out(w)
+    normal_matrix(s, w)
+    made = w.counters[FACTORIZATIONS]
+    status = update_b(w)
+    if status != OK:
+        return status
+    w.counters[KEPT] += 1 if w.counters[FACTORIZATIONS] == made and m > 0 else 0
+    for i in range(m):
+        for j in range(k):
+            w.X[i, j] = 0.0
+        for part in range(0, 4, 2):
+            begin = s.segments[i, part]
+            for c in range(begin, begin + s.segments[i, part + 1]):
+                f = w.Phi_q[i, c]
+                for j in range(k):
+                    w.X[i, j] += f * w.V[c, j]
+    for i in range(m):
+        for j in range(k):
+            w.T[i, j] = 0.0
+        for c in range(m):
+            f = w.B[i, c]
+            for j in range(k):
+                w.T[i, j] += f * w.X[c, j]
+    for i in range(n):
+        for j in range(k):
+            w.D[i, j] = w.V[i, j]
+        for c in range(m):
+            f = w.U[i, c]
+            if f != 0.0:
+                for j in range(k):
+                    w.D[i, j] -= f * w.T[c, j]
+    return OK

@@ -1,0 +1,79 @@
+"""The formulations of the equations of motion, as the addresses of their kernels."""
+
+from dataclasses import dataclass, replace
+from types import ModuleType
+
+from ..sparse.constraint_graph import REDUCED
+from ..sparse.networks import network_of
+from ..validation import unknown_name
+from . import friction_basis, friction_solve, maggi_kane, null_space, tangent
+from . import linearisation as linearise
+from .locked_orientations import moving_network
+
+
+@dataclass(frozen=True)
+class Formulation:
+    """A module of kernels: place, accelerate, complete, check, start_chart."""
+
+    name: str
+    kernels: ModuleType
+    first_order: bool = False
+    basis_free: bool = False
+
+    def serving(self, method):
+        """The form that a method runs a scene in: implicit methods need a basis."""
+        if self.basis_free and method.implicit:
+            return replace(self, kernels=null_space, basis_free=False)
+        return self
+
+    def network(self, packed):
+        """The scene's network with the loops that the kernels call; that of the forms with a basis has every row."""
+        network = moving_network(packed, *self.kernels.COLUMNS) if self.basis_free else network_of(packed, REDUCED)
+        if network.frictions.size and network.rub[0] == 0:
+            network.rub[0] = (friction_solve if self.basis_free else friction_basis).rub.address
+        return network
+
+    def sizes(self, n, rank, bodies):
+        """Lengths of x and y; rank is that of Phi_q."""
+        if self.basis_free:
+            return 8 * bodies, 8 * bodies
+        return n if self.first_order else n - rank, n - rank
+
+    def addresses(self):
+        """Addresses in the order that the driver expects; loads or compiles them."""
+        k = self.kernels
+        complete = (k if self.basis_free else null_space).complete  # qdd = D vdd - U B gamma in the others
+        return [f.address for f in (k.place, k.accelerate, complete, k.check, k.start_chart)]
+
+    def implicit(self):
+        """Addresses that implicit methods need, in the order of implicit.LINEARISE ... ERROR_NORM."""
+        kernels = (
+            linearise.linearise,
+            linearise.reduce,
+            linearise.factorise,
+            linearise.solve,
+            linearise.soften,
+            null_space.complete,
+        )
+        return [f.address for f in (*kernels, self.kernels.error_norm)]
+
+    def norm(self):
+        """Address of the error norm, for adaptive methods."""
+        return self.kernels.error_norm.address
+
+
+FORMULATIONS = {
+    f.name: f
+    for f in (
+        Formulation("tangent", tangent, basis_free=True),
+        Formulation("null-space", null_space),
+        Formulation("maggi-kane", maggi_kane, first_order=True),
+    )
+}
+
+
+def formulation(name):
+    """Return the formulation of this name."""
+    if not isinstance(name, str) or name not in FORMULATIONS:
+        raise unknown_name("formulation", name, FORMULATIONS)
+    return FORMULATIONS[name]

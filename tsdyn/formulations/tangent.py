@@ -1,0 +1,343 @@
+"""The tangent-space ODE without a basis of the tangent space: the same motion as by Eq. 26, at a cost that is O(N).
+
+    (rho, eta)      = x - Y0 u,         u from Phi = 0                           Eqs. 19-22, see chart_workspace.py
+    (rhod, etad)    = xd - Y0 z,        N z = H C xd + Phi_t                      Eq. 23
+    (rdd, omega'd)  = W (F - H^T lam),  (H W H^T) lam = H W F + gamma             Eqs. 3, 4
+    xdd             = (rhodd, etadd)
+
+H = [Phi_r, Phi_pi'] at q, Y0 = W0 H0^T at q0, N = H C Y0, F the forces. xdd is taken whole: what of it lies in the
+normal space is what the position solve takes out again, so that x carries the curvature of the manifold along, u and z
+are no more than a step's truncation error, and Newton's method is there after one sweep or two. Runge-Kutta steps are
+linear, so V^T x is the v of the null-space form.
+"""
+
+import math
+
+from ..elements.loops.body_poses import write_accelerations, write_positions, write_velocities
+from ..errors import Status
+from ..jit.kernels import callback, kernel, vector
+from ..maths.dense_linalg import copy, largest
+from ..methods.explicit import ACCELERATE, NORM, PLACE
+from ..model.equations import is_rheonomic, set_time
+from ..rows.axis_rows import is_axis
+from ..rows.evaluation import held, run_loops
+from ..rows.schur_complement import gather, scatter
+from ..rows.selection import factor_rows
+from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
+from ..sparse.factorisation import solve, solve_lu
+from ..workspaces.chart_workspace import END, FACTORED, OFF, TIME
+from ..workspaces.workspace import (
+    AT_ROUNDING,
+    CONTRACTION,
+    EVALUATIONS,
+    FACTORIZATIONS,
+    FLOOR,
+    KEPT,
+    NEWTON,
+    PLACEMENTS,
+    RATE,
+    SIZE,
+    U_TOL,
+    UNVERIFIED,
+    load,
+)
+from .accelerations import solve_accelerations
+from .chart_coordinates import (
+    displace,
+    factorise_normal,
+    gather_rates,
+    largest_rates,
+    turn_rates,
+    write_back,
+)
+from .chart_validity import BY_FAILURE, CONTRACTION_LOST, touch, turning
+from .friction_solve import call_rub
+
+OK, SINGULAR, MASS_SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR), int(Status.MASS_SINGULAR)
+NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
+CHART_LOST, UNHELD = int(Status.CHART_LOST), int(Status.UNHELD)
+COLUMNS = REDUCED, VALUES, BIAS, DRIFT  # the loops of a network that are called
+SWEEPS, RENEWALS = 24, 4
+CURVATURE = 1.0  # 1 / m: what Newton's method leaves of an error, over its square, where none has been measured
+SPEED_ROUNDING = 2e-16
+
+
+@callback(PLACE)
+def place(context, t, x):
+    """Take the coordinates x (8 b,): poses on the manifold, H, W H^T and the factors of S. Status."""
+    c = load(context)
+    s, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    w.counters[PLACEMENTS] += 1
+    l.numbers[TIME] = t
+    if not set_time(s, t):
+        return NOT_FINITE
+    x, status = vector(x, l.x.size - 8), NEWTON_FAILED
+    for attempt in range(2):
+        copy(x, l.x)
+        if attempt == 1:  # a long step: from the tangent plane, P0 x
+            gather(network, l.H0, l.x, w.u)
+            solve(network.pattern, l.S0, w.u)
+        scatter(network, l.Y0, w.u, l.x)
+        status = _solve_positions(network, s, w, f, l, t, RENEWALS * attempt)
+        if status == OK or f.b.size == 0:
+            break
+    if status != OK:
+        return status
+    if f.b.size > 0:
+        w.counters[FACTORIZATIONS] += 1
+        failed = factor_rows(network, f, f.H, f.Y, f.S, 1)
+        if failed >= 0:
+            return MASS_SINGULAR if is_axis(network, f.S, failed) else SINGULAR
+    if s.forces.shape[0] > 0:
+        write_positions(network.bodies, f.poses, w.q)
+    return OK
+
+
+@kernel
+def _solve_positions(network, s, w, f, l, t, renewals):
+    """Newton's method for u, N being that of its start or made anew so often; poses and H at the solution. Status.
+
+    It ends where what is left, |Phi| or what the convergence so far lets expect of it, is below u_tol^(3/2) or
+    rounding; H is taken there, with the last |Phi|.
+    """
+    floor = w.control[FLOOR]
+    tol = max(w.control[U_TOL], floor)
+    left = max(tol * math.sqrt(tol), floor)
+    column, before, rate, ending, anew = REDUCED, math.inf, 0.0, False, 0
+    l.numbers[FACTORED] = 0.0
+    for sweep in range(SWEEPS):
+        if not displace(network, l, f.poses):
+            return CHART_LOST
+        if f.b.size == 0:
+            return OK
+        run_loops(network, s.reals, column, f, t, f.b, f.H)
+        worst = largest(f.b)
+        if not worst < math.inf:
+            return NOT_FINITE
+        slow = worst > 0.25 * before
+        if worst <= left or ending or (slow and worst <= 100.0 * floor):
+            if column == REDUCED:
+                w.counters[AT_ROUNDING if sweep == 0 else UNVERIFIED] += 0 if ending else 1
+                return OK
+            column, ending = REDUCED, True  # once more, for H
+            continue
+        if slow:  # N was that of another place
+            anew += 1
+            if anew > renewals:
+                return NEWTON_FAILED
+            l.numbers[FACTORED] = 0.0
+            if column != REDUCED:
+                column, before = REDUCED, math.inf
+                continue
+        elif before < math.inf:
+            if worst > 100.0 * floor and rate == 0.0:
+                w.control[RATE] = worst / (before * before)
+            rate = worst / before
+        if l.numbers[FACTORED] == 0.0:
+            if not factorise_normal(network, w, f, l):
+                return SINGULAR
+            l.numbers[FACTORED], l.numbers[OFF], rate = 1.0, w.control[RATE] * worst, 0.0
+        solve_lu(network.pattern, l.lower, l.upper, f.b)
+        w.counters[NEWTON] += 1
+        scatter(network, l.Y0, f.b, l.x)
+        for e in range(f.b.size):
+            w.u[e] += f.b[e]
+        expected = worst * (rate if rate > 0.0 else w.control[RATE] * worst)
+        column, before = REDUCED if expected <= left else VALUES, worst
+    return NEWTON_FAILED
+
+
+@kernel
+def solve_velocities(network, s, w, f, l, t):
+    """rd and omega' of the poses from the rates l.y, freed of what would leave the manifold. Whether there are any.
+
+    The factors are those of N at the start of the position solve, or, where it needed none, those of S as long as they
+    do.
+    """
+    rheonomic = is_rheonomic(s)
+    if rheonomic:
+        run_loops(network, s.reals, DRIFT, f, t, l.drift, f.H)
+    factored = l.numbers[FACTORED] > 0.0
+    if not factored and network.axes.rows.shape[0] > 0:  # S is of another metric than the chart
+        if not factorise_normal(network, w, f, l):
+            return False
+        factored, l.numbers[FACTORED], l.numbers[OFF] = True, 1.0, 0.0
+    lower, upper = l.lower if factored else f.S, l.upper if factored else f.S
+    floor, before = 0.0, math.inf
+    for sweep in range(SWEEPS):
+        turn_rates(network, l, l.y, f.poses)
+        if f.b.size == 0:
+            return True
+        if sweep == 0:
+            speed, spin = largest_rates(network, f.poses)
+            floor = SPEED_ROUNDING * (speed + w.control[SIZE] * spin)
+        gather_rates(network, f.H, f.poses, f.b)
+        if rheonomic:
+            for e in range(f.b.size):
+                f.b[e] += l.drift[e]
+        worst = largest(f.b)
+        if not worst < math.inf:
+            return False
+        if worst <= floor or (factored and worst > 0.5 * before and worst <= 100.0 * floor):
+            w.counters[KEPT] += 0 if factored else 1
+            return True
+        if not factored and worst > 0.1 * before:
+            if not factorise_normal(network, w, f, l):
+                return False
+            lower, upper, factored = l.lower, l.upper, True
+            l.numbers[FACTORED], l.numbers[OFF] = 1.0, 0.0
+        solve_lu(network.pattern, lower, upper, f.b)
+        scatter(network, l.Y0, f.b, l.y)
+        before = worst
+    return True
+
+
+@callback(ACCELERATE)
+def accelerate(context, t, y, yd, unused):
+    """Take the rates y (8 b,) at the place last taken: velocities, accelerations and y'. Status."""
+    c = load(context)
+    s, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    n = l.x.size - 8
+    yd = vector(yd, n)
+    copy(vector(y, n), l.y)
+    if not solve_velocities(network, s, w, f, l, t):
+        return NOT_FINITE
+    if s.forces.shape[0] > 0:
+        write_velocities(network.bodies, f.poses, w.qd)
+    if network.frictions.shape[0] > 0:
+        status = call_rub(network.rub[0], context, t, yd)
+        if status != OK:
+            return status
+    else:
+        solve_accelerations(network, s, w, f, t)
+    write_back(network, l, f.poses, f.Z, yd)
+    w.counters[EVALUATIONS] += 1
+    total = 0.0
+    for i in range(n):
+        total += abs(yd[i])
+    return OK if total < math.inf else NOT_FINITE
+
+
+@callback("pp")
+def complete(context, yd):
+    """Write q, qd and qdd after `accelerate`, the accelerations refined once by H (rdd, omega'd) + gamma."""
+    c = load(context)
+    w, f, network = c.work, c.free, c.network
+    if f.b.size > 0:
+        gather(network, f.H, f.Z, f.b)
+        for e in range(f.b.size):
+            f.b[e] += f.gamma[e]
+        solve(network.pattern, f.S, f.b)
+        scatter(network, f.Y, f.b, f.Z)
+    write_positions(network.bodies, f.poses, w.q)
+    write_velocities(network.bodies, f.poses, w.qd)
+    write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
+    return OK
+
+
+@callback("p")
+def check(context):
+    """Reason to leave the chart, or zero."""
+    c = load(context)
+    w, f, l = c.work, c.free, c.local
+    reason = turning(c.network, w, f, l)
+    l.numbers[END] = w.counters[PLACEMENTS] if w.control[CONTRACTION] < CONTRACTION_LOST else 0.0
+    if not held(f, w.control[FLOOR]):
+        return BY_FAILURE  # the next chart can't be made, and says why
+    return reason
+
+
+@callback("pdpppp")
+def start_chart(context, t, x, y, yd, unused):
+    """Make a chart at the present q: x = 0, y = (rd, omega'), y' = (rdd, omega'd). Status."""
+    c = load(context)
+    s, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    if not set_time(s, t):
+        return NOT_FINITE
+    regular = touch(network, s, w, f, l, t)
+    x, y, yd = vector(x, l.x.size - 8), vector(y, l.x.size - 8), vector(yd, l.x.size - 8)
+    for i in range(x.size):
+        x[i] = 0.0
+    for e in range(w.u.size):
+        w.u[e] = 0.0
+    w.control[RATE] = CURVATURE
+    for b in range(network.bodies.shape[0]):
+        i, o = network.bodies[b, 0], 8 * b
+        for c in range(3):
+            y[o + c], yd[o + c] = w.qd[i + c], w.qdd[i + c]
+        if network.bodies[b, 1] == 7:
+            _spin(w.q, w.qd, i + 3, y, o + 4)
+            _spin(w.q, w.qdd, i + 3, yd, o + 4)
+    if not regular:
+        return SINGULAR
+    return OK if held(f, w.control[FLOOR]) else UNHELD
+
+
+@kernel
+def _spin(q, qd, i, out, o):
+    """out[o : o + 3] = 2 G pd / p.p, p.p - 1 being exact to rounding of itself: over many charts a bias adds up."""
+    e0, e1, e2, e3 = q[i], q[i + 1], q[i + 2], q[i + 3]
+    d0, d1, d2, d3 = qd[i], qd[i + 1], qd[i + 2], qd[i + 3]
+    excess, low = -1.0, 0.0
+    for c in range(4):
+        e = q[i + c]
+        wide = 134217729.0 * e  # Dekker: e in two halves, so that their products are exact
+        high = wide - (wide - e)
+        rest = e - high
+        square = e * e
+        low += ((high * high - square) + 2.0 * high * rest) + rest * rest
+        total = excess + square
+        part = total - excess
+        low += (excess - (total - part)) + (square - part)
+        excess = total
+    f = 2.0 * (excess + low)
+    x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3
+    y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
+    z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
+    out[o], out[o + 1], out[o + 2] = 2.0 * x - f * x, 2.0 * y - f * y, 2.0 * z - f * z
+
+
+@kernel
+def _weighted_square(network, f, l, e, values, old, at, rtol, atol):
+    """(dq_i / (atol + rtol |value|))^2 summed, dq the change of coordinates (n,) that P0 e makes at q0."""
+    copy(e, f.Z)
+    for i in range(e.size, f.Z.size):
+        f.Z[i] = 0.0
+    if f.b.size > 0:
+        gather(network, l.H0, f.Z, f.b)
+        solve(network.pattern, l.S0, f.b)
+        scatter(network, l.Y0, f.b, f.Z)
+    total = 0.0
+    for b in range(network.bodies.shape[0]):
+        i, o = network.bodies[b, 0], 8 * b
+        for c in range(3):
+            x = f.Z[o + c] / (atol + rtol * max(abs(values[i + c]), abs(old[at + i + c])))
+            total += x * x
+        if network.bodies[b, 1] == 7:
+            i += 3
+            e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
+            x, y, z = 0.5 * f.Z[o + 4], 0.5 * f.Z[o + 5], 0.5 * f.Z[o + 6]
+            for c in range(4):
+                if c == 0:
+                    part = -e1 * x - e2 * y - e3 * z
+                elif c == 1:
+                    part = e0 * x - e3 * y + e2 * z
+                elif c == 2:
+                    part = e3 * x + e0 * y - e1 * z
+                else:
+                    part = -e2 * x + e1 * y + e0 * z
+                part /= atol + rtol * max(abs(values[i + c]), abs(old[at + i + c]))
+                total += part * part
+    return total
+
+
+@callback(NORM, "d")
+def error_norm(context, ex, ey, old, rtol, atol):
+    """Root mean square of the errors P0 ex of q and P0 ey of qd, over atol + rtol times the larger end of the step."""
+    c = load(context)
+    w, f, l, network = c.work, c.free, c.local, c.network
+    n, k = w.q.size, l.x.size - 8
+    old = vector(old, 3 * n)
+    total = _weighted_square(network, f, l, vector(ex, k), w.q, old, 0, rtol, atol)
+    total += _weighted_square(network, f, l, vector(ey, k), w.qd, old, n, rtol, atol)
+    return math.sqrt(total / (2 * n))

@@ -1,0 +1,7 @@
+"""Compilation: kernels, the cache of compiled kernels on disk, SIMD types.
+
+The only package that uses Numba's decorators and code generation. Imports errors, nothing else of tsdyn.
+
+Begin with kernels.py: `kernel` (a function that other kernels call), `entry` (called from Python), `Callback` (called
+by address). cache.py stores what was compiled under a hash of all code that it depends on, code_hash.py.
+"""

@@ -1,0 +1,259 @@
+"""A kernel cache on disk that never answers with a stale or damaged kernel.
+
+A file holds one compiled function. Its name contains the hash of all that the machine code depends on (`_code_hash`),
+its first bytes are the checksum of the rest. Files are written whole or not at all. A file that fails its checksum is
+deleted and its function compiled again. A complete cache in a read-only folder is used as it is.
+Numba's own settings and classes are left alone.
+"""
+
+import contextlib
+import hashlib
+import os
+import pickle
+import sys
+import tempfile
+import time
+import uuid
+import warnings
+from collections import Counter
+from functools import cache, cached_property
+from pathlib import Path
+
+import numba
+from numba.core.caching import _Cache, dumps
+from numba.core.compiler import CompileResult
+
+from .code_hash import deep_hash, platform_hash
+
+statistics = Counter()  # "hits", "misses", "damaged", "seconds" of this process
+_DAY = 86400.0
+_KEEP = 30 * _DAY  # files that nothing has read for so long are deleted
+_told = []
+_CHECKSUM = hashlib.sha256().digest_size
+
+
+def _bases():
+    bases = []
+    with contextlib.suppress(RuntimeError):  # no home folder
+        if numba.config.CACHE_DIR:
+            bases.append(Path(numba.config.CACHE_DIR) / "tsdyn")
+        elif sys.platform == "win32" and "LOCALAPPDATA" in os.environ:
+            bases.append(Path(os.environ["LOCALAPPDATA"]) / "tsdyn" / "Cache")
+        elif sys.platform == "darwin":
+            bases.append(Path("~/Library/Caches/tsdyn").expanduser())
+        else:
+            bases.append(Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "tsdyn")
+    owner = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
+    return [*bases, Path(tempfile.gettempdir()) / f"tsdyn-{owner}"]
+
+
+@cache
+def folders():
+    """Return the folders that kernels are read from; those that others may write to hold pickles not to be trusted."""
+    folder()  # makes one, if it can
+    return tuple(path for base in _bases() if (path := base / platform_hash()).is_dir() and _trusted(base, path))
+
+
+def _trusted(base, path):
+    if not hasattr(os, "getuid"):
+        return True
+    return all(
+        found.st_uid == os.getuid() or (found.st_uid == 0 and not found.st_mode & 0o022)
+        for found in (base.stat(), path.stat())
+    )
+
+
+@cache
+def folder():
+    """Return the folder that kernels are written to, or None where there is none."""
+    for base in _bases():
+        with contextlib.suppress(OSError):
+            path = base / platform_hash()
+            new = not path.is_dir()
+            path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+            path.mkdir(exist_ok=True, mode=0o700)
+            if hasattr(os, "getuid") and {base.stat().st_uid, path.stat().st_uid} != {os.getuid()}:
+                continue
+            tempfile.TemporaryFile(dir=path).close()
+            os.utime(path)
+            if new:
+                _prune(base, path)
+            return path
+    return None
+
+
+def _prune(base, keep):
+    """Delete the folders of other versions that no process has used for a month."""
+    for old in base.iterdir():
+        with contextlib.suppress(OSError):
+            if old.is_dir() and old != keep and time.time() - old.stat().st_mtime > _KEEP:
+                for file in old.iterdir():
+                    file.unlink()
+                old.rmdir()
+
+
+@cache
+def _prune_files():
+    """Delete the kernels that no process has read for a month; once a process, when it has compiled one."""
+    for file in folder().iterdir():
+        with contextlib.suppress(OSError):
+            if time.time() - file.stat().st_mtime > _KEEP:
+                file.unlink()
+
+
+class KernelCache(_Cache):
+    """The disk cache of one function, with a lock so that processes starting together compile once."""
+
+    def __init__(self, function):
+        self._function = function
+        self._lock = None
+
+    @cached_property
+    def _name(self):
+        """Computed at first use, when all that the function names is defined."""
+        function = self._function
+        home = Path(function.__code__.co_filename).stem
+        label = f"{home}.{function.__qualname__}".translate({ord(c): "" for c in '<>:"/\\|?*'})
+        return f"{label[:100]}-{deep_hash(function)}"
+
+    @property
+    def cache_path(self):
+        """The folder that kernels are written to."""
+        return str(folder())
+
+    def enable(self):
+        """Do nothing: kernels are always cached."""
+
+    disable = flush = enable
+
+    def load_overload(self, sig, target_context):
+        """Return the compiled function, or None; a miss takes the lock that save_overload gives back."""
+        started = time.perf_counter()
+        target_context.refresh()
+        file = self._file(sig, target_context.codegen())
+        found = self._load(file, target_context)
+        if found is None:
+            self.release()  # of a compilation that was interrupted
+            self._lock = _acquire(file)
+            found = self._load(file, target_context)
+        if found is None:
+            statistics["misses"] += 1
+            tell()
+        else:
+            statistics["hits"] += 1
+            self.release()
+        statistics["seconds"] += time.perf_counter() - started
+        return found
+
+    def has(self, sig, codegen):
+        """Whether there is a file of the compiled function."""
+        name = self._file(sig, codegen)
+        return any((path / name).exists() for path in folders())
+
+    def save_overload(self, sig, data):
+        """Store the compiled function and let waiting processes read it."""
+        try:
+            if not data.lifted and not data.library.has_dynamic_globals and folder() is not None:
+                payload = dumps(data._reduce())
+                _write(folder() / self._file(sig, data.codegen), payload)
+                _prune_files()
+        except OSError as error:
+            _warn(f"tsdyn can't store its compiled kernels in {folder()} ({error.strerror})")
+        finally:
+            self.release()
+
+    def release(self):
+        """Give the lock back, if it is held."""
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+    def _file(self, sig, codegen):
+        key = hashlib.sha256(repr((sig, codegen.magic_tuple())).encode()).hexdigest()
+        return f"{self._name}-{key[:12]}.kernel"
+
+    def _load(self, name, target_context):
+        for path in folders():
+            with contextlib.suppress(OSError):
+                file = path / name
+                content = file.read_bytes()
+                try:
+                    if hashlib.sha256(content[_CHECKSUM:]).digest() != content[:_CHECKSUM]:
+                        raise ValueError("checksum")
+                    found = CompileResult._rebuild(target_context, *pickle.loads(content[_CHECKSUM:]))
+                except Exception:  # whatever a damaged file makes of the loader
+                    statistics["damaged"] += 1
+                    file.unlink()
+                    continue
+                with contextlib.suppress(OSError):
+                    if time.time() - file.stat().st_mtime > _DAY:
+                        os.utime(file)
+                return found
+        return None
+
+
+def _write(path, payload):
+    """Write a file whole or not at all."""
+    partial = path.with_name(f"{path.name}.{os.getpid()}-{uuid.uuid4().hex[:12]}")
+    try:
+        partial.write_bytes(hashlib.sha256(payload).digest() + payload)
+        os.replace(partial, path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            partial.unlink()
+        raise
+
+
+def environment():
+    """What another process needs in its environment to use the same folder."""
+    return {"NUMBA_CACHE_DIR": numba.config.CACHE_DIR}
+
+
+def remove_partial_files(process):
+    """Delete what a process that was killed has left."""
+    for file in folder().glob(f"*.kernel.{process}-*"):
+        with contextlib.suppress(OSError):
+            file.unlink()
+
+
+def tell(line="tsdyn: compiling kernels, once for this version and machine ..."):
+    """Say, once a process, that there is something to wait for; nothing where that is said elsewhere."""
+    if not _told:
+        _told.append(True)
+        if line and not os.environ.get("TSDYN_QUIET"):
+            print(line, file=sys.stderr, flush=True)
+        if folder() is None:
+            _warn("tsdyn found no writable folder for its compiled kernels")
+
+
+@cache
+def _warn(what):
+    warnings.warn(
+        f"{what}, so every process compiles them again; free some space there, or set NUMBA_CACHE_DIR to a folder that "
+        "you can write to.",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
+
+def _acquire(name, patience=300.0):
+    """Lock a kernel, wait while another process compiles it; None where files can't be locked."""
+    try:
+        import fcntl
+
+        handle = open(folder() / f"{name}.lock", "w")  # noqa: SIM115  (held until the kernel is saved)
+    except (ImportError, OSError, TypeError):  # TypeError: no folder
+        return None
+    limit = time.monotonic() + patience
+    while True:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return handle
+        except BlockingIOError:
+            if time.monotonic() > limit:
+                handle.close()
+                return None
+            time.sleep(0.02)
+        except OSError:
+            handle.close()
+            return None

@@ -1,0 +1,156 @@
+"""Hash of everything that the machine code of a function depends on.
+
+Numba stamps a cached kernel with the content of its own file only, so an edit of a callee in another file is answered
+with the old machine code. Here the hash follows the references of a function instead: byte code and constants of the
+function itself and of all functions, classes, constants and modules that its code names, at any depth. An edit changes
+the hash of exactly the kernels that it concerns.
+"""
+
+import contextlib
+import enum
+import hashlib
+import pickle
+import sys
+import types
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numba
+from llvmlite import ir
+
+_LIBRARIES = ("numpy", "numba", "math", "cmath", "scipy")  # their versions say all about them
+_GENERATORS = ("compiler.py", "kernels.py", "simd.py")  # code that no function names: types and their lowering
+_PACKAGE = __name__.partition(".")[0]
+_known = {}  # function: hash; the function is kept alive, so that the key stays its own
+
+
+@cache
+def platform_hash():
+    """Hash the versions of all that compiles, and the package's own code generation."""
+    digest = hashlib.sha256(repr(sys.version_info[:2]).encode())
+    for name in ("numba", "llvmlite", "numpy"):
+        with contextlib.suppress(PackageNotFoundError):
+            digest.update(f"{name} {version(name)}\0".encode())
+    for file in _GENERATORS:
+        with contextlib.suppress(OSError):
+            digest.update((Path(__file__).parent / file).read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def deep_hash(function):
+    """Hash a function with all the code, constants and modules that its compiled form depends on."""
+    digest = hashlib.sha256(platform_hash().encode())
+    digest.update(_function_hash(_plain(function), ()))
+    return digest.hexdigest()[:24]
+
+
+def _plain(value):
+    return getattr(value, "py_func", getattr(value, "_defn", value))  # of a dispatcher, of an intrinsic
+
+
+def _function_hash(function, above):
+    """Hash a function; `above` are the functions whose hashes are being made."""
+    if function in above:
+        return f"recursion {above.index(function) - len(above)}".encode()
+    ours = (function.__module__ or "").partition(".")[0] == _PACKAGE  # a global of a user's may change
+    if ours and function in _known:
+        return _known[function]
+    digest, above = hashlib.sha256(), (*above, function)
+    _add_code(digest, function.__code__, function.__globals__, above)
+    for default in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).items()):
+        _add(digest, default, above)
+    for cell in function.__closure__ or ():
+        with contextlib.suppress(ValueError):  # an empty cell
+            _add(digest, cell.cell_contents, above)
+    result = digest.digest()
+    if ours:
+        _known[function] = result
+    return result
+
+
+def _add_code(digest, code, namespace, above):
+    digest.update(code.co_code)
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            _add_code(digest, constant, namespace, above)
+        else:
+            digest.update(repr(constant).encode())
+    modules = []
+    for name in code.co_names:
+        digest.update(f"{name}\0".encode())
+        if name in namespace:
+            value = namespace[name]
+            _add(digest, value, above)
+            if _has_attributes_of_interest(value):
+                modules.append(value)
+    for module in modules:  # what is reached as module.name, or package.module.name
+        for name in code.co_names:
+            value = vars(module).get(name)
+            if _has_attributes_of_interest(value):
+                if value not in modules:
+                    _add(digest, value, above)
+                    modules.append(value)
+            elif name in vars(module):
+                _add(digest, value, above)
+
+
+def _has_attributes_of_interest(value):
+    return isinstance(value, types.ModuleType) and value.__name__.partition(".")[0] not in _LIBRARIES
+
+
+def _add(digest, value, above):
+    options = getattr(value, "targetoptions", None)  # of a dispatcher: whether it may allocate, is inlined, ...
+    if options:
+        digest.update(repr(sorted(options.items())).encode())
+    value = _plain(value)
+    digest.update(f"{type(value).__qualname__}\0".encode())
+    if isinstance(value, types.FunctionType):
+        digest.update(_function_hash(value, above))
+    elif isinstance(value, types.ModuleType):
+        _add_module(digest, value)
+    elif isinstance(value, type):
+        _add_class(digest, value, above)
+    elif isinstance(value, numba.types.Type):
+        _add_type(digest, value)
+    elif isinstance(value, (tuple, list)):
+        digest.update(str(len(value)).encode())
+        for item in value:
+            _add(digest, item, above)
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            _add(digest, key, above)
+            _add(digest, item, above)
+    elif type(value).__module__.startswith("llvmlite"):  # its pickle changes when it has been used
+        digest.update((str(value) if isinstance(value, ir.Type) else type(value).__name__).encode())
+    else:
+        try:
+            digest.update(pickle.dumps(value, protocol=5))
+        except Exception:  # an object without a value of its own: its type has to do
+            digest.update(f"{type(value).__module__}\0".encode())
+
+
+def _add_module(digest, module):
+    digest.update(f"{module.__name__} {getattr(module, '__version__', '')}\0".encode())
+    file = getattr(module, "__file__", None) or ""
+    if file.endswith(".py") and module.__name__.partition(".")[0] not in (*_LIBRARIES, _PACKAGE):
+        with contextlib.suppress(OSError):
+            digest.update(Path(file).read_bytes())
+
+
+def _add_class(digest, kind, above):
+    digest.update(f"{kind.__module__}.{kind.__qualname__}\0".encode())
+    if issubclass(kind, enum.Enum):
+        digest.update(repr([(name, member.value) for name, member in kind.__members__.items()]).encode())
+    elif hasattr(kind, "_fields"):
+        digest.update(repr(kind._fields).encode())
+
+
+def _add_type(digest, kind):
+    """Add a Numba type: its name, and the names of fields, which a tuple's own name leaves out."""
+    digest.update(f"{kind}\0".encode())
+    kind = getattr(kind, "kind", kind)  # a named tuple in memory
+    if isinstance(kind, numba.types.BaseNamedTuple):
+        digest.update(repr(kind.fields).encode())
+        for field in kind.types:
+            _add_type(digest, field)

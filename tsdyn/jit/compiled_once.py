@@ -1,0 +1,15 @@
+"""Users' functions, compiled once a process: the same source and constants are the same compiled code.
+
+What is compiled stays in memory, whether it is referred to or not, so it is kept and found again.
+"""
+
+from .code_hash import deep_hash
+
+_made = {}
+
+
+def compiled_once(kind, function, make):
+    """What `make()` makes of a user's function, for use as `kind`; the same one for the same code and constants."""
+    key = kind, deep_hash(function)
+    found = _made.get(key)
+    return _made.setdefault(key, make()) if found is None else found

@@ -1,0 +1,227 @@
+"""Dense factorisations for small matrices, without LAPACK and without allocation."""
+
+import math
+
+from ..jit.kernels import kernel
+
+
+@kernel
+def copy(a, b):
+    """b = a."""
+    for i in range(a.size):
+        b[i] = a[i]
+
+
+@kernel
+def transposed_times(A, x, out):
+    """out = A^T x."""
+    for j in range(out.size):
+        total = 0.0
+        for i in range(x.size):
+            total += A[i, j] * x[i]
+        out[j] = total
+
+
+@kernel
+def cholesky(A, n, limit):
+    """Factor the lower triangle of A (n, n) in place, A = L L^T; the diagonal holds the reciprocals of L's.
+
+    False where A is not positive definite: where elimination leaves less than `limit` of a diagonal entry.
+    """
+    for j in range(n):
+        s = A[j, j]
+        for k in range(j):
+            s -= A[j, k] * A[j, k]
+        if not s > limit * A[j, j]:
+            return False
+        pivot = 1.0 / math.sqrt(s)
+        A[j, j] = pivot
+        for i in range(j + 1, n):
+            s = A[i, j]
+            for k in range(j):
+                s -= A[i, k] * A[j, k]
+            A[i, j] = s * pivot
+    return True
+
+
+@kernel
+def cholesky_solve(L, b, n):
+    """Solve L L^T x = b in place."""
+    for i in range(n):
+        s = b[i]
+        for k in range(i):
+            s -= L[i, k] * b[k]
+        b[i] = s * L[i, i]
+    for i in range(n - 1, -1, -1):
+        s = b[i] * L[i, i]
+        b[i] = s
+        for k in range(i):
+            b[k] -= L[i, k] * s
+
+
+@kernel
+def invert(A, X, n):
+    """X = A^-1 by Gauss-Jordan elimination with partial pivoting; A is destroyed; False where A is singular."""
+    for i in range(n):
+        for j in range(n):
+            X[i, j] = 1.0 if i == j else 0.0
+    for c in range(n):
+        p = c
+        for i in range(c + 1, n):
+            if abs(A[i, c]) > abs(A[p, c]):
+                p = i
+        if not abs(A[p, c]) > 0.0:
+            return False
+        if p != c:
+            for j in range(n):
+                A[c, j], A[p, j] = A[p, j], A[c, j]
+                X[c, j], X[p, j] = X[p, j], X[c, j]
+        pivot = 1.0 / A[c, c]
+        for j in range(n):
+            A[c, j] *= pivot
+            X[c, j] *= pivot
+        for i in range(n):
+            f = A[i, c]
+            if i != c and f != 0.0:
+                for j in range(n):
+                    A[i, j] -= f * A[c, j]
+                    X[i, j] -= f * X[c, j]
+    return True
+
+
+@kernel
+def null_space(W, n, m, V, R, tau):
+    """Singular values of W (n, m), m <= n, and the orthonormal basis V (n, n - m) of what is orthogonal to its columns.
+
+    Householder QR, W = Q [R; 0], then the singular value decomposition of R by one-sided Jacobi rotations (Hestenes
+    1958; Drmac and Veselic, SIAM J. Matrix Anal. Appl. 29, 2008): together the full SVD of W, whose left vectors of
+    no singular value are the last columns of Q. W is destroyed; R (m, m) and tau (m,) are scratch.
+    Returns the smallest and the largest singular value.
+    """
+    for j in range(m):
+        s = 0.0
+        for i in range(j, n):
+            s += W[i, j] * W[i, j]
+        s = math.sqrt(s)
+        if W[j, j] > 0.0:
+            s = -s
+        head = W[j, j] - s
+        tau[j] = 0.0
+        if s != 0.0:
+            tau[j] = -head / s  # reflector I - tau w w^T, w = (1, W[j+1:, j])
+            for i in range(j + 1, n):
+                W[i, j] /= head
+        W[j, j] = s
+        for c in range(j + 1, m):
+            _reflect(W, j, tau[j], W, c, n)
+    for j in range(n - m):
+        for i in range(n):
+            V[i, j] = 0.0
+        V[m + j, j] = 1.0
+        for c in range(m - 1, -1, -1):
+            _reflect(W, c, tau[c], V, j, n)
+    for i in range(m):
+        for j in range(m):
+            R[i, j] = W[i, j] if j >= i else 0.0
+    return _jacobi(R, m)
+
+
+@kernel
+def _reflect(W, c, tau, X, j, n):
+    s = X[c, j]
+    for i in range(c + 1, n):
+        s += W[i, c] * X[i, j]
+    s *= tau
+    X[c, j] -= s
+    for i in range(c + 1, n):
+        X[i, j] -= s * W[i, c]
+
+
+@kernel
+def _jacobi(R, m):
+    """Smallest and largest singular value of R (m, m), by rotations of its rows until they are orthogonal."""
+    for _ in range(30):
+        worst = 0.0
+        for i in range(m - 1):
+            for j in range(i + 1, m):
+                a, b, c = 0.0, 0.0, 0.0
+                for k in range(m):
+                    a += R[i, k] * R[i, k]
+                    b += R[j, k] * R[j, k]
+                    c += R[i, k] * R[j, k]
+                if c == 0.0:
+                    continue
+                size = abs(c) / math.sqrt(a * b)
+                worst = max(worst, size)
+                if size < 1e-15:
+                    continue
+                zeta = (b - a) / (2.0 * c)
+                t = 1.0 / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
+                if zeta < 0.0:
+                    t = -t
+                cosine = 1.0 / math.sqrt(1.0 + t * t)
+                sine = cosine * t
+                for k in range(m):
+                    x, y = R[i, k], R[j, k]
+                    R[i, k] = cosine * x - sine * y
+                    R[j, k] = sine * x + cosine * y
+        if not worst > 1e-10:
+            break
+    smallest, largest = math.inf, 0.0
+    for i in range(m):
+        s = 0.0
+        for k in range(m):
+            s += R[i, k] * R[i, k]
+        s = math.sqrt(s)
+        smallest, largest = min(smallest, s), max(largest, s)
+    return smallest, largest
+
+
+@kernel
+def lu(A, pivots, n):
+    """Factor A (n, n) in place with partial pivoting; False where it is singular or not finite."""
+    for c in range(n):
+        p = c
+        for i in range(c + 1, n):
+            if abs(A[i, c]) > abs(A[p, c]):
+                p = i
+        pivots[c] = p
+        if not 0.0 < abs(A[p, c]) < math.inf:
+            return False
+        if p != c:
+            for j in range(n):
+                A[c, j], A[p, j] = A[p, j], A[c, j]
+        for i in range(c + 1, n):
+            f = A[i, c] / A[c, c]
+            A[i, c] = f
+            if f != 0.0:
+                for j in range(c + 1, n):
+                    A[i, j] -= f * A[c, j]
+    return True
+
+
+@kernel
+def lu_solve(A, pivots, b, n):
+    """Solve in place with the factors that `lu` left."""
+    for i in range(n):
+        p = pivots[i]
+        if p != i:
+            b[i], b[p] = b[p], b[i]
+        for j in range(i):
+            b[i] -= A[i, j] * b[j]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            b[i] -= A[i, j] * b[j]
+        b[i] /= A[i, i]
+
+
+@kernel
+def largest(values):
+    """The largest size; infinite where one is not finite."""
+    worst = 0.0
+    for i in range(values.size):
+        size = abs(values[i])
+        if not size < math.inf:
+            return math.inf
+        worst = max(worst, size)
+    return worst

@@ -1,0 +1,209 @@
+"""Taylor series, coefficient by coefficient: what the kernels `series` of constraints and forces are written with.
+
+A series is a row of coefficients, a[k] that of t^k. Each function gives coefficient k of its result from the rows of
+its arguments up to k, and from the result's own row up to k - 1. Fill rows of the scratch array in turn:
+
+    s[2, k] = product(s[0], s[1], k)
+    s[3, k] = root(s[2], s[3], k)
+
+    product          c = a b                 c_k = sum_j a_j b_{k-j}
+    square           c = a a                 half of that
+    dot, cross       of three rows each; scaled: of three rows and one
+    rotation         A(p) by columns, nine rows; rotated, rotated_back: A v and A^T v
+    quotient         q = a / b               b_0 q_k = a_k - sum_{j>0} b_j q_{k-j}                         (1)
+    root             r = sqrt(a)             2 r_0 r_k = a_k - sum_{0<j<k} r_j r_{k-j}                     (2)
+    power            u = a^n                 k a_0 u_k = sum_{j>0} (n j - (k - j)) a_j u_{k-j}             (3)
+    exponential      e = exp(a)              k e_k = sum_j j a_j e_{k-j}                                   (4)
+    sine_cosine      s, c of a               k s_k = sum_j j a_j c_{k-j},  k c_k = -sum_j j a_j s_{k-j}    (5)
+    angle            theta of (x, y)         theta' (x^2 + y^2) = x y' - y x'                              (6)
+
+(1)-(6) are the product rule for q b = a, r r = a, a u' = n a' u, e' = a' e, s' = a' c, c' = -a' s and theta's own.
+"""
+
+import numpy as np
+
+from ..jit.kernels import kernel
+
+
+@kernel
+def product(a, b, k):
+    """Coefficient k of a b."""
+    even, odd = a[0] * b[k], 0.0  # two sums, since each waits for its last
+    for j in range(1, k, 2):
+        odd += a[j] * b[k - j]
+        even += a[j + 1] * b[k - j - 1]
+    return even + odd + (a[k] * b[0] if k % 2 == 1 else 0.0)
+
+
+@kernel
+def square(a, k):
+    """Coefficient k of a a."""
+    total = 0.0
+    for j in range((k + 1) // 2):
+        total += a[j] * a[k - j]
+    return 2.0 * total + (a[k // 2] * a[k // 2] if k % 2 == 0 else 0.0)
+
+
+@kernel
+def dot(s, i, j, k):
+    """Coefficient k of the scalar product of the vectors in rows i, i + 1, i + 2 and j, j + 1, j + 2 of s."""
+    x, y, z = 0.0, 0.0, 0.0
+    for l in range(k + 1):
+        x += s[i, l] * s[j, k - l]
+        y += s[i + 1, l] * s[j + 1, k - l]
+        z += s[i + 2, l] * s[j + 2, k - l]
+    return x + y + z
+
+
+@kernel
+def cross(s, i, j, k):
+    """Coefficient k of the vector product, a tuple of three, of the vectors in rows i and j on of s."""
+    x, y, z, u, v, w = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for l in range(k + 1):
+        a0, a1, a2 = s[i, l], s[i + 1, l], s[i + 2, l]
+        b0, b1, b2 = s[j, k - l], s[j + 1, k - l], s[j + 2, k - l]
+        x += a1 * b2
+        u += a2 * b1
+        y += a2 * b0
+        v += a0 * b2
+        z += a0 * b1
+        w += a1 * b0
+    return x - u, y - v, z - w
+
+
+@kernel
+def scaled(s, i, j, k):
+    """Coefficient k of the vector in rows i, i + 1, i + 2 of s times the number in row j, a tuple of three."""
+    x, y, z = 0.0, 0.0, 0.0
+    for l in range(k + 1):
+        f = s[j, k - l]
+        x += s[i, l] * f
+        y += s[i + 1, l] * f
+        z += s[i + 2, l] * f
+    return x, y, z
+
+
+@kernel
+def rotation(s, p, a, k):
+    """Write coefficient k of A(p) into rows a to a + 8 of s, column after column; p is in rows p to p + 3."""
+    aa, bb, cc, dd, ab, ac, ad, bc, bd, cd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for l in range(k + 1):
+        e0, e1, e2, e3 = s[p, l], s[p + 1, l], s[p + 2, l], s[p + 3, l]
+        g0, g1, g2, g3 = s[p, k - l], s[p + 1, k - l], s[p + 2, k - l], s[p + 3, k - l]
+        aa += e0 * g0
+        bb += e1 * g1
+        cc += e2 * g2
+        dd += e3 * g3
+        ab += e0 * g1
+        ac += e0 * g2
+        ad += e0 * g3
+        bc += e1 * g2
+        bd += e1 * g3
+        cd += e2 * g3
+    s[a, k], s[a + 1, k], s[a + 2, k] = aa + bb - cc - dd, 2.0 * (bc + ad), 2.0 * (bd - ac)
+    s[a + 3, k], s[a + 4, k], s[a + 5, k] = 2.0 * (bc - ad), aa - bb + cc - dd, 2.0 * (cd + ab)
+    s[a + 6, k], s[a + 7, k], s[a + 8, k] = 2.0 * (bd + ac), 2.0 * (cd - ab), aa - bb - cc + dd
+
+
+@kernel
+def rotated(s, a, v, k):
+    """Coefficient k of A times the vector in rows v to v + 2, a tuple of three; A is in rows a to a + 8."""
+    x, y, z = 0.0, 0.0, 0.0
+    for l in range(k + 1):
+        v0, v1, v2 = s[v, k - l], s[v + 1, k - l], s[v + 2, k - l]
+        x += s[a, l] * v0 + s[a + 3, l] * v1 + s[a + 6, l] * v2
+        y += s[a + 1, l] * v0 + s[a + 4, l] * v1 + s[a + 7, l] * v2
+        z += s[a + 2, l] * v0 + s[a + 5, l] * v1 + s[a + 8, l] * v2
+    return x, y, z
+
+
+@kernel
+def rotated_back(s, a, v, k):
+    """Coefficient k of A^T times the vector in rows v to v + 2, a tuple of three; A is in rows a to a + 8."""
+    x, y, z = 0.0, 0.0, 0.0
+    for l in range(k + 1):
+        v0, v1, v2 = s[v, k - l], s[v + 1, k - l], s[v + 2, k - l]
+        x += s[a, l] * v0 + s[a + 1, l] * v1 + s[a + 2, l] * v2
+        y += s[a + 3, l] * v0 + s[a + 4, l] * v1 + s[a + 5, l] * v2
+        z += s[a + 6, l] * v0 + s[a + 7, l] * v1 + s[a + 8, l] * v2
+    return x, y, z
+
+
+@kernel
+def quotient(a, b, q, k):
+    """Coefficient k of q = a / b, Eq. (1); b must not begin at zero."""
+    total = a[k]
+    for j in range(1, k + 1):
+        total -= b[j] * q[k - j]
+    return total / b[0]
+
+
+@kernel
+def root(a, r, k):
+    """Coefficient k of r = sqrt(a), Eq. (2); a must begin above zero."""
+    if k == 0:
+        return np.sqrt(a[0])
+    total = 0.0
+    for j in range(1, (k + 1) // 2):
+        total += r[j] * r[k - j]
+    middle = r[k // 2] * r[k // 2] if k % 2 == 0 else 0.0
+    return (a[k] - 2.0 * total - middle) / (2.0 * r[0])
+
+
+@kernel
+def power(a, u, n, k):
+    """Coefficient k of u = a^n, Eq. (3), n any constant; a must not begin at zero, nor below for a broken n."""
+    if k == 0:
+        return a[0] ** n
+    total, steep = 0.0, n + 1.0
+    for j in range(1, k + 1):
+        total += (steep * j - k) * a[j] * u[k - j]
+    return total / (k * a[0])
+
+
+@kernel
+def inverse_root(a, u, k):
+    """Coefficient k of u = 1 / sqrt(a), Eq. (3) with n = -1/2; a must begin above zero."""
+    if k == 0:
+        return 1.0 / np.sqrt(a[0])
+    total = 0.0
+    for j in range(1, k + 1):
+        total += (0.5 * j - k) * a[j] * u[k - j]
+    return total / (k * a[0])
+
+
+@kernel
+def exponential(a, e, k):
+    """Coefficient k of e = exp(a), Eq. (4)."""
+    if k == 0:
+        return np.exp(a[0])
+    total = 0.0
+    for j in range(1, k + 1):
+        total += j * a[j] * e[k - j]
+    return total / k
+
+
+@kernel
+def sine_cosine(a, s, c, k):
+    """Coefficients k, a tuple, of s = sin(a) and c = cos(a), Eq. (5); the rows of both are needed."""
+    if k == 0:
+        return np.sin(a[0]), np.cos(a[0])
+    sine, cosine = 0.0, 0.0
+    for j in range(1, k + 1):
+        f = j * a[j]
+        sine += f * c[k - j]
+        cosine -= f * s[k - j]
+    return sine / k, cosine / k
+
+
+@kernel
+def angle(y, x, square, theta, k):
+    """Coefficient k of theta = atan2(y, x), Eq. (6), in (-pi, pi] at k = 0; `square` is the row of x^2 + y^2."""
+    if k == 0:
+        return np.arctan2(y[0], x[0])
+    total = 0.0
+    for j in range(1, k + 1):
+        total += j * (x[k - j] * y[j] - y[k - j] * x[j])
+    for j in range(1, k):
+        total -= j * theta[j] * square[k - j]
+    return total / (k * square[0])

@@ -1,0 +1,49 @@
+"""What has been worked out from a packed scene, once, for whoever asks next."""
+
+from dataclasses import dataclass, field
+
+
+@dataclass(slots=True)
+class Derived:
+    """Of one `Packed`: each entry is None, or empty, until the function named beside it has been called."""
+
+    dropped: object = None  # int64 (k,): redundant rows of the constraint graph; set by constraint_graph.drop
+    turning: set = field(default_factory=set)  # bodies that count as turning; locked_orientations.keep_turning
+    handles: object = None  # handles.handles_of
+    body_indices: dict = None  # packed.index_of
+    members: dict = None  # packed.member_of
+    short_rows: object = None  # a `System`: sparse_jacobian.with_short_rows
+    graph: tuple = None  # constraint_graph.network_of, and by the loops asked for:
+    networks: dict = field(default_factory=dict)
+    locked: object = None  # a `Still`: locked_orientations.still
+    moving_graph: tuple = None  # locked_orientations.moving_network, and by the loops asked for:
+    moving_networks: dict = field(default_factory=dict)
+    undropped: object = None  # a `Packed` none of whose rows is dropped: redundancy.dependent_rows
+    aligned: tuple = None  # mirrored_branches.demand_aligned
+    holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
+    loads: dict = None  # reactions.loads_of
+    places_within: list = None  # of each primitive among those of its class: reactions.only
+    coordinate_starts: dict = None  # diagnostics.starts
+    levers: object = None  # (bodies,), m: rounding_limit.within_rounding
+    grounded: tuple = None  # local_origin.origin_of, and for the start last seen:
+    origin: tuple = (None, None)
+    local: tuple = None  # the scene from an origin of its own: local_origin
+
+    def forget_graphs(self):
+        """The constraint graph is another."""
+        self.graph = None
+        self.networks.clear()
+        self.forget_locked()
+
+    def forget_locked(self):
+        """Other bodies turn."""
+        self.locked = self.moving_graph = None
+        self.moving_networks.clear()
+
+    def __reduce__(self):
+        """In another process: what doesn't depend on where things are in memory."""
+        return _of, (self.dropped, self.turning, self.handles)
+
+
+def _of(dropped, turning, handles):
+    return Derived(dropped, turning, handles)

@@ -1,0 +1,259 @@
+"""The packed system: what the kernels see of a scene, as a named tuple of arrays whose type never changes."""
+
+import os
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.element import address, checked_parameters
+from ..elements.primitive import AT, BLOCK, DIMENSION, INTS, ROW, STRIDE
+from ..errors import InvalidConstraint
+from ..motions.prescribed import Motion
+from ..motions.signals import Signal
+from .derived import Derived
+from .packed_forces import FORCE_COLUMNS, SIGNAL_COLUMNS, find_forces, pack_forces
+
+# columns of System.kinds: four addresses, where a kind's instances are, the address that implicit methods need
+PHI, JACOBIAN, GAMMA, PHI_T, COUNT, REALS, FIRST_INT, FIRST_REAL, CURVATURE, COLUMNS = range(10)
+
+
+class System(NamedTuple):
+    """All that a scene says, as arrays; built by `pack`, constant during a run but for the motions' places in reals."""
+
+    bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length 7 or 3
+    mass: np.ndarray  # float64 (nb,)
+    inertia: np.ndarray  # float64 (nb, 9): J' row by row; zero for a point mass
+    gravity: np.ndarray  # float64 (3,)
+    kinds: np.ndarray  # int64 (kinds, 9): addresses and extents, columns above
+    table: np.ndarray  # int64: for each instance the places in q and Phi_q, primitive.INTS numbers
+    reals: np.ndarray  # float64: for each instance marker coordinates, then parameters
+    motions: np.ndarray  # int64 (motions, 5): addresses of f, fd, fdd, or of what runs a program, 0, 0; the place of
+    # the first in reals; where the program begins there
+    rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
+    segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
+    forces: np.ndarray  # int64 (kinds, 9): addresses and extents, columns in force_pack
+    signals: np.ndarray  # int64 (signals, 4): functions of time and motions that loads are given, force_pack
+    memory: np.ndarray  # int64 (slots,): places in reals of what forces, then constraints remember from step to step
+    normals: np.ndarray  # int64 (frictions,): places in reals of the normal loads of joints' frictions
+    counters: np.ndarray  # int64 (kinds, 5): loops of constraints that remember: address, count, reals, places of both
+
+
+class Member(NamedTuple):
+    """A constraint of a scene as it was when it was packed: where it is among the primitives and the rows."""
+
+    constraint: object  # a Primitive, or a Joint
+    coordinates: tuple  # where its markers are, (3,) each
+    parts: slice
+    rows: slice
+
+
+class Packed(NamedTuple):
+    """A scene as it was when it was packed; a solution keeps it, whatever happens to the scene later."""
+
+    system: System
+    bodies: tuple
+    constraints: tuple  # primitives, in the order of their rows
+    parameters: tuple  # of each constraint: floats and Motions
+    coordinates: tuple  # of each constraint: where its markers are, (3,) each
+    size: float  # largest number among the coordinates
+    loads: tuple  # a force_pack.Load for each force, in the order added
+    members: tuple  # a Member for each constraint of the scene, in the order of their rows
+    slots: tuple  # of System.memory, for each constraint; -1 for none
+    derived: Derived  # what has been worked out from it
+
+    def __reduce__(self):
+        """In another process the kernels have other addresses."""
+        return _found_again, (os.getpid(), *self)
+
+
+def _found_again(process, *parts):
+    """A `Packed` from a pickle, its addresses those of this process."""
+    packed = Packed(*parts)
+    if process == os.getpid():
+        return packed
+    system = packed.system
+    kinds = classes(packed)
+    for row, kind in zip(system.kinds, kinds, strict=True):
+        for column, name in ((PHI, "phi"), (JACOBIAN, "jacobian"), (GAMMA, "gamma"), (PHI_T, "phi_t")):
+            row[column] = _address(kind, name) if row[column] else 0
+        row[CURVATURE] = 0
+    remembering = [kind for kind in kinds if kind.memory]
+    for row, kind in zip(system.counters, remembering, strict=True):
+        row[0] = _address(kind, "remember")
+    values = [
+        value
+        for kind in kinds
+        for constraint, given in zip(packed.constraints, packed.parameters, strict=True)
+        if type(constraint) is kind
+        for value in given
+        if isinstance(value, Motion)
+    ]
+    for row, motion in zip(system.motions, values, strict=True):
+        row[:3] = motion.addresses
+    return packed._replace(loads=find_forces(system, packed.loads))
+
+
+def pack(scene):
+    """Pack a scene; loads (at the very first use compiles) the kernels of the kinds it uses.
+
+    Raises
+    ------
+    InvalidConstraint
+        If a plug-in's parameters are no finite numbers or Motions, or Numba can't compile its kernels.
+    """
+    starts = np.cumsum([0, *(body.dimension for body in scene.bodies)])
+    n = int(starts[-1])
+    where = {id(body): (int(at), body.dimension) for at, body in zip(starts, scene.bodies, strict=False)}
+    groups, row = {}, 0
+    segments = []
+    primitives = scene.primitives
+    parameters = {constraint: _parameters(constraint) for constraint in primitives}
+    for constraint in primitives:
+        groups.setdefault(type(constraint), []).append((constraint, row))
+        row += constraint.rows
+        spans = [where.get(id(body), (0, 0)) for body in (constraint.a, constraint.b)]
+        segments += [[*spans[0], *spans[1]]] * constraint.rows
+
+    kinds, table, reals, motions, programs = [], [], [], [], []
+    counters, kept = [], {}
+    for kind, members in groups.items():
+        first = len(table), len(reals)
+        strides = set()
+        for constraint, at_row in members:
+            begin = len(reals)
+            table += _places(constraint, at_row, n, where)
+            reals += np.concatenate(constraint.coordinates).tolist()
+            for value in parameters[constraint]:
+                if isinstance(value, Motion):
+                    motions.append([*value.addresses, len(reals), 0])
+                    programs.append(value)
+                    reals += value.value(value.origin)
+                else:
+                    reals.append(float(value))
+            if kind.memory:
+                kept[constraint] = len(reals)
+                reals.append(0.0)
+            stride = len(reals) - begin
+            if strides - {stride}:
+                raise InvalidConstraint(
+                    f"{constraint.name}: parameters() must return as many values as for every other {kind.__name__}."
+                )
+            strides.add(stride)
+        addresses = [_address(kind, name) for name in ("phi", "jacobian", "gamma")]
+        moving = any(constraint.rheonomic for constraint, _ in members)
+        addresses.append(_address(kind, "phi_t") if moving else 0)
+        kinds.append([*addresses, len(members), stride, *first, 0])
+        if kind.memory:
+            counters.append([_address(kind, "remember"), len(members), stride, *first])
+
+    forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals)
+    begins = {}  # of programs: one for all that move alike
+    for row, motion in zip(motions, programs, strict=True):
+        if motion.smooth is not None:
+            if id(motion.smooth) not in begins:
+                begins[id(motion.smooth)] = len(reals)
+                reals += motion.smooth.program()
+            row[4] = begins[id(motion.smooth)]
+    inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
+    system = System(
+        bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
+        mass=np.array([body.values["mass"] for body in scene.bodies]),
+        inertia=np.array(inertias).reshape(-1, 9),
+        gravity=np.array(scene.gravity),  # writable, as all arrays here: what is read-only is another type to a kernel
+        kinds=np.array(kinds, np.int64).reshape(-1, COLUMNS),
+        table=np.array(table, np.int64),
+        reals=np.array(reals),
+        motions=np.array(motions, np.int64).reshape(-1, 5),
+        rheonomic=np.array([any(kind[PHI_T] for kind in kinds)], np.int64),
+        segments=np.array(segments, np.int64).reshape(-1, 4),
+        forces=np.array(forces, np.int64).reshape(-1, FORCE_COLUMNS),
+        signals=np.array(signals, np.int64).reshape(-1, SIGNAL_COLUMNS),
+        memory=np.array([*memory, *kept.values()], np.int64),
+        normals=np.array(normals, np.int64),
+        counters=np.array(counters, np.int64).reshape(-1, 5),
+    )
+    coordinates = tuple(constraint.coordinates for constraint in primitives)
+    size = max((np.abs(s).max() for each in coordinates for s in each), default=0.0)
+    parameters = tuple(parameters.values())
+    members = tuple(_members(scene.constraints))
+    order = {constraint: len(memory) + i for i, constraint in enumerate(kept)}
+    slots = tuple(order.get(constraint, -1) for constraint in primitives)
+    return Packed(
+        system, scene.bodies, primitives, parameters, coordinates, float(size), loads, members, slots, Derived()
+    )
+
+
+def _members(constraints):
+    part = row = 0
+    for constraint in constraints:
+        parts, rows = slice(part, part + len(constraint.parts)), slice(row, row + constraint.rows)
+        yield Member(constraint, constraint.coordinates, parts, rows)
+        part, row = parts.stop, rows.stop
+
+
+def index_of(packed, body):
+    """Where a body stood among the others when the scene was packed; None where it was not there."""
+    known = packed.derived
+    if known.body_indices is None:
+        known.body_indices = {id(one): i for i, one in enumerate(packed.bodies)}
+    return known.body_indices.get(id(body))
+
+
+def member_of(packed, constraint):
+    """The `Member` that a constraint, or a joint's part, is; None where it is not of that scene."""
+    known = packed.derived
+    if known.members is None:
+        found, row = {}, 0
+        for i, part in enumerate(packed.constraints):
+            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + part.rows))
+            row += part.rows
+        known.members = found | {id(member.constraint): member for member in packed.members}
+    return known.members.get(id(constraint))
+
+
+def classes(packed):
+    """The classes of constraints, in the order of System.kinds."""
+    return list(dict.fromkeys(type(constraint) for constraint in packed.constraints))
+
+
+def user_functions(packed):
+    """Yield whatever holds compiled functions of a user's, and those functions."""
+    for given in packed.parameters:
+        for value in given:
+            if isinstance(value, Motion) and value.given:
+                yield value, value.given
+    for load in packed.loads:
+        for value in load.parameters:
+            if isinstance(value, Signal) and not value.motions:
+                yield value, (value.source,)
+        if hasattr(load.force, "function_of_state"):
+            yield load.force, (load.force.function_of_state,)
+
+
+def with_curvatures(packed):
+    """The system with the kernels of second derivatives, which only implicit methods load."""
+    kinds = packed.system.kinds.copy()
+    kinds[:, CURVATURE] = [_address(kind, "curvature") for kind in classes(packed)]
+    return packed.system._replace(kinds=kinds)
+
+
+def _parameters(constraint):
+    """A constraint's parameters, checked."""
+    given = checked_parameters(constraint, Motion, "Motions")
+    if "phi_t" not in constraint.kernels and any(isinstance(p, Motion) for p in given):
+        raise InvalidConstraint(f"{constraint.name}: a Motion is among its parameters, so it needs a kernel phi_t.")
+    return given
+
+
+def _address(kind, name):
+    return address(kind.kernels, name, kind.__name__, InvalidConstraint)
+
+
+def _places(constraint, row, n, where):
+    """Fill the table entry of one instance; the ground has dimension 0 and no place."""
+    entry = np.zeros(INTS, np.int64)
+    for i, body in enumerate((constraint.a, constraint.b)):
+        at, dimension = where.get(id(body), (0, 0))
+        entry[AT + i], entry[DIMENSION + i], entry[BLOCK + i] = at, dimension, row * n + at
+    entry[ROW], entry[STRIDE] = row, n
+    return entry.tolist()

@@ -1,0 +1,129 @@
+"""Forces packed for the kernels: one row a kind, each instance's places and numbers in the shared arrays."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.element import address, checked_parameters
+from ..elements.loops.forces import AT, DIMENSION, INTS, kept_size
+from ..errors import InvalidForce
+from ..motions.signals import Signal
+
+# columns of System.forces: three addresses, then where a kind's instances are
+FORCE, FORCE_JACOBIAN, F_COUNT, F_REALS, F_FIRST_INT, F_FIRST_REAL, F_REMEMBER, F_KEPT, FORCE_COLUMNS = range(9)
+# columns of System.signals: the address of what runs; its places in reals; where a motion's program begins there, or -1
+S_ADDRESS, S_PLACE, S_WIDTH, S_FIRST, SIGNAL_COLUMNS = range(5)
+
+
+class Load(NamedTuple):
+    """One force as it was when it was packed."""
+
+    force: object
+    parameters: tuple  # floats and Signals
+    coordinates: tuple  # where its markers are, (3,) each
+    row: np.ndarray  # (FORCE_COLUMNS,) a row of System.forces that has this instance alone
+    slot: int  # of System.memory; -1 for none
+    normal: int  # of System.normals; -1 for none
+
+
+def pack_forces(forces, where, table, reals):
+    """Append the instances to `table` and `reals`; return rows of System.forces, .signals, .memory, .normals, Loads.
+
+    Raises
+    ------
+    InvalidForce
+        If a plug-in's parameters are no finite numbers or Signals, or Numba can't compile its kernels.
+    """
+    groups = {}
+    for force in forces:
+        groups.setdefault(id(force.kernels), []).append(force)  # user functions have kernels of their own
+    rows, signals, memory, normals, loads = [], [], [], [], {}
+    programs = []
+    for members in groups.values():
+        kernels = members[0].kernels
+        force_address = _address(members[0], "force")
+        remember = _address(members[0], "remember") if "remember" in kernels else 0
+        first, stride = (len(table), len(reals)), None
+        for force in members:
+            begin = len(table), len(reals)
+            parameters = checked_parameters(force, Signal, "loads")
+            table += _places(force, where)
+            reals += np.concatenate(force.coordinates).tolist()
+            for value in parameters:
+                if not isinstance(value, Signal):
+                    reals.append(float(value))
+                    continue
+                for i, motion in enumerate(value.motions):
+                    signals.append([value.address, len(reals) + i, 1, -1])
+                    programs.append((signals[-1], motion))
+                if not value.motions:
+                    signals.append([value.address, len(reals), value.width, -1])
+                reals += [np.nan] * value.width  # until the time is set
+            if force.memory:
+                memory.append(len(reals))
+                reals.append(0.0)
+            if "normal_load" in kernels:
+                normals.append(len(reals))
+                reals.append(0.0)
+            size = len(reals) - begin[1]
+            if stride not in (None, size):
+                raise InvalidForce(
+                    f"{force.name}: parameters() must return as many values as for every other {type(force).__name__}."
+                )
+            stride = size
+            row = np.array([force_address, 0, 1, stride, *begin, remember, 0], np.int64)
+            slot = len(memory) - 1 if force.memory else -1
+            normal = len(normals) - 1 if "normal_load" in kernels else -1
+            loads[id(force)] = Load(force, parameters, force.coordinates, row, slot, normal)
+        rows.append([force_address, 0, len(members), stride, *first, remember, 0])
+    begins = {}
+    for signal, motion in programs:
+        if id(motion) not in begins:  # one program for all that are given the same
+            begins[id(motion)] = len(reals)
+            reals += motion.program()
+        signal[S_FIRST] = begins[id(motion)]
+    return rows, signals, memory, normals, tuple(loads[id(force)] for force in forces)
+
+
+def with_force_jacobians(packed):
+    """The system of a packed scene with the forces' Jacobian loops, which are loaded now; and the floats they keep."""
+    rows, total = packed.system.forces.copy(), 0
+    for row in rows:
+        force = members_of(row, packed.loads)[0].force
+        row[FORCE_JACOBIAN], row[F_KEPT] = _address(force, "jacobian"), total
+        total += row[F_COUNT] * kept_size(force.markers)
+    return packed.system._replace(forces=rows), int(total)
+
+
+def find_forces(system, loads):
+    """Write this process's addresses into the rows of an unpickled system; the loads with theirs."""
+    signals, rows = iter(system.signals), {}
+    for row in system.forces:
+        members = members_of(row, loads)
+        row[FORCE], row[FORCE_JACOBIAN] = _address(members[0].force, "force"), 0
+        row[F_REMEMBER] = _address(members[0].force, "remember") if row[F_REMEMBER] else 0
+        for load in members:
+            one = load.row.copy()
+            one[[FORCE, FORCE_JACOBIAN, F_REMEMBER]] = row[[FORCE, FORCE_JACOBIAN, F_REMEMBER]]
+            rows[id(load)] = load._replace(row=one)
+            for value in load.parameters:
+                for _ in range(max(len(value.motions), 1) if isinstance(value, Signal) else 0):
+                    next(signals)[S_ADDRESS] = value.address
+    return tuple(rows[id(load)] for load in loads)
+
+
+def members_of(row, loads):
+    """The loads that a row of System.forces runs."""
+    return [load for load in loads if (load.row[[FORCE, F_REALS]] == row[[FORCE, F_REALS]]).all()]
+
+
+def _address(force, name):
+    return address(force.kernels, name, force.name, InvalidForce)
+
+
+def _places(force, where):
+    """The table entry of one instance; the ground has dimension 0 and no place."""
+    entry = np.zeros(INTS, np.int64)
+    for i, body in enumerate((force.a, force.b)):
+        entry[AT + i], entry[DIMENSION + i] = where.get(id(body), (0, 0))
+    return entry.tolist()

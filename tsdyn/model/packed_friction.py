@@ -1,0 +1,41 @@
+"""The frictions of joints in the graph of a scene: whose reaction each follows from, and on which bodies it acts."""
+
+import numpy as np
+
+from ..elements.element import address
+from ..elements.loops.forces import INTS
+from ..errors import InvalidForce
+from .packed_forces import F_COUNT, F_FIRST_INT, F_REALS
+
+# columns of Network.frictions: bodies a and b; the side that the reaction is taken on; where its rows are in
+# Network.friction_rows; row of System.forces and place in it; addresses of the loops of friction_loops
+FR_BODY, FR_ON, FR_FIRST, FR_COUNT, FR_KIND, FR_INDEX, FR_UNIT, FR_NORMAL, FR_COLUMNS = 0, *range(2, 10)
+
+
+def frictions_of(packed, bodies, rows_of, sides):
+    """Rows of Network.frictions, in the order of System.normals, and of Network.friction_rows.
+
+    bodies gives the place of a body by its id, rows_of those of a primitive's rows, sides (m, 2) their bodies.
+    """
+    found = sorted((load for load in packed.loads if load.normal >= 0), key=lambda load: load.normal)
+    members = {id(member.constraint): member for member in packed.members} if found else {}
+    frictions, rows = [], []
+    for load in found:
+        force, first = load.force, len(rows)
+        on = 0 if force.on is force.a else 1
+        for part in packed.constraints[members[id(force.joint)].parts]:
+            rows += [(e, int(sides[e, 1] == bodies[id(force.on)])) for e in rows_of(part)]
+        kind, index = _place(packed.system.forces, load.row)
+        loops = (address(force.kernels, name, force.name, InvalidForce) for name in ("unit_friction", "normal_load"))
+        pair = (bodies.get(id(body), len(bodies)) for body in (force.a, force.b))
+        frictions.append([*pair, on, first, len(rows) - first, kind, index, *loops])
+    return np.array(frictions, np.int64).reshape(-1, FR_COLUMNS), np.array(rows, np.int64).reshape(-1, 2)
+
+
+def _place(kinds, row):
+    """Which row of System.forces runs a load, and as the how manieth."""
+    for i, kind in enumerate(kinds):
+        index = (row[F_FIRST_INT] - kind[F_FIRST_INT]) // INTS
+        if kind[F_REALS] == row[F_REALS] and 0 <= index < kind[F_COUNT]:
+            return i, int(index)
+    raise AssertionError("a load has a row")

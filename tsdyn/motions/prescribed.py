@@ -1,0 +1,272 @@
+"""A prescribed function of time with its two derivatives: compiled and reached by address, or a program of numbers."""
+
+import math
+from functools import partial
+from types import FunctionType
+
+import numpy as np
+from numba.core.errors import NumbaError
+
+from ..calls import fitting
+from ..errors import InvalidArgument, InvalidConstraint
+from ..jit.compiled_once import compiled_once
+from ..jit.kernels import Callback, caller, kernel, specialised
+from ..validation import number
+from . import expressions as motions
+from .expressions import Piecewise, Smooth
+from .knots import demand_covered, demand_followed
+from .program import run_program
+from .tables import is_data
+
+SIGNATURE = "d"
+UNNAMED = "motion"
+call_motion = caller(SIGNATURE, "d")
+
+
+class Motion:
+    """f(t), fd(t), fdd(t): a length, an angle or another quantity that the user prescribes.
+
+    Parameters
+    ----------
+    f, fd, fdd : callable
+        Plain functions of one float, the time in s, that Numba can compile; fd and fdd are the exact first and second
+        derivatives of f. The compiled code is cached on disk by all the code and constants it depends on. Without fd
+        and fdd they are derived from f, which then is arithmetic and functions that `ts.motions` knows; or f is one of
+        `ts.motions`, for which nothing is compiled and Taylor has the series.
+    what : str
+        What error messages call it.
+    """
+
+    @fitting
+    def __init__(self, f, fd=None, fdd=None, what=UNNAMED):
+        self.what, self.smooth, self.given = what, None, (f, fd, fdd)
+        if is_data(f) and fd is fdd is None:
+            (f,) = self.components(f, 1, what)
+        if isinstance(f, Smooth) and fd is fdd is None:
+            self.given, self.smooth = (), f
+        elif fd is fdd is None:
+            self.given = (_plain_function(f, what),)
+            self.smooth = _derived(f, what)
+        for function in self.given:
+            _plain_function(function, what)
+        self._callbacks = None
+        self.value(self.origin)
+
+    @property
+    def functions(self):
+        """f, fd and fdd, for Python."""
+        smooth = self.smooth
+        return self.given if smooth is None else (smooth, smooth.rate, smooth.acceleration)
+
+    @property
+    def has_series(self):
+        """Whether it is one of `ts.motions`: of a user's own function no series is taken."""
+        return not self.given
+
+    @property
+    def motions(self):
+        """The motions of `ts.motions` that it is made of."""
+        return () if self.smooth is None else (self.smooth,)
+
+    @property
+    def origin(self):
+        """The time that is nearest to t = 0 among those for which it has a value, s."""
+        covers = [pieces.covers for motion in self.motions for pieces in motion.pieces]
+        return float(min([max([0.0, *(first for first, _ in covers)]), *(last for _, last in covers)]))
+
+    @classmethod
+    def always(cls, value, what):
+        """Return a Motion, of a number too."""
+        value = cls.wrap(value, what)
+        return value if isinstance(value, Motion) else cls(motions.Constant(value), what=what)
+
+    @classmethod
+    def wrap(cls, value, what):
+        """Return a Motion for functions, one of `ts.motions`, data or a Motion; a finite float for a number."""
+        if isinstance(value, Motion):
+            what = what if value.what == UNNAMED else value.what  # a part's motion is its joint's
+            return cls(*(value.given or (value.smooth,)), what=what)
+        if is_data(value):
+            return cls(value, what=what)
+        if isinstance(value, (tuple, list)) and len(value) == 3 and all(callable(f) for f in value):
+            return cls(*value, what=what)
+        if callable(value):
+            return cls(value, what=what)
+        result = number(value)
+        if not math.isfinite(result):
+            raise InvalidConstraint(
+                f"{what} must be a finite number, one of ts.motions, a ts.Table, a spline of SciPy's, arrays (t, x), a "
+                f"function of time f or three functions of time (f, fd, fdd), got {value!r}."
+            )
+        return result
+
+    @staticmethod
+    def components(value, count, what):
+        """The motions of so many components that data say; each a `Piecewise`."""
+        try:
+            motions = Piecewise.each(value)
+        except InvalidArgument as reason:
+            raise InvalidConstraint(f"{what}: {reason}") from reason
+        if len(motions) != count:
+            raise InvalidConstraint(f"{what}: the data have {len(motions)} values a time and must have {count}.")
+        return motions
+
+    @staticmethod
+    def numbers(given):
+        """Parameters as kernels have them: a Motion is its value, rate and acceleration at its origin."""
+        return [x for value in given for x in (value.value(value.origin) if isinstance(value, Motion) else (value,))]
+
+    @staticmethod
+    def places(value):
+        """What a prescribed value contributes to `parameters()`: three places for value, rate and acceleration."""
+        return (value,) if isinstance(value, Motion) else (value, 0.0, 0.0)
+
+    @staticmethod
+    def at_start(value):
+        """The value itself, or that of a Motion at its origin: t = 0, or the time nearest to it that data cover."""
+        return value.value(value.origin)[0] if isinstance(value, Motion) else value
+
+    def value(self, t):
+        """Return (f, fd, fdd) at t, by the plain Python functions."""
+        t = t if self.smooth is None else np.float64(t)  # so that nothing raises
+        try:
+            with np.errstate(all="ignore"):
+                result = tuple(float(f(t)) for f in self.functions)
+        except Exception as error:
+            raise InvalidConstraint(f"{self.what}: the motion can't be evaluated at t = {t:g}: {error!r}") from error
+        if not all(map(math.isfinite, result)):
+            raise InvalidConstraint(f"{self.what}: the motion is not finite at t = {t:g}: (f, fd, fdd) = {result}.")
+        return result
+
+    def check(self, t0, t1):
+        """Refuse derivatives that are not those of f, by difference quotients at a few times; data with a jump.
+
+        Several quotients are tried at each time, and most times must fail: a kink or a short wave is no error.
+        """
+        if self.smooth is not None:  # they are
+            demand_covered(self.smooth, t0, t1, self.what, InvalidConstraint)
+            demand_followed(self.smooth, t0, t1, self.what)
+            return
+        times = t0 + (t1 - t0) * np.array([0.11, 0.29, 0.53, 0.71, 0.89])
+        for i, names in ((0, ("f", "fd")), (1, ("fd", "fdd"))):
+            given, values = self._at(i + 1, times), self._at(i, times)
+            off = np.full(times.size, np.inf)
+            for h in min(1.0, t1 - t0) * np.array([1e-2, 1e-3, 1e-4, 1e-5]):
+                near = [self._at(i, times + k * h) for k in (-2, -1, 1, 2)]
+                with np.errstate(invalid="ignore"):
+                    quotient = (near[0] - 8.0 * near[1] + 8.0 * near[2] - near[3]) / (12.0 * h)
+                    off = np.fmin(off, np.abs(quotient - given) - 1e-9 * np.abs(values) / h)
+            if not (np.isfinite(given).all() and np.isfinite(values).all()):
+                continue  # the run ends there, and says so
+            if (off > 1e-3 * (np.abs(given).max() + np.abs(values).max())).sum() > times.size // 2:
+                raise InvalidConstraint(
+                    f"{self.what}: {names[1]} is not the derivative of {names[0]}: at t = {times[0]:g} it gives "
+                    f"{given[0]:g}, and a difference quotient of {names[0]} does not. Correct the derivatives."
+                )
+
+    def over(self, times):
+        """f, fd and fdd at times (k,), shape (3, k)."""
+        if self.smooth is not None:
+            return np.array([function(times) for function in self.functions])
+        return np.array([[function(t) for t in times] for function in self.functions], dtype=float)
+
+    def _at(self, i, times):
+        try:
+            with np.errstate(all="ignore"):
+                return np.array([self.functions[i](t) for t in times], dtype=float)
+        except Exception as error:
+            raise InvalidConstraint(
+                f"{self.what}: the motion can't be evaluated near t = {times[0]:g} ... {times[-1]:g}: {error!r}"
+            ) from error
+
+    def __getstate__(self):
+        return {**self.__dict__, "_callbacks": None}  # machine code is not for pickling
+
+    def forget(self):
+        """Drop what was compiled or derived; it is made again when asked for."""
+        self._callbacks = None
+        if self.given and self.smooth is not None:
+            self.smooth = _derived(self.given[0], self.what)
+
+    @property
+    def addresses(self):
+        """The addresses of the three compiled functions; of a program, what runs it and two zeros."""
+        if self.smooth is not None:
+            return run_program.address, 0, 0
+        try:
+            if self._callbacks is None:
+                self._callbacks = tuple(compiled_once("motion", f, partial(_callback, f)) for f in self.given)
+            return tuple(callback.address for callback in self._callbacks)
+        except NumbaError as error:
+            raise InvalidConstraint(
+                f"{self.what}: Numba can't compile the motion; use plain arithmetic, NumPy functions and constants "
+                f"in it.\n{error}"
+            ) from error
+
+
+def _plain_function(function, what):
+    """A user's function, or an error where it is none of one argument."""
+    if not callable(function):
+        raise InvalidConstraint(f"{what}: a motion is three functions of time (f, fd, fdd), got {function!r}.")
+    plain = getattr(function, "py_func", function)
+    if not isinstance(plain, FunctionType) or plain.__code__.co_argcount != 1:
+        raise InvalidConstraint(
+            f"{what}: {function!r} is no plain Python function of one argument, the time; wrap it in one: lambda t: ..."
+        )
+    return function
+
+
+def _derived(f, what):
+    """A user's function as a `Smooth`, by running it once on the time as a motion; its `math` is NumPy there."""
+    plain = getattr(f, "py_func", f)
+    known = {name: _of_motions(value) for name, value in plain.__globals__.items()}
+    twin = FunctionType(plain.__code__, known, plain.__name__, plain.__defaults__, plain.__closure__)
+    try:
+        result = twin(motions.time)
+    except Exception as error:
+        raise InvalidConstraint(
+            f"{what}: its derivatives can't be derived from f alone ({type(error).__name__}: {error}). Give three "
+            "functions of time (f, fd, fdd), or write f with arithmetic and "
+            f"{', '.join(motions.FUNCTIONS)} of NumPy, without branches."
+        ) from error
+    if isinstance(result, Smooth):
+        return result
+    if not math.isfinite(number(result)):
+        raise InvalidConstraint(f"{what}: the function must return a number, it gave {result!r} of the time.")
+    return motions.Constant(number(result))
+
+
+def _of_motions(value):
+    """What a global of a user's function stands for where it is run on a motion."""
+    if value is math:
+        return _Math
+    name = getattr(value, "__name__", "")
+    return getattr(np, _NUMPY.get(name, name), value) if value is getattr(math, name, _Math) else value
+
+
+_NUMPY = {"atan": "arctan", "fabs": "abs", "pow": "power"}
+
+
+class _Math:
+    """The module `math` with NumPy's functions, which know motions."""
+
+    pi, e, tau = math.pi, math.e, math.tau
+    sin, cos, tan, exp, log, sqrt = np.sin, np.cos, np.tan, np.exp, np.log, np.sqrt
+    sinh, cosh, tanh, atan, pow = np.sinh, np.cosh, np.tanh, np.arctan, np.power
+
+
+def _guarded(t):
+    """The function, or NaN where it raises: an error must not be taken for a zero."""
+    try:
+        return float(function(t))
+    except Exception:
+        return np.nan
+
+
+function = None  # filled in by `_callback`
+
+
+def _callback(f):
+    plain = getattr(f, "py_func", f)
+    guarded = specialised(_guarded, f"{plain.__qualname__}.guarded", plain, function=kernel(plain, allocates=True))
+    return Callback(guarded, SIGNATURE, "d", allocates=True)

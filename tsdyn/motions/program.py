@@ -1,0 +1,140 @@
+"""Taylor series of a smooth motion at a time: one kernel for all motions, which runs a short program of numbers.
+
+A program begins with (t, instructions, place of the constants, place of the rows, rows, row of the result); then come
+four numbers an instruction: what it does, the row that it writes, and two operands, rows or the place of a constant.
+A row is a series, [i] its coefficient of (time - t)^i. `Smooth.program` writes them. What is piecewise finds
+its piece by the time, until a run holds it in one (`HOLD` for the count).
+"""
+
+import numpy as np
+
+from ..jit.kernels import ANY, callback, caller, data_of, kernel, matrix, vector
+from ..maths.recurrences import exponential, power, product, quotient, sine_cosine, square
+from .piecewise import HEAD as PIECES_HEAD
+
+POLYNOMIAL, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, SINE, EXP, LOG, TANH, ARCTAN, PIECEWISE = range(12)
+HEAD, STEP, WIDTH = 6, 4, 36  # numbers before the instructions, of each, and room for coefficients in a row
+HOLD = 0  # as a count: stay with the pieces at t
+SIGNATURE = "pdip"  # program, t, how many coefficients, where they go
+# what a piecewise constant begins with, see Pieces.numbers
+COUNT, SIZE, PERIOD, BEYOND, PIECE, SHIFT, HELD = range(PIECES_HEAD)
+call_smooth = caller(SIGNATURE)
+
+
+@kernel
+def _polynomial(c, n, t, k):
+    """Coefficient k about t of c_0 + ... + c_{n-1} t^(n-1): sum_j binomial(j, k) c_j t^(j-k)."""
+    if k >= n:
+        return 0.0
+    binomial, total = 1.0, 0.0
+    for i in range(1, k + 1):
+        binomial = binomial * (n - 1 - k + i) / i
+    for j in range(n - 1, k - 1, -1):
+        total = total * t + binomial * c[j]
+        if j > 0:
+            binomial = binomial * (j - k) / j
+    return total
+
+
+@kernel
+def _slope_over(a, w, y, k):
+    """Coefficient k >= 1 of y with y' w = a'."""
+    total = k * a[k]
+    for j in range(1, k):
+        total -= j * y[j] * w[k - j]
+    return total / (k * w[0])
+
+
+@kernel
+def _hyperbolic(a, y, w, k):
+    """Coefficient k of y = tanh(a), y' = (1 - y^2) a'; w is the row of 1 - y^2, known below k."""
+    if k == 0:
+        return np.tanh(a[0])
+    total = 0.0
+    for j in range(1, k + 1):
+        total += j * a[j] * w[k - j]
+    return total / k
+
+
+@kernel
+def _find_piece(c, t):
+    """Note the piece at t, and how far its knots are shifted there."""
+    knots, low, high = c[PIECES_HEAD:], 0, int(c[COUNT])
+    c[SHIFT] = np.floor((t - knots[0]) / c[PERIOD]) * c[PERIOD] if c[PERIOD] > 0.0 else 0.0
+    x = t - c[SHIFT]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x < knots[middle]:
+            high = middle
+        else:
+            low = middle
+    c[PIECE] = low
+
+
+@kernel
+def _piecewise(c, t, k):
+    """Coefficient k about t of a piecewise polynomial; NaN where it has none."""
+    count, size, knots = int(c[COUNT]), int(c[SIZE]), c[PIECES_HEAD:]
+    if c[HELD] == 0.0 and k == 0:
+        _find_piece(c, t)
+    i = int(c[PIECE])
+    if c[HELD] == 0.0 and c[BEYOND] == 0.0 and not (t >= knots[0] and t <= knots[count]):
+        return np.nan
+    return _polynomial(knots[count + 1 + i * size :], size, (t - c[SHIFT]) - knots[i], k)
+
+
+@kernel
+def _hold(p, t):
+    """Let everything piecewise stay with its piece at t, whatever time it is asked for."""
+    constants = int(p[2])
+    for i in range(int(p[1])):
+        at = HEAD + STEP * i
+        if int(p[at]) == PIECEWISE:
+            c = p[constants + int(p[at + 2]) :]
+            _find_piece(c, t)
+            c[HELD] = 1.0
+
+
+@callback(SIGNATURE)
+def run_program(program, t, count, out):
+    """out (count,): the motion's series about t; t is left in the program's first place. HOLD writes nothing."""
+    p, out = vector(program, ANY), vector(out, count)
+    if count == HOLD:
+        _hold(p, t)
+        return 0
+    p[0] = t
+    constants, result = int(p[2]), int(p[5])
+    s = matrix(data_of(p[int(p[3]) :]), int(p[4]), WIDTH)
+    for i in range(int(p[1])):
+        at = HEAD + STEP * i
+        what, y, a, b = int(p[at]), int(p[at + 1]), int(p[at + 2]), int(p[at + 3])
+        for k in range(count):
+            if what == POLYNOMIAL:
+                s[y, k] = _polynomial(p[constants + a :], b, t, k)
+            elif what == PIECEWISE:
+                s[y, k] = _piecewise(p[constants + a :], t, k)
+            elif what == ADD:
+                s[y, k] = s[a, k] + s[b, k]
+            elif what == SUBTRACT:
+                s[y, k] = s[a, k] - s[b, k]
+            elif what == MULTIPLY:
+                s[y, k] = product(s[a], s[b], k)
+            elif what == DIVIDE:
+                s[y, k] = quotient(s[a], s[b], s[y], k)
+            elif what == POWER:
+                s[y, k] = power(s[a], s[y], p[constants + b], k)
+            elif what == SINE:
+                s[y, k], s[y + 1, k] = sine_cosine(s[a], s[y], s[y + 1], k)
+            elif what == EXP:
+                s[y, k] = exponential(s[a], s[y], k)
+            elif what == LOG:
+                s[y, k] = np.log(s[a, 0]) if k == 0 else _slope_over(s[a], s[a], s[y], k)
+            elif what == TANH:
+                s[y, k] = _hyperbolic(s[a], s[y], s[y + 1], k)
+                s[y + 1, k] = (1.0 if k == 0 else 0.0) - square(s[y], k)
+            else:
+                s[y + 1, k] = (1.0 if k == 0 else 0.0) + square(s[a], k)
+                s[y, k] = np.arctan(s[a, 0]) if k == 0 else _slope_over(s[a], s[y + 1], s[y], k)
+    for k in range(count):
+        out[k] = s[result, k]
+    return 0

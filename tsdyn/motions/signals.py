@@ -1,0 +1,182 @@
+"""A load as a function of time: a plain function of t, smooth motions, or data, evaluated once a time of a run."""
+
+import math
+from functools import partial
+from types import FunctionType
+
+import numpy as np
+from numba.core.errors import NumbaError
+
+from ..errors import InvalidArgument
+from ..jit.compiled_once import compiled_once
+from ..jit.kernels import Callback, caller, kernel, specialised, vector
+from ..validation import floats, number
+from .expressions import Constant, Piecewise, Smooth
+from .knots import demand_covered
+from .program import run_program
+from .tables import is_data
+
+SIGNATURE = "dp"  # t, where the values go
+call_signal = caller(SIGNATURE)
+
+
+class Signal:
+    """`width` numbers, 1 or 3, as a function of time.
+
+    Parameters
+    ----------
+    source : callable, tuple of Smooth, Table, SciPy's PPoly, BPoly or BSpline, or (times, values)
+        A plain function of one float, the time in s, that Numba can compile and that returns a number (a tuple of
+        three for width 3); compiled code is cached on disk by all the code and constants it depends on. Or as many of
+        `ts.motions`, or data, for which nothing is compiled.
+    width : int
+    what : str
+        What error messages call it.
+    error : type
+        What they raise.
+    """
+
+    def __init__(self, source, width, what, error):
+        self.source, self.width, self.what, self.error = source, width, what, error
+        self._callback = None
+        self.motions = source if isinstance(source, tuple) and isinstance(source[0], Smooth) else ()
+        if is_data(source):
+            try:
+                self.motions = Piecewise.each(source)
+            except InvalidArgument as reason:
+                raise error(f"{what}: {reason}") from reason
+            if len(self.motions) != width:
+                raise error(f"{what}: the table has {len(self.motions)} values a time and must have {width}.")
+        if self.motions:
+            if not any(motion.pieces for motion in self.motions):
+                self.value(0.0)
+            return
+        plain = getattr(source, "py_func", source)
+        if not isinstance(plain, FunctionType) or plain.__code__.co_argcount != 1:
+            raise error(
+                f"{what}: {source!r} is no plain Python function of one argument, the time; wrap it in one, "
+                "lambda t: ..."
+            )
+        self.value(0.0)
+
+    @classmethod
+    def wrap(cls, value, width, what, error):
+        """Return a Signal for a function, data or Signal; a finite float or an array (3,) for numbers."""
+        if isinstance(value, Signal):
+            value = value.source
+        if is_data(value):
+            return cls(value, width, what, error)
+        if isinstance(value, Smooth):
+            value = (value,)
+        if isinstance(value, (tuple, list)) and any(isinstance(part, Smooth) or is_data(part) for part in value):
+            value = [Piecewise(part) if is_data(part) else part for part in value]
+            parts = [part if isinstance(part, Smooth) else number(part) for part in value]
+            if len(parts) == width and all(isinstance(part, Smooth) or math.isfinite(part) for part in parts):
+                parts = tuple(part if isinstance(part, Smooth) else Constant(part) for part in parts)
+                return cls(parts, width, what, error)
+            raise error(f"{what} must be {width} of ts.motions or finite numbers, got {value!r}.")
+        if callable(value):
+            return cls(value, width, what, error)
+        result = number(value) if width == 1 else floats(value)
+        if np.shape(result) != (() if width == 1 else (3,)) or not np.isfinite(result).all():
+            kind = "a finite number" if width == 1 else "three finite numbers"
+            raise error(f"{what} must be {kind}, a function of time or a ts.Table, got {value!r}.")
+        if width == 3:
+            result.setflags(write=False)
+        return result
+
+    @staticmethod
+    def places(value):
+        """What a load contributes to `parameters()`."""
+        return tuple(value) if isinstance(value, np.ndarray) else (value,)
+
+    @staticmethod
+    def is_zero(value):
+        """Whether a load is zero at all times."""
+        return not isinstance(value, Signal) and not np.any(value)
+
+    def value(self, t):
+        """The values at t, an array (width,), by the plain Python function."""
+        try:
+            with np.errstate(all="ignore"):
+                result = floats([f(np.float64(t)) for f in self.motions] if self.motions else self.source(t))
+        except Exception as error:
+            raise self.error(f"{self.what}: the function can't be evaluated at t = {t:g}: {error!r}") from error
+        if result.shape not in ((self.width,), ()) or (result.shape == () and self.width != 1):
+            raise self.error(
+                f"{self.what}: the function must return {'a number' if self.width == 1 else 'three numbers'}, it "
+                f"gave {result!r} at t = {t:g}."
+            )
+        result = np.atleast_1d(result)
+        if not np.isfinite(result).all():
+            raise self.error(f"{self.what}: the function is not finite at t = {t:g}: {result}.")
+        return result
+
+    def over(self, t):
+        """The values at times t (k,): `width` arrays (k,)."""
+        if self.motions:
+            return [f(t) for f in self.motions]
+        with np.errstate(all="ignore"):
+            values = np.array([self.source(time) for time in t], dtype=float).reshape(t.size, self.width)
+        return list(values.T)
+
+    def check(self, t0, t1):
+        """Refuse an interval that data don't cover."""
+        for motion in self.motions:
+            demand_covered(motion, t0, t1, self.what, self.error)
+
+    def forget(self):
+        """Drop the compiled function; it is made again when asked for."""
+        self._callback = None
+
+    @property
+    def address(self):
+        """The address of the compiled function, or of what runs motions."""
+        if self.motions:
+            return run_program.address
+        try:
+            if self._callback is None:
+                make = partial(_callback, self.source, self.width)
+                self._callback = compiled_once(f"signal{self.width}", self.source, make)
+            return self._callback.address
+        except NumbaError as error:
+            raise self.error(
+                f"{self.what}: Numba can't compile the function; use plain arithmetic, NumPy functions and constants "
+                f"in it{', and return a tuple of three' if self.width == 3 else ''}.\n{error}"
+            ) from error
+
+    def __getstate__(self):
+        return {**self.__dict__, "_callback": None}  # machine code is not for pickling
+
+
+def _one(t, out):
+    """The number, or NaN where the function raises: an error must not be taken for a zero."""
+    out = vector(out, 1)
+    out[0] = math.nan
+    try:
+        out[0] = float(function(t))
+    except Exception:
+        out[0] = math.nan
+    return 0
+
+
+def _three(t, out):
+    out = vector(out, 3)
+    try:
+        value = function(t)
+        out[0], out[1], out[2] = value[0], value[1], value[2]
+    except Exception:
+        out[0] = math.nan
+    return 0
+
+
+function = None  # filled in by `_callback`
+
+
+def _callback(f, width):
+    plain = getattr(f, "py_func", f)
+    template = _one if width == 1 else _three
+    name = f"{plain.__qualname__}.signal{width}"
+    return Callback(
+        specialised(template, name, plain, function=kernel(plain, allocates=True)), SIGNATURE, allocates=True
+    )

@@ -1,0 +1,8 @@
+"""What follows from t, q, qd, qdd: positions, energy, momentum, constraint errors, multipliers, reactions.
+
+Imports formulations and below. States and solutions share it.
+
+Begin with kinematics.py (motion of bodies, points and joints) and state.py; diagnostics.py recomputes errors, energy
+and momentum in plain NumPy; reactions.py has multipliers and constraint forces; evaluate.py all matrices at one
+state.
+"""

@@ -1,0 +1,206 @@
+"""Constraint errors, energy and momentum of a trajectory, recomputed in NumPy from nothing but t, q, qd, qdd.
+
+Nothing here calls the solver's kernels. Constraint errors carry each marker's value, velocity and acceleration through
+the primitive's phi as a truncated Taylor series, so neither its jacobian nor its gamma is used.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
+from ..elements.markers import PARAMETERS, POINT, TURN
+from ..jit.kernels import twin
+from ..maths.two_jets import Jet
+from ..motions.prescribed import Motion
+
+AT_ONCE = 1 << 16  # numbers in an array: constraints and bodies are taken together up to that
+
+
+class ConstraintError(NamedTuple):
+    """Maximum norms of the left-hand sides of Eqs. 1, 2 and 3 at every output, shapes (k,)."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+
+
+def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0, memory=None):
+    """Phi and its first two time derivatives along a trajectory of a packed scene: three arrays (k, m).
+
+    With time_rate=0 time stands still: the derivatives are those along (qd, qdd) alone. memory (k, slots) is what
+    constraints remember.
+    """
+    levels = tuple(np.zeros((t.size, len(packed.system.segments))) for _ in range(3))
+    for rows, part in _groups(packed, t, q, qd, qdd, time_rate, memory):
+        for level, values in zip(levels, part, strict=True):
+            level[:, rows] = values
+    return levels
+
+
+def constraint_error(packed, t, q, qd, qdd, memory=None):
+    """Maximum norms of `constraint_rows` over the rows."""
+    worst = np.zeros((3, t.size))
+    for _, part in _groups(packed, t, q, qd, qdd, 1.0, memory):
+        for level, values in zip(worst, part, strict=True):
+            np.maximum(level, np.abs(values).max(axis=1), out=level)
+    return ConstraintError(*worst)
+
+
+def _groups(packed, t, q, qd, qdd, time_rate, memory):
+    """Yield rows of Phi (r,) and their three levels, (k, r) each: constraints of one form at a time."""
+    starts, groups, row = starts_of(packed), {}, 0
+    lists = packed.constraints, packed.parameters, packed.coordinates, packed.slots
+    for constraint, values, places, slot in zip(*lists, strict=True):
+        if slot >= 0:
+            values = *values, np.zeros(t.size) if memory is None else memory[:, slot]
+        bodies = tuple(constraint.body_of(marker) for marker in constraint.markers)
+        form = (
+            type(constraint),
+            *(body.dimension for body in bodies),
+            *(isinstance(value, Motion) for value in values),
+        )
+        members = [starts.get(body, 0) for body in bodies], places, values, row
+        groups.setdefault(form, (constraint, []))[1].append(members)
+        row += constraint.rows
+    most = max(AT_ONCE // max(t.size, 1), 1)
+    for constraint, members in groups.values():
+        for first in range(0, len(members), most):
+            some = members[first : first + most]
+            try:
+                found = [_levels(constraint, some, t, q, qd, qdd, time_rate)]
+            except (TypeError, ValueError):  # a plug-in's phi that takes no arrays for its parameters
+                found = (_levels(constraint, [one], t, q, qd, qdd, time_rate) for one in some)
+            yield from found
+
+
+def _levels(constraint, members, t, q, qd, qdd, time_rate):
+    """The rows of constraints of the form of this one, and their levels, instances along the last axis."""
+    starts, places, values, rows = zip(*members, strict=True)
+    places, starts = np.array(places), np.array(starts)
+    x = []
+    for j, marker in enumerate(constraint.markers):
+        at, s = starts[:, j], places[:, j].T
+        x += _marker_jet(marker, constraint.body_of(marker).dimension, at, s, q, qd, qdd)
+    par = [entry for given in zip(*values, strict=True) for entry in _parameter(given, t, time_rate)]
+    out = [None] * constraint.rows
+    twin(type(constraint).phi)(x, par, Jet(t[:, None], time_rate), out)
+    shape = t.size, len(members)
+    out = [Jet.of(row) for row in out]
+    levels = [[np.broadcast_to(getattr(row, name), shape) for row in out] for name in ("x", "xd", "xdd")]
+    places = np.concatenate([np.array(rows) + i for i in range(constraint.rows)])
+    return places, [np.concatenate(level, axis=1) for level in levels]
+
+
+def _parameter(given, t, rate):
+    """One parameter of some instances, (instances,) or one number for all, or Jets (k, instances) of Motions."""
+    if isinstance(given[0], np.ndarray):  # what each remembers
+        return [np.transpose(given)]
+    if not isinstance(given[0], Motion):
+        same = all(value == given[0] for value in given)
+        return [given[0] if same else np.array(given)]
+    f, fd, fdd = np.array([value.over(t) for value in given]).reshape(len(given), 3, t.size).transpose(1, 2, 0)
+    return [Jet(f, rate * fd, rate * rate * fdd), Jet(fd, rate * fdd), Jet(fdd)]
+
+
+def starts_of(packed):
+    """Where the coordinates of each body begin."""
+    if packed.derived.coordinate_starts is None:
+        packed.derived.coordinate_starts = dict(zip(packed.bodies, packed.system.bodies[:, 0].tolist(), strict=True))
+    return packed.derived.coordinate_starts
+
+
+def marker_jets(starts, constraint, coordinates, q, qd, qdd):
+    """Yield the coordinates of each marker of a constraint or force as Jets over the outputs; starts of `starts_of`."""
+    for marker, s in zip(constraint.markers, coordinates, strict=True):
+        body = constraint.body_of(marker)
+        yield _marker_jet(marker, body.dimension, starts.get(body, 0), s, q, qd, qdd)
+
+
+def _marker_jet(marker, dimension, at, s, q, qd, qdd):
+    """Coordinates of a marker on a body whose own begin at `at`; or of several, at and s[i] being arrays."""
+    if marker.code == TURN:
+        return [Jet(0.0)] * 3
+    if marker.code == PARAMETERS and dimension != 7:
+        return [Jet(value) for value in IDENTITY]
+    if dimension == 0:
+        return [Jet(value) for value in s]
+    r = [Jet(q[:, at + i], qd[:, at + i], qdd[:, at + i]) for i in range(dimension)]
+    if marker.code == PARAMETERS:
+        return r[3:]
+    x = _rotate(r[3:], s) if dimension == 7 else [Jet(0.0)] * 3
+    return [a + b for a, b in zip(r[:3], x, strict=True)] if marker.code == POINT else x
+
+
+def _rotate(p, s):
+    """A(p) s, from the matrix written out."""
+    e0, e1, e2, e3 = p
+    rows = [
+        [e0 * e0 + e1 * e1 - e2 * e2 - e3 * e3, 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)],
+        [2.0 * (e1 * e2 + e0 * e3), e0 * e0 - e1 * e1 + e2 * e2 - e3 * e3, 2.0 * (e2 * e3 - e0 * e1)],
+        [2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), e0 * e0 - e1 * e1 - e2 * e2 + e3 * e3],
+    ]
+    return [row[0] * s[0] + row[1] * s[1] + row[2] * s[2] for row in rows]
+
+
+class Motions(NamedTuple):
+    """The motion of some bodies of one kind at every output."""
+
+    mass: np.ndarray  # (b,)
+    inertia: np.ndarray  # (b, 3, 3)
+    r: np.ndarray  # (k, b, 3)
+    rd: np.ndarray  # (k, b, 3)
+    p: np.ndarray | None  # (k, b, 4)
+    omega: np.ndarray | None  # (k, b, 3), body frame
+
+
+def body_motions(system, q, qd):
+    """Yield a `Motions` for the point masses, and one for the rigid bodies, some at a time; masses are the run's."""
+    most = max(AT_ONCE // max(len(q), 1), 1)
+    for length in (3, 7):
+        bodies = np.flatnonzero(system.bodies[:, 1] == length)
+        for first in range(0, bodies.size, most):
+            some = bodies[first : first + most]
+            at = system.bodies[some, 0][:, None]
+            p = omega = None
+            if length == 7:
+                p, pd = (x[:, at + np.arange(3, 7)] for x in (q, qd))
+                omega = angular_velocity(p, pd)
+            r, rd = (x[:, at + np.arange(3)] for x in (q, qd))
+            yield Motions(system.mass[some], system.inertia[some].reshape(-1, 3, 3), r, rd, p, omega)
+
+
+def angular_velocity(p, pd):
+    """omega' = 2 G(p) pd, shapes (..., 4) -> (..., 3); of pdd it gives the angular acceleration, as 2 Gd pd = 0."""
+    return 2.0 * np.einsum("...ij,...j->...i", transform_g(p), pd)
+
+
+def kinetic_energy(system, q, qd):
+    """Kinetic energy (k,), J."""
+    total = np.zeros(q.shape[0])
+    for bodies in body_motions(system, q, qd):
+        total += 0.5 * (bodies.rd**2).sum(axis=2) @ bodies.mass
+        if bodies.omega is not None:
+            total += 0.5 * np.einsum("kbi,bij,kbj->k", bodies.omega, bodies.inertia, bodies.omega)
+    return total
+
+
+def potential_energy(system, q):
+    """Potential energy of gravity (k,), J, zero at the ground's origin."""
+    return -(q[:, system.bodies[:, :1] + np.arange(3)] @ system.gravity) @ system.mass
+
+
+def linear_momentum(system, q, qd):
+    """Linear momentum (k, 3), kg m/s, ground frame."""
+    return sum(np.einsum("b,kbi->ki", bodies.mass, bodies.rd) for bodies in body_motions(system, q, qd))
+
+
+def angular_momentum(system, q, qd):
+    """Angular momentum about the ground's origin (k, 3), kg m^2/s, ground frame."""
+    total = np.zeros((q.shape[0], 3))
+    for bodies in body_motions(system, q, qd):
+        total += np.einsum("b,kbi->ki", bodies.mass, np.cross(bodies.r, bodies.rd))
+        if bodies.omega is not None:
+            own = np.einsum("bjl,kbl->kbj", bodies.inertia, bodies.omega)
+            total += np.einsum("kbij,kbj->ki", rotation_matrix(bodies.p), own)
+    return total

@@ -1,0 +1,245 @@
+"""What the solver sees at one state, in plain NumPy, exactly as the paper writes it: `scene.evaluate(q, qd, t)`."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..calls import fitting
+from ..elements.bodies import transform_g
+from ..errors import InvalidArgument, SingularConfiguration
+from ..formulations.redundancy import dependent_rows
+from ..maths.row_rank import RANK_TOL, dependent, farthest_first
+from ..model.equations import evaluate_constraints
+from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
+from ..validation import finite_vector, number
+from .generalised_forces import applied_loads, velocity_forces
+
+NOT_UNIQUE = (
+    "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
+    "leave free carries no inertia."
+)
+LOST = 1e-13  # of the largest pivot of a sparse factorisation: less is rounding
+SHARES = 3e-2, 1e-3, 1e-6, 1e-9  # of what elimination leaves of rows that are kept, in turn
+ROUNDS, MOST_AT_ONCE = 8, 64  # of taking back rows that were left out wrongly; how many pushes tell which
+INDEPENDENT = 1e-3  # of what the rows move at most that are left out: more is independent of others that are
+LARGE = 1000  # coordinates from which on matrices are sparse
+
+
+class Evaluation(NamedTuple):
+    """Everything in the equations of motion at one state; n coordinates, m rows."""
+
+    Phi: np.ndarray  # (m,) constraints, Eq. 1
+    Phi_q: np.ndarray  # (m, n) their Jacobian
+    Phi_t: np.ndarray  # (m,) their explicit time derivative
+    gamma: np.ndarray  # (m,) Phi_q qdd + gamma = 0, Eq. 3
+    M: np.ndarray  # (n, n) mass matrix
+    Q_A: np.ndarray  # (n,) applied forces
+    S: np.ndarray  # (n,) velocity terms, on the right-hand side
+    multipliers: np.ndarray  # (m,) M qdd + Phi_q^T lam = Q_A + S
+    qdd: np.ndarray  # (n,) accelerations
+
+
+@fitting
+def evaluate(scene, q=None, qd=None, t=0.0):
+    """Evaluate constraints, masses, forces, multipliers and accelerations at one state.
+
+    Parameters
+    ----------
+    q, qd : array_like (n,), optional
+        Positions and velocities; default the start values of the bodies. They need not satisfy the constraints.
+    t : float, s
+
+    Returns
+    -------
+    Evaluation
+        Named tuple of arrays: Phi, Phi_q, Phi_t, gamma, M, Q_A, S, multipliers, qdd; Phi_q and M are SciPy sparse
+        arrays where n is above 1000. Multipliers are NaN for rows that follow from others.
+
+    Raises
+    ------
+    InvalidArgument
+        If q or qd is not n finite numbers, or t is not finite.
+    SingularConfiguration
+        If accelerations are not unique there, or rows that depend on each other contradict each other.
+
+    Notes
+    -----
+    Haug 2018, Eqs. 1-4. Multipliers and accelerations solve [M, Phi_q^T; Phi_q, 0] (qdd, lam) = (Q_A + S, -gamma).
+    """
+    system = scene.system
+    start = scene.start
+    q = finite_vector(start[0] if q is None else q, start[0].size, "q")
+    qd = finite_vector(start[1] if qd is None else qd, start[0].size, "qd")
+    if not np.isfinite(number(t)):
+        raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
+    if q.size > LARGE:
+        return _evaluate_sparse(scene.packed, q, qd, float(t))
+    Phi, Phi_q, Phi_t, gamma = constraint_arrays(system, q, qd, t)
+    M, S = mass_matrix(system, q), velocity_forces(system, q[None], qd[None])[0]
+    Q_A = applied_loads(system, np.array([float(t)]), q[None], qd[None])[0]
+    m, n = Phi_q.shape
+    kkt = np.block([[M, Phi_q.T], [Phi_q, np.zeros((m, m))]])
+
+    def solve(friction):
+        try:
+            return equilibrated_solve(kkt, np.concatenate((Q_A + S + friction, -gamma)))
+        except np.linalg.LinAlgError:
+            return _of_independent_rows(M, Phi_q, Q_A + S + friction, gamma)
+
+    friction, solution = _with_friction(scene.packed, t, q, qd, Phi_q, solve)
+    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, S, solution[n:], solution[:n])
+
+
+def _with_friction(packed, t, q, qd, Phi_q, solve):
+    """Frictions of joints (n,), and what solve(friction) gives of them."""
+    if not packed.system.normals.size:
+        return 0.0, solve(0.0)
+    from .friction_balance import balance  # imported here: few scenes need it
+
+    return balance(packed, float(t), q, qd, Phi_q, solve)
+
+
+def _of_independent_rows(M, Phi_q, load, gamma):
+    """(qdd, lam) with NaN for rows of Phi_q that follow from others, and hold with them."""
+    dropped = dependent(Phi_q)
+    if not dropped.size:
+        raise SingularConfiguration(NOT_UNIQUE)
+    kept = np.setdiff1d(np.arange(len(Phi_q)), dropped)
+    kkt = np.block([[M, Phi_q[kept].T], [Phi_q[kept], np.zeros((kept.size, kept.size))]])
+    try:
+        found = equilibrated_solve(kkt, np.concatenate((load, -gamma[kept])))
+    except np.linalg.LinAlgError as error:
+        raise SingularConfiguration(NOT_UNIQUE) from error
+    return _with_gaps(found, kept, Phi_q, gamma)
+
+
+def _with_gaps(found, kept, Phi_q, gamma):
+    """(qdd, lam) of all rows, from that of the kept ones; refused where some row doesn't hold with them."""
+    m, n = Phi_q.shape
+    left = Phi_q @ found[:n] + gamma
+    if np.abs(left).max(initial=0.0) > RANK_TOL * (1.0 + np.abs(found[:n]).max()):
+        raise SingularConfiguration(NOT_UNIQUE)
+    lam = np.full(m, np.nan)
+    lam[kept] = found[n:]
+    return np.concatenate((found[:n], lam))
+
+
+def _evaluate_sparse(packed, q, qd, t):
+    system = with_short_rows(packed)
+    n = q.size
+    Phi, rows, Phi_t, gamma = constraint_arrays(system, q, qd, t, WIDTH)
+    Phi_q, M = as_csr(packed, rows), mass_matrix_sparse(system, q)
+    S = velocity_forces(system, q[None], qd[None])[0]
+    Q_A = applied_loads(system, np.array([t]), q[None], qd[None])[0]
+    regular = _sparse_solver(M, Phi_q)
+
+    def solve(friction):
+        load = Q_A + S + friction
+        if regular is None:
+            return _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t)
+        return regular(load, gamma)
+
+    friction, solution = _with_friction(packed, t, q, qd, Phi_q, solve)
+    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, S, solution[n:], solution[:n])
+
+
+def _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t):
+    """As `_of_independent_rows`, of sparse arrays."""
+    m, found = len(gamma), False
+    for share in SHARES:
+        dropped = dependent_rows(packed, q, t, share)
+        if dropped is None or not dropped.size:
+            continue
+        found = True
+        for _ in range(ROUNDS):
+            kept = np.setdiff1d(np.arange(m), dropped)
+            solve = _sparse_solver(M, Phi_q[kept])
+            if solve is None:
+                break
+            wrong = _independent(Phi_q[dropped], solve, np.zeros(kept.size))
+            if not wrong.size:
+                return _with_gaps(solve(load, gamma[kept]), kept, Phi_q, gamma)
+            dropped = np.delete(dropped, wrong)
+    solve = None if found else _sparse_solver(M, Phi_q, 0.0)  # regular, if not by much
+    if solve is None:
+        raise SingularConfiguration(NOT_UNIQUE)
+    return solve(load, gamma)
+
+
+def _independent(rows, solve, still):
+    """Which of the rows that were left out are independent of the kept ones, and of one another.
+
+    What the kept ones let move, pushed at random, leaves those at rest that follow from them; `still` is their gamma.
+    """
+    rng, n, count = np.random.default_rng(0), rows.shape[1], 1
+    while True:
+        moved = np.stack([solve(rng.normal(size=n), still)[:n] for _ in range(count)], axis=1)
+        seen = rows @ (moved / np.abs(moved).max(axis=0))
+        if np.abs(seen).max() <= RANK_TOL:
+            return np.zeros(0, int)
+        order, size = farthest_first(seen)
+        rank = (size > INDEPENDENT * size.max()).sum()
+        if rank < count or count >= MOST_AT_ONCE:
+            return order[:rank]
+        count *= 4
+
+
+def _sparse_solver(M, Phi_q, lost=LOST):
+    """(qdd, lam) of a load and gamma, by a sparse factorisation; None where it is singular to working precision."""
+    from scipy.sparse import block_array, diags_array
+    from scipy.sparse.linalg import splu
+
+    kkt = block_array([[M, Phi_q.T], [Phi_q, None]], format="csc")
+    scale = 1.0 / np.sqrt(np.maximum(abs(kkt).max(axis=1).toarray().ravel(), 1e-300))
+    weights = diags_array(scale)
+    try:
+        factors = splu((weights @ kkt @ weights).tocsc())
+    except RuntimeError:
+        return None
+    pivots = np.abs(factors.U.diagonal())
+    if pivots.min() < lost * pivots.max():
+        return None
+    return lambda load, gamma: scale * factors.solve(scale * np.concatenate((load, -gamma)))
+
+
+def equilibrated_solve(A, b):
+    """Solve a symmetric system scaled to unit rows; LinAlgError where it is singular to working precision."""
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(A).max(axis=1), 1e-300))
+    scaled = A * scale[:, None] * scale
+    if A.size and np.linalg.cond(scaled) > 1e14:
+        raise np.linalg.LinAlgError
+    return np.linalg.solve(scaled, b * scale) * scale
+
+
+def constraint_arrays(system, q, qd, t, width=None):
+    """Phi, Phi_q, Phi_t and gamma as the kernels give them; with a width, of a system with short rows."""
+    system = system._replace(reals=system.reals.copy())  # the motions' places are written to
+    m, n = system.segments.shape[0], width or q.size
+    Phi, Phi_q, Phi_t, gamma = np.zeros(m), np.zeros((m, n)), np.zeros(m), np.zeros(m)
+    evaluate_constraints(system, q, qd, float(t), Phi, Phi_q, Phi_t, gamma)
+    return Phi, Phi_q, Phi_t, gamma
+
+
+def mass_matrix(system, q):
+    """M: m I on r and 4 G^T J' G on p."""
+    M = np.zeros((q.size, q.size))
+    for (at, length), mass, J in zip(system.bodies, system.mass, system.inertia, strict=True):
+        M[at : at + 3, at : at + 3] = mass * np.eye(3)
+        if length == 7:
+            G = transform_g(q[at + 3 : at + 7])
+            M[at + 3 : at + 7, at + 3 : at + 7] = 4.0 * G.T @ J.reshape(3, 3) @ G
+    return M
+
+
+def mass_matrix_sparse(system, q):
+    """The same as a SciPy sparse array."""
+    from scipy.sparse import csr_array
+
+    r, rigid = system.bodies[:, :1] + np.arange(3), system.bodies[:, 1] == 7
+    p, J = system.bodies[rigid, :1] + np.arange(3, 7), system.inertia[rigid].reshape(-1, 3, 3)
+    G = transform_g(q[p])
+    blocks = 4.0 * G.swapaxes(1, 2) @ J @ G
+    i, j = np.broadcast_to(p[:, :, None], blocks.shape), np.broadcast_to(p[:, None], blocks.shape)
+    values = np.concatenate((np.repeat(system.mass, 3), blocks.ravel()))
+    places = [np.concatenate((r.ravel(), k.ravel())) for k in (i, j)]
+    return csr_array((values, places), (q.size, q.size))

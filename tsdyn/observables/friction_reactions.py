@@ -1,0 +1,56 @@
+"""The normal loads of joints' frictions, from positions, velocities and accelerations."""
+
+import numpy as np
+
+from ..elements.loops.body_poses import place_bodies, take_loads
+from ..formulations.friction_solve import find_reactions
+from ..jit.kernels import entry, resident
+from ..model.equations import set_time
+from ..rows.evaluation import factorise_rows, run_loops
+from ..rows.schur_complement import weigh
+from ..sparse.constraint_graph import REDUCED
+from ..sparse.networks import network_of
+from ..workspaces.workspace import load_parts, parts
+from .generalised_forces import applied_loads, inertial_forces, velocity_forces
+
+
+@entry
+def _solve(context, t, q, qd, r, out):
+    """out (k, frictions): normal loads with which Phi_q^T lam less the frictions is r (k, n); NaN where there are none.
+
+    H W (H^T lam - sum_i g_i N_i(lam)) = H W r: the equation of the accelerations, of what is left of the forces.
+    """
+    c = load_parts(context)
+    network, s, f = c.network, c.system, c.free
+    bodies = network.bodies
+    for k in range(t.size):
+        set_time(s, t[k])
+        place_bodies(bodies, q[k], f.poses)
+        run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
+        found = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, 0)
+        take_loads(bodies, q[k], r[k], f.Z)
+        for b in range(bodies.shape[0]):
+            weigh(network.inverse, b, f.Z, 8 * b, f.Z, 8 * b)
+        for e in range(f.gamma.size):
+            f.gamma[e] = 0.0
+        found = found and find_reactions(network, s, f, q[k], qd[k], t[k])
+        for i in range(out.shape[1]):
+            out[k, i] = f.friction.load[7 * i] if found else np.nan
+
+
+def with_normal_loads(packed, t, q, qd, qdd, memory):
+    """What forces remember (k, slots) and then the normal loads of joints' frictions; memory as it is without any."""
+    system = packed.system
+    if not system.normals.size:
+        return memory
+    memory = np.zeros((t.size, system.memory.size)) if memory is None else memory
+    if memory.shape[1] > system.memory.size:
+        return memory
+    r = applied_loads(system, t, q, qd, memory)
+    r += velocity_forces(system, q, qd)
+    r -= inertial_forces(system, q, qdd)
+    own = system._replace(reals=system.reals.copy())
+    context, *_keep = resident(parts(own, network_of(packed, REDUCED), q.shape[1]))
+    loads = np.zeros((t.size, system.normals.size))
+    _solve(context, t, q, qd, r, loads)
+    return np.hstack((memory, loads))

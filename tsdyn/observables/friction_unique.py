@@ -1,0 +1,56 @@
+"""Among redundant constraints reactions may not be unique, and friction that follows from such a one is refused."""
+
+import numpy as np
+
+from ..errors import RedundantConstraints
+from ..formulations.friction_solve import normal_load
+from ..jit.kernels import entry, resident, stack
+from ..model.packed_friction import FR_COUNT, FR_FIRST
+from ..sparse.constraint_graph import REDUCED
+from ..sparse.networks import network_of
+from ..workspaces.workspace import load_parts, parts
+from .uniqueness import NEXT_TO_NOTHING, find_rows, find_stress
+
+
+@entry
+def _free_loads(context, t, q, whole, out):
+    """out (frictions,): the largest normal load that a self-stress of size one makes."""
+    c = load_parts(context)
+    network, s, f = c.network, c.system, c.free
+    reaction, none, found = stack(6), stack(7), stack(7)
+    find_rows(network, s, f, q, t, whole)
+    for d in range(f.dropped[0]):
+        largest = find_stress(network, f, whole, f.dropped[1 + d])
+        for i in range(out.size):
+            friction = network.frictions[i]
+            for c in range(6):
+                reaction[c] = 0.0
+            normal_load(s, friction, q, q, t, 0, reaction, none)
+            for j in range(friction[FR_FIRST], friction[FR_FIRST] + friction[FR_COUNT]):
+                e, side = network.friction_rows[j]
+                at = 16 * e + 8 * side
+                for c in range(3):
+                    reaction[c] -= whole[at + c] * f.b[e] / largest
+                    reaction[3 + c] -= whole[at + 4 + c] * f.b[e] / largest
+            normal_load(s, friction, q, q, t, 0, reaction, found)
+            out[i] = max(out[i], abs(found[0] - none[0]))
+
+
+def demand_unique(packed, q, t):
+    """Raise RedundantConstraints where a friction needs a reaction that isn't unique at q."""
+    network = network_of(packed, REDUCED)
+    if not (network.dropped.size and len(network.frictions)):
+        return
+    system = packed.system._replace(reals=packed.system.reals.copy())
+    context, *_keep = resident(parts(system, network, q.size))
+    free = np.zeros(len(network.frictions))
+    _free_loads(context, t, q, np.zeros(16 * len(network.row)), free)
+    wrong = [load.force for load in packed.loads if load.normal >= 0 and free[load.normal] > NEXT_TO_NOTHING]
+    if wrong:
+        names = ", ".join(force.name for force in wrong)
+        joints = ", ".join(force.joint.name for force in wrong)
+        raise RedundantConstraints(
+            f"{names}: the normal load follows from a reaction of {joints} that is not unique, since constraint rows "
+            "are redundant: how they share it is not determined by rigid bodies.\nUse joints with fewer rows, so that "
+            "the reaction is unique (scene.mobility() names the rows), or leave out what of it causes friction."
+        )

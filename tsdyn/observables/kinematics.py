@@ -1,0 +1,149 @@
+"""Motion of bodies, of their points and of joints, at one instant or along a run: what states and solutions share."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..calls import fitting_methods
+from ..elements.bodies import rotation_matrix
+from ..errors import InvalidArgument
+from ..model import joint_motion
+from ..validation import vector3
+from .diagnostics import angular_velocity
+
+
+class Anchor(NamedTuple):
+    """A point of the run in the same step, from which the turns of the joints' angles are known."""
+
+    angles: np.ndarray  # (count,) or (k, count) there; right to less than half a turn
+    h: object = 0.0  # s since then, a number or (k,); below zero before it
+    levels: tuple = ()  # q, qd there, (n,) or (k, n); empty for the point itself
+
+
+@fitting_methods
+class Kinematics:
+    """Mixed into what has `handles`, q, qd and qdd, (n,) at one instant or (k, n) along a run, and an `anchor`.
+
+    A body is a handle or a name, and so is a joint. Along a run there is a leading k in every shape given here.
+    """
+
+    __slots__ = ()
+
+    def position(self, body, point=None):
+        """Position (3,) of the centroid, or of a point (3,) in the body frame; m, ground frame."""
+        return self._place(body, point, 0)
+
+    def velocity(self, body, point=None):
+        """Velocity (3,) of the centroid, or of a point (3,) in the body frame; m/s, ground frame."""
+        return self._place(body, point, 1)
+
+    def acceleration(self, body, point=None):
+        """Acceleration (3,) of the centroid, or of a point (3,) in the body frame; m/s^2, ground frame."""
+        return self._place(body, point, 2)
+
+    def orientation(self, body):
+        """Euler parameters (4,), body to ground, scalar first."""
+        return self.q[..., self._parameters(body)]
+
+    def rotation(self, body):
+        """Rotation matrix A(p) (3, 3), body to ground."""
+        return rotation_matrix(self.orientation(body))
+
+    def angular_velocity(self, body):
+        """Angular velocity (3,), rad/s, body frame."""
+        return angular_velocity(self.orientation(body), self.qd[..., self._parameters(body)])
+
+    def angular_acceleration(self, body):
+        """Angular acceleration (3,), rad/s^2, body frame."""
+        return angular_velocity(self.orientation(body), self.qdd[..., self._parameters(body)])
+
+    def angle(self, joint):
+        """Angle of a joint, rad: of b against a about its axis (right hand), counted over any number of turns.
+
+        Zero as built, or between the references of a joint that has them. A run begins within half a turn of zero,
+        unless `scene.set`, a motor, a thread or the state that the run goes on from says otherwise.
+
+        Returns
+        -------
+        float, or ndarray (k,) along a run
+            With a last axis for a joint of several angles: (2,) or (k, 2) for Universal, about axis_a and axis_b.
+
+        Raises
+        ------
+        InvalidConstraint
+            If the joint has no angle, or is not of this scene.
+        """
+        row = self.handles.row(joint, "angle")
+        return _one([self._counted(j, geometry) for j, geometry in enumerate(row.angles, row.first)])
+
+    def angle_rate(self, joint):
+        """Rate of the `angle` of a joint, rad/s."""
+        return self._coordinate(joint, "angle", 1)
+
+    def angle_acceleration(self, joint):
+        """Second time derivative of the `angle` of a joint, rad/s^2."""
+        return self._coordinate(joint, "angle", 2)
+
+    def displacement(self, joint):
+        """Displacement of a joint, m: of its point of b from that of a along the axis; a number, or (k,) along a run.
+
+        Raises
+        ------
+        InvalidConstraint
+            If the joint has no displacement, or is not of this scene.
+        """
+        return self._coordinate(joint, "displacement", 0)
+
+    def displacement_rate(self, joint):
+        """Rate of the `displacement` of a joint, m/s."""
+        return self._coordinate(joint, "displacement", 1)
+
+    def displacement_acceleration(self, joint):
+        """Second time derivative of the `displacement` of a joint, m/s^2."""
+        return self._coordinate(joint, "displacement", 2)
+
+    @property
+    def angles(self):
+        """All angles that the run counts (count,), in the order of the joints."""
+        counted = [self._counted(row.first + i, g) for row in self.handles.rows for i, g in enumerate(row.angles)]
+        return np.stack(counted, axis=-1) if counted else np.zeros((*np.shape(self.q)[:-1], 0))
+
+    def _coordinate(self, joint, kind, level):
+        evaluate = getattr(joint_motion, kind)
+        geometries = getattr(self.handles.row(joint, kind), f"{kind}s")
+        return _one([evaluate(g, *self._motions(g), level) for g in geometries])
+
+    def _counted(self, j, geometry):
+        """Angle j: on the turn that follows from the anchor's angle, and the rates there and here."""
+        bodies, anchor = self._motions(geometry), self.anchor
+        near = anchor.angles[..., j]
+        if anchor.levels:
+            before = self.handles.motions(geometry, anchor.levels)
+            rates = (joint_motion.angle(geometry, *pair, 1) for pair in (before, bodies))
+            near = joint_motion.counted(joint_motion.angle(geometry, *before, 0), near) + 0.5 * anchor.h * sum(rates)
+        return joint_motion.counted(joint_motion.angle(geometry, *bodies, 0), near)
+
+    def _motions(self, geometry):
+        return self.handles.motions(geometry, (self.q, self.qd, self.qdd))
+
+    def _place(self, body, point, level):
+        """Position, velocity or acceleration of the centroid of a body, or of a point of it."""
+        body, levels = self.handles.body(body), (self.q, self.qd, self.qdd)
+        at, dimension = self.handles.where(body)
+        if point is None:
+            return levels[level][..., at : at + 3]
+        s = vector3(point, f"{body.name}: point (m, body frame)", InvalidArgument)
+        if dimension == 3 and s.any():
+            raise InvalidArgument(f"{body.name}: a point mass has no other point than (0, 0, 0), got {point!r}.")
+        return np.array(joint_motion.BodyMotion(at, dimension, levels).point(s.tolist(), level)).T
+
+    def _parameters(self, body):
+        """Where the Euler parameters of a body are."""
+        body = self.handles.body(body)
+        body.orientation  # noqa: B018  a point mass says that it has none
+        at, _ = self.handles.where(body)
+        return slice(at + 3, at + 7)
+
+
+def _one(values):
+    return values[0] if len(values) == 1 else np.stack(values, axis=-1)

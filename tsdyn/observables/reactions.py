@@ -1,0 +1,178 @@
+"""Multipliers and the forces of constraints, from positions, velocities and accelerations."""
+
+import math
+from collections import Counter
+
+import numpy as np
+
+from ..elements.bodies import rotation_matrix, transform_g
+from ..elements.loops.body_poses import place_bodies, take_loads
+from ..elements.markers import POINT
+from ..elements.primitive import INTS
+from ..jit.kernels import entry, resident
+from ..maths.dense_linalg import copy
+from ..model.equations import constraint_jacobian, set_time
+from ..model.packed import COUNT, FIRST_INT, FIRST_REAL, REALS, classes, index_of
+from ..model.sparse_jacobian import WIDTH, with_short_rows
+from ..rows.evaluation import factorise_rows, run_loops
+from ..rows.schur_complement import gather, scatter
+from ..sparse.constraint_graph import REDUCED
+from ..sparse.factorisation import solve
+from ..sparse.networks import network_of
+from ..workspaces.workspace import load_parts, parts
+from .friction_reactions import with_normal_loads
+from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
+
+
+@entry
+def solve_multipliers(context, t, q, r, rows, out):
+    """out (k, m) with Phi_q^T lam = r, by least squares; r (k, n) is Q_A + S - M qdd. NaN where Phi_q is singular.
+
+    S lam = H W r on the network with one step of refinement, r in terms of bodies, then the normalisations from what is
+    left of r along p. The system is that with short rows, rows (m, 14) scratch, zero on entry.
+    """
+    whole = load_parts(context)
+    network, s, f = whole.network, whole.system, whole.free
+    bodies = network.bodies
+    for k in range(t.size):
+        set_time(s, t[k])
+        place_bodies(bodies, q[k], f.poses)
+        run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
+        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, 0)
+        constraint_jacobian(s, q[k], t[k], rows)
+        copy(r[k], f.Q)
+        take_loads(bodies, q[k], r[k], f.Z)
+        for i in range(out.shape[1]):
+            out[k, i] = 0.0
+        for _ in range(2):
+            gather(network, f.Y, f.Z, f.b)
+            solve(network.pattern, f.S, f.b)
+            scatter(network, f.H, f.b, f.Z)
+            for e in range(f.b.size):
+                if network.row[e] >= 0:
+                    out[k, network.row[e]] += f.b[e]
+        for i in range(out.shape[1]):  # what the joints leave of r
+            for half in range(2):
+                at = s.segments[i, 2 * half]
+                for c in range(s.segments[i, 2 * half + 1]):
+                    f.Q[at + c] -= rows[i, 7 * half + c] * out[k, i]
+        for b in range(bodies.shape[0]):
+            i = network.normals[b]
+            if i >= 0:
+                x = 0.0
+                for c in range(3, 7):
+                    x += f.Q[bodies[b, 0] + c] * q[k, bodies[b, 0] + c]
+                out[k, i] = x
+        for i in range(f.dropped[0]):
+            out[k, network.row[f.dropped[1 + i]]] = math.nan
+        if not regular:
+            for i in range(out.shape[1]):
+                out[k, i] = math.nan
+
+
+def multipliers(packed, t, q, qd, qdd, memory=None):
+    """Multipliers (k, m) of M qdd + Phi_q^T lam = Q_A + S; NaN where Phi_q has lost rank.
+
+    memory (k, slots) is what forces remember, zeros by default.
+    """
+    memory = with_normal_loads(packed, t, q, qd, qdd, memory)
+    system, network = with_short_rows(packed), network_of(packed, REDUCED)
+    out = np.zeros((t.size, len(system.segments)))
+    system = system._replace(reals=system.reals.copy())
+    f = applied_loads(packed.system, t, q, qd, memory)
+    f += velocity_forces(system, q, qd)
+    f -= inertial_forces(system, q, qdd)
+    context, *_keep = resident(parts(system, network, q.shape[1]))
+    solve_multipliers(context, t, q, f, np.zeros((out.shape[1], WIDTH)), out)
+    return out
+
+
+def particular(multipliers):
+    """Multipliers (k, m) with zeros where rows are dropped: they solve the same equations."""
+    dropped = np.isnan(multipliers)
+    if not dropped.any():
+        return multipliers
+    return np.where(dropped & ~dropped.all(axis=1, keepdims=True), 0.0, multipliers)
+
+
+def reaction(solution, member, body):
+    """Force and torque (k, 3) that a constraint exerts on a body, torque about its first point on it, ground frame.
+
+    -Phi_r^T lam at the centroid and the body torque -G Phi_p^T lam / 2, moved to the point. member is a system.Member.
+    """
+    packed = solution.packed
+    system = with_short_rows(packed)
+    system = system._replace(reals=system.reals.copy(), kinds=only(packed, member.parts))
+    load = np.zeros((solution.t.size, system.bodies[index_of(packed, body), 1]))
+    rows = np.zeros((len(system.segments), WIDTH))
+    halves = []  # where the body's numbers are in each row
+    for part in packed.constraints[member.parts]:
+        halves += [0 if body is part.a else WIDTH // 2 if body is part.b else -1] * part.rows
+    lam = np.ascontiguousarray(particular(solution.multipliers)[:, member.rows])
+    first, halves = member.rows.start, np.array(halves, np.int64)
+    constraint_loads(system, solution.t, solution.q, lam, first, halves, rows, load)
+    return _at_first_point(solution, body, load, member.constraint, member.coordinates)
+
+
+def only(packed, parts):
+    """Of System.kinds what these primitives, a slice, need: a row each."""
+    if packed.derived.places_within is None:
+        seen, within = Counter(), []
+        for constraint in packed.constraints:
+            within.append(seen[type(constraint)])
+            seen[type(constraint)] += 1
+        packed.derived.places_within = within
+    rows = dict(zip(classes(packed), with_short_rows(packed).kinds, strict=True))
+    kinds = np.array([rows[type(part)] for part in packed.constraints[parts]])
+    within = np.array(packed.derived.places_within[parts])
+    kinds[:, FIRST_INT] += INTS * within
+    kinds[:, FIRST_REAL] += kinds[:, REALS] * within
+    kinds[:, COUNT] = 1
+    return kinds
+
+
+def loads_of(packed):
+    """The loads by the id of their force."""
+    if packed.derived.loads is None:
+        packed.derived.loads = {id(load.force): load for load in packed.loads}
+    return packed.derived.loads
+
+
+def force_reaction(solution, load, body):
+    """Force and torque (k, 3) that a force exerts on a body, torque about its first point on it, ground frame."""
+    force, system = load.force, solution.system._replace(forces=load.row[None])
+    Q = force_loads(system, solution.t, solution.q, solution.qd, solution._memory)
+    at, length = solution.system.bodies[index_of(solution.packed, body)]
+    return _at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)
+
+
+def _at_first_point(solution, body, load, item, coordinates):
+    """Force and torque of generalised forces load (k, 7 or 3) on a body, about the first point of the item on it."""
+    at, length = solution.system.bodies[index_of(solution.packed, body)]
+    force, torque = load[:, :3].copy(), np.zeros((load.shape[0], 3))
+    if length == 7:
+        p = solution.q[:, at + 3 : at + 7]
+        A = rotation_matrix(p)
+        torque = np.einsum("kij,kjl,kl->ki", A, 0.5 * transform_g(p), load[:, 3:])
+        letter = "a" if body is item.a else "b"
+        pairs = zip(item.markers, coordinates, strict=True)
+        points = [s for marker, s in pairs if marker.body == letter and marker.code == POINT]
+        if points:
+            torque -= np.cross(A @ points[0], force)
+    return force, torque
+
+
+@entry
+def constraint_loads(s, t, q, lam, first, halves, rows, out):
+    """out (k, 7 or 3) = -Phi_q^T lam of one body; lam (k, rows of the constraint), which begin at first.
+
+    halves (rows,) says where the body's numbers begin in each row, below zero where it has none.
+    """
+    for k in range(t.size):
+        set_time(s, t[k])
+        constraint_jacobian(s, q[k], t[k], rows)
+        for i in range(lam.shape[1]):
+            if halves[i] < 0:
+                continue
+            for c in range(out.shape[1]):
+                out[k, c] -= rows[first + i, halves[i] + c] * lam[k, i]

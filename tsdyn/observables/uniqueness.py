@@ -1,0 +1,90 @@
+"""Which reactions are unique among redundant constraints: those that no self-stress has a part in.
+
+Where a row h of H follows from the kept ones, H^T z = 0 for z = 1 in its place and -(H W H^T)^-1 H W h^T in theirs: any
+multiple of z may be added to the multipliers, and nothing moves otherwise. A constraint's reaction is unique where all
+such z leave its load on the body zero.
+"""
+
+import math
+
+import numpy as np
+
+from ..elements.loops.body_poses import place_bodies
+from ..jit.kernels import entry, kernel, long_kernel, resident
+from ..model.equations import set_time
+from ..model.packed import index_of
+from ..rows.evaluation import factorise_rows, run_loops
+from ..rows.schur_complement import gather, weigh
+from ..sparse.constraint_graph import REDUCED
+from ..sparse.factorisation import solve
+from ..sparse.networks import network_of
+from ..workspaces.workspace import load_parts, parts
+
+NEXT_TO_NOTHING = 1e-7  # of the rows' own size
+
+
+@kernel
+def find_stress(network, f, whole, dropped):
+    """b = z of a dropped row, of H whole; its largest entry."""
+    for i in range(f.Z.size):
+        f.Z[i] = 0.0
+    for side in range(2):
+        body = network.sides[dropped, side]
+        if body < network.bodies.shape[0]:
+            weigh(network.inverse, body, whole, 16 * dropped + 8 * side, f.Z, 8 * body)
+    gather(network, f.H, f.Z, f.b)
+    solve(network.pattern, f.S, f.b)
+    largest = 1.0
+    for e in range(f.b.size):
+        f.b[e] = -f.b[e]
+        largest = max(largest, abs(f.b[e]))
+    f.b[dropped] = 1.0
+    return largest
+
+
+@long_kernel
+def find_rows(network, s, f, q, t, whole):
+    """H with and, in `whole`, without what is dropped, and the factors of S, at q; whether there are any."""
+    set_time(s, t)
+    place_bodies(network.bodies, q, f.poses)
+    run_loops(network, s.reals, REDUCED, f, t, f.b, f.H)
+    regular = factorise_rows(network, s.reals, f, t, f.b, f.H, f.Y, f.S, 0)
+    count = f.dropped[0]
+    f.dropped[0] = 0
+    run_loops(network, s.reals, REDUCED, f, t, f.b, whole)
+    f.dropped[0] = count
+    return regular
+
+
+@entry
+def free_loads(context, t, q, rows, sides, whole, out):
+    """out (k,): the largest load that a self-stress of size one has these rows put on a body, by their own size."""
+    c = load_parts(context)
+    network, s, f = c.network, c.system, c.free
+    for k in range(t.size):
+        out[k] = 0.0 if find_rows(network, s, f, q[k], t[k], whole) else math.inf
+        for d in range(f.dropped[0]):
+            largest, size = find_stress(network, f, whole, f.dropped[1 + d]), 0.0
+            for c in range(8):
+                load = 0.0
+                for i in range(rows.size):
+                    h = whole[16 * rows[i] + 8 * sides[i] + c]
+                    size = max(size, abs(h))
+                    load += f.b[rows[i]] * h
+                f.Z[c] = load
+            for c in range(8):
+                out[k] = max(out[k], abs(f.Z[c]) / max(largest * size, 1e-300))
+
+
+def unique(solution, rows, body):
+    """Whether the reaction of these rows, a slice, on a body is unique; bool (k,)."""
+    network = network_of(solution.packed, REDUCED)
+    if not network.dropped.size:
+        return np.ones(solution.t.size, bool)
+    wanted = np.flatnonzero((network.row >= rows.start) & (network.row < rows.stop))
+    sides = np.where(network.sides[wanted, 0] == index_of(solution.packed, body), 0, 1)
+    system = solution.system._replace(reals=solution.system.reals.copy())
+    context, *_keep = resident(parts(system, network, solution.q.shape[1]))
+    out = np.zeros(solution.t.size)
+    free_loads(context, solution.t, solution.q, wanted, sides, np.zeros(16 * len(network.row)), out)
+    return out < NEXT_TO_NOTHING

@@ -1,0 +1,155 @@
+"""What plug-ins are written with: constraints, joints, forces, friction and integration methods of your own.
+
+The one module below `tsdyn` that is part of the public interface; the built-in classes in constraints/, forces/ and
+integrators/ import from here, too. docs/plug-ins.md shows how.
+"""
+
+from .calls import Placing, fitting
+from .elements.applied_load import Given, GivenByState, GivenInBody
+from .elements.bodies import Ground, PointMass, rotation_matrix
+from .elements.element import in_frame
+from .elements.force import Force, finite, load, not_negative, positive_number, vector_load
+from .elements.framed_joint import PARALLEL, FramedJoint, beside, carried, turned_about
+from .elements.friction_laws import act, along_and_across, coefficient, demand_bodies, slip
+from .elements.joint import Joint, across
+from .elements.joint_coordinates import Angle, Displacement, angles, displacements
+from .elements.joint_friction import AXIS, JointFriction, optional_length
+from .elements.joint_load import JointLoad, instants, law_of_joint
+from .elements.markers import Parameters, Point, Turn, Vector
+from .elements.primitive import Primitive
+from .elements.user_functions import ByState, arguments_of, fill_state, state_load
+from .errors import InvalidArgument, InvalidConstraint, InvalidForce
+from .jit.kernels import kernel, specialised, stack
+from .maths.angles import angle_near
+from .maths.recurrences import (
+    angle,
+    cross,
+    dot,
+    exponential,
+    inverse_root,
+    product,
+    quotient,
+    root,
+    rotated,
+    rotated_back,
+    rotation,
+    scaled,
+    sine_cosine,
+    square,
+)
+from .methods.diagonally_implicit import trapezoid_error
+from .methods.explicit import (
+    call_accelerate,
+    call_place,
+    embedded_error,
+    error_kernel,
+    second_embedded_error,
+    step_kernel,
+    vector,
+)
+from .methods.integrator import Adaptive, DiagonallyImplicit, ExplicitNystrom, ExplicitRungeKutta, Integrator
+from .methods.interpolants import DOP853 as DOP853_INTERPOLANT
+from .methods.interpolants import linear_second
+from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
+from .motions.expressions import Smooth
+from .motions.prescribed import Motion
+from .motions.signals import Signal
+from .motions.tables import is_data
+from .validation import floats, number, positive, vector3, whole
+
+__all__ = [
+    "AXIS",
+    "DOP853_INTERPOLANT",
+    "PARALLEL",
+    "Adaptive",
+    "Angle",
+    "ByState",
+    "DiagonallyImplicit",
+    "Displacement",
+    "ExplicitNystrom",
+    "ExplicitRungeKutta",
+    "Force",
+    "FramedJoint",
+    "Given",
+    "GivenByState",
+    "GivenInBody",
+    "Ground",
+    "ImplicitTableau",
+    "Integrator",
+    "InvalidArgument",
+    "InvalidConstraint",
+    "InvalidForce",
+    "Joint",
+    "JointFriction",
+    "JointLoad",
+    "Motion",
+    "NystromTableau",
+    "Parameters",
+    "Placing",
+    "Point",
+    "PointMass",
+    "Primitive",
+    "RungeKuttaTableau",
+    "Signal",
+    "Smooth",
+    "Turn",
+    "Vector",
+    "across",
+    "act",
+    "along_and_across",
+    "angle",
+    "angle_near",
+    "angles",
+    "arguments_of",
+    "beside",
+    "call_accelerate",
+    "call_place",
+    "carried",
+    "coefficient",
+    "cross",
+    "demand_bodies",
+    "displacements",
+    "dot",
+    "embedded_error",
+    "error_kernel",
+    "exponential",
+    "fill_state",
+    "finite",
+    "fitting",
+    "floats",
+    "in_frame",
+    "instants",
+    "inverse_root",
+    "is_data",
+    "kernel",
+    "law_of_joint",
+    "linear_second",
+    "load",
+    "not_negative",
+    "number",
+    "optional_length",
+    "positive",
+    "positive_number",
+    "product",
+    "quotient",
+    "root",
+    "rotated",
+    "rotated_back",
+    "rotation",
+    "rotation_matrix",
+    "scaled",
+    "second_embedded_error",
+    "sine_cosine",
+    "slip",
+    "specialised",
+    "square",
+    "stack",
+    "state_load",
+    "step_kernel",
+    "trapezoid_error",
+    "turned_about",
+    "vector",
+    "vector3",
+    "vector_load",
+    "whole",
+]

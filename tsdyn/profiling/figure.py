@@ -1,0 +1,56 @@
+"""The figure of `profile`: a bar a phase, a colour a group."""
+
+from ..benchmarking.figure import COLOURS
+from ..drawing import GREY, demand_matplotlib
+from .units import duration
+
+
+def figure(profile):
+    """Draw a profile.
+
+    Parameters
+    ----------
+    profile : Profile
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    MissingDependency
+        If matplotlib is not installed.
+    """
+    demand_matplotlib()
+    from matplotlib import style
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    groups = list(profile.groups())
+    colours = {group: COLOURS[i % len(COLOURS)] for i, group in enumerate(groups)}
+    phases = profile.phases
+    with style.context("default"):
+        drawn = Figure(figsize=(8.0, 1.4 + 0.28 * len(phases)), dpi=200, layout="constrained")
+        FigureCanvasAgg(drawn)
+        ax = drawn.subplots()
+        shares = [100.0 * phase.seconds / profile.seconds for phase in phases]
+        ax.barh(range(len(phases)), shares, color=[colours[phase.group] for phase in phases], height=0.7)
+        for i, (phase, share) in enumerate(zip(phases, shares, strict=True)):
+            ax.annotate(
+                duration(phase.seconds),
+                (share, i),
+                (4, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=8,
+                color=GREY,
+            )
+        ax.set_yticks(range(len(phases)), [f"{phase.group}: {phase.part}" for phase in phases], fontsize=8)
+        ax.invert_yaxis()
+        ax.margins(x=0.12)
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.set_xlabel("share of the call (%)")
+        ax.set_title(
+            f"{duration(profile.seconds)} a call, {profile.solution.method}", loc="left", fontsize=11, weight="bold"
+        )
+    return drawn

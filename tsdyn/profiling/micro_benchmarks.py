@@ -1,0 +1,87 @@
+"""What parts of a placement and an evaluation cost, that no address parts: they are run again at a run's last state."""
+
+import time
+
+from ..formulations.chart_coordinates import factorise_normal
+from ..formulations.null_space import reduced_mass, velocities
+from ..formulations.tangent import solve_velocities
+from ..jit.kernels import entry, kernel
+from ..maths.dense_linalg import copy
+from ..rows.selection import factor_rows
+from ..runs.run_state import T, load_run
+from ..taylor.workspace import load_series
+from ..workspaces.workspace import load
+
+SYSTEM, NORMAL, VELOCITIES, MASS = range(4)
+BRIEF = 2e-3  # s, of a sample
+ROUNDS = 5
+
+
+@kernel
+def _system(network, f):
+    """W H^T, H W H^T and its factors."""
+    factor_rows(network, f, f.H, f.Y, f.S, 1)
+
+
+@entry
+def again(context, run, what, count):
+    """A part of the form without a basis."""
+    c, r = load(context), load_run(run)
+    w, f, l = c.work, c.free, c.local
+    for _ in range(count):
+        if what == SYSTEM:
+            _system(c.network, f)
+        elif what == NORMAL:
+            factorise_normal(c.network, w, f, l)
+        else:
+            copy(r.y, l.y)
+            solve_velocities(c.network, c.system, w, f, l, r.clock[T])
+
+
+@entry
+def again_with_basis(context, run, what, count):
+    """A part of the forms with one."""
+    c, r = load(context), load_run(run)
+    for _ in range(count):
+        if what == MASS:
+            reduced_mass(c.system, c.work)
+        else:
+            velocities(c.system, c.work, r.clock[T], r.y)
+
+
+@entry
+def again_in_series(context, run, what, count):
+    """A part of a Taylor step."""
+    c = load_series(context)
+    for _ in range(count):
+        _system(c.network, c.free)
+
+
+def prices(memory):
+    """Seconds of each part that the memory's form has, by name, at the state that its run has left."""
+    if hasattr(memory, "series"):
+        function, parts = again_in_series, {"system": SYSTEM}
+    elif memory.basis_free:
+        function, parts = again, {"system": SYSTEM, "normal": NORMAL, "velocities": VELOCITIES}
+    else:
+        function, parts = again_with_basis, {"mass": MASS, "velocities": VELOCITIES}
+    return {name: _seconds(lambda n, what=what: function(*memory.where, what, n)) for name, what in parts.items()}
+
+
+def _seconds(call):
+    """Of one of n that call(n) makes: the least of some samples."""
+    call(1)
+    n, spent = 1, 0.0
+    while True:
+        began = time.perf_counter()
+        call(n)
+        spent = time.perf_counter() - began
+        if spent > BRIEF / 2 or n > 1 << 20:
+            break
+        n *= 4
+    least = spent / n
+    for _ in range(ROUNDS if spent < 0.1 else 0):
+        began = time.perf_counter()
+        call(n)
+        least = min(least, (time.perf_counter() - began) / n)
+    return least

@@ -1,0 +1,197 @@
+"""`profile`: where the time of a call of `simulate` goes, phase by phase, and what to change."""
+
+import copy
+import time
+from functools import partial
+
+import numpy as np
+
+from ..calls import fitting
+from ..errors import InvalidArgument, Status
+from ..formulations.registry import formulation
+from ..jit.cache import statistics
+from ..jit.kernels import DEBUG
+from ..observables.state import remembered
+from ..runs.arguments import interval, method_of, state_arrays
+from ..simulation import method_choice as choice
+from ..simulation.scene import Scene
+from ..simulation.scene_cache import prepared
+from ..simulation.simulate import DRIVERS, simulate
+from .advice import advise
+from .instrumentation import Stopwatch, Timekeeper
+from .micro_benchmarks import prices
+from .phases import Phase, of_series, of_steps, orders
+from .report import Profile
+from .timers import own_cost
+
+SAMPLE, FEWEST, MOST = 1.0, 2, 40  # s of calls of each sort, and how many
+LONG = 5.0  # s, of calls that are made as few times as can be
+OUTPUTS = {"t_eval": "times of t_eval", "dense_output": "dense output", "events": "events"}
+
+
+@fitting
+def profile(scene, t_span=(0.0, 10.0), *, advice=True, **options):
+    """Measure where the time of `simulate(scene, t_span, **options)` goes; the scene is not changed.
+
+    The call is made several times as it is, and as often with its two ends as the only output, once with nothing but a
+    stopwatch around the compiled driver and once with timers in place of what the driver calls by address. So no run
+    but those pays for it, and the sum of the phases can be held against the time of the call as it is.
+
+    Parameters
+    ----------
+    scene : Scene
+    t_span : (float, float), s
+    advice : bool
+        Whether to try what might be quicker: another method, looser tolerances. Those calls take time of their own.
+    **options
+        As for `simulate`, but progress.
+
+    Returns
+    -------
+    Profile
+        Its `phases`, `advice`, `skipped`; text in a terminal, a table in a notebook, and a figure by `plot()`.
+
+    Raises
+    ------
+    TsdynError
+        As `simulate`, before anything is measured; StepFailure if the run makes no step.
+    """
+    if DEBUG:
+        raise InvalidArgument("profile times compiled kernels, and with TSDYN_DEBUG=1 there are none.")
+    if not isinstance(scene, Scene):
+        raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
+    if "progress" in options:
+        raise InvalidArgument("profile makes many runs, and so has no progress to show; leave progress out.")
+    if not isinstance(advice, (bool, np.bool_)):
+        raise InvalidArgument(f"advice must be True or False, got {advice!r}.")
+    before = dict(statistics)
+    solution, seconds = _timed(scene, t_span, options)
+    loaded = {name: statistics[name] - before.get(name, 0) for name in ("hits", "misses", "seconds")}
+    if solution.stats.seconds["run"] < LONG:  # what it took besides may be of kernels loaded or compiled
+        solution, seconds = _timed(scene, t_span, options)
+    start, end = interval(t_span)[0], solution.reached
+    if not end > start:
+        solution.raise_if_failed()
+    method = _method(scene, solution, options)
+    plain = {name: value for name, value in options.items() if name not in (*OUTPUTS, "integrator", "rtol", "atol")}
+    plain["t_eval"] = (start, end)
+
+    asked = {name: options[name] for name in OUTPUTS if not (options.get(name) is None or options[name] is False)}
+    sorts = {"asked": (t_span, options), "plain": ((start, end), {**plain, "integrator": method})}
+    if options.get("integrator") is None and (solution.stats.stiff or method.implicit):
+        sorts["chosen"] = t_span, {**_without(options), "integrator": method}
+    if len(asked) > 1:
+        sorts |= {name: ((start, end), {**plain, name: value, "integrator": method}) for name, value in asked.items()}
+    least, watch, keeper, run = _rounds(scene, method, (start, end), plain, sorts, seconds)
+
+    entries = keeper.entries(own_cost())
+    series = method.driver == "series"
+    found = (of_series if series else of_steps)(entries, keeper.kinds, prices(watch.memory), run.stats)
+    chosen = least.get("chosen", least["asked"])
+    outside = [Phase("Python", "arguments, slices, the solution", 1, max(least["plain"] - least["driver"], 0.0))]
+    outside += _outputs(asked, least, chosen, solution)
+    if "chosen" in least:
+        outside.append(Phase("choice of the method", "an attempt, and a pilot", 1, max(least["asked"] - chosen, 0.0)))
+    once = _once(scene, method, options, start)
+    result = Profile(
+        scene, solution, method, (start, end), least["asked"], least["driver"], (*found, *outside), once, loaded,
+        orders(entries) if series else (),
+    )  # fmt: skip
+    if advice:
+        try:
+            result.advice = advise(result, simulate, plain, options)
+        except KeyboardInterrupt:
+            result.advice = ("Interrupted before all alternatives were tried: there may be more to say.",)
+    return result
+
+
+def _timed(scene, t_span, options):
+    """A solution, and the seconds of its call; Ctrl-C ends the profile."""
+    began = time.perf_counter()
+    solution = simulate(scene, t_span, **options)
+    seconds = time.perf_counter() - began
+    if solution.status == Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    return solution, seconds
+
+
+def _without(options):
+    return {name: value for name, value in options.items() if name not in ("rtol", "atol")}
+
+
+def _first(scene, options):
+    """The method that a call begins with where none is named."""
+    series = options.get("formulation", "tangent") == "tangent" and options.get("chart_interval") is None
+    return choice.explicit(prepared(scene), options.get("rtol"), options.get("atol"), series)
+
+
+def _method(scene, solution, options):
+    """The method that made a solution."""
+    if options.get("integrator") is not None:
+        return method_of(options["integrator"], options.get("rtol"), options.get("atol"))
+    method = _first(scene, options)
+    return method if repr(method) == solution.method else choice.implicit(method)
+
+
+def _observed(method, observer):
+    """The method with a driver that lets an observer see its memory."""
+    method = copy.copy(method)
+    method.driver = partial(DRIVERS[method.driver], observe=observer.observe)
+    return method
+
+
+def _rounds(scene, method, span, plain, sorts, seconds):
+    """The least seconds of each sort of call, in turn; the last stopwatch, the quickest timekeeper and its solution."""
+    least, keeper, run = {}, None, None
+    _timed(scene, span, {**plain, "integrator": _observed(method, Timekeeper()), "max_steps": 1})  # loads the timers
+    for _ in range(int(np.clip(SAMPLE / seconds, FEWEST if seconds < LONG else 1, MOST))):
+        watch, timed = Stopwatch(), Timekeeper()
+        _timed(scene, span, {**plain, "integrator": _observed(method, watch)})
+        solution, _ = _timed(scene, span, {**plain, "integrator": _observed(method, timed)})
+        watch.release()
+        timed.release()
+        if keeper is None or timed.seconds < keeper.seconds:
+            keeper, run = timed, solution
+        times = {"driver": watch.seconds}
+        times |= {name: _timed(scene, *arguments)[1] for name, arguments in sorts.items()}
+        least = {name: min(value, least.get(name, np.inf)) for name, value in times.items()}
+    return least, watch, keeper, run
+
+
+def _outputs(asked, least, chosen, solution):
+    """What is asked for besides the two ends, each by what a call takes longer with it."""
+    total = max(chosen - least["plain"], 0.0)
+    if not asked:
+        return [Phase("outputs", "every step", solution.t.size, total)]
+    more = (
+        {name: max(least[name] - least["plain"], 1e-9) for name in asked} if len(asked) > 1 else dict.fromkeys(asked, 1)
+    )
+    calls = {"t_eval": solution.t.size, "dense_output": solution.stats.steps, "events": solution.stats.steps}
+    share = total / sum(more.values())
+    return [Phase("outputs", OUTPUTS[name], calls[name], value * share) for name, value in more.items()]
+
+
+def _once(scene, method, options, start):
+    """Seconds of what a scene's first call does and later ones find done."""
+    seconds, clock = {}, time.perf_counter
+    scene.touch()
+    began = clock()
+    scene.packed  # noqa: B018
+    seconds["packing"] = clock() - began
+    began, kept = clock(), prepared(scene)
+    if method.driver == "series":
+        kept.series  # noqa: B018
+    else:
+        form = formulation(options.get("formulation", "tangent")).serving(method)
+        form.network(kept.packed)
+        kept.system(method.implicit)
+    seconds["order of elimination"] = clock() - began
+    state = options.get("state")
+    q, qd = scene.start if state is None else state_arrays(state, kept.n)
+    began = clock()
+    memory = remembered(state, kept, start, q)
+    kept.start(
+        scene, q, qd, start, options.get("initial_tol", 1e-9), memory, options.get("redundancy", "drop") == "drop"
+    )
+    seconds["check of the start"] = clock() - began
+    return seconds

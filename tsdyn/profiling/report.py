@@ -1,0 +1,153 @@
+"""What `profile` hands back: phases, the table they make, what was skipped, what to change, and the figure."""
+
+import html
+
+from .units import duration
+
+SKIPPED = {
+    "solves_skipped": "position solves, on the constraints to rounding already",
+    "checks_skipped": "checks of a correction that was known to suffice",
+    "factorizations_skipped": "factorisations, older factors serving or still contracting",
+    "gyroscopic_skipped": "gyroscopic torques of spheres",
+    "rotations_skipped": "rotations of bodies that never turn",
+    "columns_skipped": "series of constant columns of Phi_q",
+    "forces_skipped": "evaluations without forces",
+}
+HEAD = ("", "share", "time", "calls", "a call")
+
+
+class Profile:
+    """Where the time of a call of `simulate` goes; made by `tsdyn.profile`.
+
+    Attributes
+    ----------
+    seconds : float
+        Of the call, once everything is loaded: the least of some.
+    driver : float
+        Seconds of it in the compiled driver, without outputs between the steps.
+    phases : tuple of Phase
+        group, part, calls, seconds; and `each`, seconds a call.
+    orders : tuple of (int, float)
+        Of Taylor: calls and seconds of each order from zero, without its loops over constraints and forces.
+    once : dict
+        Seconds of what only a scene's first call does, by name.
+    skipped : dict
+        What was not needed, by its name in `Solution.stats`.
+    advice : tuple of str
+        What to change, each with what it was measured to bring; empty where nothing stands out.
+    solution : Solution
+    """
+
+    def __init__(self, scene, solution, method, span, seconds, driver, phases, once, loaded, orders):
+        self.scene, self.solution, self.method, self.span = scene, solution, method, span
+        self.seconds, self.driver, self.phases, self.once = seconds, driver, phases, once
+        self.loaded, self.orders, self.advice = loaded, orders, ()
+
+    @property
+    def accounted(self):
+        """The share of the driver's time that its phases add up to: what timers add and what they miss is off it."""
+        return sum(p.seconds for p in self.phases if p.group not in _OUTSIDE) / self.driver
+
+    @property
+    def skipped(self):
+        """What was not needed, by its name in `Solution.stats`."""
+        return {name: getattr(self.solution.stats, name) for name in SKIPPED}
+
+    def share(self, group, part=None):
+        """The share of the call that a group takes, or a part of it."""
+        return sum(p.seconds for p in self.phases if p.group == group and part in (None, p.part)) / self.seconds
+
+    def groups(self):
+        """Seconds of each group."""
+        return {
+            name: sum(p.seconds for p in self.phases if p.group == name)
+            for name in dict.fromkeys(phase.group for phase in self.phases)
+        }
+
+    def _rows(self):
+        """(whether a group's own, cells) of the table."""
+        for group, seconds in self.groups().items():
+            parts = [phase for phase in self.phases if phase.group == group]
+            only = parts[0] if len(parts) == 1 else None
+            yield True, self._cells(f"{group}: {only.part}" if only else group, seconds, only.calls if only else 0)
+            for phase in parts if only is None else ():
+                yield False, self._cells(phase.part, phase.seconds, phase.calls)
+
+    def _cells(self, name, seconds, calls):
+        each = duration(seconds / calls) if calls else ""
+        return name, f"{100.0 * seconds / self.seconds:.1f} %", duration(seconds), str(calls or ""), each
+
+    def _facts(self):
+        s, solution = self.solution.stats, self.solution
+        yield f"{duration(self.seconds)} a call, {self.span[0]:g} to {self.span[1]:g} s"
+        yield f"{solution.method}, formulation {solution.formulation}"
+        counts = "steps", "rejected", "evaluations", "placements", "factorizations", "charts"
+        yield ", ".join(f"{getattr(s, name)} {name}" for name in counts)
+        yield f"the phases add up to {100.0 * self.accounted:.0f} % of the compiled driver's {duration(self.driver)}"
+
+    def _notes(self):
+        """Titled lines below the table."""
+        if self.orders:
+            times = ", ".join(duration(seconds / calls) for calls, seconds in self.orders)
+            yield "Each order, from 0, constraints and forces apart", [times]
+        yield "Once for a scene", [", ".join(f"{name} {duration(x)}" for name, x in self.once.items())]
+        if self.loaded["misses"]:
+            yield "Once for this machine, just now", [f"kernels compiled: {self.loaded['misses']}"]
+        elif self.loaded["hits"]:
+            yield "Once for a process", [f"kernels loaded: {self.loaded['hits']}, {duration(self.loaded['seconds'])}"]
+        skipped = [f"{count} {SKIPPED[name]}" for name, count in self.skipped.items() if count]
+        yield "Skipped", skipped or ["nothing"]
+        yield "What to change", list(self.advice) or ["nothing stands out"]
+
+    def __str__(self):
+        lines = [HEAD, *(cells for _, cells in self._rows())]
+        names = [line[0] if own else f"  {line[0]}" for own, line in [(True, HEAD), *self._rows()]]
+        widths = [max(map(len, column)) for column in (names, *list(zip(*lines, strict=True))[1:])]
+        table = [
+            "  ".join([name.ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(line[1:], widths[1:], strict=True))])
+            for name, line in zip(names, lines, strict=True)
+        ]
+        notes = [text for title, items in self._notes() for text in (f"{title}:", *(f"- {item}" for item in items))]
+        return "\n".join(["Profile: " + ";\n".join(self._facts()) + ".", "", *map(str.rstrip, table), "", *notes])
+
+    def __repr__(self):
+        largest = max(self.groups().items(), key=lambda pair: pair[1])
+        return (
+            f"<Profile: {duration(self.seconds)} a call by {self.solution.method}, {largest[0]} "
+            f"{100.0 * largest[1] / self.seconds:.0f} %, {len(self.advice)} to change>"
+        )
+
+    def _repr_html_(self):
+        """The same in a notebook."""
+        rows = ["".join(f"<th>{cell}</th>" for cell in HEAD)]
+        for own, cells in self._rows():
+            tag = "th" if own else "td"
+            rows.append("".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells))
+        caption = "; ".join(html.escape(fact) for fact in self._facts())
+        notes = "".join(
+            f"<dt>{html.escape(title)}</dt>" + "".join(f"<dd>{html.escape(item)}</dd>" for item in items)
+            for title, items in self._notes()
+        )
+        body = "".join(f"<tr>{row}</tr>" for row in rows)
+        return f"<table><caption>Profile: {caption}</caption>{body}</table><dl>{notes}</dl>"
+
+    def plot(self, path=None):
+        """Draw the phases as bars; return the matplotlib Figure, written to `path` if given.
+
+        Raises
+        ------
+        MissingDependency
+            If matplotlib is not installed.
+        InvalidArgument
+            If the figure can't be written there.
+        """
+        from ..drawing import save
+        from .figure import figure
+
+        drawn = figure(self)
+        if path is not None:
+            save(drawn, path)
+        return drawn
+
+
+_OUTSIDE = ("Python", "outputs", "choice of the method")

@@ -1,0 +1,91 @@
+"""The arguments of `simulate`, checked: times, the method, the state to start from."""
+
+import math
+
+import numpy as np
+
+from ..errors import InvalidArgument
+from ..methods.integrator import Integrator, registered
+from ..validation import finite_vector, floats, unknown_name
+
+TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
+
+
+def interval(t_span):
+    """Start and end of the interval, s."""
+    span = floats(t_span)
+    t0, t1 = span.tolist() if span.shape == (2,) else (math.nan, math.nan)
+    if not (math.isfinite(t0) and math.isfinite(t1)):
+        raise InvalidArgument(f"t_span must be two finite times in s, (start, end), got {t_span!r}.")
+    if not t1 > t0:
+        raise InvalidArgument(
+            f"t_span must end after it starts, got ({t0:g}, {t1:g}); swap them, or choose a later end."
+        )
+    return t0, t1
+
+
+def output_times(t_eval, t0, t1):
+    """The times of t_eval (k,), s, none for None."""
+    if t_eval is None:
+        return np.empty(0)
+    times = floats(t_eval)
+    increasing = times.ndim == 1 and np.count_nonzero(times[1:] > times[:-1]) == max(times.size - 1, 0)
+    if increasing and times.size and t0 <= times[0] and times[-1] <= t1:
+        return times
+    if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
+        raise InvalidArgument("t_eval must be a non-empty vector of finite times in s.")
+    if not increasing:
+        raise InvalidArgument("t_eval must increase from each time to the next.")
+    if times[0] < t0 or times[-1] > t1:
+        raise InvalidArgument(
+            f"t_eval must lie within t_span, ({t0:g}, {t1:g}); it runs from {times[0]:g} to {times[-1]:g}."
+        )
+    return times
+
+
+def step_count(t0, t1, step):
+    """How many fixed steps there are, the last of which may be shorter."""
+    count = (t1 - t0) / step
+    if not count < 2**53 or t0 + step == t0:
+        raise InvalidArgument(f"the step of {step:g} s is too small for the interval ({t0:g}, {t1:g}).")
+    return max(1, math.ceil(count * (1.0 - 1e-12)))
+
+
+def state_arrays(state, n):
+    """Positions and velocities (n,) of a state given to start from."""
+    if not (hasattr(state, "q") and hasattr(state, "qd")):
+        raise InvalidArgument(f"state must have q and qd, such as solution.state, got {state!r}.")
+    return finite_vector(state.q, n, "state.q"), finite_vector(state.qd, n, "state.qd")
+
+
+def tolerances(rtol, atol):
+    """Rtol and atol by name, TOLERANCE for None."""
+    return {"rtol": TOLERANCE if rtol is None else rtol, "atol": TOLERANCE if atol is None else atol}
+
+
+def method_of(integrator, rtol, atol):
+    """The method that is given as an instance, a class or a name; tolerances are for a name."""
+    known = registered()
+    given = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
+    adaptive = isinstance(integrator, str) and getattr(known.get(_key(integrator)), "embedded_order", 0) > 0
+    if given and not adaptive:
+        raise InvalidArgument(
+            f"{' and '.join(given)} set the tolerances of an adaptive method given by its name, such as "
+            f"integrator='rk45', not of {integrator!r}; give an instance its own, such as RK45(rtol=1e-8)."
+        )
+    if isinstance(integrator, str):
+        if _key(integrator) not in known:
+            raise unknown_name("integrator", integrator, known)
+        kind = known[_key(integrator)]
+        return kind(**tolerances(rtol, atol)) if adaptive else kind()
+    if isinstance(integrator, type) and integrator in known.values():
+        return integrator()
+    if not isinstance(integrator, Integrator):
+        raise InvalidArgument(
+            f"integrator must be a name or an instance such as ts.integrators.Nystrom4(step=1e-3), got {integrator!r}."
+        )
+    return integrator
+
+
+def _key(name):
+    return name.lower().replace("-", "").replace("_", "")

@@ -1,0 +1,298 @@
+"""Events along a run: zeros of users' functions, found inside every step on the manifold.
+
+The driver is called one step at a time and never learns of events, so they change no step. Within a step the functions
+are sampled on states of its dense output, as finely as each asks for (root_isolation.py), and Brent's method finds the
+zeros. A change of sign is an event, and so is a value of zero: exactly at a time that is looked at, or within rounding
+where the function touches zero without changing sign. A touch counts once, in either direction.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InvalidArgument, Status
+from ..maths.root_isolation import EPS, LARGEST, Search, TooFast
+from ..model.handles import handles_of
+from .event_states import Inside
+from .events import Failed, Instant
+from .run_state import BEGUN, BLOCKS, CHART_ROWS, DENSE, ROWS, STEPS, STORED, T
+from .trajectory import B_END
+
+SLOW, FAST = 0.1, 2.0  # rad that a body turns in a step: less needs half of the samples, more needs the most
+AT_START = 64.0 * EPS  # a value, or a time, that is no more than this beside others is that of the start
+
+
+class Occurrence(NamedTuple):
+    """An event found."""
+
+    t: float
+    index: int
+    state: np.ndarray  # (3, n)
+
+
+class Track:
+    """What is known of one function up to the last step's end."""
+
+    def __init__(self, value):
+        self.value = self.end = value  # at that time, and at the end of the step that is looked at
+        self.sign = 0.0  # the last it had; 0 for none yet
+        self.significant = None  # time and value at which it had that sign
+        self.zero = None  # time of the last zero, if it has had no sign since
+        self.passed = self.pending = False  # that zero is a start within rounding; may become an event on being left
+        self.noise = 0.0  # rounding error of the values, where it has been found out
+        self.degree = 0  # that the last step needed
+
+
+class Watch:
+    """The events of one run: what is known of the functions, and what has been found.
+
+    Attributes
+    ----------
+    t : float, s
+        The time up to which the run has been looked at.
+    """
+
+    def __init__(self, events, packed, reader, start):
+        self.events, self.packed = events, packed
+        self.start = self.t = start
+        self.state = self.memory = None  # at t, and what is remembered of it: joints' angles, and what forces do
+        self.angles = handles_of(packed).count
+        self.beside = None  # the start of the step that is looked at, for `Instant`
+        self.tracks = None
+        self.list = [[] for _ in events]
+        rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, 0]
+        self._p = rigid[:, None] + np.arange(3, 7)
+        self._signs = np.random.default_rng(0).choice([-1.0, 1.0], (3, 3, packed.system.bodies[:, 1].sum()))
+        self.read_by(reader)
+
+    def read_by(self, reader):
+        """Take a reader of the steps that are watched from now on."""
+        none, self.reader = np.empty(0), reader
+        reader(none, none.astype(int), np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0)))  # loads the kernel
+
+    def found(self, n):
+        """Times, positions and velocities of each event."""
+        times = [np.array([each.t for each in found]) for found in self.list]
+        states = [np.array([each.state for each in found]).reshape(-1, 3, n) for found in self.list]
+        return times, *([np.ascontiguousarray(state[:, i]) for state in states] for i in (0, 1))
+
+    def advance(self, memory, record, most):
+        """As `Memory.advance`; the Status, and what there is to say of it."""
+        run = memory.run
+        if not run.numbers[BEGUN]:
+            status = memory.advance(record, -1)
+            if not run.numbers[BEGUN]:
+                return status, ""
+            self.state, self.memory = run.now.copy(), run.remembered.copy()
+            self._look_from()
+            if self.tracks is None:
+                try:
+                    self.tracks = [Track(self._value(i, self.t, self.state)) for i in range(len(self.events))]
+                except Failed as failure:
+                    raise InvalidArgument(f"events: {failure}") from failure.__cause__
+        for _ in range(most):
+            done = run.numbers[STEPS]
+            status = memory.advance(record, 1)
+            if run.numbers[STEPS] > done:
+                try:
+                    last = self._look(run, record)
+                except Failed as failure:
+                    return Status.EVENT_FAILED, str(failure)
+                if last is not None:
+                    return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
+            if status != Status.SLICE_DONE or run.numbers[CHART_ROWS] + 2 >= len(record.charts):
+                return status, ""
+        return status, ""
+
+    def go_back(self, run, record):
+        """Let the run end where it has been looked at last."""
+        if self.state is not None and run.clock[T] > self.t:
+            run.remembered[:] = self.memory
+            self._end(run, record, self.t, self.state, self.t)
+
+    def _look_from(self):
+        self.beside = self.t, self.state, self.memory[: self.angles]
+
+    def _instant(self, t, state):
+        return Instant(self.packed, self.memory[self.angles :], self.beside, t, state)
+
+    def _value(self, i, t, state):
+        return self.events[i].value(t, self._instant(t, state))
+
+    def _look(self, run, record):
+        """Look at the step just made; the `Occurrence` that ends the run, or None."""
+        self._look_from()
+        before, self.memory = self.memory, run.remembered.copy()
+        try:
+            return self._looked(run, record, Inside(self.reader, run, record, self.t, self.state))
+        except KeyboardInterrupt:
+            self.memory = before
+            raise
+
+    def _looked(self, run, record, step):
+        found, failure, end = [], None, step.t1
+        step.degree = self._degree(step)
+        for i in range(len(self.events)):
+            points, failed = self._points(i, step, end)
+            if failed is not None:
+                failure, end = failed, min(end, failed.t)
+            try:
+                mine = self._walk(i, step, points)
+            except Failed as failed:
+                mine, failure, end = [], failed, min(end, failed.t)
+            found += mine
+            last = self.events[i].limit - len(self.list[i])
+            if len(mine) >= last:
+                end = min(end, mine[int(last) - 1].t)
+        for each in sorted(found, key=lambda each: each.t):
+            if failure is not None and each.t >= failure.t:
+                break
+            self.list[each.index].append(each)
+            if len(self.list[each.index]) >= self.events[each.index].limit:
+                run.remembered[: self.angles] = self._instant(each.t, each.state).angles
+                self._end(run, record, each.t, each.state, step.t0)
+                self.t, self.state = each.t, each.state
+                return each
+        self.t, self.state = step.t1, step.at(step.t1)
+        if failure is not None:
+            raise failure
+        return None
+
+    def _points(self, i, step, end):
+        """Times up to `end`, and values of event i, between which its sign changes once at most; what `Failed`."""
+        track, good, failure = self.tracks[i], [step.t0], None
+
+        def sample(times):
+            values = np.full(times.size, np.nan)
+            for k, (t, state) in enumerate(zip(times.tolist(), step.states(times), strict=True)):
+                if state is not None:
+                    values[k] = self._value(i, t, state)
+                    good.append(t)
+            return values
+
+        while end > step.t0:
+            search = Search(sample, lambda t: self._shaken(i, step, t), track.noise)
+            try:
+                degree = max(step.degree, track.degree // 2)
+                track.degree, track.end = search.run(step.t0, track.value, end, degree)
+                track.noise = search.noise
+                return search.points, failure
+            except Failed as failed:
+                failure, end = failed, max(t for t in good if t < failed.t)
+            except TooFast:
+                return [(step.t0, track.value)], Failed(
+                    f"{self.events[i].name} changes too fast to be followed: {search.spent} values between "
+                    f"t = {step.t0:.9g} and {end:.9g} s were not enough. Give a max_step, or a smoother function.",
+                    step.t0,
+                )
+        return [(step.t0, track.value)], failure
+
+    def _degree(self, step):
+        """The degree that the interpolant and the fastest turn of a body ask for."""
+        squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
+        turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
+        return LARGEST if turn > FAST else self.reader.degree if turn > SLOW else self.reader.degree // 2
+
+    def _walk(self, i, step, points):
+        """The occurrences of event i among these points."""
+        track, direction, found = self.tracks[i], self.events[i].direction, []
+        (before, value), *rest = points
+        if track.sign == 0.0 and track.zero is None:  # the run's first step
+            if 0.0 < abs(track.value) <= AT_START * max(abs(value) for _, value in points):
+                track.zero, track.passed, track.pending = before, value != 0.0, value == 0.0
+            else:
+                rest = points
+        for t, value in rest:
+            sign = float(value > 0.0) - float(value < 0.0)
+            if value == 0.0:
+                if track.zero is None or track.passed:
+                    late = track.sign == 0.0 and t > self.start  # the start's own zero, within rounding
+                    track.passed, track.pending = False, late or (direction != 0.0 and direction * track.sign >= 0.0)
+                    if not track.pending:
+                        found.append(self._zero(i, step, t, before))
+                track.zero = t
+            elif abs(value) > track.noise:
+                if track.zero is not None:
+                    if track.pending and direction * sign >= 0.0:
+                        found.append(self._left(i, step, track.zero, (t, value)))
+                    track.zero, track.passed, track.pending = None, False, False
+                elif sign == -track.sign and direction * sign >= 0.0:
+                    found += self._root(i, step, t, value)
+                track.sign, track.significant = sign, (t, value)
+            before = t
+        track.value = track.end
+        return found
+
+    def _shaken(self, i, step, t):
+        """By how much the value of event i at t changes with rounding errors of the state."""
+        try:
+            state, value = step.at(t), self._at(i, step, t)
+            size = 4.0 * EPS * np.abs(state).max(axis=1, keepdims=True)
+            shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
+        except Failed:
+            return 0.0
+        return 4.0 * max(abs(each - value) for each in shaken)
+
+    def _zero(self, i, step, t, other):
+        """The `Occurrence` at a zero, or at the end next to another time of the zeros around it."""
+        if t != other and self._at(i, step, t) == 0.0:
+            while t != (middle := 0.5 * (t + other)) != other:
+                if self._at(i, step, middle) == 0.0:
+                    t = middle
+                else:
+                    other = middle
+        return Occurrence(t, i, step.at(t))
+
+    def _left(self, i, step, t, last):
+        """The `Occurrence` where event i leaves a zero: that at t, or one that is so within rounding."""
+        value = self._at(i, step, t)
+        if value * last[1] < 0.0:
+            t = self._between(i, step, (t, value), last)
+            return Occurrence(t, i, step.at(t))
+        return self._zero(i, step, t, last[0])
+
+    def _root(self, i, step, t1, b):
+        """The change of sign up to t1, where event i has the value b; none if it is that of the run's start."""
+        track = self.tracks[i]
+        t0, a = max(track.significant, (step.t0, track.value))
+        if a * b >= 0.0:
+            return [Occurrence(t0, i, step.at(t0))]
+        root = self._between(i, step, (t0, a), (t1, b))
+        if root - self.start <= AT_START * max(1.0, abs(self.start)):
+            return []
+        return [Occurrence(root, i, step.at(root))]
+
+    def _between(self, i, step, first, last):
+        """Where event i changes its sign between two times with values."""
+        from scipy.optimize import brentq  # takes a while to import
+
+        known, (t1, b) = dict((first, last)), last
+
+        def value(t):
+            return known[t] if t in known else self._at(i, step, t)
+
+        root = brentq(value, first[0], t1, xtol=4.0 * EPS, rtol=4.0 * EPS, maxiter=1000)
+        shift = 4.0 * EPS * max(abs(root), 1.0)
+        # a run that goes on from a terminal event had better find it behind itself
+        while self.events[i].limit < math.inf and root + shift < t1 and value(root) * b <= 0.0:
+            root, shift = root + shift, 2.0 * shift
+        return root
+
+    def _at(self, i, step, t):
+        return self._value(i, t, step.at(t))
+
+    @staticmethod
+    def _end(run, record, t, state, start):
+        """Let the run end at t, within the step that began at `start`."""
+        run.now[:] = state
+        run.clock[T] = t
+        if record.t_eval.size > 0:
+            while run.numbers[ROWS] > 0 and record.out[run.numbers[ROWS] - 1, 0] > t:
+                run.numbers[ROWS] -= 1
+        elif t > start:
+            record.out[run.numbers[ROWS] - 1] = [t, *state.ravel(), *run.remembered]
+        else:
+            run.numbers[ROWS] -= 1
+        if run.numbers[DENSE] == STORED:
+            record.blocks[run.numbers[BLOCKS] - 1, B_END] = t

@@ -1,0 +1,38 @@
+"""What a driver keeps of accepted states."""
+
+from ..jit.kernels import kernel
+from ..maths.dense_linalg import copy
+from ..model.joint_turns import angle_after
+from .run_state import ROWS, T
+
+
+@kernel
+def record(r, log, t, q, qd, qdd):
+    """One row of output, at the last accepted point or within the step at its side."""
+    n, i = q.size, r.numbers[ROWS]
+    row = log.out[i]
+    row[0] = t
+    for j in range(n):
+        row[1 + j], row[1 + n + j], row[1 + 2 * n + j] = q[j], qd[j], qdd[j]
+    for j in range(r.remembered.size):
+        row[1 + 3 * n + j] = r.remembered[j]
+    if t != r.clock[T]:
+        for j in range(r.joints.shape[0]):
+            row[1 + 3 * n + j] = angle_after(r, j, q, qd, t - r.clock[T])
+    r.numbers[ROWS] = i + 1
+
+
+@kernel
+def store_now(w, r):
+    """q, qd, qdd as those of the last accepted point."""
+    copy(w.q, r.now[0])
+    copy(w.qd, r.now[1])
+    copy(w.qdd, r.now[2])
+
+
+@kernel
+def restore_now(w, r):
+    """Put them back."""
+    copy(r.now[0], w.q)
+    copy(r.now[1], w.qd)
+    copy(r.now[2], w.qdd)

@@ -1,0 +1,67 @@
+"""A run as its driver sees it: what is asked of it, and what it hands back.
+
+A method has a driver, the attribute `driver`: a name in simulate.DRIVERS, or the driver itself, a function of a `Task`
+that returns an `Outcome`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import Status
+from .history import ChartLog, StepLog
+
+
+def between(times, span):
+    """Whether there are times between the ends of a span."""
+    return times.size > 2 or any(span[0] < t < span[1] for t in times.tolist())
+
+
+class Task(NamedTuple):
+    """One run, its arguments checked and its start consistent; n coordinates, m constraint rows."""
+
+    prepared: object  # the scene's `Prepared`: the packed system, and memory for a run
+    method: object
+    form: object
+    span: tuple  # start and end, s
+    q: np.ndarray  # (n,) at the start; not to be written to
+    qd: np.ndarray  # (n,)
+    remembered: np.ndarray  # (angles + slots,) angles of joints at the start, and what forces remember
+    times: np.ndarray  # (k,) output times, s; empty for every step
+    dense_output: bool
+    events: list  # of `events.Event`, or None
+    constraint_tol: float
+    max_steps: int  # or None
+    interval: int  # steps between charts that are forced; 0 for none
+    report: object  # a function of the fraction done, None at the end
+    history: bool  # whether the histories of steps and charts are kept
+    choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
+    stops: np.ndarray = np.empty((0, 2))  # times at which a step ends, s, and whether a function is asked there
+    sampling: object = None  # a `sampling.Sampling`, or None
+
+    @property
+    def angles(self):
+        """Of the joints at the start (angles,)."""
+        return self.remembered[: self.prepared.handles.count]
+
+    @property
+    def within(self):
+        """Whether anything is asked for between the ends of steps."""
+        return self.dense_output or self.events is not None or between(self.times, self.span)
+
+
+class Outcome(NamedTuple):
+    """How a run went: arrays of its own, shared with no other run."""
+
+    status: Status
+    reason: str  # what there is to say about the status
+    rows: np.ndarray  # (k, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
+    steps: StepLog  # or None
+    charts: ChartLog  # or None
+    reached: float  # s
+    last: np.ndarray  # (3, n)  q, qd, qdd there
+    remembered: np.ndarray  # (angles + slots,)  there
+    counts: dict  # of `Solution.stats`
+    trajectory: object  # a `trajectory.Trajectory`, or None
+    events: tuple  # times, positions, velocities of each event; or None
+    began: float  # time.perf_counter() when the driver began, prepared

@@ -1,0 +1,45 @@
+"""How far bodies may turn in a step of a driven scene.
+
+What is driven follows its motion whatever the step is, so no error says that a step is long; but a body that has turned
+by a whole turn stands where it stood, and nothing would show it.
+"""
+
+import math
+
+from ..jit.kernels import kernel
+
+MOST = 1.0  # rad in a step, as its start has it
+TOO_FAR = 2.5  # rad, as both ends have it
+GAIN = 1.05  # of the share of MOST that is tried, from step to step, where a chart has failed at all of it
+
+
+@kernel
+def longest_step(bodies, now):
+    """The step in which nothing turns by more than MOST; now (3, n) is q, qd, qdd."""
+    longest = math.inf
+    for b in range(bodies.shape[0]):
+        if bodies[b, 1] == 7:
+            speed, gain = 0.0, 0.0
+            for c in range(bodies[b, 0] + 3, bodies[b, 0] + 7):
+                speed += now[1, c] * now[1, c]
+                gain += now[2, c] * now[2, c]
+            gain = 2.0 * math.sqrt(max(gain - speed * speed, 0.0))  # pdd is pd.pd along p, alpha / 2 across
+            speed = 2.0 * math.sqrt(speed)
+            fast = speed + math.sqrt(speed * speed + 2.0 * gain * MOST)
+            if fast > 0.0:
+                longest = min(longest, 2.0 * MOST / fast)
+    return longest
+
+
+@kernel
+def too_far(bodies, now, qd, h):
+    """Whether a body has turned by more than TOO_FAR, from its speeds at both ends."""
+    for b in range(bodies.shape[0]):
+        if bodies[b, 1] == 7:
+            one, other = 0.0, 0.0
+            for c in range(bodies[b, 0] + 3, bodies[b, 0] + 7):
+                one += now[1, c] * now[1, c]
+                other += qd[c] * qd[c]
+            if (math.sqrt(one) + math.sqrt(other)) * h > TOO_FAR:
+                return True
+    return False

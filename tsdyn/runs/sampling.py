@@ -1,0 +1,128 @@
+"""Sample and hold: loads on joints whose functions are called in Python at instants k period, between slices of a run.
+
+A step ends at each instant. There the driver comes back, the functions that are due are asked, what they say goes where
+the forces remember it, and the driver goes on from the accelerations after it.
+"""
+
+import math
+
+import numpy as np
+
+from ..errors import InvalidArgument, InvalidForce, Status
+from ..model import joint_motion
+from ..validation import number
+from .run_state import BEGUN, HISTORY, WAITING, T
+
+MOST = 1 << 25  # instants of a run
+SAME = 1e-9  # of a period: instants that are nearer are the same
+
+
+class Failed(Exception):
+    """A function raised, or gave no finite number."""
+
+
+class Sampling:
+    """The sampled loads of one run, all of its parts.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    continued : bool
+        Whether the run goes on from a state, so that what is held there stays until the next instant.
+    """
+
+    def __init__(self, prepared, continued):
+        self.packed, self.handles, self.loads = prepared.packed, prepared.handles, sampled(prepared.packed)
+        self.last = [-math.inf] * len(self.loads)  # when each was asked
+        self.begun = continued
+        for load in self.loads:
+            reset = getattr(load.force.function, "reset", None)
+            if callable(reset) and not continued:
+                reset()
+
+    def ask(self, memory, t, q, qd):
+        """Ask those that are due at t, and hold what they say."""
+        for i, load in enumerate(self.loads):
+            force = load.force
+            if t > self.last[i] and (not self.begun or is_due(t, force.period)):
+                angles, self.last[i] = memory.run.remembered[: self.handles.count], t
+                value = self._value(force, t, (q, qd), angles)
+                memory.context.system.reals[self.packed.system.memory[load.slot]] = value
+                memory.run.remembered[self.handles.count + load.slot] = value
+        self.begun = True
+
+    def _value(self, force, t, levels, angles):
+        """What the function of a force says; angles are those that the run has counted, roughly."""
+        row = self.handles.row(force.joint, force.coordinate)
+        evaluate, geometry = getattr(joint_motion, force.coordinate), force.geometry
+        x, rate = (float(evaluate(geometry, *self.handles.motions(geometry, levels), level)) for level in (0, 1))
+        if force.coordinate == "angle":
+            x = float(joint_motion.counted(x, angles[row.first + force.which]))
+        try:
+            given = force.function(t, x, rate)
+        except Exception as error:
+            raise Failed(
+                f"{force.name}: its function raised {type(error).__name__} at t = {t:.9g} s: {error}."
+            ) from error
+        value = number(given)
+        if not math.isfinite(value):
+            raise Failed(f"{force.name}: its function must return a finite number; at t = {t:.9g} s it gave {given!r}.")
+        return value
+
+
+class Sampled:
+    """The memory of a run, advanced from instant to instant; see `Memory` and `SeriesMemory`."""
+
+    def __init__(self, memory, sampling):
+        self.memory, self.sampling = memory, sampling
+        self.run, self.weight, self.context = memory.run, memory.weight, memory.context
+        self.reason = ""
+
+    def advance(self, record, most):
+        """Make up to `most` steps; the Status, as of the driver's `advance`."""
+        run, work = self.run, self.memory.context.work
+        numbers = run.numbers
+        try:
+            if not numbers[BEGUN] and most != 0:
+                self.sampling.ask(self.memory, float(run.clock[T]), work.q.copy(), work.qd.copy())
+            first = numbers[HISTORY]
+            while True:
+                done = int(numbers[HISTORY] - first)
+                status = self.memory.advance(record, most - done if most > 0 else most)
+                if status != Status.SLICE_DONE or not numbers[WAITING]:
+                    return status
+                self.sampling.ask(self.memory, float(run.clock[T]), run.now[0].copy(), run.now[1].copy())
+                status = self.memory.advance(record, 0)
+                if status != Status.SLICE_DONE or numbers[HISTORY] - first >= most:
+                    return status
+        except Failed as failure:
+            if not numbers[BEGUN]:
+                raise InvalidForce(str(failure)) from failure.__cause__
+            self.reason = str(failure)
+            return Status.SAMPLING_FAILED
+
+
+def sampled(packed):
+    """The loads that are sampled."""
+    return [load for load in packed.loads if getattr(load.force, "period", None) is not None]
+
+
+def is_due(t, period):
+    """Whether t is an instant of a period."""
+    return abs(t - round(t / period) * period) <= SAME * period
+
+
+def instants_of(packed, t0, t1):
+    """The instants within (t0, t1) at which a function is asked, s, increasing."""
+    found = []
+    for load in sampled(packed):
+        period = load.force.period
+        count = (t1 - t0) / period
+        if not count < MOST:
+            raise InvalidArgument(
+                f"{load.force.name}: a period of {period:g} s makes {count:.3g} instants, and {MOST} are as many as a "
+                "run may have; take a longer period or a shorter run."
+            )
+        times = np.arange(math.floor(t0 / period), math.ceil(t1 / period) + 1) * period
+        found.append(times[(times > t0) & (times < t1)])
+    return np.unique(np.concatenate(found)) if found else np.empty(0)

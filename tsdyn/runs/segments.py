@@ -1,0 +1,35 @@
+"""What the parts of one run, made by different methods, hand on to each other."""
+
+from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
+from .event_search import Watch
+
+
+class Relay:
+    """Handed from part to part of a run: its events, and how near to a singular configuration it has come."""
+
+    def __init__(self):
+        self.watch = None
+        self.share = self.largest = (
+            0.0  # of the weakest row, where the last part ended, and at most; see singularity.py
+        )
+
+    def enter(self, memory):
+        """Let a part begin where the last one ended."""
+        memory.context.free.sizes[LARGEST_SHARE] = self.largest
+
+    def leave(self, memory):
+        """Take over how a part ended."""
+        sizes = memory.context.free.sizes
+        self.share, self.largest = float(sizes[SHARE]), float(sizes[LARGEST_SHARE])
+
+    def watching(self, task, reading):
+        """The `Watch` of the run's events, with a reader for the steps of this part; None where there are none."""
+        if task.events is None:
+            return None
+        kind, *arguments = reading
+        reader = kind(*arguments)
+        if self.watch is None:
+            self.watch = Watch(task.events, task.prepared.packed, reader, task.span[0])
+        else:
+            self.watch.read_by(reader)
+        return self.watch

@@ -1,0 +1,36 @@
+"""What energy was kept of a run next to singular configurations, where nothing drives or damps the scene."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from ..observables import diagnostics, power
+
+MOST_OUTPUTS = 200  # that are looked at
+ZERO = 1e-9  # of the largest kinetic energy a second: more power than this isn't rounding
+
+
+def energy_error(solution, task):
+    """Largest change of the energy since the start, of the largest kinetic energy; None where it isn't constant.
+
+    Outputs and the point reached are looked at.
+    """
+    system, packed = solution.system, solution.packed
+    if system.rheonomic[0] or system.normals.size:
+        return None
+    some, slots = slice(None, None, max(solution.t.size // MOST_OUTPUTS, 1)), system.memory.size
+    t = np.concatenate(([task.span[0]], solution.t[some], [solution.reached]))
+    q, qd = (
+        np.vstack((first, rows[some], last))
+        for first, rows, last in zip((task.q, task.qd), (solution.q, solution.qd), solution._last[:2], strict=True)
+    )
+    memory = np.vstack(
+        (task.remembered[-slots:] if slots else np.zeros(0), solution._remembers[some], solution._remembered)
+    )
+    forces = power.force_powers(SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=packed))
+    kinetic = diagnostics.kinetic_energy(system, q, qd)
+    largest = kinetic.max()
+    if not (largest > 0.0 and max(np.abs(forces.applied).max(), np.abs(forces.dissipation).max()) <= ZERO * largest):
+        return None
+    energy = kinetic + diagnostics.potential_energy(system, q) + forces.potential
+    return float(np.abs(energy - energy[0]).max() / largest)

@@ -1,0 +1,170 @@
+"""Scenes far from the origin: run in coordinates whose origin is among the bodies, and handed back in the scene's own.
+
+Constraints and forces see differences of positions, and a position of 1e6 m has no digits below 1e-10 m. So where the
+bodies that are joined, and the points of the ground that they are joined to, lie close together and far away, the run
+takes positions relative to an origin there. It is a multiple of a power of two, so nothing is rounded on the way.
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from ..elements.bodies import Ground
+from ..elements.markers import POINT
+from ..elements.user_functions import Kernels
+from ..model.derived import Derived
+from ..model.packed import FIRST_REAL, REALS, classes
+from ..model.packed_forces import F_FIRST_REAL
+from ..runs.events import Instant
+from .scene_cache import Prepared
+
+FAR = 100.0  # sizes of a scene: its distance from the origin above which it has one of its own
+
+
+def origin_of(packed, q):
+    """The origin (3,) for a run from positions q (n,), or None for that of the scene."""
+    of, origin = packed.derived.origin
+    if of is not q:
+        origin = _origin(packed, q)
+        packed.derived.origin = q, origin
+    return origin
+
+
+def _origin(packed, q):
+    if packed.derived.grounded is None:
+        packed.derived.grounded = _points(packed)
+    grounded, longest = packed.derived.grounded
+    if np.maximum.reduce(np.abs(q)) <= FAR * longest:
+        return None
+    places = np.concatenate((q[packed.system.bodies[:, :1] + np.arange(3)], grounded))
+    low, high = places.min(axis=0), places.max(axis=0)
+    size, centre = max(float((high - low).max()), longest), 0.5 * (low + high)
+    if not (size > 0.0 and np.abs(centre).max() > FAR * size and _sees_differences(packed)):
+        return None
+    step = 2.0 ** np.floor(np.log2(size))
+    return np.round(centre / step) * step
+
+
+def _points(packed):
+    """The corners (2, 3) of a box with the points of the ground that items are on, and the longest lever on a body."""
+    grounded, longest = [], 0.0
+    pairs = [*zip(packed.constraints, packed.coordinates, strict=True)]
+    pairs += [(load.force, load.coordinates) for load in packed.loads]
+    for item, coordinates in pairs:
+        for marker, s in zip(item.markers, coordinates, strict=True):
+            if marker.code == POINT and isinstance(item.body_of(marker), Ground):
+                grounded.append(s)
+            elif marker.code == POINT:
+                longest = max(longest, float(np.abs(s).max()))
+    grounded = np.array(grounded).reshape(-1, 3)
+    return np.array([grounded.min(axis=0), grounded.max(axis=0)]) if len(grounded) else grounded, longest
+
+
+def _sees_differences(packed):
+    """Whether there are constraints or forces, and none that may depend on positions as they are."""
+    items = [*packed.constraints, *(load.force for load in packed.loads)]
+    joined = packed.loads or not all(constraint.normalises for constraint in packed.constraints)
+    own = joined and all(type(item).__module__.startswith("tsdyn.") for item in items)
+    return own and not any(isinstance(load.force.kernels, Kernels) for load in packed.loads)
+
+
+def run_near(driver, task, scene, origin, tol):
+    """The `Outcome` of a task whose positions are taken from an origin; tol as of `Prepared.start`."""
+    packed = task.prepared.packed
+    local, shift = _local(task.prepared, scene, origin), np.zeros(task.q.size)
+    shift[packed.system.bodies[:, :1] + np.arange(3)] = origin
+    q = task.q - shift
+    tol *= (1.0 + np.abs(task.q).max()) / (1.0 + np.abs(q).max())
+    stand_in = SimpleNamespace(
+        packed=local.packed, system=local.packed.system, bodies=scene.bodies, constraints=scene.constraints,
+        row_names=scene.row_names,
+    )  # fmt: skip
+    memory = task.remembered[task.prepared.handles.count :]
+    q, qd = local.start(stand_in, q, task.qd, task.span[0], tol, memory, True)
+    watched = task.events and [each._replace(function=_away(each.function, packed, shift)) for each in task.events]
+    outcome = driver(
+        task._replace(
+            prepared=local,
+            q=q,
+            qd=qd,
+            events=watched,
+            choose=task.choose and (lambda run: task.choose(run._replace(now=run.now + [[1.0], [0.0], [0.0]] * shift))),
+        )
+    )
+    rows, last, events = outcome.rows.copy(), outcome.last.copy(), outcome.events
+    rows[:, 1 : 1 + shift.size] += shift
+    last[0] += shift
+    if events is not None:
+        times, positions, *rest = events
+        events = times, [each + shift for each in positions], *rest
+    trajectory = outcome.trajectory and _Moved(outcome.trajectory, shift)
+    return outcome._replace(rows=rows, last=last, events=events, trajectory=trajectory)
+
+
+def _local(prepared, scene, origin):
+    """The `Prepared` of the scene with that origin; kept for the next run."""
+    kept = prepared.packed.derived.local
+    if kept is None or (kept[0] != origin).any():
+        kept = prepared.packed.derived.local = origin, Prepared(scene, _moved(prepared.packed, origin))
+    return kept[1]
+
+
+def _moved(packed, origin):
+    """The packed scene with the points of the ground relative to an origin."""
+    reals = packed.system.reals.copy()
+
+    def move(item, coordinates, begin):
+        found = []
+        for j, (marker, s) in enumerate(zip(item.markers, coordinates, strict=True)):
+            if marker.code == POINT and isinstance(item.body_of(marker), Ground):
+                s = s - origin
+                reals[begin + 3 * j : begin + 3 * j + 3] = s
+            found.append(s)
+        return tuple(found)
+
+    coordinates, kinds = {}, zip(classes(packed), packed.system.kinds, strict=True)
+    for kind, row in kinds:
+        members = [i for i, constraint in enumerate(packed.constraints) if type(constraint) is kind]
+        for at, i in enumerate(members):
+            begin = row[FIRST_REAL] + at * row[REALS]
+            coordinates[i] = move(packed.constraints[i], packed.coordinates[i], begin)
+    coordinates = tuple(coordinates[i] for i in range(len(packed.constraints)))
+    loads = tuple(
+        load._replace(coordinates=move(load.force, load.coordinates, load.row[F_FIRST_REAL])) for load in packed.loads
+    )
+    return packed._replace(
+        system=packed.system._replace(reals=reals),
+        coordinates=coordinates,
+        size=float(max((np.abs(s).max() for each in coordinates for s in each), default=0.0)),
+        loads=loads,
+        derived=Derived(),
+    )
+
+
+def _away(function, packed, shift):
+    """A user's event function that is given positions as they are in the scene."""
+
+    def moved(t, instant):
+        begin, state, angles = instant._beside
+        states = [np.array(state), np.array([instant.q, instant.qd, instant.qdd])]
+        for each in states:
+            each[0] += shift
+        return function(t, Instant(packed, instant.memory, (begin, states[0], angles), t, states[1]))
+
+    return moved
+
+
+class _Moved:
+    """A `trajectory.Trajectory` in the scene's coordinates."""
+
+    def __init__(self, trajectory, shift):
+        self.trajectory, self.shift = trajectory, shift
+
+    def __getattr__(self, name):
+        return getattr(self.trajectory, name)
+
+    def __call__(self, t):
+        """As of a `Trajectory`."""
+        states, memory, status = self.trajectory(t)
+        states[:, 0] += self.shift
+        return states, memory, status

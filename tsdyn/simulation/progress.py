@@ -1,0 +1,36 @@
+"""Progress of a run: a bar in terminal or notebook, or a user's function."""
+
+import sys
+
+from ..errors import InvalidArgument, MissingDependency
+
+
+def reporter(progress):
+    """Return a function that is given the fraction done, and None at the end."""
+    if progress is None or progress is False:
+        return lambda fraction: None
+    if callable(progress):
+        return lambda fraction: None if fraction is None else progress(min(max(float(fraction), 0.0), 1.0))
+    if progress is not True:
+        raise InvalidArgument(
+            f"progress must be True, False, None or a function of the fraction done, got {progress!r}."
+        )
+    try:
+        from tqdm.auto import tqdm
+    except ImportError as error:
+        raise MissingDependency(
+            "progress=True needs tqdm: pip install 'tsdyn[progress]'; or pass a function of the fraction done."
+        ) from error
+    form = "{desc}{percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
+    bars = []  # made at the first report: a refused run shows none
+
+    def show(fraction):
+        if fraction is None:
+            for bar in bars:
+                bar.close()
+            return
+        if not bars:
+            bars.append(tqdm(total=100, unit="%", file=sys.stderr, bar_format=form))
+        bars[0].update(100.0 * min(fraction, 1.0) - bars[0].n)
+
+    return show

@@ -1,0 +1,40 @@
+"""Tolerances that rounding leaves: a step's error can't be told below what positions lose far from the origin."""
+
+import copy
+
+import numpy as np
+
+from ..formulations.chart_validity import ROUNDING
+from ..sparse.massless_axes import levers
+
+NOISE = 4.0 * ROUNDING  # of a position, over the lever: what a placement leaves of a direction
+FAR = 1e4  # levers: below that no tolerance is touched
+
+
+def within_rounding(method, packed, q):
+    """A method whose steps look for no smaller errors than there are digits for, and a sentence if it is another.
+
+    Series know by themselves what a landing leaves.
+    """
+    if method.step is not None or method.driver != "steps":
+        return method, ""
+    if packed.derived.levers is None:
+        packed.derived.levers = levers(packed)
+    arms = packed.derived.levers
+    if np.abs(q).max() < FAR * arms.min(where=arms > 0.0, initial=np.inf):
+        return method, ""
+    far = np.abs(q[packed.system.bodies[:, :1] + np.arange(3)]).max(axis=1)
+    ratios = np.where(arms > 0.0, far / np.where(arms > 0.0, arms, 1.0), 0.0)
+    worst = int(np.argmax(ratios))
+    noise = NOISE * ratios[worst]
+    if ratios[worst] < FAR or min(method.step_tolerances()) >= noise:
+        return method, ""
+    other = copy.copy(method)
+    for i, name in enumerate(("rtol", "atol")):
+        while other.step_tolerances()[i] < noise:
+            setattr(other, name, 2.0 * getattr(other, name))
+    body = packed.bodies[worst].name
+    return other, (
+        f"The tolerances were raised to rtol={other.rtol:.1e} and atol={other.atol:.1e}: {body} is "
+        f"{far[worst]:.3g} m from the origin, where on a lever of {arms[worst]:.3g} m no more digits are left."
+    )

@@ -1,0 +1,299 @@
+"""The scene: what a user assembles from bodies, constraints and forces, checked piece by piece."""
+
+from collections import Counter
+from itertools import count
+
+import numpy as np
+
+from ..calls import fitting, fitting_methods
+from ..configuration.assemble import assemble
+from ..configuration.mobility import mobility
+from ..configuration.setting import set_joint
+from ..constraints.euler_normalization import EulerNormalization
+from ..elements.bodies import IDENTITY, Body, Ground, PointMass
+from ..elements.force import Force
+from ..elements.joint import Joint
+from ..elements.membership import admit, settle
+from ..elements.names import named
+from ..elements.primitive import Primitive
+from ..errors import InvalidArgument, InvalidBody, InvalidConstraint
+from ..jit.cache import deep_hash
+from ..model.packed import pack, user_functions
+from ..motions.prescribed import Motion
+from ..motions.signals import Signal
+from ..observables.evaluate import evaluate
+from ..validation import counted, demand_known, label, vector3
+from .editing import WHAT, copy, demand_present, found, remove
+
+
+@fitting_methods
+class Scene:
+    """Bodies, constraints, forces and gravity.
+
+    Parameters
+    ----------
+    gravity : array_like (3,), m/s^2; default (0, 0, -9.81)
+        Acceleration of free fall, ground frame.
+
+    Attributes
+    ----------
+    ground : Ground
+        The inertial frame, to attach constraints to.
+    bodies, constraints : tuple
+        In the order added, joints whole; the normalisations of the rigid bodies come last, in body order.
+    primitives : tuple
+        The constraints in the order of their rows, joints taken apart.
+    forces : tuple
+        In the order added.
+
+    Notes
+    -----
+    A scene can be run as often as you like; `simulate` never changes it. Set a body's mass, inertia, position,
+    orientation or velocities and run again: nothing is rebuilt but the numbers that changed.
+    """
+
+    @fitting
+    def __init__(self, gravity=(0.0, 0.0, -9.81)):
+        self.ground = Ground(self)
+        self._bodies, self._added, self._forces, self._normalisations = [], [], [], {}
+        self._waiting, self._titles = {}, None  # see membership.py
+        self._names = None  # of ground and bodies; None where one may have been renamed
+        self._twins = None  # handle of the scene that this one is a copy of -> handle here
+        self.gravity = gravity
+
+    def __setattr__(self, name, value):
+        """Set an attribute that there is; a misspelt one is refused."""
+        demand_known(self, name, ("ground",))
+        super().__setattr__(name, value)
+
+    @property
+    def gravity(self):
+        """Acceleration of free fall, ground frame, m/s^2, shape (3,)."""
+        return self._gravity
+
+    @gravity.setter
+    def gravity(self, value):
+        self._gravity = vector3(value, "gravity (m/s^2)", InvalidArgument)
+        self._gravity.setflags(write=False)
+        self.touch()
+
+    @property
+    def bodies(self):
+        """The bodies, in the order added."""
+        return tuple(self._bodies)
+
+    @property
+    def constraints(self):
+        """The constraints, in the order of their rows; joints whole."""
+        return (*self._added, *self._normalisations.values())
+
+    @property
+    def primitives(self):
+        """The constraints, in the order of their rows; joints taken apart."""
+        return tuple(part for constraint in self.constraints for part in constraint.parts)
+
+    @property
+    def forces(self):
+        """The forces, in the order added."""
+        return tuple(self._forces)
+
+    @fitting
+    def add_body(
+        self,
+        mass,
+        inertia,
+        position=(0.0, 0.0, 0.0),
+        orientation=IDENTITY,
+        velocity=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, 0.0),
+        name="",
+    ):
+        """Add a rigid body and return its handle.
+
+        Parameters
+        ----------
+        mass : float, kg
+            Positive.
+        inertia : array_like (3,) or (3, 3), kg m^2
+            About the centroid, body frame; not negative, and no principal value above the sum of the other two.
+        position, velocity : array_like (3,), m and m/s
+            Of the centroid, ground frame.
+        orientation : array_like (4,) or scipy.spatial.transform.Rotation
+            Euler parameters (e0, e1, e2, e3), scalar first, body to ground; of unit length to 1e-6, then scaled.
+        angular_velocity : array_like (3,), rad/s
+            Body frame.
+        name : str, optional
+            What messages call it; default "body1", "body2", ...
+
+        Returns
+        -------
+        Body
+
+        Raises
+        ------
+        InvalidBody
+            If a value is impossible, not finite or of a wrong shape, or the name is taken.
+        """
+        values = {
+            "mass": mass,
+            "inertia": inertia,
+            "position": position,
+            "orientation": orientation,
+            "velocity": velocity,
+            "angular_velocity": angular_velocity,
+        }
+        body = self._admit(Body, name, values)
+        self._normalisations[body] = EulerNormalization(body, name=f"EulerNormalization({body.name})")
+        settle(self._normalisations[body])
+        return body
+
+    @fitting
+    def add_point_mass(self, mass, position=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), name=""):
+        """Add a particle of three coordinates and return its handle; arguments as for `add_body`."""
+        return self._admit(PointMass, name, {"mass": mass, "position": position, "velocity": velocity})
+
+    def _admit(self, kind, name, values):
+        if self._names is None:
+            self._names = {"ground", *(body.name for body in self._bodies)}
+        taken = self._names
+        free = (f"body{i}" for i in count(len(self._bodies) + 1))
+        name = label(name, kind.__name__, InvalidBody) or next(name for name in free if name not in taken)
+        if name in taken:
+            raise InvalidBody(f"the scene has a body named {name!r} already; choose another name.")
+        body = kind(self, len(self._bodies), name, **values)
+        self._bodies.append(body)
+        taken.add(name)
+        self.touch()
+        return body
+
+    def add(self, item):
+        """Add a constraint or a force and return it; a second EulerNormalization of a body gives back the one it has.
+
+        Raises
+        ------
+        InvalidConstraint, InvalidForce
+            If it is neither, belongs to another scene, or has been added before.
+        """
+        if not isinstance(item, (Primitive, Joint, Force)):
+            raise InvalidConstraint(
+                f"{item!r} is not a constraint or force; pass an instance, such as ts.constraints.Spherical(...) or "
+                "ts.forces.Spring(...)."
+            )
+        word, members = ("force", self._forces) if isinstance(item, Force) else ("constraint", self._added)
+        if not hasattr(item, "coordinates"):
+            raise item.error(f"{type(item).__name__}: its __init__ must call super().__init__(...).")
+        if item.scene is not self:
+            raise item.error(f"{item.name}: its bodies belong to another scene; use bodies of this one.")
+        demand_present(item.name, (item.a, item.b))
+        if item.owner is not None:
+            raise item.error(f"{item.name}: it is a part of {item.owner.title}; add that instead.")
+        if isinstance(item, Joint):
+            item.parts  # noqa: B018  it says what is wrong with them
+        settle(item)
+        if type(item) is EulerNormalization:
+            return self._normalisations[item.a]
+        if item.added and any(item is other for other in members):
+            raise item.error(f"{item.name}: it has been added to this scene before; add each {word} once.")
+        admit(self, item)
+        item.added = True
+        members.append(item)
+        self.touch()
+        return item
+
+    def refresh(self):
+        """Compile those functions of a user's again of which a global has changed since the scene was packed."""
+        if self._packed is not None and self._users and _marks(self._users) != self._functions:
+            for owner, _ in self._users:
+                owner.forget()
+            self.touch()
+
+    def __getstate__(self):
+        """What is packed holds addresses of this process, so it stays here."""
+        gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins"))
+        return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
+
+    def touch(self):
+        """Forget the packed numbers: something has changed."""
+        self._packed = self._start = self._prepared = None
+
+    @property
+    def packed(self):
+        """Bodies, constraints and their numbers as they are now, a `Packed`; made again after a change only."""
+        if not self._bodies:
+            raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
+        if self._packed is None:
+            self._packed = pack(self)
+            self._users = list(user_functions(self._packed))
+            self._functions = _marks(self._users)
+        return self._packed
+
+    @property
+    def system(self):
+        """What the kernels see, a `System`."""
+        return self.packed.system
+
+    def motions(self):
+        """The functions of time and tables that constraints and forces are given."""
+        given = [*self.packed.parameters, *(load.parameters for load in self.packed.loads)]
+        return [value for values in given for value in values if isinstance(value, (Motion, Signal))]
+
+    @property
+    def start(self):
+        """(q, qd) that the bodies say, shapes (n,), (n,)."""
+        if self._start is None:
+            self._start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
+        return tuple(array.copy() for array in self._start)
+
+    def body(self, name):
+        """Return the body of this name."""
+        for body in self._bodies:
+            if isinstance(name, str) and body.name == name:
+                return body
+        raise InvalidBody(f"no body is named {name!r}; there are {', '.join(b.name for b in self._bodies) or 'none'}.")
+
+    def __getitem__(self, item):
+        """The body, constraint or force of this name; in a copy also that of a handle of the scene it was made of."""
+        if isinstance(item, str):
+            return named([self.ground, *self._bodies, *self.constraints, *self._forces], item, WHAT)
+        known = isinstance(item, (PointMass, Ground, Primitive, Joint, Force))
+        twin = self._twins.get(item) if self._twins is not None and known else None
+        return found(self, item) if twin is None else twin
+
+    def row_names(self):
+        """Name the rows of Phi, in order: a constraint's title, with the row's label where it has several."""
+        names, seen = [], Counter()
+        for constraint in self.constraints:
+            title = constraint.title
+            seen[title] += 1
+            again = "" if seen[title] == 1 else f" #{seen[title]}"
+            names += [f"{title}{again}{label}" for label in constraint.row_labels]
+        return names
+
+    def place(self, q, qd):
+        """Write coordinates q (n,) and velocities qd (n,) into the bodies as their values at the start."""
+        at = 0
+        for body in self._bodies:
+            span = slice(at, at := at + body.dimension)
+            body.place(q[span], qd[span])
+
+    evaluate = evaluate
+    assemble = assemble
+    mobility = mobility
+    set = set_joint
+    remove = remove
+    copy = copy
+    __copy__ = copy
+
+    def __repr__(self):
+        rows = sum(constraint.rows for constraint in self.constraints)
+        n = sum(body.dimension for body in self._bodies)
+        rigid = len(self._normalisations)
+        parts = [(rigid, "rigid body", "rigid bodies"), (len(self._bodies) - rigid, "point mass", "point masses")]
+        bodies = ", ".join(counted(*part) for part in parts if part[0]) or "no bodies"
+        forces = f", {counted(len(self._forces), 'force')}" if self._forces else ""
+        return f"<Scene of {bodies}: {counted(n, 'coordinate')}, {counted(rows, 'constraint row')}{forces}>"
+
+
+def _marks(users):
+    """What the compiled forms of the users' functions depend on."""
+    return [deep_hash(function) for _, functions in users for function in functions]

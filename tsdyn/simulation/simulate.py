@@ -1,0 +1,202 @@
+"""`simulate`: check everything, hand a task to the method's driver, make a Solution of what it hands back."""
+
+import time
+
+import numpy as np
+
+from ..ahead.first_run import prepare_first_run
+from ..calls import fitting
+from ..configuration.holonomic import demand_holonomic
+from ..elements.membership import warn_of_waiting
+from ..errors import InvalidArgument, Status
+from ..formulations.registry import formulation as find_formulation
+from ..methods.integrator import registered
+from ..motions.knots import stops_of
+from ..observables.state import remembered
+from ..runs.arguments import interval, method_of, output_times, state_arrays
+from ..runs.events import prepare
+from ..runs.request import Task, between
+from ..runs.sampling import Sampling, instants_of, sampled
+from ..taylor.series_run import run_series
+from ..validation import one_of, positive, whole
+from . import method_choice as choice
+from .local_origin import origin_of, run_near
+from .progress import reporter
+from .rounding_limit import within_rounding
+from .scene import Scene
+from .scene_cache import prepared
+from .singularity_crossing import run_past
+from .solution import Solution
+
+DRIVERS = {
+    "steps": run_past,
+    "series": run_series,
+}  # by Integrator.driver, if it isn't one itself; see request.py
+
+
+@fitting
+def simulate(
+    scene,
+    t_span,
+    *,
+    integrator=None,
+    rtol=None,
+    atol=None,
+    formulation="tangent",
+    constraint_tol=1e-12,
+    initial_tol=1e-9,
+    redundancy="drop",
+    t_eval=None,
+    dense_output=False,
+    events=None,
+    max_steps=None,
+    max_step=None,
+    history=True,
+    progress=None,
+    chart_interval=None,
+    state=None,
+):
+    """Integrate a scene over an interval of time; the scene is not changed.
+
+    Parameters
+    ----------
+    scene : Scene
+    t_span : (float, float), s
+        Start and end, the end later.
+    integrator : Integrator or str, optional
+        A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor,
+        DOP853 where a part of the scene has no series, and SDIRK54 from the start where the motion turns out to be
+        stiff and evaluations are saved by it.
+    rtol, atol : float, optional
+        Tolerances of the default method, or of an adaptive method that is given by its name; 1e-8 if not given. An
+        instance has its own, and rtol or atol beside one is refused.
+    formulation : {"tangent", "null-space", "maggi-kane"}
+        "tangent": the tangent-space ODE without a basis, at a cost that grows with the scene's size and fill;
+        "null-space": the same by Eq. 26, as in the paper; "maggi-kane": Eqs. 17-18, which drift off the constraints,
+        for comparison. Implicit methods solve Eq. 26 in either of the first two.
+    constraint_tol : float
+        u_tol and B_tol of Eqs. 28-29: bound on |Phi| (m) and on |Phi_q U B - I|.
+    initial_tol : float
+        Residuals of the start, relative to 1 + max |q| or 1 + max |qd|, up to which it is accepted and projected.
+    redundancy : {"drop", "refuse"}
+        What to do about constraint rows that follow from the others: "drop" leaves them out of the equations where
+        they are sure to hold (independent rows are chosen anew where those that were chosen come close to depending on
+        one another); "refuse" raises RedundantConstraints.
+    t_eval : array_like, s, optional
+        Increasing output times within t_span, from dense output on the manifold, which never changes the steps;
+        None gives every accepted step and both ends.
+    dense_output : bool
+        Keep every step's interpolant, for `solution.at(t)` at any time.
+    events : callable or list of callables, optional
+        f(t, state) -> float, state being a `State`. Every zero within every step is found on the manifold and recorded
+        in `solution.t_events`, which never changes the steps: changes of sign, and touches of zero within rounding,
+        which count once. As for scipy.integrate.solve_ivp, an attribute `direction` > 0 or < 0 restricts to changes
+        that rise or fall, and `terminal` = True, or a number of occurrences, ends the run there. A function that
+        raises, or gives no finite number, ends it too, with success=False.
+    max_steps : int, optional
+        End the run after so many steps.
+    max_step : float, s, optional
+        The longest step, for every method; a fixed step that is longer becomes this one.
+    history : bool
+        Keep `solution.steps` and `solution.charts`: 8 bytes a step, 16 to 40 more for each step rejected and each
+        chart.
+    progress : bool or callable, optional
+        True shows a bar (needs tqdm); a callable is given the fraction done, 0 to 1.
+    chart_interval : int, optional
+        Make a new chart every so many steps, whatever the criteria say; for experiments.
+    state : State, optional
+        Positions and velocities to start from instead of those of the bodies, such as `solution.state`.
+
+    Returns
+    -------
+    Solution
+        Also of a run that ended early, by Ctrl-C too: see `.success`, `.status`, `.message`; in a loop over runs call
+        `.raise_if_failed()`.
+
+    Raises
+    ------
+    TsdynError
+        One of its kinds, before anything runs: InvalidArgument, InvalidBody, InconsistentState, RedundantConstraints,
+        SingularConfiguration.
+    """
+    if not isinstance(scene, Scene):
+        raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
+    warn_of_waiting(scene, 3)
+    span = interval(t_span)
+    form = find_formulation(formulation)
+    chart_interval = whole(chart_interval, "chart_interval")
+    method = None if integrator is None else method_of(integrator, rtol, atol)
+    if method is not None and method.implicit and form.first_order:
+        others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
+        raise InvalidArgument(
+            f"{type(method).__name__} solves its stages in the tangent-space form only; formulation={form.name!r} is "
+            f"served by {others}."
+        )
+    longest = None if max_step is None else positive(max_step, "max_step (s)")
+    constraint_tol = positive(constraint_tol, "constraint_tol")
+    initial_tol = positive(initial_tol, "initial_tol")
+    one_of(redundancy, ("drop", "refuse"), "redundancy")
+    for name, value in (("dense_output", dense_output), ("history", history)):
+        if not isinstance(value, (bool, np.bool_)):
+            raise InvalidArgument(f"{name} must be True or False, got {value!r}.")
+    watched = prepare(events)
+    times = output_times(t_eval, *span)
+    max_steps = whole(max_steps, "max_steps")
+    default = rtol, atol, form.name == "tangent" and chart_interval is None
+    within = bool(dense_output) or watched is not None or between(times, span)
+    prepare_first_run(scene, method, form, within, default)
+    kept = prepared(scene)
+    if method is None:
+        method = choice.explicit(kept, *default)
+    if longest is not None:
+        method = method.bounded(longest)
+    report = reporter(progress)
+
+    started = time.perf_counter()
+    for motion in kept.motions:
+        motion.check(*span)
+    q, qd = scene.start if state is None else state_arrays(state, kept.n)
+    memory = remembered(state, kept, span[0], q)
+    q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
+    if not form.serving(method).basis_free:
+        demand_holonomic(kept.packed, q, span[0], form.name)
+    stops = stops_of(kept.motions, instants_of(kept.packed, *span), *span)
+    sampling = Sampling(kept, state is not None) if sampled(kept.packed) else None
+    choose = None
+    if integrator is None and sampling is None:  # what is asked in Python is asked once
+        options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol, "max_step": max_step}
+        choose = choice.chooser(simulate, scene, method, span[1], options)
+    task = Task(
+        kept, method, form, span, q, qd, memory, times, bool(dense_output),
+        watched, constraint_tol, max_steps, chart_interval or 0, report, bool(history), choose, stops, sampling,
+    )  # fmt: skip
+    driver, origin, said = DRIVERS.get(method.driver, method.driver), origin_of(kept.packed, q), ""
+    if origin is None:
+        limited, said = within_rounding(method, kept.packed, q)
+        outcome = driver(task if limited is method else task._replace(method=limited))
+    else:
+        outcome = run_near(driver, task, scene, origin, initial_tol)
+    ended = time.perf_counter()
+    if outcome.status == Status.STIFF:
+        return simulate(
+            scene,
+            t_span,
+            integrator=choice.implicit(method),
+            formulation=formulation,
+            constraint_tol=constraint_tol,
+            initial_tol=initial_tol,
+            redundancy=redundancy,
+            t_eval=t_eval,
+            dense_output=dense_output,
+            events=events,
+            max_steps=max_steps,
+            max_step=max_step,
+            history=history,
+            progress=progress,
+            chart_interval=chart_interval,
+            state=state,
+        )
+    if said:
+        outcome = outcome._replace(reason=" ".join(part for part in (outcome.reason, said) if part))
+    seconds = {"prepare": outcome.began - started, "run": ended - outcome.began}
+    return Solution(scene, task, outcome, seconds)

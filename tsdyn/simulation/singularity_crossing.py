@@ -1,0 +1,176 @@
+"""Runs of methods that go by stages, past singular configurations: series carry the motion over each of them.
+
+Next to such a place the charts of these methods reach less and less far, while the series of a motion that passes it
+smoothly knows nothing of it. So where a chart is made next to one, or a fixed step can't be made near one, a run by
+series goes on from there until the configuration is regular again, and the method from there as from a start. A
+method with a fixed step goes on at a time of its own grid. Nothing of this is loaded by runs that meet no such place.
+"""
+
+import math
+
+import numpy as np
+
+from ..errors import Status, TsdynError
+from ..formulations.registry import formulation
+from ..integrators import Taylor
+from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
+from ..runs.history import ChartLog, StepLog
+from ..runs.run_state import STEPS, T_END, T
+from ..runs.segments import Relay
+from ..runs.step_run import run_steps
+from ..runs.trajectory import Pieces
+from ..taylor.series_run import run_series
+
+REGULAR = 0.02  # of the largest share of the weakest row: as much is regular again, as it is for Taylor
+FINEST = 1e-10  # tolerance of the series, if the method has none that is less
+NO_STEP = 1e-6  # of a fixed step: a time of the grid that is nearer has been reached
+
+
+def run_past(task, observe=None):
+    """Run a `Task` of a method that goes by stages; the `Outcome`. An observed run is one part: it passes nothing."""
+    if observe is not None or task.form.first_order or task.prepared.refusal:
+        return run_steps(task, observe)
+    relay = Relay()
+    try:
+        outcome = run_steps(task._replace(report=_until_its_end(task.report)), relay=relay)
+        return _go_on(task, relay, outcome) if outcome.status == Status.PASSAGE else outcome
+    finally:
+        task.report(None)
+
+
+def _until_its_end(report):
+    """A report that is not told of the end: others may go on."""
+    return lambda fraction: None if fraction is None else report(fraction)
+
+
+def _go_on(task, relay, first):
+    """The whole run, of which the first part has ended next to a singular configuration."""
+    parts = [first]
+    try:
+        while parts[-1].status == Status.PASSAGE:
+            series = len(parts) % 2 == 1
+            rest = _rest(task, parts, series)
+            if rest.max_steps == 0:
+                parts[-1] = parts[-1]._replace(status=Status.MAX_STEPS)
+                break
+            try:
+                if series:
+                    part = run_series(rest, relay=relay, past=lambda memory: Carrier(memory, task, relay.share))
+                else:
+                    part = run_steps(rest, relay=relay)
+            except TsdynError as error:  # what has been computed is worth more
+                parts[-1] = parts[-1]._replace(status=Status.SINGULAR, reason=str(error))
+                break
+            parts.append(part)
+    except KeyboardInterrupt:
+        parts[-1] = parts[-1]._replace(status=Status.INTERRUPTED)
+    last = parts[-1]
+    return last._replace(
+        reason=" ".join(part for part in (last.reason, _said(parts)) if part),
+        rows=np.concatenate([_new_rows(task, part, i) for i, part in enumerate(parts)]),
+        steps=StepLog([part.steps for part in parts]) if task.history else None,
+        charts=ChartLog([part.charts for part in parts]) if task.history else None,
+        counts=_summed([part.counts for part in parts]),
+        trajectory=Pieces([part.trajectory for part in parts]) if task.dense_output else None,
+        began=first.began,
+    )
+
+
+def _said(parts):
+    """How often series have carried the motion, and from where at first."""
+    way = zip(parts[::2], parts[1::2], strict=False)
+    passed = [before.reached for before, series in way if series.status in (Status.PASSAGE, Status.SUCCESS)]
+    if not passed:
+        return ""
+    times = "once" if len(passed) == 1 else f"{len(passed)} times, the first"
+    return f"Taylor series carried the motion past a singular configuration {times} after t = {passed[0]:.6g} s."
+
+
+def _new_rows(task, part, i):
+    """Those rows of part i that the part before doesn't end with."""
+    return part.rows[1:] if i and task.times.size == 0 else part.rows
+
+
+def _rest(task, parts, series):
+    """The task that is left, for series or for the method itself."""
+    last, times, left = parts[-1], task.times, task.max_steps
+    if times.size:
+        times = times[sum(len(part.rows) for part in parts) :]
+        times = times if times.size else np.array([np.inf])  # none would be every step
+    if left is not None:
+        left = max(left - sum(part.counts["steps"] for part in parts), 0)
+    (start, end), reached = task.span, last.reached
+
+    def report(fraction):
+        task.report((reached + fraction * (end - reached) - start) / (end - start))
+
+    rest = task._replace(
+        span=(reached, end), q=last.last[0], qd=last.last[1], remembered=last.remembered, times=times, max_steps=left,
+        report=_until_its_end(report),
+    )  # fmt: skip
+    if not series:
+        return rest
+    rtol, atol = (FINEST if tol is None else min(tol, FINEST) for tol in (task.method.rtol, task.method.atol))
+    return rest._replace(
+        method=Taylor(rtol=rtol, atol=atol, max_step=task.method.max_step), form=formulation("tangent"), choose=None
+    )
+
+
+def _summed(counts):
+    """Counts of the whole run."""
+    ways = {"stiff": any, "largest_landing": max}
+    return {name: ways.get(name, sum)(each[name] for each in counts) for name in counts[0]}
+
+
+class Carrier:
+    """The memory of a run by series that is advanced until the configuration is regular again.
+
+    Parameters
+    ----------
+    memory : SeriesMemory
+    task : Task
+        The whole run's.
+    share : float
+        That the weakest row had at the start: it is to have more, so that the method can go on.
+    """
+
+    def __init__(self, memory, task, share):
+        self.memory, self.share = memory, share
+        self.run, self.weight, self.context = memory.run, memory.weight, memory.context
+        self.origin, self.end = task.span
+        self.step = task.method.step
+        self.grid = math.nan  # the time of the grid that is made for
+
+    def advance(self, record, most):
+        """As `SeriesMemory.advance`; Status.PASSAGE where the configuration is regular again."""
+        if most <= 0:
+            return self.memory.advance(record, most)
+        numbers, clock = self.run.numbers, self.run.clock
+        for _ in range(most):
+            done = numbers[STEPS]
+            status = self.memory.advance(record, 1)
+            if status == Status.SUCCESS and clock[T] < self.end:
+                status = Status.SLICE_DONE
+            if status != Status.SLICE_DONE or numbers[STEPS] == done:
+                return status
+            if not self._is_regular():
+                clock[T_END] = self.end
+            elif self.step is None or clock[T] == self.grid:
+                return Status.PASSAGE
+            else:
+                clock[T_END] = self.grid = self._next()
+        return Status.SLICE_DONE
+
+    @property
+    def reason(self):
+        """What there is to say of how the run ended."""
+        return self.memory.reason
+
+    def _is_regular(self):
+        sizes = self.context.free.sizes
+        return sizes[SHARE] >= max(REGULAR * sizes[LARGEST_SHARE], self.share)
+
+    def _next(self):
+        """The first time of the grid after the present one."""
+        done = (self.run.clock[T] - self.origin) / self.step
+        return min(self.origin + math.ceil(done + NO_STEP) * self.step, self.end)

@@ -1,0 +1,369 @@
+"""What a run hands back: the trajectory, how it went, and everything that follows from it."""
+
+import html
+from functools import cached_property
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..calls import fitting_methods
+from ..errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
+from ..formulations.chart_validity import REASONS
+from ..model.packed import member_of
+from ..observables import diagnostics, power, reactions, uniqueness
+from ..observables.friction_reactions import with_normal_loads
+from ..observables.kinematics import Anchor, Kinematics
+from ..observables.state import RememberingState
+from ..validation import counted, floats
+from .conservation import energy_error
+from .mechanical_work import work as integrate_work
+from .termination import account
+
+
+class Steps(NamedTuple):
+    """Every step tried: where it began, s, its length, s, and whether it was accepted."""
+
+    t: np.ndarray
+    h: np.ndarray
+    accepted: np.ndarray
+
+
+class Charts(NamedTuple):
+    """Every chart: its instant, s, why it was made, and on leaving it its condition, contraction and steps."""
+
+    t: np.ndarray
+    reason: tuple
+    condition: np.ndarray
+    contraction: np.ndarray
+    steps: np.ndarray
+
+
+@fitting_methods
+class Solution(Kinematics):
+    """The result of `simulate`; k outputs, n coordinates, m constraint rows.
+
+    Attributes
+    ----------
+    t : ndarray (k,), s
+    q, qd, qdd : ndarray (k, n)
+        7 coordinates a rigid body (r, then p) and 3 a point mass, in the order added.
+    multipliers : ndarray (k, m)
+        M qdd + Phi_q^T lam = Q_A + S; rows in the order added, then the normalisations in body order. NaN for rows
+        that were left out as redundant, see `reaction_unique`.
+    success : bool
+        Whether the run reached the end of the interval, or a terminal event.
+    status : Status
+    message : str
+        What happened, where, and what to try.
+    t_events : list of ndarray (k_i,), s, or None
+        Times of each event; q_events and qd_events are lists of (k_i, n).
+    stats : SimpleNamespace
+        steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds; of
+        implicit methods also jacobians, iteration_matrices, stage_iterations; stiff: whether an explicit adaptive
+        method has met its limit of stability for a while. What was not needed: solves_skipped, placements that lay on
+        the constraints to rounding already; checks_skipped, those whose last correction was known to suffice;
+        factorizations_skipped, for which older factors served or still contracted; gyroscopic_skipped, torques of
+        bodies whose inertia is a sphere's, rotations_skipped, of bodies that their joints never let turn, and
+        forces_skipped, of scenes without any, one an evaluation; columns_skipped, constant ones of series, an order.
+        Of series: steps_near_singular, which began or ended next to a singular configuration; largest_landing, how far
+        (m, rad) the constraints moved a body at the end of one of them; energy_error, the largest change of the energy
+        in such a run, of the largest kinetic energy, None where energy isn't constant.
+    """
+
+    def __init__(self, scene, task, outcome, seconds):
+        self.scene, self.packed = scene, task.prepared.packed
+        self.method, self.formulation, self.span = repr(task.method), task.form.name, task.span
+        self.system = self.packed.system
+        self.status, self._trajectory = outcome.status, outcome.trajectory
+        self.t_events, self.q_events, self.qd_events = outcome.events or (None, None, None)
+        self.handles = task.prepared.handles
+        rows, n, angles = outcome.rows, task.q.size, self.handles.count
+        self.t = rows[:, 0].copy()
+        self.q, self.qd, self.qdd = rows[:, 1 : 1 + 3 * n].reshape(-1, 3, n).swapaxes(0, 1).copy()
+        rest = rows[:, 1 + 3 * n :].copy()
+        self.anchor, self._remembers = Anchor(rest[:, :angles]), rest[:, angles:]  # (k, slots), what forces remember
+        self._reached, self._last = outcome.reached, outcome.last
+        self._angles, self._remembered = outcome.remembered[:angles], outcome.remembered[angles:]
+        self._step_log, self._chart_log = outcome.steps, outcome.charts
+        self.stats = SimpleNamespace(**outcome.counts, seconds=seconds, energy_error=None)
+        if self.stats.steps_near_singular:
+            self.stats.energy_error = energy_error(self, task)
+        self.message = account(self, scene, outcome.reason)  # now: the scene may change
+
+    def __setstate__(self, state):
+        """Take over what was pickled; the packed scene finds its kernels again."""
+        self.__dict__.update(state, system=state["packed"].system)
+
+    @property
+    def success(self):
+        """Whether the run reached the end of the interval, or a terminal event."""
+        return self.status in (Status.SUCCESS, Status.EVENT)
+
+    def raise_if_failed(self):
+        """Raise StepFailure, with this solution as `.solution`, if the run ended early; return self otherwise."""
+        if not self.success:
+            raise StepFailure(self.message, self)
+        return self
+
+    @property
+    def reached(self):
+        """The time that the run has come to, s."""
+        return self._reached
+
+    @property
+    def state(self):
+        """The last point reached, to go on from: simulate(scene, (state.t, t_end), state=state)."""
+        q, qd, qdd = (a.copy() for a in self._last)
+        t, memory = np.array([self._reached]), self._remembered[None]
+        lam = reactions.multipliers(self.packed, t, q[None], qd[None], qdd[None], memory)[0]
+        remembered = self.handles, self._remembered.copy(), Anchor(self._angles)
+        return RememberingState.of(*remembered, self._reached, q, qd, qdd, lam)
+
+    def at(self, t):
+        """State at any time of a run with dense_output=True, on the manifold as the steps are.
+
+        Parameters
+        ----------
+        t : float or array_like (k,), s
+            Between the start and the time reached, in any order.
+
+        Returns
+        -------
+        State
+            t, q (n,), qd, qdd and multipliers (m,), with (k,) before each for a vector of times. Between steps they
+            are of the interpolant's order; at a step's ends they are the step's own to rounding.
+
+        Raises
+        ------
+        InvalidArgument
+            If the run kept no dense output, or t isn't finite, one time or a vector of them, or is outside the run.
+        StepFailure
+            If the constraints can't be solved there.
+        """
+        if self._trajectory is None:
+            raise InvalidArgument("at(t) needs the steps' interpolants: simulate(..., dense_output=True) keeps them.")
+        times, start, end = floats(t), self._trajectory.start, self._trajectory.end
+        if times.ndim > 1 or (times.ndim == 1 and np.size(t) != times.size) or not np.isfinite(times).all():
+            raise InvalidArgument(f"t must be a finite time in s, or a vector of them, got {t!r}.")
+        if times.size and (times.min() < start or times.max() > end):
+            raise InvalidArgument(f"t must lie within the run, from {start!r} to {end!r} s, got {t!r}.")
+        every = np.atleast_1d(times)
+        states, memory, status = self._trajectory(every)
+        if status != Status.SUCCESS:
+            raise StepFailure(f"no state could be found at some t in {t!r}. {status.sentence} {status.remedy}", self)
+        q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
+        parts = q, qd, qdd, reactions.multipliers(self.packed, every, q, qd, qdd, memory)
+        anchor = self._anchor_of(every)
+        if times.ndim:
+            return RememberingState.of(self.handles, memory, anchor, every, *parts)
+        angles, h, levels = anchor
+        anchor = Anchor(angles[0], h[0], tuple(level[0] for level in levels))
+        return RememberingState.of(self.handles, memory[0], anchor, float(times), *(part[0] for part in parts))
+
+    def _anchor_of(self, t):
+        """What angles at times t (k,) are counted from: the starts of the steps that they are in."""
+        start, angles = self._trajectory.anchors(t)
+        if not angles.size:
+            return Anchor(angles, np.zeros(t.size))
+        starts, back = np.unique(start, return_inverse=True)
+        states, _, _ = self._trajectory(starts)
+        return Anchor(angles, t - start, (states[back, 0], states[back, 1]))
+
+    @property
+    def steps(self):
+        """History of the steps, a `Steps`; raises InvalidArgument if the run kept none."""
+        return Steps(*self._kept(self._step_log).arrays())
+
+    @property
+    def charts(self):
+        """History of the charts, a `Charts`; raises InvalidArgument if the run kept none."""
+        t, reasons, condition, contraction, steps = self._kept(self._chart_log).arrays()
+        return Charts(t, tuple(REASONS[int(i)] for i in reasons.tolist()), condition, contraction, steps.astype(int))
+
+    @staticmethod
+    def _kept(log):
+        if log is None:
+            raise InvalidArgument("the run kept no histories of steps and charts: it was made with history=False.")
+        return log
+
+    @cached_property
+    def _memory(self):
+        """What forces remember, and the normal loads of joints' frictions, (k, ...)."""
+        return with_normal_loads(self.packed, self.t, self.q, self.qd, self.qdd, self._remembers)
+
+    @cached_property
+    def multipliers(self):
+        """Multipliers (k, m), computed when first asked for."""
+        return reactions.multipliers(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
+
+    @cached_property
+    def constraint_error(self):
+        """Maximum norms of Eqs. 1-3 at every output, recomputed by code that is not the solver's."""
+        return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
+
+    def reaction(self, item, on=None):
+        """Force (N) and torque (N m) that a constraint, a joint as a whole, or a force exerts: (k, 3) each.
+
+        Parameters
+        ----------
+        item : constraint, force, or name of one
+        on : Body or str, optional
+            Which of its bodies they act on; by default a, or b where a is the ground (`item.on`).
+
+        Returns
+        -------
+        force, torque : ndarray (k, 3)
+            In the ground frame; the torque is about the item's first point on that body (`point_a`), or the centroid
+            where it has none.
+        """
+        item = self.handles.item(item)
+        load = reactions.loads_of(self.packed).get(id(item))
+        if load is not None:
+            return reactions.force_reaction(self, load, self._acted(item, on))
+        member = self._member(item)
+        return reactions.reaction(self, member, self._acted(item, on))
+
+    def reaction_unique(self, item, on=None):
+        """Whether what `reaction` gives is the only answer, at each output: bool (k,).
+
+        Redundant constraints share their loads in many ways, all of which move the bodies alike; `reaction` is then
+        one of them, with the multipliers of dropped rows, NaN in `multipliers`, taken as zero.
+        """
+        item = self.handles.item(item)
+        if id(item) in reactions.loads_of(self.packed):
+            return np.ones(self.t.size, bool)
+        return uniqueness.unique(self, self._member(item).rows, self._acted(item, on))
+
+    def rows(self, constraint):
+        """Which columns of `multipliers` are those of a constraint, a slice."""
+        return self._member(self.handles.item(constraint)).rows
+
+    def _member(self, constraint):
+        member = member_of(self.packed, constraint)
+        if member is None:
+            raise InvalidConstraint(f"{constraint!r} is not a constraint or force of this solution's scene.")
+        return member
+
+    def _acted(self, item, on):
+        """The body that a reaction is asked for."""
+        if on is None:
+            return item.on
+        on = self.handles.body(on) if isinstance(on, str) else on
+        if on is item.a or on is item.b:
+            if on.dimension:
+                return on
+            raise InvalidBody(f"{item.name}: what acts on the ground is the opposite of what acts on {item.on.name!r}.")
+        raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
+
+    @cached_property
+    def kinetic_energy(self):
+        """Kinetic energy (k,), J."""
+        return diagnostics.kinetic_energy(self.system, self.q, self.qd)
+
+    @cached_property
+    def potential_energy(self):
+        """Potential energy (k,), J, of gravity, zero at the ground's origin, and of springs; loads have none."""
+        return diagnostics.potential_energy(self.system, self.q) + self._force_powers.potential
+
+    @property
+    def energy(self):
+        """Kinetic and potential energy together (k,), J."""
+        return self.kinetic_energy + self.potential_energy
+
+    @cached_property
+    def _force_powers(self):
+        return power.force_powers(self)
+
+    @cached_property
+    def power(self):
+        """Power (k,), W, of applied forces, actuators and driven constraints: dE/dt = power - dissipation."""
+        return self._force_powers.applied + power.driving_power(self)
+
+    @property
+    def dissipation(self):
+        """Power (k,), W, that dampers and friction take; not negative."""
+        return self._force_powers.dissipation
+
+    @cached_property
+    def work(self):
+        """Work (k,), J, since the start: of applied and driving forces, less what dampers and friction have taken.
+
+        energy - work is constant but for the method's error. It is integrated over the dense output.
+
+        Raises
+        ------
+        InvalidArgument
+            If the run kept no dense output.
+        """
+        return self._integrated(None)
+
+    def power_of(self, item):
+        """Power (k,), W, that one constraint or force, or that of a name, puts in: what dE/dt owes to it.
+
+        Of a motor or a driver: of its force or torque along the motion prescribed. Of a force: of its loads and
+        actuators, less what it dissipates; what a spring stores is energy, not power. Of any other constraint: zero.
+        """
+        return power.power_of(self, self._part(item))
+
+    def work_of(self, item):
+        """Work (k,), J, since the start, of `power_of` one constraint or force: the energy that a motor has put in.
+
+        Raises
+        ------
+        InvalidArgument
+            If the run kept no dense output.
+        """
+        return self._integrated(self._part(item))
+
+    def _part(self, item):
+        """The `Load` of a force, or the `Member` of a constraint."""
+        item = self.handles.item(item)
+        load = reactions.loads_of(self.packed).get(id(item))
+        return self._member(item) if load is None else load
+
+    def _integrated(self, part):
+        if self._trajectory is None:
+            raise InvalidArgument("work is integrated over dense output: simulate(..., dense_output=True) keeps it.")
+        return integrate_work(self, self._trajectory, part)
+
+    @cached_property
+    def linear_momentum(self):
+        """Linear momentum (k, 3), kg m/s, ground frame."""
+        return diagnostics.linear_momentum(self.system, self.q, self.qd)
+
+    @cached_property
+    def angular_momentum(self):
+        """Angular momentum about the ground's origin (k, 3), kg m^2/s, ground frame."""
+        return diagnostics.angular_momentum(self.system, self.q, self.qd)
+
+    def _facts(self):
+        s = self.stats
+        sweeps = f", {counted(s.newton_iterations, 'Newton sweep')}" if s.newton_iterations else ""
+        if sweeps and s.placements:  # series place none
+            sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement"
+        return {
+            "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self.t.size, 'output')}",
+            "method": f"{self.method}, formulation {self.formulation}",
+            "steps": f"{s.steps}, {s.rejected} rejected, {counted(s.charts, 'chart')}",
+            "work": f"{counted(s.evaluations, 'evaluation')}, {counted(s.placements, 'placement')}{sweeps}",
+            "time": f"{s.seconds['run']:.3g} s, {s.seconds['prepare']:.2g} s to prepare",
+        }
+
+    def __str__(self):
+        lines = [f"  {name:8}{fact}" for name, fact in self._facts().items()]
+        return "\n".join(["Solution", *lines, *([] if self.success else ["  " + self.message])])
+
+    def _repr_html_(self):
+        """The same in a notebook."""
+        facts = self._facts() | ({} if self.success else {"message": self.message})
+        rows = "".join(f"<tr><th>{name}</th><td>{html.escape(fact)}</td></tr>" for name, fact in facts.items())
+        return f"<table><caption>Solution</caption>{rows}</table>"
+
+    def __repr__(self):
+        s = self.stats
+        return (
+            f"<Solution: {self.status.name.lower()} at t = {self._reached:g} s by {self.method}, {self.formulation}: "
+            f"{counted(s.steps, 'step')}, {counted(s.evaluations, 'evaluation')}, {counted(s.charts, 'chart')}, "
+            f"{s.seconds['run']:.3g} s>"
+        )

@@ -1,0 +1,96 @@
+"""How a run ended, in words: what happened, where, and what to try."""
+
+import numpy as np
+
+from ..configuration.rank import weakest_row
+from ..errors import Status
+from ..formulations.redundancy import dependent_rows
+from ..observables.evaluate import constraint_arrays
+from ..sparse.networks import dropped_rows
+from ..taylor.layout import without_series
+from ..validation import counted
+
+NEARLY_SINGULAR = 0.05
+MOST = 600  # coordinates for which singular values are worked out
+FEW = 3  # parts of a scene that are named
+BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
+
+
+def account(solution, scene, reason):
+    """How the run of a solution ended, in words."""
+    reason = " ".join(part for part in (reason, _kept(solution.stats)) if part)
+    if solution.success:
+        return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
+    steps = counted(solution.stats.steps, "step")
+    where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
+    suspect = _suspect(solution, scene)
+    remedy = Status.SINGULAR.remedy if suspect else solution.status.remedy
+    lacking = without_series(solution.packed)[:FEW] if suspect else ()
+    if lacking:
+        remedy += f" Without a series: {'; '.join(lacking)}."
+    if not suspect and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
+        suspect = _growth(solution)
+    parts = (solution.status.sentence, reason, where, suspect, remedy)
+    return " ".join(part for part in parts if part)
+
+
+def _kept(stats):
+    """The accuracy that was kept next to singular configurations, as energy and landings tell."""
+    if not stats.steps_near_singular:
+        return ""
+    energy = (
+        "" if stats.energy_error is None else f"energy was kept to {stats.energy_error:.1e} of the kinetic energy, "
+    )
+    return (
+        f"Next to singular configurations ({stats.steps_near_singular} steps) {energy}constraints moved bodies by at "
+        f"most {stats.largest_landing:.1e} (m, rad) at the end of a step."
+    )
+
+
+def _locked(solution):
+    """Say so where redundant rows leave nothing free."""
+    redundant = len(dropped_rows(solution.packed))
+    still = redundant and not solution.system.rheonomic[0]
+    if not (still and solution.q.shape[1] == len(solution.system.segments) - redundant):
+        return ""
+    return "Nothing can move: the constraints, redundant ones among them, leave no degree of freedom."
+
+
+def _growth(solution):
+    """Say that the motion is stiff, or that its speed has grown beyond all measure."""
+    said = "The motion is stiff: an implicit method, such as SDIRK54, may go on. " if solution.stats.stiff else ""
+    first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (solution.qd[:1], solution._last[1]))
+    if last > BLOW_UP * (1.0 + first):
+        said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion itself blows up."
+    return said.strip()
+
+
+def _suspect(solution, scene):
+    """Name what is nearly singular at the last point."""
+    if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
+        return ""
+    if solution.q.shape[1] > MOST:
+        return _suspect_of_many(solution, scene)
+    _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)
+    rows, share = weakest_row(scene, Phi_q, len(dropped_rows(solution.packed)))
+    if not share < NEARLY_SINGULAR:
+        return ""
+    return (
+        f"Phi_q is near to losing rank there (its smallest singular value is {share:.1e} of the largest, rows "
+        f"scaled): a singular configuration, in which {rows} depends on other rows."
+    )
+
+
+def _suspect_of_many(solution, scene):
+    """The same by elimination, at a cost of O(N)."""
+    packed = solution.packed
+    rows = dependent_rows(packed, solution._last[0], solution._reached, NEARLY_SINGULAR**2)
+    redundant = len(dropped_rows(packed))
+    if rows is None or len(rows) <= redundant:
+        return ""
+    names = scene.row_names()
+    which = ", ".join(names[i] for i in rows[:FEW]) + (", ..." if len(rows) > FEW else "")
+    return (
+        f"Phi_q is near to losing rank there: a singular configuration, in which {len(rows)} rows nearly depend on "
+        f"others ({which}), {redundant} of them everywhere."
+    )

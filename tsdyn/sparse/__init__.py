@@ -1,0 +1,8 @@
+"""Sparse symmetric factorisation of S = H W H^T: the graph of a scene, elimination order, dense blocks.
+
+Imports model and below.
+
+Begin with constraint_graph.py (which rows meet at which bodies), then symbolic.py (a fill-reducing order, and where
+every number goes) and factorisation.py (numeric block elimination and the solves). massless_axes.py adds a row for an
+axis about which a body has no inertia.
+"""

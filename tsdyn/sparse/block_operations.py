@@ -1,0 +1,233 @@
+"""Steps of block elimination, in local scalars: up to three pivots at a time, and whole links of chains.
+
+A step works on rows of a panel (see symbolic.py) from the first pivot on, rows `width` apart: in u, or for a matrix
+that isn't symmetric in u and, transposed, in l. It puts the pivots' reciprocals in their places, and returns which
+pivot fails, or -1. `kept` holds the diagonal as it was before elimination, and its sign is the pivot's.
+"""
+
+import math
+
+from ..jit.kernels import kernel
+
+
+@kernel
+def eliminate(u, size, width, n, kept, limit):
+    """Eliminate up to three rows of a panel, n columns from the diagonal on; which of them fails, or -1."""
+    u00 = u[0]
+    if not limit * kept[0] * kept[0] < u00 * kept[0] < math.inf:
+        return 0
+    d0 = 1.0 / u00
+    u[0] = d0
+    if size == 1:
+        return -1
+    v = u[width:]
+    u01 = u[1]
+    f01 = u01 * d0
+    u11 = v[1] - f01 * u01
+    if not limit * kept[1] * kept[1] < u11 * kept[1] < math.inf:
+        return 1
+    d1 = 1.0 / u11
+    v[1] = d1
+    if size == 2:
+        for x in range(2, n):
+            v[x] -= f01 * u[x]
+        return -1
+    w = v[width:]
+    u02 = u[2]
+    f02 = u02 * d0
+    u12 = v[2] - f01 * u02
+    v[2] = u12
+    f12 = u12 * d1
+    u22 = w[2] - f02 * u02 - f12 * u12
+    if not limit * kept[2] * kept[2] < u22 * kept[2] < math.inf:
+        return 2
+    w[2] = 1.0 / u22
+    u, v, w = u[3:], v[3:], w[3:]
+    for x in range(n - 3):
+        a = u[x]
+        b = v[x] - f01 * a
+        v[x] = b
+        w[x] -= f02 * a + f12 * b
+    return -1
+
+
+@kernel
+def subtract_products(pivots, size, width, left, right, out, stride, rows, n, diagonal):
+    """Subtract from out, up to three pivots: left's columns times right's rows; of a diagonal block the upper part."""
+    if size >= 3:
+        d0, d1, d2 = pivots[0], pivots[width + 1], pivots[2 * width + 2]
+        a, b, c = left, left[width:], left[2 * width :]
+        u, v, w = right, right[width:], right[2 * width :]
+        r = 0
+        while r + 3 <= rows:
+            skip = r if diagonal else 0
+            x0, x1, x2 = a[r] * d0, b[r] * d1, c[r] * d2
+            y0, y1, y2 = a[r + 1] * d0, b[r + 1] * d1, c[r + 1] * d2
+            z0, z1, z2 = a[r + 2] * d0, b[r + 2] * d1, c[r + 2] * d2
+            o = out[r * stride + skip :]
+            p, q = o[stride:], o[2 * stride :]
+            us, vs, ws = u[skip:], v[skip:], w[skip:]
+            for x in range(n - skip):
+                e, f, g = us[x], vs[x], ws[x]
+                o[x] -= x0 * e + x1 * f + x2 * g
+                p[x] -= y0 * e + y1 * f + y2 * g
+                q[x] -= z0 * e + z1 * f + z2 * g
+            r += 3
+        while r < rows:
+            skip = r if diagonal else 0
+            x0, x1, x2 = a[r] * d0, b[r] * d1, c[r] * d2
+            o = out[r * stride + skip :]
+            us, vs, ws = u[skip:], v[skip:], w[skip:]
+            for x in range(n - skip):
+                o[x] -= x0 * us[x] + x1 * vs[x] + x2 * ws[x]
+            r += 1
+    elif size == 2:
+        d0, d1 = pivots[0], pivots[width + 1]
+        b, v = left[width:], right[width:]
+        for r in range(rows):
+            skip = r if diagonal else 0
+            x0, x1 = left[r] * d0, b[r] * d1
+            o, us, vs = out[r * stride + skip :], right[skip:], v[skip:]
+            for x in range(n - skip):
+                o[x] -= x0 * us[x] + x1 * vs[x]
+    else:
+        d0 = pivots[0]
+        for r in range(rows):
+            skip = r if diagonal else 0
+            x0 = left[r] * d0
+            o, us = out[r * stride + skip :], right[skip:]
+            for x in range(n - skip):
+                o[x] -= x0 * us[x]
+
+
+@kernel
+def link(u, values, record, kept, limit):
+    """Eliminate a 3 x 3 block that updates one other, as in a chain; which row fails, or -1."""
+    stride = record[5]
+    v, w = u[6:], u[12:]
+    o = values[record[4] :]
+    p, q = o[stride:], o[2 * stride :]
+    u00, u01, u02 = u[0], u[1], u[2]
+    if not limit * kept[0] * kept[0] < u00 * kept[0] < math.inf:
+        return 0
+    d0 = 1.0 / u00
+    f01, f02 = u01 * d0, u02 * d0
+    u11, u12 = v[1] - f01 * u01, v[2] - f01 * u02
+    if not limit * kept[1] * kept[1] < u11 * kept[1] < math.inf:
+        return 1
+    d1 = 1.0 / u11
+    f12 = u12 * d1
+    u22 = w[2] - f02 * u02 - f12 * u12
+    if not limit * kept[2] * kept[2] < u22 * kept[2] < math.inf:
+        return 2
+    d2 = 1.0 / u22
+    a0, a1, a2 = u[3], u[4], u[5]
+    b0, b1, b2 = v[3] - f01 * a0, v[4] - f01 * a1, v[5] - f01 * a2
+    c0, c1, c2 = w[3] - f02 * a0 - f12 * b0, w[4] - f02 * a1 - f12 * b1, w[5] - f02 * a2 - f12 * b2
+    u[0], v[1], v[2], w[2] = d0, d1, u12, d2
+    v[3], v[4], v[5] = b0, b1, b2
+    w[3], w[4], w[5] = c0, c1, c2
+    x, y, z = a0 * d0, b0 * d1, c0 * d2
+    o[0] -= x * a0 + y * b0 + z * c0
+    o[1] -= x * a1 + y * b1 + z * c1
+    o[2] -= x * a2 + y * b2 + z * c2
+    x, y, z = a1 * d0, b1 * d1, c1 * d2
+    p[1] -= x * a1 + y * b1 + z * c1
+    p[2] -= x * a2 + y * b2 + z * c2
+    x, y, z = a2 * d0, b2 * d1, c2 * d2
+    q[2] -= x * a2 + y * b2 + z * c2
+    return -1
+
+
+@kernel
+def eliminate_lu(l, u, size, width, n, kept, limit):
+    """Eliminate up to three rows of upper and columns of lower; which of them fails, or -1."""
+    u00 = u[0]
+    if not limit * abs(kept[0]) < abs(u00) < math.inf:
+        return 0
+    d0 = 1.0 / u00
+    u[0] = l[0] = d0
+    if size == 1:
+        return -1
+    v, m = u[width:], l[width:]
+    u01, l01 = u[1], l[1]
+    f01, g01 = l01 * d0, u01 * d0
+    u11 = v[1] - f01 * u01
+    if not limit * abs(kept[1]) < abs(u11) < math.inf:
+        return 1
+    d1 = 1.0 / u11
+    v[1] = m[1] = d1
+    if size == 2:
+        for x in range(2, n):
+            v[x] -= f01 * u[x]
+            m[x] -= g01 * l[x]
+        return -1
+    w, o = v[width:], m[width:]
+    u02, l02 = u[2], l[2]
+    f02, g02 = l02 * d0, u02 * d0
+    u12, l12 = v[2] - f01 * u02, m[2] - g01 * l02
+    v[2], m[2] = u12, l12
+    f12, g12 = l12 * d1, u12 * d1
+    u22 = w[2] - f02 * u02 - f12 * u12
+    if not limit * abs(kept[2]) < abs(u22) < math.inf:
+        return 2
+    w[2] = o[2] = 1.0 / u22
+    u, v, w = u[3:], v[3:], w[3:]
+    l, m, o = l[3:], m[3:], o[3:]
+    for x in range(n - 3):
+        a, b = u[x], l[x]
+        c, d = v[x] - f01 * a, m[x] - g01 * b
+        v[x], m[x] = c, d
+        w[x] -= f02 * a + f12 * c
+        o[x] -= g02 * b + g12 * d
+    return -1
+
+
+@kernel
+def link_lu(l, u, lower, upper, record, kept, limit):
+    """Eliminate a 3 x 3 block that updates one other, as in a chain; which row fails, or -1."""
+    target, stride = record[4], record[5]
+    v, w, m, n = u[6:], u[12:], l[6:], l[12:]
+    u00, u01, u02, l01, l02 = u[0], u[1], u[2], l[1], l[2]
+    if not limit * abs(kept[0]) < abs(u00) < math.inf:
+        return 0
+    d0 = 1.0 / u00
+    f01, f02, g01, g02 = l01 * d0, l02 * d0, u01 * d0, u02 * d0
+    u11, u12, l12 = v[1] - f01 * u01, v[2] - f01 * u02, m[2] - g01 * l02
+    if not limit * abs(kept[1]) < abs(u11) < math.inf:
+        return 1
+    d1 = 1.0 / u11
+    f12, g12 = l12 * d1, u12 * d1
+    u22 = w[2] - f02 * u02 - f12 * u12
+    if not limit * abs(kept[2]) < abs(u22) < math.inf:
+        return 2
+    d2 = 1.0 / u22
+    u[0], v[1], v[2], w[2] = d0, d1, u12, d2
+    l[0], m[1], m[2], n[2] = d0, d1, l12, d2
+    a0, a1, a2 = u[3], u[4], u[5]
+    b0, b1, b2 = v[3] - f01 * a0, v[4] - f01 * a1, v[5] - f01 * a2
+    c0, c1, c2 = w[3] - f02 * a0 - f12 * b0, w[4] - f02 * a1 - f12 * b1, w[5] - f02 * a2 - f12 * b2
+    v[3], v[4], v[5] = b0, b1, b2
+    w[3], w[4], w[5] = c0, c1, c2
+    x0, x1, x2 = l[3], l[4], l[5]
+    y0, y1, y2 = m[3] - g01 * x0, m[4] - g01 * x1, m[5] - g01 * x2
+    z0, z1, z2 = n[3] - g02 * x0 - g12 * y0, n[4] - g02 * x1 - g12 * y1, n[5] - g02 * x2 - g12 * y2
+    m[3], m[4], m[5] = y0, y1, y2
+    n[3], n[4], n[5] = z0, z1, z2
+    a0, a1, a2 = a0 * d0, a1 * d0, a2 * d0
+    b0, b1, b2 = b0 * d1, b1 * d1, b2 * d1
+    c0, c1, c2 = c0 * d2, c1 * d2, c2 * d2
+    o = upper[target:]
+    p, q = o[stride:], o[2 * stride :]
+    o[0] -= x0 * a0 + y0 * b0 + z0 * c0
+    o[1] -= x0 * a1 + y0 * b1 + z0 * c1
+    o[2] -= x0 * a2 + y0 * b2 + z0 * c2
+    p[1] -= x1 * a1 + y1 * b1 + z1 * c1
+    p[2] -= x1 * a2 + y1 * b2 + z1 * c2
+    q[2] -= x2 * a2 + y2 * b2 + z2 * c2
+    o = lower[target:]
+    p = o[stride:]
+    o[1] -= x1 * a0 + y1 * b0 + z1 * c0
+    o[2] -= x2 * a0 + y2 * b0 + z2 * c0
+    p[2] -= x2 * a1 + y2 * b1 + z2 * c1
+    return -1

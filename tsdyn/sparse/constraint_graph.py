@@ -1,0 +1,61 @@
+"""The graph of a scene for the basis-free forms: which rows meet at which bodies, and where their products go.
+
+Normalisation rows are no part of it: in terms of (dr, dpi') every body's is fulfilled (see body_loops). What is left
+of Phi_q W Phi_q^T, S = H W H^T, couples rows that share a body; its blocks, their order of elimination and all places
+are found once for a scene.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..model.packed_friction import FR_COLUMNS
+from .massless_axes import Axes, no_axes
+from .symbolic import Pattern, analyse
+
+# columns of Network.kinds: addresses of the loops, then where a kind's instances are
+REDUCED, VALUES, BIAS, DRIFT, N_COUNT, N_REALS, N_FIRST_INT, N_FIRST_REAL, N_COLUMNS = range(9)
+# columns of Network.products
+P_LEFT, P_ROWS, P_RIGHT, P_COLUMNS, P_TARGET, P_STRIDE, P_SAME, P_WIDTH = range(8)  # SAME: with itself, both sides
+# columns of Network.parts; kinds of products
+H_LEFT, H_ROWS, H_RIGHT, H_COLUMNS, H_TARGET, H_STRIDE, H_KIND, H_BODY, H_WIDTH = range(9)
+ROWS, ROWS_WELD, WELD_ROWS, WELDS = range(4)
+W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
+
+
+class Network(NamedTuple):
+    """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H, which are zero where row is -1."""
+
+    bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length: 7, 3, or poses.STILL of what never turns
+    kinds: np.ndarray  # int64 (kinds, N_COLUMNS); more than one of a kind where instances between them are left out
+    table: np.ndarray  # int64: body_loops.INTS for each instance
+    sides: np.ndarray  # int64 (m, 2): the bodies of a row; nb is the ground
+    row: np.ndarray  # int64 (m,): its place among the rows of Phi; -1 for a weld's or an axis's
+    products: np.ndarray  # int64 (products, P_WIDTH): rows of sides that meet at a body, and where their product goes
+    inverse: np.ndarray  # ((nb + 1) 16,): 1 / m and three zeros, columns of J'^-1; zero for the ground
+    mass: np.ndarray  # ((nb + 1) 16,): m and three zeros, columns of J'
+    spins: np.ndarray  # int64 (nb,): whether omega' x J' omega' is ever other than zero
+    pattern: Pattern  # of S
+    normals: np.ndarray  # int64 (nb,): the row of Phi that normalises a body's p, or -1
+    parts: np.ndarray  # int64 (products, H_WIDTH): the products at the parts of hubs, see body_splitting.py
+    scales: np.ndarray  # (products,): what they are multiplied by
+    welds: np.ndarray  # int64 (rows of welds, 2): which row, of which body
+    diagonal: np.ndarray  # int64 (m,): where the diagonal entry of a row is in a value array of the pattern
+    dropped: np.ndarray  # int64: rows that follow from the others, as chosen at the first start; see selection.py
+    frictions: np.ndarray  # int64 (frictions, FR_COLUMNS): those that follow from reactions; see packed_friction.py
+    friction_rows: np.ndarray  # int64 (rows of their joints, 2): which row, and on which side its reaction is taken
+    rub: np.ndarray  # int64 (1,): address of what solves for them, as the form needs it
+    axes: Axes  # rows of bodies with next to no inertia about an axis
+
+
+def no_network():
+    """The network of nothing, for its type."""
+    none, pattern = np.zeros(0, np.int64), analyse([], [])[1]
+    pairs = np.zeros((0, 2), np.int64)
+    kinds, products = np.zeros((0, N_COLUMNS), np.int64), np.zeros((0, P_WIDTH), np.int64)
+    parts = np.zeros((0, H_WIDTH), np.int64)
+    return Network(
+        pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none, parts, np.zeros(0),
+        pairs, none, none, np.zeros((0, FR_COLUMNS), np.int64), pairs, np.zeros(1, np.int64),
+        no_axes(),
+    )  # fmt: skip

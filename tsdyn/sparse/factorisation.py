@@ -1,0 +1,270 @@
+"""Numeric part of the sparse factorisation: block elimination in the panels that blocks.analyse laid out.
+
+    S = U^T D^-1 U    symmetric and, but for late nodes (see symbolic.py), positive definite; values hold U
+    N = L D^-1 U      any other, without pivoting: `upper` holds U, `lower` holds L^T
+
+D is the diagonal of U and of L; the arrays hold its reciprocals. With U = L^T both are the same, so that one pair of
+kernels solves with either, and a matrix's transpose is solved by handing its arrays over in the other order. Only the
+upper triangle of a diagonal block is read. After the panels comes room for the diagonal as it was before elimination,
+against which pivots are judged.
+"""
+
+from ..jit.kernels import kernel
+from .block_operations import eliminate, eliminate_lu, link, link_lu, subtract_products
+
+
+@kernel
+def keep_diagonal(pattern, values):
+    """Copy the diagonal to where `factor` judges pivots by it, its sign that of the pivot."""
+    starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
+    kept = values[pattern.shape[1] :]
+    for j in range(heads.size):
+        head, step, first = heads[j], widths[j] + 1, starts[j]
+        for k in range(starts[j + 1] - first):
+            kept[first + k] = abs(values[head + k * step])
+    for i in range(pattern.negative.size):
+        row = pattern.negative[i]
+        kept[row] = -kept[row] if kept[row] > 0.0 else -1.0
+
+
+@kernel
+def factor(pattern, values, limit):
+    """Factor S in place; S positive definite, but for rows that are to have negative pivots.
+
+    Returns -1, or the row of the eliminated vector where elimination leaves less than `limit` of a diagonal entry.
+    """
+    kept = values[pattern.shape[1] :]
+    if pattern.shape[0] == 1:
+        keep_diagonal(pattern, values)
+        return eliminate(values, 1, 1, 1, kept, limit)
+    starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
+    keep_diagonal(pattern, values)
+    for j in range(heads.size):
+        first, width, panel = starts[j], widths[j], values[heads[j] :]
+        size = starts[j + 1] - first
+        if size == 3 and width == 6 and updates[j + 1] - updates[j] == 1:
+            failed = link(panel, values, pattern.records[6 * updates[j] :], kept[first:], limit)
+            if failed >= 0:
+                return first + failed
+            continue
+        for k in range(0, size, 3):
+            u = panel[k * (width + 1) :]
+            failed = eliminate(u, size - k, width, width - k, kept[first + k :], limit)
+            if failed >= 0:
+                return first + k + failed
+            if size - k > 3:
+                out, right = u[3 * (width + 1) :], u[3:]
+                subtract_products(u, 3, width, right, right, out, width, size - k - 3, width - k - 3, True)
+        for e in range(updates[j], updates[j + 1]):
+            at, rows, run, n, target, stride = record(pattern, e)
+            for k in range(0, size, 3):
+                u, r = panel[k * (width + 1) :], panel[k * width :]
+                subtract_products(u, size - k, width, r[at:], r[run:], values[target:], stride, rows, n, at == run)
+    return -1
+
+
+@kernel
+def record(pattern, e):
+    """Which products go where: columns of a panel and how many, twice; place and row length of what they change."""
+    record = pattern.records[6 * e :]
+    return record[0], record[1], record[2], record[3], record[4], record[5]
+
+
+@kernel
+def factor_lu(pattern, lower, upper, limit):
+    """Factor N in place, without pivoting.
+
+    Returns -1, or the row of the eliminated vector where elimination leaves less than `limit` of a diagonal entry's
+    size, or a number that is not finite.
+    """
+    kept = upper[pattern.shape[1] :]
+    if pattern.shape[0] == 1:
+        kept[0] = upper[0]
+        return eliminate_lu(lower, upper, 1, 1, 1, kept, limit)
+    starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
+    keep_diagonal(pattern, upper)
+    for j in range(heads.size):
+        first, width, below, above = starts[j], widths[j], lower[heads[j] :], upper[heads[j] :]
+        size = starts[j + 1] - first
+        if size == 3 and width == 6 and updates[j + 1] - updates[j] == 1:
+            failed = link_lu(below, above, lower, upper, pattern.records[6 * updates[j] :], kept[first:], limit)
+            if failed >= 0:
+                return first + failed
+            continue
+        for k in range(0, size, 3):
+            l, u = below[k * (width + 1) :], above[k * (width + 1) :]
+            failed = eliminate_lu(l, u, size - k, width, width - k, kept[first + k :], limit)
+            if failed >= 0:
+                return first + k + failed
+            if size - k > 3:
+                left, right, corner = l[3:], u[3:], 3 * (width + 1)
+                out, other = u[corner:], l[corner:]
+                for _ in range(2):
+                    subtract_products(u, 3, width, left, right, out, width, size - k - 3, width - k - 3, True)
+                    left, right, out = right, left, other
+        for e in range(updates[j], updates[j + 1]):
+            at, rows, run, n, target, stride = record(pattern, e)
+            left, right, out = below, above, upper[target:]
+            for _ in range(2):
+                for k in range(0, size, 3):
+                    u, l, r = above[k * (width + 1) :], left[k * width + at :], right[k * width + run :]
+                    subtract_products(u, size - k, width, l, r, out, stride, rows, n, at == run)
+                left, right, out = above, below, lower[target:]
+    return -1
+
+
+@kernel
+def solve(pattern, values, b):
+    """Solve S x = b in place, b (rows,) in the eliminated order, with what `factor` left."""
+    solve_lu(pattern, values, values, b)
+
+
+@kernel
+def solve_lu_transposed(pattern, lower, upper, b):
+    """Solve N^T x = b in place, with what `factor_lu` left."""
+    solve_lu(pattern, upper, lower, b)
+
+
+@kernel
+def solve_lu(pattern, lower, upper, b):
+    """Solve N x = b in place, b (rows,) in the eliminated order, with what `factor_lu` left."""
+    if pattern.shape[0] == 1:
+        b[0] *= lower[0]
+        return
+    starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
+    columns, segments = pattern.columns, pattern.segments
+    for j in range(heads.size):
+        first, width, head = starts[j], widths[j], heads[j]
+        size, own, u = starts[j + 1] - first, b[first:], lower[head:]
+        one = columns[j + 1] - columns[j] == 1
+        while True:
+            _forward(size, width, u, own)
+            if one and width == 6 and size == 3:
+                v, w, out = u[6:], u[12:], b[segments[2 * columns[j]] :]
+                x, y, z = own[0], own[1], own[2]
+                out[0] -= x * u[3] + y * v[3] + z * w[3]
+                out[1] -= x * u[4] + y * v[4] + z * w[4]
+                out[2] -= x * u[5] + y * v[5] + z * w[5]
+                break
+            _forward_rest(size, width, u, own, b, columns[j], columns[j + 1], segments)
+            if size <= 3:
+                break
+            u, own, size = u[3 * (width + 1) :], own[3:], size - 3
+    for j in range(heads.size - 1, -1, -1):
+        first, width, head = starts[j], widths[j], heads[j]
+        size = starts[j + 1] - first
+        one = columns[j + 1] - columns[j] == 1
+        k = (size - 1) // 3 * 3
+        while k >= 0:
+            own, u = b[first + k :], upper[head + k * (width + 1) :]
+            if one and width == 6 and size == 3:
+                v, w, out = u[6:], u[12:], b[segments[2 * columns[j]] :]
+                e, f, g = out[0], out[1], out[2]
+                x, y, z = (
+                    e * u[3] + f * u[4] + g * u[5],
+                    e * v[3] + f * v[4] + g * v[5],
+                    e * w[3] + f * w[4] + g * w[5],
+                )
+            else:
+                x, y, z = _backward_rest(size - k, width, u, own, b, columns[j], columns[j + 1], segments)
+            _backward(size - k, width, u, own, x, y, z)
+            k -= 3
+
+
+@kernel
+def _forward(size, width, u, own):
+    x = own[0] * u[0]
+    own[0] = x
+    if size > 1:
+        v = u[width:]
+        y = (own[1] - x * u[1]) * v[1]
+        own[1] = y
+        if size > 2:
+            w = v[width:]
+            own[2] = (own[2] - x * u[2] - y * v[2]) * w[2]
+
+
+@kernel
+def _forward_rest(size, width, u, own, b, here, end, segments):
+    """Take up to three unknowns from the rows after them."""
+    if size == 1:
+        x = own[0]
+        at = 1
+        for e in range(here, end):
+            out, n, us = b[segments[2 * e] :], segments[2 * e + 1], u[at:]
+            for i in range(n):
+                out[i] -= x * us[i]
+            at += n
+    elif size == 2:
+        x, y = own[0], own[1]
+        v = u[width:]
+        at = 2
+        for e in range(here, end):
+            out, n, us, vs = b[segments[2 * e] :], segments[2 * e + 1], u[at:], v[at:]
+            for i in range(n):
+                out[i] -= x * us[i] + y * vs[i]
+            at += n
+    else:
+        x, y, z = own[0], own[1], own[2]
+        v, w = u[width:], u[2 * width :]
+        for i in range(3, size):
+            own[i] -= x * u[i] + y * v[i] + z * w[i]
+        at = size
+        for e in range(here, end):
+            out, n, us, vs, ws = b[segments[2 * e] :], segments[2 * e + 1], u[at:], v[at:], w[at:]
+            for i in range(n):
+                out[i] -= x * us[i] + y * vs[i] + z * ws[i]
+            at += n
+
+
+@kernel
+def _backward(size, width, u, own, x, y, z):
+    if size > 1:
+        v = u[width:]
+        if size > 2:
+            w = v[width:]
+            z = own[2] - w[2] * z
+            own[2] = z
+            x += u[2] * z
+            y += v[2] * z
+        y = own[1] - v[1] * y
+        own[1] = y
+        x += u[1] * y
+    own[0] -= u[0] * x
+
+
+@kernel
+def _backward_rest(size, width, u, own, b, here, end, segments):
+    """What the rows after them give to up to three unknowns."""
+    x, y, z = 0.0, 0.0, 0.0
+    if size == 1:
+        at = 1
+        for e in range(here, end):
+            source, n, us = b[segments[2 * e] :], segments[2 * e + 1], u[at:]
+            for i in range(n):
+                x += us[i] * source[i]
+            at += n
+    elif size == 2:
+        v = u[width:]
+        at = 2
+        for e in range(here, end):
+            source, n, us, vs = b[segments[2 * e] :], segments[2 * e + 1], u[at:], v[at:]
+            for i in range(n):
+                x += us[i] * source[i]
+                y += vs[i] * source[i]
+            at += n
+    else:
+        v, w = u[width:], u[2 * width :]
+        for i in range(3, size):
+            x += u[i] * own[i]
+            y += v[i] * own[i]
+            z += w[i] * own[i]
+        at = size
+        for e in range(here, end):
+            source, n, us, vs, ws = b[segments[2 * e] :], segments[2 * e + 1], u[at:], v[at:], w[at:]
+            for i in range(n):
+                x += us[i] * source[i]
+                y += vs[i] * source[i]
+                z += ws[i] * source[i]
+            at += n
+    return x, y, z

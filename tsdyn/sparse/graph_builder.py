@@ -1,0 +1,297 @@
+"""Builds the constraint graph of a packed scene, step by step.
+
+joints      constraints that are no normalisations, the two bodies and the first row of Phi of each
+nodes       pairs of bodies that joints connect: the blocks of S; their rows are eliminated together
+hubs        bodies with many nodes, cut into parts that welds hold together (body_splitting.py)
+products    where H_i W H_j^T of two joints at a body goes in S
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.loops.body_poses import STILL
+from ..elements.loops.constraint_rows import BODY, INTS, MASK, ROW
+from ..model.packed_friction import frictions_of
+from .body_splitting import cut
+from .constraint_graph import (
+    H_WIDTH,
+    N_COLUMNS,
+    N_COUNT,
+    P_WIDTH,
+    ROWS,
+    ROWS_WELD,
+    W_MASS,
+    W_ROTATION,
+    WEIGHTS,
+    WELD_ROWS,
+    WELDS,
+    Network,
+)
+from .massless_axes import Share, axes_of, inverses, lean_bodies
+from .symbolic import analyse
+
+
+class _Joint(NamedTuple):
+    constraint: object
+    pair: tuple  # the numbers of its two bodies; that of the ground is the number of bodies
+    row: int  # the first of its rows in Phi
+
+
+class _Lean(NamedTuple):
+    """A body without inertia about an axis, or a part of it where it is cut as a hub."""
+
+    body: int
+    clique: int
+    scale: float
+    nodes: list  # of a part; None for a whole body
+    welds: list
+
+
+def build(packed, still=None):
+    """The network of a packed scene, with the addresses of the loops still zero, and the classes of its kinds.
+
+    With `still`, a `locked_orientations.Still`, without the rotations of those bodies and the rows that hold them.
+    """
+    return _Builder(packed, still).network()
+
+
+class _Builder:
+    """What the steps hand on to each other."""
+
+    def __init__(self, packed, still):
+        self.packed, self.system, self.still = packed, packed.system, still
+        self.rows, omitted = packed.system.bodies, ()
+        if still is not None:
+            omitted, self.rows = still.omitted, self.rows.copy()
+            self.rows[still.bodies, 1] = STILL
+        self.bodies = {id(body): i for i, body in enumerate(packed.bodies)}
+        self.nb = len(self.bodies)
+        self._find_joints(omitted)
+        self._find_nodes()
+        self._cut_hubs()
+        self._find_lean_bodies()
+        self.starts, self.pattern, self.where = analyse(self.sizes, self.cliques, len(self.held))
+        self._place_rows()
+
+    def _find_joints(self, omitted):
+        self.joints, row, self.normals = [], 0, np.full(self.nb, -1, np.int64)
+        for i, constraint in enumerate(self.packed.constraints):
+            if constraint.normalises:
+                self.normals[self.bodies[id(constraint.a)]] = row
+            elif i not in omitted:
+                pair = tuple(self.bodies.get(id(body), self.nb) for body in (constraint.a, constraint.b))
+                self.joints.append(_Joint(constraint, pair, row))
+            row += constraint.rows
+
+    def _find_nodes(self):
+        """The nodes, how many rows each has, and of every joint its node and its first row within."""
+        self.nodes, self.sizes, self.inside = {}, [], []
+        for constraint, pair, _ in self.joints:
+            node = self.nodes.setdefault(tuple(sorted(pair)), len(self.nodes))
+            if node == len(self.sizes):
+                self.sizes.append(0)
+            self.inside.append((node, self.sizes[node]))
+            self.sizes[node] += constraint.rows
+
+    def _cut_hubs(self):
+        """Parts of hubs, and the cliques: nodes that meet at a body or a part. Frictions couple a hub's rows whole."""
+        degrees = np.where(self.rows[:, 1] == 7, 6, 3).tolist()
+        whole = self.packed.derived.dropped is not None or self.system.normals.size
+        pairs = [tuple(body if body < self.nb else -1 for body in pair) for pair in self.nodes]
+        self.parts = [] if whole else cut(pairs, self.sizes, degrees)
+        self.hubs, self.cliques = {part.body for part in self.parts}, [[] for _ in range(self.nb)]
+        for pair, node in self.nodes.items():
+            for body in set(pair) - self.hubs - {self.nb}:
+                self.cliques[body].append(node)
+        self.cliques += [[*part.nodes, *(weld for weld, _ in part.welds)] for part in self.parts]
+
+    def _find_lean_bodies(self):
+        """Bodies with axes without inertia, whose rows are nodes of their own, eliminated last."""
+        self.lean = {body: one for body, one in lean_bodies(self.packed).items() if self.rows[body, 1] == 7}
+        self.held = [_Lean(body, body, 1.0, None, []) for body in sorted(self.lean.keys() - self.hubs)]
+        self.held += [
+            _Lean(part.body, self.nb + i, part.scale, part.nodes, part.welds)
+            for i, part in enumerate(self.parts)
+            if part.body in self.lean
+        ]
+        for i, held in enumerate(self.held):
+            self.cliques[held.clique].append(len(self.sizes) + i)
+        self.sizes += [len(self.lean[held.body].axes) for held in self.held]
+
+    def _place_rows(self):
+        """Of every row, in order of elimination, its two bodies and its place in Phi; and the joints at each body."""
+        m = sum(self.sizes)
+        self.firsts = [int(self.starts[node]) + offset for node, offset in self.inside]
+        self.sides, self.places = np.full((m, 2), self.nb, np.int64), np.full(m, -1, np.int64)
+        self.at_body, self.at_node = [[] for _ in range(self.nb)], [[] for _ in self.nodes]
+        for i, (constraint, pair, row) in enumerate(self.joints):
+            e = np.arange(self.firsts[i], self.firsts[i] + constraint.rows)
+            self.sides[e], self.places[e] = pair, np.arange(row, row + constraint.rows)
+            self.at_node[self.inside[i][0]].append(i)
+            for side, body in enumerate(pair):
+                if body < self.nb and body not in self.hubs:
+                    self.at_body[body].append((i, side))
+
+    def _at_part(self, body, nodes):
+        """The joints of these nodes and their sides at a body."""
+        return [(i, self.joints[i].pair.index(body)) for node in nodes for i in self.at_node[node]]
+
+    def _product(self, i, side, j, other):
+        """Columns of Network.products, as far as the two joints say them."""
+        (node, r), (other_node, c) = self.inside[i], self.inside[j]
+        target, stride, _ = self.where(node, other_node)
+        left, right = 16 * self.firsts[i] + 8 * side, 16 * self.firsts[j] + 8 * other
+        return (
+            left, self.joints[i].constraint.rows, right, self.joints[j].constraint.rows,
+            target + r * stride + c, stride,
+        )  # fmt: skip
+
+    def _products(self):
+        products = [(*self._product(i, 0, i, 0), 1) for i in range(len(self.joints))]
+        for found in self.at_body:
+            for i, side in found:
+                for j, other in found:
+                    if self.firsts[i] < self.firsts[j]:
+                        products.append((*self._product(i, side, j, other), 0))
+        return np.array(products, np.int64).reshape(-1, P_WIDTH)
+
+    def _products_at_hubs(self):
+        """Network.parts and Network.scales: products at the parts of hubs, and with the welds between these."""
+        products, scales = [], []
+        for part in self.parts:
+            found = self._at_part(part.body, part.nodes)
+            for i, side in found:
+                for j, other in found:
+                    if self.firsts[i] <= self.firsts[j]:
+                        products.append((*self._product(i, side, j, other), ROWS, part.body))
+                        scales.append(part.scale - (i == j))  # the whole hub's is among the products
+            for weld, sign in part.welds:
+                count = self.sizes[weld]
+                for i, side in found:
+                    node, r = self.inside[i]
+                    target, stride, after = self.where(node, weld)
+                    to, kind = (target + r, WELD_ROWS) if after else (target + r * stride, ROWS_WELD)
+                    left = 16 * self.firsts[i] + 8 * side
+                    products.append((left, self.joints[i].constraint.rows, 0, count, to, stride, kind, part.body))
+                    scales.append(sign * part.scale)
+                for other, other_sign in part.welds:
+                    target, stride, after = self.where(weld, other)
+                    if not after:
+                        products.append((0, count, 0, count, target, stride, WELDS, part.body))
+                        scales.append(sign * other_sign * part.scale)
+        return np.array(products, np.int64).reshape(-1, H_WIDTH), np.array(scales, float)
+
+    def _welds(self):
+        rows = [
+            (int(self.starts[weld]) + r, part.body)
+            for part in self.parts
+            for weld, sign in part.welds
+            if sign > 0
+            for r in range(self.sizes[weld])
+        ]
+        return np.array(rows, np.int64).reshape(-1, 2)
+
+    def _axes(self):
+        """Network.axes; the rows of axes get their body as a side."""
+        first = len(self.sizes) - len(self.held)
+        shares = [
+            Share(
+                held.body,
+                held.scale,
+                self.at_body[held.body] if held.nodes is None else self._at_part(held.body, held.nodes),
+                held.welds,
+                first + i,
+            )
+            for i, held in enumerate(self.held)
+        ]
+        counts = [joint.constraint.rows for joint in self.joints]
+        axes = axes_of(shares, self.lean, counts, self.inside, self.starts, self.where)
+        self.sides[axes.rows[:, 0], 0] = axes.rows[:, 1]
+        return axes
+
+    def _kinds(self, index):
+        """Network.kinds and Network.table, and the class of each of the kinds: runs of instances without a gap."""
+        classes = dict.fromkeys(type(constraint) for constraint in self.packed.constraints)
+        kinds, table, used = [], [], []
+        for kind, packed_kind in zip(classes, self.system.kinds, strict=True):
+            if kind.normalises:
+                continue
+            _, _, _, phi_t, _, stride, _, first_real, _ = packed_kind
+            last = None  # the instance before, where it is not left out
+            for at, constraint in enumerate(c for c in self.packed.constraints if type(c) is kind):
+                i = index.get(id(constraint))
+                if i is None:
+                    continue
+                if last is None or last != at - 1:
+                    kinds.append([0, 0, 0, int(phi_t != 0), 0, stride, len(table), first_real + at * stride])
+                    used.append(kind)
+                last = at
+                kinds[-1][N_COUNT] += 1
+                entry = [0] * INTS
+                entry[BODY : BODY + 2], entry[ROW], entry[MASK] = self.joints[i].pair, self.firsts[i], 0
+                table += entry
+        return np.array(kinds, np.int64).reshape(-1, N_COLUMNS), np.array(table, np.int64), tuple(used)
+
+    def _weights(self):
+        """Network.inverse, Network.mass and Network.spins."""
+        nb, system = self.nb, self.system
+        inverse, mass = np.zeros((nb + 1, WEIGHTS)), np.zeros((nb + 1, WEIGHTS))
+        spins = np.zeros(nb, np.int64)
+        inverse[:nb, W_MASS], mass[:nb, W_MASS] = 1.0 / system.mass, system.mass
+        rigid = np.flatnonzero(self.rows[:, 1] == 7)
+        J = system.inertia[rigid].reshape(-1, 3, 3)
+        spins[rigid] = (J[:, :1, :1] * np.eye(3) != J).any(axis=(1, 2))
+        for weights, matrices in ((inverse, inverses(J, [self.lean.get(i) for i in rigid])), (mass, J)):
+            weights[rigid, W_ROTATION:] = np.pad(matrices, ((0, 0), (0, 0), (0, 1))).reshape(-1, 12)
+        return inverse.ravel(), mass.ravel(), spins
+
+    def _dropped(self):
+        if self.still is not None:
+            return np.flatnonzero(np.isin(self.places, self.still.dropped))
+        dropped = self.packed.derived.dropped
+        return np.zeros(0, np.int64) if dropped is None else dropped.copy()
+
+    def network(self):
+        """The `Network`, and the classes of its kinds."""
+        parts, scales = self._products_at_hubs()
+        axes = self._axes()
+        index = {id(joint.constraint): i for i, joint in enumerate(self.joints)}
+        kinds, table, used = self._kinds(index)
+        inverse, mass, spins = self._weights()
+
+        def rows_of(part):
+            first = self.firsts[index[id(part)]]
+            return range(first, first + part.rows)
+
+        frictions, friction_rows = frictions_of(self.packed, self.bodies, rows_of, self.sides)
+        network = Network(
+            bodies=self.rows,
+            kinds=kinds,
+            table=table,
+            sides=self.sides,
+            row=self.places,
+            products=self._products(),
+            inverse=inverse,
+            mass=mass,
+            spins=spins,
+            pattern=self.pattern,
+            normals=self.normals,
+            parts=parts,
+            scales=scales,
+            welds=self._welds(),
+            diagonal=_diagonal(self.pattern),
+            dropped=self._dropped(),
+            frictions=frictions,
+            friction_rows=friction_rows,
+            rub=np.zeros(1, np.int64),
+            axes=axes,
+        )
+        return network, used
+
+
+def _diagonal(pattern):
+    """Where the diagonal entries are, in the order of the eliminated vector."""
+    sizes = np.diff(pattern.starts)
+    within = np.arange(pattern.shape[0]) - np.repeat(pattern.starts[:-1], sizes)
+    return np.repeat(pattern.heads, sizes) + within * (np.repeat(pattern.widths, sizes) + 1)

@@ -1,0 +1,142 @@
+"""Axes about which a body has next to no inertia: the network has a row for each, and masses that can be inverted.
+
+The moment of inertia j about such an axis e is raised to J. A multiplier mu takes from the equation of motion what that
+adds to it, c^2 = J - j:
+
+    (J' + c^2 e e^T) omega'd = n' - H^T lam - c e mu,        c e . omega'd + mu = 0
+
+The motion is that of J', whatever J is. The second equation is an axis row of S: the products of c e with the other
+rows at the body, and -j / J on the diagonal. It is eliminated after those rows. Its pivot is minus the share of J that
+they hold, or that j is, so S needs no exchange of rows wherever the constraints hold the axis, and is as well
+conditioned as with the inertia J. A body that is small for the length of its levers has three such axes.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.markers import POINT
+
+THIN = (
+    1e-6  # of a body's largest moment of inertia, about its centroid or by its levers: what is less takes an axis row
+)
+GIVEN = 0.1  # of it: J
+NONE = 1e-14  # of its largest moment of inertia: what is less is none
+# columns of Axes.rows, of Axes.values, and of Axes.products
+AXIS_ROW, AXIS_BODY = range(2)
+AXIS_H, AXIS_Y, AXIS_OWN, AXIS_WIDTH = 0, 4, 8, 12  # c e; (J' + j e e^T)^-1 c e; the diagonal entry
+A_AXIS, A_SIDE, A_TARGET, A_WIDTH = range(4)  # A_SIDE: where a row's side begins in H, or -1 - component of a weld
+
+
+class Axes(NamedTuple):
+    """The axis rows of a network."""
+
+    rows: np.ndarray  # int64 (axes, 2): the row in order of elimination, the body
+    values: np.ndarray  # (axes, AXIS_WIDTH)
+    products: np.ndarray  # int64 (products, A_WIDTH): with which row, and where the product goes
+    scales: np.ndarray  # (products,): what a product is multiplied by
+
+
+class Lean(NamedTuple):
+    """The axes of one body about which it has next to no inertia."""
+
+    axes: np.ndarray  # (k, 3), body frame
+    true: np.ndarray  # (k,): j
+    given: float  # J
+
+
+def lean_bodies(packed):
+    """The `Lean` of each body that has such axes, by its number."""
+    system = packed.system
+    rigid = np.flatnonzero(system.bodies[:, 1] == 7)
+    size, axes = np.linalg.eigh(system.inertia[rigid].reshape(-1, 3, 3))
+    whole = np.maximum(size[:, 2], system.mass[rigid] * levers(packed)[rigid] ** 2)
+    found = {}
+    for i in np.flatnonzero(size[:, 0] < THIN * whole):
+        few = size[i] < THIN * whole[i]
+        true = np.where(size[i, few] > NONE * size[i, 2], size[i, few], 0.0)
+        found[int(rigid[i])] = Lean(axes[i].T[few], true, GIVEN * whole[i])
+    return found
+
+
+def levers(packed):
+    """The largest distance of a constraint's point from each body's centroid."""
+    bodies, far = {id(body): i for i, body in enumerate(packed.bodies)}, np.zeros(len(packed.bodies))
+    for constraint, coordinates in zip(packed.constraints, packed.coordinates, strict=True):
+        for marker, s in zip(constraint.markers, coordinates, strict=True):
+            i = bodies.get(id(constraint.body_of(marker))) if marker.code == POINT else None
+            if i is not None:
+                far[i] = max(far[i], float(s @ s))
+    return np.sqrt(far)
+
+
+def inverses(J, lean):
+    """Of inertias (k, 3, 3), with what is given to those of `lean`, a list of `Lean` or None."""
+    whole = J.copy()
+    for i, one in enumerate(lean):
+        if one is not None:
+            whole[i] += np.einsum("a,ai,aj->ij", one.given - one.true, one.axes, one.axes)
+    return np.linalg.inv(whole)
+
+
+class Share(NamedTuple):
+    """A lean body, or a part of it where it is cut as a hub."""
+
+    body: int
+    scale: float  # of the body's mass over its own
+    sides: list  # pairs: the place of a constraint in the network's joints, its side
+    welds: list  # pairs: the node of a weld, its sign
+    node: int  # of its axis rows
+
+
+def no_axes():
+    """The `Axes` of a network without lean bodies."""
+    return Axes(np.zeros((0, 2), np.int64), np.zeros((0, AXIS_WIDTH)), np.zeros((0, A_WIDTH), np.int64), np.zeros(0))
+
+
+def axis_of(axes, row):
+    """The body and the axis, body frame, that a row in order of elimination belongs to."""
+    i = int(np.flatnonzero(axes.rows[:, AXIS_ROW] == row)[0])
+    h = axes.values[i, AXIS_H : AXIS_H + 3]
+    return int(axes.rows[i, AXIS_BODY]), h / np.linalg.norm(h)
+
+
+def axes_of(shares, lean, joints, inside, starts, where):
+    """The `Axes` of these shares.
+
+    Parameters
+    ----------
+    shares : list of Share
+    lean : dict
+        As `lean_bodies` returns it.
+    joints, inside : list
+        Of each constraint its rows' count; its node, and where its rows begin there.
+    starts : ndarray of int64
+        Where each node's rows begin.
+    where : callable
+        As `blocks.analyse` returns it.
+    """
+    rows, values, products, scales = [], [], [], []
+    for share in shares:
+        one = lean[share.body]
+        for a, (axis, true) in enumerate(zip(one.axes, one.true, strict=True)):
+            k, c = len(rows), np.sqrt((one.given - true) / share.scale)
+            rows.append((int(starts[share.node]) + a, share.body))
+            values.append([*c * axis, 0.0, *c / one.given * axis, 0.0, -true / one.given, 0.0, 0.0, 0.0])
+            for i, side in share.sides:
+                node, first = inside[i]
+                target, stride, _ = where(node, share.node)
+                for r in range(first, first + joints[i]):
+                    products.append((k, 16 * (int(starts[node]) + r) + 8 * side, target + r * stride + a))
+                    scales.append(share.scale)
+            for weld, sign in share.welds:
+                target, stride, _ = where(weld, share.node)
+                for r in range(3):
+                    products.append((k, -1 - r, target + (3 + r) * stride + a))
+                    scales.append(sign * share.scale)
+    return Axes(
+        np.array(rows, np.int64).reshape(-1, 2),
+        np.array(values, float).reshape(-1, AXIS_WIDTH),
+        np.array(products, np.int64).reshape(-1, A_WIDTH),
+        np.array(scales, float),
+    )

@@ -1,0 +1,243 @@
+"""Taylor coefficients of the motion of all bodies, order by order, from the state at order zero.
+
+    (k+1) A_{k+1}           = sum_j A_j omega'~_{k-j}                                            (1)
+    (k+1)(k+2) m r_{k+2}    = F_k - [Phi_r^T lam]_k                                              (2)
+    (k+1) J' omega'_{k+1}   = T_k - sum_j omega'_j x (J' omega')_{k-j} - [Phi_pi'^T lam]_k       (3)
+    Phi_{k+2}               = 0                                                                  (4)
+
+(4) is linear in lam_k: S lam_k = (k+1)(k+2) Phi_{k+2} with what (1)-(3) give for lam_k = 0, and S = H W H^T at order
+zero for every k, factorised once a step.
+"""
+
+from fractions import Fraction
+
+import numpy as np
+
+from ..elements.loops.body_poses import OMEGA, POSE, RD, R
+from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R, S_SPIN, call_series
+from ..jit.kernels import kernel
+from ..jit.simd import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times, total
+from ..maths.dense_linalg import copy
+from ..rows.schur_complement import scatter, weigh
+from ..rows.selection import drop
+from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS
+from ..sparse.factorisation import solve
+from ..sparse.massless_axes import AXIS_BODY, AXIS_H, AXIS_ROW
+
+MOST_ORDERS = 64
+
+
+def _inverse(n):
+    """1 / n as the sum of two floats."""
+    high = 1.0 / n
+    return high, float(Fraction(1, n) - Fraction(high))
+
+
+# What an integral, or two of them, divide order k by; in two floats
+ONE_INTEGRAL = np.array([_inverse(k + 1) for k in range(MOST_ORDERS)])
+TWO_INTEGRALS = np.array([_inverse((k + 1) * (k + 2)) for k in range(MOST_ORDERS)])
+
+
+@kernel
+def begin(network, system, poses, orders, bodies, Z):
+    """Order zero of all bodies, order one of their places, and the forces of order zero but those of a series."""
+    for b in range(network.bodies.shape[0]):
+        at, p, m = b * orders * BODY_ROW, b * POSE, network.mass[16 * b]
+        for c in range(3):
+            put(bodies, at + 4 * c, four(poses, p + 4 * c))
+        put(bodies, at + S_R * orders, four(poses, p + R))
+        put(bodies, at + S_R * orders + 4, four(poses, p + RD))
+        put(Z, 8 * b, lanes(m * system.gravity[0], m * system.gravity[1], m * system.gravity[2]))
+        if network.bodies[b, 1] == 7:
+            put(bodies, at + S_OMEGA * orders, four(poses, p + OMEGA))
+            put(bodies, at + 12, splat(0.0))
+            put(bodies, at + 16, splat(0.0))
+            put(bodies, at + 20, splat(0.0))
+            _turn(bodies, at, 1, four(poses, p + OMEGA))
+            _turn_ahead(bodies, at, orders, 1, False)
+            put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, 0))
+
+
+@kernel
+def _spin(network, b, bodies, at, orders, k):
+    """(J' omega')_k and the gyroscopic torque of order k; the body's series begins at bodies[at]."""
+    torque = splat(0.0)
+    if network.spins[b] != 0:
+        w, o, spins = 16 * b + 4, at + S_OMEGA * orders, at + S_SPIN * orders
+        f = times(four(network.mass, w), splat(bodies[o + 4 * k]))
+        f = fma(four(network.mass, w + 4), splat(bodies[o + 4 * k + 1]), f)
+        put(bodies, spins + 4 * k, fma(four(network.mass, w + 8), splat(bodies[o + 4 * k + 2]), f))
+        for j in range(k + 1):
+            torque = add(torque, cross(four(bodies, spins + 4 * (k - j)), four(bodies, o + 4 * j)))
+    return torque
+
+
+@kernel
+def _fetch_next(bodies, at, orders, count, k):
+    """Have the series of the body at bodies[at] brought into the cache: the beginning of A, and where order k goes."""
+    fetch(bodies, at, count)
+    fetch(bodies, at + 12 * k, 12)
+    fetch(bodies, at + S_R * orders + 4 * k, 4)
+    fetch(bodies, at + S_OMEGA * orders + 4 * (k - 1), 4)
+
+
+@kernel
+def _turn(bodies, at, k, change):
+    """A_k += A_0 change~, the part of (1) that is linear in the last omega'."""
+    w0, w1, w2, o = splat(first(change)), splat(second(change)), splat(third(change)), at + 12 * k
+    a0, a1, a2 = four(bodies, at), four(bodies, at + 4), four(bodies, at + 8)
+    put(bodies, o, add(four(bodies, o), sub(times(a1, w2), times(a2, w1))))
+    put(bodies, o + 4, add(four(bodies, o + 4), sub(times(a2, w0), times(a0, w2))))
+    put(bodies, o + 8, add(four(bodies, o + 8), sub(times(a0, w1), times(a1, w0))))
+
+
+@kernel
+def _turn_ahead(bodies, at, orders, k, exact):
+    """A_{k+1} of (1) but for omega'_k."""
+    x, y, z = splat(0.0), splat(0.0), splat(0.0)
+    u, v, w = splat(0.0), splat(0.0), splat(0.0)
+    o = at + S_OMEGA * orders + 4 * (k - 1)
+    for c in range(at + 12, at + 12 * (k + 1), 12):
+        a0, a1, a2 = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8)
+        w0, w1, w2 = splat(bodies[o]), splat(bodies[o + 1]), splat(bodies[o + 2])
+        x, u = fma(a1, w2, x), fma(a2, w1, u)  # six sums, since each waits for its last
+        y, v = fma(a2, w0, y), fma(a0, w2, v)
+        z, w = fma(a0, w1, z), fma(a1, w0, w)
+        o -= 4
+    o, f = at + 12 * (k + 1), splat(ONE_INTEGRAL[k, 0])
+    x, y, z = sub(x, u), sub(y, v), sub(z, w)
+    if exact:
+        low = splat(ONE_INTEGRAL[k, 1])
+        put(bodies, o, _product(x, f, low))
+        put(bodies, o + 4, _product(y, f, low))
+        put(bodies, o + 8, _product(z, f, low))
+    else:
+        put(bodies, o, times(x, f))
+        put(bodies, o + 4, times(y, f))
+        put(bodies, o + 8, times(z, f))
+
+
+@kernel
+def _product(x, f, low):
+    """x (f + low), rounded once where the processor can."""
+    return fma(x, f, times(x, low))
+
+
+@kernel
+def _put_product(array, o, x, f, low, exact):
+    """array[o : o + 4] = x (f + low), low being zero unless `exact`."""
+    if exact:
+        put(array, o, _product(x, f, low))
+    else:
+        put(array, o, times(x, f))
+
+
+@kernel
+def run_loops(network, reals, mode, k, orders, bodies, values, places, b, Z):
+    """One mode of the series loops of every kind."""
+    for i in range(network.kinds.shape[0]):
+        kind = network.kinds[i]
+        call_series(
+            places[i, 0], mode, k, orders, kind[N_COUNT], kind[N_REALS], places[i, 2],
+            network.table[kind[N_FIRST_INT] :], reals[kind[N_FIRST_REAL] :], bodies, values[places[i, 1] :], b, Z,
+        )  # fmt: skip
+
+
+@kernel
+def run_forces(reals, x, k, orders, poses, Z):
+    """Order k of all forces, onto Z; at k = 0 the poses are those of order zero."""
+    for i in range(x.forces.shape[0]):
+        kind = x.forces[i]
+        call_series(
+            kind[0], 0, k, orders, kind[2], kind[3], kind[6], x.table[kind[4] :], reals[kind[5] :],
+            x.bodies, x.loads[kind[1] :], poses, Z,
+        )  # fmt: skip
+
+
+@kernel
+def expand(network, system, k, last, ahead, orders, refine, x, f):
+    """Order k of the forces and multipliers, k + 1 of omega', k + 2 of r and A; k in turn from zero, after `begin`.
+
+    On entry Z has the gyroscopic torques of order k, and A_{k+2} what (1) has without omega'_{k+1}; on exit both are
+    of the next order, unless this is the last one. lam_k stays in b until then.
+
+    The first `refine` orders of lam are refined once. If more than lam_0, factors 1 / n are exact as well: their
+    rounding errors have the same sign in every step, and add up. With `ahead`, a constant, the next body's numbers are
+    prefetched: that pays where the series don't fit into the cache. x is an `Expansion`, f a `Free`.
+    """
+    bodies, Z = x.bodies, f.Z
+    nb, size = network.bodies.shape[0], orders * BODY_ROW
+    run_loops(network, system.reals, ADVANCE, k, orders, bodies, x.constraints, x.places, f.b, Z)
+    run_forces(system.reals, x, k, orders, f.poses, Z)
+    exact = refine > 1
+    g, h, g_low, h_low = splat(ONE_INTEGRAL[k, 0]), splat(TWO_INTEGRALS[k, 0]), splat(0.0), splat(0.0)
+    if exact:
+        g_low, h_low = splat(ONE_INTEGRAL[k, 1]), splat(TWO_INTEGRALS[k, 1])
+    for b in range(nb):
+        at = b * size
+        if ahead:
+            _fetch_next(bodies, at + size, orders, 12, k + 2)
+        weigh(network.inverse, b, Z, 8 * b, Z, 8 * b)
+        _put_product(bodies, at + S_R * orders + 4 * (k + 2), four(Z, 8 * b), h, h_low, exact)
+        if network.bodies[b, 1] == 7:
+            _put_product(bodies, at + S_OMEGA * orders + 4 * (k + 1), four(Z, 8 * b + 4), g, g_low, exact)
+            _turn(bodies, at, k + 2, _product(four(Z, 8 * b + 4), h, h_low))
+    refined = k < refine
+    if refined:
+        _solve(network, system, k, orders, x, f, False)
+        copy(f.b, f.gamma)
+        for b in range(nb):
+            _change(network, b, bodies, b * size, orders, k, g, h, g_low, h_low, exact, Z)
+    _solve(network, system, k, orders, x, f, refined)
+    if refined:
+        for e in range(f.b.size):
+            f.b[e] += f.gamma[e]
+    for b in range(nb):
+        at = b * size
+        if ahead:
+            _fetch_next(bodies, at + size, orders, 12 * (k + 3), k + 2)
+            fetch(bodies, at + size + S_OMEGA * orders, 4 * (k + 1))
+            fetch(bodies, at + size + S_SPIN * orders, 4 * (k + 2))
+        _change(network, b, bodies, at, orders, k, g, h, g_low, h_low, exact, Z)
+        put(Z, 8 * b, splat(0.0))
+        if network.bodies[b, 1] == 7 and not last:
+            put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, k + 1))
+            _turn_ahead(bodies, at, orders, k + 2, exact)
+
+
+@kernel
+def _solve(network, system, k, orders, x, f, refined):
+    """b = lam_k, or what it lacks to gamma where it is `refined`, and with it Z = -W H^T lam_k."""
+    run_loops(network, system.reals, RESIDUAL, k, orders, x.bodies, x.constraints, x.places, f.b, f.Z)
+    for i in range(network.welds.shape[0]):
+        f.b[network.welds[i, 0]] = 0.0
+    for i in range(network.axes.rows.shape[0]):
+        e, b = network.axes.rows[i, AXIS_ROW], network.axes.rows[i, AXIS_BODY]
+        omega = four(x.bodies, (b * BODY_ROW + S_OMEGA) * orders + 4 * (k + 1))
+        f.b[e] = (k + 1.0) * total(times(four(network.axes.values[i], AXIS_H), omega))
+        f.b[e] += f.gamma[e] if refined else 0.0
+    drop(f.dropped, f.b)
+    solve(network.pattern, f.S, f.b)
+    for i in range(f.Z.size):
+        f.Z[i] = 0.0
+    scatter(network, f.Y, f.b, f.Z)
+
+
+@kernel
+def _change(network, b, bodies, at, orders, k, g, h, g_low, h_low, exact, Z):
+    """Add what Z makes of a body's r_{k+2}, omega'_{k+1} and A_{k+2}.
+
+    g + g_low = 1 / (k + 1), h + h_low = 1 / ((k + 1) (k + 2)); `exact`: the low parts are not zero.
+    """
+    push, o = four(Z, 8 * b), at + S_R * orders + 4 * (k + 2)
+    if exact:
+        put(bodies, o, add(four(bodies, o), _product(push, h, h_low)))
+    else:
+        put(bodies, o, fma(push, h, four(bodies, o)))
+    if network.bodies[b, 1] == 7:
+        change, o = four(Z, 8 * b + 4), at + S_OMEGA * orders + 4 * (k + 1)
+        if exact:
+            put(bodies, o, add(four(bodies, o), _product(change, g, g_low)))
+        else:
+            put(bodies, o, fma(change, g, four(bodies, o)))
+        _turn(bodies, at, k + 2, _product(change, h, h_low))

@@ -1,0 +1,204 @@
+"""The memory of a Taylor run, and which parts of a scene have no series."""
+
+import numpy as np
+
+from ..elements.bodies import Ground
+from ..elements.element import address
+from ..elements.loops import force_series
+from ..elements.loops.body_poses import STILL
+from ..elements.loops.constraint_rows import BODY, INTS, MASK
+from ..elements.loops.constraint_series import BODY_ROW, GROUND, UNTURNED, instance_width, scratch_at
+from ..elements.markers import POINT
+from ..errors import InvalidConstraint, InvalidForce
+from ..formulations.locked_orientations import instances
+from ..jit.aligned_arrays import zeros
+from ..jit.kernels import twin
+from ..model.packed_forces import F_FIRST_REAL, F_REALS, members_of
+from ..motions.prescribed import Motion
+from ..motions.signals import Signal
+from ..motions.tables import is_data
+from ..sparse.constraint_graph import DRIFT, N_COUNT, N_FIRST_INT
+from .workspace import Expansion
+
+SHOWN = 5  # in a message
+FAR = 1 << 15  # orders of all bodies, each some hundred bytes
+
+
+def refusal(packed):
+    """Why a scene can't be run by Taylor series, naming each part that has none; empty where it can."""
+    found = without_series(packed)
+    if not found:
+        return ""
+    shown = found[:SHOWN] + ([f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else [])
+    return (
+        f"Taylor needs the series of every constraint and force, and these have none: {'; '.join(shown)}. All other "
+        "methods serve: DOP853 is the nearest to it, SDIRK54 is for stiff scenes. A plug-in may be given a kernel "
+        "`series` (docs/plug-ins.md); a length, value or angle has one where it is one of ts.motions."
+    )
+
+
+def without_series(packed):
+    """The constraints and forces that have no series, each as `name: why`."""
+    return [f"{_label(item)}: {why}" for item, why in lacking(packed)]
+
+
+def lacking(packed):
+    """The constraints and forces that have no series, each with why."""
+    found = []
+    for constraint, given in zip(packed.constraints, packed.parameters, strict=True):
+        if constraint.normalises:
+            continue
+        if any(isinstance(value, Motion) and not value.has_series for value in given):
+            found.append((constraint, _given_by(constraint, Motion)))
+        elif "driven_series" not in constraint.kernels and (
+            constraint.rheonomic or any(isinstance(value, Motion) for value in given)
+        ):
+            found.append((constraint, "it depends on time"))
+        elif "series" not in constraint.kernels:
+            found.append((constraint, f"{constraint._kind()} has no kernel `series`"))
+    for load in packed.loads:
+        if any(isinstance(value, Signal) for value in load.parameters):
+            found.append((load.force, _given_by(load.force, Signal)))
+        elif "series" not in load.force.kernels:
+            found.append((load.force, load.force.no_series or f"{load.force._kind()} has no kernel `series`"))
+    return found
+
+
+def _label(item):
+    return item.name if item.name.startswith(item._kind()) else f"{item._kind()} {item.name!r}"
+
+
+def _given_by(item, kind):
+    """Which attribute is a function of time, or a table."""
+    for name, value in vars(item).items():
+        if isinstance(value, kind) and not getattr(value, "has_series", False):
+            table = is_data(getattr(value, "source", None))
+            return f"its {name} is {'a table' if table else 'a function of time'}"
+    return "it has a function of time"
+
+
+def room(highest):
+    """Orders that there is room for, the highest being that of omega'."""
+    return (highest + 3) | 1  # odd: parts that are powers of two apart would share their places in the cache
+
+
+def is_far(network, highest):
+    """Whether the series are so long that each loop finds nothing in the caches near by."""
+    return len(network.bodies) * room(highest) > FAR
+
+
+def allocate_expansion(network, kinds, packed, highest):
+    """Lay out the series of a run, room for orders up to the highest (of omega'); the loops are loaded now."""
+    orders, nb = room(highest), len(network.bodies)
+    loops = ("far_series", "far_driven_series") if is_far(network, highest) else ("series", "driven_series")
+    bodies = zeros((nb + 1) * orders * BODY_ROW)
+    bodies.reshape(nb + 1, -1)[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
+    places, total = np.zeros((len(kinds), 3), np.int64), 0
+    for i, kind in enumerate(kinds):
+        first, count = network.kinds[i, N_FIRST_INT], int(network.kinds[i, N_COUNT])
+        masks = network.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
+        varies = bool((masks & ((1 << GROUND) - 1)).any())
+        driven = bool(network.kinds[i, DRIFT])
+        slots = kind.slots + (len(kind.quantities()) if driven else 0)
+        width = instance_width(len(kind.markers), kind.rows, slots, orders, varies, driven)
+        places[i] = address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint), total, width
+        total += count * width
+    forces, table, loads = _forces(packed, orders)
+    constraints = zeros(total + 4)
+    return Expansion(
+        order=np.array([highest, orders, highest, highest, highest, 0]),
+        bodies=bodies,
+        constraints=constraints,
+        places=places,
+        forces=forces,
+        table=table,
+        loads=loads,
+        motions=_motions(network, packed, orders, places, constraints),
+    )
+
+
+def _motions(network, packed, orders, places, constraints):
+    """Expansion.motions; what is prescribed and constant is written now."""
+    motions, rows = iter(packed.system.motions), []
+    for i, (kind, members) in enumerate(instances(packed, network)):
+        for at, (_, given) in enumerate(members if network.kinds[i, DRIFT] != 0 else ()):
+            first = places[i, 1] + at * places[i, 2] + scratch_at(len(kind.markers), kind.rows, orders, True)
+            entry = 0
+            for j in range(len(kind.quantities())):
+                row = first + (kind.slots + j) * orders
+                moves = isinstance(given[entry], Motion)
+                if moves:
+                    address_, _, _, _, program = next(motions)
+                    rows.append([address_, program, row])
+                else:
+                    constraints[row] = given[entry]
+                entry += 1 if moves else 3
+    return np.array(rows, np.int64).reshape(-1, 3)
+
+
+def _forces(packed, orders):
+    """Expansion.forces, .table and .loads."""
+    nb = len(packed.bodies)
+    index = {id(body): i for i, body in enumerate(packed.bodies)}
+    rows, table, total = [], [], 0
+    for row in packed.system.forces:
+        members = members_of(row, packed.loads)
+        kind = members[0].force
+        series = address(kind.kernels, "series", kind.name, InvalidForce)
+        width = force_series.instance_width(len(kind.markers), kind.slots, orders)
+        rows.append([series, total, len(members), row[F_REALS], len(table), row[F_FIRST_REAL], width])
+        total += len(members) * width
+        for load in members:
+            pair = [index.get(id(body), nb) for body in (load.force.a, load.force.b)]
+            table += [*pair, (pair[0] == nb) | (pair[1] == nb) << 1]
+    return np.array(rows, np.int64).reshape(-1, 7), np.array(table, np.int64), zeros(total + 4)
+
+
+def masks(network, packed):
+    """Write into the network's table which markers' columns vary along a motion, and which are on the ground.
+
+    Directions of bodies that never turn are as good as those of the ground. Columns are constant where the primitive's
+    own series says so for a random motion; returns of how many markers.
+    """
+    constant, lengths = 0, np.append(network.bodies[:, 1], 0)
+    for row, (kind, members) in zip(network.kinds, instances(packed, network), strict=True):
+        motions, patterns, series = {}, {}, twin(kind.series)
+        for i, (constraint, par) in enumerate(members):
+            entry = network.table[row[N_FIRST_INT] + i * INTS :][:INTS]
+            length = [lengths[entry[BODY + (marker.body == "b")]] for marker in kind.markers]
+            grounded = tuple(
+                isinstance(constraint.body_of(marker), Ground) or (size == STILL and marker.code != POINT)
+                for marker, size in zip(kind.markers, length, strict=True)
+            )
+            key = grounded, tuple(Motion.numbers(par))
+            if key not in patterns:
+                if grounded not in motions:
+                    motions[grounded] = _random_motion(grounded)
+                patterns[key] = _mask(kind, series, key[1], grounded, motions[grounded])
+            mask = patterns[key]
+            entry[MASK] = mask | sum(int(size != 7) << (UNTURNED + j) for j, size in enumerate(length))
+            constant += len(kind.markers) - (mask & ((1 << GROUND) - 1)).bit_count()
+    return constant
+
+
+def _random_motion(grounded):
+    """The first coefficients of x, those of the ground constant."""
+    x = np.random.default_rng(0).normal(size=(4, len(grounded), 3))
+    x[1:, np.array(grounded)] = 0.0
+    return x.reshape(4, -1).tolist()
+
+
+def _mask(kind, series, par, grounded, motion):
+    prescribed = np.random.default_rng(1).normal(size=(len(kind.quantities()), len(motion)))
+    scratch = np.concatenate((np.zeros((kind.slots, len(motion))), prescribed))
+    varies = np.zeros(len(motion[0]), bool)
+    for k, x in enumerate(motion):
+        out = np.zeros((kind.rows, len(x)))
+        series(x, par, k, scratch, out)
+        if k > 0:
+            varies |= out.any(axis=0)
+            if varies.all():
+                break
+    bits = [bool(varies[3 * j : 3 * j + 3].any()) << j for j in range(len(kind.markers))]
+    bits += [bool(on) << (GROUND + j) for j, on in enumerate(grounded)]
+    return sum(bits)

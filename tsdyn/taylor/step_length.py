@@ -1,0 +1,117 @@
+"""How long a Taylor step is, by the radius of convergence; and how near to a singular configuration it ends."""
+
+import math
+
+from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
+from ..formulations.chart_validity import ROUNDING
+from ..jit.kernels import kernel
+from ..jit.simd import first, four, larger, second, splat, third
+from ..rows.singularity import NEAR
+from ..rows.tangent_workspace import END_SHARE, LARGEST_SHARE, SHARE
+from ..runs.run_state import ATOL, RTOL
+from ..workspaces.workspace import FLOOR, SIZE
+from .workspace import HIGHEST, LOWEST, NEXT, ORDERS, TOP
+
+LEAST_ORDER = 5  # of the series of a step past such a place
+FAR_PASSING, PASSING = 1e-13, 1e-10  # the loosest tolerance of a step past: from elsewhere, and from close by
+STEP_COST = 3  # of a step's landing, in orders
+
+
+@kernel
+def _most(f):
+    return max(first(f), max(second(f), third(f)))
+
+
+@kernel
+def _size(bodies, nb, orders, k, far, fast):
+    """The largest coefficient k of A and of r over far, and k - 1 of omega' over fast."""
+    turn, shift, spin = splat(0.0), splat(0.0), splat(0.0)
+    for b in range(nb):
+        at = b * orders * BODY_ROW
+        for i in range(at + 12 * k, at + 12 * k + 12, 4):
+            turn = larger(four(bodies, i), turn)
+        shift = larger(four(bodies, at + S_R * orders + 4 * k), shift)
+        spin = larger(four(bodies, at + S_OMEGA * orders + 4 * (k - 1)), spin)
+    return max(_most(turn), max(_most(shift) * far, _most(spin) * fast))
+
+
+@kernel
+def radius(bodies, nb, orders, top, far, fast):
+    """The radius of convergence as the last coefficients up to top + 1 have it (Jorba, Zou, 2005); 0 if not finite.
+
+    More than their two: where a motion began at rest every fourth coefficient can vanish.
+    """
+    rho = math.inf
+    for k in range(top + 1, max(top - 3, 1), -1):
+        size = _size(bodies, nb, orders, k, far, fast)
+        if not size < math.inf:
+            return 0.0
+        if size > 0.0:
+            rho = min(rho, size ** (-1.0 / k))
+    return rho
+
+
+@kernel
+def weights(c, r):
+    """What coefficients of r and omega' are multiplied by to be compared with those of A; sets the floor of Phi."""
+    x, orders = c.expansion, c.expansion.order[ORDERS]
+    rtol, atol = r.clock[RTOL], r.clock[ATOL]
+    far, fast = splat(0.0), splat(0.0)
+    for b in range(c.network.bodies.shape[0]):
+        at = b * orders * BODY_ROW
+        far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
+    far, fast = _most(far), _most(fast)
+    c.work.control[FLOOR] = ROUNDING * (c.work.control[SIZE] + far)
+    tol = atol + rtol
+    return tol / (atol + rtol * far), tol / (atol + rtol * fast)
+
+
+@kernel
+def step_length(c, r):
+    """h = rho tol^(1 / (top + 2)); and the order of the next step, that with the longer step for the work."""
+    x, nb = c.expansion, c.network.bodies.shape[0]
+    top, orders = x.order[TOP], x.order[ORDERS]
+    tol = r.clock[ATOL] + r.clock[RTOL]
+    far, fast = weights(c, r)
+    h = radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2))
+    if x.order[HIGHEST] > x.order[LOWEST]:
+        lower = radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top)
+        change = 1 if h * (top + STEP_COST - 2) > lower * (top + STEP_COST) else -1
+        x.order[NEXT] = min(max(top + change, x.order[LOWEST]), x.order[HIGHEST])
+    return h
+
+
+@kernel
+def longest(c, r, tol, most):
+    """The longest step to a tolerance by any order up to `most`, which becomes the step's.
+
+    Next to a singular configuration rounding of lam grows from order to order as if the motion ended there: high orders
+    see no further than to it.
+    """
+    x, nb = c.expansion, c.network.bodies.shape[0]
+    far, fast = weights(c, r)
+    h = 0.0
+    for k in range(most, LEAST_ORDER, -1):
+        longer = radius(x.bodies, nb, x.order[ORDERS], k, far, fast) * tol ** (1.0 / (k + 2))
+        if longer > h:
+            h, x.order[TOP] = longer, k
+    return h
+
+
+@kernel
+def is_next_to(share, c):
+    """Whether a place with this share is next to a singular configuration."""
+    return share < NEAR * c.free.sizes[LARGEST_SHARE]
+
+
+@kernel
+def loosest(c, tol):
+    """The loosest tolerance of a step past a singular configuration: next to it lam has few digits."""
+    return max(tol, PASSING if is_next_to(c.free.sizes[SHARE], c) else FAR_PASSING)
+
+
+@kernel
+def is_near(c, part):
+    """Whether a step ends next to a singular configuration, with less than a part of the share that it began with."""
+    sizes = c.free.sizes
+    return is_next_to(sizes[END_SHARE], c) and sizes[END_SHARE] < part * sizes[SHARE]

@@ -1,0 +1,148 @@
+"""The parts of a Taylor step as callbacks: each is compiled once, and loaded where a run needs it.
+
+They get the address of a `SeriesContext`.
+"""
+
+import math
+
+from ..elements.loops.body_poses import write_accelerations, write_positions, write_velocities
+from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
+from ..errors import Status
+from ..formulations.accelerations import accelerate_bodies
+from ..formulations.projection import find_drift, land, land_velocities, sum_series
+from ..jit.kernels import callback, caller, kernel
+from ..jit.simd import fma, four, put, splat, times
+from ..model.equations import set_time
+from ..rows.evaluation import run_loops
+from ..rows.selection import select, weakest
+from ..rows.singularity import NEAR
+from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
+from ..sparse.constraint_graph import REDUCED
+from .coefficients import begin, expand
+from .prescribed_series import expand_motions
+from .workspace import ORDERS, REFINED, TOP, load_series
+
+NOT_FINITE, SINGULAR = int(Status.NOT_FINITE), int(Status.SINGULAR)
+NEXT_TO_SINGULAR = 1e-8  # as a share of pivots: accelerations by elimination have lost as many digits
+GONE = 1e-10  # rows with less are left out: they would make more of what positions are off by than the series is
+EXPAND, REACH, WITHIN, PASS, STEPS = range(5)  # of the addresses that the driver is given
+call_expand, call_reach = caller("pi"), caller("pdd")
+
+
+@callback("pi")
+def expand_series(context, k):
+    """Order k of everything, in turn; order zero begins the series at the poses, and gives qdd."""
+    return _expand(context, k, False)
+
+
+@callback("pi")
+def expand_far_series(context, k):
+    """The same for series that are too long for the caches near by."""
+    return _expand(context, k, True)
+
+
+@kernel
+def _expand(context, k, ahead):
+    c = load_series(context)
+    w, x, f = c.work, c.expansion, c.free
+    orders = x.order[ORDERS]
+    if k == 0:
+        expand_motions(c.system, x)
+        begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
+    near = f.sizes[SHARE] < NEAR * f.sizes[LARGEST_SHARE]  # there rounding of lam grows from order to order
+    refine = orders if near else x.order[REFINED]
+    expand(c.network, c.system, k, k > 0 and k + 1 == x.order[TOP], ahead, orders, refine, x, f)
+    if k == 0:
+        for b in range(c.network.bodies.shape[0]):
+            at = b * orders * BODY_ROW
+            put(f.a, 8 * b, times(four(x.bodies, at + S_R * orders + 8), splat(2.0)))
+            put(f.a, 8 * b + 4, four(x.bodies, at + S_OMEGA * orders + 4))
+        write_accelerations(c.network.bodies, f.poses, f.a, w.qdd)
+    return 0
+
+
+@kernel
+def is_driven(system):
+    """Whether a scene that Taylor serves depends on time."""
+    return system.motions.shape[0] > 0
+
+
+@kernel
+def _land_rates(c, t):
+    driven = is_driven(c.system)
+    if driven:
+        find_drift(c.network, c.system, c.free, t)
+    land_velocities(c.network, c.free, driven)
+
+
+@callback("pdd")
+def reach(context, t, h):
+    """The state at t, h after the series' origin, on the manifold, but for qdd; h < 0 takes the poses. Status."""
+    c = load_series(context)
+    w, x, f = c.work, c.expansion, c.free
+    if is_driven(c.system) and not set_time(c.system, t):
+        return NOT_FINITE
+    if h >= 0.0:
+        sum_series(c.network, x.bodies, x.order[ORDERS], x.order[TOP], h, f.poses, f.p)
+    status = land(c.network, c.system, w, f, t)
+    if status == 0:
+        _land_rates(c, t)
+        write_positions(c.network.bodies, f.poses, w.q)
+        write_velocities(c.network.bodies, f.poses, w.qd)
+        total = 0.0
+        for i in range(w.q.size):
+            total += abs(w.q[i]) + abs(w.qd[i])
+        if not total < math.inf:
+            return NOT_FINITE
+    return status
+
+
+@callback("pdd")
+def accelerate_here(context, t, h):
+    """Qdd where `reach` has come to, between the steps: what it asks for outlives no step."""
+    c = load_series(context)
+    accelerate_bodies(c.network, c.system, c.work, c.free, t)
+    return 0
+
+
+@callback("pdd")
+def pass_singular(context, t, h):
+    """The state at t next to a singular configuration, between the steps: qdd is that of the series. Status.
+
+    Rows that come near to depending on the others there are left to the series, which is right to the tolerance.
+    """
+    c = load_series(context)
+    w, x, f, network = c.work, c.expansion, c.free, c.network
+    count, orders, top = f.dropped[0], x.order[ORDERS], x.order[TOP]
+    sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
+    status = land(network, c.system, w, f, t)
+    if status == SINGULAR or (status == 0 and weakest(network, f.S) < GONE):
+        sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
+        f.dropped[0] = 0
+        run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)
+        if select(network, f, f.H, f.Y, f.S, -1, GONE):
+            status = land(network, c.system, w, f, t)
+    if status == 0:
+        _land_rates(c, t)
+        for b in range(network.bodies.shape[0]):
+            at, r, omega = b * orders * BODY_ROW, splat(0.0), splat(0.0)
+            for k in range(top, 0, -1):
+                r = fma(r, splat(h), times(four(x.bodies, at + S_R * orders + 4 * (k + 1)), splat((k + 1.0) * k)))
+                omega = fma(omega, splat(h), times(four(x.bodies, at + S_OMEGA * orders + 4 * k), splat(float(k))))
+            put(f.Z, 8 * b, r)
+            put(f.Z, 8 * b + 4, omega)
+        write_positions(network.bodies, f.poses, w.q)
+        write_velocities(network.bodies, f.poses, w.qd)
+        write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
+    f.dropped[0] = count
+    return status
+
+
+@kernel
+def state_within(context, steps, t, h):
+    """q, qd, qdd at t, h after the series' origin. Status."""
+    status = call_reach(steps[REACH], context, t, h)
+    f = load_series(context).free
+    if status == SINGULAR or (status == 0 and weakest(load_series(context).network, f.S) < NEXT_TO_SINGULAR):
+        return call_reach(steps[PASS], context, t, h)
+    return call_reach(steps[WITHIN], context, t, h) if status == 0 else status

@@ -1,0 +1,42 @@
+"""Stops of a run by series: what follows a step that has been cut at one."""
+
+import math
+
+from ..errors import Status
+from ..jit.kernels import kernel
+from ..runs.outputs import store_now
+from ..runs.run_state import T
+from ..runs.stops import amend, take_pieces
+from .step_parts import EXPAND, REACH, call_expand, call_reach
+from .workspace import LOWEST, NEXT, TOP
+
+NOT_FINITE = int(Status.NOT_FINITE)
+
+
+@kernel
+def cross_stop(context, c, r, log, steps):
+    """At a stop: poses and accelerations after it, for its output and the next series. Status."""
+    w = c.work
+    take_pieces(c.system, r, log)
+    status = call_reach(steps[REACH], context, r.clock[T], -1.0)
+    if status == 0:
+        call_expand(steps[EXPAND], context, 0)
+        total = 0.0
+        for i in range(w.q.size):
+            total += abs(w.qdd[i])
+        if not total < math.inf:
+            return NOT_FINITE
+        store_now(w, r)
+        amend(r, log, w.q, w.qd, w.qdd)
+    return status
+
+
+@kernel
+def lower_order(order, rho, tol, h):
+    """After a step cut to h: one order less for the next, where two less would have reached as far.
+
+    rho is the radius of convergence as the coefficients up to that order have it.
+    """
+    top = order[TOP]
+    if top > order[LOWEST] and rho * tol ** (1.0 / top) > h:
+        order[NEXT] = top - 1

@@ -1,0 +1,155 @@
+"""The checker of forces: `tsdyn.testing.check_force`."""
+
+import numpy as np
+
+from ..elements.force import Force
+from ..errors import CheckFailed, InvalidArgument, InvalidForce
+from ..jit.kernels import entry, twin
+from ..model.equations import force_jacobian, set_time
+from ..model.packed_forces import with_force_jacobians
+from ..motions.signals import Signal
+from ..observables.generalised_forces import force_loads
+from ..observables.power import load_powers, marker_states
+from ..simulation.scene import Scene
+from .series_checks import check_force_series
+
+SPACING = 4e-3  # of central differences of sixth order
+QUOTIENT = 1e-8  # what they leave, relative to the size of the Jacobian
+ROUNDING = 1e-11  # relative to the size of what is compared
+
+
+@entry
+def evaluate_force_jacobian(s, q, qd, t, Q_q, Q_qd, anew, kept):
+    """Q_q, Q_qd (n, n) += the Jacobians of the forces; s is from `with_force_jacobians`."""
+    set_time(s, t)
+    force_jacobian(s, q, qd, t, Q_q, Q_qd, anew, kept)
+
+
+def jacobians(packed, q, qd, t):
+    """dQ/dq and dQ/dqd (n, n) of all forces of a packed scene, gravity has none."""
+    system, size = with_force_jacobians(packed)
+    system = system._replace(reals=system.reals.copy())
+    Q_q, Q_qd = np.zeros((2, q.size, q.size))
+    system.reals[system.normals] = 1.0
+    if len(system.forces):
+        evaluate_force_jacobian(system, q, qd, float(t), Q_q, Q_qd, 1, np.zeros(size))
+    return Q_q, Q_qd
+
+
+def check_force(kind, *, seed=0, states=3):
+    """Check a force's kernels; return None, or raise naming the wrong entry.
+
+    Parameters
+    ----------
+    kind : Force subclass, or callable (a, b) -> Force
+        A class is tried with its own `example(rng, a, b)`.
+    seed : int
+        Of the random states.
+    states : int
+        Number of random, fast-turning states for each arrangement: body to body, body to ground, ground to body.
+
+    Raises
+    ------
+    CheckFailed
+        If the compiled force differs from the Python one, its Jacobians from differences of sixth order, dissipation is
+        negative, or a force without loads gives or takes power that is in neither its potential nor its dissipation.
+    """
+    rng = np.random.default_rng(seed)
+    for arrangement in ("body to body", "body to ground", "ground to body"):
+        for _ in range(states):
+            scene, force = _instance(kind, arrangement, rng)
+            if force is not None:
+                name = f"{force._kind()} ({arrangement})"
+                _check(scene, force, name, rng)
+                check_force_series(scene, force, name, rng)
+
+
+def _instance(kind, arrangement, rng):
+    """A scene with one instance, moving; None where the arrangement means nothing to the force."""
+    scene = Scene()
+    bodies = [scene.add_body(1.0, (1.0, 1.1, 1.2), rng.normal(size=3), _unit(rng), name=n) for n in ("one", "two")]
+    for body in bodies:
+        body.velocity, body.angular_velocity = rng.normal(size=3), 3.0 * rng.normal(size=3)
+    a = scene.ground if arrangement == "ground to body" else bodies[0]
+    b = scene.ground if arrangement == "body to ground" else bodies[1]
+    if isinstance(kind, type) and issubclass(kind, Force):
+        kind, one = (lambda a, b, kind=kind: kind.example(rng, a, b)), not any(m.body == "b" for m in kind.markers)
+        if one and arrangement != "body to body":
+            return scene, None
+    elif not callable(kind):
+        raise InvalidArgument(f"check_force needs a Force class or a callable (a, b), got {kind!r}.")
+    try:
+        force = kind(a, b)
+    except InvalidForce:
+        if arrangement == "body to body":
+            raise
+        return scene, None
+    return scene, scene.add(force)
+
+
+def _unit(rng):
+    p = rng.normal(size=4)
+    return p / np.linalg.norm(p)
+
+
+def _check(scene, force, name, rng):
+    packed, (q, qd) = scene.packed, scene.start
+    (load,) = packed.loads
+    t = np.array([rng.uniform(0.2, 0.8)])
+    memory = np.append(np.zeros(packed.system.memory.size), np.ones(packed.system.normals.size))[None]
+
+    def Q(q, qd):
+        return force_loads(packed.system, t, q[None], qd[None], memory)[0]
+
+    value = Q(q, qd)
+    if not np.isfinite(value).all():
+        raise CheckFailed(f"{name}: the force is not finite at a random state: {value}.")
+    coordinates = [f"{c} of {body.name}" for body in scene.bodies for c in ("r1", "r2", "r3", "e0", "e1", "e2", "e3")]
+    if force.analytic:
+        _check_twin(packed, load, name, t, q, qd, value, coordinates)
+    _check_jacobians(packed, name, Q, q, qd, t[0], coordinates)
+    _, lost, applied = (np.broadcast_to(x, (1,))[0] for x in load_powers(packed, load, t, q[None], qd[None], memory))
+    size = np.abs(value) @ np.abs(qd)
+    if lost < -ROUNDING * size:
+        raise CheckFailed(f"{name}: dissipation is {lost:.6g} W; it is what the force takes and can't be negative.")
+    undriven = force.conservative and all(Signal.is_zero(getattr(force, attribute)) for attribute in force.loads)
+    if undriven and not abs(applied) <= ROUNDING * (1.0 + size):
+        raise CheckFailed(
+            f"{name}: its power {value @ qd:.15g} W is not that of its potential and dissipation, {applied:.6g} W are "
+            "left over. Correct them, or name the attributes that drive it in `loads`."
+        )
+
+
+def _check_twin(packed, load, name, t, q, qd, value, coordinates):
+    """The compiled force against the Python one, carried back by xd_qd."""
+    x, xd = marker_states(packed, load, q[None], qd[None])
+    par = [part for p in load.parameters for part in (p.value(t[0]) if isinstance(p, Signal) else [p])]
+    par += [0.0] * load.force.memory + [1.0] * (load.normal >= 0)
+    f = [0.0] * len(x)
+    numbers = [[float(np.squeeze(entry)) for entry in part] for part in ([jet.x for jet in x], xd)]
+    twin(type(load.force).law)(*numbers, par, t[0], f)
+    for j, label in enumerate(coordinates):
+        direction = np.zeros_like(qd)
+        direction[j] = 1.0
+        _, W = marker_states(packed, load, q[None], direction[None])
+        expected = sum(float(np.squeeze(a)) * b for a, b in zip(W, f, strict=True))
+        _compare(name, f"compiled Q[{j}] ({label})", value[j], expected, value, ROUNDING)
+
+
+def _check_jacobians(packed, name, Q, q, qd, t, coordinates):
+    got = jacobians(packed, q, qd, t)
+    weights = {1: 45.0 / 60.0, 2: -9.0 / 60.0, 3: 1.0 / 60.0}
+    for which, matrix in zip(("q", "qd"), got, strict=True):
+        for j, label in enumerate(coordinates):
+            h = np.zeros_like(q)
+            h[j] = SPACING
+            shift = (lambda d: (q + d, qd)) if which == "q" else (lambda d: (q, qd + d))
+            column = sum(w * (Q(*shift(k * h)) - Q(*shift(-k * h))) for k, w in weights.items()) / SPACING
+            for i in range(q.size):
+                _compare(name, f"dQ[{i}] / d{which}[{j}] ({label})", matrix[i, j], column[i], got, QUOTIENT)
+
+
+def _compare(name, entry, got, expected, scale, tolerance):
+    size = max(1.0, *(np.abs(part).max(initial=0.0) for part in scale))
+    if not abs(got - expected) <= tolerance * size:
+        raise CheckFailed(f"{name}: {entry} is {got:.15g} and should be {expected:.15g}.")

@@ -1,0 +1,288 @@
+"""The checks of `series` in `check_primitive` and `check_force`, against truncated Taylor arithmetic.
+
+The bodies go through random analytic motions. Along them phi, its jacobian or the law, run on truncated series, give
+the coefficients that `series` must give: first the Python kernel, one coefficient after the other, then the compiled
+loops.
+"""
+
+import numpy as np
+
+from ..elements.loops.body_poses import POSE, P
+from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R
+from ..elements.loops.marker_jacobians import state
+from ..elements.markers import PARAMETERS, POINT, TURN
+from ..errors import CheckFailed
+from ..jit.kernels import entry, twin
+from ..maths.euler_parameters import rotate
+from ..maths.power_series import Truncated
+from ..model.equations import set_time
+from ..motions.prescribed import Motion
+from ..motions.signals import Signal
+from ..observables.diagnostics import starts_of
+from ..sparse.graph_builder import build
+from ..taylor.coefficients import run_forces, run_loops
+from ..taylor.layout import allocate_expansion, masks
+from ..taylor.prescribed_series import expand_motions
+from ..taylor.workspace import ORDERS
+
+ORDER = 8
+TOLERANCE = 1e-11  # relative to the largest coefficient up to the one compared
+SHRINK = 0.5  # of the motions' coefficients from order to order
+_AXES = ("x", "y", "z")
+
+
+@entry
+def constraint_coefficients(network, reals, x, k, b, Z):
+    """b = (k + 1)(k + 2) Phi_{k+2}, x being an Expansion with the bodies' series; k in turn from zero."""
+    orders = x.order[ORDERS]
+    for i in range(b.size):
+        b[i] = 0.0  # the multipliers
+    run_loops(network, reals, ADVANCE, k, orders, x.bodies, x.constraints, x.places, b, Z)
+    run_loops(network, reals, RESIDUAL, k, orders, x.bodies, x.constraints, x.places, b, Z)
+
+
+@entry
+def begin_motions(system, x, t):
+    """The series of all motions about t, x being an Expansion."""
+    set_time(system, t)
+    expand_motions(system, x)
+
+
+@entry
+def force_coefficients(reals, x, k, poses, Z):
+    """Z ((b + 1) 8,) = order k of the forces and body torques; k in turn from zero."""
+    for i in range(Z.size):
+        Z[i] = 0.0
+    run_forces(reals, x, k, x.order[ORDERS], poses, Z)
+
+
+def check_constraint_series(scene, constraint, name, rng):
+    """Check the `series` of a primitive, or of a joint's parts, if it has one that a run would use."""
+    parts = constraint.parts
+    if any("series" not in part.kernels for part in parts):
+        return
+    moved = [part for part in parts if any(isinstance(value, Motion) for value in part.parameters())]
+    if any("driven_series" not in part.kernels for part in moved):
+        return
+    if any(isinstance(p, Motion) and p.smooth is None for part in moved for p in part.parameters()):
+        return
+    q, t = random_motion(scene, rng), _time(rng)
+    Phi = np.concatenate([_check_rows(scene, part, name, q, t) for part in parts])
+    packed, m = scene.packed, len(Phi)
+    network, kinds = build(packed)
+    Phi = Phi[network.row]
+    masks(network, packed)
+    expansion = allocate_expansion(network, kinds, packed, ORDER)
+    write_bodies(scene, q, expansion)
+    begin_motions(packed.system._replace(reals=packed.system.reals.copy()), expansion, t.c[0])
+    b, Z = np.zeros(m), np.zeros(8 * (len(scene.bodies) + 1))
+    for k in range(ORDER - 1):
+        constraint_coefficients(network, packed.system.reals, expansion, k, b, Z)
+        value = b / ((k + 1) * (k + 2))
+        _compare(name, k + 2, [f"compiled Phi[{i}]" for i in network.row], value, Phi)
+
+
+def _check_rows(scene, primitive, name, q, t):
+    """Check the Python `series` of a primitive along a motion q; return Phi (rows,) as Truncated series."""
+    kind, given = type(primitive), primitive.parameters()
+    par = [entry for value in given for entry in _entries(value, t)] + [0.0] * kind.memory
+    numbers = [entry.c[0] if isinstance(entry, Truncated) else entry for entry in par]
+    rows = [_series(par[3 * i]).c for i in range(len(kind.quantities()) if "driven_series" in kind.kernels else 0)]
+    x, _ = along(scene, primitive, primitive.coordinates, q)
+    Phi, Phi_x = _zeros(kind.rows), _zeros((kind.rows, len(x)))
+    _run(kind, "phi", name, x, par, t, Phi)
+    _run(kind, "jacobian", name, x, par, t, Phi_x)
+    columns = _labels(kind)
+    labels = [[f"jacobian[{i}, {j}] (d phi[{i}] / d {c})" for j, c in enumerate(columns)] for i in range(kind.rows)]
+    Phi_t = _zeros(kind.rows)
+    if rows:
+        _run(kind, "phi_t", name, x, par, t, Phi_t)
+    for k, f, scratch in _coefficients(kind, name, (x,), numbers, (kind.rows, len(x)), rows):
+        _compare(name, k, labels, f, Phi_x)
+        if rows:
+            drift = np.zeros(kind.rows)
+            twin(kind.series_t)(np.array([c.c[k] for c in x]), numbers, k, scratch, drift)
+            _compare(name, k, [f"phi_t[{i}], by series_t," for i in range(kind.rows)], drift, Phi_t)
+    return Phi
+
+
+def _entries(value, t):
+    """A parameter as phi has it: a Motion is its series, and those of its rate and acceleration."""
+    if not isinstance(value, Motion):
+        return (value,)
+    f = t.of(value.smooth(t))
+    return f, f.rate, f.rate.rate
+
+
+def check_force_series(scene, force, name, rng):
+    """Check a force's `series`, if it has one that a run would use."""
+    packed = scene.packed
+    (load,), kind = packed.loads, type(force)
+    if "series" not in force.kernels or any(isinstance(p, Signal) for p in load.parameters):
+        return
+    q = random_motion(scene, rng)
+    x, xd = along(scene, force, load.coordinates, q)
+    par = [*load.parameters, *rng.normal(scale=10.0, size=force.memory)]
+    f = _zeros(len(x))
+    _run(kind, "law", name, x, xd, par, _time(rng), f)
+    labels = [f"out[{j}] (conjugate to {c})" for j, c in enumerate(_labels(kind))]
+    for k, out, _ in _coefficients(kind, name, (x, xd), par, (len(x),)):
+        _compare(name, k, labels, out, f)
+
+    network, kinds = build(packed)
+    expansion = allocate_expansion(network, kinds, packed, ORDER)
+    poses = write_bodies(scene, q, expansion)
+    reals = packed.system.reals.copy()
+    reals[packed.system.memory] = par[len(load.parameters) :]
+    expected = _carried_back(scene, load, q, f)
+    labels = [f"{what} {axis} of {b.name}" for b in scene.bodies for what in ("force", "body torque") for axis in _AXES]
+    Z = np.zeros(8 * (len(scene.bodies) + 1))
+    for k in range(ORDER):
+        force_coefficients(reals, expansion, k, poses, Z)
+        got = Z.reshape(-1, 2, 4)[:-1, :, :3].ravel()
+        _compare(name, k, [f"compiled {label}" for label in labels], got, expected)
+
+
+def random_motion(scene, rng):
+    """q (n,) of a scene of rigid bodies as Truncated series, p.p = 1; they begin where the bodies are."""
+    weights = SHRINK ** np.arange(ORDER + 2)
+    q = []
+    for body in scene.bodies:
+        series = [
+            Truncated(np.append(v, rng.normal(size=ORDER + 1)) * weights) for v in (*body.position, *body.orientation)
+        ]
+        p = series[3:]
+        length = np.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3])
+        q += [*series[:3], *(e / length for e in p)]
+    return _objects(q)
+
+
+def along(scene, attachment, coordinates, q):
+    """x and xd of an attachment's markers as Truncated series."""
+    starts, qd = starts_of(scene.packed), _objects([c.rate for c in q])
+    x, xd = [], []
+    for marker, s in zip(attachment.markers, coordinates, strict=True):
+        body, place, rate = attachment.body_of(marker), _zeros(marker.size), _zeros(marker.size)
+        twin(state)(marker.code, body.dimension, starts.get(body, 0), q, qd, s, place, rate)
+        x += [q[0].of(c) for c in place]
+        xd += [q[0].of(c) for c in rate]
+    return _objects(x), _objects(xd)
+
+
+def write_bodies(scene, q, expansion):
+    """Write the bodies' series into an Expansion; return the poses ((b + 1) * POSE,) at order zero."""
+    orders, known = int(expansion.order[ORDERS]), q[0].c.size
+    poses = np.zeros((len(scene.bodies) + 1, POSE))
+    poses[:, P] = 1.0
+    for b, row in enumerate(expansion.bodies.reshape(-1, BODY_ROW * orders)[:-1]):
+        r, p = q[7 * b : 7 * b + 3], q[7 * b + 3 : 7 * b + 7]
+        A = row[: 12 * orders].reshape(orders, 3, 4)
+        for c, column in enumerate(_columns(p)):
+            A[:known, c, :3] = np.transpose([entry.c for entry in column])
+        for first, vector in ((S_R, r), (S_OMEGA, _omega(p))):
+            part = row[first * orders : (first + 4) * orders].reshape(orders, 4)
+            part[:known, :3] = np.transpose([entry.c for entry in vector])
+        poses[b, P : P + 4] = [entry.c[0] for entry in p]
+    return poses.ravel()
+
+
+def _columns(p):
+    """The columns of A(p)."""
+    columns = [_zeros(3) for _ in range(3)]
+    for column, axis in zip(columns, np.eye(3), strict=True):
+        twin(rotate)(p, axis, column)
+    return columns
+
+
+def _omega(p):
+    """omega' = 2 G(p) pd."""
+    e0, e1, e2, e3 = p
+    d0, d1, d2, d3 = (e.rate for e in p)
+    return [
+        2.0 * (e0 * d1 - e1 * d0 + e3 * d2 - e2 * d3),
+        2.0 * (e0 * d2 - e2 * d0 - e3 * d1 + e1 * d3),
+        2.0 * (e0 * d3 - e3 * d0 + e2 * d1 - e1 * d2),
+    ]
+
+
+def _carried_back(scene, load, q, f):
+    """Forces and body torques about the centroids that a force's f is to each body, (b, 6) series in a row."""
+    total, at = _zeros((len(scene.bodies), 2, 3)), 0
+    for marker, s in zip(load.force.markers, load.coordinates, strict=True):
+        part, body = f[at : at + marker.size], load.force.body_of(marker)
+        at += marker.size
+        if body.dimension == 0:
+            continue
+        p, (force, torque) = q[7 * body.index + 3 : 7 * body.index + 7], total[body.index]
+        if marker.code == PARAMETERS:
+            e0, e1, e2, e3 = p
+            f0, f1, f2, f3 = part
+            torque[0] += 0.5 * (e0 * f1 - e1 * f0 + e3 * f2 - e2 * f3)
+            torque[1] += 0.5 * (e0 * f2 - e2 * f0 - e3 * f1 + e1 * f3)
+            torque[2] += 0.5 * (e0 * f3 - e3 * f0 + e2 * f1 - e1 * f2)
+            continue
+        y = _objects([sum(a * b for a, b in zip(column, part, strict=True)) for column in _columns(p)])
+        if marker.code == POINT:
+            force += part
+        torque += y if marker.code == TURN else np.cross(s, y)
+    return total.ravel()
+
+
+def _coefficients(kind, name, coordinates, par, shape, rows=()):
+    """Yield k, what the Python `series` writes, and its scratch, which holds nothing yet but the rows prescribed."""
+    scratch, series = np.full((kind.slots + len(rows), ORDER + 2), np.nan), twin(kind.series)
+    for i, row in enumerate(rows):
+        scratch[kind.slots + i] = row
+    for k in range(ORDER + 1):
+        out = np.zeros(shape)
+        try:
+            series(*(np.array([c.c[k] for c in part]) for part in coordinates), par, k, scratch, out)
+        except IndexError as error:
+            raise CheckFailed(
+                f"{name}: series writes outside its arrays ({error}); scratch has slots = {kind.slots} rows, and a "
+                "coefficient up to k in each."
+            ) from error
+        yield k, out, scratch
+
+
+def _run(kind, what, name, *arguments):
+    try:
+        twin(getattr(kind, what))(*arguments)
+    except TypeError as error:
+        raise CheckFailed(
+            f"{name}: {what} can't be run on truncated Taylor series ({error}), so its series can't be checked; use "
+            "arithmetic and NumPy functions, and no comparison, abs or norm of x."
+        ) from error
+
+
+def _labels(kind):
+    return [
+        f"{m.argument}, component {_AXES[i] if m.size == 3 else f'e{i}'}" for m in kind.markers for i in range(m.size)
+    ]
+
+
+def _compare(name, k, labels, got, expected):
+    """Coefficient k of each against those of series; all of one shape."""
+    scale = max(1.0, *(np.abs(_series(e).c[: k + 1]).max() for e in np.ravel(expected)))
+    for label, value, series in zip(np.ravel(labels), np.ravel(got), np.ravel(expected), strict=True):
+        right = _series(series).c[k]
+        if not abs(value - right) <= TOLERANCE * scale:
+            raise CheckFailed(f"{name}: series: coefficient {k} of {label} is {value:.15g} and should be {right:.15g}.")
+
+
+def _series(value):
+    return value if isinstance(value, Truncated) else Truncated([value, *[0.0] * (ORDER + 1)])
+
+
+def _time(rng):
+    return Truncated([rng.uniform(0.1, 2.0), 1.0, *[0.0] * ORDER])
+
+
+def _zeros(shape):
+    return np.full(shape, 0.0, dtype=object)
+
+
+def _objects(entries):
+    result = np.empty(len(entries), object)
+    result[:] = entries
+    return result

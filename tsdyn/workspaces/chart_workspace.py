@@ -1,0 +1,47 @@
+"""The memory of a chart on the network: where it touches, the normal space there, and how far bodies have gone.
+
+A body's coordinates in the chart are a row of eight floats, (rho, 0, eta, 0): r = r0 + rho, p = p0 o (d0, d) with
+d = eta / 2 and d0 = sqrt(1 - |d|^2), so that p has length one. It is the chart q = q0 + xi - U u of the paper with U
+the range of W0 Phi_q0^T, W0 the inverse of the masses: xi_p is at right angles to p0, and a normalisation row's part of
+u is d0 - 1.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..jit.aligned_arrays import zeros
+
+
+class Local(NamedTuple):
+    """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
+
+    base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; local_chart.touch
+    d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 of the present place; displacement.displace
+    x: np.ndarray  # ((b + 1) * 8,)  its coordinates; tangent.place
+    y: np.ndarray  # ((b + 1) * 8,)  their rates; tangent.accelerate
+    H0: np.ndarray  # (m * 16,)  rows of [Phi_r, Phi_pi'] at q0; local_chart.touch
+    Y0: np.ndarray  # (m * 16,)  W0 H0^T
+    S0: np.ndarray  # factors of H0 W0 H0^T
+    X: np.ndarray  # (m * 16,)  C Y0, displacement.turn_rows
+    lower: np.ndarray  # factors of N = H C Y0; displacement.factorise_normal
+    upper: np.ndarray
+    drift: np.ndarray  # (m,)  Phi_t
+    numbers: np.ndarray  # (NUMBERS,)  below
+
+
+# the time last placed at; whether lower and upper hold factors, and by how much of N they are off at the place itself;
+# the count of placements at the last step's end
+TIME, FACTORED, OFF, END, NUMBERS = range(5)
+
+
+def allocate_local(network):
+    """Lay it out; the ground doesn't move, nor does a point mass turn."""
+    nb, m = len(network.bodies), len(network.row)
+    size = network.pattern.shape[2]
+    base = zeros(8 * (nb + 1))
+    base[4::8] = 1.0
+    return Local(
+        base, zeros(4 * (nb + 1)), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(16 * m), zeros(16 * m), zeros(size),
+        zeros(16 * m), zeros(size), zeros(size), zeros(m), zeros(NUMBERS),
+    )  # fmt: skip

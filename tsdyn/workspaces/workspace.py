@@ -1,0 +1,207 @@
+"""The scratch memory of one run: every array laid out once, before the first step."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..jit.kernels import loader
+from ..model.packed import System
+from ..rows.tangent_workspace import Free
+from ..sparse.constraint_graph import Network, no_network
+from .chart_workspace import Local, allocate_local
+from .tangent_memory import allocate_free
+
+
+class Work(NamedTuple):
+    """n coordinates, m constraints, k = n - m + d degrees of freedom, d redundant rows left out, b bodies.
+
+    "computed by" names the kernel. What belongs to a row that is left out is zero, on the diagonal of N and B one.
+    """
+
+    q: np.ndarray  # (n,)    positions; computed by newton.solve_positions
+    qd: np.ndarray  # (n,)   velocities; computed by null_space.velocities
+    qdd: np.ndarray  # (n,)  accelerations; computed by null_space.complete
+    Phi: np.ndarray  # (m,)  constraints at q; newton.solve_positions, and scratch of null_space.complete
+    Phi_t: np.ndarray  # (m,)  their time derivative; null_space.velocities
+    gamma: np.ndarray  # (m,)  acceleration bias; null_space.reduced_acceleration
+    z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; newton.solve_positions, null_space; scratch elsewhere
+    Phi_q: np.ndarray  # (m, n)  Jacobian at q; chart.tangent_map, new_chart
+    q0: np.ndarray  # (n,)   where the chart touches; chart.new_chart
+    U: np.ndarray  # (n, m)  spans W0 Phi_q(q0)^T, in place of Eq. 5; chart.new_chart
+    V: np.ndarray  # (n, k)  orthonormal basis of ker Phi_q(q0); chart.new_chart
+    L: np.ndarray  # (n, k)  transposed: V^T P0, P0 the projection along U; chart.new_chart
+    B: np.ndarray  # (m, m)  (Phi_q U)^-1, Eqs. 7, 28, warm-started; newton.update_b
+    u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; newton.solve_positions, tangent.place
+    T: np.ndarray  # (m, k)  B Phi_q V = du/dv; chart.tangent_map
+    v: np.ndarray  # (k,)    tangent coordinates of the latest u; newton.solve_positions
+    base: np.ndarray  # (n,)   q0 + V v; newton.solve_positions
+    N: np.ndarray  # (m, m)  Phi_q U; chart.tangent_map
+    R: np.ndarray  # (m, m)  residual of Eq. 28, and scratch of factorisations; newton.update_b
+    X: np.ndarray  # (m, k)  Phi_q V, or U^T V; chart.tangent_map, new_chart
+    D: np.ndarray  # (n, k)  (I - U B Phi_q) V, Eq. 9; chart.tangent_map
+    E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.reduced_mass
+    A: np.ndarray  # (k, k)  D^T M D, then its Cholesky factor; null_space.reduced_mass
+    Q: np.ndarray  # (n,)    applied forces without gravity; null_space.reduced_acceleration
+    h: np.ndarray  # (n,)    -U B gamma; null_space.reduced_acceleration
+    householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; linalg.null_space
+    control: np.ndarray  # (CONTROLS,)  tolerances and criteria, below
+    counters: np.ndarray  # int64 (COUNTERS,)  what was done how often, below
+    left_out: np.ndarray  # int64 (d + 1,)  how many rows of Phi are redundant and left out, and which; chart.new_chart
+
+
+U_TOL, B_TOL, SIZE, FLOOR, RATE, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(9)
+EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS = range(6)
+JACOBIANS, ITERATION_MATRICES, STAGE_ITERATIONS, AT_ROUNDING, UNVERIFIED, KEPT, COUNTERS = range(6, 13)
+
+
+ROOM = 16  # for implicit.KERNELS addresses and implicit.NUMBERS floats
+
+
+class Linear(NamedTuple):
+    """What implicit methods need besides; empty for explicit ones. l = 6 a rigid body and 3 a point mass.
+
+    Body frame means: of a body's displacement, the components A^T dr and dpi' = 2 G dp.
+    """
+
+    K: np.ndarray  # (n, n)  stiffness in q, then scratch; linearise.linearise
+    C: np.ndarray  # (n, n)  damping in q, then scratch; linearise.linearise
+    G1: np.ndarray  # (m, n)  (Phi_q qd + Phi_t)_q; assembly.constraint_curvature
+    G2: np.ndarray  # (m, n)  (Phi_q qdd + gamma)_q; assembly.constraint_curvature
+    UB: np.ndarray  # (n, m)  U B; linearise.linearise
+    Y: np.ndarray  # (n, n)  U B G1; linearise.linearise
+    Z: np.ndarray  # (n, n)  U B G2; linearise.linearise
+    lam: np.ndarray  # (m,)  multipliers; linearise.linearise
+    r: np.ndarray  # (n,)  Q_A + S - M qdd; linearise.linearise
+    K_body: np.ndarray  # (l, l)  stiffness in body frames, kept over steps and charts; linearise.linearise
+    C_body: np.ndarray  # (l, l)  damping in body frames; linearise.linearise
+    F: np.ndarray  # (l, k)  D in body frames; linearise.reduce
+    X: np.ndarray  # (n, k)  scratch
+    X2: np.ndarray  # (n, k)  scratch
+    Q_q: np.ndarray  # (n, n)  stiffness of the forces; linearise.reduce
+    Q_qd: np.ndarray  # (n, n)  their damping; linearise.reduce
+    kept: np.ndarray  # derivatives of the forces' laws; force_loops.jacobian
+    K_hat: np.ndarray  # (k, k)  F^T K_body F; linearise.reduce
+    C_hat: np.ndarray  # (k, k)  F^T C_body F; linearise.reduce
+    P: np.ndarray  # (k, k)  LU factors of D^T M D - g C_hat + g^2 K_hat; linearise.factorise
+    b: np.ndarray  # (k,)  scratch
+    pivots: np.ndarray  # int64 (k,)  row exchanges of P
+    now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point; the run's own array
+    before: np.ndarray  # (3, n)  at the one before; the run's own array
+    kernels: np.ndarray  # int64 (KERNELS,)  addresses, implicit.LINEARISE ... ERROR_NORM
+    numbers: np.ndarray  # (NUMBERS,)  implicit.RTOL ... EAGER
+
+
+class Parts(NamedTuple):
+    """What kernels without a formulation get, by one address."""
+
+    system: System
+    work: Work
+    network: Network
+    free: Free
+
+
+class Context(NamedTuple):
+    """What a formulation's kernels get, by one address."""
+
+    system: System
+    work: Work
+    linear: Linear
+    network: Network
+    free: Free
+    local: Local
+
+
+def carve(shapes):
+    """Arrays of zeros of these shapes, by name, cut from one block, which is the `base` of each."""
+    sizes = {name: math.prod(shape) for name, shape in shapes.items()}
+    block = np.zeros(sum(sizes.values()))
+    arrays, at = {}, 0
+    for name, shape in shapes.items():
+        arrays[name] = block[at : at + sizes[name]].reshape(shape)
+        at += sizes[name]
+    return arrays
+
+
+def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=0):
+    """Lay out the scratch memory of a formulation; size is that of the numbers in the constraints.
+
+    With joint_rows, how many rows are no normalisations, that of the form without a basis: no matrices.
+    """
+    shapes = {**dict.fromkeys(("q", "qd", "qdd"), (n,)), "u": (m if joint_rows is None else joint_rows,)}
+    if joint_rows is not None:
+        n = m = bodies = redundant = 0
+    k = n - m + redundant
+    shapes |= {
+        **dict.fromkeys(("q0", "base", "Q", "h"), (n,)),
+        **dict.fromkeys(("Phi", "Phi_t", "gamma", "z"), (m,)),
+        **dict.fromkeys(("B", "N", "R"), (m, m)),
+        **dict.fromkeys(("U", "householder"), (n, m)),
+        **dict.fromkeys(("V", "L", "D"), (n, k)),
+        "Phi_q": (m, n),
+        **dict.fromkeys(("T", "X"), (m, k)),
+        "v": (k,),
+        "E": (3 * bodies, k),
+        "A": (k, k),
+        "control": (CONTROLS,),
+    }
+    work = Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), left_out=np.zeros(redundant + 1, np.int64))
+    work.control[U_TOL] = work.control[B_TOL] = constraint_tol
+    work.control[SIZE] = size
+    return work
+
+
+def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
+    """Lay out the memory of implicit methods, `kept` floats of it for forces; of no size where it is not wanted."""
+    k, l = n - m + redundant, sum(6 if length == 7 else 3 for length in system.bodies[:, -1])
+    if not wanted:
+        n = m = k = l = 0
+    shapes = {
+        **dict.fromkeys(("K", "C", "Y", "Z", "Q_q", "Q_qd"), (n, n)),
+        **dict.fromkeys(("G1", "G2"), (m, n)),
+        "UB": (n, m),
+        "lam": (m,),
+        "r": (n,),
+        **dict.fromkeys(("K_body", "C_body"), (l, l)),
+        "F": (l, k),
+        **dict.fromkeys(("X", "X2"), (n, k)),
+        "kept": (kept,),
+        **dict.fromkeys(("K_hat", "C_hat", "P"), (k, k)),
+        "b": (k,),
+    }
+    shapes |= {"now": (3, n), "before": (3, n), "numbers": (ROOM,)}
+    return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=np.zeros(ROOM, np.int64))
+
+
+def basis_free_parts(network, n, basis):
+    """Network, Free and Local of a Context; their memory is small in every form, with a basis or without."""
+    return network, allocate_free(network, n, basis=basis), allocate_local(network)
+
+
+def plain_context():
+    """A context of the right types."""
+    one, two = np.zeros(1), np.zeros((1, 1))
+    ones, twos = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
+    system = System(twos, one, two, one, twos, ones, one, twos, ones, twos, twos, twos, ones, ones, twos)
+    return Context(
+        system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False), *basis_free_parts(no_network(), 2, False)
+    )
+
+
+load = loader(plain_context())
+
+
+def plain_work(n):
+    """A `Work` for n coordinates that has no matrices."""
+    whole = ("counters", "left_out")
+    shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name not in whole}
+    shapes |= {"q": (n,), "qd": (n,), "qdd": (n,), "control": (CONTROLS,)}
+    return Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), left_out=np.zeros(1, np.int64))
+
+
+def parts(system, network, n):
+    """`Parts` for n coordinates, without matrices."""
+    return Parts(system, plain_work(n), network, allocate_free(network, n))
+
+
+load_parts = loader(parts(plain_context().system, no_network(), 0))

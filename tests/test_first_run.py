@@ -200,10 +200,6 @@ def test_longest_first():
     assert min(names) > max(small)
 
 
-def loaded(kernels):
-    return {kernel.py_func.__qualname__ for kernel in kernels if is_loaded(kernel)}
-
-
 RUN = """
 import importlib, sys
 import tsdyn as ts

@@ -40,14 +40,14 @@ def compile_ahead(kernels, asked=False):
             count = min(processors(), len(order), MOST)
             if count > 1 and _may_start() and cache.folder() is not None:
                 done = _in_processes(order, count, waiting)
-            for name in order:
-                if done.get(name) != "":
-                    waiting.begin(name)
-                    try:
-                        load(missing[name])
-                        waiting.end(name)
-                    except Exception as error:  # it will be met again, where it is needed
-                        failed[name] = f"{type(error).__name__}: {error}"
+            waiting.now.clear()
+            for name in (name for name in order if done.get(name) != ""):
+                waiting.begin(name)
+                try:
+                    load(missing[name])
+                except Exception as error:  # it will be met again, where it is needed
+                    failed[name] = f"{type(error).__name__}: {error}"
+                waiting.end(name, name not in failed)
             return failed
 
 
@@ -108,8 +108,7 @@ def _in_processes(order, count, waiting):
                 waiting.begin(name)
             elif what == "done":
                 done[name] = problem
-                if not problem:
-                    waiting.end(name)
+                waiting.end(name, not problem)
             else:
                 serving -= 1
         return done

@@ -3,5 +3,6 @@
 The only package that uses Numba's decorators and code generation. Imports errors, nothing else of tsdyn.
 
 Begin with kernels.py: `kernel` (a function that other kernels call), `entry` (called from Python), `Callback` (called
-by address). cache.py stores what was compiled under a hash of all code that it depends on, code_hash.py.
+by address). compiler.py has Numba do less than it does for functions of Python. cache.py stores what was compiled
+under a hash of all code that it depends on, code_hash.py; waiting.py counts kernels on stderr.
 """

@@ -37,12 +37,11 @@ class Waiting:
         self.now.append(name)
         self.show()
 
-    def end(self, name):
-        """It is done."""
-        self.done += 1
-        if name in self.now:
-            self.now.remove(name)
-        if self.asked and not self.terminal:
+    def end(self, name, well=True):
+        """It is done, or has failed."""
+        self.done += well
+        self.now.remove(name)
+        if well and self.asked and not self.terminal:
             self._print(f"tsdyn: {self.done:3d} of {self.count}  {_short(name)}")
         self.show()
 

@@ -20,7 +20,8 @@ from .elements.primitive import Primitive
 from .elements.user_functions import ByState, arguments_of, fill_state, state_load
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
-from .maths.angles import angle_near
+from .maths import vectors
+from .maths.angles import angle_about, angle_near
 from .maths.recurrences import (
     angle,
     cross,
@@ -98,6 +99,7 @@ __all__ = [
     "act",
     "along_and_across",
     "angle",
+    "angle_about",
     "angle_near",
     "angles",
     "arguments_of",
@@ -151,5 +153,6 @@ __all__ = [
     "vector",
     "vector3",
     "vector_load",
+    "vectors",
     "whole",
 ]

@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_near, angles, instants, law_of_joint, specialised
+from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles, instants, law_of_joint, specialised
 
 
 class JointTorque(JointLoad, Force):
@@ -116,18 +116,14 @@ class _ContinuousTorque(ByState, JointTorque):
     @staticmethod
     def remember(x, xd, par, t):
         """The angle."""
-        w0, w1, w2 = x[1] * x[5] - x[2] * x[4], x[2] * x[3] - x[0] * x[5], x[0] * x[4] - x[1] * x[3]
-        y = x[6] * w0 + x[7] * w1 + x[8] * w2
-        return angle_near(y, x[6] * x[3] + x[7] * x[4] + x[8] * x[5], par[0])
+        return angle_about(x, par[0])
 
 
 function = None  # filled in by `wrap`
 
 
 def _law(x, xd, par, t, out):
-    w0, w1, w2 = x[1] * x[5] - x[2] * x[4], x[2] * x[3] - x[0] * x[5], x[0] * x[4] - x[1] * x[3]  # u x f
-    y = x[6] * w0 + x[7] * w1 + x[8] * w2
-    turned = angle_near(y, x[6] * x[3] + x[7] * x[4] + x[8] * x[5], par[0])
+    turned = angle_about(x, par[0])
     rate = x[0] * (xd[12] - xd[9]) + x[1] * (xd[13] - xd[10]) + x[2] * (xd[14] - xd[11])
     torque = math.nan
     try:

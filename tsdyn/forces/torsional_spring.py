@@ -24,6 +24,7 @@ from ..plugins import (
     Vector,
     across,
     angle,
+    angle_about,
     angle_near,
     cross,
     dot,
@@ -183,9 +184,7 @@ class TorsionalSpring(Force):
     @staticmethod
     def law(x, xd, par, t, out):
         """Eqs. (1), (2)."""
-        w0, w1, w2 = x[1] * x[5] - x[2] * x[4], x[2] * x[3] - x[0] * x[5], x[0] * x[4] - x[1] * x[3]  # u x f_a
-        y = x[6] * w0 + x[7] * w1 + x[8] * w2
-        turned = angle_near(y, x[6] * x[3] + x[7] * x[4] + x[8] * x[5], par[4])
+        turned = angle_about(x, par[4])
         rate = x[0] * (xd[12] - xd[9]) + x[1] * (xd[13] - xd[10]) + x[2] * (xd[14] - xd[11])
         f = par[3] - par[0] * (turned - par[2]) - par[1] * rate
         for i in range(9):
@@ -219,16 +218,12 @@ class TorsionalSpring(Force):
     @staticmethod
     def remember(x, xd, par, t):
         """The angle, Eq. (1)."""
-        w0, w1, w2 = x[1] * x[5] - x[2] * x[4], x[2] * x[3] - x[0] * x[5], x[0] * x[4] - x[1] * x[3]
-        y = x[6] * w0 + x[7] * w1 + x[8] * w2
-        return angle_near(y, x[6] * x[3] + x[7] * x[4] + x[8] * x[5], par[4])
+        return angle_about(x, par[4])
 
     @staticmethod
     def potential(x, par, t):
         """Eq. (3)."""
-        w0, w1, w2 = x[1] * x[5] - x[2] * x[4], x[2] * x[3] - x[0] * x[5], x[0] * x[4] - x[1] * x[3]
-        y = x[6] * w0 + x[7] * w1 + x[8] * w2
-        turned = angle_near(y, x[6] * x[3] + x[7] * x[4] + x[8] * x[5], par[4])
+        turned = angle_about(x, par[4])
         return 0.5 * par[0] * (turned - par[2]) * (turned - par[2])
 
     @staticmethod

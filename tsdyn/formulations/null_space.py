@@ -14,7 +14,7 @@ import math
 from ..elements.loops.body_poses import place_bodies
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
-from ..maths.dense_linalg import cholesky, cholesky_solve, transposed_times
+from ..maths.dense_linalg import cholesky, cholesky_solve, is_finite, transposed_times
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import acceleration_bias, applied_forces, is_rheonomic, set_time, time_derivative
 from ..rows.evaluation import held, run_loops
@@ -169,11 +169,8 @@ def reduced_acceleration(s, w, t, vdd):
                 for j in range(k):
                     vdd[j] += f * w.D[c, j]
     cholesky_solve(w.A, vdd, k)
-    total = 0.0
-    for j in range(k):
-        total += abs(vdd[j])
     w.counters[EVALUATIONS] += 1
-    return OK if total < math.inf else NOT_FINITE
+    return OK if is_finite(vdd[:k]) else NOT_FINITE
 
 
 @kernel

@@ -16,7 +16,7 @@ import math
 from ..elements.loops.body_poses import write_accelerations, write_positions, write_velocities
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
-from ..maths.dense_linalg import copy, largest
+from ..maths.dense_linalg import copy, is_finite, largest
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.axis_rows import is_axis
@@ -212,10 +212,7 @@ def accelerate(context, t, y, yd, unused):
         solve_accelerations(network, s, w, f, t)
     write_back(network, l, f.poses, f.Z, yd)
     w.counters[EVALUATIONS] += 1
-    total = 0.0
-    for i in range(n):
-        total += abs(yd[i])
-    return OK if total < math.inf else NOT_FINITE
+    return OK if is_finite(yd) else NOT_FINITE
 
 
 @callback("pp")

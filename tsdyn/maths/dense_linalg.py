@@ -6,6 +6,15 @@ from ..jit.kernels import kernel
 
 
 @kernel
+def is_finite(x):
+    """Whether all numbers of a vector are finite."""
+    total = 0.0
+    for i in range(x.size):
+        total += abs(x[i])
+    return total < math.inf
+
+
+@kernel
 def copy(a, b):
     """b = a."""
     for i in range(a.size):

@@ -4,13 +4,11 @@ The driver uses it at the times of t_eval, `Solution.at` and the events through 
 step anew (a chart follows from its q0 and time alone) in a workspace of its own.
 """
 
-import math
-
 import numpy as np
 
 from ..errors import Status
 from ..jit.kernels import caller, entry, kernel, resident
-from ..maths.dense_linalg import copy
+from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import call_accelerate, call_place
 from ..methods.interpolants import call_value
 from ..workspaces.workspace import RATE, Context, allocate, allocate_linear, basis_free_parts, load
@@ -35,12 +33,8 @@ def evaluate(context, w, at, t, x, y, yd, xd):
         status = call_accelerate(at[A_ACCELERATE], context, t, y, yd, xd)
     if status == 0:
         status = call_complete(at[A_COMPLETE], context, yd)
-    if status == 0:
-        total = 0.0
-        for i in range(w.q.size):
-            total += abs(w.q[i]) + abs(w.qd[i]) + abs(w.qdd[i])
-        if not total < math.inf:
-            return NOT_FINITE
+    if status == 0 and not (is_finite(w.q) and is_finite(w.qd) and is_finite(w.qdd)):
+        return NOT_FINITE
     return status
 
 

@@ -3,8 +3,6 @@
 They get the address of a `SeriesContext`.
 """
 
-import math
-
 from ..elements.loops.body_poses import write_accelerations, write_positions, write_velocities
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..errors import Status
@@ -12,6 +10,7 @@ from ..formulations.accelerations import accelerate_bodies
 from ..formulations.projection import find_drift, land, land_velocities, sum_series
 from ..jit.kernels import callback, caller, kernel
 from ..jit.simd import fma, four, put, splat, times
+from ..maths.dense_linalg import is_finite
 from ..model.equations import set_time
 from ..rows.evaluation import run_loops
 from ..rows.selection import select, weakest
@@ -89,10 +88,7 @@ def reach(context, t, h):
         _land_rates(c, t)
         write_positions(c.network.bodies, f.poses, w.q)
         write_velocities(c.network.bodies, f.poses, w.qd)
-        total = 0.0
-        for i in range(w.q.size):
-            total += abs(w.q[i]) + abs(w.qd[i])
-        if not total < math.inf:
+        if not (is_finite(w.q) and is_finite(w.qd)):
             return NOT_FINITE
     return status
 

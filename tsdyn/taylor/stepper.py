@@ -10,7 +10,7 @@ from ..elements.loops.body_poses import OMEGA, POSE, RD, move_bodies, place_bodi
 from ..errors import Status
 from ..formulations.chart_validity import AT_START, BY_SERIES, ROUNDING
 from ..jit.kernels import entry, kernel
-from ..maths.dense_linalg import copy
+from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import remember, set_time
 from ..model.joint_turns import count_turns
 from ..rows.selection import weakest
@@ -97,10 +97,7 @@ def _accept(context, c, r, log, steps, t, ended):
     remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
     if not ended:
         call_expand(steps[EXPAND], context, 0)
-    total = 0.0
-    for i in range(w.q.size):
-        total += abs(w.qdd[i])
-    if not total < math.inf:
+    if not is_finite(w.qdd):
         return NOT_FINITE
     count_turns(r, w.q, w.qd, t - r.clock[T])
     store_now(w, r)

@@ -1,9 +1,8 @@
 """Stops of a run by series: what follows a step that has been cut at one."""
 
-import math
-
 from ..errors import Status
 from ..jit.kernels import kernel
+from ..maths.dense_linalg import is_finite
 from ..runs.outputs import store_now
 from ..runs.run_state import T
 from ..runs.stops import amend, take_pieces
@@ -21,10 +20,7 @@ def cross_stop(context, c, r, log, steps):
     status = call_reach(steps[REACH], context, r.clock[T], -1.0)
     if status == 0:
         call_expand(steps[EXPAND], context, 0)
-        total = 0.0
-        for i in range(w.q.size):
-            total += abs(w.qdd[i])
-        if not total < math.inf:
+        if not is_finite(w.qdd):
             return NOT_FINITE
         store_now(w, r)
         amend(r, log, w.q, w.qd, w.qdd)

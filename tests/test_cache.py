@@ -199,7 +199,7 @@ def test_edited_callee_in_another_file_is_seen(package):
     before, _ = run(SMALL, environment, package)
     assert before["Phi"] == 0.0
     edit(
-        package / "tsdyn" / "markers.py",
+        package / "tsdyn" / "elements" / "markers.py",
         "            x[i] = q[at + i]\n    else",
         "            x[i] = 2.0 * q[at + i]\n    else",
     )
@@ -208,8 +208,10 @@ def test_edited_callee_in_another_file_is_seen(package):
     assert after["misses"] == 3  # the loops; their caller reaches them by address
     again, _ = run(SMALL, environment, package)
     assert (again["Phi"], again["misses"]) == (after["Phi"], 0)
-    edit(package / "tsdyn" / "solution.py", "import numpy as np\n", "import numpy as np\n\nNOTHING = 0\n")
-    edit(package / "tsdyn" / "markers.py", "2.0 * q[at + i]", "2.0 * q[at + i]  # twice")
+    edit(
+        package / "tsdyn" / "simulation" / "solution.py", "import numpy as np\n", "import numpy as np\n\nNOTHING = 0\n"
+    )
+    edit(package / "tsdyn" / "elements" / "markers.py", "2.0 * q[at + i]", "2.0 * q[at + i]  # twice")
     assert run(SMALL, environment, package)[0]["misses"] == 0  # no code that a kernel reaches has changed
 
 

@@ -353,3 +353,19 @@ print(cache.statistics["misses"], end.tobytes().hex())
     out, _ = python("-c", code, folder=tmp_path, TSDYN_QUIET="1")
     expected = ts.simulate(top.build(), (0.0, 0.1)).q[-1]
     assert out == f"0 {expected.tobytes().hex()}"
+
+
+def test_users_kernels_may_be_recursive_and_serve_numba():
+    import numba
+
+    @ts.kernel
+    def factorial(n):
+        if n <= 1:
+            return 1
+        return n * factorial(n - 1)
+
+    @numba.njit
+    def used(x):
+        return factorial(4) + x
+
+    assert (factorial(3), used(2)) == (6, 26)

@@ -31,6 +31,11 @@ _SERVE_OTHERS = {  # passes for closures, with blocks, exceptions, literal_unrol
 }
 
 
+def is_ours(module):
+    """Whether a module is one of tsdyn's. A user's kernel may be anything that Numba compiles, such as a recursion."""
+    return (module or "").partition(".")[0] == __package__.partition(".")[0]
+
+
 class _Operator(types.Function):
     """The type of an operator or built-in function, which remembers the types of results.
 
@@ -91,7 +96,7 @@ class Compiler(CompilerBase):
     def define_pipelines(self):
         """Numba's own passes, but those that serve others; all of them for a user's kernel."""
         manager, seen = PassManager("kernel"), set()
-        ours = self.state.func_id.modname.partition(".")[0] == __package__.partition(".")[0]
+        ours = is_ours(self.state.func_id.modname)
         for kind, what in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
             if not ours or kind not in _SERVE_OTHERS | seen:
                 manager.add_pass(self.lowering if kind is typed_passes.NativeLowering else kind, what)
@@ -139,7 +144,7 @@ class _Dispatcher(CPUDispatcher):
 
 
 class Callee:
-    """A kernel that kernels call; what Numba needs to compile it is made when a caller is compiled."""
+    """A kernel of tsdyn's that kernels call; what Numba needs to compile it is made when a caller is compiled."""
 
     def __init__(self, py_func, options):
         self.py_func, self.targetoptions = py_func, options
@@ -159,9 +164,9 @@ class Callee:
     def _from_python(self):
         return numba.njit(**self.targetoptions)(self.py_func)
 
-    def __call__(self, *arguments):
+    def __call__(self, *arguments, **keywords):
         """For whoever tries a kernel: it is compiled once more, for Python."""
-        return self._from_python(*arguments)
+        return self._from_python(*arguments, **keywords)
 
     def __reduce__(self):
         """By name, as functions are."""

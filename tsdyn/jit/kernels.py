@@ -24,7 +24,7 @@ from numba.np.arrayobj import populate_array
 
 from ..errors import InvalidConstraint
 from .compiled import DEBUG, Callback, callback, entry, letters, table
-from .compiler import OPTIONS, Callee
+from .compiler import OPTIONS, Callee, is_ours
 
 __all__ = ["Callback", "callback", "entry"]  # what is to be found here, too
 RAISE = dis.opmap["RAISE_VARARGS"]
@@ -44,7 +44,8 @@ def kernel(function, allocates=False, inline=True):
         )
     else:
         options = {**OPTIONS, "forceinline": inline}
-        return function if DEBUG else Callee(function, options)
+        if is_ours(function.__module__) and not DEBUG:
+            return Callee(function, options)
     return function if DEBUG else numba.njit(**options)(function)
 
 

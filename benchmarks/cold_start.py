@@ -1,48 +1,66 @@
-"""Cold start: import time, and the time of a first and a second process to the end of a 10 s run of the top.
+"""Cold start: the first run of an installation, a first run by DOP853 after it, a second process, the import.
 
-Run it: python -m benchmarks.cold_start (the first compilation goes to a temporary folder)
+Run it: python -m benchmarks.cold_start (compiles several times, into temporary folders; some minutes)
 """
 
 import os
 import subprocess
 import sys
 import tempfile
+import time
 
 import numpy as np
 
-IMPORT = """
-import time, numpy, numba
-started = time.perf_counter()
-import tsdyn
+IMPORTS = "import time, numpy, numba; started = time.perf_counter(); import tsdyn"
+IMPORT = f"{IMPORTS}; print(time.perf_counter() - started)"
+RUN = f"""
+{IMPORTS}
+from benchmarks.scenes import SCENES
+scene = SCENES["sliding top"]
+tsdyn.simulate(scene.build(), (0.0, scene.end), integrator=METHOD)
 print(time.perf_counter() - started)
 """
-RUN = """
-import time
-started = time.perf_counter()
-import tsdyn
-from examples import top
-tsdyn.simulate(top.build(), (0.0, 10.0))
-print(time.perf_counter() - started)
-"""
+ONE_PROCESSOR = "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"
+DEFAULT, DOP853 = RUN.replace("METHOD", "None"), RUN.replace("METHOD", "'dop853'")
 
 
-def seconds(code, folder):
-    """What the code prints, and how long its whole process took."""
-    import time
-
-    started = time.perf_counter()
-    environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "TSDYN_QUIET": "1"}
+def process(code, folder):
+    """Of a process: what it prints, how long it took, and processor time with that of its own processes; s."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "TSDYN_QUIET": "1", "PYTHONPYCACHEPREFIX": f"{folder}/code"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    started, before = time.perf_counter(), os.times()
     result = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    return float(result.stdout), time.perf_counter() - started
+    after = os.times()
+    used = after.children_user + after.children_system - before.children_user - before.children_system
+    return float(result.stdout), time.perf_counter() - started, used
+
+
+def show(what, figures):
+    """Print a line of figures."""
+    print(f"{what:42s} {figures[0]:8.2f} {figures[1]:8.2f} {figures[2]:8.2f}", flush=True)
+
+
+def median(code, folder):
+    """The medians of five processes."""
+    return np.median([process(code, folder) for _ in range(5)], axis=0)
 
 
 def main():
-    """Print the three figures."""
+    """Print the table."""
+    print(f"{'s':42s} {'beyond':>8s} {'whole':>8s} {'of all':>8s}")
+    print(f"{'':42s} {'Numba':>8s} {'process':>8s} {'processors':>8s}")
     with tempfile.TemporaryDirectory() as folder:
-        print(f"first process, compiling     {seconds(RUN, folder)[1]:6.2f} s")
-        print(f"second process               {np.median([seconds(RUN, folder)[1] for _ in range(5)]):6.2f} s")
-        imports = np.median([seconds(IMPORT, folder)[0] for _ in range(5)])
-        print(f"import tsdyn, beyond numba   {imports:6.3f} s")
+        process(IMPORT, folder)  # byte code, as an installation has it
+        show(f"first run, {os.cpu_count()} processors", process(DEFAULT, folder))
+        show("first run by DOP853 after it", process(DOP853, folder))
+        show("second process", median(DEFAULT, folder))
+        show("second process, DOP853", median(DOP853, folder))
+        show("import tsdyn", median(IMPORT, folder))
+    if hasattr(os, "sched_setaffinity"):
+        with tempfile.TemporaryDirectory() as folder:
+            process(IMPORT, folder)
+            show("first run, one processor", process(ONE_PROCESSOR + DEFAULT, folder))
+            show("first run by DOP853 after it", process(ONE_PROCESSOR + DOP853, folder))
 
 
 if __name__ == "__main__":

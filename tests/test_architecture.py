@@ -39,6 +39,7 @@ ORDER = [
     "runs",
     "taylor",
     "configuration",
+    "ahead",
     "simulation",
     "benchmarking",
     "profiling",

@@ -200,7 +200,7 @@ def test_edited_callee_in_another_file_is_seen(package):
     before, _ = run(SMALL, environment, package)
     assert before["Phi"] == 0.0
     edit(
-        package / "tsdyn" / "markers.py",
+        package / "tsdyn" / "elements" / "markers.py",
         "            x[i] = q[at + i]\n    else",
         "            x[i] = 2.0 * q[at + i]\n    else",
     )
@@ -209,8 +209,10 @@ def test_edited_callee_in_another_file_is_seen(package):
     assert after["misses"] == 3  # the loops; their caller reaches them by address
     again, _ = run(SMALL, environment, package)
     assert (again["Phi"], again["misses"]) == (after["Phi"], 0)
-    edit(package / "tsdyn" / "solution.py", "import numpy as np\n", "import numpy as np\n\nNOTHING = 0\n")
-    edit(package / "tsdyn" / "markers.py", "2.0 * q[at + i]", "2.0 * q[at + i]  # twice")
+    edit(
+        package / "tsdyn" / "simulation" / "solution.py", "import numpy as np\n", "import numpy as np\n\nNOTHING = 0\n"
+    )
+    edit(package / "tsdyn" / "elements" / "markers.py", "2.0 * q[at + i]", "2.0 * q[at + i]  # twice")
     assert run(SMALL, environment, package)[0]["misses"] == 0  # no code that a kernel reaches has changed
 
 
@@ -219,10 +221,10 @@ def test_kernels_in_a_sub_package_follow_an_edit_of_their_callees(package):
     folder.mkdir()
     (folder / "__init__.py").touch()
     (folder / "inner.py").write_text(
-        "from .._kernel import kernel\nLEVEL = 3.0\n@kernel\ndef level(x):\n    return LEVEL * x\n"
+        "from ..jit.kernels import kernel\nLEVEL = 3.0\n@kernel\ndef level(x):\n    return LEVEL * x\n"
     )
     (folder / "outer.py").write_text(
-        "from .._kernel import entry\nfrom . import inner\n@entry\ndef twice(x):\n    return 2.0 * inner.level(x)\n"
+        "from ..jit.kernels import entry\nfrom . import inner\n@entry\ndef twice(x):\n    return 2.0 * inner.level(x)\n"
     )
     environment = {"NUMBA_CACHE_DIR": str(package / "cache")}
     code = REPORT + "\nfrom tsdyn.below.outer import twice\nreport(value=twice(1.0))\n"

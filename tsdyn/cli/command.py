@@ -1,4 +1,4 @@
-"""The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), and the profile of a scene."""
+"""The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), the profile of a scene, compiling ahead."""
 
 import argparse
 import sys
@@ -60,6 +60,15 @@ def _parser():
     profile.add_argument("--no-advice", action="store_true", help="don't try other methods and tolerances")
     profile.add_argument("--figure", metavar="PATH", help="where to draw it; the suffix says how")
     profile.set_defaults(run=_profile)
+    kernels = commands.add_parser(
+        "compile",
+        help="compile kernels ahead of the first run, on all processors",
+        description="Fill the cache on disk with the kernels of the default method and of every built-in constraint "
+        "and force, or with all of them. What is there already is left alone. The exit code is 1 where a kernel can't "
+        "be compiled or stored.",
+    )
+    kernels.add_argument("--all", action="store_true", help="of every method, formulation and result, too")
+    kernels.set_defaults(run=_compile)
     return parser
 
 
@@ -94,6 +103,17 @@ def _profile(parsed):
         found.plot(parsed.figure)
         print(f"Figure: {parsed.figure}")
     return 0
+
+
+def _compile(parsed):
+    from ..ahead.all_kernels import compile_kernels
+
+    count, folder, failed = compile_kernels(parsed.all)
+    for name, problem in failed.items():
+        print(f"tsdyn: {name} was not compiled: {problem}", file=sys.stderr)
+    if not failed:
+        print(f"{count} kernels are in {folder}.")
+    return 1 if failed else 0
 
 
 def _draw(tables, path):

@@ -39,7 +39,7 @@ DEPENDENT = (
 )
 
 
-@entry
+@entry("pvvdv")
 def _look(context, q, qd, t, velocity):
     """f.b = Phi and velocity = Phi_q qd + Phi_t of the network's rows, and H; the row that depends on others, or -1."""
     c = load_parts(context)
@@ -56,7 +56,7 @@ def _look(context, q, qd, t, velocity):
     return factor_rows(network, f, f.H, f.Y, f.S, 0)
 
 
-@entry
+@entry("pd")
 def _land(context, t):
     """Put w.q and w.qd onto the manifold. Status."""
     c = load_parts(context)
@@ -74,7 +74,7 @@ def _land(context, t):
     return 0
 
 
-@entry
+@entry("pd")
 def _choose(context, share):
     """Choose the rows to drop of those that `_look` has evaluated, those left less than a share; how many they are."""
     c = load_parts(context)
@@ -84,7 +84,7 @@ def _choose(context, share):
     return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, 0) < 0 else -1
 
 
-@entry
+@entry("pvd")
 def _hold_axes(context, q, t):
     """The row of an axis without inertia that the rows which are kept leave free at q, or -1."""
     c = load_parts(context)
@@ -96,7 +96,7 @@ def _hold_axes(context, q, t):
     return failed if is_axis(network, f.S, failed) else -1
 
 
-@entry
+@entry("pdvd")
 def _wander(context, t, way, far):
     """Go a little along the manifold: the body that moves most turns by far, or is shifted by that share of the size.
 

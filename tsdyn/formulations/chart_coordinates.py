@@ -8,7 +8,7 @@ N       = H(q) C Y0                         derivative of Phi with respect to -u
 import math
 
 from ..elements.loops.body_poses import OMEGA, POSE, RD, R, orient
-from ..jit.kernels import kernel, stack
+from ..jit.kernels import kernel, long_kernel, stack
 from ..jit.simd import add, cross, first, fma, four, lanes, put, second, splat, sub, third, times, total
 from ..rows.axis_rows import leave_axes_out
 from ..rows.independent_rows import drop_diagonal
@@ -122,7 +122,7 @@ def _multiply_parts_both(network, l, H, lower, upper):
                         more(lower, target + c * stride + r, scale * turned)
 
 
-@kernel
+@long_kernel
 def factorise_normal(network, w, f, l):
     """Factors of N = H C Y0, H being that of the present place; whether there are any."""
     for e in range(network.sides.shape[0]):

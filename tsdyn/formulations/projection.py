@@ -72,7 +72,7 @@ def land(network, system, w, f, t):
     return NEWTON_FAILED
 
 
-@kernel
+@long_kernel
 def _settle(network, f, floor):
     """End a landing, b being Phi: next to a singular configuration it is corrected below its floor. Status.
 

@@ -28,6 +28,7 @@ from .code_hash import deep_hash, platform_hash
 statistics = Counter()  # "hits", "misses", "damaged", "seconds" of this process
 _DAY = 86400.0
 _KEEP = 30 * _DAY  # files that nothing has read for so long are deleted
+_told = []
 _CHECKSUM = hashlib.sha256().digest_size
 
 
@@ -137,12 +138,17 @@ class KernelCache(_Cache):
             found = self._load(file, target_context)
         if found is None:
             statistics["misses"] += 1
-            _tell()
+            tell()
         else:
             statistics["hits"] += 1
             self.release()
         statistics["seconds"] += time.perf_counter() - started
         return found
+
+    def has(self, sig, codegen):
+        """Whether there is a file of the compiled function."""
+        name = self._file(sig, codegen)
+        return any((path / name).exists() for path in folders())
 
     def save_overload(self, sig, data):
         """Store the compiled function and let waiting processes read it."""
@@ -188,7 +194,7 @@ class KernelCache(_Cache):
 
 def _write(path, payload):
     """Write a file whole or not at all."""
-    partial = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}")
+    partial = path.with_name(f"{path.name}.{os.getpid()}-{uuid.uuid4().hex[:12]}")
     try:
         partial.write_bytes(hashlib.sha256(payload).digest() + payload)
         os.replace(partial, path)
@@ -198,16 +204,26 @@ def _write(path, payload):
         raise
 
 
-@cache
-def _tell():
-    if not os.environ.get("TSDYN_QUIET"):
-        print(
-            "tsdyn: compiling kernels, once for this version and machine (about a minute) ...",
-            file=sys.stderr,
-            flush=True,
-        )
-    if folder() is None:
-        _warn("tsdyn found no writable folder for its compiled kernels")
+def environment():
+    """What another process needs in its environment to use the same folder."""
+    return {"NUMBA_CACHE_DIR": numba.config.CACHE_DIR}
+
+
+def remove_partial_files(process):
+    """Delete what a process that was killed has left."""
+    for file in folder().glob(f"*.kernel.{process}-*"):
+        with contextlib.suppress(OSError):
+            file.unlink()
+
+
+def tell(line="tsdyn: compiling kernels, once for this version and machine ..."):
+    """Say, once a process, that there is something to wait for; nothing where that is said elsewhere."""
+    if not _told:
+        _told.append(True)
+        if line and not os.environ.get("TSDYN_QUIET"):
+            print(line, file=sys.stderr, flush=True)
+        if folder() is None:
+            _warn("tsdyn found no writable folder for its compiled kernels")
 
 
 @cache

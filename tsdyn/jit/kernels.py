@@ -9,32 +9,26 @@ written as, addresses are indices into a table, and a debugger or a print works 
 """
 
 import dis
-import os
 import platform
-import threading
+from hashlib import sha256
 
 import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.ccallback import CFunc
 from numba.core.errors import RequireLiteralValue
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
 from numba.np.arrayobj import populate_array
 
 from ..errors import InvalidConstraint
-from .cache import KernelCache
-from .interrupts import prompt_interrupts
+from .compiled import DEBUG, Callback, callback, entry, letters, table
+from .compiler import OPTIONS, Callee, is_ours
 
-DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
-_OPTIONS = {"error_model": "numpy", "_nrt": False}
+__all__ = ["Callback", "callback", "entry"]  # what is to be found here, too
 RAISE = dis.opmap["RAISE_VARARGS"]
-_lock = threading.RLock()
-_table = [None]  # debug mode: what an address stands for; zero is no address
 ANY = 1 << 40  # the length of arrays whose length a kernel doesn't need
-_letters = {"i": types.int64, "d": types.float64, "p": types.int64}
 
 
 def kernel(function, allocates=False, inline=True):
@@ -52,29 +46,21 @@ def kernel(function, allocates=False, inline=True):
     8.0
     """
     if allocates:
-        options = {**_OPTIONS, "_nrt": True, "boundscheck": True}
+        options = {**OPTIONS, "_nrt": True, "boundscheck": True}
     elif RAISE in function.__code__.co_code[::2]:  # every second byte is an operation
         raise InvalidConstraint(
             f"{function.__qualname__}: a kernel can't raise or assert; write nan where there is no value."
         )
     else:
-        options = {**_OPTIONS, "forceinline": inline}
+        options = {**OPTIONS, "forceinline": inline}
+        if is_ours(function.__module__) and not DEBUG:
+            return Callee(function, options)
     return function if DEBUG else numba.njit(**options)(function)
 
 
 def long_kernel(function):
     """`kernel` for what is long and not called often: it is called where it is used, which compiles in less time."""
     return kernel(function, inline=False)
-
-
-def entry(function):
-    """Compile a function that Python calls with arrays; cached, and run without the GIL."""
-    if DEBUG:
-        return function
-    dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
-    dispatcher._cache = KernelCache(function)
-    dispatcher.compile = prompt_interrupts()(dispatcher.compile)
-    return dispatcher
 
 
 def twin(function):
@@ -94,50 +80,6 @@ def twin(function):
         function.__defaults__,
         function.__closure__,
     )
-
-
-class Callback:
-    """A cached kernel that others call by `address`; compiled or loaded when the address is first asked for.
-
-    The signature has a letter an argument: i an integer, d a float, p the address of an array. It returns an integer.
-    """
-
-    def __init__(self, function, signature, result="i", allocates=False):
-        self.py_func = getattr(function, "py_func", function)
-        self.options = {**_OPTIONS, "_nrt": allocates}
-        self.signature = signature
-        self.result = result
-        self._address = None
-
-    @property
-    def address(self):
-        """The address to hand to a kernel."""
-        if self._address is None:
-            with _lock:  # threads that ask together compile, or load, once
-                if self._address is None:
-                    self._address = self._register() if DEBUG else self._compile()
-        return self._address
-
-    def _register(self):
-        _table.append(self.py_func)
-        return len(_table) - 1
-
-    def _compile(self):
-        arguments = tuple(_letters[c] for c in self.signature)
-        cfunc = CFunc(self.py_func, (arguments, _letters[self.result]), locals={}, options=self.options)
-        cfunc._cache = cache = KernelCache(self.py_func)
-        try:
-            with prompt_interrupts():
-                cfunc.compile()
-        finally:
-            cache.release()
-        self._cfunc = cfunc  # keeps the code alive
-        return cfunc.address
-
-
-def callback(signature, result="i"):
-    """Decorate a function to make it a `Callback`."""
-    return lambda function: Callback(function, signature, result)
 
 
 def specialised(template, name, owner, **constants):
@@ -281,7 +223,7 @@ class _Seen(types.Type):
 
     def __init__(self, kind):
         self.kind = kind
-        super().__init__(name=f"Seen({kind})")
+        super().__init__(name=f"Seen({kind.instance_class.__name__} {sha256(str(kind).encode()).hexdigest()[:12]})")
 
 
 @register_model(_Seen)
@@ -343,13 +285,13 @@ def loader(example):
 def caller(signature, result="i"):
     """Make the kernel that calls a `Callback` of this signature: call(address, *arguments), arrays as they are."""
     if DEBUG:
-        return lambda address, *arguments: _table[address](*arguments)
+        return lambda address, *arguments: table[address](*arguments)
     native = {"i": _i64, "d": _f64, "p": _i64}
 
     @intrinsic
     def call(typing, address, *arguments):
         wanted = [
-            given if isinstance(given, types.Array) else _letters[letter]
+            given if isinstance(given, types.Array) else letters[letter]
             for letter, given in zip(signature, arguments, strict=True)
         ]
 
@@ -364,7 +306,7 @@ def caller(signature, result="i"):
             target = ir.FunctionType(native[result], [native[c] for c in signature]).as_pointer()
             return builder.call(builder.inttoptr(values[0], target), words)
 
-        return _letters[result](types.int64, types.StarArgTuple(wanted)), generate
+        return letters[result](types.int64, types.StarArgTuple(wanted)), generate
 
     return call
 

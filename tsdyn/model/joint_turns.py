@@ -11,7 +11,7 @@ results are computed from q, on the turn nearest to the tracked angle.
 
 import math
 
-from ..jit.kernels import kernel
+from ..jit.kernels import kernel, long_kernel
 from ..maths.vectors import cross, dot, spin, subtract, to_body, to_ground
 
 HALF_PI, TURN_ROUND = 0.5 * math.pi, 2.0 * math.pi
@@ -62,7 +62,7 @@ def _rate(f, g, v, p, pd, o, od):
     return rate_of(f, g, v, subtract(seen(p, o, spin(o, od)), spin(p, pd)))
 
 
-@kernel
+@long_kernel
 def angle_after(r, j, q, qd, h):
     """Angle j at q, qd, which is h after the last accepted point, or before it."""
     frame = r.frames[j]

@@ -27,10 +27,10 @@ from .run_state import (
     T_END,
     T_ORIGIN,
     H,
-    Record,
     T,
     enter_joints,
     lay_out,
+    no_record,
 )
 from .stepper import advance
 from .trajectory import B_DATA, warm_size
@@ -141,8 +141,7 @@ class Memory:
     def load(self):
         """Load the driver, where this process has not called it yet."""
         if not getattr(advance, "overloads", True):
-            none = np.zeros((0, 1))
-            advance(self._context, self._run, Record(np.zeros(0), np.zeros((0, 2)), *[none] * 5), self.addresses, 0)
+            advance(self._context, self._run, no_record(), self.addresses, 0)
 
     def advance(self, record, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""

@@ -65,6 +65,12 @@ class Record(NamedTuple):
     blocks: np.ndarray  # (rows, block)  those of accepted steps
 
 
+def no_record():
+    """An example of its type, of no rows."""
+    none = np.zeros((0, 1))
+    return Record(np.zeros(0), np.zeros((0, 2)), none, none, none, none, none)
+
+
 def enter_joints(run, handles, remembered):
     """Let a run count the angles of a scene's joints from those remembered on."""
     if remembered.size:

@@ -48,6 +48,7 @@ from .run_state import (
     H,
     T,
     load_run,
+    no_record,
 )
 from .step_control import accept, first_step, gets_on, stretch, watch_stiffness
 from .step_outputs import record_step
@@ -240,7 +241,7 @@ def _enter(context, c, r, log, at):
     return 0
 
 
-@entry
+@entry("pp", no_record(), "wi")
 def advance(context, run, log, at, most):
     """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or why it stopped.
 

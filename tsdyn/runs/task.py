@@ -12,6 +12,11 @@ from ..errors import Status
 from .history import ChartLog, StepLog
 
 
+def between(times, span):
+    """Whether there are times between the ends of a span."""
+    return times.size > 2 or any(span[0] < t < span[1] for t in times.tolist())
+
+
 class Task(NamedTuple):
     """One run, its arguments checked and its start consistent; n coordinates, m constraint rows."""
 
@@ -42,9 +47,7 @@ class Task(NamedTuple):
     @property
     def within(self):
         """True if output between the ends of steps is requested."""
-        times, (t0, t1) = self.times, self.span
-        inside = times.size > 2 or any(t0 < t < t1 for t in times.tolist())
-        return self.dense_output or self.events is not None or inside
+        return self.dense_output or self.events is not None or between(self.times, self.span)
 
 
 class Outcome(NamedTuple):

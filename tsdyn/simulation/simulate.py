@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..ahead.first_run import prepare_first_run
 from ..calls import fitting
 from ..configuration.holonomic import demand_holonomic
 from ..elements.membership import warn_of_waiting
@@ -18,7 +19,7 @@ from ..observables.state import remembered
 from ..runs.arguments import interval, method_of, output_times, state_arrays
 from ..runs.events import prepare
 from ..runs.sampling import Sampling, instants_of, sampled
-from ..runs.task import Task
+from ..runs.task import Task, between
 from ..taylor.series_run import run_series
 from ..validation import one_of, positive, whole
 from . import method_choice
@@ -147,19 +148,14 @@ def simulate(
     span = interval(t_span)
     form = find_formulation(formulation)
     chart_interval = whole(chart_interval, "chart_interval")
-    kept = prepared(scene)
-    if integrator is None:
-        method = method_choice.explicit(kept, rtol, atol, form.name == "tangent" and chart_interval is None)
-    else:
-        method = method_of(integrator, rtol, atol)
-    if method.implicit and form.first_order:
+    method = None if integrator is None else method_of(integrator, rtol, atol)
+    if method is not None and method.implicit and form.first_order:
         others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
         raise InvalidArgument(
             f"{type(method).__name__} solves its stages in the tangent-space form only; formulation={form.name!r} is "
             f"served by {others}."
         )
-    if max_step is not None:
-        method = method.bounded(positive(max_step, "max_step (s)"))
+    longest = None if max_step is None else positive(max_step, "max_step (s)")
     constraint_tol = positive(constraint_tol, "constraint_tol")
     initial_tol = positive(initial_tol, "initial_tol")
     one_of(redundancy, ("drop", "refuse"), "redundancy")
@@ -169,6 +165,14 @@ def simulate(
     watched = prepare(events)
     times = output_times(t_eval, *span)
     max_steps = whole(max_steps, "max_steps")
+    default = rtol, atol, form.name == "tangent" and chart_interval is None
+    within = bool(dense_output) or watched is not None or between(times, span)
+    prepare_first_run(scene, method, form, within, default)
+    kept = prepared(scene)
+    if method is None:
+        method = method_choice.explicit(kept, *default)
+    if longest is not None:
+        method = method.bounded(longest)
     report = reporter(progress)
 
     started = time.perf_counter()

@@ -18,10 +18,10 @@ from ..runs.run_state import (
     T_END,
     T_ORIGIN,
     H,
-    Record,
     T,
     enter_joints,
     lay_out,
+    no_record,
 )
 from ..runs.trajectory import B_DATA
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
@@ -125,8 +125,7 @@ class SeriesMemory:
     def load(self):
         """Load the driver, where this process has not called it yet."""
         if not getattr(advance_series, "overloads", True):
-            none = np.zeros((0, 1))
-            advance_series(self._context, self._run, Record(np.zeros(0), np.zeros((0, 2)), *[none] * 5), self.steps, 0)
+            advance_series(self._context, self._run, no_record(), self.steps, 0)
 
     def advance(self, record, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""

@@ -44,6 +44,7 @@ from ..runs.run_state import (
     H,
     T,
     load_run,
+    no_record,
 )
 from ..runs.step_control import gets_on, stretch
 from ..runs.trajectory import B_CHART, B_DATA, B_END, B_H, B_START
@@ -192,7 +193,7 @@ def _watch(c, r, h):
     return False
 
 
-@entry
+@entry("pp", no_record(), "wi")
 def advance_series(context, run, log, steps, most):
     """Make up to `most` steps, as `stepper.advance` does; context is the address of a `SeriesContext`. Status."""
     c, r = load_series(context), load_run(run)

@@ -1,0 +1,104 @@
+"""Which kernels a run needs, so that a first one can have them compiled at the same time."""
+
+from ..configuration import initial_conditions
+from ..formulations import friction_basis, friction_solve, linearisation, null_space
+from ..formulations.registry import FORMULATIONS
+from ..integrators import DOP853, Taylor
+from ..jit.compiled import DEBUG
+from ..motions import program
+from ..motions.signals import Signal
+from ..runs.arguments import tolerances
+from ..runs.stepper import advance
+from ..taylor import step_parts
+from ..taylor.layout import FAR, room
+from ..taylor.stepper import advance_series
+from .workers import compile_ahead
+
+_known = set()  # what this process has made sure of: methods and forms, each with or without what is between steps
+
+
+def prepare_first_run(scene, method, form, within, default):
+    """Have compiled what a run of the scene needs, if any of it is missing on disk.
+
+    method may be None: `default` is then (rtol, atol, whether Taylor may be chosen). within: whether anything is asked
+    for between the steps.
+    """
+    key = type(method), form.name, within
+    if DEBUG or not scene.bodies or (scene._packed is not None and key in _known):
+        return
+    method = method or _default_method(scene, *default)
+    far = isinstance(method, Taylor) and len(scene.bodies) * room(method.orders()[2]) > FAR
+    compile_ahead(dict.fromkeys([*of_scene(scene, method, form, far), *of_method(method, form, within, far)]))
+    _known.add(key)
+
+
+def of_scene(scene, method, form, far):
+    """The kernels of constraints and forces."""
+    series, implicit = isinstance(method, Taylor), method.implicit
+    for kind, moving in _kinds(scene).items():
+        yield from of_constraint(kind, moving, series, far, implicit)
+    for force in scene.forces:
+        yield from of_force(force.kernels, series, implicit, form)
+        if any(isinstance(value, Signal) and value.motions for value in vars(force).values()):
+            yield program.run_program
+
+
+def of_constraint(kind, moving, series=True, far=False, implicit=False):
+    """The loops over constraints of a class; moving: whether one of them depends on time."""
+    names = ["phi", "jacobian", "gamma", *["phi_t"] * moving, *["remember"] * bool(kind.memory)]
+    if not kind.normalises:
+        names += ["reduced", "values", "bias", *["drift"] * moving]
+        names += ["far_" * far + "driven_" * moving + "series"] * series
+    names += ["curvature"] * implicit
+    return [kind.kernels[name] for name in names if name in kind.kernels]
+
+
+def of_force(kernels, series=True, implicit=False, form=FORMULATIONS["tangent"]):
+    """The loops over forces that have these kernels."""
+    names = ["force", "remember", "normal_load", "unit_friction", *["series"] * series, *["jacobian"] * implicit]
+    found = [kernels[name] for name in names if name in kernels]
+    if "normal_load" in kernels:
+        found.append((friction_solve if form.basis_free else friction_basis).rub)
+    return found
+
+
+def of_method(method, form, within, far=False):
+    """The kernels of a start, of the method and of the form; far: of series that are too long for caches near by."""
+    yield initial_conditions._look
+    if isinstance(method, Taylor):
+        yield from (step_parts.expand_far_series if far else step_parts.expand_series, step_parts.reach)
+        yield advance_series
+        yield from (step_parts.accelerate_here, step_parts.pass_singular) if within else ()
+        return
+    form = form.serving(method)
+    kernels = form.kernels
+    yield from (kernels.place, kernels.accelerate, (kernels if form.basis_free else null_space).complete)
+    yield from (kernels.check, kernels.start_chart, kernels.error_norm, advance)
+    if method.driver == "steps":
+        yield method.kernel(form.first_order)[0]
+    if method.step is None:
+        yield from method.errors
+    if method.implicit:
+        names = ("linearise", "reduce", "factorise", "solve", "soften")
+        yield from (getattr(linearisation, name) for name in names)
+    if within:
+        interpolant = method.interpolant(form.first_order)
+        yield from (interpolant.fill, interpolant.value)
+        yield from (method.second,) if method.implicit else ()
+
+
+def _kinds(scene):
+    """{class of constraint: whether one of them moves}."""
+    kinds = {}
+    for constraint in scene.primitives:
+        kind = type(constraint)
+        kinds[kind] = kinds.get(kind, False) or constraint.rheonomic
+    return kinds
+
+
+def _default_method(scene, rtol, atol, series):
+    """The default method, as `choice.explicit` will find it."""
+    kinds = (kind.kernels for kind in _kinds(scene) if not kind.normalises)
+    forces = (force.kernels for force in scene.forces)
+    series = series and all("series" in kernels for kernels in (*kinds, *forces))
+    return (Taylor if series else DOP853)(**tolerances(rtol, atol))

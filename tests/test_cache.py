@@ -236,6 +236,19 @@ def test_kernels_in_a_sub_package_follow_an_edit_of_their_callees(package):
     assert (edited["value"], edited["misses"]) == (10.0, 1)
 
 
+def test_an_edit_of_a_docstring_compiles_nothing(package):
+    file = package / "tsdyn" / "documented.py"
+    file.write_text('from .jit.kernels import entry\n@entry\ndef twice(x):\n    """Double."""\n    return 2.0 * x\n')
+    environment = {"NUMBA_CACHE_DIR": str(package / "cache")}
+    code = REPORT + "\nfrom tsdyn.documented import twice\nreport(value=twice(1.0))\n"
+    assert run(code, environment, package)[0]["misses"] == 1
+    edit(file, "Double.", "Twice x.")
+    assert run(code, environment, package)[0]["misses"] == 0
+    edit(file, "2.0", "3.0")
+    edited, _ = run(code, environment, package)
+    assert (edited["value"], edited["misses"]) == (3.0, 1)
+
+
 @pytest.mark.parametrize("damage", [lambda b: b[: len(b) // 2], lambda b: b"", lambda b: b[:-9] + b"\0" * 9])
 def test_damaged_kernels_are_compiled_anew(tmp_path, damage):
     environment = {"NUMBA_CACHE_DIR": str(tmp_path)}

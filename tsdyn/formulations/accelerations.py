@@ -18,7 +18,7 @@ from ..sparse.factorisation import solve
 
 @kernel
 def body_forces(network, system, w, f, t):
-    """Z = applied forces, gravity and gyroscopic torques on the bodies, at w.q, w.qd and the poses."""
+    """Set Z to applied forces, gravity and gyroscopic torques on the bodies, at w.q, w.qd and the poses."""
     has_forces = system.forces.shape[0] > 0
     if has_forces:
         for i in range(f.Q.size):
@@ -46,14 +46,14 @@ def body_forces(network, system, w, f, t):
 
 @kernel
 def accelerate_bodies(network, system, w, f, t):
-    """Z = (r'', omega''), b = lam; H, Y and the factors of S are those of the poses, w.q and w.qd their numbers."""
+    """Set Z = (r'', omega'') and b = lam; H, Y and the factors of S are those of the poses, w.q and w.qd."""
     solve_accelerations(network, system, w, f, t)
     write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
 
 
 @kernel
 def solve_accelerations(network, system, w, f, t):
-    """The same without qdd; w.q and w.qd are read where there are forces."""
+    """Solve for accelerations and multipliers, without qdd; w.q and w.qd are read if there are forces."""
     body_forces(network, system, w, f, t)
     for b in range(network.bodies.shape[0]):
         weigh(network.inverse, b, f.Z, 8 * b, f.Z, 8 * b)

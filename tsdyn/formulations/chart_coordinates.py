@@ -38,7 +38,7 @@ PIVOT_LIMIT = 1e-13  # of N: less of a diagonal entry than this is rounding
 
 @kernel
 def displace(network, l, poses):
-    """The poses at l.x; False where a body has turned too far."""
+    """Set the poses at chart coordinates l.x; False if a body has rotated too far for the chart."""
     for b in range(network.bodies.shape[0]):
         at, o = b * POSE, 8 * b
         put(poses, at + R, fma(four(l.x, o), splat(1.0), four(l.base, o)))
@@ -64,7 +64,7 @@ def displace(network, l, poses):
 
 @kernel
 def _turn_by(l, b, y):
-    """C y of body b, y in four lanes."""
+    """Return C y of body b, y in four lanes."""
     x, e, z, w = l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2], l.d[4 * b + 3]
     d = lanes(x, e, z)
     along = total(times(d, y)) / (1.0 + w)
@@ -73,7 +73,7 @@ def _turn_by(l, b, y):
 
 @kernel
 def turn_rates(network, l, rates, poses):
-    """rd and omega' of the poses, of rates in chart coordinates."""
+    """Set rd and omega' of the poses from rates of chart coordinates."""
     for b in range(network.bodies.shape[0]):
         put(poses, b * POSE + RD, four(rates, 8 * b))
         if network.bodies[b, 1] == 7:
@@ -124,7 +124,7 @@ def _multiply_parts_both(network, l, H, lower, upper):
 
 @long_kernel
 def factorise_normal(network, w, f, l):
-    """Factors of N = H C Y0, H being that of the present place; whether there are any."""
+    """Factorise N = H C Y0 at the present H; False if N is singular."""
     for e in range(network.sides.shape[0]):
         for k in range(2):
             at = 16 * e + 8 * k
@@ -152,7 +152,7 @@ def gather_rates(network, H, poses, out):
 
 @kernel
 def write_back(network, l, poses, Z, out):
-    """Accelerations (rhodd, etadd) of (rdd, omega'd); out (8 b,)."""
+    """Set accelerations of chart coordinates (rhodd, etadd) from (rdd, omega'd); out (8 b,)."""
     for b in range(network.bodies.shape[0]):
         o, at = 8 * b, b * POSE
         put(out, o, four(Z, o))
@@ -165,7 +165,7 @@ def write_back(network, l, poses, Z, out):
 
 @kernel
 def largest_rates(network, poses):
-    """The largest |rd| and |omega'| entries."""
+    """Return the largest entries of |rd| and |omega'|."""
     r, w = 0.0, 0.0
     for b in range(network.bodies.shape[0]):
         f, g = four(poses, b * POSE + RD), four(poses, b * POSE + OMEGA)
@@ -176,7 +176,7 @@ def largest_rates(network, poses):
 
 @kernel
 def turned_most(l):
-    """The largest |d| of a body: the sine of half the angle."""
+    """Return the largest |d| of a body, the sine of half its rotation angle since q0."""
     most = 0.0
     for i in range(0, l.d.size, 4):
         most = max(most, l.d[i] * l.d[i] + l.d[i + 1] * l.d[i + 1] + l.d[i + 2] * l.d[i + 2])

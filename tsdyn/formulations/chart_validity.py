@@ -42,7 +42,7 @@ SAME = 1e-6  # of N: factors that are off by less tell the contraction as well a
 
 @kernel
 def touch(network, system, w, f, l, t):
-    """The chart at w.q: base, H0, Y0, the factors of S0. Whether the rows of H0 are independent."""
+    """Make the chart at w.q: base, H0, Y0, factors of S0. True if the rows of H0 are independent."""
     regular = True
     last = l.numbers[END] > 0.0 and l.numbers[END] == w.counters[PLACEMENTS] and network.axes.rows.shape[0] == 0
     if last and serve_still(network, f, f.S):  # the place that was left last
@@ -90,7 +90,7 @@ def measure_turns(network, q, l):
 
 @kernel
 def turning(network, w, f, l):
-    """Reason to leave the chart at the place that l.d and f.H belong to, or STAY; records contraction and condition."""
+    """Return the reason to abandon the chart at l.d and f.H, or STAY; records contraction and condition."""
     turn, contraction = turned_most(l), 0.0
     if f.b.size > 0:
         known = l.numbers[FACTORED] > 0.0 and l.numbers[OFF] < SAME
@@ -106,7 +106,7 @@ def turning(network, w, f, l):
 
 @kernel
 def _contraction(network, l):
-    """From the reciprocal pivots of both."""
+    """Return the contraction from the reciprocal pivots of N and S0."""
     pattern, worst = network.pattern, 0.0
     for j in range(pattern.heads.size):
         at, step = pattern.heads[j], pattern.widths[j] + 1

@@ -151,7 +151,7 @@ def _find_load(s, w, network, friction, lam, t, out, by_row):
 
 @callback(RUB)
 def rub(context, t, vdd):
-    """vdd with the frictions of joints, from that without. Status."""
+    """Add joint friction to vdd. Status."""
     c = load(context)
     s, w, f, network = c.system, c.work, c.free, c.network
     r, n, m, frictions = f.friction, w.q.size, w.Phi.size, c.network.frictions.shape[0]

@@ -69,7 +69,7 @@ def normal_load(system, friction, q, qd, t, derive, reaction, out):
 
 @kernel
 def forget_loads(system):
-    """Let the joints' frictions be zero where forces are summed."""
+    """Set joint friction to zero in the sum of forces."""
     for i in range(system.normals.size):
         system.reals[system.normals[i]] = 0.0
 
@@ -125,7 +125,7 @@ def _rub_bodies(network, f):
 
 @kernel
 def _factorise(network, f, cold):
-    """Factors of N~, or where `cold` those of S; whether there are any."""
+    """Factorise N~, or S if `cold`; False if the matrix is singular."""
     r, change = f.friction, stack(8)
     copy(f.Y, r.X)
     if not cold:
@@ -155,7 +155,7 @@ def _factorise(network, f, cold):
 def find_reactions(network, system, f, q, qd, t):
     """Z = (r'', omega''), r.lam the multipliers and r.load the normal loads; Z is W F on entry, gamma as Eq. 3 has it.
 
-    H, Y and S are those of the poses. Whether there are any.
+    H, Y and S are those of the poses. Return True if reactions were found.
     """
     r = f.friction
     _weigh_units(network, system, f, q, qd, t)
@@ -196,7 +196,7 @@ def find_reactions(network, system, f, q, qd, t):
 
 @callback(RUB)
 def rub(context, t, unused):
-    """As free_accelerations.solve_accelerations, with the frictions of joints. Status."""
+    """Solve for accelerations as accelerations.solve_accelerations, with joint friction. Status."""
     c = load(context)
     s, w, f, network = c.system, c.work, c.free, c.network
     forget_loads(s)

@@ -171,7 +171,7 @@ def _to_body_frames(s, q, X, scratch, out):
 
 @callback("pd")
 def linearise(context, t):
-    """K_body and C_body at the state last completed. Status."""
+    """Set K_body and C_body at the last completed state. Status."""
     c = load(context)
     s, w, l = c.system, c.work, c.linear
     n = w.q.size
@@ -228,7 +228,7 @@ def _forces(s, w, l, t, anew):
 
 @callback("pd")
 def reduce(context, t):
-    """K_hat and C_hat of the state last taken."""
+    """Set K_hat and C_hat at the current state."""
     c = load(context)
     s, w, l = c.system, c.work, c.linear
     k, to, A = w.v.size, 0, stack2(3, 3)

@@ -20,7 +20,7 @@ from .null_space_chart import new_chart, tangent_map
 
 @callback(PLACE)
 def place(context, t, q):
-    """Take the positions q as they are: Phi_q, B, D and the factor of D^T M D. Status."""
+    """Set positions q without projection: Phi_q, B, D and the factor of D^T M D. Status."""
     c = load(context)
     s, w = c.system, c.work
     w.counters[PLACEMENTS] += 1
@@ -34,7 +34,7 @@ def place(context, t, q):
 
 @callback(ACCELERATE)
 def accelerate(context, t, velocity, wd, qd):
-    """Take the kinematic velocities w at the place last taken: qd and wd. Status."""
+    """Set kinematic velocities w at the current position: qd and wd. Status."""
     c = load(context)
     s, w = c.system, c.work
     velocities(s, w, t, vector(velocity, w.v.size))
@@ -64,7 +64,7 @@ def error_norm(context, eq, ew, old, rtol, atol):
 
 @callback("pdpppp")
 def start_chart(context, t, q, velocity, wd, qd):
-    """Choose U and V anew at the present q; w = V^T P0 qd, wd = V^T P0 qdd. Status."""
+    """Make new bases U and V at the present q; w = V^T P0 qd, wd = V^T P0 qdd. Status."""
     c = load(context)
     s, w = c.system, c.work
     set_time(s, t)

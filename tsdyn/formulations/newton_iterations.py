@@ -73,7 +73,7 @@ def solve_positions(s, w, t, v):
 
 @kernel
 def leave_out(w, f):
-    """Zero what belongs to redundant rows of Phi."""
+    """Zero the entries of redundant rows of Phi."""
     for i in range(w.left_out[0]):
         f[w.left_out[1 + i]] = 0.0
 
@@ -108,7 +108,7 @@ def subtract_normal(w, out):
 
 @kernel
 def factorise_b(s, w, t):
-    """B = (Phi_q U)^-1 at the present q, from nothing; False where it is singular."""
+    """Factorise B = (Phi_q U)^-1 at the present q; False if Phi_q U is singular."""
     constraint_jacobian(s, w.q, t, w.Phi_q)
     leave_rows_out(w)
     normal_matrix(s, w)

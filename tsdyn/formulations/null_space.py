@@ -186,7 +186,7 @@ def frictional_acceleration(context, c, t, vdd):
 
 @callback(PLACE)
 def place(context, t, v):
-    """Take the position coordinates v: q, Phi_q, B, D and the factor of D^T M D. Status."""
+    """Set positions from v: q, Phi_q, B, D and the factor of D^T M D. Status."""
     c = load(context)
     s, w = c.system, c.work
     w.counters[PLACEMENTS] += 1
@@ -201,7 +201,7 @@ def place(context, t, v):
 
 @callback(ACCELERATE)
 def accelerate(context, t, vd, vdd, unused):
-    """Take the velocity coordinates vd at the place last taken: qd and vdd. Status."""
+    """Set velocities from vd at the current position: qd and vdd. Status."""
     c = load(context)
     s, w = c.system, c.work
     velocities(s, w, t, vector(vd, w.v.size))
@@ -234,13 +234,13 @@ def complete(context, vdd):
 
 @callback("p")
 def check(context):
-    """Reason to leave the chart, or zero."""
+    """Return the reason to abandon the chart, or zero."""
     return look(load(context))
 
 
 @kernel
 def look(c):
-    """Reason to leave the chart at the present q, or zero."""
+    """Return the reason to abandon the chart at the present q, or zero."""
     w, f, l, network = c.work, c.free, c.local, c.network
     place_bodies(network.bodies, w.q, f.poses)
     measure_turns(network, w.q, l)

@@ -39,7 +39,7 @@ def factorise(network, system, w, f, t):
 
 @long_kernel
 def land(network, system, w, f, t):
-    """Bring positions onto the manifold along W H^T; H, Y and S are those of where they land. Status."""
+    """Project positions onto the manifold along W H^T; H, Y and the factors of S are those of the result. Status."""
     floor, before, moved, renew = w.control[FLOOR], math.inf, 0.0, True
     f.sizes[RESIDUAL], f.sizes[MOVED] = -1.0, 0.0
     for _ in range(SWEEPS):
@@ -76,7 +76,7 @@ def land(network, system, w, f, t):
 def _settle(network, f, floor):
     """End a landing, b being Phi: next to a singular configuration it is corrected below its floor. Status.
 
-    What Phi leaves there moves bodies by as much over the distance.
+    A residual of Phi there displaces bodies by the residual over the distance.
     """
     if not held(f, floor):
         return UNHELD
@@ -88,7 +88,7 @@ def _settle(network, f, floor):
 
 @kernel
 def _displace(network, f):
-    """Move and turn the bodies by -Y b; by how much, at most."""
+    """Displace the bodies by -Y b; return the largest displacement."""
     for i in range(f.Z.size):
         f.Z[i] = 0.0
     scatter(network, f.Y, f.b, f.Z)
@@ -98,7 +98,7 @@ def _displace(network, f):
 
 @kernel
 def move_by(network, f):
-    """Move and turn the bodies by Z, to first order."""
+    """Displace the bodies by Z, to first order."""
     p = f.p
     for b in range(network.bodies.shape[0]):
         at, o = b * POSE, 8 * b
@@ -140,7 +140,7 @@ def find_drift(network, system, f, t):
 
 @kernel
 def land_velocities(network, f, drifting):
-    """Take out of the velocities of the poses what is normal to the manifold, twice: the second time it is rounding.
+    """Project the velocities of the poses onto the tangent space, twice: the second projection removes rounding.
 
     H, Y and S are those of the poses; with `drifting`, gamma is Phi_t.
     """

@@ -63,7 +63,7 @@ SPEED_ROUNDING = 2e-16
 
 @callback(PLACE)
 def place(context, t, x):
-    """Take the coordinates x (8 b,): poses on the manifold, H, W H^T and the factors of S. Status."""
+    """Set positions from x (8 b,): poses on the manifold, H, W H^T and the factors of S. Status."""
     c = load(context)
     s, w, f, l, network = c.system, c.work, c.free, c.local, c.network
     w.counters[PLACEMENTS] += 1
@@ -148,7 +148,7 @@ def _solve_positions(network, s, w, f, l, t, renewals):
 
 @kernel
 def solve_velocities(network, s, w, f, l, t):
-    """rd and omega' of the poses from the rates l.y, freed of what would leave the manifold. Whether there are any.
+    """rd and omega' of the poses from the rates l.y, projected onto the tangent space. False if N is singular.
 
     The factors are those of N at the start of the position solve, or, where it needed none, those of S as long as they
     do.
@@ -193,7 +193,7 @@ def solve_velocities(network, s, w, f, l, t):
 
 @callback(ACCELERATE)
 def accelerate(context, t, y, yd, unused):
-    """Take the rates y (8 b,) at the place last taken: velocities, accelerations and y'. Status."""
+    """Set velocities from y (8 b,) at the current position: velocities, accelerations and y'. Status."""
     c = load(context)
     s, w, f, l, network = c.system, c.work, c.free, c.local, c.network
     n = l.x.size - 8
@@ -233,7 +233,7 @@ def complete(context, yd):
 
 @callback("p")
 def check(context):
-    """Reason to leave the chart, or zero."""
+    """Return the reason to abandon the chart, or zero."""
     c = load(context)
     w, f, l = c.work, c.free, c.local
     reason = turning(c.network, w, f, l)

@@ -57,7 +57,7 @@ def _function_hash(function, above):
     if ours and function in _known:
         return _known[function]
     digest, above = hashlib.sha256(), (*above, function)
-    _add_code(digest, function.__code__, function.__globals__, above)
+    _add_code(digest, function.__code__, function.__globals__, above, function.__doc__)
     for default in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).items()):
         _add(digest, default, above)
     for cell in function.__closure__ or ():
@@ -69,9 +69,10 @@ def _function_hash(function, above):
     return result
 
 
-def _add_code(digest, code, namespace, above):
+def _add_code(digest, code, namespace, above, docstring=None):
     digest.update(code.co_code)
-    for constant in code.co_consts:
+    documented = docstring is not None and code.co_consts[:1] == (docstring,)  # no machine code depends on it
+    for constant in code.co_consts[documented:]:
         if isinstance(constant, types.CodeType):
             _add_code(digest, constant, namespace, above)
         else:

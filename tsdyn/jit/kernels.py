@@ -1,4 +1,4 @@
-"""How kernels are compiled and called: the only file that uses Numba's decorators and code generation.
+"""How kernels are compiled and called. This package alone uses the decorators and code generation of Numba.
 
 Kernels are compiled without Numba's runtime, so a kernel that would allocate or count references does not compile.
 What is chosen at run time (a primitive, a method, a formulation) is called by address, all arguments being 64-bit

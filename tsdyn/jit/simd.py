@@ -1,4 +1,4 @@
-"""Four floats at once, as one vector register: what a kernel says with them becomes SIMD code on every processor.
+"""Vectors of four floats in one register: SIMD code on every processor, generated here for Numba.
 
     four(array, i)       the floats array[i : i + 4]          put(array, i, f)   write them there
     splat(x)             x four times                         lanes(a, b, c)     (a, b, c, 0)

@@ -33,7 +33,7 @@ def frictions_of(packed, bodies, rows_of, sides):
 
 
 def _place(kinds, row):
-    """Which row of System.forces runs a load, and as the how manieth."""
+    """Return the row of System.forces that runs a load, and the index of the load in it."""
     for i, kind in enumerate(kinds):
         index = (row[F_FIRST_INT] - kind[F_FIRST_INT]) // INTS
         if kind[F_REALS] == row[F_REALS] and 0 <= index < kind[F_COUNT]:

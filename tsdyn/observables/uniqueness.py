@@ -44,7 +44,7 @@ def find_stress(network, f, whole, dropped):
 
 @long_kernel
 def find_rows(network, s, f, q, t, whole):
-    """H with and, in `whole`, without what is dropped, and the factors of S, at q; whether there are any."""
+    """H at q without dropped rows and, in `whole`, with them, and the factors of S; False if S is singular."""
     set_time(s, t)
     place_bodies(network.bodies, q, f.poses)
     run_loops(network, s.reals, REDUCED, f, t, f.b, f.H)

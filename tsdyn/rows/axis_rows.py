@@ -10,7 +10,7 @@ from ..sparse.massless_axes import A_AXIS, A_SIDE, A_TARGET, AXIS_BODY, AXIS_H, 
 
 @kernel
 def weigh_axes(network, Y):
-    """Axis rows of Y = W H^T."""
+    """Set the axis rows of Y = W H^T."""
     axes = network.axes
     for i in range(axes.rows.shape[0]):
         put(Y, 16 * axes.rows[i, AXIS_ROW] + 4, four(axes.values[i], AXIS_Y))
@@ -18,7 +18,7 @@ def weigh_axes(network, Y):
 
 @kernel
 def multiply_axes(network, H, Y, values):
-    """Their products with the other rows, and their own, into the blocks of the pattern."""
+    """Add the products of axis rows with all rows to the blocks of S."""
     axes = network.axes
     for i in range(axes.products.shape[0]):
         product, scale = axes.products[i], axes.scales[i]
@@ -31,7 +31,7 @@ def multiply_axes(network, H, Y, values):
 
 @kernel
 def multiply_axes_both(network, H, X, lower, upper):
-    """The same of H X^T, as `factor_lu` takes it; no body is cut."""
+    """Add the products of axis rows to H X^T, in the form of `factor_lu`; no body is split."""
     multiply_axes(network, H, X, upper)
     axes = network.axes
     for i in range(axes.products.shape[0]):
@@ -44,7 +44,7 @@ def multiply_axes_both(network, H, X, lower, upper):
 
 @kernel
 def leave_axes_out(network, values):
-    """In place of it minus one on the diagonal: S is that of the inertias given, and their multipliers are zero."""
+    """Replace axis rows by minus one on the diagonal: S for the given inertias, with zero multipliers of axis rows."""
     axes = network.axes
     for i in range(axes.rows.shape[0]):
         let(values, network.diagonal[axes.rows[i, AXIS_ROW]], -1.0)
@@ -69,5 +69,5 @@ def clear_axes(network, out):
 
 @kernel
 def is_axis(network, values, e):
-    """Whether a row that elimination has failed at, or -1, is an axis row; values are what it has left of S."""
+    """Return True if the failed row of an elimination, or -1, is an axis row; values are the partial factors of S."""
     return e >= 0 and values[network.pattern.shape[1] + e] < 0.0

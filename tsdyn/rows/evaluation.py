@@ -50,7 +50,7 @@ def _remember_unheld(f, Phi):
 
 @kernel
 def serve_still(network, f, S):
-    """Whether the rows that were chosen are about as independent as at best since then, by the factors of S."""
+    """Return True if the selected rows are nearly as independent as at their best, judged by the factors of S."""
     if f.dropped[0] == 0:
         return True
     share = weakest(network, S)
@@ -60,13 +60,13 @@ def serve_still(network, f, S):
 
 @kernel
 def held(f, floor):
-    """Whether the dropped rows hold at a place on the manifold, by the last H taken there."""
+    """Return True if the dropped rows hold on the manifold, by the residuals of the last evaluation."""
     return f.dropped[0] == 0 or f.sizes[UNHELD] <= HELD * floor
 
 
 @kernel
 def factor_rows(network, f, H, Y, S, axes):
-    """Y = W H^T and the factors of S = H W H^T, of H without the dropped rows; the row that fails, or -1.
+    """Set Y = W H^T and the factors of S = H W H^T without dropped rows; return the row that fails, or -1.
 
     Without the `axes` W is that of the inertias given, which serves as a metric; accelerations need them.
     """
@@ -109,7 +109,7 @@ call_choose = caller(CHOOSE)
 
 @kernel
 def _choose(network, f, reals, t, b, H, Y, S, axes):
-    """Choose others to drop, with b, H, Y = W H^T and the factors of S of the new choice; whether there are any."""
+    """Renew the selection of rows; b, H, Y = W H^T and the factors of S follow it. True if S is nonsingular."""
     count = f.dropped[0]
     f.dropped[0] = 0
     run_loops(network, reals, REDUCED, f, t, b, H)
@@ -125,7 +125,7 @@ def _choose(network, f, reals, t, b, H, Y, S, axes):
 
 @callback(CHOOSE)
 def choose_anew(choice, reals, t, b, H, Y, S, axes):
-    """`_choose` by address: few scenes have redundant rows, and it is as long as all the rest. 1 or 0."""
+    """Call `_choose` by address, 1 or 0: few scenes need it, and its code is as long as all other row code."""
     c = load_choice(choice)
     network, f = c.network, c.free
     m, size = network.row.size, network.pattern.shape[2]
@@ -144,7 +144,7 @@ else:
 
 @long_kernel
 def factorise_rows(network, reals, f, t, b, H, Y, S, axes):
-    """Y = W H^T and the factors of S of the present H; of redundant rows others are chosen where these serve no more.
+    """Set Y = W H^T and the factors of S at the present H, with a new selection of redundant rows where needed.
 
     Whether there are any. Then b and H are those of the new choice. `axes` (0 or 1) as in `factor_rows`.
     """

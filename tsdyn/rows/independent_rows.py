@@ -48,7 +48,7 @@ def drop_diagonal(network, dropped, values):
 
 @kernel
 def weakest(network, values):
-    """The least share of its diagonal entry that elimination has left of a row, axis rows not among them.
+    """Return the smallest pivot relative to its diagonal entry, axis rows excluded.
 
     values are factors of S.
     """
@@ -63,7 +63,7 @@ def weakest(network, values):
 
 @long_kernel
 def _choose_of_all(network, H, Y, wanted, least, dropped, A, order):
-    """Choose among all rows at once, A (m, m) scratch; how many are dropped, those that are left less than `least`."""
+    """Select rows by global pivoting, A (m, m) scratch; return the number of rows with pivots below `least`."""
     m, count = network.row.size, 0
     for i in range(m):
         if network.row[i] >= 0:
@@ -107,7 +107,7 @@ def _choose_of_all(network, H, Y, wanted, least, dropped, A, order):
 
 @kernel
 def _choose(size, width, panel, kept, joints, share, A, order):
-    """Order the rows of a block, A (size, size) scratch: the kept ones first; how many they are.
+    """Order the rows of a block by pivoting, kept rows first, A (size, size) scratch; return the number of kept rows.
 
     joints (size,) is negative for rows that are kept in any case, the welds of a hub and the rows of axes.
     """
@@ -138,7 +138,7 @@ def _choose(size, width, panel, kept, joints, share, A, order):
 
 @long_kernel
 def _eliminate_choosing(network, values, share, dropped, A, order):
-    """Factor S in place but for the rows that are left less than a share of their diagonal entry; how many they are.
+    """Factor S in place without rows whose relative pivots are below `share`; return the number of these rows.
 
     As factorisation.factor; what is left in `values` serves nothing. Negative where a row that must be kept can't be.
     """
@@ -176,7 +176,7 @@ def _eliminate_choosing(network, values, share, dropped, A, order):
 
 @kernel
 def _settle(f, count, wanted):
-    """Drop the rows that were chosen, if they are as many as wanted."""
+    """Drop the selected rows if their number is the wanted one."""
     if count < 0 or (wanted >= 0 and count != wanted):
         return False
     f.dropped[0] = count
@@ -187,9 +187,9 @@ def _settle(f, count, wanted):
 
 @long_kernel
 def select(network, f, H, Y, S, wanted, least):
-    """Choose `wanted` rows to drop of H, that of all rows; where wanted < 0, all that are left less than a least share.
+    """Select `wanted` rows of H to drop; if wanted < 0, all rows with relative pivots below `least`.
 
-    Whether there are so many; f.dropped then has them, in order of elimination. Y and S are scratch.
+    Return True if that many exist; f.dropped then lists them in elimination order. Y and S are scratch.
     """
     m, count = network.row.size, -1
     if f.block.size >= m * m and network.welds.shape[0] == 0:

@@ -32,7 +32,7 @@ from ..sparse.constraint_graph import (
 
 @kernel
 def weigh(weights, at, values, i, out, o):
-    """out[o : o + 8] = the weights of one body, 1 / m and J'^-1 or m and J', times values[i : i + 8]."""
+    """Set out[o : o + 8] to values[i : i + 8] times 1 / m and J'^-1, or m and J', of one body."""
     w = at * WEIGHTS
     f = times(four(weights, w + W_ROTATION), splat(values[i + 4]))
     f = fma(four(weights, w + W_ROTATION + 4), splat(values[i + 5]), f)
@@ -43,7 +43,7 @@ def weigh(weights, at, values, i, out, o):
 
 @kernel
 def weigh_rows(network, H, Y):
-    """Y = W H^T, side by side."""
+    """Set Y = W H^T, body by body."""
     for e in range(network.sides.shape[0]):
         for k in range(2):
             at = 16 * e + 8 * k
@@ -52,13 +52,13 @@ def weigh_rows(network, H, Y):
 
 @kernel
 def inner(H, h, Y, y):
-    """The product of two rows at one body."""
+    """Return the product of two rows at one body."""
     return total(fma(four(H, h), four(Y, y), times(four(H, h + 4), four(Y, y + 4))))
 
 
 @kernel
 def _inner_both(H, h, Y, y):
-    """The product of two rows at both bodies."""
+    """Return the product of two rows at both bodies."""
     f = fma(four(H, h), four(Y, y), times(four(H, h + 4), four(Y, y + 4)))
     g = fma(four(H, h + 8), four(Y, y + 8), times(four(H, h + 12), four(Y, y + 12)))
     return total(add(f, g))
@@ -72,7 +72,7 @@ def more(values, at, x):
 
 @kernel
 def multiply_rows(network, H, Y, values):
-    """The upper triangle of H Y^T, Y = W H^T, into the blocks of the pattern, with zeros where elimination fills in."""
+    """Set the upper triangle of S = H Y^T in the blocks of the pattern, with zeros for fill."""
     products = network.products
     for i in range(network.pattern.shape[1]):
         let(values, i, 0.0)
@@ -97,7 +97,7 @@ def multiply_rows(network, H, Y, values):
 
 @kernel
 def _multiply_parts(network, H, Y, values):
-    """The products at the parts of hubs."""
+    """Add the products at the parts of split bodies."""
     for i in range(network.parts.shape[0]):
         part, scale = network.parts[i], network.scales[i]
         left, rows, right, columns = part[H_LEFT], part[H_ROWS], part[H_RIGHT], part[H_COLUMNS]
@@ -120,7 +120,7 @@ def _multiply_parts(network, H, Y, values):
 
 @kernel
 def multiply_both(network, H, X, lower, upper):
-    """H X^T into the blocks of the pattern, as `factor_lu` takes it: its upper triangle, its lower one transposed."""
+    """Set H X^T in the blocks of the pattern as `factor_lu` expects: upper triangle, lower triangle transposed."""
     products = network.products
     for i in range(network.pattern.shape[1]):
         let(upper, i, 0.0)

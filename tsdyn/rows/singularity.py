@@ -14,7 +14,7 @@ NEXT_TO, WITHIN_A_STEP = 1e-3, 0.2  # of it: less is next to one; where fixed st
 
 @kernel
 def note_share(network, f, values):
-    """Take the factors of S at a chart or a step's end, `values`, for where the scene is now."""
+    """Record the singularity indicator from the factors of S, `values`, at a chart or the end of a step."""
     sizes = f.sizes
     sizes[SHARE] = weakest(network, values)
     sizes[LARGEST_SHARE] = max(sizes[SHARE], sizes[LARGEST_SHARE])
@@ -22,5 +22,5 @@ def note_share(network, f, values):
 
 @kernel
 def is_below(f, part):
-    """Whether the share is less than a part of the largest."""
+    """Return True if the indicator is below `part` of its largest value."""
     return f.sizes[SHARE] < part * f.sizes[LARGEST_SHARE]

@@ -8,7 +8,7 @@ from .run_state import ROWS, T
 
 @kernel
 def record(r, log, t, q, qd, qdd):
-    """One row of output, at the last accepted point or within the step at its side."""
+    """Record one output, at the last accepted state or inside the step."""
     n, i = q.size, r.numbers[ROWS]
     row = log.out[i]
     row[0] = t

@@ -75,7 +75,7 @@ class Pace:
 
 
 def drive(memory, task, watch):
-    """Drive a run; the Status, what there is to say about it, and what it `Recorded`.
+    """Drive a run; return Status, message and `Recorded`.
 
     A slice is short enough for Ctrl-C to be answered at once: the first by the memory's `weight`, which is the number
     of coordinates where a step is O(N) and more where it is not, the others by the time that the last took.

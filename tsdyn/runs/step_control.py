@@ -76,7 +76,7 @@ def first_step(context, w, r, at):
 
 @kernel
 def accept(context, l, r, at, h):
-    """Judge the step h just made and choose the next (Gustafsson's PI control). Whether it is accepted."""
+    """Accept or reject the step h and choose the next one (Gustafsson's PI control). True if accepted."""
     end = r.xd if r.numbers[FIRST_ORDER] == 1 else r.y
     call_error(at[A_ERROR], h, r.x.size, r.y.size, end, r.yd, r.tableau, r.memory, r.dx, r.dy)
     if l.numbers[G] > 0.0:

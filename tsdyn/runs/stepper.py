@@ -243,7 +243,7 @@ def _enter(context, c, r, log, at):
 
 @entry("pp", no_record(), "wi")
 def advance(context, run, log, at, most):
-    """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or why it stopped.
+    """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or the reason to stop.
 
     context and run are the addresses of a `Context` and a `Run`, log is a `Record`. The first call, but one with
     most = 0, begins the run; with most = -1 it does no more.

@@ -27,7 +27,7 @@ NO_STEP = 1e-6  # of a fixed step: a time of the grid that is nearer has been re
 
 
 def run_past(task, observe=None):
-    """Run a `Task` of a method that goes by stages; the `Outcome`. An observed run is one part: it passes nothing."""
+    """Run a `Task` of a step method; return the `Outcome`. An observed run has one segment, without crossings."""
     if observe is not None or task.form.first_order or task.prepared.refusal:
         return run_steps(task, observe)
     relay = Relay()

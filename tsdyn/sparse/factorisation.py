@@ -114,19 +114,19 @@ def factor_lu(pattern, lower, upper, limit):
 
 @kernel
 def solve(pattern, values, b):
-    """Solve S x = b in place, b (rows,) in the eliminated order, with what `factor` left."""
+    """Solve S x = b in place, b (rows,) in elimination order, by the factors of `factor`."""
     solve_lu(pattern, values, values, b)
 
 
 @kernel
 def solve_lu_transposed(pattern, lower, upper, b):
-    """Solve N^T x = b in place, with what `factor_lu` left."""
+    """Solve N^T x = b in place, by the factors of `factor_lu`."""
     solve_lu(pattern, upper, lower, b)
 
 
 @kernel
 def solve_lu(pattern, lower, upper, b):
-    """Solve N x = b in place, b (rows,) in the eliminated order, with what `factor_lu` left."""
+    """Solve N x = b in place, b (rows,) in elimination order, by the factors of `factor_lu`."""
     if pattern.shape[0] == 1:
         b[0] *= lower[0]
         return

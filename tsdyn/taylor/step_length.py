@@ -100,7 +100,7 @@ def longest(c, r, tol, most):
 
 @kernel
 def is_next_to(share, c):
-    """Whether a place with this share is next to a singular configuration."""
+    """Return True if a configuration with this indicator is near a singular one."""
     return share < NEAR * c.free.sizes[LARGEST_SHARE]
 
 
@@ -112,6 +112,6 @@ def loosest(c, tol):
 
 @kernel
 def is_near(c, part):
-    """Whether a step ends next to a singular configuration, with less than a part of the share that it began with."""
+    """Return True if a step ends near a singular configuration: the indicator is below `part` of its start value."""
     sizes = c.free.sizes
     return is_next_to(sizes[END_SHARE], c) and sizes[END_SHARE] < part * sizes[SHARE]

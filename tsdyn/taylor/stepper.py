@@ -70,7 +70,7 @@ SMALL, SMALL_STEPS = 0.02, 40  # a step that turns and moves everything by less;
 
 @kernel
 def _mind_singular(c):
-    """After a step: note how near Phi_q is to losing rank."""
+    """Record the singularity indicator after a step."""
     sizes = c.free.sizes
     sizes[SHARE] = sizes[END_SHARE]
     sizes[LARGEST_SHARE] = max(sizes[SHARE], sizes[LARGEST_SHARE])
@@ -168,7 +168,7 @@ def _within(context, c, r, log, steps, t0, t1):
 
 @kernel
 def _fastest(c):
-    """The highest angular velocity."""
+    """Return the largest angular velocity."""
     square = 0.0
     for b in range(c.network.bodies.shape[0]):
         w = c.free.poses[b * POSE + OMEGA : b * POSE + OMEGA + 3]
@@ -178,7 +178,7 @@ def _fastest(c):
 
 @kernel
 def _watch(c, r, h):
-    """Whether the steps have just been found short for what moves: many in which nothing turns or moves far."""
+    """Return True if the motion is found stiff: many steps in which nothing rotates or moves far."""
     far, p = SMALL * c.work.control[FLOOR] / (ROUNDING * h), c.free.poses
     for b in range(c.network.bodies.shape[0]):
         at = b * POSE

@@ -1,1 +1,1 @@
-"""What tsdyn costs, measured against code written by hand; run a file, or python -m benchmarks.step_cost."""
+"""Benchmarks of tsdyn against code written by hand and other engines, such as python -m benchmarks.step_cost."""

@@ -1,9 +1,9 @@
-"""Assemblies of mechanisms from random sketches: how many end on the branch of the sketch, and what they cost.
+"""Assembly from random sketches: the share that ends on the branch of the sketch, and the cost.
 
-Each body is off by up to 0.3 of its link's length and 0.5 rad, both uniform, in any direction; before that each
-mechanism is at a random configuration 0.1 rad or more from its dead centres. Right is the same sign of each of the
-mechanism's orientation determinants as before the disturbance; `clear` counts sketches that are 0.1 rad from a dead
-centre on that side themselves. The last columns are Gauss-Newton steps from the same sketches, for comparison.
+Each mechanism starts from a random configuration at least 0.1 rad from its dead centres. Each body is then disturbed by
+up to 0.3 of its link length and 0.5 rad, both uniform, in a random direction. An assembly is right if every orientation
+determinant of the mechanism has its sign from before the disturbance; `clear` counts sketches that are still 0.1 rad
+from a dead centre on that side. The last columns are plain Gauss-Newton steps from the same sketches.
 
 Run it: python -m benchmarks.assembly [--count 200] [--seed 1] [mechanism ...]
 """

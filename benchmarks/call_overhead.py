@@ -1,6 +1,6 @@
-"""What a call of `ts.simulate` costs besides the computing: runs over an interval of a step or two.
+"""Overhead of a call of `ts.simulate`, from runs over one or two steps.
 
-Python's part is the whole call less the time in the compiled driver. Run it: python -m benchmarks.call_overhead
+The overhead is the time of the call less the time in the compiled driver. Run it: python -m benchmarks.call_overhead
 """
 
 import itertools

@@ -1,4 +1,4 @@
-"""What is compared: anything that runs a scene to its end at a tolerance or of a step, and says how long it took."""
+"""The interface of a contender: it runs a scene to its end at a tolerance or step size and reports the time."""
 
 import time
 from typing import NamedTuple

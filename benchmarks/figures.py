@@ -1,4 +1,4 @@
-"""The figures of the README, from what was measured; matplotlib is needed: pip install '.[plot]'."""
+"""The figures of the README, from recorded measurements; needs matplotlib: pip install '.[plot]'."""
 
 import math
 

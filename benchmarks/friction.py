@@ -1,6 +1,6 @@
-"""What friction of joints costs: an evaluation of a chain whose pins are rough, beside the same chain with smooth pins.
+"""Cost of joint friction: an evaluation of a chain with rough pins against the same chain with smooth pins.
 
-Both hang from hinges with parallel axes and run in turn; quote the ratio. Run it: python -m benchmarks.friction
+Both chains have hinges with parallel axes and run in turn; quote the ratio. Run it: python -m benchmarks.friction
 """
 
 import time

@@ -1,4 +1,4 @@
-"""Run time against error: every contender at every setting that is worth it, the timed rounds interleaved."""
+"""Run time against error: every contender at every useful setting, timed in interleaved rounds."""
 
 from typing import NamedTuple
 

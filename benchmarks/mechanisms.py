@@ -1,4 +1,4 @@
-"""Mechanisms as plain data, which tsdyn, kernels written by hand and other engines all read.
+"""Mechanisms as plain data, read by tsdyn, by kernels written by hand and by other engines.
 
 A definition is a dictionary in the form of tests/references: gravity (m/s^2); bodies, each the arguments of
 `Scene.add_body`; constraints, each (class of ts.constraints, body a, body b, arguments), the ground being body 0;

@@ -1,4 +1,4 @@
-"""tsdyn as contenders: the default method, and every registered one; times are of whole warm calls of `simulate`."""
+"""tsdyn as contender: the default method and every registered one; times are those of warm calls of `simulate`."""
 
 from inspect import signature
 

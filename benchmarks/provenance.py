@@ -1,4 +1,4 @@
-"""Where figures come from: machine, versions, date."""
+"""Provenance of figures: machine, versions, date."""
 
 import datetime
 import platform

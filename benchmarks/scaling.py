@@ -1,9 +1,9 @@
-"""Cost against the number of bodies: open chains, trees, hubs, closed loops, nets of loops. A process each.
+"""Cost against the number of bodies: open chains, trees, hubs, closed loops, nets of loops, one process each.
 
-Columns: building; the first steps, with loading of kernels and analysis; a whole warm run of 0.2 s of motion to 1e-6;
-microseconds an evaluation of the right-hand side per body, steps included and what a call costs at any rate left out,
-by the difference of the shortest runs to 1e-11 and to 1e-6; d log evaluation / d log N; the same two of DOP853; the
-largest memory of the process. An evaluation of the default method, Taylor, is an order of a step.
+Columns: time to build; time of the first steps, with loading of kernels and analysis; a warm run of 0.2 s of motion to
+1e-6; microseconds an evaluation of the right-hand side and body, steps included and the overhead of a call excluded, by
+the difference of the shortest runs to 1e-11 and to 1e-6; d log evaluation / d log N; the last two for DOP853; peak
+memory of the process. For Taylor, the default method, an evaluation is one order of a step.
 
 Run it: python -m benchmarks scaling
 """

@@ -1,4 +1,4 @@
-"""The scenes of the benchmarks, by name, and the references of their ends.
+"""The scenes of the benchmarks by name, and reference solutions for their final states.
 
 SCENES["chain of 64"].build(), .end (s), .definition() (plain data, see mechanisms.py), .reference()
 

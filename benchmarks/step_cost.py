@@ -1,7 +1,7 @@
-"""What a step costs: the general machinery beside the same mathematics written by hand for the sliding top.
+"""Cost of a step: the general machinery against the same mathematics written by hand for the sliding top.
 
-The two run in turn in one process; quote the ratio. Then each phase of a step of the machinery, by `ts.profile`, on the
-top and on a chain. Run it: python -m benchmarks.step_cost
+Runs of both are interleaved in one process; quote the ratio. `ts.profile` then gives the phases of a step, for the top
+and for a chain. Run it: python -m benchmarks.step_cost
 """
 
 import time

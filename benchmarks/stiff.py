@@ -1,4 +1,4 @@
-"""Stiff scenes, fully stated: what they are made of, and how stiff they are.
+"""Stiff scenes: their parameters and the eigenvalues that make them stiff.
 
 jointed   a planar double pendulum of rods 1 m long, m = 1 kg, I = 0.1 kg m^2, released at rest 45 degrees from hanging;
 a torsional spring and damper at the second joint, k = 1e6 N m/rad and c = 1e3 N m s/rad, keeps it straight. The fast

@@ -1,4 +1,4 @@
-"""What bodies cost that a scene never turns: each scene as it is, and with all their coordinates, in turn.
+"""Saving by locked orientations: each scene with and without rotational coordinates of its locked bodies.
 
 Quote the ratio. Run it: python -m benchmarks.still
 """

@@ -1,4 +1,4 @@
-"""A driven turn: the row of a motor, which needs no count of turns.
+"""Prescribed angle: the row of a motor, valid over any number of turns without counting.
 
     E = f.h,  F = g.h              f, g of body a, h of body b: at an angle theta, E = cos(theta), F = sin(theta)
     Phi   = cos(c) F - sin(c) E                             (1)  sin(theta - c); c(t) is the angle prescribed
@@ -7,12 +7,19 @@
     gamma = 2 cos(c) gd.hd - 2 sin(c) fd.hd - 2 cd (sin(c) Fd + cos(c) Ed)
             - cdd (sin(c) F + cos(c) E) - cd^2 Phi          (4)
 
-Holds after half a turn, too: a start there is refused. Singular where h is along the axis f x g.
+The row also admits the angle half a turn away; such a start is refused. Singular if h is along the axis f x g.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..plugins import Motion, Primitive, Vector, dot, product, scaled, sine_cosine
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class AngleDriver(Primitive):
@@ -36,6 +43,18 @@ class AngleDriver(Primitive):
     ------
     InvalidConstraint
         If a direction is missing or zero, or the angle is no motion, or a body is wrong.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> wheel = scene.add_body(mass=1.0, inertia=(1, 1, 2), angular_velocity=(0, 0, 3))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1)))
+    >>> directions = {"reference_a": (1, 0, 0), "across_a": (0, 1, 0), "reference_b": (1, 0, 0)}
+    >>> scene.add(ts.constraints.AngleDriver(scene.ground, wheel, **directions, angle=ts.motions.Ramp(0.0, 3.0)))
+    <AngleDriver 'AngleDriver(ground, body1)'>
+    >>> print(f"{ts.simulate(scene, (0, 5)).state.angle(hinge):.6f} rad")
+    15.000000 rad
     """
 
     rows = 1
@@ -43,7 +62,17 @@ class AngleDriver(Primitive):
     prescribed = "angle"
     slots = 14
 
-    def __init__(self, a, b, *, reference_a=None, across_a=None, reference_b=None, angle=0.0, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        reference_a: ArrayLike | None = None,
+        across_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        angle: Prescribed = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (reference_a, across_a, reference_b), name)
         self.angle = angle
 
@@ -52,7 +81,7 @@ class AngleDriver(Primitive):
         super().__setattr__(name, Motion.always(value, f"{self.name}: angle") if name == "angle" else value)
 
     @property
-    def opposed(self):
+    def opposed(self) -> tuple[Any, ...]:
         """The directions that must not be opposed: that at the angle, and reference_b."""
         return (((self.a, Turned(self.reference_a, self.across_a, self.angle)), (self.b, self.reference_b)),)
 
@@ -134,7 +163,7 @@ class AngleDriver(Primitive):
 class Turned:
     """The direction at a motion's angle between two that are at right angles: a function of time."""
 
-    def __init__(self, f, g, angle):
+    def __init__(self, f: float, g: float, angle: Prescribed) -> None:
         self.f, self.g, self.angle = f, g, angle
 
     def __call__(self, t):

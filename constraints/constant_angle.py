@@ -1,16 +1,22 @@
-"""Constant angle between a direction of each body; all else stays free.
+"""Constant angle between a direction of each body; all other motion is free.
 
     a.b = cos(angle)     (1)  Dot1
 
-Singular where a and b are parallel (an angle of 0 or pi): Parallel keeps them so.
+Singular if a and b are parallel (an angle of 0 or pi): use Parallel.
 """
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..plugins import InvalidConstraint, Joint, Smooth, Vector, number, rotation_matrix
 from .dot1 import Dot1
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class ConstantAngle(Joint):
@@ -35,11 +41,29 @@ class ConstantAngle(Joint):
     Notes
     -----
     One row: angle. `ConstantAngle.at(a, b, axis_a=, axis_b=)` takes both directions in the ground frame.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> mast = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> lean = scene.add(ts.constraints.ConstantAngle.at(mast, scene.ground, axis_a=(1, 0, 1), axis_b=(0, 0, 1)))
+    >>> print(f"{lean.angle:.4f} rad")
+    0.7854 rad
     """
 
     markers = (Vector("a"), Vector("b"))
 
-    def __init__(self, a, b, *, axis_a=None, axis_b=None, angle=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        angle: Prescribed | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (axis_a, axis_b), name)
         if angle is None:
             u, v = (rotation_matrix(body.orientation) @ s for body, s in zip((a, b), self.coordinates, strict=True))

@@ -1,14 +1,21 @@
-"""Cylindrical joint: a common axis; one rotation about it and one displacement along it stay free.
+"""Cylindrical joint: a common axis; rotation about it and displacement along it are free.
 
     f_a.b = 0,  g_a.b = 0                           (1)  two rows, Parallel
     f_a.(x_b - x_a) = 0,  g_a.(x_b - x_a) = 0       (2)  two rows, PointOnLine: x_b on the axis of a
 
-Holds with the axes opposed, too: a start there is refused. Never singular.
+The rows also admit opposed axes; such a start is refused. Never singular.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from ..plugins import Angle, Displacement, Joint, Point, Vector
 from .parallel import Parallel
 from .point_on_line import PointOnLine
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Cylindrical(Joint):
@@ -33,12 +40,34 @@ class Cylindrical(Joint):
     -----
     Rows: axis[0], axis[1], line[0], line[1]. `Cylindrical.at(a, b, point=, axis=)` takes a point and the direction of
     the axis in the ground frame.
+
+    Examples
+    --------
+    A sleeve spins on a vertical shaft and falls along it:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> sleeve = scene.add_body(mass=1.0, inertia=(1, 1, 1), angular_velocity=(0, 0, 3))
+    >>> joint = scene.add(ts.constraints.Cylindrical.at(scene.ground, sleeve, point=(0, 0, 0), axis=(0, 0, 1)))
+    >>> state = ts.simulate(scene, (0, 1)).state
+    >>> print(f"{state.angle(joint):.3f} rad, {state.displacement(joint):.3f} m")
+    3.000 rad, -5.000 m
     """
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(), Displacement())
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
 
     def compose(self):

@@ -6,12 +6,19 @@
     Phi_t = -L Ld / L0                      (3)
     gamma = (dd.dd - Ld^2 - L Ldd) / L0     (4)  dd = d/dt d
 
-Singular where x_a = x_b: a distance of zero is a Spherical joint.
+Singular if x_a = x_b: for zero distance use Spherical.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..plugins import InvalidConstraint, Motion, Point, Primitive, rotation_matrix, square
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class Distance(Primitive):
@@ -31,13 +38,36 @@ class Distance(Primitive):
     ------
     InvalidConstraint
         If the length is not positive and finite (at t = 0, for a function), or a point or body is wrong.
+
+    Examples
+    --------
+    A pendulum of 2 m, released from the horizontal:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(2, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground))
+    >>> def lowest(t, state):
+    ...     return state.position(bob)[0]
+    >>> solution = ts.simulate(scene, (0, 1), events=lowest)
+    >>> print(f"length {rod.length:g} m, lowest at {solution.t_events[0][0]:.4f} s")
+    length 2 m, lowest at 0.8292 s
     """
 
     rows = 1
     markers = (Point("a"), Point("b"))
     prescribed = "length"
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), length=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        length: Prescribed | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b), name)
         if length is None:
             ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]

@@ -5,10 +5,17 @@
     Phi_t = -cd                    (3)
     gamma = 2 ad.bd - cdd          (4)
 
-Singular where a and b are parallel (c = 1 or -1): two Dot1 rows with directions across make axes parallel.
+Singular if a and b are parallel (c = 1 or -1): Parallel uses two rows on perpendicular directions instead.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..plugins import InvalidConstraint, Motion, Primitive, Vector
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class Dot1(Primitive):
@@ -28,13 +35,32 @@ class Dot1(Primitive):
     ------
     InvalidConstraint
         If an axis is missing or zero, or the value is no cosine.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 2, 2))
+    >>> scene.add(ts.constraints.Dot1(body, scene.ground, axis_a=(0, 0, 1), axis_b=(1, 0, 0)))
+    <Dot1 'Dot1(body1, ground)'>
+    >>> scene.mobility().degrees_of_freedom
+    5
     """
 
     rows = 1
     markers = (Vector("a"), Vector("b"))
     prescribed = "value"
 
-    def __init__(self, a, b, *, axis_a=None, axis_b=None, value=0.0, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        value: Prescribed = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (axis_a, axis_b), name)
         self.value = value
         self.check()

@@ -9,7 +9,14 @@
 Never singular by itself.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..plugins import Motion, Point, Primitive, Vector
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class Dot2(Primitive):
@@ -31,13 +38,36 @@ class Dot2(Primitive):
     ------
     InvalidConstraint
         If the axis is missing or zero, or a point, value or body is wrong.
+
+    Examples
+    --------
+    A point mass is kept 0.5 m above the plane z = 0:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> particle = scene.add_point_mass(mass=1.0, position=(1, 0, 0.4))
+    >>> scene.add(ts.constraints.Dot2(scene.ground, particle, axis_a=(0, 0, 1), value=0.5))
+    <Dot2 'Dot2(ground, body1)'>
+    >>> report = scene.assemble()
+    >>> print(particle.position, f"moved by {report.moved:.2f} m")
+    [1.  0.  0.5] moved by 0.10 m
     """
 
     rows = 1
     markers = (Vector("a"), Point("a"), Point("b"))
     prescribed = "value"
 
-    def __init__(self, a, b, *, axis_a=None, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), value=0.0, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        axis_a: ArrayLike | None = None,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        value: Prescribed = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (axis_a, point_a, point_b), name)
         self.value = value
 

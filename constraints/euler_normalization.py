@@ -4,10 +4,17 @@
     Phi_x = p^T               (2)  x = p
     gamma = pd.pd             (3)
 
-Every rigid body of a scene has one by itself.
+Every rigid body of a scene has one automatically.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..plugins import Parameters, Primitive
+
+if TYPE_CHECKING:
+    from ..hints import Body
 
 
 class EulerNormalization(Primitive):
@@ -24,13 +31,23 @@ class EulerNormalization(Primitive):
         If a is a point mass.
     InvalidConstraint
         If a is the ground.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1), name="top")
+    >>> scene.constraints
+    (<EulerNormalization 'EulerNormalization(top)'>,)
+    >>> float(scene.evaluate().Phi[0])
+    0.0
     """
 
     rows = 1
     markers = (Parameters("a"),)
     normalises = True
 
-    def __init__(self, a, *, name=""):
+    def __init__(self, a: Body, *, name: str = "") -> None:
         super().__init__(a, None, (None,), name)
 
     @staticmethod

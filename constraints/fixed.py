@@ -1,17 +1,24 @@
-"""Fixed joint: nothing stays free.
+"""Fixed joint: no relative motion.
 
     x_a - x_b = 0            (1)  three rows, Spherical
     f_a.b = 0,  g_a.b = 0    (2)  two rows, Parallel
     f_a.g_b = 0              (3)  Dot1
 
-f_a and f_b are the references made perpendicular to the axes, g = axis x f. Holds after half a turn about f, g or the
-axis, too: a start there is refused. Never singular.
+f_a and f_b are the references, made perpendicular to the axes; g = axis x f. The rows also admit half a turn about f, g
+or the axis; such a start is refused. Never singular.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Self
 
 from ..plugins import FramedJoint, Ground, Placing, PointMass, rotation_matrix
 from .dot1 import Dot1
 from .parallel import Parallel
 from .spherical import Spherical
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 DEFAULT = (0.0, 0.0, 1.0)  # the axis in a's frame; any would do
 
@@ -39,26 +46,36 @@ class Fixed(FramedJoint):
     -----
     Rows: point[0] to point[2], axis[0], axis[1], turn. `Fixed.at(a, b)` takes the bodies as they stand now; the point,
     in the ground frame, is the centroid of b, or of a where b is the ground, unless `point=` says another.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> beam = scene.add_body(mass=2.0, inertia=(1, 1, 1), position=(1, 0, 0))
+    >>> clamp = scene.add(ts.constraints.Fixed.at(beam, scene.ground, point=(0, 0, 0)))
+    >>> force, torque = ts.simulate(scene, (0, 1)).reaction(clamp)
+    >>> print(force[-1].round(6) + 0.0, torque[-1].round(6) + 0.0)
+    [ 0.  0. 20.] [  0. -20.   0.]
     """
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        axis_a=None,
-        axis_b=None,
-        reference_a=None,
-        reference_b=None,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        reference_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
         self.check()
 
     @Placing
-    def at(cls, a, b=None, *, point=None, **arguments):
+    def at(cls, a: BodyLike, b: BodyLike | None = None, *, point: ArrayLike | None = None, **arguments: Any) -> Self:
         """Make one from points and directions in the ground frame; none are needed."""
         bodies = [body for body in (b, a) if isinstance(body, (PointMass, Ground))]
         if point is None and len(bodies) == 2 and not {"point_a", "point_b"} & arguments.keys():

@@ -1,4 +1,4 @@
-"""Gear pair: two wheels on parallel axes turn in a fixed ratio, against the line of their centres.
+"""Gear pair: wheels on parallel axes rotate in a fixed ratio, relative to the line of centres.
 
     l = x_b - x_a;  for w = f of a, and w = h of b:  X = l.w,  Y = u.(l x w),  S = X^2 + Y^2
     theta = atan2(Y, X)                                              (1)  from the line of centres to w, about u
@@ -7,9 +7,13 @@
     thetadd = (X Ydd - Y Xdd) / S - 2 (X Xd + Y Yd) (X Yd - Y Xd) / S^2                               (4)
               with Xdd = 2 ld.wd, Ydd = 2 (ud.(ld x w) + ud.(l x wd) + u.(ld x wd))
 
-The line of centres turns with whatever carries the wheels, so a planet gear needs nothing more. Turns are counted from
-the last accepted step, so a step must turn less than half a turn. Singular where l, f or h is along the axis.
+The line of centres rotates with the carrier of the wheels, so planetary gears are covered. Turns are counted from the
+last accepted step, so a step must rotate by less than half a turn. Singular if l, f or h is along the axis.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,6 +37,11 @@ from ..plugins import (
     vectors,
 )
 from .thread import place
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
+
+_dot, _cross = vectors.dot, vectors.cross  # by name: `twin` follows the names of kernels
 
 
 class Gear(Primitive):
@@ -65,6 +74,21 @@ class Gear(Primitive):
     -----
     `Gear.at(a, b, point_a=, point_b=, axis=, ratio=)` takes the centres and the axis in the ground frame. At a start
     theta_a lies in (-pi, pi], unless it goes on from the state of another run.
+
+    Examples
+    --------
+    A pinion drives a wheel of twice its radius:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> pinion = scene.add_body(mass=1.0, inertia=(1, 1, 1), angular_velocity=(0, 0, 2))
+    >>> wheel = scene.add_body(mass=1.0, inertia=(1, 1, 2), position=(0.3, 0, 0), angular_velocity=(0, 0, -1))
+    >>> hinges = [ts.constraints.Revolute.at(scene.ground, b, point=b.position, axis=(0, 0, 1)) for b in scene.bodies]
+    >>> fast, slow = map(scene.add, hinges)
+    >>> gear = scene.add(ts.constraints.Gear(pinion, wheel, axis_a=(0, 0, 1), ratio=-0.5))
+    >>> state = ts.simulate(scene, (0, 10)).state
+    >>> print(f"{state.angle(fast):.4f} rad, {state.angle(slow):.4f} rad")
+    20.0000 rad, -10.0000 rad
     """
 
     rows = 1
@@ -74,18 +98,18 @@ class Gear(Primitive):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        axis_a=None,
-        reference_a=None,
-        reference_b=None,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        ratio=None,
-        offset=None,
-        name="",
-    ):
+        axis_a: ArrayLike | None = None,
+        reference_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        ratio: float | None = None,
+        offset: float | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (axis_a, reference_a, reference_b, point_a, point_b), name)
         self.ratio = ratio
         u, f, h, l = self._now()
@@ -140,23 +164,23 @@ class Gear(Primitive):
     def phi(x, par, t, out):
         """Eq. (2)."""
         u, f, h, l = _parts(x)
-        one = angle_near(vectors.dot(u, vectors.cross(l, f)), vectors.dot(l, f), par[2])
+        one = angle_near(_dot(u, _cross(l, f)), _dot(l, f), par[2])
         goal = par[0] * one + par[1]
-        out[0] = angle_near(vectors.dot(u, vectors.cross(l, h)), vectors.dot(l, h), goal.real) - goal
+        out[0] = angle_near(_dot(u, _cross(l, h)), _dot(l, h), goal.real) - goal
 
     @staticmethod
     def jacobian(x, par, t, out):
         """By Eq. (3)."""
         u, f, h, l = _parts(x)
-        sides = vectors.cross(u, l)
+        sides = _cross(u, l)
         for j in range(2):
             factor = -par[0] if j == 0 else 1.0
             w = f if j == 0 else h
-            turned = vectors.cross(l, w)
-            X, Y = vectors.dot(l, w), vectors.dot(u, turned)
+            turned = _cross(l, w)
+            X, Y = _dot(l, w), _dot(u, turned)
             S = X * X + Y * Y
             X, Y = factor * X / S, factor * Y / S
-            wide = vectors.cross(w, u)
+            wide = _cross(w, u)
             for i in range(3):
                 out[0, i] += X * turned[i]
                 out[0, 3 + 3 * j + i] = X * sides[i] - Y * l[i]
@@ -175,7 +199,7 @@ class Gear(Primitive):
     def remember(x, par, t):
         """theta_a."""
         u, f, _, l = _parts(x)
-        return angle_near(vectors.dot(u, vectors.cross(l, f)), vectors.dot(l, f), par[2])
+        return angle_near(_dot(u, _cross(l, f)), _dot(l, f), par[2])
 
     @staticmethod
     def series(x, par, k, s, out):
@@ -234,11 +258,11 @@ def _parts(x):
 @kernel
 def _second(u, w, l, ud, wd, ld):
     """Eq. (4)."""
-    turned = vectors.cross(l, w)
-    X, Y = vectors.dot(l, w), vectors.dot(u, turned)
-    Xd, Xdd = vectors.dot(ld, w) + vectors.dot(l, wd), 2.0 * vectors.dot(ld, wd)
-    one, two = vectors.cross(ld, w), vectors.cross(l, wd)
-    Yd = vectors.dot(ud, turned) + vectors.dot(u, one) + vectors.dot(u, two)
-    Ydd = 2.0 * (vectors.dot(ud, one) + vectors.dot(ud, two) + vectors.dot(u, vectors.cross(ld, wd)))
+    turned = _cross(l, w)
+    X, Y = _dot(l, w), _dot(u, turned)
+    Xd, Xdd = _dot(ld, w) + _dot(l, wd), 2.0 * _dot(ld, wd)
+    one, two = _cross(ld, w), _cross(l, wd)
+    Yd = _dot(ud, turned) + _dot(u, one) + _dot(u, two)
+    Ydd = 2.0 * (_dot(ud, one) + _dot(ud, two) + _dot(u, _cross(ld, wd)))
     S = X * X + Y * Y
     return (X * Ydd - Y * Xdd) / S - 2.0 * (X * Xd + Y * Yd) * (X * Yd - Y * Xd) / (S * S)

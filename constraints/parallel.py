@@ -1,13 +1,20 @@
-"""Parallel axes: a direction of each body stay parallel; three displacements and one rotation stay free.
+"""Parallel axes: one direction of each body; three displacements and one rotation are free.
 
     f_a.b = 0,  g_a.b = 0     (1)  two Dot1; f, g, a a right-handed orthonormal frame of body a
 
-The two rows are orthonormal in terms of small relative rotations. They hold with a and b opposed, too: a start there is
+The two rows are orthonormal in terms of small relative rotations. They also admit a and b opposed; such a start is
 refused. Never singular.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..plugins import Angle, Joint, Vector, across
 from .dot1 import Dot1
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Parallel(Joint):
@@ -29,12 +36,30 @@ class Parallel(Joint):
     Notes
     -----
     Rows: axis[0], axis[1]. `Parallel.at(a, b, axis=)` takes one direction in the ground frame.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> disc = scene.add_body(mass=1.0, inertia=(1, 1, 2), angular_velocity=(0, 0, 4))
+    >>> upright = scene.add(ts.constraints.Parallel.at(scene.ground, disc, axis=(0, 0, 1)))
+    >>> state = ts.simulate(scene, (0, 2)).state
+    >>> print(f"{state.angle(upright):.4f} rad")
+    8.0000 rad
     """
 
     markers = (Vector("a"), Vector("b"))
     joint_coordinates = (Angle(),)
 
-    def __init__(self, a, b, *, axis_a=None, axis_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (axis_a, axis_b), name)
 
     def compose(self):

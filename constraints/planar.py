@@ -1,14 +1,21 @@
-"""Planar joint: a face of each body stay in one plane; two displacements in it and one rotation stay free.
+"""Planar joint: a face of each body in a common plane; two displacements and one rotation are free.
 
     f_a.b = 0,  g_a.b = 0    (1)  two rows, Parallel: a and b are the normals
     a.(x_b - x_a) = 0        (2)  Dot2
 
-Holds with the normals opposed, too: a start there is refused. Never singular.
+The rows also admit opposed normals; such a start is refused. Never singular.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from ..plugins import Angle, Joint, Point, Vector
 from .dot2 import Dot2
 from .parallel import Parallel
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Planar(Joint):
@@ -33,12 +40,34 @@ class Planar(Joint):
     -----
     Rows: axis[0], axis[1], plane. `Planar.at(a, b, point=, axis=)` takes a point and the normal of the plane in the
     ground frame. A single point on a plane is a PlaneContact.
+
+    Examples
+    --------
+    A plate slides over a table and spins on it:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> plate = scene.add_body(mass=1.0, inertia=(1, 1, 2), velocity=(1, 2, 0), angular_velocity=(0, 0, 1))
+    >>> table = scene.add(ts.constraints.Planar.at(scene.ground, plate, point=(0, 0, 0), axis=(0, 0, 1)))
+    >>> state = ts.simulate(scene, (0, 2)).state
+    >>> print(state.position(plate).round(6) + 0.0)
+    [2. 4. 0.]
     """
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(),)
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
 
     def compose(self):

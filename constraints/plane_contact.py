@@ -1,4 +1,4 @@
-"""Point on plane: a point of a stays in a plane of b, on either side (two-sided).
+"""Point on plane: a point of a stays in a plane of b (bilateral).
 
     d     = x_a - x_b,  n = normal of b in the ground frame
     Phi   = n.d                       (1)  [m]
@@ -8,7 +8,14 @@
 Never singular by itself.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..plugins import Point, Primitive, Vector
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class PlaneContact(Primitive):
@@ -34,12 +41,33 @@ class PlaneContact(Primitive):
     Notes
     -----
     The force on a is -lam n: the plane pushes where lam < 0.
+
+    Examples
+    --------
+    A particle slides down a plane at 45 degrees:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> block = scene.add_point_mass(mass=1.0, name="block")
+    >>> plane = scene.add(ts.constraints.PlaneContact(block, scene.ground, normal_b=(1, 0, 1)))
+    >>> solution = ts.simulate(scene, (0, 1))
+    >>> print(solution.position("block")[-1].round(3) + 0.0, solution.multipliers[0].round(3))
+    [ 2.5  0.  -2.5] [-7.071]
     """
 
     rows = 1
     markers = (Point("a"), Point("b"), Vector("b", "normal_b"))
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), normal_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        normal_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, normal_b), name)
 
     @staticmethod

@@ -1,14 +1,21 @@
-"""Point driver: a point of a body follows a path, given in the frame of another.
+"""Point driver: a point of a body follows a prescribed path in the frame of another body.
 
     e_i.(x_b - x_a) = path_i(t)     (1)  three rows, Dot2; e_i are the axes of body a's frame
 
 Never singular.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..plugins import InvalidConstraint, Joint, Motion, Point, is_data
 from .dot2 import Dot2
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Path
 
 
 class PointDriver(Joint):
@@ -35,11 +42,34 @@ class PointDriver(Joint):
     Notes
     -----
     Three rows: path[0] to path[2]. The force that leads b is that of `solution.reaction(driver, on=b)`.
+
+    Examples
+    --------
+    The pivot of a pendulum goes round a circle:
+
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> scene, t = ts.Scene(), ts.motions.time
+    >>> bob = scene.add_body(mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.2, 0, -1), velocity=(0, 0.4, 0))
+    >>> path = (0.2 * np.cos(2.0 * t), 0.2 * np.sin(2.0 * t), 0.0)
+    >>> pivot = scene.add(ts.constraints.PointDriver(scene.ground, bob, point_b=(0, 0, 1), path=path))
+    >>> place = ts.simulate(scene, (0, 1)).state.position(bob, point=(0, 0, 1))
+    >>> print(place.round(6) + 0.0)
+    [-0.083229  0.181859  0.      ]
     """
 
     markers = (Point("a"), Point("b"))
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), path=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        path: Path | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b), name)
         self.path = path
         self.check()

@@ -1,12 +1,19 @@
-"""Point on line: a point of a stays on a line of b; one displacement and three rotations stay free.
+"""Point on line: a point of a stays on a line of b; one displacement and three rotations are free.
 
     f_b.(x_a - x_b) = 0,  g_b.(x_a - x_b) = 0     (1)  two Dot2; f, g, b a right-handed orthonormal frame of body b
 
 Never singular.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..plugins import Displacement, Joint, Point, Vector, across
 from .dot2 import Dot2
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class PointOnLine(Joint):
@@ -32,12 +39,33 @@ class PointOnLine(Joint):
     Notes
     -----
     Rows: line[0], line[1]. `PointOnLine.at(a, b, point=, axis=)` takes the point and the direction in the ground frame.
+
+    Examples
+    --------
+    A bead on a straight wire at 45 degrees:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bead = scene.add_point_mass(mass=1.0)
+    >>> wire = scene.add(ts.constraints.PointOnLine(bead, scene.ground, axis_b=(1, 0, -1)))
+    >>> state = ts.simulate(scene, (0, 1)).state
+    >>> print(state.position(bead).round(6) + 0.0)
+    [ 2.5  0.  -2.5]
     """
 
     markers = (Point("a"), Point("b"), Vector("b"))
     joint_coordinates = (Displacement("axis_b"),)
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_b), name)
 
     def compose(self):

@@ -1,10 +1,14 @@
-"""Rack and pinion: a wheel that turns about its axis moves along a rack in proportion.
+"""Rack and pinion: displacement along a rack in proportion to rotation of a wheel.
 
     radius sin(theta - e.(x_b - x_a) / radius) = 0     (1)  Thread; theta about the axis, from e to h
 
-e is the rack's direction, h a direction of the pinion made perpendicular to its axis. The row is periodic as the teeth
-are, and counts no turns. Singular where the axis of the pinion is along the rack: joints keep it across.
+e is the direction of the rack, h a direction of the pinion, made perpendicular to its axis. The row is periodic and
+counts no turns. Singular if the axis of the pinion is along the rack, which its joints exclude.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +25,9 @@ from ..plugins import (
     turned_about,
 )
 from .thread import Thread, demand_lead, travel
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class RackAndPinion(Joint):
@@ -55,6 +62,22 @@ class RackAndPinion(Joint):
     -----
     One row: teeth. `RackAndPinion.at(a, b, point=, axis=, direction=, radius=)` takes a point on the pinion's axis,
     that axis and the rack's direction in the ground frame.
+
+    Examples
+    --------
+    A pinion of 0.1 m turns in the ground and moves a rack along x:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> rack = scene.add_body(mass=1.0, inertia=(1, 1, 1), velocity=(-0.2, 0, 0))
+    >>> pinion = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(0, 0.1, 0), angular_velocity=(0, 0, 2))
+    >>> slide = scene.add(ts.constraints.Translational.at(scene.ground, rack, point=(0, 0, 0), axis=(1, 0, 0)))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, pinion, point=(0, 0.1, 0), axis=(0, 0, 1)))
+    >>> teeth = {"point": (0, 0.1, 0), "axis": (0, 0, 1), "direction": (1, 0, 0), "radius": 0.1}
+    >>> scene.add(ts.constraints.RackAndPinion.at(rack, pinion, **teeth))
+    <RackAndPinion(body1, body2): 1 row>
+    >>> print(f"{ts.simulate(scene, (0, 1)).state.displacement(slide):.4f} m")
+    -0.2000 m
     """
 
     markers = (
@@ -69,18 +92,18 @@ class RackAndPinion(Joint):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        axis_a=None,
-        axis_b=None,
-        direction_a=None,
-        reference_b=None,
-        radius=None,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        direction_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        radius: float | None = None,
+        name: str = "",
+    ) -> None:
         given = reference_b if reference_b is not None else direction_a
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b, direction_a, given), name)
         self.radius = demand_lead(self, "radius", radius)

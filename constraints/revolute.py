@@ -1,14 +1,21 @@
-"""Revolute joint: a common point and a common axis; one rotation stays free.
+"""Revolute joint: a common point and a common axis; one rotation is free.
 
     x_a - x_b = 0            (1)  three rows, Spherical
     f_a.b = 0,  g_a.b = 0    (2)  two rows, Parallel
 
-Holds with the axes opposed, too: a start there is refused. Never singular.
+The rows also admit opposed axes; such a start is refused. Never singular.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from ..plugins import Angle, Joint, Point, Vector
 from .parallel import Parallel
 from .spherical import Spherical
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Revolute(Joint):
@@ -33,12 +40,34 @@ class Revolute(Joint):
     -----
     Rows: point[0] to point[2], axis[0], axis[1]. `Revolute.at(a, b, point=, axis=)` takes the point and the axis in the
     ground frame, the bodies being where they stand now.
+
+    Examples
+    --------
+    A bar of 1 m, released from the horizontal:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bar = scene.add_body(**ts.shapes.rod(1.0, axis="x", mass=3.0), position=(0.5, 0, 0))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0)))
+    >>> solution = ts.simulate(scene, (0, 1))
+    >>> print(f"{solution.angle(hinge)[-1]:.6f} rad")
+    3.133418 rad
     """
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(),)
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
 
     def compose(self):

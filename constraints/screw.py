@@ -1,18 +1,25 @@
-"""Screw joint: a common axis, and a turn about it for every travel along it.
+"""Screw joint: a common axis; rotation in proportion to displacement along it.
 
     f_a.b = 0,  g_a.b = 0                           (1)  two rows, Parallel
     f_a.(x_b - x_a) = 0,  g_a.(x_b - x_a) = 0       (2)  two rows, PointOnLine: x_b on the axis of a
     lead sin(theta - a.(x_b - x_a) / lead) = 0      (3)  Thread; theta from f_a to f_b about the axis
 
-f_a and f_b are the references made perpendicular to the axes. (1) holds with the axes opposed, too: a start there is
-refused. (3) is periodic as the thread is, and counts no turns. Never singular.
+f_a and f_b are the references, made perpendicular to the axes. (1) also admits opposed axes; such a start is refused.
+(3) is periodic and counts no turns. Never singular.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from ..plugins import Angle, Displacement, FramedJoint
 from .parallel import Parallel
 from .point_on_line import PointOnLine
 from .rotation_motor import set_apart
 from .thread import Thread, demand_lead, travel
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Screw(FramedJoint):
@@ -43,24 +50,36 @@ class Screw(FramedJoint):
     -----
     Rows: axis[0], axis[1], line[0], line[1], thread. `Screw.at(a, b, point=, axis=, lead=)` takes a point and the
     direction of the axis in the ground frame. A thread of one pitch p in m has lead = p / (2 pi).
+
+    Examples
+    --------
+    A nut that may only turn on a vertical screw of 0.1 m/rad:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> nut = scene.add_body(mass=1.0, inertia=(1, 1, 0.99))
+    >>> screw = scene.add(ts.constraints.Screw.at(scene.ground, nut, point=(0, 0, 0), axis=(0, 0, 1), lead=0.1))
+    >>> state = ts.simulate(scene, (0, 1)).state
+    >>> print(f"{state.angle(screw):.4f} rad, {state.displacement(screw):.4f} m")
+    -0.5000 rad, -0.0500 m
     """
 
     joint_coordinates = (Angle(reference="reference_a", direction="reference_b"), Displacement())
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        axis_a=None,
-        axis_b=None,
-        reference_a=None,
-        reference_b=None,
-        lead=None,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        reference_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        lead: float | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
         self.lead = demand_lead(self, "lead", lead)
         turn = travel(a, b, self.axis_a, self.point_a, self.point_b) / self.lead
@@ -93,7 +112,7 @@ class Screw(FramedJoint):
         )
 
     @property
-    def travel_per_radian(self):
+    def travel_per_radian(self) -> float:
         """The lead, m/rad: its angle and its displacement are one freedom."""
         return self.lead
 

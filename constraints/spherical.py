@@ -1,13 +1,20 @@
-"""Spherical joint: a point of each body coincide.
+"""Spherical joint: a point of each body coincides.
 
     Phi   = x_a - x_b         (1)  [m], 3 rows, ground frame
     Phi_x = [ I, -I ]         (2)
-    gamma = 0                 (3)  what remains is the markers' own acceleration
+    gamma = 0                 (3)  the acceleration of the markers is added by the core
 
 Never singular by itself.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..plugins import Point, Primitive
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Spherical(Primitive):
@@ -29,12 +36,30 @@ class Spherical(Primitive):
     Notes
     -----
     The force on b is the multiplier itself, in the ground frame: -Phi_r^T lam = lam.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> pendulum = scene.add_body(mass=2.0, inertia=(1, 1, 1), position=(0, 0, -1))
+    >>> pivot = scene.add(ts.constraints.Spherical(pendulum, scene.ground, point_a=(0, 0, 1)))
+    >>> force, torque = ts.simulate(scene, (0, 1)).reaction(pivot)
+    >>> print(f"{force[0, 2]:.3f} N carry the pendulum at rest")
+    20.000 N carry the pendulum at rest
     """
 
     rows = 3
     markers = (Point("a"), Point("b"))
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b), name)
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""A turn in proportion to a travel: the thread of a screw, or the teeth of a rack.
+"""Rotation in proportion to displacement: the thread of a screw, the teeth of a rack.
 
     E = f.h,  F = g.h,  d = x_b - x_a         f, g, e of body a, h of body b: E = cos(theta), F = sin(theta)
     s     = e.d / L                                                 (1)  L is the lead, m/rad
@@ -9,9 +9,13 @@
     gamma = L cos(s) (Fdd - sd^2 F - sdd E - 2 sd Ed) - L sin(s) (Edd - sd^2 E + sdd F + 2 sd Fd)
             with Edd = 2 fd.hd, Fdd = 2 gd.hd, sdd = 2 ed.dd / L    (5)
 
-It is periodic as a thread is, so no turns are counted; the neighbouring solutions are half a turn or half a pitch away.
-Singular where h is along f x g.
+The row is periodic, so no turns are counted; the neighbouring solutions are half a turn or half a pitch away. Singular
+if h is along f x g.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +31,9 @@ from ..plugins import (
     scaled,
     sine_cosine,
 )
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Thread(Primitive):
@@ -52,6 +59,18 @@ class Thread(Primitive):
     ------
     InvalidConstraint
         If the lead is zero or not finite, or a direction, point or body is wrong.
+
+    Examples
+    --------
+    One row; a `Screw` has those that keep the axes on one line, too:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> nut = scene.add_body(mass=1.0, inertia=(1, 1, 1), velocity=(0, 0, 0.2), angular_velocity=(0, 0, 2))
+    >>> directions = {"reference_a": (1, 0, 0), "across_a": (0, 1, 0), "axis_a": (0, 0, 1), "reference_b": (1, 0, 0)}
+    >>> thread = scene.add(ts.constraints.Thread(scene.ground, nut, **directions, lead=0.1))
+    >>> print(thread.rows, scene.mobility().degrees_of_freedom)
+    1 5
     """
 
     rows = 1
@@ -67,18 +86,18 @@ class Thread(Primitive):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        reference_a=None,
-        across_a=None,
-        axis_a=None,
-        reference_b=None,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        lead=None,
-        name="",
-    ):
+        reference_a: ArrayLike | None = None,
+        across_a: ArrayLike | None = None,
+        axis_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        lead: float | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (reference_a, across_a, axis_a, reference_b, point_a, point_b), name)
         self.lead = lead
         self.check()

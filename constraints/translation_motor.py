@@ -1,13 +1,20 @@
-"""Translation motor: the displacement along an axis is a function of time.
+"""Translation motor: the displacement along an axis is a prescribed function of time.
 
     a.(x_b - x_a) = displacement(t)     (1)  Dot2
 
 Never singular by itself.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Self
+
 from ..plugins import Displacement, Joint, Motion, Point, Vector, fitting
 from .dot2 import Dot2
 from .rotation_motor import axes, geometry
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Prescribed
 
 
 class TranslationMotor(Joint):
@@ -35,14 +42,35 @@ class TranslationMotor(Joint):
     One row: travel. `TranslationMotor.of(joint, displacement=)` drives a joint between its points;
     `TranslationMotor.at(a, b, point=, axis=, displacement=)` takes a point (or `point_a=`, `point_b=`) and the axis in
     the ground frame. The force on b along the axis is that of `solution.reaction(motor, on=b)`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> table = scene.add_body(mass=2.0, inertia=(1, 1, 1), velocity=(0.5, 0, 0))
+    >>> slide = scene.add(ts.constraints.Translational.at(scene.ground, table, point=(0, 0, 0), axis=(1, 0, 0)))
+    >>> motion = 0.1 * np.sin(5.0 * ts.motions.time)
+    >>> drive = scene.add(ts.constraints.TranslationMotor.of(slide, displacement=motion))
+    >>> force, _ = ts.simulate(scene, (0, 1)).reaction(drive, on=table)
+    >>> print(f"{force[-1, 0]:.4f} N")
+    4.7946 N
     """
 
     markers = (Point("a"), Point("b"), Vector("a"))
     joint_coordinates = (Displacement(),)
 
     def __init__(
-        self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, displacement=0.0, name=""
-    ):
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        displacement: Prescribed = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a), name)
         self.displacement = displacement
         self.check()
@@ -55,7 +83,7 @@ class TranslationMotor(Joint):
 
     @classmethod
     @fitting
-    def of(cls, joint, *, displacement, name=""):
+    def of(cls, joint: Joint, *, displacement: Prescribed, name: str = "") -> Self:
         """Make the motor that moves b of a joint against a, along its axis, measured between the joint's points."""
         bodies, given = geometry(joint), axes(joint)
         given.pop("axis_b")

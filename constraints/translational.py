@@ -1,17 +1,24 @@
-"""Translational joint: one displacement along an axis stays free.
+"""Translational joint: displacement along one axis is free.
 
     f_a.b = 0,  g_a.b = 0                           (1)  two rows, Parallel
-    f_a.g_b = 0                                     (2)  Dot1: no turn about the axis
+    f_a.g_b = 0                                     (2)  Dot1: no rotation about the axis
     f_a.(x_b - x_a) = 0,  g_a.(x_b - x_a) = 0       (3)  two rows, PointOnLine: x_b on the axis of a
 
-f_a and f_b are the references made perpendicular to the axes, g = axis x f. Holds after half a turn, too: a start there
-is refused. Never singular.
+f_a and f_b are the references, made perpendicular to the axes; g = axis x f. The rows also admit half a turn; such a
+start is refused. Never singular.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from ..plugins import Displacement, FramedJoint
 from .dot1 import Dot1
 from .parallel import Parallel
 from .point_on_line import PointOnLine
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class Translational(FramedJoint):
@@ -39,23 +46,35 @@ class Translational(FramedJoint):
     -----
     Rows: axis[0], axis[1], turn, line[0], line[1]. `Translational.at(a, b, point=, axis=)` takes a point and the
     direction of the axis in the ground frame.
+
+    Examples
+    --------
+    A block slides down a guide at 45 degrees:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> block = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> guide = scene.add(ts.constraints.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, -1)))
+    >>> state = ts.simulate(scene, (0, 1)).state
+    >>> print(f"{state.displacement(guide):.4f} m, {state.displacement_rate(guide):.4f} m/s")
+    3.5355 m, 7.0711 m/s
     """
 
     joint_coordinates = (Displacement(),)
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        axis_a=None,
-        axis_b=None,
-        reference_a=None,
-        reference_b=None,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        reference_a: ArrayLike | None = None,
+        reference_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
         self.check()
 

@@ -1,17 +1,24 @@
-"""Universal joint (Hooke, Cardan): a common point and a cross of two arms; two rotations stay free.
+"""Universal joint (Hooke, Cardan): a common point and a cross of two arms; two rotations are free.
 
     x_a - x_b = 0     (1)  three rows, Spherical
     a.b = 0           (2)  Dot1: a is the arm of the cross that turns in body a, b the one that turns in body b
 
-Never singular. Shafts at an angle beta turn at the same speed on average only: w_b / w_a = cos(beta) / (1 - sin(beta)^2
-sin(theta)^2), theta being the turn of the shaft of a from where its arm is across both.
+Never singular. Shafts at an angle beta have equal mean speeds only: w_b / w_a = cos(beta) / (1 - sin(beta)^2
+sin(theta)^2), with theta the rotation of shaft a from where its arm is perpendicular to both shafts.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from ..plugins import Angle, InvalidConstraint, Joint, Placing, Point, Vector, in_frame
 from .dot1 import Dot1
 from .spherical import Spherical
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 ALONG = 1e-6  # sine of the angle below which an arm would lie along the shaft
 
@@ -38,16 +45,47 @@ class Universal(Joint):
     Notes
     -----
     Rows: point[0] to point[2], cross. `Universal.at(a, b, point=, axis=, axis_b=)` takes them in the ground frame.
+
+    Examples
+    --------
+    The second axis of the cross follows from the centroid of the second shaft:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> one = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> other = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(1, 0, 0))
+    >>> cross = scene.add(ts.constraints.Universal.at(one, other, point=(0.5, 0, 0), axis=(0, 1, 0)))
+    >>> print(cross, cross.axis_b + 0.0)
+    <Universal(body1, body2): 4 rows> [ 0.  0. -1.]
     """
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(direction="axis_b"), Angle("axis_b", direction="axis_a"))
 
-    def __init__(self, a, b, *, point_a=(0.0, 0.0, 0.0), point_b=(0.0, 0.0, 0.0), axis_a=None, axis_b=None, name=""):
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        axis_a: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
 
     @Placing
-    def at(cls, a, b=None, *, point=None, axis=None, axis_b=None, **arguments):
+    def at(
+        cls,
+        a: BodyLike,
+        b: BodyLike | None = None,
+        *,
+        point: ArrayLike | None = None,
+        axis: ArrayLike | None = None,
+        axis_b: ArrayLike | None = None,
+        **arguments: Any,
+    ) -> Self:
         """Make one from its point and axes in the ground frame, the bodies being where they stand now.
 
         Parameters

@@ -1,9 +1,9 @@
-"""A door on three hinges, whose common axis leans out of the vertical: it swings to and fro under its own weight.
+"""A door on three hinges with a common axis off the vertical: it swings under its own weight.
 
     hinges    three Revolute, ground and door: 15 rows on one body, 5 of them independent
 
-How the hinges share the weight is not determined by rigid bodies, and the solution says so; what they carry together
-is. The turn theta from where the door hangs lowest follows J theta'' = -m g d sin(lean) sin(theta), J about the axis.
+The weight carried by each hinge is statically indeterminate, and the solution reports it as such; the total is unique.
+The angle theta from the lowest position obeys J theta'' = -m g d sin(lean) sin(theta), J about the axis.
 
 Run it: python examples/door.py
 """

@@ -1,7 +1,7 @@
-"""A motor turns a wheel through a soft shaft; a brake rubs on the wheel, and a weight on a spring hangs from its rim.
+"""A motor drives a wheel through a flexible shaft, against a friction brake and a weight on a spring at the rim.
 
-Forces of every sort: a torque given as a function of time, a torsional spring and damper, Coulomb friction, a spring.
-Energy less the work of motor, damper and brake is constant: the balance is the example's check.
+Forces of several kinds: a torque as a function of time, a torsional spring and damper, Coulomb friction, a spring. The
+check is the energy balance: energy minus the work of motor, damper and brake is constant.
 
 Run it: python examples/drive_train.py
 """

@@ -1,13 +1,13 @@
-"""A plug-in constraint that depends on time: a pendulum whose pivot is shaken, here fast enough to stand upside down.
+"""A time-dependent plug-in constraint: a pendulum on a vibrating pivot, here fast enough to stand upside down.
 
-    c(t)  = (0, 0, h cos(w t))                   where the pivot is
+    c(t)  = (0, 0, h cos(w t))                   position of the pivot
     Phi   = x_a - c(t),   Phi_x = I
     Phi_t = -cd = (0, 0, h w sin(w t))
     gamma = -cdd = (0, 0, h w^2 cos(w t))
 
-The same without a plug-in is `PointDriver` with a smooth motion, `build_driven`, which Taylor serves, too.
+`build_driven` is the same scene without a plug-in, by a `PointDriver` and one of ts.motions; Taylor runs it, too.
 
-Kapitza's pendulum: upside down is stable where h w > sqrt(2 g L'), L' = (I + m L^2) / (m L).
+Kapitza's pendulum: the inverted position is stable if h w > sqrt(2 g L'), L' = (I + m L^2) / (m L).
 
 Run it: python examples/driven_pivot.py
 """

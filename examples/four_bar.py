@@ -1,11 +1,11 @@
-"""A planar four-bar of four Revolute joints in space: three more rows than are needed, and nothing to be said about it.
+"""A planar four-bar of four spatial Revolute joints: three redundant rows, without special treatment by the user.
 
     bearing, crank pin, rocker pin, far bearing    Revolute, 5 rows each: 20 for 18 degrees of freedom, 17 independent
 
-What would tilt the links out of their plane is held by every joint, so three rows follow from the others. They are
-left out; which bending moments the joints carry among themselves is not determined, and the solution says so.
+Every joint keeps the links in their plane, so three rows are redundant and are dropped. The bending moments in the
+joints are statically indeterminate, and the solution reports them as such.
 
-Compared with the one equation of the crank's angle theta,
+The check compares with the single equation of the crank angle theta,
 
     M(theta) thetadd + M'(theta) thetad^2 / 2 = -V'(theta),  2 T = M thetad^2     Lagrange
 

@@ -1,9 +1,9 @@
-"""A geared pair: a pinion drives a wheel against a torsional spring, many turns of the one for a few of the other.
+"""A geared pair: a pinion drives a wheel against a torsional spring, over many turns of the pinion.
 
     bearings  Revolute, ground and pinion, ground and wheel    10 rows
     teeth     Gear, pinion and wheel                            1 row: 11 for 12 degrees of freedom
 
-With ratio = -R1 / R2 it is an oscillator in the pinion's turn theta, from rest:
+With ratio = -R1 / R2 it is an oscillator in the pinion angle theta, from rest:
 
     (J1 + ratio^2 J2) thetadd + k ratio^2 theta = torque
 

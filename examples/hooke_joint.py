@@ -1,11 +1,11 @@
-"""Two shafts at an angle, connected by a universal joint: a motor turns one, the other drives a viscous load.
+"""Two shafts at an angle, connected by a universal joint: a motor drives one, the other a viscous load.
 
     bearing       Revolute, ground and driving shaft          5 rows
     cross         Universal, driving and driven shaft         4 rows
     far bearing   PointOnLine, driven shaft and ground        2 rows: 11 for 12 degrees of freedom
 
-The speeds are in the ratio s = w2 / w1 = cos(bend) / (1 - sin(bend)^2 sin(theta)^2), theta being the turn of the
-driving shaft from where its arm is across both shafts. So its one equation is
+The speed ratio is s = w2 / w1 = cos(bend) / (1 - sin(bend)^2 sin(theta)^2), with theta the angle of the driving shaft
+from where its arm is perpendicular to both shafts. The equation of motion is
 
     (J1 + J2 s^2) thetadd + J2 s s' thetad^2 = torque - damping s^2 thetad
 

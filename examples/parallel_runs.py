@@ -1,4 +1,4 @@
-"""Many runs at once: threads share one process and its kernels, processes have their own.
+"""Parallel runs: threads share one process and its kernels; processes have their own.
 
 Run it: python examples/parallel_runs.py
 """

@@ -1,8 +1,8 @@
-"""Two integrators of one's own: a tableau with an error estimate, and a method with a step kernel of its own.
+"""Two integrator plug-ins: a tableau with an error estimate, and a method with its own step kernel.
 
-BogackiShampine is the pair 3(2) behind many an `ode23`: its coefficients are all that it takes. Extrapolation applies
-Gragg's modified midpoint rule over the step, with 2, 4 and 6 parts, and Richardson's extrapolation to the results,
-which has order 6; the kernel steps any system x' = ..., y' = f(t, x, y), compiled and cached as the built-in ones are.
+BogackiShampine, the pair 3(2) of many an `ode23`, is defined by its coefficients alone. Extrapolation applies Gragg's
+modified midpoint rule with 2, 4 and 6 substeps and Richardson extrapolation, for order 6; its kernel steps any system
+x' = ..., y' = f(t, x, y), compiled and cached like the built-in methods.
 
 Run it: python examples/plug_in_integrator.py
 """

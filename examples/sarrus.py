@@ -1,9 +1,9 @@
-"""Sarrus' linkage: six links and six revolute joints in one loop, which guide a platform along a straight line.
+"""Sarrus linkage: one loop of six links and six revolute joints that guides a platform along a straight line.
 
-    two legs of two links, their three hinges parallel; the planes of the legs are at right angles
-    30 rows for 30 degrees of freedom, but one of them follows from the others wherever it goes: one is left free
+    two legs of two links with three parallel hinges each; the planes of the legs are perpendicular
+    30 rows for 30 degrees of freedom, one row redundant in every configuration: one degree of freedom
 
-A spring carries the platform. The turn phi of the legs' lower links from the ground follows
+A spring carries the platform. The angle phi of the lower links from the ground obeys
 
     M thetadd + M' phid^2 / 2 = -V',   M = 2 (m l^2 / 4 + J) + 2 (m l^2 (sin^2 + 9 cos^2) / 4 + J) + 4 P l^2 cos^2
                                        V = 4 m g l sin + 2 P g l sin + k (2 l sin - l0)^2 / 2

@@ -1,10 +1,10 @@
-"""A screw press: a torque turns a screw in its nut, and the screw pushes a platen against a spring and a damper.
+"""A screw press: a torque drives a screw in its nut, which pushes a platen against a spring and a damper.
 
     nut       Screw, ground and screw           5 rows
     guide     Translational, ground and platen  5 rows
     collar    Dot2, screw and platen            1 row: 11 for 12 degrees of freedom
 
-With s = lead theta, the travel downwards, it is one oscillator, here damped:
+With the downward displacement s = lead theta it is a damped oscillator:
 
     (J + m lead^2) thetadd + c lead^2 thetad + k lead^2 theta = torque + m g lead,   m both masses
 

@@ -1,13 +1,13 @@
-"""A slider-crank, in space and without a redundant row: the crank turns over and over and drives a piston.
+"""A spatial slider-crank without redundant rows: the crank makes full turns and drives a piston.
 
     bearing      Revolute, ground and crank          5 rows
     crank pin    Spherical, crank and rod            3 rows
-    wrist pin    Universal, piston and rod           4 rows: the rod turns about the pin, and can't spin about its line
+    wrist pin    Universal, piston and rod           4 rows: the rod rotates about the pin but can't spin about its axis
     guide        Translational, ground and piston    5 rows: 17 for 18 degrees of freedom
 
-Compared with the one equation of the crank's angle theta from the x axis towards z:
+The check compares with the single equation of the crank angle theta, from the x axis towards z:
 
-    r sin(theta) = L sin(phi),  x = r cos(theta) + L cos(phi)                     the rod's angle and the piston
+    r sin(theta) = L sin(phi),  x = r cos(theta) + L cos(phi)                     rod angle and piston
     M(theta) thetadd + M'(theta) thetad^2 / 2 = -V'(theta),  2 T = M thetad^2     Lagrange
 
 Run it: python examples/slider_crank.py

@@ -1,15 +1,15 @@
-"""Stick and slip: a slide is pulled along its rough guide by a spring whose other end moves on at constant speed.
+"""Stick-slip: a spring, its far end at constant speed, pulls a slide along a rough guide.
 
-    guide       Translational, slide and ground      5 rows: the friction follows from what it carries
+    guide       Translational, slide and ground      5 rows: friction in proportion to its reaction
     lead        PointDriver, ground and hook         3 rows: the hook moves along x at the speed V
     spring      from the slide, above its axis, to the hook, higher still
 
-The spring lifts and tilts the slide the more the further it is stretched, so the normal load varies; it creeps until
-the spring is strong enough, then jumps, over and over. Compared with the one equation of the slide's place x,
+The stretched spring lifts and tilts the slide, so the normal load varies. The slide creeps until the spring force
+suffices, then slips, periodically. The check compares with the single equation of the slide's position x,
 
     m xdd = S_x - mu(xd) N,   N = |m g - S_z| + (2 / L) |arm_z S_x - arm_x S_z|
 
-S being the spring's force on the slide.
+where S is the spring force on the slide.
 
 Run it: python examples/stick_slip.py
 """

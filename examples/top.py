@@ -1,4 +1,4 @@
-"""A heavy top whose tip slides on a plane without friction (Haug 2018, section 7.1), lively or asleep.
+"""A heavy top whose tip slides on a plane without friction (Haug 2018, section 7.1), nutating or asleep.
 
 Run it: python examples/top.py
 """

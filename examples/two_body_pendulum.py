@@ -1,4 +1,4 @@
-"""Two spheres: one turns about its fixed centre, the other hangs from it on a massless rod (Haug 2018, section 7.2).
+"""Two spheres: one rotates about its fixed centre, the other hangs from it on a massless rod (Haug 2018, section 7.2).
 
 Run it: python examples/two_body_pendulum.py
 """

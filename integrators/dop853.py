@@ -1,16 +1,22 @@
 """DOP853: the explicit Runge-Kutta method of order 8 of Dormand and Prince, in Hairer's form, adaptive.
 
-Twelve stages; the step's error is estimated at orders five and three, which Hairer combines; three more stages, made
-where a step's inside is wanted, give an interpolant of order seven. E. Hairer, S. P. Norsett, G. Wanner, Solving
-Ordinary Differential Equations I, 2nd ed., II.5, II.6 and II.10. The coefficients are those that SciPy carries.
+Twelve stages; Hairer's error estimate combines embedded formulas of orders five and three. Three further stages, made
+only where dense output is needed, give an interpolant of order seven. E. Hairer, S. P. Norsett, G. Wanner, Solving
+Ordinary Differential Equations I, 2nd ed., II.5, II.6 and II.10. The coefficients are SciPy's.
 """
 
+from __future__ import annotations
+
 from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..plugins import DOP853_INTERPOLANT as INTERPOLANT
 from ..plugins import ExplicitRungeKutta, RungeKuttaTableau, embedded_error, second_embedded_error
+
+if TYPE_CHECKING:
+    from ..hints import StepKernel
 
 
 @cache
@@ -48,6 +54,18 @@ class DOP853(ExplicitRungeKutta):
     ------
     InvalidArgument
         If a tolerance or a step is not positive and finite.
+
+    Examples
+    --------
+    A pendulum of 1 m, released from the horizontal; |Phi| stays at rounding:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+    >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+    >>> solution = ts.simulate(scene, (0, 1), integrator=ts.integrators.DOP853(rtol=1e-10, atol=1e-10))
+    >>> print(f"z = {solution.position(ball)[-1, 2]:.4f} m", solution.constraint_error.position.max() < 1e-12)
+    z = -0.1650 m True
     """
 
     order = 8
@@ -57,14 +75,14 @@ class DOP853(ExplicitRungeKutta):
     errors = (embedded_error, second_embedded_error)
 
     @property
-    def tableau(self):
+    def tableau(self) -> RungeKuttaTableau:
         """The `RungeKuttaTableau`."""
         return _coefficients()[0]
 
-    def kernel(self, first_order):
+    def kernel(self, first_order: bool) -> StepKernel:
         """The step kernel; the interpolant's numbers after the tableau's, and room for its four derivatives."""
         return super().kernel(first_order)[0], _coefficients()[1], lambda nx, ny: 17 * (nx + ny)
 
-    def interpolant(self, first_order):
+    def interpolant(self, first_order: bool) -> Any:
         """Its own, of order seven, for either form."""
         return INTERPOLANT

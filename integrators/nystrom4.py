@@ -1,4 +1,4 @@
-"""Nystrom4: explicit Nystrom, four stages, order 4, the acceleration may depend on the velocity.
+"""Nystrom4: explicit Nystrom method of order 4, four stages, for accelerations that depend on velocity.
 
     stage   c     v                              vd
     1       0     v                              vd
@@ -7,9 +7,11 @@
     4       1     v + h vd + h^2/2 k3            vd + h k3
     step          v + h vd + h^2/6 (k1+k2+k3)    vd + h/6 (k1 + 2 k2 + 2 k3 + k4)
 
-Stages 2 and 3 share their position, so a step places the system three times (the end included) for four accelerations.
+Stages 2 and 3 share one position: a step has three position solves, its end included, and four accelerations.
 Nystrom 1925; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.14, Eq. (14.13).
 """
+
+from __future__ import annotations
 
 from ..plugins import ExplicitNystrom, NystromTableau, RungeKuttaTableau
 
@@ -30,6 +32,18 @@ class Nystrom4(ExplicitNystrom):
     Notes
     -----
     With formulation="maggi-kane" it is its first-order equivalent, the classical Runge-Kutta method.
+
+    Examples
+    --------
+    A pendulum of 1 m, released from the horizontal; |Phi| stays at rounding:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+    >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+    >>> solution = ts.simulate(scene, (0, 1), integrator=ts.integrators.Nystrom4(step=0.01))
+    >>> print(f"z = {solution.position(ball)[-1, 2]:.4f} m", solution.constraint_error.position.max() < 1e-12)
+    z = -0.1650 m True
     """
 
     order = 4
@@ -45,5 +59,5 @@ class Nystrom4(ExplicitNystrom):
         a=((), (1 / 2,), (0, 1 / 2), (0, 0, 1)), b=(1 / 6, 1 / 3, 1 / 3, 1 / 6), c=(0, 1 / 2, 1 / 2, 1), order=4
     )
 
-    def __init__(self, step=1e-3):
+    def __init__(self, step: float = 1e-3) -> None:
         super().__init__(step)

@@ -1,7 +1,7 @@
 """RK45: the embedded pair 5(4) of Dormand and Prince, adaptive.
 
 J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, J. Comput. Appl. Math. 6, 19-26 (1980); applied
-to (v, vd). The seventh stage is the evaluation at the step's end, which the driver makes anyway.
+to (v, vd). First same as last: the seventh stage is the evaluation at the step's end.
 """
 
 from ..plugins import ExplicitRungeKutta, RungeKuttaTableau
@@ -24,6 +24,18 @@ class RK45(ExplicitRungeKutta):
     ------
     InvalidArgument
         If a tolerance or a step is not positive and finite.
+
+    Examples
+    --------
+    A pendulum of 1 m, released from the horizontal; |Phi| stays at rounding:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+    >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+    >>> solution = ts.simulate(scene, (0, 1), integrator=ts.integrators.RK45(rtol=1e-8, atol=1e-8))
+    >>> print(f"z = {solution.position(ball)[-1, 2]:.4f} m", solution.constraint_error.position.max() < 1e-12)
+    z = -0.1650 m True
     """
 
     order = 5

@@ -1,4 +1,4 @@
-"""SDIRK54: L-stable, stiffly accurate, order 5(4), one implicit stage after the other: ESDIRK5(4)7L[2]SA2.
+"""SDIRK54: diagonally implicit, L-stable, stiffly accurate, order 5(4): ESDIRK5(4)7L[2]SA2.
 
 C. A. Kennedy, M. H. Carpenter, Diagonally implicit Runge-Kutta methods for stiff ODEs, Appl. Numer. Math. 146, 221-244
 (2019). Seven stages with the same diagonal, the first explicit; stage order 2; the error estimate is of order 4.
@@ -70,6 +70,18 @@ class SDIRK54(DiagonallyImplicit):
     ------
     InvalidArgument
         If a tolerance or a step is not positive and finite.
+
+    Examples
+    --------
+    A pendulum of 1 m, released from the horizontal; |Phi| stays at rounding:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+    >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+    >>> solution = ts.simulate(scene, (0, 1), integrator=ts.integrators.SDIRK54(rtol=1e-6))
+    >>> print(f"z = {solution.position(ball)[-1, 2]:.4f} m", solution.constraint_error.position.max() < 1e-12)
+    z = -0.1650 m True
     """
 
     order = 5

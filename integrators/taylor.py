@@ -1,8 +1,10 @@
 """Taylor series of the motion, of variable order and step (Jorba and Zou, Experiment. Math. 14, 99, 2005).
 
-The coefficients of r, A, omega' and the multipliers follow order by order from the equations of motion (see
-coefficients.py); at a step's end positions and velocities are put back on the constraints.
+The coefficients of r, A, omega' and lam follow order by order from the equations of motion, see
+coefficients.py. At the end of a step, positions and velocities are projected onto the constraint manifold.
 """
+
+from __future__ import annotations
 
 import math
 
@@ -38,13 +40,35 @@ class Taylor(Integrator):
     ------
     InvalidArgument
         If a tolerance is not positive, or the order is out of range.
+
+    Examples
+    --------
+    A pendulum of 1 m, released from the horizontal; |Phi| stays at rounding:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+    >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+    >>> solution = ts.simulate(scene, (0, 1), integrator=ts.integrators.Taylor(tol=1e-15))
+    >>> print(f"z = {solution.position(ball)[-1, 2]:.4f} m", solution.constraint_error.position.max() < 1e-12)
+    z = -0.1650 m True
     """
 
     order = embedded_order = 15
     driver = "series"
     margin = 1000.0
 
-    def __init__(self, tol=1e-15, order=None, *, rtol=None, atol=None, step=None, max_step=None, first_step=None):
+    def __init__(
+        self,
+        tol: float = 1e-15,
+        order: int | None = None,
+        *,
+        rtol: float | None = None,
+        atol: float | None = None,
+        step: float | None = None,
+        max_step: float | None = None,
+        first_step: float | None = None,
+    ) -> None:
         self.tol = positive(tol, "Taylor: tol")
         self.rtol = self.tol if rtol is None else positive(rtol, "Taylor: rtol")
         self.atol = self.tol if atol is None else positive(atol, "Taylor: atol")
@@ -57,7 +81,7 @@ class Taylor(Integrator):
         if self.fixed is not None:
             self.order = self.embedded_order = self.fixed
 
-    def step_tolerances(self):
+    def step_tolerances(self) -> tuple[float, float]:
         """Return (rtol, atol) that each step's error is held to.
 
         Truncation has one sign for many steps and adds up, rounding has either. So below TIGHT the margin grows, until
@@ -73,11 +97,11 @@ class Taylor(Integrator):
         return 0.5 * (self.rtol + self.atol) < TIGHT
 
     @property
-    def refined(self):
+    def refined(self) -> int:
         """How many orders of the multipliers are refined, from zero on."""
         return REFINED if self._tight else 0
 
-    def orders(self):
+    def orders(self) -> tuple[int, int, int]:
         """Return the first step's order, and the lowest and highest of all."""
         if self.fixed is not None:
             return self.fixed, self.fixed, self.fixed
@@ -86,11 +110,11 @@ class Taylor(Integrator):
         return first, LOWEST, min(first + 8, HIGHEST)
 
     @property
-    def stages(self):
+    def stages(self) -> int:
         """Orders of a step, each of which costs about an evaluation."""
         return self.orders()[0]
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         tolerance = (
             f"tol={self.tol:g}" if self.rtol == self.atol == self.tol else (f"rtol={self.rtol:g}, atol={self.atol:g}")
         )

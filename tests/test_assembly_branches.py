@@ -26,7 +26,7 @@ def test_sketches_assemble_on_their_branch(name):
         try:
             report = mechanism.scene.assemble()
         except ts.InconsistentState as error:
-            assert "fold links to the other side" in str(error)  # noqa: PT017
+            assert "folded to the other side" in str(error)  # noqa: PT017
             refused += 1
             continue
         np.testing.assert_array_equal(np.sign(mechanism.branch()), side)

@@ -13,6 +13,7 @@ import pytest
 import tsdyn
 
 ROOT = Path(__file__).parents[1]
+posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX file permissions, limits or locks")
 
 REPORT = """
 import json, tsdyn
@@ -247,6 +248,7 @@ def test_damaged_kernels_are_compiled_anew(tmp_path, damage):
     assert (again.get("damaged", 0), again["misses"]) == (0, 0)
 
 
+@posix
 def test_full_disk_costs_a_warning_and_not_the_run(tmp_path):
     full = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
     result, errors = run(full + TINY, {"NUMBA_CACHE_DIR": str(tmp_path)})
@@ -258,6 +260,7 @@ def test_full_disk_costs_a_warning_and_not_the_run(tmp_path):
 WITHOUT_PRIVILEGE = ["setpriv", "--bounding-set=-dac_override,-dac_read_search"]  # root heeds permissions, too
 
 
+@posix
 def test_complete_cache_that_can_not_be_written_is_used(tmp_path):
     as_root = hasattr(os, "getuid") and os.getuid() == 0
     if as_root and not shutil.which("setpriv"):
@@ -303,6 +306,7 @@ def test_interrupt_while_llvm_works_is_a_keyboard_interrupt(tmp_path):
     assert process.communicate(timeout=300) == ("interrupted\n2.0 True\n", "")
 
 
+@posix
 def test_no_writable_home_falls_back_to_the_temporary_folder(package):
     blocked = package / "file"
     blocked.touch()
@@ -317,6 +321,7 @@ def test_no_writable_home_falls_back_to_the_temporary_folder(package):
     assert (first["misses"], second["misses"]) == (KERNELS, 0)
 
 
+@posix
 def test_processes_starting_together_compile_once(tmp_path):
     environment = {"NUMBA_CACHE_DIR": str(tmp_path)}
     results = [finish(process)[0] for process in [command(SMALL, environment, ROOT) for _ in range(3)]]

@@ -232,7 +232,7 @@ def test_a_method_that_is_never_the_same(one_scene):
             step, numbers, memory = super().kernel(first_order)
             return step, numbers * (1.0 + 1e-15 * rng.integers(0, 9, numbers.size)), memory
 
-    fails(Moody, "gives other numbers when it is run again")
+    fails(Moody, "is not reproducible")
 
 
 @pytest.mark.parametrize(

@@ -288,9 +288,9 @@ def rod(angle, mu, kind=F.ContactFriction):
 def test_a_mechanism_that_jams_says_so():
     """Above mu = (1 + 3 c^2) / (3 s c), 4 / 3 at 1.1 rad, no reaction is in balance with its friction."""
     assert ts.simulate(rod(1.1, 1.3), (0.0, 0.01), **EXACT).success
-    with pytest.raises(ts.InconsistentState, match="the mechanism jams"):
+    with pytest.raises(ts.InconsistentState, match="mechanism may jam"):
         ts.simulate(rod(1.1, 1.4), (0.0, 0.01), **EXACT)
-    with pytest.raises(ts.SingularConfiguration, match="the mechanism jams"):
+    with pytest.raises(ts.SingularConfiguration, match="mechanism may jam"):
         rod(1.1, 1.4).evaluate()
 
 
@@ -310,7 +310,7 @@ def test_jamming_on_the_way_ends_the_run():
     assert not solution.success
     assert solution.status == ts.Status.JAMMED
     assert solution.reached == pytest.approx(0.004, abs=1e-6)
-    assert "friction is in balance" in solution.message
+    assert "consistent with the friction" in solution.message
     for numbers in (solution.q, solution.qd, solution.qdd, solution.multipliers):
         assert np.isfinite(numbers).all()
         assert len(numbers) > 3
@@ -364,7 +364,7 @@ def test_a_plug_in():
 
 def test_taylor_refuses_by_name_and_the_default_takes_another():
     scene, *_ = pendulum()
-    with pytest.raises(ts.InvalidArgument, match=r"RevoluteFriction\(pin\): its size follows from a reaction"):
+    with pytest.raises(ts.InvalidArgument, match=r"RevoluteFriction\(pin\): its magnitude depends on a reaction"):
         ts.simulate(scene, (0.0, 1.0), integrator="taylor")
     assert "DOP853" in ts.simulate(scene, (0.0, 0.05)).method
 

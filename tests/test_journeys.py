@@ -129,17 +129,30 @@ def test_snippets_run(blocks, request, tmp_path, monkeypatch):
     import_module(name)
 
 
+def commands():
+    """Commands that README, CONTRIBUTING and docs show, inline or in blocks, without the folder of an environment."""
+    for file in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))):
+        blocks = re.findall(r"```sh\n(.*?)```", file.read_text(), re.DOTALL)
+        lines = [part for block in blocks for line in block.splitlines() for part in line.split("&&")]
+        for command in (*re.findall(r"`([^`\n]+)`", file.read_text()), *lines):
+            yield command.strip().replace(".venv/bin/", "")
+
+
 def test_commands_of_the_docs_exist():
-    """Modules and verbs that README and docs name in commands."""
+    """Modules, files and verbs that pages name in commands."""
     from tsdyn.cli.command import main
 
-    for file in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
-        for command in re.findall(r"`([^`\n]+)`", file.read_text()):
-            words = command.split()
-            if words[:2] == ["python", "-m"] and words[2] != "pytest":
-                module = ROOT.joinpath(*words[2].split("."))
-                assert module.with_suffix(".py").exists() or (module / "__main__.py").exists(), command
-            if words[0] == "tsdyn" and len(words) > 1:
-                with pytest.raises(SystemExit) as ended:
-                    main([shlex.split(command)[1], "--help"])
-                assert ended.value.code == 0, command
+    seen = set()
+    for command in commands():
+        words = shlex.split(command, comments=True) if command.startswith(("python", "tsdyn")) else []
+        if words[:2] == ["python", "-m"] and words[2] not in ("pytest", "venv"):
+            module = ROOT.joinpath(*words[2].split("."))
+            assert module.with_suffix(".py").exists() or (module / "__main__.py").exists(), command
+        elif words[:1] == ["python"] and words[1].endswith(".py"):
+            assert (ROOT / words[1]).exists(), command
+        elif words[:1] == ["tsdyn"] and len(words) > 1 and words[1] not in seen:
+            with pytest.raises(SystemExit) as ended:
+                main([words[1], "--help"])
+            assert ended.value.code == 0, command
+        seen.update(words[:2])
+    assert {"-m", "examples/top.py", "tables", "profile"} <= seen

@@ -91,6 +91,8 @@ def test_at_has_the_arguments_of_its_class():
     assert list(inspect.signature(C.Revolute.at).parameters)[:4] == ["a", "b", "point", "axis"]
     assert "lead" in inspect.signature(C.Screw.at).parameters
     assert "lead" not in inspect.signature(C.Revolute.at).parameters
+    assert "axis" in inspect.signature(C.Dot2.at).parameters  # axis_a is on one body only
+    assert "turn" not in inspect.signature(F.Bushing.at).parameters  # nothing to place
     assert next(iter(inspect.signature(F.PointForce.at).parameters)) == "a"
 
 

@@ -165,7 +165,7 @@ def advice(scene, span=(0.0, 1.0), **options):
 
 def test_a_method_that_is_slower_than_the_default():
     said = advice(top.build(), (0.0, 10.0), integrator="rk45", rtol=1e-9, atol=1e-9)
-    assert "Without a method named it is run by Taylor(rtol=1e-09, atol=1e-09)" in said
+    assert "The default method, Taylor(rtol=1e-09, atol=1e-09) at" in said
     assert "times as quick" in said
     assert "the ends differ by" in said
 

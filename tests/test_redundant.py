@@ -174,7 +174,7 @@ def test_constraints_that_contradict_each_other_later():
     solution = ts.simulate(scene, (0.0, 1.0))
     assert not solution.success
     assert solution.status == ts.Status.UNHELD
-    assert "hold no longer" in solution.message
+    assert "no longer hold" in solution.message
     assert solution.t[-1] < 0.1
 
 

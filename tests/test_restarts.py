@@ -40,6 +40,17 @@ def wound():
     return scene
 
 
+def test_a_state_of_arrays_alone_says_that_it_knows_no_bodies():
+    scene = ts.Scene()
+    ball = scene.add_point_mass(1.0, position=(1, 0, 0))
+    solution = ts.simulate(scene, (0, 1))
+    assert isinstance(solution.state, ts.State)
+    arrays = ts.State(*solution.state)
+    np.testing.assert_array_equal(ts.simulate(scene, (1, 2), state=arrays).q[0], solution.q[-1])
+    with pytest.raises(ts.InvalidArgument, match=r"knows no bodies and joints: ask solution\.state"):
+        arrays.position(ball)
+
+
 def test_every_state_of_a_run_goes_on_counting_turns():
     scene, seen = wound(), []
 

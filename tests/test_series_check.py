@@ -217,7 +217,7 @@ REFUSED = {
     "a table": (lambda a, b: F.Torque(a, torque=ts.Table([0, 1], np.ones((2, 3))), name="t"), "its torque is a table"),
     "of state": (lambda a, b: F.PointForce(a, force=follow), r"PointForce\(body1\): it is a function of the state"),
     "user": (lambda a, b: F.UserForce(a, b, function=drag, name="u"), "UserForce 'u': it is a function of the state"),
-    "friction": (lambda a, b: F.CoulombFriction(a, b, force=1.0), r"CoulombFriction\(body1, body2\): its force turns"),
+    "friction": (lambda a, b: F.CoulombFriction(a, b, force=1.0), r"CoulombFriction\(body1, body2\): its force"),
     "plug-in force": (
         lambda a, b: NoForceSeries(a, name="f"),
         "NoForceSeries 'f': NoForceSeries has no kernel `series`",

@@ -132,7 +132,7 @@ def test_two_angles_of_a_universal_joint():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({}, "nothing is said"),
+        ({}, "no value is given"),
         ({"angle": (1, 2)}, "must be a finite number"),
         ({"angle": "right"}, "must be a finite number"),
         ({"angle": np.nan}, "must be a finite number"),

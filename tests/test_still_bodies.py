@@ -10,7 +10,7 @@ from still_scenes import SCENES, C, F, X, Y, Z, block, floating, slider_crank, s
 
 import tsdyn as ts
 from tsdyn.formulations.locked_orientations import keep_turning, moving_network, still
-from tsdyn.sparse.networks import network_of
+from tsdyn.sparse.constraint_graphs import network_of
 
 I = ts.integrators
 END = 1.0

@@ -11,7 +11,7 @@ from test_constraints_hold import chains, check
 import tsdyn as ts
 from examples import pendulum_chain
 from tsdyn.formulations.registry import formulation
-from tsdyn.sparse.networks import network_of
+from tsdyn.sparse.constraint_graphs import network_of
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 FORMS = ("tangent", "null-space")

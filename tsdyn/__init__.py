@@ -1,6 +1,9 @@
 """tsdyn: constrained rigid-body dynamics on the constraint manifold, by Haug's tangent-space ODE."""
 
+from __future__ import annotations
+
 from pathlib import Path as _Path
+from typing import TYPE_CHECKING
 
 _here = _Path(__file__).parent
 if not (_here / "constraints").is_dir():  # a checkout: they stand beside this folder
@@ -102,19 +105,24 @@ __all__ = [
 ]
 
 
-def __getattr__(name):
-    """What is loaded when it is asked for: no run needs it."""
-    if name == "plots":
-        from importlib import import_module
+if TYPE_CHECKING:
+    from . import plots
+    from .profiling.profile import profile
+else:
 
-        return import_module(".plots", __name__)
-    if name == "profile":
-        from .profiling.profile import profile
+    def __getattr__(name):
+        """What is loaded when it is asked for: no run needs it."""
+        if name == "plots":
+            from importlib import import_module
 
-        return profile
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+            return import_module(".plots", __name__)
+        if name == "profile":
+            from .profiling.profile import profile
+
+            return profile
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def __dir__():
+def __dir__() -> list[str]:
     """What users use, for completion."""
     return sorted([*__all__, "__version__"])

@@ -1,15 +1,23 @@
-"""Calls of public functions and classes: one that doesn't fit the signature says what would.
+"""Calls of public functions and classes: a call that doesn't match the signature is answered with the nearest match.
 
-`fitting` wraps a function and costs nothing where a call fits; `Placing` is the descriptor of `.at`, which gives every
-class a signature of its own.
+`fitting` wraps a function and costs nothing for a valid call; `Placing` is the descriptor of `.at`, which gives every
+class its own signature.
 """
+
+from __future__ import annotations
 
 import inspect
 from functools import wraps
 from types import FunctionType, MethodType
+from typing import TYPE_CHECKING, Any
 
 from .errors import InvalidCall
 from .validation import nearest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .hints import Class, Function
 
 KEYWORD, OPEN = inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.VAR_KEYWORD
 BY_POSITION = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
@@ -20,7 +28,7 @@ def unknown_argument(title, name, known):
     return InvalidCall(f"{title}() has no argument {name}{nearest(name, known)} It has {', '.join(known)}.")
 
 
-def fitting(function, then=None):
+def fitting(function: Function, then: Callable[[Any], None] | None = None) -> Function:
     """Wrap a public function, or an `__init__`: a call that doesn't fit its signature raises InvalidCall.
 
     `then` is called with an instance when its `__init__` has ended, that of its own class.
@@ -47,7 +55,7 @@ def fitting(function, then=None):
     return call
 
 
-def fitting_methods(cls):
+def fitting_methods(cls: Class) -> Class:
     """Decorate a class: `fitting` for the public methods that it defines."""
     for name, value in list(vars(cls).items()):
         if isinstance(value, FunctionType) and not name.startswith("_") and not hasattr(value, "__wrapped__"):
@@ -96,14 +104,14 @@ def complete_signature(cls):
 class Placing:
     """Decorate `at`: a classmethod whose signature has the arguments of the class that it is asked of.
 
-    A point or an axis that both bodies have, `point_a` and `point_b`, may be given once, as `point`.
+    A point or an axis is given once, as `point` for `point_a` and `point_b`, or by the name that it has on one body.
     """
 
-    def __init__(self, function):
+    def __init__(self, function: Callable[..., Any]) -> None:
         self.function, self._made = function, {}
         self.__doc__ = function.__doc__
 
-    def __get__(self, instance, owner):
+    def __get__(self, instance: object, owner: type) -> Any:
         if owner not in self._made:
             self._made[owner] = self._of(owner)
         return MethodType(self._made[owner], owner)
@@ -130,10 +138,10 @@ class Placing:
         first = [inspect.Parameter("cls", BY_POSITION[1])]
         first += [p for name, p in whole.items() if name != "self" and p.kind in BY_POSITION]
         keywords = {name: p for name, p in own.items() if p.kind == KEYWORD}
-        markers = [marker.argument for marker in owner.markers]
+        markers = [marker.argument for marker in owner.markers if marker.argument in whole]
         for name in markers:
-            common = name[:-2]
-            if name.endswith("_a") and f"{common}_b" in markers:
-                keywords.setdefault(common, inspect.Parameter(common, KEYWORD, default=None))
+            if name.endswith(("_a", "_b")) and name[:-2] not in whole:
+                given = inspect.Parameter(name[:-2], KEYWORD, default=None, annotation=whole[name].annotation)
+                keywords.setdefault(given.name, given)
         keywords |= {name: p for name, p in whole.items() if p.kind in (KEYWORD, OPEN) and name not in keywords}
         return inspect.Signature([*first, *sorted(keywords.values(), key=lambda p: p.kind)])

@@ -1,6 +1,9 @@
 """What figures share: colours, whether matplotlib is there, and how a figure is written to a file."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import Any
 
 from .errors import InvalidArgument, MissingDependency
 
@@ -17,13 +20,23 @@ def demand_matplotlib():
         raise MissingDependency("the figure needs matplotlib: pip install 'tsdyn[plot]'") from error
 
 
-def save(figure, path):
+def save(figure: Any, path: str | Path) -> Path:
     """Write a figure to a file, in the format that its suffix names, PNG if it has none; return the file's path.
 
     Raises
     ------
     InvalidArgument
         If the folder doesn't exist or can't be written to, or the format is unknown.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from matplotlib.figure import Figure
+    >>> import tsdyn as ts
+    >>> with TemporaryDirectory() as folder:
+    ...     print(ts.plots.save(Figure(), Path(folder) / "errors").name)
+    errors.png
     """
     from matplotlib import style
 

@@ -1,66 +1,230 @@
-"""What can go wrong: exceptions for what is refused before a run, a status for how a run ended."""
+"""Exceptions for input refused before a run; the status with which a run ends."""
+
+from __future__ import annotations
 
 from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .hints import Solution
 
 
 class TsdynError(Exception):
-    """Any error that tsdyn raises on purpose; the message says what is wrong, where, and how to mend it."""
+    """Base of all errors that tsdyn raises; the message says what is wrong, where, and how to fix it.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> try:
+    ...     ts.simulate(scene, (0, 1))
+    ... except ts.TsdynError as error:
+    ...     print(error)
+    the scene has no bodies; add one with scene.add_body(...).
+    """
 
 
 class InvalidArgument(TsdynError, ValueError):
-    """An argument that is neither a body nor a constraint has a wrong value, type or shape."""
+    """An argument has an invalid value, type or shape.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> try:
+    ...     ts.shapes.sphere(0.5)
+    ... except ts.InvalidArgument as error:
+    ...     print(error)
+    sphere: give either mass= in kg or density= in kg/m^3.
+    """
 
 
 class InvalidCall(InvalidArgument, TypeError):
-    """A call that the signature doesn't allow: an argument is misspelt, missing, given twice or one too many."""
+    """A call doesn't match the signature: an argument is misspelt, missing, duplicate or superfluous.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> try:
+    ...     ts.Table(time=(0, 1), values=(0, 1))
+    ... except ts.InvalidCall as error:
+    ...     print(error)
+    Table() has no argument time; did you mean times? It has times, values.
+    """
 
 
 class InvalidBody(TsdynError, ValueError):
-    """A body's mass, inertia, pose or velocity is impossible, or the body belongs to another scene."""
+    """The mass, inertia, pose or velocity of a body is inadmissible, or the body belongs to another scene.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> try:
+    ...     scene.add_body(mass=-1.0, inertia=(1, 1, 1))
+    ... except ts.InvalidBody as error:
+    ...     print(error)
+    body1: mass (kg) must be a positive finite number, got -1.0.
+    """
 
 
 class InvalidConstraint(TsdynError, ValueError):
-    """A constraint's geometry, bodies or kernels are impossible."""
+    """The geometry, bodies or kernels of a constraint are inadmissible.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> try:
+    ...     ts.constraints.Dot1(body, scene.ground, axis_a=(0, 0, 1), axis_b=(0, 0, 0))
+    ... except ts.InvalidConstraint as error:
+    ...     print(error)
+    Dot1(body1, ground): axis_b has length zero; give a direction, such as (0, 0, 1).
+    """
 
 
 class InvalidForce(TsdynError, ValueError):
-    """A force's numbers, functions, bodies or kernels are impossible."""
+    """The parameters, functions, bodies or kernels of a force are inadmissible.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> try:
+    ...     ts.forces.Spring(body, scene.ground, point_b=(1, 0, 0), stiffness=-5.0)
+    ... except ts.InvalidForce as error:
+    ...     print(error)
+    Spring(body1, ground): stiffness must be a finite number that is not negative, got -5.0.
+    """
 
 
 class InconsistentState(TsdynError, ValueError):
-    """Positions or velocities break a constraint; the message names it and its residual."""
+    """Positions or velocities violate a constraint; the message names the row and its residual.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> rod = scene.add(ts.constraints.Distance(body, scene.ground, point_b=(1, 0, 0), length=1.5))
+    >>> try:
+    ...     ts.simulate(scene, (0, 1))
+    ... except ts.InconsistentState as error:
+    ...     print(error)
+    the initial position breaks 1 constraint row (allowed: 2e-09):
+      Distance(body1, ground): Phi = -0.416667
+    Correct the bodies' poses, or call scene.assemble() to move them to the nearest consistent ones.
+    """
+
+    constraints: tuple[Any, ...] = ()  # in conflict, where no state meets all of them
 
 
 class RedundantConstraints(TsdynError, ValueError):
-    """Rows of Phi_q depend on each other; the message names them."""
+    """Rows of Phi_q are linearly dependent; the message names them.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> one, two = (scene.add(ts.constraints.Spherical(body, scene.ground)) for _ in range(2))
+    >>> try:
+    ...     ts.simulate(scene, (0, 1), redundancy="refuse")
+    ... except ts.RedundantConstraints as error:
+    ...     print(str(error).splitlines()[0])
+    3 of the 7 constraint rows are redundant, Phi_q has rank 4:
+    """
 
 
 class SingularConfiguration(TsdynError, ArithmeticError):
-    """The equations of motion have no unique solution here: Phi_q loses rank, or D^T M D is singular."""
+    """The equations of motion have no unique solution: Phi_q loses rank, or D^T M D is singular.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> needle = scene.add_body(**ts.shapes.rod(1.0, mass=1.0), name="needle")  # no inertia about its axis
+    >>> try:
+    ...     ts.simulate(scene, (0, 1))
+    ... except ts.SingularConfiguration as error:
+    ...     print(str(error).partition(", so")[0])
+    needle: turning about the axis [0. 0. 1.] of its frame is free and carries no inertia
+    """
 
 
 class UnknownAttribute(TsdynError, AttributeError):
-    """An attribute that a body, constraint or scene does not have was set: a slip of the pen would change nothing."""
+    """Assignment to an attribute that a body, constraint, force or scene doesn't have.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> try:
+    ...     body.masss = 2.0
+    ... except ts.UnknownAttribute as error:
+    ...     print(error)
+    <Body 'body1'> has no attribute 'masss' to set; did you mean mass?
+    """
 
 
 class MissingDependency(TsdynError, ImportError):
-    """An optional package is needed for this and is not installed."""
+    """A feature needs an optional package that is not installed.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> issubclass(ts.MissingDependency, ImportError)
+    True
+    """
 
 
 class StepFailure(TsdynError, ArithmeticError):
-    """A run ended early; raised by `Solution.raise_if_failed`, with the solution so far as `.solution`."""
+    """A run ended early; raised by `Solution.raise_if_failed`, with the partial solution as `.solution`.
 
-    def __init__(self, message, solution=None):
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> try:
+    ...     ts.simulate(scene, (0, 1), max_steps=2).raise_if_failed()
+    ... except ts.StepFailure as failure:
+    ...     print(failure.solution.stats.steps, failure.solution.status)
+    2 max_steps
+    """
+
+    def __init__(self, message: str, solution: Solution | None = None) -> None:
         super().__init__(message)
-        self.solution = solution
+        self.solution: Solution | Any = solution  # never None where `raise_if_failed` has raised it
 
 
 class CheckFailed(TsdynError, AssertionError):
-    """A check of a plug-in failed; the message says which entry, what it gave and what it should have given."""
+    """A check of a plug-in failed; the message names the entry, its value and the expected value.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> issubclass(ts.testing.CheckFailed, ts.TsdynError)
+    True
+    """
 
 
 class Status(IntEnum):
-    """How a run ended, or the stop of one slice of it; `sentence` says it, `remedy` what to do."""
+    """Reason for the end of a run or of a slice of it; `sentence` states it, `remedy` what to do.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> solution = ts.simulate(scene, (0, 1), max_steps=2)
+    >>> solution.status == ts.Status.MAX_STEPS, solution.status.sentence
+    (True, 'The run reached max_steps.')
+    """
 
     SUCCESS = 0
     NEWTON_FAILED = 1
@@ -81,19 +245,19 @@ class Status(IntEnum):
     PASSAGE = 16
     SAMPLING_FAILED = 17
 
-    def __str__(self):
+    def __str__(self) -> str:
         return self.name.lower()
 
-    def __format__(self, spec):
+    def __format__(self, spec: str) -> str:
         return format(str(self), spec)
 
     @property
-    def sentence(self):
-        """What happened, without the place."""
+    def sentence(self) -> str:
+        """What happened, without the location."""
         return _SENTENCES[self][0]
 
     @property
-    def remedy(self):
+    def remedy(self) -> str:
         """What to try."""
         return _SENTENCES[self][1]
 
@@ -101,53 +265,55 @@ class Status(IntEnum):
 _SENTENCES = {
     Status.SUCCESS: ("The run reached the end of the interval.", ""),
     Status.NEWTON_FAILED: (
-        "Newton's method for the position constraints (Eq. 29) did not converge, not even on a fresh chart.",
+        "Newton's method for the position constraints (Eq. 29) did not converge, even on a new chart.",
         "Take a smaller step.",
     ),
     Status.NOT_FINITE: (
-        "A number stopped being finite.",
-        "Look for a motion, a force or a plug-in that returns inf or nan here, or take a smaller step.",
+        "A number is no longer finite.",
+        "Check for a motion, force or plug-in that returns inf or nan here, or take a smaller step.",
     ),
     Status.SINGULAR: (
         "The constraint Jacobian Phi_q has lost rank: this is a singular configuration.",
-        "Taylor series pass such a place where the motion is smooth, if every part of the scene has one; else start "
-        "elsewhere, or remove the constraint that has become dependent.",
+        "The Taylor integrator passes a singular configuration if the motion is smooth and every part of the scene has "
+        "a series; else start from another configuration, or remove the constraint that has become dependent.",
     ),
     Status.MASS_SINGULAR: (
-        "The reduced mass matrix D^T M D is not positive definite: a direction that the constraints leave free "
-        "carries no inertia.",
-        "Give the body inertia about its free axis, or add the constraint that holds it.",
+        "The reduced mass matrix D^T M D is not positive definite: a free direction has no inertia.",
+        "Give the body inertia about its free axis, or constrain that axis.",
     ),
     Status.CHART_LOST: (
-        "The motion left its chart within a single step, so which branch of the constraints it is on is not certain.",
+        "The motion left its chart within one step, so its branch of the constraints is uncertain.",
         "Take a smaller step.",
     ),
     Status.STEP_COLLAPSED: (
-        "The step that the tolerances ask for is down to rounding of the time.",
-        "Look for a singular configuration, a jump in a motion or stiff parts near this time; or loosen rtol and atol.",
+        "The step size that the tolerances require has reached the rounding of the time.",
+        "Check for a singular configuration, a jump in a motion or stiffness near this time, or loosen rtol and atol.",
     ),
     Status.STAGE_FAILED: (
-        "Newton's method for a stage of the implicit method did not converge, or went far from its prediction.",
-        "Take a smaller step, or an adaptive one.",
+        "Newton's method for an implicit stage did not converge, or ended far from its prediction.",
+        "Take a smaller step, or an adaptive method.",
     ),
     Status.MAX_STEPS: ("The run reached max_steps.", "Raise max_steps, or take a larger step."),
-    Status.INTERRUPTED: ("The run was interrupted.", "Go on with simulate(scene, (t, t_end), state=solution.state)."),
+    Status.INTERRUPTED: (
+        "The run was interrupted.",
+        "Continue with simulate(scene, (t, t_end), state=solution.state).",
+    ),
     Status.EVENT: ("A terminal event ended the run.", ""),
-    Status.EVENT_FAILED: ("An event function gave no number.", "Mend it, or return a finite float for every state."),
+    Status.EVENT_FAILED: ("An event function returned no number.", "It must return a finite float for every state."),
     Status.UNHELD: (
-        "Constraint rows that followed from the others at the start hold no longer: together they can't be met here.",
-        "Remove one of the constraints that contradict each other, or correct their points and axes.",
+        "Constraint rows that were redundant at the start no longer hold: the constraints are incompatible here.",
+        "Remove one of the conflicting constraints, or correct their points and axes.",
     ),
     Status.JAMMED: (
-        "No reactions could be found with which the joints' friction is in balance.",
-        "The coefficients may be so large that the mechanism jams, so that no motion follows from rigid bodies; else "
-        "take a smaller step.",
+        "No reactions are consistent with the friction of the joints.",
+        "The mechanism may jam: with large friction coefficients rigid-body dynamics has no solution. Otherwise take a "
+        "smaller step.",
     ),
-    Status.STIFF: ("The motion is stiff, and an implicit method is cheaper.", "Use SDIRK54."),
+    Status.STIFF: ("The motion is stiff; an implicit method is cheaper.", "Use SDIRK54."),
     Status.SLICE_DONE: ("A slice of the run is done.", ""),
     Status.SAMPLING_FAILED: (
-        "A function that is sampled gave no number.",
-        "Mend it, or return a finite float for every angle and rate.",
+        "The function of a sampled load returned no number.",
+        "It must return a finite float for every coordinate and rate.",
     ),
-    Status.PASSAGE: ("A singular configuration is near, and there is a way past it.", ""),
+    Status.PASSAGE: ("A singular configuration is near; the Taylor integrator takes over.", ""),
 }

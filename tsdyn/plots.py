@@ -1,22 +1,30 @@
-"""Figures (matplotlib, an optional dependency, is imported when one is drawn).
+"""Figures; matplotlib, an optional dependency, is imported on first use.
 
-`constraint_error` draws one solution into axes of the caller's; `tables_figure` draws what `tables.reproduce` measured,
-without pyplot and so without touching the caller's backend or figures.
+`constraint_error` draws one solution into the caller's axes; `tables_figure` draws the result of
+`haug_tables.reproduce` without pyplot, so it affects neither the caller's backend nor open figures.
 """
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .benchmarking.haug_tables import DURATION, LEVELS
 from .drawing import BLUE, GREEN, GREY, VERMILION, demand_matplotlib, save
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .hints import Solution
+
 ZERO = 1e-17  # what an error of exactly zero is drawn as: below any other
 POINTS = 400  # stretches of time, the largest error of each of which is drawn
 UNITS = ("m", "m/s", "m/s²")
 
 
-def constraint_error(solution, ax=None):
+def constraint_error(solution: Solution, ax: Any = None) -> Any:
     """Draw the constraint errors of a solution over time: position, velocity and acceleration, log scale.
 
     Of a long run the largest error in each of 400 stretches of time is drawn; zeros are drawn at 1e-17.
@@ -35,6 +43,18 @@ def constraint_error(solution, ax=None):
     ------
     MissingDependency
         If matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> from matplotlib.figure import Figure
+    >>> figure = Figure()
+    >>> axes = ts.plots.constraint_error(ts.simulate(scene, (0, 1)), figure.subplots())
+    >>> axes.get_yscale()
+    'log'
     """
     demand_matplotlib()
     if ax is None:
@@ -52,7 +72,7 @@ def constraint_error(solution, ax=None):
     return ax
 
 
-def tables_figure(tables):
+def tables_figure(tables: Sequence[Any]) -> Any:
     """Draw constraint errors over time at the tightest tolerance: scenes side by side, a panel for each level.
 
     Parameters
@@ -68,6 +88,15 @@ def tables_figure(tables):
     ------
     MissingDependency
         If matplotlib is not installed.
+
+    Examples
+    --------
+    The tables take minutes:
+
+    >>> import tsdyn as ts
+    >>> from tsdyn.benchmarking.haug_tables import reproduce
+    >>> figure = ts.plots.tables_figure(reproduce())  # doctest: +SKIP
+    >>> ts.plots.save(figure, "tables.png")  # doctest: +SKIP
     """
     demand_matplotlib()
     from matplotlib import style

@@ -3,14 +3,20 @@
 box, sphere, cylinder, rod, from_mesh; +, moved and rotated make one body of several.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import InvalidArgument
 from .maths.mesh_integrals import moments
 from .validation import floats, number, positive, vector3
+
+if TYPE_CHECKING:
+    from .hints import ArrayLike, Axis, Floats, Rotation
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
@@ -26,24 +32,36 @@ class Shape:
         About the centroid, in axes parallel to the shape's own frame: those of the body.
     centroid : ndarray (3,), m
         In the shape's own frame. A point p of that frame is p - centroid in the body's.
+
+    Examples
+    --------
+    A hammer, its handle along z:
+
+    >>> import tsdyn as ts
+    >>> handle = ts.shapes.cylinder(0.015, 0.3, density=700)
+    >>> head = ts.shapes.box((0.1, 0.03, 0.03), density=7850).moved((0, 0, 0.15))
+    >>> hammer = handle + head
+    >>> print(f"{hammer.mass:.3f} kg, centroid at z = {hammer.centroid[2]:.4f} m")
+    0.855 kg, centroid at z = 0.1240 m
+    >>> body = ts.Scene().add_body(**hammer)
     """
 
     mass: float
-    inertia: np.ndarray
-    centroid: np.ndarray
+    inertia: Floats
+    centroid: Floats
 
-    def keys(self):
+    def keys(self) -> tuple[str, str]:
         """What `add_body` is given."""
         return ("mass", "inertia")
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> Any:
         return {"mass": self.mass, "inertia": self.inertia}[name]
 
-    def moved(self, by):
+    def moved(self, by: ArrayLike) -> Shape:
         """The same shape elsewhere in its frame; by (3,), m."""
         return Shape(self.mass, self.inertia, self.centroid + vector3(by, "shape.moved: by (m)", InvalidArgument))
 
-    def rotated(self, rotation):
+    def rotated(self, rotation: ArrayLike | Rotation) -> Shape:
         """The shape turned about the origin of its frame, by a matrix (3, 3) or a scipy Rotation."""
         A = floats(rotation.as_matrix() if hasattr(rotation, "as_matrix") else rotation)
         if A.shape != (3, 3) or not np.abs(A @ A.T - np.eye(3)).max() < 1e-9 or np.linalg.det(A) < 0.0:
@@ -52,7 +70,7 @@ class Shape:
             )
         return Shape(self.mass, A @ self.inertia @ A.T, A @ self.centroid)
 
-    def __add__(self, other):
+    def __add__(self, other: Shape) -> Shape:
         if not isinstance(other, Shape):
             raise InvalidArgument(f"a shape can be added to a shape only, not to {other!r}.")
         mass = self.mass + other.mass
@@ -62,7 +80,7 @@ class Shape:
         return Shape(mass, inertia, centroid)
 
 
-def box(size, *, mass=None, density=None):
+def box(size: ArrayLike, *, mass: float | None = None, density: float | None = None) -> Shape:
     """A cuboid about its centre, edges along the axes.
 
     Parameters
@@ -81,6 +99,13 @@ def box(size, *, mass=None, density=None):
     ------
     InvalidArgument
         If a length, mass or density is not positive and finite, or not one of mass and density is given.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> block = ts.shapes.box((1, 2, 3), mass=12.0)
+    >>> print(block.inertia.diagonal())
+    [13. 10.  5.]
     """
     edges = vector3(size, "box: size (m)", InvalidArgument)
     if not (edges > 0.0).all():
@@ -90,8 +115,15 @@ def box(size, *, mass=None, density=None):
     return _shape(m, (m / 12.0) * (squares.sum() - squares))
 
 
-def sphere(radius, *, inner=0.0, mass=None, density=None):
-    """A ball about its centre; with an inner radius, m, a hollow one. Other arguments and errors as for `box`."""
+def sphere(radius: float, *, inner: float = 0.0, mass: float | None = None, density: float | None = None) -> Shape:
+    """A ball about its centre; with an inner radius, m, a hollow one. Other arguments and errors as for `box`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> print(ts.shapes.sphere(0.5, mass=10.0).inertia.diagonal().round(6))
+    [1. 1. 1.]
+    """
     a, b = _radii("sphere", radius, inner)
     m = _mass("sphere", 4.0 / 3.0 * math.pi * (a - b) * (a * a + a * b + b * b), mass, density)
     ratio = b / a  # (a^5 - b^5) / (a^3 - b^3), with a - b divided out
@@ -99,10 +131,24 @@ def sphere(radius, *, inner=0.0, mass=None, density=None):
     return _shape(m, np.full(3, 0.4 * m * a * a * share))
 
 
-def cylinder(radius, length, *, axis="z", inner=0.0, mass=None, density=None):
+def cylinder(
+    radius: float,
+    length: float,
+    *,
+    axis: Axis = "z",
+    inner: float = 0.0,
+    mass: float | None = None,
+    density: float | None = None,
+) -> Shape:
     """A cylinder about its centre, along the axis "x", "y" or "z"; with an inner radius, m, a tube.
 
     Other arguments and errors as for `box`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> print(ts.shapes.cylinder(0.2, 1.0, axis="x", mass=6.0).inertia.diagonal().round(6))
+    [0.12 0.56 0.56]
     """
     a, b = _radii("cylinder", radius, inner)
     length = positive(length, "cylinder: length (m)")
@@ -110,21 +156,29 @@ def cylinder(radius, length, *, axis="z", inner=0.0, mass=None, density=None):
     return _round("cylinder", m, a * a + b * b, length, axis)
 
 
-def rod(length, *, axis="z", mass):
+def rod(length: float, *, axis: Axis = "z", mass: float) -> Shape:
     """A slender rod about its centre, along the axis "x", "y" or "z".
 
-    It has no inertia about its axis: a joint must hold that turn. A rod with a thickness is a `cylinder`.
+    It has no inertia about its axis, so a joint must constrain that rotation. For a rod with thickness use `cylinder`.
 
     Raises
     ------
     InvalidArgument
         If the length or mass is not positive and finite, or the axis is unknown.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> print(ts.shapes.rod(2.0, axis="x", mass=3.0).inertia.diagonal())
+    [0. 1. 1.]
     """
     return _round("rod", positive(mass, "rod: mass (kg)"), 0.0, positive(length, "rod: length (m)"), axis)
 
 
-def from_mesh(vertices, faces, *, mass=None, density=None):
-    """The solid that a closed mesh of triangles bounds; exact, but for rounding.
+def from_mesh(
+    vertices: ArrayLike, faces: ArrayLike, *, mass: float | None = None, density: float | None = None
+) -> Shape:
+    """The solid bounded by a closed triangle mesh; exact to rounding.
 
     Parameters
     ----------
@@ -144,7 +198,18 @@ def from_mesh(vertices, faces, *, mass=None, density=None):
     ------
     InvalidArgument
         If the mesh is not closed, its triangles don't turn the same way or all face inward, it has no volume, or an
-        index is out of range. A mesh that cuts through itself is not noticed.
+        index is out of range. Self-intersections are not detected.
+
+    Examples
+    --------
+    A tetrahedron:
+
+    >>> import tsdyn as ts
+    >>> vertices = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+    >>> faces = ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
+    >>> solid = ts.shapes.from_mesh(vertices, faces, density=600.0)
+    >>> print(f"{solid.mass:.3f} kg", solid.centroid.round(6))
+    100.000 kg [0.25 0.25 0.25]
     """
     volume, centroid, second = moments(vertices, faces)
     m = _mass("from_mesh", volume, mass, density)

@@ -1,4 +1,4 @@
-"""Numbers that users give: taken only where they are numbers, so that nothing is rounded, parsed or cut silently."""
+"""Validation of users' numbers: no silent rounding, parsing or truncation."""
 
 import difflib
 import math

@@ -1,4 +1,4 @@
-"""The figure of `benchmark`: run time against error, a panel a scene, a line a method."""
+"""The work-precision figure of `benchmark`: one panel a scene, one line a method."""
 
 from ..drawing import BLUE, GREEN, GREY, VERMILION, demand_matplotlib
 

@@ -1,6 +1,6 @@
-"""The two tables of Haug (2018), measured here: constraint errors of the sliding top and of the two-body pendulum.
+"""The two tables of Haug (2018), reproduced: constraint errors of the sliding top and of the two-body pendulum.
 
-`reproduce` runs everything and returns data, `as_text` lays the data out. `tsdyn tables` prints it.
+`reproduce` makes the runs and returns data, `as_text` formats the data. `tsdyn tables` prints both tables.
 """
 
 import math
@@ -57,7 +57,7 @@ class Row:
 
     @property
     def within(self):
-        """Whether each entry keeps its bound."""
+        """True if each entry keeps its bound."""
         return tuple(value <= bound for value, bound in zip(self.measured, self.bound, strict=True))
 
     @property
@@ -77,7 +77,7 @@ class Table:
 
     @property
     def within(self):
-        """Whether every entry of the tangent-space rows keeps its bound."""
+        """True if every entry of the tangent-space rows keeps its bound."""
         return all(all(row.within) for row in (*self.rows, *(row for _, row in self.variants)))
 
 

@@ -1,4 +1,6 @@
-"""A scene's own reference solution: two methods of different kinds, refined until they agree or as far as they do."""
+"""Reference solution of a scene: two unrelated methods, refined until they agree as far as they can."""
+
+from __future__ import annotations
 
 import math
 from typing import NamedTuple
@@ -25,7 +27,7 @@ class Reference(NamedTuple):
     source: str
 
     @property
-    def digits(self):
+    def digits(self) -> float:
         """Decimals of r (m) and A that are trusted."""
         return -math.log10(self.trusted) if self.trusted > 0.0 else 16.0
 

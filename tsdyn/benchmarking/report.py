@@ -1,13 +1,18 @@
-"""What `benchmark` hands back: rows, the table they make, and the figure."""
+"""The result of `benchmark`: rows, their table, and the figure."""
+
+from __future__ import annotations
 
 import datetime
 import html
 import platform
 from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from ..hints import Reference, Solution
 
 COUNTS = (
     "steps",
@@ -44,12 +49,21 @@ class Row(NamedTuple):
     message: str  # empty for a run that reached its end
 
     @property
-    def error(self):
+    def error(self) -> float:
         """The larger of the two."""
         return max(self.error_r, self.error_A)
 
     @classmethod
-    def of(cls, method, setting, value, solution, off, floor, message):
+    def of(
+        cls,
+        method: str,
+        setting: str,
+        value: float,
+        solution: Solution | None,
+        off: tuple[float, float],
+        floor: float,
+        message: str,
+    ) -> Row:
         """The row of a run that has not been timed."""
         stats = None if solution is None else solution.stats
         counts = {name: getattr(stats, name, 0) for name in COUNTS}
@@ -74,16 +88,24 @@ class Benchmark:
         Processor, versions and date.
     """
 
-    def __init__(self, rows, reference, span, formulation, repeats, interrupted):
+    def __init__(
+        self,
+        rows: tuple[Row, ...],
+        reference: Reference | None,
+        span: tuple[float, float],
+        formulation: str,
+        repeats: int,
+        interrupted: bool,
+    ) -> None:
         self.rows, self.reference, self.span, self.formulation = rows, reference, span, formulation
         self.repeats, self.interrupted, self.machine = repeats, interrupted, machine()
 
     @property
-    def reference_digits(self):
+    def reference_digits(self) -> float:
         """Decimals that the reference is trusted to; 0 without one."""
         return 0.0 if self.reference is None else self.reference.digits
 
-    def table(self):
+    def table(self) -> str:
         """The rows as text, with where the errors come from and the machine."""
         if self.reference is None:
             return "Benchmark, interrupted before there was a reference."
@@ -116,10 +138,10 @@ class Benchmark:
 
     __str__ = table
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<Benchmark: {len(self.rows)} runs, reference trusted to {self.reference_digits:.1f} digits>"
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The table in a notebook."""
         lines = [f"<th>{html.escape(cell)}</th>" for cell in _HEAD]
         rows = [
@@ -133,7 +155,7 @@ class Benchmark:
             f"</caption>{body}</table><p>{notes}</p>"
         )
 
-    def plot(self, path=None):
+    def plot(self, path: str | Path | None = None) -> Any:
         """Draw run time against error, one line a method; return the matplotlib Figure, written to `path` if given.
 
         Raises
@@ -164,7 +186,7 @@ def _cells(row):
     return (row.method, setting, *off, mark, seconds, *(str(getattr(row, name)) for name in COUNTS), row.status)
 
 
-def machine():
+def machine() -> str:
     """Processor, versions and date in one line."""
     from .._version import __version__
 

@@ -1,4 +1,4 @@
-"""The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), where a scene's time goes, and compiling."""
+"""The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), the profile of a scene, and compiling."""
 
 import argparse
 import sys

@@ -1,4 +1,4 @@
-"""A scene from a Python file, for the command line."""
+"""Loading of a scene from a Python file, for the command line."""
 
 import importlib.util
 import sys

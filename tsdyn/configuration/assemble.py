@@ -1,6 +1,9 @@
-"""`scene.assemble`: the nearest consistent positions, then the nearest consistent velocities."""
+"""`scene.assemble`: nearest consistent positions, then nearest consistent velocities."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +18,11 @@ from .kinetic_metric import Metric, least_step
 from .loop_folds import Folds
 from .mirrored_branches import demand_aligned
 from .start_violations import ROUNDING, demand_finite
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..hints import PointMass, Scene
 
 STIFFER = (0.1, 0.01, 0.001)  # softness of what keeps a fold, from try to try
 
@@ -48,7 +56,13 @@ class AssemblyReport:
 
 
 @fitting
-def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
+def assemble(
+    scene: Scene,
+    tol: float = 1e-12,
+    fixed: Sequence[PointMass | str] = (),
+    t: float = 0.0,
+    folds: Folds = "keep",
+) -> AssemblyReport:
     """Move the bodies to the nearest consistent positions, then to the nearest consistent velocities.
 
     Parameters
@@ -82,6 +96,17 @@ def assemble(scene, tol=1e-12, fixed=(), t=0.0, folds="keep"):
     Bodies hang on springs at their places in the sketch, in the metric of kinetic energy, and constraints are springs
     that stiffen until they hold; then Gauss-Newton steps. Redundant rows are welcome. The velocity correction is the
     smallest in kinetic energy.
+
+    Examples
+    --------
+    A ball is moved to the end of its rod:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> ball = scene.add_point_mass(mass=1.0, position=(1.2, 0, 0))
+    >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground, length=1.0))
+    >>> print(f"moved by {scene.assemble().moved:.2f} m to {ball.position.round(6) + 0.0}")
+    moved by 0.20 m to [1. 0. 0.]
     """
     tol = positive(tol, "tol")
     if not np.isfinite(number(t)):
@@ -164,10 +189,10 @@ def _unfolded(scene, metric, sketch, found, links, drawn, tol):
         for k in first[:8]
     ]
     raise InconsistentState(
-        "the configurations found fold links to the other side than the sketch does, which is another branch:\n"
+        "the configurations found are on another branch than the sketch: links are folded to the other side:\n"
         + "\n".join(stories)
-        + '\nDraw the links there further from straight, or on the other side; or pass folds="free" to take the '
-        "nearest configuration whatever its branch."
+        + '\nDraw these links further from straight, or on the other side; or pass folds="free" to accept the '
+        "nearest configuration on any branch."
     )
 
 
@@ -189,13 +214,13 @@ def _velocities(scene, metric, q, qd, A, Phi_t):
 
 
 def _demand_direction(scene, metric, found):
-    """Refuse a constraint whose derivative vanishes where it isn't met: nothing says which way to go."""
+    """Refuse a constraint whose derivative vanishes where it isn't met: no correction is determined."""
     still = stuck(metric, found.q, found.Phi)
     if still.size and metric.columns.size == metric.size:
         name = scene.row_names()[metric.own[still[0]]]
         raise InconsistentState(
-            f"{name}: Phi = {found.Phi[still[0]]:.3g}, and its derivative vanishes, so nothing says which way to go. "
-            "Move its bodies a little towards where they should be."
+            f"{name}: Phi = {found.Phi[still[0]]:.3g} and its derivative vanishes, so the direction of a correction is "
+            "undetermined. Move its bodies a little in the right direction."
         )
 
 
@@ -216,6 +241,6 @@ def _demand_compatible(scene, residual, tol):
         names = scene.row_names()
         rows = ", ".join(f"{names[i]} ({residual[i]:.3g})" for i in sorted(bad, key=lambda i: -abs(residual[i]))[:8])
         raise InconsistentState(
-            f"no velocities meet all constraints in the configuration found; Phi_q qd + Phi_t left over: {rows}. "
-            "Rows that say the same must also move the same: give their motions equal rates, or drop one."
+            f"no velocities satisfy all constraints in the configuration found; residuals of Phi_q qd + Phi_t: {rows}. "
+            "Redundant driven rows must have equal rates: correct their motions, or remove one."
         )

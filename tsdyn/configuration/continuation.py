@@ -1,10 +1,10 @@
-"""The way from a sketch to the nearest configuration that meets the constraints.
+"""Continuation (homotopy) from a sketch to the nearest configuration that satisfies the constraints.
 
-Each body hangs on a spring at its place in the sketch, by the metric of kinetic energy, and each constraint is a spring
-of stiffness 1 / s. The equilibrium is followed from s = 1, where the sketch is hardly strained, to s = 1e-8, where
-the constraints are met but for that: so bodies give way together, and links fold the way they are drawn. Dependent rows
-need no care, for springs may share a load. What is left is taken away by Gauss-Newton steps of least change, and by
-steps along the constraints to where the distance is least.
+A spring holds each body at its pose in the sketch, in the metric of kinetic energy; each constraint is a spring of
+stiffness 1 / s. The equilibrium is followed from s = 1, where the sketch is hardly strained, to s = 1e-8, where the
+constraint residuals are of that order. Bodies move together, so links keep the fold of the sketch. Dependent rows need
+no special treatment: parallel springs share their load. Minimum-norm Gauss-Newton steps then remove the remaining
+residual, and steps along the constraints minimise the distance to the sketch.
 """
 
 from typing import NamedTuple

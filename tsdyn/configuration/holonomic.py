@@ -1,7 +1,7 @@
-"""Whether the rows of plug-ins are holonomic: their jacobian is the derivative of their phi.
+"""Check that the rows of a plug-in are holonomic: its jacobian is the derivative of its phi.
 
-The tangent form takes a row on velocities for what it says. The forms with a basis solve for positions by Phi and
-Phi_q together, and go wrong, without a sign of it, where the one isn't the derivative of the other.
+The tangent form would run a row on velocities as it is given. The forms with a basis solve for positions with Phi and
+Phi_q together and silently give wrong results if one isn't the derivative of the other.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
-"""Which constraints contradict each other: the smallest set that can't be met, joints whole.
+"""Conflicting constraints: the minimal infeasible subset, joints taken as a whole.
 
-Where |Phi|^2 is least, Phi_q^T Phi = 0: the constraints that are left over there balance each other like the forces of
-a strained structure, and they alone can conflict. Of these, sets are tried from small to large, or, where they are
-many, what can be left out is left out piece by piece; each trial is an assembly from the sketch.
+At a minimum of |Phi|^2, Phi_q^T Phi = 0: the residuals balance like the forces of a prestressed structure, and only
+constraints with a non-zero residual can conflict. Subsets of these are assembled from the sketch in order of size; with
+many candidates, constraints are removed one at a time as long as the rest still fails.
 """
 
 from itertools import combinations
@@ -42,18 +42,18 @@ def refuse(scene, metric, sketch, found, tol, held=()):
     if len(conflicting) > 8:
         lines.append(f"  ... and {len(conflicting) - 8} more")
     if len(conflicting) == 1:
-        story = "This one can't be met by itself"
+        story = "This constraint is infeasible on its own"
     elif minimal:
-        story = f"These {len(conflicting)} conflict, and without any one of them the rest of them can be met"
+        story = f"These {len(conflicting)} conflict; without any one of them, the others can be satisfied"
     else:
-        story = "These are left over"
+        story = "These have non-zero residuals"
     where = f" with {', '.join(body.name for body in held)} held fixed" if len(held) else ""
     error = InconsistentState(
-        f"no configuration that meets all constraints{where} was found in {found.iterations} iterations from the "
-        f"sketch and from others near it. {story}:\n"
+        f"no configuration that satisfies all constraints{where} was found in {found.iterations} iterations from the "
+        f"sketch and from perturbed ones. {story}:\n"
         + "\n".join(lines)
-        + "\nChange a length, point or axis of one of them, or drop one"
-        + ("; or hold fewer bodies." if len(held) else ". If they do fit, bring the bodies nearer to where they do.")
+        + "\nChange a length, point or axis of one of them, or remove one"
+        + ("; or hold fewer bodies." if len(held) else ". If they are compatible, improve the sketch of the bodies.")
     )
     error.constraints = tuple(member.constraint for member in conflicting)
     raise error
@@ -96,6 +96,6 @@ class _Trial:
         self.metric, self.sketch, self.also, self.tol = metric, sketch, (q,), tol
 
     def met(self, members):
-        """Whether they can be met together."""
+        """Return True if the constraints can be satisfied together."""
         rows = np.concatenate([np.arange(member.rows.start, member.rows.stop) for member in members])
         return nearest(self.metric, self.sketch, self.tol, rows, TRIAL_SHAKES, self.also).met

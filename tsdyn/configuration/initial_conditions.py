@@ -1,4 +1,4 @@
-"""Initial conditions of scenes of any size: by the constraint graph instead of matrices, at a cost of O(N)."""
+"""Initial conditions of scenes of any size, by the constraint graph instead of matrices, in O(N)."""
 
 import numpy as np
 
@@ -11,13 +11,13 @@ from ..maths.row_rank import dependent
 from ..model.equations import set_time
 from ..observables.evaluate import constraint_arrays
 from ..rows.axis_rows import is_axis
-from ..rows.evaluation import run_loops
+from ..rows.evaluation import factor_rows, run_loops
+from ..rows.independent_rows import drop_rows, select
 from ..rows.schur_complement import gather, scatter
-from ..rows.selection import drop_rows, factor_rows, select
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
+from ..sparse.constraint_graphs import drop, network_of
 from ..sparse.factorisation import solve
 from ..sparse.massless_axes import axis_of
-from ..sparse.networks import drop, network_of
 from ..workspaces.tangent_memory import allocate_free
 from ..workspaces.workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 from .rank import check_rank
@@ -30,12 +30,12 @@ WANDER, NEAR_BY = 1e-2, 1e-3  # how far to look whether they do, and at least: t
 SHORTER, SHORTEST = 0.25, 1e-3  # a leg of the way from whose end Newton's method finds no place is cut; no shorter
 NO_WAY = 1e-9  # of a direction is left: nothing can move
 NO_CHOICE = (
-    "Phi_q has dependent rows, and no choice among them is independent: a row of it may be zero here. Start from "
+    "Phi_q has dependent rows, and no independent selection of its rows was found: a row may be zero here. Start from "
     "another configuration."
 )
 DEPENDENT = (
-    "Phi_q has dependent rows.\nRemove the rows that say nothing new, or use a joint with fewer rows. Rows that are "
-    "independent elsewhere make this a singular configuration: start from another one."
+    "Phi_q has dependent rows.\nRemove the redundant rows, or use a joint with fewer rows. If the rows are independent "
+    "elsewhere, this is a singular configuration: start from another one."
 )
 
 
@@ -266,10 +266,10 @@ class _Start:
         count = int((row >= 0).sum())
         free = int(np.where(self.network.bodies[:, 1] == 7, 6, 3).sum()) - count + rows.size
         raise SingularConfiguration(
-            f"Phi_q has lost rank in this configuration, and has not near by: of {count} rows of the joints "
-            f"{count - rows.size} are independent here ({which} follow{'s' if rows.size == 1 else ''} from the "
+            f"Phi_q has lost rank in this configuration, and has full rank nearby: of {count} rows of the joints "
+            f"{count - rows.size} are independent here ({which} depend{'s' if rows.size == 1 else ''} on the "
             f"others), so {free} directions are free at this point and fewer next to it. Branches of the motion meet "
-            "here, and which it takes is not determined: start from another configuration, on the branch that you mean."
+            "here, and its branch is not determined: start from another configuration, on the intended branch."
         )
 
     def chosen_of_all(self):

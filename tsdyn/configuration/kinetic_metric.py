@@ -1,9 +1,9 @@
-"""Changes of a configuration in coordinates x that measure kinetic energy: six a rigid body, three a point mass.
+"""Increments of a configuration in the kinetic metric: six coordinates a rigid body, three a point mass.
 
     r + x_r / sqrt(m),    p (x) exp(w' / 2),  w' = L^-T x_w,  J' = L L^T        so  2 T = |xd|^2
     Phi + A x = 0                                                               A = Phi_q q_x
 
-Normalisations hold by themselves, so they are no rows of A.
+Euler parameters stay normalised, so A has no normalisation rows.
 """
 
 import numpy as np

@@ -1,13 +1,12 @@
-"""Which way a sketch folds the links of its closed loops, so that an assembly folds them the same way.
+"""Assembly modes of closed loops: the folds of the links in a sketch, which an assembly has to keep.
 
-Round a loop of constraints, at each joint j that has an axis n, the links to the joints before and after it make an
-angle, and
+At each joint j with an axis n in a loop of constraints, the links to its two neighbours enclose the signed angle
 
     theta = arcsin( n.(u x v) / |u| |v| )      u, v: from j to the joints before and after
 
-is how far they are from being in line, with a sign. A mirrored assembly has another sign somewhere. At a ball joint n
-is the axis of the joint before, or after; a slide is a joint infinitely far away, across its direction. The sign of a
-sketch counts where its links and its joints' places both say the same, clearly.
+measured from the dead centre. Mirrored assemblies differ in at least one sign. At a spherical joint, n is the axis of a
+neighbouring joint; a slide is a joint at infinity, across its direction. A sign of the sketch counts only where the
+directions of its links and the positions of its joints agree on it clearly.
 """
 
 from typing import NamedTuple

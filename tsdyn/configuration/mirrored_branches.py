@@ -1,4 +1,4 @@
-"""Mirrored joints: rows that make directions parallel hold with them opposed, too, and no start is taken there."""
+"""Mirrored branches of joints: rows that align directions also admit opposed ones; such a start is refused."""
 
 import numpy as np
 

@@ -1,9 +1,11 @@
-"""`scene.mobility`: degrees of freedom, rank, and the rows that say nothing new; everywhere, or just here."""
+"""`scene.mobility`: degrees of freedom, rank, redundant rows, and whether the configuration is singular."""
+
+from __future__ import annotations
 
 import html
 from collections import Counter
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,6 +18,9 @@ from .kinetic_metric import Metric, unit_tangent
 from .row_dependence import divide, partners, put_aside
 from .start_violations import demand_finite, demand_small
 
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, Attachment, Scene
+
 CONSISTENT = 1e-9  # of 1 + max |q|
 ASIDE = 0.02  # of the scene's size, and rad: how far the neighbours are at which the rank is compared
 TRIES = 3
@@ -26,8 +31,8 @@ class RedundantRow(NamedTuple):
     """A row of Phi_q that depends on others."""
 
     name: str
-    depends_on: tuple  # names of rows
-    constraint: object  # whose row it is
+    depends_on: tuple[str, ...]  # names of rows
+    constraint: Attachment  # whose row it is
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,8 +60,8 @@ class Mobility:
     coordinates: int
     rows: int
     rank: int
-    redundant: tuple
-    dependent_here: tuple
+    redundant: tuple[RedundantRow, ...]
+    dependent_here: tuple[RedundantRow, ...]
     singular: bool
 
     def _facts(self):
@@ -87,7 +92,7 @@ class Mobility:
                 heads = list(dict.fromkeys(map(_head, on)))
                 yield said + ending, sorted(on, key=lambda name: heads.index(_head(name)))
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         more = ", singular here" if self.singular else ""
         n, r = self.degrees_of_freedom, len(self.redundant)
         return (
@@ -95,7 +100,7 @@ class Mobility:
             f"{r or 'no'} redundant row{'' if r == 1 else 's'}{more}>"
         )
 
-    def __str__(self):
+    def __str__(self) -> str:
         facts = self._facts()
         width = max(map(len, facts))
         lines = [f"  {name:{width}}  {fact}" for name, fact in facts.items()]
@@ -110,7 +115,7 @@ class Mobility:
 
 
 @fitting
-def mobility(scene, q=None, t=0.0):
+def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobility:
     """Count degrees of freedom, and name the rows that are redundant.
 
     Parameters
@@ -138,6 +143,17 @@ def mobility(scene, q=None, t=0.0):
     the largest. A row is called redundant if it depends on those of its joint and of joints added before it, so they
     gather in few joints. Whether a configuration is singular is told by consistent ones beside it. Above 1000
     coordinates, what hangs in open chains is put aside first and costs O(N); closed loops cost the cube of their rows.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bar = scene.add_body(**ts.shapes.cylinder(0.02, 1.0, axis="x", mass=1.0), position=(0.5, 0, 0))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    >>> again = scene.add(ts.constraints.Dot1(scene.ground, bar, axis_a=(0, 1, 0), axis_b=(1, 0, 0), name="again"))
+    >>> report = scene.mobility()
+    >>> report.degrees_of_freedom, len(report.redundant)
+    (1, 1)
     """
     packed, start = scene.packed, scene.start[0]
     q = finite_vector(start if q is None else q, start.size, "q").copy()
@@ -195,8 +211,8 @@ def _core(metric, q, rows):
         rows = put_aside(A, owners)
         if len(rows) > MOST_ROWS:
             raise InvalidArgument(
-                f"mobility: the closed loops of this scene have {len(rows)} constraint rows; it is worked out for up "
-                f"to {MOST_ROWS}. Ask for a smaller scene of the same kind."
+                f"mobility: the closed loops of this scene have {len(rows)} constraint rows; the limit is "
+                f"{MOST_ROWS}. Analyse a smaller scene of the same kind."
             )
     left = A[rows]
     used = np.unique(left.indices) if len(rows) else np.zeros(0, int)

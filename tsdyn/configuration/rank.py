@@ -1,4 +1,4 @@
-"""Rows of Phi_q that depend on each other: found, and named."""
+"""Redundant rows of Phi_q: detection, and their names."""
 
 import numpy as np
 
@@ -34,8 +34,8 @@ def check_rank(scene, Phi_q):
     raise RedundantConstraints(
         f"{m - rank} of the {m} constraint rows are redundant, Phi_q has rank {rank}:\n"
         + "\n".join(stories)
-        + "\nRemove the rows that say nothing new, or use a joint with fewer rows. Rows that are independent elsewhere "
-        "make this a singular configuration: start from another one."
+        + "\nRemove the redundant rows, or use a joint with fewer rows. If the rows are independent elsewhere, this is "
+        "a singular configuration: start from another one."
     )
 
 

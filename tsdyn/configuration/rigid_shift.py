@@ -1,7 +1,7 @@
-"""One part of a scene moved against the other as a rigid body, where a joint is the only link between them.
+"""Rigid displacement of one part of a scene relative to the other, across the only joint between them.
 
-A point x goes to c + R (x - c) + d, R being a turn about the joint's axis through c, d a travel along its direction.
-Velocities v - v_F and angular velocities omega - omega_F against the body F that stays are turned by R.
+A point x moves to c + R (x - c) + d, with R a rotation about the axis of the joint through c and d a translation along
+its direction. Velocities v - v_F and omega - omega_F relative to the fixed body F are rotated by R.
 """
 
 import numpy as np

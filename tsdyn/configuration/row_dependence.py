@@ -1,4 +1,4 @@
-"""Which rows say nothing that others don't say already: one joint after the other, in the order added."""
+"""Linear dependence of constraint rows, joint by joint in the order in which the joints were added."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Initial conditions that break constraints: refused by the names of the rows."""
+"""Checks of initial conditions against the constraints; messages name the violated rows."""
 
 import numpy as np
 

@@ -1,6 +1,9 @@
-"""What PointForce and Torque share: three numbers, a function of time, or of time and state, in either frame."""
+"""Applied loads, the base of PointForce and Torque: constant, f(t) or f(t, state), in the ground or body frame."""
+
+from __future__ import annotations
 
 import math
+from typing import Any
 
 from ..errors import InvalidForce
 from ..jit.kernels import specialised, stack
@@ -19,7 +22,7 @@ class Given:
 
     given = ""
 
-    def take(self, value, frame, hint):
+    def take(self, value: Any, frame: str, hint: str) -> None:
         """Take the vector over, and the frame that it is in; hint is how to write it, with its unit."""
         self.frame = one_of(frame, ("ground", "body"), f"{self.name}: frame", InvalidForce)
         if value is None:
@@ -27,11 +30,11 @@ class Given:
         setattr(self, self.given, value)
         self.check()
 
-    def check(self):
+    def check(self) -> None:
         """It must do something."""
         self.demand_any(self.given)
 
-    def parameters(self):
+    def parameters(self) -> tuple[Any, ...]:
         """The vector."""
         return Signal.places(getattr(self, self.given))
 
@@ -81,7 +84,7 @@ class GivenByState(ByState):
     series = None  # nothing is known of a function
 
     def parameters(self):
-        """Whether the vector is in axes of the body."""
+        """One flag: the vector is given in the body frame."""
         return (float(self.frame == "body"),)
 
     @staticmethod

@@ -1,9 +1,18 @@
-"""Rigid bodies, point masses and the ground: what the user sets, checked when it is set."""
+"""Rigid bodies, point masses and the ground, with attributes that are validated when set."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Generic, Never, TypeVar
 
 import numpy as np
 
 from ..errors import InvalidBody
 from ..validation import demand_known, floats, positive, vector3
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..hints import ArrayLike, Floats, Orientation, Scene
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -14,29 +23,40 @@ class Ground:
     dimension = 0
     name = "ground"
 
-    def __init__(self, scene):
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
 
-    position = property(lambda self: np.zeros(3))
-    orientation = property(lambda self: IDENTITY.copy())
+    @property
+    def position(self) -> Floats:
+        """The origin."""
+        return np.zeros(3)
 
-    def __repr__(self):
+    @property
+    def orientation(self) -> Floats:
+        """Euler parameters (1, 0, 0, 0)."""
+        return IDENTITY.copy()
+
+    def __repr__(self) -> str:
         return "<ground>"
 
 
-class _Attribute:
+Given = TypeVar("Given")  # what an attribute is set to
+Kept = TypeVar("Kept")  # and what is kept of it
+
+
+class Attribute(Generic[Given, Kept]):
     """A checked, read-only attribute of a body; setting it tells the scene that its packed numbers are out of date."""
 
-    def __init__(self, check, what):
+    def __init__(self, check: Callable[[Any, Any], Any], what: str) -> None:
         self.check, self.__doc__ = check, what
 
-    def __set_name__(self, owner, name):
+    def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
-    def __get__(self, body, owner=None):
+    def __get__(self, body: Any, owner: type | None = None) -> Kept:
         return self if body is None else body.values[self.name]
 
-    def __set__(self, body, value):
+    def __set__(self, body: Any, value: Given) -> None:
         value = self.check(value, body)
         value.setflags(write=False)  # a change of one component would not reach the packed numbers
         body.values[self.name] = value
@@ -101,19 +121,32 @@ def _vector(what, unit):
 
 
 class PointMass:
-    """A particle: three coordinates, no orientation. Made by `Scene.add_point_mass`."""
+    """A particle: three coordinates, no orientation. Made by `Scene.add_point_mass`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bob = scene.add_point_mass(mass=1.0, position=(0, 0, -2), name="bob")
+    >>> bob, bob.position
+    (<PointMass 'bob'>, array([ 0.,  0., -2.]))
+    """
 
     dimension = 3
-    mass = _Attribute(_mass, "Mass, kg.")
-    position = _Attribute(_vector("position", "m"), "Position at the start, ground frame, m, shape (3,).")
-    velocity = _Attribute(_vector("velocity", "m/s"), "Velocity at the start, ground frame, m/s, shape (3,).")
+    mass: Attribute[float, float] = Attribute(_mass, "Mass, kg.")
+    position: Attribute[ArrayLike, Floats] = Attribute(
+        _vector("position", "m"), "Position at the start, ground frame, m, shape (3,)."
+    )
+    velocity: Attribute[ArrayLike, Floats] = Attribute(
+        _vector("velocity", "m/s"), "Velocity at the start, ground frame, m/s, shape (3,)."
+    )
 
-    def __init__(self, scene, index, name, **values):
+    def __init__(self, scene: Scene, index: int, name: str, **values: Any) -> None:
         self.scene, self.index, self.name, self.values = scene, index, name, {}
         for attribute, value in values.items():
             setattr(self, attribute, value)
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute that there is; a misspelt one is refused."""
         demand_known(self, name, ("scene", "index", "name", "values"))
         if name == "name" and "name" in self.__dict__:
@@ -121,63 +154,77 @@ class PointMass:
         super().__setattr__(name, value)
 
     @property
-    def orientation(self):
+    def orientation(self) -> Any:
         """A point mass has none."""
         raise InvalidBody(f"{self.name}: a point mass has no orientation; use scene.add_body for a rigid body.")
 
     @property
-    def q(self):
+    def q(self) -> Floats:
         """Coordinates at the start, shape (3,) or (7,)."""
         return self.values["position"]
 
     @property
-    def qd(self):
+    def qd(self) -> Floats:
         """Velocities at the start."""
         return self.values["velocity"]
 
-    def place(self, q, qd):
+    def place(self, q: Floats, qd: Floats) -> None:
         """Take over coordinates and velocities as the values at the start."""
         self.position, self.velocity = q, qd
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name!r}>"
 
 
 class Body(PointMass):
-    """A rigid body: centroid r and Euler parameters p, seven coordinates. Made by `Scene.add_body`."""
+    """A rigid body: centroid r and Euler parameters p, seven coordinates. Made by `Scene.add_body`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> crank = scene.add_body(mass=2.0, inertia=(0.1, 0.2, 0.2), name="crank")
+    >>> crank.mass = 3.0  # for all runs from now on
+    >>> crank, float(crank.mass), crank.position
+    (<Body 'crank'>, 3.0, array([0., 0., 0.]))
+    """
 
     dimension = 7
-    inertia = _Attribute(_inertia, "Inertia about the centroid, body frame, kg m^2, shape (3, 3).")
-    orientation = _Attribute(_orientation, "Euler parameters at the start, body to ground, scalar first, shape (4,).")
-    angular_velocity = _Attribute(
+    inertia: Attribute[ArrayLike, Floats] = Attribute(
+        _inertia, "Inertia about the centroid, body frame, kg m^2, shape (3, 3)."
+    )
+    orientation: Attribute[Orientation, Floats] = Attribute(
+        _orientation, "Euler parameters at the start, body to ground, scalar first, shape (4,)."
+    )
+    angular_velocity: Attribute[ArrayLike, Floats] = Attribute(
         _vector("angular velocity", "rad/s"), "Angular velocity at the start, body frame, rad/s, shape (3,)."
     )
 
     @property
-    def q(self):
+    def q(self) -> Floats:
         """Coordinates (r, p) at the start, shape (7,)."""
         return np.concatenate((self.values["position"], self.values["orientation"]))
 
     @property
-    def qd(self):
+    def qd(self) -> Floats:
         """Velocities (rd, pd), pd = G(p)^T omega' / 2, shape (7,)."""
         p, w = self.values["orientation"], self.values["angular_velocity"]
         return np.concatenate((self.values["velocity"], 0.5 * (transform_g(p).T @ w)))
 
-    def place(self, q, qd):
+    def place(self, q: Floats, qd: Floats) -> None:
         """Take over coordinates and velocities as the values at the start."""
         self.position, self.velocity, self.orientation = q[:3], qd[:3], q[3:]
         self.angular_velocity = 2.0 * (transform_g(q[3:]) @ qd[3:])
 
 
-def transform_g(p):
+def transform_g(p: ArrayLike) -> Floats:
     """G(p) = [-e, -e~ + e0 I], shape (3, 4), or (..., 3, 4) for p of shape (..., 4)."""
     e0, e1, e2, e3 = np.moveaxis(np.asarray(p), -1, 0)
     rows = [[-e1, e0, e3, -e2], [-e2, -e3, e0, e1], [-e3, e2, -e1, e0]]
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def rotation_matrix(p):
+def rotation_matrix(p: ArrayLike) -> Floats:
     """A(p), homogeneous, shape (3, 3), or (..., 3, 3) for p of shape (..., 4)."""
     e0, e1, e2, e3 = np.moveaxis(np.asarray(p), -1, 0)
     rows = [

@@ -1,8 +1,11 @@
-"""What constraints and forces share: two bodies, a name, markers, and attributes that are checked when they are set."""
+"""Base of constraints and forces: two bodies, a name, markers, and attributes that are validated when set."""
+
+from __future__ import annotations
 
 from functools import wraps
 from inspect import CO_VARKEYWORDS, signature, unwrap
 from types import MethodType
+from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
 from numba.core.errors import NumbaError
@@ -16,8 +19,15 @@ from .markers import PARAMETERS, POINT, TURN
 from .membership import note
 from .names import named
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
-def by_name(function):
+    from ..hints import AnyBody, ArrayLike, BodyLike, Floats, Function, Scene, TsdynError
+    from .joint_coordinates import Angle, Displacement
+    from .markers import Marker
+
+
+def by_name(function: Function) -> Function:
     """Wrap an `__init__`: a or b may be the name of a body in the scene of the other."""
 
     @wraps(function)
@@ -55,16 +65,19 @@ class Attachment:
         Where each marker is, body frame.
     """
 
-    markers = ()
-    error = InvalidConstraint
+    a: AnyBody
+    b: Any  # Body or ground; None where there are markers on a only
+    coordinates: tuple[Floats, ...]
+    markers: tuple[Marker, ...] = ()
+    error: type[TsdynError] = InvalidConstraint
     particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
-    joint_coordinates = ()  # Angle and Displacement, see tsdyn/joint_coordinates.py
+    joint_coordinates: tuple[Angle | Displacement, ...] = ()  # Angle and Displacement, see tsdyn/joint_coordinates.py
     angle_near = 0.0  # on which turn its angles begin: set by `Scene.set`
     added = False  # to its scene
     named = False  # by its user
-    owner = None  # the joint that it is a part of
+    owner: Any = None  # the joint that it is a part of
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         cls.__init__ = fitting(by_name(cls.__init__), then=note)
         if unwrap(cls.__init__).__code__.co_flags & CO_VARKEYWORDS:
@@ -72,7 +85,9 @@ class Attachment:
         if "__new__" in vars(cls):  # else the signature would be that of __new__
             cls.__signature__ = signature(MethodType(cls.__init__, cls))
 
-    def __init__(self, a, b=None, coordinates=(), name=""):
+    def __init__(
+        self, a: BodyLike, b: BodyLike | None = None, coordinates: Sequence[ArrayLike | None] = (), name: str = ""
+    ) -> None:
         """Attach it to its bodies; coordinates has an entry for each marker, in the body frame."""
         self.a, self.b = a, b
         kind = self._kind()
@@ -104,7 +119,7 @@ class Attachment:
         return f"{self._kind()}({', '.join(body.name for body in bodies)})"
 
     @Placing
-    def at(cls, a, b=None, **arguments):
+    def at(cls, a: BodyLike, b: BodyLike | None = None, **arguments: Any) -> Self:
         """Make one from points and directions in the ground frame, the bodies being where they stand now.
 
         Parameters
@@ -143,7 +158,7 @@ class Attachment:
             return np.zeros(3)
         return marker.coordinates(body, value, self.name, self.error)
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; the scene packs its numbers again.
 
         A marker's argument (`point_a`, ...) may be set too. Once it is in its scene, a name that it does not have is
@@ -171,44 +186,44 @@ class Attachment:
             raise
         self.scene.touch()
 
-    def __getattr__(self, name):
+    def __getattr__(self, name: str) -> Any:
         """The body-frame coordinates of a marker, by its argument."""
         for marker, place in zip(self.markers, self.__dict__.get("coordinates", ()), strict=False):
             if marker.argument == name:
                 return place
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
-    def check(self):
+    def check(self) -> None:
         """Raise an error where an attribute has an impossible value; asked again when one is set."""
 
     @property
-    def scene(self):
+    def scene(self) -> Scene:
         """The scene of its bodies."""
         return self.a.scene
 
     @property
-    def on(self):
+    def on(self) -> PointMass:
         """The body that its reaction is given on: a, or b where a is the ground."""
         return self.a if self.a.dimension else self.b
 
     @property
-    def title(self):
+    def title(self) -> str:
         """What its rows are called by."""
         return self.name
 
-    def body_of(self, marker):
+    def body_of(self, marker: Marker) -> AnyBody:
         """The body that a marker is on."""
         return self.a if marker.body == "a" else self.b
 
-    def counted_from(self, t, *displacements):
+    def counted_from(self, t: float, *displacements: float) -> float:
         """The angle, or angles, near which a run that begins at t counts turns: zero, or what `Scene.set` has set."""
         return self.angle_near
 
-    def parameters(self):
+    def parameters(self) -> tuple[Any, ...]:
         """What the kernels get as `par`: floats, and functions of time."""
         return ()
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<{self._kind()} {self.name!r}>"
 
 

@@ -1,4 +1,4 @@
-"""What a force is: a class whose kernel is compiled once and reached by address.
+"""The interface of a force: a class whose kernel is compiled once and called by address.
 
 A force works on marker coordinates x and their rates xd (ground frame) and never sees Euler parameters:
 
@@ -10,16 +10,19 @@ A force works on marker coordinates x and their rates xd (ground frame) and neve
     normal_load(x, f, par)         optional, of friction: what par[-1] is, from a reaction f, see joint_friction.py
 
 x is the concatenation of the force's markers, par the floats that `parameters()` returns, functions of time among them
-evaluated at t. Conjugate to a Point is a force, to a Turn a torque, both in the ground frame. What does its work by a
-potential or takes it as dissipation says so; the rest of out . xd is applied power.
+evaluated at t. A Point is conjugate to a force, a Turn to a torque, both in the ground frame. Work that belongs to
+`potential` or `dissipation` is declared by these methods; the remainder of out . xd counts as applied power.
 
 `law` uses arithmetic and NumPy functions of scalars and is analytic in x and xd (no comparison, abs or norm), since
-complex steps of it are the Jacobians of implicit methods; write products instead of powers of x. Set analytic = False
-where that is impossible: then central differences do it. `potential` and `dissipation` are run by NumPy on arrays.
-`series` gets the coefficients k of x and xd, and fills column k of the scratch array s[slots, k].
+complex steps of it give the Jacobians of implicit methods; write products instead of powers of x. Where that is
+impossible, set analytic = False for central differences. `potential` and `dissipation` are evaluated by NumPy on
+arrays. `series` receives coefficient k of x and xd and fills column k of the scratch array s[slots, k].
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
 
@@ -28,12 +31,15 @@ from ..jit.kernels import Callback, kernel, specialised
 from ..motions.signals import Signal
 from ..validation import number
 from .element import Attachment, check_slots, inlined, layout, static_kernel
-from .loops import constraint_series as series_loops
-from .loops import force_series
+from .loops import constraint_series, force_series, friction
 from .loops import forces as loops
-from .loops import friction as friction_loops
 from .markers import PARAMETERS, TURN, Marker, Point
 from .primitive import SIGNATURE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from ..hints import AnyBody, ArrayLike, BodyLike, Random
 
 _registry = {}
 _KERNELS = {"law": 5}  # and their numbers of arguments
@@ -68,6 +74,29 @@ class Force(Attachment):
         Whether all but the loads' work is in potential and dissipation, however the bodies move.
     a, b : Body or ground
     name : str
+
+    Examples
+    --------
+    A point of a body is pulled back to the z axis by -k d:
+
+    >>> import tsdyn as ts
+    >>> class Pole(ts.Force):
+    ...     markers = (ts.Point("a"),)
+    ...     def __init__(self, a, *, point_a=(0, 0, 0), stiffness=1.0, name=""):
+    ...         super().__init__(a, None, (point_a,), name)
+    ...         self.stiffness = float(stiffness)
+    ...     def parameters(self):
+    ...         return (self.stiffness,)
+    ...     @staticmethod
+    ...     def law(x, xd, par, t, out):
+    ...         out[0], out[1] = -par[0] * x[0], -par[0] * x[1]
+    ...     @staticmethod
+    ...     def potential(x, par, t):
+    ...         return par[0] * (x[0] * x[0] + x[1] * x[1]) / 2
+    >>> scene = ts.Scene()
+    >>> ball = scene.add_point_mass(mass=1.0, position=(0.5, 0, 0))
+    >>> scene.add(Pole(ball, stiffness=8.0))
+    <Pole 'Pole(body1)'>
     """
 
     error = InvalidForce
@@ -75,14 +104,14 @@ class Force(Attachment):
     slots = 0
     no_series = ""
     analytic = True
-    quantities = MappingProxyType({})
-    loads = ()
+    quantities: Mapping[str, Callable[..., Any]] = MappingProxyType({})
+    loads: tuple[str, ...] = ()
     conservative = True
     own_kernels = MappingProxyType(
         {}
     )  # force, jacobian, remember -> Callback, compiled when a scene first uses the kind
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         where = f"force {cls.__name__}"
         markers = cls.markers if isinstance(cls.markers, (tuple, list)) else ()
@@ -105,30 +134,32 @@ class Force(Attachment):
         if not cls.__name__.startswith("_"):
             _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
-    def __init__(self, a, b=None, coordinates=(), name=""):
+    def __init__(
+        self, a: BodyLike, b: BodyLike | None = None, coordinates: Sequence[ArrayLike | None] = (), name: str = ""
+    ) -> None:
         """Attach the force to its bodies; coordinates has an entry for each marker, in the body frame."""
         if not self.markers:
             raise InvalidForce("Force is the base of forces and has no law; use one of them, or a subclass.")
         super().__init__(a, b, coordinates, name)
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked by `quantities`."""
         if name in self.quantities:
             value = self.quantities[name](value, f"{self.name}: {name}", self.error)
         super().__setattr__(name, value)
 
     @property
-    def kernels(self):
+    def kernels(self) -> Mapping[str, Any]:
         """The callbacks that run it; forces with the same ones are run together."""
         return self.own_kernels
 
-    def demand_any(self, *names):
+    def demand_any(self, *names: str) -> None:
         """Refuse a force all of whose attributes of these names are zero."""
         if all(Signal.is_zero(getattr(self, name)) for name in names):
             raise InvalidForce(f"{self.name}: it is zero at all times; set {' or '.join(names)}.")
 
     @classmethod
-    def example(cls, rng, a, b):
+    def example(cls, rng: Random, a: AnyBody, b: AnyBody) -> Self:
         """Return a random valid instance between two bodies, for tests."""
         places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code not in (PARAMETERS, TURN)}
         return cls(a, b, **places) if any(m.body == "b" for m in cls.markers) else cls(a, **places)
@@ -168,7 +199,7 @@ def vector_load(value, what, error):
     return Signal.wrap(value, 3, what, error)
 
 
-def registered():
+def registered() -> Mapping[str, type[Force]]:
     """Return every force class known, built in or plugged in, by its full name."""
     return MappingProxyType(_registry)
 
@@ -199,11 +230,11 @@ def callbacks(cls, functions, owner=None):
         home = getattr(functions["series"], "py_func", functions["series"])
         names.update(kernel_series=inlined(functions["series"]), SLOTS=cls.slots)
         copy = specialised(force_series.series, f"{label}.series_loop", home, **names)
-        result["series"] = Callback(copy, series_loops.SIGNATURE)
+        result["series"] = Callback(copy, constraint_series.SIGNATURE)
     if "normal_load" in functions:
         home = getattr(functions["normal_load"], "py_func", functions["normal_load"])
         names["kernel_normal_load"] = inlined(functions["normal_load"])
         for name in ("unit_friction", "normal_load"):
-            copy = specialised(getattr(friction_loops, name), f"{label}.{name}_loop", home, **names)
-            result[name] = Callback(copy, getattr(friction_loops, name.upper()))
+            copy = specialised(getattr(friction, name), f"{label}.{name}_loop", home, **names)
+            result[name] = Callback(copy, getattr(friction, name.upper()))
     return MappingProxyType(result)

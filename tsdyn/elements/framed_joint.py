@@ -1,4 +1,8 @@
-"""Joints that hold an orientation: on each body an axis and a direction across it, by default as the bodies stand."""
+"""Base of joints that hold an orientation: an axis and a perpendicular direction on each body, by default as built."""
+
+from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -55,7 +59,7 @@ class FramedJoint(Joint):
         return reference
 
     @property
-    def frames(self):
+    def frames(self) -> tuple[Any, ...]:
         """(f, g) of a and of b: f is the reference made perpendicular to the axis, f, g, axis are right-handed."""
         return beside(self.axis_a, self.reference_a), beside(self.axis_b, self.reference_b)
 

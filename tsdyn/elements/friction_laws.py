@@ -1,4 +1,4 @@
-"""What friction laws share: the slip of a's point over b, how force and torque act on both, the coefficient of Coulomb.
+"""Common parts of friction laws: slip velocity of a's point over b, reaction on both bodies, friction coefficient.
 
 Markers: Point a, Turn a, Point b, Turn b.
 """

@@ -1,9 +1,11 @@
-"""What a joint is: a constraint composed of others, which has no kernels and costs what its rows cost."""
+"""The interface of a joint: a constraint composed of primitives, with no kernels of its own."""
+
+from __future__ import annotations
 
 from collections import Counter
 from functools import cached_property
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Never, Self
 
 import numpy as np
 
@@ -13,6 +15,11 @@ from .element import Attachment
 from .markers import TURN, Marker
 from .membership import settle
 from .primitive import Primitive
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from ..hints import AnyBody, ArrayLike, Floats, Random
 
 _registry = {}
 
@@ -38,9 +45,29 @@ class Joint(Attachment):
     a, b : Body or ground
     name : str
         What error messages call it.
+
+    Examples
+    --------
+    A pin in a slot along x, which slides and turns about z:
+
+    >>> import tsdyn as ts
+    >>> class PinInSlot(ts.Joint):
+    ...     markers = (ts.Point("a"), ts.Point("b"))
+    ...     def __init__(self, a, b, *, point_a=(0, 0, 0), point_b=(0, 0, 0), name=""):
+    ...         super().__init__(a, b, (point_a, point_b), name)
+    ...     def compose(self):
+    ...         points = {"point_a": self.point_a, "point_b": self.point_b}
+    ...         yield "axis", ts.constraints.Parallel(self.a, self.b, axis_a=(0, 0, 1), axis_b=(0, 0, 1))
+    ...         yield "slot", ts.constraints.PointOnLine(self.a, self.b, **points, axis_b=(1, 0, 0))
+    >>> scene = ts.Scene()
+    >>> pin = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> scene.add(PinInSlot(pin, scene.ground, name="pin"))
+    <PinInSlot 'pin': 4 rows>
+    >>> scene.mobility().degrees_of_freedom
+    2
     """
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         if "compose" not in vars(cls):
             return
@@ -51,7 +78,7 @@ class Joint(Attachment):
             raise InvalidConstraint(f"{where}: markers must be a tuple of Point or Vector.")
         _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
-    def compose(self):
+    def compose(self) -> Iterator[tuple[str, Primitive | Joint]]:
         """Yield (label, part), part a Primitive or another Joint on the same bodies, in the order of their rows.
 
         The label is what a message calls the part's rows. Parts are new ones each time: `compose` is asked again when
@@ -59,7 +86,7 @@ class Joint(Attachment):
         """
         raise InvalidConstraint("Joint is the base of joints and has no parts; use one of them, or a subclass.")
 
-    def aligned(self):
+    def aligned(self) -> Iterable[tuple[ArrayLike, ArrayLike]]:
         """Return the pairs of directions (of a, of b; body frames) that the rows make parallel and never opposed.
 
         A row knows no sign, so it holds after half a turn, too: a start there is refused. What the parts say counts
@@ -67,7 +94,7 @@ class Joint(Attachment):
         """
         return ()
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; the parts follow."""
         super().__setattr__(name, value)
         self.__dict__.pop("_composition", None)
@@ -109,47 +136,47 @@ class Joint(Attachment):
             raise InvalidConstraint(f"{self.title}: {part.name} is a part of it and must be on its own two bodies.")
 
     @property
-    def parts(self):
+    def parts(self) -> tuple[Primitive, ...]:
         """The primitives that it is made of, in the order of their rows."""
         return self._composition.parts
 
     @property
-    def rows(self):
+    def rows(self) -> int:
         """Number of scalar constraints."""
         return len(self._composition.labels)
 
     @property
-    def row_labels(self):
+    def row_labels(self) -> tuple[str, ...]:
         """What follows its title in the names of its rows."""
         return self._composition.labels
 
     @property
-    def opposed(self):
+    def opposed(self) -> tuple[Any, ...]:
         """((body, direction), (body, direction)) pairs that must not be opposed, its parts' included."""
         return self._composition.aligned
 
     @property
-    def title(self):
+    def title(self) -> str:
         """Its kind and name."""
         kind = self._kind()
         return self.name if self.name.startswith(kind) else f"{kind} {self.name!r}"
 
     @classmethod
-    def example(cls, rng, a, b):
+    def example(cls, rng: Random, a: AnyBody, b: AnyBody) -> Self:
         """Return a random instance between two bodies, for tests; it need not hold where they are."""
         places = {m.argument: rng.normal(size=3) for m in cls.markers}
         return cls(a, b, **places)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<{self.title}: {counted(self.rows, 'row')}>"
 
 
-def registered():
+def registered() -> Mapping[str, type[Joint]]:
     """Return every joint class known, built in or plugged in, by its full name."""
     return MappingProxyType(_registry)
 
 
-def across(axis):
+def across(axis: ArrayLike) -> tuple[Floats, Floats]:
     """f, g (3,): with a direction they make a right-handed orthonormal frame f, g, axis.
 
     f is across the coordinate axis that is furthest from the direction, so nothing is lost to rounding.

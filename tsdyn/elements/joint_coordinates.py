@@ -4,12 +4,14 @@
     theta = atan2(g.v, f.v)           (1)  f, g: directions of the own body at right angles; modulo 2 pi
     s     = e.(x_other - x_own)       (2)  e: a direction of the own body
 
-The own body is the one that the axis belongs to. f, g and the axis are right-handed; where the axis belongs to b, g is
-reversed, so that theta is the angle of b against a about the axis (right hand) in either case.
+The own body is the body of the axis. f, g and the axis are right-handed; if the axis belongs to b, g is reversed, so
+that theta is the angle of b relative to a about the axis (right-hand rule) in either case.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..jit.kernels import twin
 from ..maths import vectors
@@ -35,6 +37,12 @@ class Angle:
         as the bodies stood when the joint was made.
     direction : str, optional
         The direction of the other body whose angle it is. Left out: the one that was at the angle zero as built.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.constraints.Revolute.joint_coordinates
+    (Angle(axis='axis_a', other='axis_b', reference='', direction=''),)
     """
 
     axis: str = "axis_a"
@@ -42,7 +50,7 @@ class Angle:
     reference: str = ""
     direction: str = ""
 
-    def of(self, item):
+    def of(self, item: Any) -> AngleGeometry:
         """The `AngleGeometry` of an item."""
         own, other, A, B = _bodies(item, self.axis)
         axis = unit(getattr(item, self.axis))
@@ -66,11 +74,17 @@ class Displacement:
     ----------
     axis : str
         The direction, an attribute of the joint; its name ends with the letter of its body.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.constraints.Translational.joint_coordinates
+    (Displacement(axis='axis_a'),)
     """
 
     axis: str = "axis_a"
 
-    def of(self, item):
+    def of(self, item: Any) -> DisplacementGeometry:
         """The `DisplacementGeometry` of an item."""
         own, other, _, _ = _bodies(item, self.axis)
         points = [tuple(item.point_a.tolist()), tuple(item.point_b.tolist())]

@@ -1,12 +1,15 @@
-"""Friction of a constraint from its own reaction: what the laws of joints and contacts share.
+"""Base of joint friction: laws in proportion to the reaction of their own joint or contact.
 
-    friction on a   = par[-1] times what `law` gives for a normal load of one
+    friction on a   = par[-1] times `law` for unit normal load
     par[-1]         = normal_load(x, f, par), f (6,) the force and torque that the constraint exerts
 
-The normal load depends on multipliers, and those on the friction: the solver finds both together (friction_solve.py).
+The normal load depends on the multipliers and they on the friction: both are solved for together (friction_solve.py).
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
 
@@ -14,7 +17,12 @@ from ..calls import fitting, unknown_argument
 from ..errors import InvalidForce
 from ..validation import label, number
 from .force import not_negative, positive_number
-from .markers import TURN, Point, Turn, Vector
+from .markers import TURN, Marker, Point, Turn, Vector
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from ..hints import AnyBody, Attachment, Floats, Random
 
 AXIS = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("a"))
 
@@ -46,13 +54,23 @@ class JointFriction:
     ----------
     joints : tuple of classes
         The constraints whose friction it can be.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> block = scene.add_point_mass(mass=1.0)
+    >>> table = scene.add(ts.constraints.PlaneContact(block, scene.ground, normal_b=(0, 0, 1), name="table"))
+    >>> friction = scene.add(ts.forces.ContactFriction(table, kinetic=0.2, static=0.3))
+    >>> isinstance(friction, ts.JointFriction), friction
+    (True, <ContactFriction 'ContactFriction(table)'>)
     """
 
-    joints = ()
-    markers = ()
+    joints: tuple[type, ...] = ()
+    markers: tuple[Marker, ...] = ()
     particles = True
-    no_series = "its size follows from a reaction, and its direction turns round too sharply for a series"
-    quantities = MappingProxyType(
+    no_series = "its magnitude depends on a reaction, and its direction reverses too sharply for a series"
+    quantities: Mapping[str, Callable[..., Any]] = MappingProxyType(
         {
             "kinetic": not_negative,
             "static": lambda value, *where: None if value is None else not_negative(value, *where),
@@ -65,16 +83,16 @@ class JointFriction:
     @fitting
     def __init__(
         self,
-        joint,
+        joint: Attachment,
         *,
-        kinetic,
-        static=None,
-        slip_velocity=1e-3,
-        stribeck_velocity=None,
-        preload=0.0,
-        name="",
-        **geometry,
-    ):
+        kinetic: float,
+        static: float | None = None,
+        slip_velocity: float = 1e-3,
+        stribeck_velocity: float | None = None,
+        preload: float = 0.0,
+        name: str = "",
+        **geometry: Any,
+    ) -> None:
         kind = self._kind()
         name = label(name, kind, InvalidForce)
         if not isinstance(joint, self.joints):
@@ -94,13 +112,13 @@ class JointFriction:
         return f"{self._kind()}({self.joint.name})"
 
     @property
-    def coordinates(self):
+    def coordinates(self) -> tuple[Floats, ...]:
         """Where the markers are, (3,) each: where the joint's are."""
         return tuple(
             np.zeros(3) if marker.code == TURN else getattr(self.joint, marker.argument) for marker in self.markers
         )
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; where it acts is the joint's."""
         if name == "coordinates":
             return
@@ -108,7 +126,7 @@ class JointFriction:
             raise self.error(f"{self.name}: {name} is that of its joint {self.joint.name!r}; set it there.")
         super().__setattr__(name, value)
 
-    def check(self):
+    def check(self) -> None:
         """It must do something, and be no smaller at rest than sliding."""
         if not self.joint.added:
             raise self.error(f"{self.name}: add its joint {self.joint.name!r} to the scene first.")
@@ -120,24 +138,24 @@ class JointFriction:
         if self.kinetic == 0.0 and not self.static:
             raise self.error(f"{self.name}: it is zero at all times; set kinetic.")
 
-    def parameters(self):
+    def parameters(self) -> tuple[Any, ...]:
         """(mu, mu_s, v_s, v_0, preload), then the geometry."""
         static = self.kinetic if self.static is None else self.static
         stribeck = 10.0 * self.slip_velocity if self.stribeck_velocity is None else self.stribeck_velocity
         return self.kinetic, static, stribeck, self.slip_velocity, self.preload, *self.geometry()
 
-    def geometry(self):
+    def geometry(self) -> tuple[float, ...]:
         """What `law` and `normal_load` need besides, floats."""
         return ()
 
-    def __getattr__(self, name):
+    def __getattr__(self, name: str) -> Any:
         """The body-frame coordinates of a marker, by its argument: those of the joint."""
         if name in [marker.argument for marker in self.markers] and "joint" in self.__dict__:
             return getattr(self.joint, name)
         return super().__getattr__(name)
 
     @classmethod
-    def example(cls, rng, a, b):
+    def example(cls, rng: Random, a: AnyBody, b: AnyBody) -> Self:
         """A random one, on a joint that is added to the scene, regularised over the velocities of a test."""
         kind = cls.joints[0]
         places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code != TURN}
@@ -147,7 +165,7 @@ class JointFriction:
         return cls(joint, kinetic=mu, static=mu + more, slip_velocity=v0, stribeck_velocity=vs, **cls.sizes(rng))
 
     @classmethod
-    def sizes(cls, rng):
+    def sizes(cls, rng: Random) -> dict[str, float]:
         """Random arguments of the geometry, for tests."""
         return {}
 

@@ -1,4 +1,8 @@
-"""What JointTorque and JointForce share: a function of time, joint coordinate and rate, continuous or sampled."""
+"""Base of JointTorque and JointForce: a function of time, joint coordinate and rate, continuous or sampled."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
 
@@ -6,6 +10,12 @@ from ..errors import InvalidForce
 from ..validation import label, positive
 from .markers import TURN
 from .user_functions import arguments_of
+
+if TYPE_CHECKING:
+    from ..hints import AnyBody, Floats, Random
+
+if TYPE_CHECKING:
+    from ..hints import Attachment, JointLaw
 
 
 def instants(value, what, error):
@@ -23,7 +33,7 @@ def law_of_joint(value, what, error):
 class JointLoad:
     """Mixed into forces of one joint coordinate; the load does its work on that coordinate.
 
-    With a period the load is held between instants and is what such a force remembers: see tsdyn/sampling.py.
+    With a period the load is held between instants and is what such a force remembers: see runs/sampling.py.
     """
 
     loads = ("function",)
@@ -31,7 +41,9 @@ class JointLoad:
     coordinate = ""  # "angle" or "displacement"
     remembers_angle = False  # of its joint, from the start of a run on
 
-    def __init__(self, joint, *, function, period=None, which=0, name=""):
+    def __init__(
+        self, joint: Attachment, *, function: JointLaw, period: float | None = None, which: int = 0, name: str = ""
+    ) -> None:
         kind = self._kind()
         name = label(name, kind, InvalidForce)
         geometries = self.geometries(joint) if hasattr(joint, "joint_coordinates") else []
@@ -52,17 +64,17 @@ class JointLoad:
         return f"{self._kind()}({self.joint.name})"
 
     @property
-    def geometry(self):
+    def geometry(self) -> Any:
         """Where the coordinate is measured: a `joint_coordinates.AngleGeometry` or `DisplacementGeometry`."""
         return self.geometries(self.joint)[self.which]
 
     @property
-    def coordinates(self):
+    def coordinates(self) -> tuple[Floats, ...]:
         """Where the markers are, (3,) each: where the joint measures."""
         given = iter(self.directions(self.geometry))
         return tuple(np.zeros(3) if marker.code == TURN else np.array(next(given)) for marker in self.markers)
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; where it acts is the joint's."""
         if name == "coordinates":
             return
@@ -72,7 +84,7 @@ class JointLoad:
             raise self.error(f"{self.name}: make a new one to change between a continuous and a sampled load.")
         super().__setattr__(name, value)
 
-    def check(self):
+    def check(self) -> None:
         """A joint that the scene has; of a continuous load a plain function of three arguments."""
         if not self.joint.added:
             raise self.error(f"{self.name}: add its joint {self.joint.name!r} to the scene first.")
@@ -82,11 +94,11 @@ class JointLoad:
                 f"rate), got {self.function!r}. With period= it may be any object to be called so."
             )
 
-    def parameters(self):
+    def parameters(self) -> tuple[Any, ...]:
         """None but what it remembers."""
         return ()
 
     @classmethod
-    def example(cls, rng, a, b):
+    def example(cls, rng: Random, a: AnyBody, b: AnyBody) -> Self:
         """A damper that is sampled, on a joint that is added to the scene."""
         return cls(a.scene.add(cls.joint_of_example(rng, a, b)), function=lambda t, x, rate: -rate, period=0.1)

@@ -5,11 +5,14 @@
     Parameters  x = p             xd = pd                             xdd = 0
     Turn        x = 0             xd = 2 E(p) pd, the angular velocity; for forces only
 
-x and xd are in the ground frame, s in the body frame. On the ground x = s, or p = (1, 0, 0, 0), and nothing moves; a
-point mass has r only.
+x and xd are in the ground frame, s in the body frame. On the ground x = s or p = (1, 0, 0, 0), at rest; a point mass
+has r only.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +20,9 @@ from ..errors import InvalidBody, InvalidConstraint
 from ..jit.kernels import kernel, stack
 from ..maths.euler_parameters import rotate, rotate_gradient, rotate_rate
 from ..validation import vector3
+
+if TYPE_CHECKING:
+    from ..hints import AnyBody, ArrayLike, Floats, TsdynError
 
 POINT, VECTOR, PARAMETERS, TURN = 0, 1, 2, 3  # codes in kernels
 
@@ -31,13 +37,15 @@ class Marker:
     size = 3
     prefix = "point_"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.body not in ("a", "b"):
             raise InvalidConstraint(f"a marker belongs to body 'a' or 'b', not to {self.body!r}.")
         if not self.argument:
             object.__setattr__(self, "argument", self.prefix + self.body)
 
-    def coordinates(self, body, value, where, error=InvalidConstraint):
+    def coordinates(
+        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
+    ) -> Floats:
         """Check the body-frame coordinates that a user gave, return them as an array (3,)."""
         place = vector3(value, f"{where}: {self.argument}", error)
         place.setflags(write=False)
@@ -45,9 +53,18 @@ class Marker:
 
 
 class Point(Marker):
-    """A point of a body, by its coordinates in the body frame, m."""
+    """A point of a body, by its coordinates in the body frame, m.
 
-    def coordinates(self, body, value, where, error=InvalidConstraint):
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.Point("a").argument, ts.Point("b", "tip_b").argument
+    ('point_a', 'tip_b')
+    """
+
+    def coordinates(
+        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
+    ) -> Floats:
         """Check the coordinates; a point mass has no other point than itself."""
         value = super().coordinates(body, value, where, error)
         if body.dimension == 3 and value.any():
@@ -56,12 +73,21 @@ class Point(Marker):
 
 
 class Vector(Marker):
-    """A direction of a body, by its components in the body frame; scaled to unit length."""
+    """A direction of a body, by its components in the body frame; scaled to unit length.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.Vector("b").argument, ts.Vector("b", "normal_b").argument
+    ('axis_b', 'normal_b')
+    """
 
     code = VECTOR
     prefix = "axis_"
 
-    def coordinates(self, body, value, where, error=InvalidConstraint):
+    def coordinates(
+        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
+    ) -> Floats:
         """Check and normalise the direction."""
         value = super().coordinates(body, value, where, error)
         _needs_rotation(body, f"{where}: {self.argument}")
@@ -75,25 +101,43 @@ class Vector(Marker):
 
 
 class Parameters(Marker):
-    """The Euler parameters of a rigid body themselves; (1, 0, 0, 0) on the ground."""
+    """The Euler parameters of a rigid body themselves; (1, 0, 0, 0) on the ground.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.constraints.EulerNormalization.markers
+    (Parameters(body='a', argument='parameters_a'),)
+    """
 
     code = PARAMETERS
     size = 4
     prefix = "parameters_"
 
-    def coordinates(self, body, value, where, error=InvalidConstraint):
+    def coordinates(
+        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
+    ) -> Floats:
         """Nothing to place: the marker is p."""
         _needs_rotation(body, where)
         return np.zeros(3)
 
 
 class Turn(Marker):
-    """The turning of a rigid body, for forces: xd is its angular velocity, conjugate is a torque, ground frame."""
+    """The turning of a rigid body, for forces: xd is its angular velocity, conjugate is a torque, ground frame.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.forces.Torque.markers
+    (Turn(body='a', argument='turn_a'),)
+    """
 
     code = TURN
     prefix = "turn_"
 
-    def coordinates(self, body, value, where, error=InvalidConstraint):
+    def coordinates(
+        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
+    ) -> Floats:
         """Nothing to place: all points of a body turn alike."""
         _needs_rotation(body, where)
         return np.zeros(3)

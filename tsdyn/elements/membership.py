@@ -1,4 +1,4 @@
-"""Which constraints and forces have been made for a scene, which of them were added, and by what names."""
+"""Bookkeeping of the constraints and forces made for a scene: which were added, and under which names."""
 
 import warnings
 

@@ -1,4 +1,4 @@
-"""Names in place of handles: the body, constraint or force that a user means."""
+"""Lookup of bodies, constraints and forces by name or handle."""
 
 from ..errors import InvalidArgument
 from ..validation import close

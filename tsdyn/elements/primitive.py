@@ -1,4 +1,4 @@
-"""What a constraint primitive is: a class whose kernels are compiled once and reached by address.
+"""The interface of a constraint primitive: a class whose kernels are compiled once and called by address.
 
 A primitive works on marker coordinates x (3-vectors in the ground frame) and never sees Euler parameters:
 
@@ -10,23 +10,29 @@ A primitive works on marker coordinates x (3-vectors in the ground frame) and ne
     series_t(x, par, k, s, out)  out[rows]          and of Phi_t, where it has what is `prescribed`; after `series`
     remember(x, par, t)          optional, with memory = 1: what the last of par is after each accepted step
 
-x is the concatenation of the primitive's markers, par the floats that `parameters()` returns; a motion among them takes
-three places, its value, rate and acceleration at t. The loops below apply the chain rule x(q) (Haug 2018, Eqs. 2-3).
-Kernels use arithmetic and NumPy functions, no comparison, abs or norm of x, so that they also run on complex numbers
-and on truncated Taylor series: that is how they are checked. `series` gets the coefficients k of x, those before being
-where it has left them: in the scratch array s[slots, k], of which it fills column k.
+x is the concatenation of the primitive's markers, par the floats that `parameters()` returns; a motion among them
+occupies three: value, rate and acceleration at t. The loops below apply the chain rule x(q) (Haug 2018, Eqs. 2-3).
+Kernels use arithmetic and NumPy functions, no comparison, abs or norm of x, so that checks can run them on complex
+numbers and truncated Taylor series. `series` receives coefficient k of x and fills column k of the scratch array
+s[slots, k], where earlier coefficients remain.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Never, Self
 
 from ..errors import InvalidConstraint
 from ..jit.kernels import ANY, Callback, caller, integers, specialised, stack, stack2, vector
 from ..motions.prescribed import Motion
 from .element import Attachment, check_slots, inlined, layout, static_kernel
-from .loops import constraint_hessians as curvature
-from .loops import constraint_rows as body_loops
-from .loops import constraint_series as series_loops
+from .loops import constraint_hessians, constraint_rows, constraint_series
 from .markers import PARAMETERS, TURN, Marker, chain_rule, motion, position
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from ..hints import AnyBody, ArrayLike, BodyLike, Random
 
 # what the table of a kind holds for each instance
 AT, DIMENSION, BLOCK, ROW, STRIDE, INTS = 0, 2, 4, 6, 7, 8
@@ -61,16 +67,43 @@ class Primitive(Attachment):
         The bodies; b is None for a primitive that has markers on a only.
     name : str
         What error messages call it.
+
+    Examples
+    --------
+    A point of a body stays on the cylinder x^2 + y^2 = R^2:
+
+    >>> import tsdyn as ts
+    >>> class OnCylinder(ts.Primitive):
+    ...     rows, markers = 1, (ts.Point("a"),)
+    ...     def __init__(self, a, *, point_a=(0, 0, 0), radius=1.0, name=""):
+    ...         super().__init__(a, None, (point_a,), name)
+    ...         self.radius = float(radius)
+    ...     def parameters(self):
+    ...         return (self.radius,)
+    ...     @staticmethod
+    ...     def phi(x, par, t, out):
+    ...         out[0] = (x[0] * x[0] + x[1] * x[1] - par[0] * par[0]) / 2
+    ...     @staticmethod
+    ...     def jacobian(x, par, t, out):
+    ...         out[0, 0], out[0, 1] = x[0], x[1]
+    ...     @staticmethod
+    ...     def gamma(x, xd, par, t, out):
+    ...         out[0] = xd[0] * xd[0] + xd[1] * xd[1]
+    >>> scene = ts.Scene()
+    >>> bead = scene.add_point_mass(mass=1.0, position=(1, 0, 0), velocity=(0, 2, 0))
+    >>> scene.add(OnCylinder(bead))
+    <OnCylinder 'OnCylinder(body1)'>
+    >>> ts.testing.check_primitive(OnCylinder)  # doctest: +SKIP
     """
 
     rows = 0
     slots = 0
     memory = 0
     normalises = False  # whether it does no more than keep the length of p
-    prescribed = ""
+    prescribed: str | tuple[str, ...] = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         where = f"primitive {cls.__name__}"
         if isinstance(cls.rows, bool) or not isinstance(cls.rows, int) or cls.rows < 1:
@@ -95,7 +128,9 @@ class Primitive(Attachment):
         cls.kernels = MappingProxyType(_compile(cls, functions))
         _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
-    def __init__(self, a, b=None, coordinates=(), name=""):
+    def __init__(
+        self, a: BodyLike, b: BodyLike | None = None, coordinates: Sequence[ArrayLike | None] = (), name: str = ""
+    ) -> None:
         """Attach the primitive to its bodies; coordinates has an entry for each marker, in the body frame."""
         if not self.rows:
             raise InvalidConstraint(
@@ -103,42 +138,42 @@ class Primitive(Attachment):
             )
         super().__init__(a, b, coordinates, name)
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; a prescribed one may be a number or three functions of time."""
         if name in self.quantities():
             value = Motion.wrap(value, f"{self.name}: {name}")
         super().__setattr__(name, value)
 
     @property
-    def parts(self):
+    def parts(self) -> tuple[Primitive, ...]:
         """The primitives that it is made of: itself."""
         return (self,)
 
     @property
-    def row_labels(self):
+    def row_labels(self) -> tuple[str, ...]:
         """What follows its title in the names of its rows."""
         return ("",) if self.rows == 1 else tuple(f"[{i}]" for i in range(self.rows))
 
     @property
-    def rheonomic(self):
-        """Whether it depends on time."""
+    def rheonomic(self) -> bool:
+        """True if the constraint depends on time."""
         names = self.quantities()
         moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
         return moves and "phi_t" in self.kernels
 
     @classmethod
-    def quantities(cls):
+    def quantities(cls) -> tuple[str, ...]:
         """The names of what is prescribed."""
         return (cls.prescribed,) * bool(cls.prescribed) if isinstance(cls.prescribed, str) else cls.prescribed
 
     @classmethod
-    def example(cls, rng, a, b):
+    def example(cls, rng: Random, a: AnyBody, b: AnyBody) -> Self:
         """Return a random valid instance between two bodies, for tests."""
         places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code != PARAMETERS}
         return cls(a, b, **places) if any(m.body == "b" for m in cls.markers) else cls(a, **places)
 
 
-def registered():
+def registered() -> Mapping[str, type[Primitive]]:
     """Return every primitive class known, built in or plugged in, by its full name."""
     return MappingProxyType(_registry)
 
@@ -156,14 +191,14 @@ def _compile(cls, functions):
         "jacobian": (_jacobian, "jacobian", SIGNATURE),
         "gamma": (_gamma, "gamma", SIGNATURE),
         "remember": (_remembers, "remember", SIGNATURE),
-        "values": (body_loops.values, "phi", body_loops.SIGNATURE),
-        "drift": (body_loops.values, "phi_t", body_loops.SIGNATURE),
-        "reduced": (body_loops.reduced, "jacobian", body_loops.SIGNATURE),
-        "bias": (body_loops.bias, "gamma", body_loops.SIGNATURE),
-        "series": (series_loops.series, "series", series_loops.SIGNATURE),
-        "far_series": (series_loops.series, "series", series_loops.SIGNATURE),
-        "driven_series": (series_loops.series, "series_t", series_loops.SIGNATURE),
-        "far_driven_series": (series_loops.series, "series_t", series_loops.SIGNATURE),
+        "values": (constraint_rows.values, "phi", constraint_rows.SIGNATURE),
+        "drift": (constraint_rows.values, "phi_t", constraint_rows.SIGNATURE),
+        "reduced": (constraint_rows.reduced, "jacobian", constraint_rows.SIGNATURE),
+        "bias": (constraint_rows.bias, "gamma", constraint_rows.SIGNATURE),
+        "series": (constraint_series.series, "series", constraint_series.SIGNATURE),
+        "far_series": (constraint_series.series, "series", constraint_series.SIGNATURE),
+        "driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
+        "far_driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
     }
     result = {}
     for name, (template, whose, signature) in loops.items():
@@ -177,8 +212,10 @@ def _compile(cls, functions):
             result[name] = Callback(copy, signature)
     owner = getattr(functions["gamma"], "py_func", functions["gamma"])
     places = {"AT": AT, "DIMENSION": DIMENSION, "ROW": ROW, "INTS": INTS}
-    copy = specialised(curvature.loop, f"{cls.__qualname__}.curvature_loop", owner, **constants, **inner, **places)
-    result["curvature"] = Callback(copy, curvature.SIGNATURE)
+    copy = specialised(
+        constraint_hessians.loop, f"{cls.__qualname__}.curvature_loop", owner, **constants, **inner, **places
+    )
+    result["curvature"] = Callback(copy, constraint_hessians.SIGNATURE)
     return result
 
 

@@ -1,7 +1,10 @@
-"""Functions of time and state that users write, as kernels of forces; each gives callbacks of its own, once."""
+"""Users' functions of time and state as force kernels, with one set of callbacks for each function."""
+
+from __future__ import annotations
 
 from functools import partial
 from types import FunctionType
+from typing import Any
 
 from ..jit.compiled_once import compiled_once
 from ..jit.kernels import kernel
@@ -70,11 +73,11 @@ class ByState:
         return self.__dict__["_kernels"]
 
     @property
-    def function_of_state(self):
+    def function_of_state(self) -> Any:
         """The user's function."""
         return getattr(self, self.given)
 
-    def forget(self):
+    def forget(self) -> None:
         """Drop its compiled form; it is made again when asked for."""
         self.__dict__.pop("_of", None)
 

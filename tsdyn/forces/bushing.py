@@ -7,15 +7,21 @@
     U = (d.K d + phi.K_t phi) / 2                                                (3)
     dissipation = dd.C dd + w.C_t w                                              (4)
 
-(1) and (2) are minus the derivatives of U: phid = e0 w + w x e. U is largest at half a turn; beyond, it pulls on to the
-full turn.
+(1) and (2) are minus the derivatives of U, since phid = e0 w + w x e. U has its maximum at half a turn; beyond it the
+restoring torque acts towards the full turn.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..plugins import Force, Parameters, Point, Turn, cross, floats, kernel, rotated, rotated_back, rotation
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 def _three(value, what, error):
@@ -48,6 +54,18 @@ class Bushing(Force):
     ------
     InvalidForce
         If a number is negative or not finite, or all are zero.
+
+    Examples
+    --------
+    A machine of 100 kg on a rubber mount settles under its weight:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> machine = scene.add_body(mass=100.0, inertia=(8, 8, 8))
+    >>> mount = {"stiffness": 1e5, "damping": 4e3, "torsional_stiffness": 1e3, "torsional_damping": 1e2}
+    >>> bushing = scene.add(ts.forces.Bushing(machine, scene.ground, **mount))
+    >>> print(f"{ts.simulate(scene, (0, 2)).state.position(machine)[2]:.4f} m")
+    -0.0100 m
     """
 
     markers = (Point("a"), Point("b"), Parameters("a"), Parameters("b"), Turn("a"), Turn("b"))
@@ -58,17 +76,17 @@ class Bushing(Force):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        stiffness=0.0,
-        damping=0.0,
-        torsional_stiffness=0.0,
-        torsional_damping=0.0,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        stiffness: ArrayLike = 0.0,
+        damping: ArrayLike = 0.0,
+        torsional_stiffness: ArrayLike = 0.0,
+        torsional_damping: ArrayLike = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b, None, None, None, None), name)
         self.stiffness, self.damping = stiffness, damping
         self.torsional_stiffness, self.torsional_damping = torsional_stiffness, torsional_damping

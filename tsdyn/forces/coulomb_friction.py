@@ -1,18 +1,24 @@
-"""Coulomb friction of constant size between two bodies, of a point and of their turning, smooth at rest.
+"""Coulomb friction of constant magnitude between two bodies, in translation and rotation, regularised at rest.
 
-    v, w as for ViscousFriction: relative velocity at the place of a's point, relative angular velocity
-    F = -R v / sqrt(v.v + v0^2)     on a at x_a, the opposite on b at the same place     (1)
+    v, w as for ViscousFriction: relative velocity at a's point, relative angular velocity
+    F = -R v / sqrt(v.v + v0^2)     on a at x_a, the opposite on b at the same point     (1)
     N = -N0 w / sqrt(w.w + w0^2)    on a, the opposite on b                              (2)
     dissipation = -F.v - N.w                                                             (3)
 
-Below the slip velocity v0 it is viscous: it does not hold a body at rest but lets it creep.
+Below the slip velocity v0 the law is viscous: a body that should stick creeps.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..plugins import Force, Point, Turn, act, demand_bodies, not_negative, positive_number, slip
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 class CoulombFriction(Force):
@@ -39,27 +45,39 @@ class CoulombFriction(Force):
     InvalidForce
         If a size is negative, a regularisation not positive, or both sizes are zero, or a torque would act on a point
         mass.
+
+    Examples
+    --------
+    A block of 2 kg comes to rest after 0.5 s:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, 0))
+    >>> block = scene.add_point_mass(mass=2.0, velocity=(1, 0, 0))
+    >>> friction = scene.add(ts.forces.CoulombFriction(block, scene.ground, force=4.0))
+    >>> state = ts.simulate(scene, (0, 0.6)).state
+    >>> print(f"{state.position(block)[0]:.3f} m, {abs(state.velocity(block)[0]):.3f} m/s")
+    0.250 m, 0.000 m/s
     """
 
     markers = (Point("a"), Turn("a"), Point("b"), Turn("b"))
     particles = True
-    no_series = "its force turns round within slip_velocity, too sharply for a series"
+    no_series = "its force reverses within slip_velocity, too sharply for a series"
     quantities = MappingProxyType(
         {"force": not_negative, "torque": not_negative, "slip_velocity": positive_number, "slip_rate": positive_number}
     )
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        force=0.0,
-        torque=0.0,
-        slip_velocity=1e-3,
-        slip_rate=1e-3,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        force: float = 0.0,
+        torque: float = 0.0,
+        slip_velocity: float = 1e-3,
+        slip_rate: float = 1e-3,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, None, (0.0, 0.0, 0.0), None), name)
         self.force, self.torque, self.slip_velocity, self.slip_rate = force, torque, slip_velocity, slip_rate
         self.check()

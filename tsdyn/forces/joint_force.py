@@ -1,11 +1,11 @@
-"""A force along a joint's axis by time, displacement and rate: a linear drive with its law of control.
+"""Force along a joint's axis as a function of time, displacement and rate: a linear actuator with a control law.
 
     f = F e at x_b on b, -F e there on a             (1)  [N]  e: the axis, in the ground frame
     s = e.(x_b - x_a)                                (2)  the displacement
     F = function(t, s, sd)                           (3)  continuous
     F = function(t_k, s(t_k), sd(t_k))               (4)  from t_k = k period to t_{k+1}
 
-The power of (1) is F sd, however the bodies move.
+The power of (1) is F sd for any motion of the bodies.
 """
 
 import math
@@ -37,6 +37,16 @@ class JointForce(JointLoad, Force):
     Notes
     -----
     Its power is applied power.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> table = scene.add_body(mass=2.0, inertia=(1, 1, 1))
+    >>> slide = scene.add(ts.constraints.Translational.at(scene.ground, table, point=(0, 0, 0), axis=(1, 0, 0)))
+    >>> drive = scene.add(ts.forces.JointForce(slide, function=lambda t, displacement, rate: 4.0, period=0.1))
+    >>> print(f"{ts.simulate(scene, (0, 1)).state.displacement(slide):.4f} m")
+    1.0000 m
     """
 
     markers = (Vector("a", "axis"), Point("a", "own_point"), Point("b", "other_point"))

@@ -1,10 +1,10 @@
-"""A torque about a joint's axis by time, angle and rate: a motor with its law of control, continuous or sampled.
+"""Torque about a joint's axis as a function of time, angle and rate: a motor with a control law.
 
     N = T u on b, -T u on a                          (1)  [N m]  u: the axis, in the ground frame
     T = function(t, angle, rate)                     (2)  continuous
     T = function(t_k, angle(t_k), rate(t_k))         (3)  from t_k = k period to t_{k+1}
 
-The power of (1) is T times the rate of the angle, where the joint holds the axis.
+The power of (1) is T times the rate of the angle if the joint holds the axis.
 """
 
 import math
@@ -44,6 +44,20 @@ class JointTorque(JointLoad, Force):
     -----
     Its power is applied power. Turns are counted as for `solution.angle(joint)`. What the function raises, or a value
     that is not finite, ends the run.
+
+    Examples
+    --------
+    A controller that is sampled every 10 ms holds a wheel at 1 rad:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> wheel = scene.add_body(mass=1.0, inertia=(1, 1, 2))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1)))
+    >>> def controller(t, angle, rate):
+    ...     return 50.0 * (1.0 - angle) - 20.0 * rate
+    >>> drive = scene.add(ts.forces.JointTorque(hinge, function=controller, period=0.01))
+    >>> print(f"{ts.simulate(scene, (0, 3)).state.angle(hinge):.3f} rad")
+    1.000 rad
     """
 
     markers = (Vector("a", "axis"), Turn("a"), Turn("b"))

@@ -1,10 +1,13 @@
-"""A force on a point of one body: constant, a function of time, or of time and state.
+"""Force on a point of one body: constant, a function of time, or of time and state.
 
 f = F             frame="ground"     (1)  [N], conjugate to x_a
 f = A(p_a) F      frame="body"       (2)
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from ..plugins import (
     Force,
@@ -18,6 +21,9 @@ from ..plugins import (
     state_load,
     vector_load,
 )
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, Frame, PointMass, VectorLoad
 
 
 class PointForce(Given, Force):
@@ -45,6 +51,16 @@ class PointForce(Given, Force):
     -----
     Its power is applied power. Whether it is a function of state is settled when it is made; a new function of the same
     sort may be set.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, 0))
+    >>> puck = scene.add_body(mass=2.0, inertia=(1, 1, 1))
+    >>> push = scene.add(ts.forces.PointForce(puck, force=(4, 0, 0)))
+    >>> solution = ts.simulate(scene, (0, 1))
+    >>> print(f"{solution.position(puck)[-1, 0]:.4f} m, {solution.power[-1]:.4f} W")
+    1.0000 m, 8.0000 W
     """
 
     markers = (Point("a"),)
@@ -60,7 +76,15 @@ class PointForce(Given, Force):
             cls = _BodyPointForce
         return super().__new__(cls)
 
-    def __init__(self, a, *, force=None, point_a=(0.0, 0.0, 0.0), frame="ground", name=""):
+    def __init__(
+        self,
+        a: PointMass | str,
+        *,
+        force: VectorLoad | None = None,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        frame: Frame = "ground",
+        name: str = "",
+    ) -> None:
         super().__init__(a, None, (point_a, *[None] * (len(self.markers) - 1)), name)
         self.take(force, frame, "(Fx, Fy, Fz) in N")
 

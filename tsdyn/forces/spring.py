@@ -6,10 +6,13 @@
     U = k (l - l0)^2 / 2                 (3)
     dissipation = c ld^2                 (4)
 
-Singular where l = 0: the run ends there.
+Singular at l = 0: a run ends there.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +30,9 @@ from ..plugins import (
     scaled,
     square,
 )
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Load
 
 
 class Spring(Force):
@@ -50,6 +56,19 @@ class Spring(Force):
     ------
     InvalidForce
         If a number is negative or not finite, the points coincide, or stiffness, damping and actuator are all zero.
+
+    Examples
+    --------
+    A mass of 1 kg hangs on a spring of 100 N/m and is released at its free length of 1 m:
+
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> mass = scene.add_point_mass(mass=1.0, position=(0, 0, -1))
+    >>> spring = scene.add(ts.forces.Spring(mass, scene.ground, stiffness=100.0))
+    >>> state = ts.simulate(scene, (0, np.pi / 10)).state
+    >>> print(f"lowest at {state.position(mass)[2]:.4f} m, free length {spring.free_length:g} m")
+    lowest at -1.2000 m, free length 1 m
     """
 
     markers = (Point("a"), Point("b"))
@@ -61,17 +80,17 @@ class Spring(Force):
 
     def __init__(
         self,
-        a,
-        b,
+        a: BodyLike,
+        b: BodyLike,
         *,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        stiffness=0.0,
-        damping=0.0,
-        free_length=None,
-        actuator=0.0,
-        name="",
-    ):
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        stiffness: float = 0.0,
+        damping: float = 0.0,
+        free_length: float | None = None,
+        actuator: Load = 0.0,
+        name: str = "",
+    ) -> None:
         super().__init__(a, b, (point_a, point_b), name)
         ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
         length = np.linalg.norm(ends[0] - ends[1])

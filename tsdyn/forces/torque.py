@@ -1,10 +1,13 @@
-"""A torque on one body: constant, a function of time, or of time and state.
+"""Torque on one body: constant, a function of time, or of time and state.
 
-n = N             frame="ground"     (1)  [N m], conjugate to the turning of a
+n = N             frame="ground"     (1)  [N m], conjugate to the rotation of a
 n = A(p_a) N      frame="body"       (2)
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from ..plugins import (
     Force,
@@ -18,6 +21,9 @@ from ..plugins import (
     state_load,
     vector_load,
 )
+
+if TYPE_CHECKING:
+    from ..hints import Body, Frame, VectorLoad
 
 
 class Torque(Given, Force):
@@ -45,6 +51,16 @@ class Torque(Given, Force):
     -----
     Its power is applied power. Whether it is a function of state is settled when it is made; a new function of the same
     sort may be set.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> rotor = scene.add_body(mass=1.0, inertia=(1, 1, 2))
+    >>> drive = scene.add(ts.forces.Torque(rotor, torque=(0, 0, 6), frame="body"))
+    >>> solution = ts.simulate(scene, (0, 1))
+    >>> print(f"{solution.angular_velocity(rotor)[-1, 2]:.4f} rad/s")
+    3.0000 rad/s
     """
 
     markers = (Turn("a"),)
@@ -60,7 +76,9 @@ class Torque(Given, Force):
             cls = _BodyTorque
         return super().__new__(cls)
 
-    def __init__(self, a, *, torque=None, frame="ground", name=""):
+    def __init__(
+        self, a: Body | str, *, torque: VectorLoad | None = None, frame: Frame = "ground", name: str = ""
+    ) -> None:
         places = [(0.0, 0.0, 0.0) if marker.code == Point.code else None for marker in self.markers]
         super().__init__(a, None, places, name)
         self.take(torque, frame, "(Nx, Ny, Nz) in N m")

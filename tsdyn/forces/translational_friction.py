@@ -1,16 +1,19 @@
-"""Friction of a translational joint, a slide in its guide, from the joint's own reaction.
+"""Friction of a translational joint (a slide in a guide), in proportion to the reaction of the joint.
 
     n      axis, v = n.(velocity of a's point over b)
     N      = N_0 + |F - n n.F| + |n.T| / W + (2 / L) |T - n n.T|     (1)
     force  = -mu(v) N n     on a along the axis, the opposite on b   (2)
     dissipation = mu(v) N v                                          (3)
 
-F and T are the force and the torque that the joint exerts, at its point on a (on b where a is the ground); mu is that
-of friction.coefficient. A torque that tilts the slide is carried by two forces, L apart; one about the axis at the arm
-W.
+F and T are the force and the torque that the joint exerts at its point on a (on b if a is the ground); mu is given by
+friction_laws.coefficient. A tilting torque on the slide is carried by a couple of two forces, L apart; a torque about
+the axis by a force with lever arm W.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -41,13 +44,31 @@ class TranslationalFriction(JointFriction, Force):
         If joint is no Translational of the scene, or a number is negative, not finite or impossible.
     RedundantConstraints
         When a run begins, if the reaction that it needs isn't unique.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> slider = scene.add_body(mass=1.0, inertia=(1, 1, 1), velocity=(3, 0, 0))
+    >>> guide = scene.add(ts.constraints.Translational.at(scene.ground, slider, point=(0, 0, 0), axis=(1, 0, 0)))
+    >>> friction = scene.add(ts.forces.TranslationalFriction(guide, kinetic=0.2))
+    >>> print(f"{ts.simulate(scene, (0, 1)).state.displacement_rate(guide):.3f} m/s")
+    1.000 m/s
     """
 
     joints = (Translational,)
     markers = AXIS
     quantities = MappingProxyType({**JointFriction.quantities, "length": optional_length, "width": optional_length})
 
-    def __init__(self, joint, *, kinetic, length=None, width=None, **given):
+    def __init__(
+        self,
+        joint: Translational,
+        *,
+        kinetic: float,
+        length: float | None = None,
+        width: float | None = None,
+        **given: Any,
+    ) -> None:
         super().__init__(joint, kinetic=kinetic, length=length, width=width, **given)
 
     def geometry(self):

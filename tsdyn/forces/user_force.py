@@ -1,14 +1,17 @@
-"""A force between two bodies by any function of time and both states.
+"""Force and torque between two bodies as a function of time and both states.
 
     function(t, a, b, par, out)   a, b (13,): point, Euler parameters, velocity of the point, angular velocity
                                   out (6,): force on a at x_a, torque on a
-    f = [F, 0, T; -F, 0, -T - (x_a - x_b) x F]    conjugate to x_a, p_a, turning of a; x_b, p_b, turning of b   (1)
+    f = [F, 0, T; -F, 0, -T - (x_a - x_b) x F]    conjugate to x_a, p_a, rotation of a; x_b, p_b, rotation of b   (1)
 
-so that b gets the opposite force at the same place x_a. Everything is in the ground frame.
+so that the opposite force acts on b at x_a. All components are in the ground frame.
 """
+
+from __future__ import annotations
 
 import math
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +28,11 @@ from ..plugins import (
     specialised,
     stack,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..hints import ArrayLike, BodyLike, PointMass
 
 
 def _numbers(value, what, error):
@@ -63,6 +71,23 @@ class UserForce(ByState, Force):
     -----
     b gets the opposite force at the place x_a, so momentum is conserved. A point mass takes no torque: on one the
     force alone acts, and its Euler parameters are (1, 0, 0, 0). The power of the force is applied power.
+
+    Examples
+    --------
+    Gravity of a planet at the origin, G M = par[0], on a moon:
+
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, 0))
+    >>> moon = scene.add_point_mass(mass=1.0, position=(2, 0, 0), velocity=(0, 2, 0))
+    >>> def attraction(t, a, b, par, out):
+    ...     r = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
+    ...     for i in range(3):
+    ...         out[i] = -par[0] * a[i] / r**3
+    >>> force = scene.add(ts.forces.UserForce(moon, function=attraction, parameters=(8.0,)))
+    >>> force.values = (9.0,)  # from the next run on; nothing is compiled again
+    >>> print(force.values)
+    [9.]
     """
 
     markers = (Point("a"), Parameters("a"), Turn("a"), Point("b"), Parameters("b"), Turn("b"))
@@ -73,15 +98,15 @@ class UserForce(ByState, Force):
 
     def __init__(
         self,
-        a,
-        b=None,
+        a: PointMass | str,
+        b: BodyLike | None = None,
         *,
-        function,
-        point_a=(0.0, 0.0, 0.0),
-        point_b=(0.0, 0.0, 0.0),
-        parameters=(),
-        name="",
-    ):
+        function: Callable[..., object],
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        point_b: ArrayLike = (0.0, 0.0, 0.0),
+        parameters: ArrayLike = (),
+        name: str = "",
+    ) -> None:
         if b is None:
             b = getattr(getattr(a, "scene", None), "ground", None)
         super().__init__(a, b, (point_a, None, None, point_b, None, None), name)

@@ -2,7 +2,8 @@
 
 Imports methods and below.
 
-Begin with registry.py (the forms, as addresses of kernels), then tangent.py (O(N), the default) and null_space.py
-(Haug's Eq. 26). projection.py puts positions and velocities back on the constraint manifold; chart_coordinates.py and
-chart_validity.py say where a chart leads and when it is left; friction_solve.py solves friction with its reactions.
+Begin with registry.py (the forms, as addresses of kernels), then tangent.py (O(N), without a basis, the default) and
+null_space.py (Haug's Eq. 26; newton_iterations.py solves Eqs. 28 and 29). Both place the stages of a step in a chart:
+chart_coordinates.py, chart_validity.py. projection.py lands starts and Taylor steps on the manifold.
+friction_solve.py solves friction with its reactions.
 """

@@ -1,8 +1,8 @@
-"""Accelerations and multipliers at a place on the manifold, without a basis of its tangent space.
+"""Accelerations and multipliers on the constraint manifold, without a basis of the tangent space.
 
-    (H W H^T) lam = H W (Q_A + S) + gamma,    qdd = W (Q_A + S - H^T lam)
+    (H W H^T) lam = H W (Q_A + Q_v) + gamma,    qdd = W (Q_A + Q_v - H^T lam)
 
-in terms of (r'', omega''): Q_A + S is the force and body torque less omega' x J' omega'.
+in terms of (r'', omega''): Q_A + Q_v is the force and the body torque less omega' x J' omega'.
 """
 
 from ..elements.loops.body_poses import OMEGA, POSE, P, add_torque, write_accelerations

@@ -1,8 +1,8 @@
-"""From coordinates of a chart on the network to poses and their velocities, and back from accelerations.
+"""Chart coordinates to body poses and velocities (the retraction), and accelerations back to chart coordinates.
 
 omega'  = C etad,                           C = d0 I - d~ + d d^T / d0
 etadd   = (d0 I + d~) omega'd - |omega'|^2 d / 2
-N       = H(q) C Y0                         what Phi changes by, with -u
+N       = H(q) C Y0                         derivative of Phi with respect to -u
 """
 
 import math
@@ -11,8 +11,8 @@ from ..elements.loops.body_poses import OMEGA, POSE, RD, R, orient
 from ..jit.kernels import kernel, long_kernel, stack
 from ..jit.simd import add, cross, first, fma, four, lanes, put, second, splat, sub, third, times, total
 from ..rows.axis_rows import leave_axes_out
+from ..rows.independent_rows import drop_diagonal
 from ..rows.schur_complement import inner, more, multiply_both
-from ..rows.selection import drop_diagonal
 from ..sparse.constraint_graph import (
     H_BODY,
     H_COLUMNS,

@@ -1,11 +1,11 @@
-"""Charts on the network: where they touch, and the signs on which they are left, the same in every form.
+"""Chart validity in the tangent form, by the two criteria that every form uses.
 
-A chart is left at the end of a step, on signs that have no dimension and don't depend on units, scales of constraints
-or levers, the metric being that of the masses:
+A chart is abandoned at the end of a step when one of two dimensionless criteria is met. In the mass metric they depend
+neither on units nor on the scaling of constraint rows or lever arms:
 
-    contraction    the largest |1 - n / s|, n and s the pivots of N = H C Y0 and of S0 = H0 W0 H0^T: how much of what
-                   elimination leaves of a row is gone; 1 where the normal space of q0 meets the manifold
-    turn           |d|, the sine of half the angle that a body has turned since q0
+    contraction    max |1 - n / s|, with n and s the pivots of N = H C Y0 and of S0 = H0 W0 H0^T: the relative loss of a
+                   pivot since q0; 1 where a normal direction of q0 is tangent to the manifold
+    turn           |d|, the sine of half the angle by which a body has rotated since q0
 """
 
 import math

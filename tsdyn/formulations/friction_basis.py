@@ -1,10 +1,10 @@
-"""Friction and reactions together, in the form with U, V, B and D: everything is linear in the normal loads N.
+"""Coupled friction and reactions in the null-space form: accelerations and multipliers are linear in the normal loads.
 
-    vdd = vdd_0 + sum_i a_i N_i      a_i = (D^T M D)^-1 D^T g_i
-    lam = lam_0 + sum_i l_i N_i      l_i = B^T U^T (g_i - M D a_i),   lam_0 = B^T U^T (Q_A + S - M qdd_0)
-    N_i = N_i(lam)                   Newton's method, from the loads of the evaluation before
+    vdd = vdd_0 + sum_i a_i F_n,i    a_i = (D^T M D)^-1 D^T g_i
+    lam = lam_0 + sum_i l_i F_n,i    l_i = B^T U^T (g_i - M D a_i),   lam_0 = B^T U^T (Q_A + Q_v - M qdd_0)
+    F_n,i = F_n,i(lam)               Newton's method, started from the loads of the previous evaluation
 
-g_i is what friction i does for a normal load of one; what has the index 0 is without friction.
+g_i is the generalised friction force for unit normal load; index 0 marks the solution without friction.
 """
 
 import math

@@ -1,15 +1,15 @@
-"""Friction and reactions together, without a basis of the tangent space: a joint's friction follows from its reaction.
+"""Coupled friction and reactions in the tangent form: friction of a joint depends on the reaction of the joint.
 
-    (r'', omega'') = W (F + sum_i g_i N_i(lam) - H^T lam)
-    S lam = H W (F + sum_i g_i N_i(lam)) + gamma
+    (r'', omega'') = W (F + sum_i g_i F_n,i(lam) - H^T lam)
+    S lam = H W (F + sum_i g_i F_n,i(lam)) + gamma
 
-g_i is what friction i does for a normal load of one, N_i its normal load. Newton's method, from the multipliers of the
-evaluation before:
+g_i is the generalised force of friction i for unit normal load, F_n,i the normal load. Newton's method starts from the
+multipliers of the previous evaluation; its matrix is
 
-    N~ = H (W (H^T - sum_i g_i N_i,lam))^T
+    N~ = H (W (H^T - sum_i g_i F_n,i,lam))^T
 
-g_i acts on the two bodies of its joint and N_i,lam has that joint's rows, so N~ has the blocks of S and costs about as
-much.
+g_i acts on the two bodies of its joint and F_n,i,lam has entries in the rows of that joint, so N~ has the block
+pattern of S and a factorisation of comparable cost.
 """
 
 import math
@@ -25,8 +25,8 @@ from ..model.packed_forces import F_FIRST_INT, F_FIRST_REAL, F_REALS
 from ..model.packed_friction import FR_BODY, FR_COUNT, FR_FIRST, FR_INDEX, FR_KIND, FR_NORMAL, FR_ON, FR_UNIT
 from ..rows.axis_rows import gather_axes, multiply_axes_both
 from ..rows.evaluation import run_loops
+from ..rows.independent_rows import drop, drop_diagonal
 from ..rows.schur_complement import gather, inner, multiply_both, scatter, weigh
-from ..rows.selection import drop, drop_diagonal
 from ..sparse.constraint_graph import BIAS
 from ..sparse.factorisation import factor_lu, solve_lu
 from ..sparse.massless_axes import AXIS_ROW

@@ -1,16 +1,15 @@
-"""The Jacobian of the tangent-space ODE, for implicit methods: vdd = f(t, v, vd), Eq. 26, differentiated exactly.
+"""Linearisation of the tangent-space ODE for implicit methods: exact derivatives of vdd = f(t, v, vd), Eq. 26.
 
 With dq = D dv and, from Eqs. 2 and 3, Phi_q dqd = -G1 dq and Phi_q dqdd = -G2 dq - 2 G1 dqd (G1, G2 as in
-constraint_hessians.py), Eq. 4 gives, the multipliers dropping out because Phi_q D = 0,
+constraint_hessians.py), Eq. 4 gives (multipliers drop out because Phi_q D = 0)
 
     A f_v = -D^T K* D,    A f_vd = D^T C* D,    A = D^T M D
-    C* = Q_qd + S_qd + 2 M Y,                          Y = U B G1
-    K* = (M qdd - S - Q)_q + (Phi_q^T lam)_q - M Z + C* Y,    Z = U B G2
+    C* = Q_A,qd + Q_v,qd + 2 M Y,                             Y = U B G1
+    K* = (M qdd - Q_v - Q_A)_q + (Phi_q^T lam)_q - M Z + C* Y,  Z = U B G2
 
-One evaluation serves many steps and charts: K* and C*, the forces' Q_q and Q_qd left out, are kept in the bodies' own
-frames, and the derivatives of the forces' laws in frames that go along with the forces (corotated_frames.py). With the
-place last taken, `reduce` and `factorise` make P = A - g C_hat + g^2 K_hat, the iteration matrix of a stage with
-g = h a_ii.
+One evaluation serves many steps and charts: K* and C* without Q_A,q and Q_A,qd are stored in body frames, the
+derivatives of the force laws in corotated frames (corotated_frames.py). At the current configuration, `reduce` and
+`factorise` form P = A - g C_hat + g^2 K_hat, the iteration matrix of a stage with g = h a_ii.
 """
 
 from ..jit.kernels import callback, kernel, stack, stack2, vector
@@ -18,7 +17,7 @@ from ..maths.dense_linalg import lu, lu_solve, transposed_times
 from ..maths.euler_parameters import matrix_a, matrix_g
 from ..model.equations import applied_forces, constraint_curvature, force_jacobian
 from ..workspaces.workspace import ITERATION_MATRICES, JACOBIANS, load
-from .newton import NOT_FINITE, OK, SINGULAR
+from .newton_iterations import NOT_FINITE, OK, SINGULAR
 
 
 @kernel

@@ -1,10 +1,9 @@
-"""Bodies that a scene never turns, and its network without their rotations.
+"""Locked orientations: bodies that the constraints never let rotate, and the constraint graph without their rotations.
 
-A row on directions of two bodies alone, which no time enters, holds an orientation. Where three such rows join a body
-to the ground, or to bodies that are held already, and are independent there, the orientations that they allow are
-isolated: the body keeps the one that it has for as long as it moves. So those rows hold by themselves, and neither they
-nor the body's rotation need be in the equations. What is left has as many redundant rows as there were, but for those
-among the rows that are left out.
+A scleronomic row on directions alone constrains relative orientation. If three independent rows of this sort join a
+body to the ground, or to bodies that are locked already, the admissible orientations are isolated, and the body keeps
+its initial orientation. The rows then hold identically, and neither the rows nor the rotation of the body enter the
+equations. The reduced graph keeps every redundancy of the remaining rows.
 """
 
 from typing import NamedTuple
@@ -15,8 +14,8 @@ from ..elements.markers import PARAMETERS, VECTOR
 from ..model.packed import FIRST_REAL, classes
 from ..motions.prescribed import Motion
 from ..sparse.constraint_graph import N_COUNT, N_FIRST_REAL, N_REALS
+from ..sparse.constraint_graphs import dropped_rows, network_of, with_loops
 from ..sparse.graph_builder import build
-from ..sparse.networks import dropped_rows, network_of, with_loops
 from ..workspaces.tangent_memory import MOST_ROWS
 
 LEAST = 1e-12  # of the largest square of a singular value of its rows: with less they don't hold a body
@@ -173,7 +172,7 @@ def _dropped(packed, omitted, spare):
 
 
 def _holds(kind):
-    """Whether a kind of constraint is on directions alone, and no time enters it but by a Motion."""
+    """Return True if a kind of constraint is on directions alone, and depends on time through a Motion only."""
     return (
         all(marker.code in (VECTOR, PARAMETERS) for marker in kind.markers)
         and not (kind.normalises or kind.memory)

@@ -1,8 +1,8 @@
 """The Maggi/Kane equations, the baseline that drifts: a first-order system in (w, q) (Haug 2018, Eqs. 17-18).
 
-    D^T M D wd = D^T (M U B gamma + Q_A + S),   qd = D w - U B Phi_t
+    D^T M D wd = D^T (M U B gamma + Q_A + Q_v),   qd = D w - U B Phi_t
 
-q is integrated as it stands and nothing puts it back on Phi(q) = 0. D, B, V and U are those of the tangent-space form.
+q is integrated directly, without projection onto Phi(q) = 0. D, B, V and U are those of the null-space form.
 """
 
 import math
@@ -13,7 +13,7 @@ from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import set_time
 from ..workspaces.chart_workspace import TIME
 from ..workspaces.workspace import PLACEMENTS, load
-from .newton import NOT_FINITE, OK
+from .newton_iterations import NOT_FINITE, OK
 from .null_space import frictional_acceleration, look, project, reduced_mass, velocities, weighted_square
 from .null_space_chart import new_chart, tangent_map
 

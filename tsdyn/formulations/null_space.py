@@ -1,12 +1,12 @@
-"""The tangent-space ODE in the paper's own form, with U, V, B and D (Haug 2018, Eqs. 19-29).
+"""The null-space form of the tangent-space ODE, with U, V, B and D (Haug 2018, Eqs. 19-29).
 
     q   = q0 + V v - U u                                             Eq. 19
     qd  = D vd - U B Phi_t                                           Eq. 23
-    D^T M D vdd = D^T (M U B gamma + Q_A + S)                        Eq. 26
+    D^T M D vdd = D^T (M U B gamma + Q_A + Q_v)                      Eq. 26
     qdd = D vdd - U B gamma                                          Eq. 24
 
 M_r = m I and M_p = 4 G^T J' G give D^T M D = sum m D_r^T D_r + E^T J' E with E = 2 G D_p, the body's angular velocity
-per vd; S_p = 8 Gd^T J' Gd p.
+per vd; Q_v = 8 Gd^T J' Gd p on p (S in the paper).
 """
 
 import math
@@ -23,7 +23,7 @@ from ..workspaces.chart_workspace import TIME
 from ..workspaces.workspace import EVALUATIONS, FACTORIZATIONS, FLOOR, PLACEMENTS, load
 from .chart_validity import measure_turns, turning
 from .friction_solve import call_rub, forget_loads
-from .newton import NOT_FINITE, OK, leave_out, solve_positions, subtract_normal
+from .newton_iterations import NOT_FINITE, OK, leave_out, solve_positions, subtract_normal
 from .null_space_chart import new_chart, tangent_map
 
 PIVOT_LIMIT = 1e-14  # of D^T M D: less than this is rounding

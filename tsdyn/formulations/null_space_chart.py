@@ -1,9 +1,9 @@
-"""Charts in the paper's own form (Eqs. 5-9, 27): made at q0, with U and V, and used; `local_chart` says when to leave.
+"""Charts with bases U and V (Eqs. 5-9, 27), made at q0; chart_validity.py decides when a chart is abandoned.
 
-U spans W0 Phi_q0^T, W0 the inverse of the mass matrix with p p^T added: the normal space in the metric of kinetic
-energy, so that lengths and angles are weighed as the motion weighs them. Columns are scaled so that Phi_q0 U has a
-diagonal of ones; those of normalisation rows are p0. V is orthonormal. L^T is V^T P0, with P0 = I - U (Phi_q0 U)^-1
-Phi_q0 the projection along U: L^T V = I, L^T U = 0.
+U spans W0 Phi_q0^T, W0 being the inverse of the mass matrix with p p^T added: the normal space in the metric of kinetic
+energy, which weights lengths and angles by inertia. (The paper takes U = Phi_q0^T.) Columns are scaled so that Phi_q0 U
+has a unit diagonal; the columns of normalisation rows are p0. V is orthonormal. With the projection along U, P0 =
+I - U (Phi_q0 U)^-1 Phi_q0, L^T is V^T P0: L^T V = I, L^T U = 0.
 """
 
 import math
@@ -13,7 +13,7 @@ from ..maths.dense_linalg import null_space
 from ..model.equations import constraint_jacobian
 from ..workspaces.workspace import FACTORIZATIONS, KEPT, RATE
 from .chart_validity import touch
-from .newton import OK, SINGULAR, invert_normal_matrix, leave_rows_out, normal_matrix, update_b
+from .newton_iterations import OK, SINGULAR, invert_normal_matrix, leave_rows_out, normal_matrix, update_b
 
 RANK_LIMIT = 1e-14  # smallest singular value of Phi_q, rows scaled to length one: less is rounding; S, in the metric
 # of the masses, says what is independent: rows of points that are a nanometre apart differ by 1e-9

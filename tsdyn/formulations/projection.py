@@ -1,7 +1,7 @@
-"""From the end of a series, or anywhere near the manifold, onto it: positions, then velocities (Eqs. 20, 23, 29).
+"""Projection onto the constraint manifold: positions, then velocities (Eqs. 20, 23, 29).
 
-The normal space is that of the place itself, W H^T, so that one factorisation of S = H W H^T serves both and, renewed
-where positions have moved by more than rounding, the accelerations too.
+Corrections lie in the normal space W H^T at the current configuration, so one factorisation of S = H W H^T serves
+positions and velocities. It also serves the accelerations, unless positions have moved by more than rounding.
 """
 
 import math
@@ -13,8 +13,8 @@ from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import add, fma, four, put, splat
 from ..maths.dense_linalg import largest
 from ..rows.evaluation import factorise_rows, held, run_loops
+from ..rows.independent_rows import weakest
 from ..rows.schur_complement import gather, scatter
-from ..rows.selection import weakest
 from ..rows.singularity import NEAR
 from ..rows.tangent_workspace import LARGEST_SHARE, MOVED, RESIDUAL
 from ..sparse.constraint_graph import DRIFT, REDUCED, VALUES

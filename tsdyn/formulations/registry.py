@@ -1,13 +1,12 @@
-"""The formulations of the equations of motion, as the addresses of their kernels."""
+"""The formulations of the equations of motion and the addresses of their kernels."""
 
 from dataclasses import dataclass, replace
 from types import ModuleType
 
 from ..sparse.constraint_graph import REDUCED
-from ..sparse.networks import network_of
+from ..sparse.constraint_graphs import network_of
 from ..validation import unknown_name
-from . import friction_basis, friction_solve, maggi_kane, null_space, tangent
-from . import linearisation as linearise
+from . import friction_basis, friction_solve, linearisation, maggi_kane, null_space, tangent
 from .locked_orientations import moving_network
 
 
@@ -48,11 +47,11 @@ class Formulation:
     def implicit(self):
         """Addresses that implicit methods need, in the order of implicit.LINEARISE ... ERROR_NORM."""
         kernels = (
-            linearise.linearise,
-            linearise.reduce,
-            linearise.factorise,
-            linearise.solve,
-            linearise.soften,
+            linearisation.linearise,
+            linearisation.reduce,
+            linearisation.factorise,
+            linearisation.solve,
+            linearisation.soften,
             null_space.complete,
         )
         return [f.address for f in (*kernels, self.kernels.error_norm)]

@@ -1,14 +1,14 @@
-"""The tangent-space ODE without a basis of the tangent space: the same motion as by Eq. 26, at a cost that is O(N).
+"""The tangent form: the tangent-space ODE without a basis of the tangent space, equivalent to Eq. 26, in O(N).
 
     (rho, eta)      = x - Y0 u,         u from Phi = 0                           Eqs. 19-22, see chart_workspace.py
     (rhod, etad)    = xd - Y0 z,        N z = H C xd + Phi_t                      Eq. 23
     (rdd, omega'd)  = W (F - H^T lam),  (H W H^T) lam = H W F + gamma             Eqs. 3, 4
     xdd             = (rhodd, etadd)
 
-H = [Phi_r, Phi_pi'] at q, Y0 = W0 H0^T at q0, N = H C Y0, F the forces. xdd is taken whole: what of it lies in the
-normal space is what the position solve takes out again, so that x carries the curvature of the manifold along, u and z
-are no more than a step's truncation error, and Newton's method is there after one sweep or two. Runge-Kutta steps are
-linear, so V^T x is the v of the null-space form.
+H = [Phi_r, Phi_pi'] at q, Y0 = W0 H0^T at q0, N = H C Y0, F the applied and velocity forces. xdd keeps its component
+in the normal space, so x follows the curvature of the manifold; u and z are then of the size of the truncation error of
+a step, and Newton's method converges in one or two sweeps. The position solve removes the normal component again.
+Runge-Kutta steps are linear, so V^T x is the v of the null-space form.
 """
 
 import math
@@ -20,9 +20,8 @@ from ..maths.dense_linalg import copy, is_finite, largest
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.axis_rows import is_axis
-from ..rows.evaluation import held, run_loops
+from ..rows.evaluation import factor_rows, held, run_loops
 from ..rows.schur_complement import gather, scatter
-from ..rows.selection import factor_rows
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.factorisation import solve, solve_lu
 from ..workspaces.chart_workspace import END, FACTORED, OFF, TIME

@@ -1,4 +1,4 @@
-"""Arrays that begin where a line of the cache does, so that no four floats of theirs are in two."""
+"""Arrays aligned to cache lines, so that no vector of four floats straddles two lines."""
 
 import numpy as np
 

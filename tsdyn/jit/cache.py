@@ -1,9 +1,9 @@
 """A kernel cache on disk that never answers with a stale or damaged kernel.
 
-A file holds one compiled function. Its name contains the hash of all that the machine code depends on (`_code_hash`),
-its first bytes are the checksum of the rest. Files are written whole or not at all. A file that fails its checksum is
-deleted and its function compiled again. A complete cache in a read-only folder is used as it is.
-Numba's own settings and classes are left alone.
+Each file holds one compiled function. The file name contains a hash of everything that determines the machine code
+(code_hash.py); the file starts with a checksum of its content. Writes are atomic. A file that fails its checksum is
+deleted and its function is compiled again. A complete cache in a read-only folder is used in place. Numba's own
+settings and classes are not modified.
 """
 
 import contextlib

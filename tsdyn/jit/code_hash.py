@@ -1,9 +1,9 @@
-"""Hash of everything that the machine code of a function depends on.
+"""Hash of everything that determines the machine code of a function.
 
-Numba stamps a cached kernel with the content of its own file only, so an edit of a callee in another file is answered
-with the old machine code. Here the hash follows the references of a function instead: byte code and constants of the
-function itself and of all functions, classes, constants and modules that its code names, at any depth. An edit changes
-the hash of exactly the kernels that it concerns.
+Numba stamps a cached kernel with the content of its own file only, so an edit of a callee in another file returns stale
+machine code. This hash follows references instead: byte code and constants of the function itself and of every
+function, class, constant and module that it names, at any depth. An edit changes the hash of the kernels that depend on
+it, and of no others.
 """
 
 import contextlib

@@ -1,6 +1,6 @@
-"""Users' functions, compiled once a process: the same source and constants are the same compiled code.
+"""Users' functions, compiled once a process: equal source and constants share one compiled function.
 
-What is compiled stays in memory, whether it is referred to or not, so it is kept and found again.
+Compiled code is never freed, so compiled functions are kept and reused.
 """
 
 from .code_hash import deep_hash

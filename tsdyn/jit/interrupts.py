@@ -1,7 +1,7 @@
 """Ctrl-C while a kernel compiles.
 
-LLVM calls back into Python. An exception raised in such a callback is printed and forgotten, and Numba finds no machine
-code afterwards. Here a signal that arrives in a callback is kept until the end of the compilation.
+LLVM calls back into Python. An exception raised in such a callback is printed and lost, and Numba then finds no machine
+code. Signals that arrive in a callback are therefore deferred to the end of the compilation.
 """
 
 import contextlib

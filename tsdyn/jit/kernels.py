@@ -35,6 +35,15 @@ def kernel(function, allocates=False, inline=True):
     """Compile a function that other kernels call; it is compiled into each of them.
 
     With allocates=True it may allocate and raise, indices are checked, and it is not inlined: for functions of time.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> @ts.kernel
+    ... def cube(x):
+    ...     return x * x * x
+    >>> cube(2.0)
+    8.0
     """
     if allocates:
         options = {**OPTIONS, "_nrt": True, "boundscheck": True}

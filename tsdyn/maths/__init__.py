@@ -1,7 +1,7 @@
 """Mathematics without mechanics: Euler parameters, vectors, dense linear algebra, power series, root isolation.
 
-Imports jit. Modules are independent of each other but for the pieces that they are made of.
+Imports jit. Most modules are independent of each other.
 
-Begin with euler_parameters.py: A(p), G(p) and their derivatives. recurrences.py has the coefficients of Taylor
-series; power_series.py and two_jets.py are numbers that carry a series through any formula.
+Begin with euler_parameters.py: A(p), G(p) and their derivatives. recurrences.py has the recurrences of
+Taylor coefficients; power_series.py and two_jets.py are numbers that propagate a series through any formula.
 """

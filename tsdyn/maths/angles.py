@@ -1,4 +1,4 @@
-"""The angle of a point (x, y), analytic: also of complex numbers, truncated Taylor series and arrays."""
+"""The polar angle of (x, y) as an analytic function: also for complex numbers, truncated Taylor series and arrays."""
 
 import numpy as np
 

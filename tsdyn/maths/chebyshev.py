@@ -1,4 +1,4 @@
-"""Chebyshev interpolants through samples on [-1, 1], as tables made once for each degree."""
+"""Chebyshev interpolation on [-1, 1]; tables are made once for each degree."""
 
 from functools import cache
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Volume, centroid and second moments of what a closed mesh of triangles bounds, and what makes it closed."""
+"""Volume, centroid and second moments of a closed triangle mesh, and the check that it is closed."""
 
 import numpy as np
 

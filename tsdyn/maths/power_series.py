@@ -1,7 +1,7 @@
-"""Truncated Taylor series of any order as numbers: a kernel run on them gives the series of its result.
+"""Truncated power series of any order as numbers: a kernel evaluated on them gives the series of its result.
 
-Nothing here is shared with `recurrences`, which it serves to check: functions go by their own Taylor coefficients at
-the value of the argument, f(x_0 + d) = sum_n f_n d^n, d^n being zero beyond the order.
+The module is independent of `recurrences`, which it checks: functions are composed from their Taylor coefficients at
+the value of the argument, f(x_0 + d) = sum_n f_n d^n, where d^n vanishes beyond the order.
 """
 
 import numpy as np

@@ -1,13 +1,13 @@
-"""Taylor series, coefficient by coefficient: what the kernels `series` of constraints and forces are written with.
+"""Recurrences of Taylor coefficients: the building blocks of `series` kernels of constraints and forces.
 
-A series is a row of coefficients, a[k] that of t^k. Each function gives coefficient k of its result from the rows of
-its arguments up to k, and from the result's own row up to k - 1. Fill rows of the scratch array in turn:
+A series is a row of coefficients, a[k] that of t^k. Each function returns coefficient k of its result from the rows of
+its arguments up to k and the row of the result up to k - 1. Fill rows of the scratch array in order:
 
     s[2, k] = product(s[0], s[1], k)
     s[3, k] = root(s[2], s[3], k)
 
     product          c = a b                 c_k = sum_j a_j b_{k-j}
-    square           c = a a                 half of that
+    square           c = a a                 the same in half the operations
     dot, cross       of three rows each; scaled: of three rows and one
     rotation         A(p) by columns, nine rows; rotated, rotated_back: A v and A^T v
     quotient         q = a / b               b_0 q_k = a_k - sum_{j>0} b_j q_{k-j}                         (1)
@@ -17,7 +17,7 @@ its arguments up to k, and from the result's own row up to k - 1. Fill rows of t
     sine_cosine      s, c of a               k s_k = sum_j j a_j c_{k-j},  k c_k = -sum_j j a_j s_{k-j}    (5)
     angle            theta of (x, y)         theta' (x^2 + y^2) = x y' - y x'                              (6)
 
-(1)-(6) are the product rule for q b = a, r r = a, a u' = n a' u, e' = a' e, s' = a' c, c' = -a' s and theta's own.
+(1)-(6) are the product rule applied to q b = a, r r = a, a u' = n a' u, e' = a' e, s' = a' c, c' = -a' s and (6).
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
-"""Times between which the sign of a function changes once at most: where to look for its zeros.
+"""Bracketing of zeros: times between which a function changes sign at most once.
 
-The function is sampled at Chebyshev points. Where an interpolant of degree 4, 8, 16 or 32 has resolved the function,
-its extremes next to zero are sampled too, so that no pair of close zeros is missed; elsewhere the interval
-is halved. What stays rough on ever shorter intervals is a kink or a jump, of which the samples' signs count.
+The function is sampled at Chebyshev points. Once an interpolant of degree 4, 8, 16 or 32 resolves the function, its
+extrema near zero are sampled too, so that pairs of close zeros are found; otherwise the interval is halved. A function
+that stays unresolved on ever shorter intervals has a kink or a jump, judged by the signs of the samples.
 """
 
 from itertools import pairwise

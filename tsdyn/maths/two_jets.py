@@ -1,7 +1,7 @@
-"""Truncated Taylor series x + x' t + x'' t^2 / 2, as numbers: value and two derivatives go through any formula.
+"""Second-order Taylor numbers (2-jets) x + x' t + x'' t^2 / 2: value and two derivatives through any formula.
 
-They turn a primitive's phi into Phi, its rate and its acceleration along a motion, without its jacobian and gamma:
-that is how constraint errors are recomputed independently of the solver.
+They turn a primitive's phi into Phi, its rate and its acceleration along a motion, without jacobian and gamma, and so
+make the constraint errors of a solution independent of the solver.
 """
 
 import operator

@@ -3,7 +3,7 @@
     A(p) v   = v + 2 e x (e x v + e0 v),  A(p)^T v = v + 2 e x (e x v - e0 v)      p of unit length
     omega'   = 2 G(p) pd                                                            body frame
 
-They are kernels; elsewhere call their `twin`.
+The functions are kernels; Python code calls their `twin`.
 """
 
 import math

@@ -1,7 +1,8 @@
-"""Integration methods without their tables of coefficients: tableaus, step kernels, interpolants.
+"""Integration methods, coefficients aside: tableaus, step kernels, interpolants.
 
 Imports workspaces and below. integrators/ is written on this package, a file a method.
 
 Begin with integrator.py (what a method is), then explicit.py and diagonally_implicit.py (the kernels that make a
-step) and interpolants.py (dense output within a step, in chart coordinates).
+step) and interpolants.py (polynomials within a step, in chart coordinates; runs/trajectory.py puts them on the
+manifold).
 """

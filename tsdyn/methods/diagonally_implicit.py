@@ -5,8 +5,8 @@ Stage i of (v, vd)' = (vd, f) has the unknown k_i = vdd there:
     vd_i = vd + h sum_{j<i} a_ij k_j + g k_i,    v_i = v + h sum_{j<i} a_ij vd_j + g vd_i,    g = h a_ii
     k_i <- k_i + P^-1 A (f(v_i, vd_i) - k_i),    P = A - g C_hat + g^2 K_hat  (linearisation.py)
 
-P is kept over iterations, stages and steps. Where the measured contraction is poor it is made anew, first from the same
-stiffness and damping at the present place, then, if that does not help, from new ones.
+P is kept over iterations, stages and steps. On poor measured contraction it is rebuilt, first from the same stiffness
+and damping at the current configuration, then from new ones.
 """
 
 import math

@@ -1,13 +1,13 @@
 """The step kernels of tableau methods.
 
-The equations are given by two kernels of the formulation, called by address:
+A formulation supplies two kernels, called by address:
 
-    place(context, t, x)                take positions (all that depends on t and x alone)
-    accelerate(context, t, y, yd, xd)   take velocities there, return yd and, for a first-order system, xd
+    place(context, t, x)                set positions: evaluate all that depends on t and x alone
+    accelerate(context, t, y, yd, xd)   set velocities; return yd and, for a first-order system, xd
 
-A step kernel returns the increments dx, dy, so that the driver can add them with compensation. Signature of a step
-kernel: context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy; yd and xd are those of the
-step's start. The memory of a Runge-Kutta method holds n = nx + ny floats of scratch, then n for each stage: (x', y').
+A step kernel returns the increments dx, dy, which the driver adds by compensated summation. Signature of a step kernel:
+context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy; yd and xd are the derivatives at the
+start of the step. The memory of a Runge-Kutta method holds n = nx + ny floats of scratch, then (x', y') of each stage.
 """
 
 from ..jit.kernels import ANY, callback, caller, kernel, vector

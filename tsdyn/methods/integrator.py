@@ -1,14 +1,22 @@
-"""What an integrator is: a small object that holds its settings and names the kernel that makes a step."""
+"""The interface of an integrator: an object that holds the settings and names the step kernel."""
+
+from __future__ import annotations
 
 from copy import copy
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
 
 from ..calls import fitting
 from ..validation import positive
 from .diagonally_implicit import implicit_step
 from .explicit import embedded_error, nystrom_step, runge_kutta_step, second_embedded_error, second_order_step
 from .interpolants import HERMITE, HERMITE_FIRST_ORDER, hermite_second
-from .tableau import RungeKuttaTableau
+from .tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ..hints import StepKernel
 
 _registry = {}
 
@@ -29,17 +37,28 @@ class Integrator:
         How far below the tolerances one step's error is kept: errors of many steps add up.
     errors : tuple of Callback
         The kernels of the error estimate; a second one tempers the first (Hairer's combination of two orders).
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> isinstance(ts.integrators.Nystrom4(step=0.01), ts.Integrator)
+    True
     """
 
     order = 0
     embedded_order = 0  # of the error estimate; zero for a method that has none
     implicit = False
-    driver = "steps"  # which one runs it; see request.py
+    driver = "steps"  # which one runs it; see task.py
     stability_limit = 0.0  # h |lambda| that its last stage and the step's end, of one time, may show; 0: not watched
-    rtol = atol = max_step = first_step = None
-    margin, errors = 30.0, (embedded_error,)
+    rtol: float | None = None
+    atol: float | None = None
+    step: float | None
+    max_step: float | None = None
+    first_step: float | None = None
+    margin: float = 30.0
+    errors: tuple[Any, ...] = (embedded_error,)
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         if "__init__" in vars(cls):
             cls.__init__ = fitting(cls.__init__)
@@ -47,35 +66,48 @@ class Integrator:
             _registry[cls.__name__.lower().replace("_", "")] = cls
 
     @fitting
-    def __init__(self, step):
+    def __init__(self, step: float) -> None:
         self.step = positive(step, f"{type(self).__name__}: step (s)")
 
-    def bounded(self, longest):
+    def bounded(self, longest: float) -> Self:
         """Return the method with steps of at most `longest`, s."""
         method = copy(self)
         method.max_step = min(self.max_step or longest, longest)
         method.step = None if self.step is None else min(self.step, longest)
         return method
 
-    def kernel(self, first_order):
+    def kernel(self, first_order: bool) -> StepKernel:
         """Return (step kernel, its numbers (float64), floats of memory it needs for systems of sizes nx, ny)."""
         raise NotImplementedError
 
-    def interpolant(self, first_order):
+    def interpolant(self, first_order: bool) -> Any:
         """Return the `Interpolant` of its steps; the one for every method uses their two ends alone."""
         return HERMITE_FIRST_ORDER if first_order else HERMITE
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"{type(self).__name__}(step={self.step:g})"
 
 
 class ExplicitNystrom(Integrator):
-    """A method that is a `NystromTableau`, with the Runge-Kutta tableau of its first-order equivalent."""
+    """A method that is a `NystromTableau`, with the Runge-Kutta tableau of its first-order equivalent.
 
-    tableau = None
-    first_order = None
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> class Midpoint(ts.ExplicitNystrom):
+    ...     order = 2
+    ...     tableau = ts.NystromTableau(
+    ...         a=((), (1 / 2,)), abar=((), (1 / 8,)), b=(0, 1), bbar=(0, 1 / 2), c=(0, 1 / 2), order=2
+    ...     )
+    ...     first_order = ts.RungeKuttaTableau(a=((), (1 / 2,)), b=(0, 1), c=(0, 1 / 2), order=2)
+    >>> Midpoint(step=1e-3)
+    Midpoint(step=0.001)
+    """
 
-    def kernel(self, first_order):
+    tableau: NystromTableau | None = None
+    first_order: RungeKuttaTableau | None = None
+
+    def kernel(self, first_order: bool) -> StepKernel:
         """The numbers of the tableau, and the kernel that steps by it."""
         tableau = self.first_order if first_order else self.tableau
         stages = len(tableau.c)
@@ -85,9 +117,24 @@ class ExplicitNystrom(Integrator):
 
 
 class Adaptive(Integrator):
-    """A method that chooses its steps by an error estimate, unless it is given a fixed one."""
+    """A method that chooses its steps by an error estimate, unless it is given a fixed one.
 
-    def __init__(self, rtol=1e-6, atol=1e-8, step=None, max_step=None, first_step=None):
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> method = ts.integrators.RK45(rtol=1e-6, max_step=0.1)
+    >>> isinstance(method, ts.Adaptive), method
+    (True, RK45(rtol=1e-06, atol=1e-08))
+    """
+
+    def __init__(
+        self,
+        rtol: float = 1e-6,
+        atol: float = 1e-8,
+        step: float | None = None,
+        max_step: float | None = None,
+        first_step: float | None = None,
+    ) -> None:
         what = type(self).__name__
         self.rtol, self.atol = positive(rtol, f"{what}: rtol"), positive(atol, f"{what}: atol")
         self.step = None if step is None else positive(step, f"{what}: step (s)")
@@ -95,31 +142,44 @@ class Adaptive(Integrator):
         self.first_step = None if first_step is None else positive(first_step, f"{what}: first_step (s)")
 
     @property
-    def stages(self):
+    def stages(self) -> int:
         """Evaluations that a step takes."""
         return len(self.tableau.c)
 
-    def step_tolerances(self):
+    def step_tolerances(self) -> tuple[float, float]:
         """Return (rtol, atol) that each step's error is held to."""
         return self.rtol / self.margin, self.atol / self.margin
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         settings = f"rtol={self.rtol:g}, atol={self.atol:g}" if self.step is None else f"step={self.step:g}"
         return f"{type(self).__name__}({settings})"
 
 
 class ExplicitRungeKutta(Adaptive):
-    """A method that is a `RungeKuttaTableau` with an error estimate, applied to (v, vd)."""
+    """A method that is a `RungeKuttaTableau` with an error estimate, applied to (v, vd).
 
-    tableau = None
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> class BogackiShampine(ts.ExplicitRungeKutta):
+    ...     order = 3
+    ...     tableau = ts.RungeKuttaTableau(
+    ...         a=((), (1 / 2,), (0, 3 / 4)), b=(2 / 9, 1 / 3, 4 / 9), c=(0, 1 / 2, 3 / 4), order=3,
+    ...         error=(-5 / 72, 1 / 12, 1 / 9, -1 / 8), embedded_order=2,
+    ...     )
+    >>> BogackiShampine(rtol=1e-4)
+    BogackiShampine(rtol=0.0001, atol=1e-08)
+    """
 
-    def __init_subclass__(cls, **keywords):
+    tableau: Any = None  # RungeKuttaTableau, or a property that makes one
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         if isinstance(cls.tableau, RungeKuttaTableau):  # and not one that is made when first used
             cls.embedded_order = cls.tableau.embedded_order
             cls.errors = (embedded_error, second_embedded_error)[: 2 if cls.tableau.second_error else 1]
 
-    def kernel(self, first_order):
+    def kernel(self, first_order: bool) -> StepKernel:
         """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
         step = runge_kutta_step if first_order else second_order_step
@@ -131,22 +191,31 @@ class DiagonallyImplicit(Adaptive):
 
     One stiffness and damping, exact, and one factorised iteration matrix are kept over iterations, stages, steps and
     charts until the measured contraction says otherwise.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> class Trapezoid(ts.DiagonallyImplicit):
+    ...     order = 2
+    ...     tableau = ts.ImplicitTableau(a=((0,), (1 / 2, 1 / 2)), c=(0, 1), order=2, embedded_order=2)
+    >>> Trapezoid(step=1e-3)
+    Trapezoid(step=0.001)
     """
 
-    tableau = None
+    tableau: ImplicitTableau | None = None
     implicit = True
     second = hermite_second  # accelerations between the ends of a step
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         cls.embedded_order = cls.tableau.embedded_order
 
-    def kernel(self, first_order):
+    def kernel(self, first_order: bool) -> StepKernel:
         """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
         return implicit_step, self.tableau.numbers, lambda nx, ny: (stages + 1) * (nx + ny) + 6 * nx + 1
 
 
-def registered():
+def registered() -> Mapping[str, type[Integrator]]:
     """Return every integrator class known, by its name in lower case."""
     return MappingProxyType(_registry)

@@ -1,11 +1,11 @@
-"""Interpolants: what is known of a step, as one block of numbers, and the motion within the step from that block.
+"""Interpolants: one block of numbers a step, and the motion inside the step from that block.
 
     fill(context, place, accelerate, first_order, t, h, n, nx, ny,
          x0, y0, yd0, x1, y1, yd1, xd1, before, now, tableau, memory, data)     the block of a step; Status
     value(s, h, n, nx, ny, data, x, y)                                          x and y at t + s h
 
-0 marks the step's start and 1 its end; before and now hold q, qd, qdd there; a fill may evaluate the equations, by
-place and accelerate, and leaves the workspace to its caller to put back.
+0 marks the start of the step and 1 its end; before and now hold q, qd, qdd there. A fill may evaluate the equations by
+place and accelerate; the caller restores the workspace.
 """
 
 from collections.abc import Callable

@@ -1,11 +1,19 @@
-"""Tableaus of Runge-Kutta, diagonally implicit and Nystrom methods: data that checks itself."""
+"""Tableaus of Runge-Kutta, diagonally implicit and Nystrom methods, with checks of their order conditions."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import InvalidArgument
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..hints import Floats
 
 
 def _rows(values, stages, what):
@@ -37,17 +45,34 @@ def _demand(what, size=1.0, **conditions):
 
 @dataclass(frozen=True)
 class RungeKuttaTableau:
-    """An explicit Runge-Kutta method: stage times c, coefficients a (rows below the diagonal), weights b."""
+    """An explicit Runge-Kutta method: stage times c, coefficients a (rows below the diagonal), weights b.
 
-    a: tuple
-    b: tuple
-    c: tuple
+    Examples
+    --------
+    The classical method of order 4; a wrong coefficient is refused:
+
+    >>> import tsdyn as ts
+    >>> classical = {"a": ((), (1 / 2,), (0, 1 / 2), (0, 0, 1)), "b": (1 / 6, 1 / 3, 1 / 3, 1 / 6), "order": 4}
+    >>> len(ts.RungeKuttaTableau(**classical, c=(0, 1 / 2, 1 / 2, 1)).b)
+    4
+    >>> try:
+    ...     ts.RungeKuttaTableau(**classical, c=(0, 1 / 2, 1 / 3, 1))
+    ... except ts.InvalidArgument as error:
+    ...     print(error)
+    RungeKuttaTableau: the condition sum a = c fails by 0.167.
+    """
+
+    a: Sequence[Sequence[float]]
+    b: Sequence[float]
+    c: Sequence[float]
     order: int
-    error: tuple = ()  # weights of the error estimate: one a stage, and one of the derivative at the step's end
-    second_error: tuple = ()  # those of a second, lower one
+    error: Sequence[
+        float
+    ] = ()  # weights of the error estimate: one a stage, and one of the derivative at the step's end
+    second_error: Sequence[float] = ()  # those of a second, lower one
     embedded_order: int = 0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         a, b, c = self.arrays
         ones, size = np.ones(len(c)), max(1.0, np.abs(a).sum(axis=1).max(), np.abs(b).sum())
         what = "RungeKuttaTableau", size
@@ -59,12 +84,12 @@ class RungeKuttaTableau:
         _demand(*what, **_trees(a, b, c, min(self.order, 4)))
 
     @property
-    def arrays(self):
+    def arrays(self) -> tuple[Floats, ...]:
         """a (s, s), b (s,), c (s,)."""
         return _rows(self.a, len(self.c), "RungeKuttaTableau"), np.array(self.b), np.array(self.c)
 
     @cached_property
-    def numbers(self):
+    def numbers(self) -> Floats:
         """The numbers as the kernels read them: s; a stage's same-place flag, c, row of a; b; rows of error weights."""
         a, b, c = self.arrays
         stages = [[0.0, c[i], *a[i]] for i in range(len(c))]
@@ -77,15 +102,23 @@ class ImplicitTableau:
 
     Such a method is stiffly accurate and begins with the derivative at the step's start; error holds the weights of
     the error estimate, one a stage, none where the method has an estimate of its own.
+
+    Examples
+    --------
+    The trapezoidal rule:
+
+    >>> import tsdyn as ts
+    >>> ts.ImplicitTableau(a=((0,), (1 / 2, 1 / 2)), c=(0, 1), order=2).order
+    2
     """
 
-    a: tuple
-    c: tuple
+    a: Sequence[Sequence[float]]
+    c: Sequence[float]
     order: int
-    error: tuple = ()
+    error: Sequence[float] = ()
     embedded_order: int = 0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         what = "ImplicitTableau"
         a, b, c = self.arrays
         ones, diagonal = np.ones(len(c)), np.diag(a)
@@ -97,12 +130,12 @@ class ImplicitTableau:
         _demand(what, **_trees(a, b, c, self.order))
 
     @property
-    def arrays(self):
+    def arrays(self) -> tuple[Floats, ...]:
         """a (s, s), b (s,), c (s,)."""
         a = _lower(self.a, len(self.c), "ImplicitTableau")
         return a, a[-1], np.array(self.c)
 
-    def predictor(self, points=4):
+    def predictor(self, points: int = 4) -> Floats:
         """First guess of stage i from the stages before, (s, s): extrapolation through the nearest of them in time."""
         c = np.array(self.c)
         weights = np.zeros((len(c), len(c)))
@@ -113,7 +146,7 @@ class ImplicitTableau:
         return weights
 
     @cached_property
-    def numbers(self):
+    def numbers(self) -> Floats:
         """As `RungeKuttaTableau.numbers`, followed by the predictor."""
         a, b, c = self.arrays
         stages = [[0.0, c[i], *a[i]] for i in range(len(c))]
@@ -129,16 +162,27 @@ class NystromTableau:
     Step:     v   += h vd + h^2 sum_i bbar_i k_i,            vd  += h sum_i b_i k_i
 
     Conditions up to order 4 are those of Hairer, Norsett, Wanner, Solving ODEs I, 2nd ed., II.14.
+
+    Examples
+    --------
+    The midpoint rule:
+
+    >>> import tsdyn as ts
+    >>> midpoint = ts.NystromTableau(
+    ...     a=((), (1 / 2,)), abar=((), (1 / 8,)), b=(0, 1), bbar=(0, 1 / 2), c=(0, 1 / 2), order=2
+    ... )
+    >>> midpoint.order
+    2
     """
 
-    a: tuple
-    abar: tuple
-    b: tuple
-    bbar: tuple
-    c: tuple
+    a: Sequence[Sequence[float]]
+    abar: Sequence[Sequence[float]]
+    b: Sequence[float]
+    bbar: Sequence[float]
+    c: Sequence[float]
     order: int
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         a, abar, b, bbar, c = self.arrays
         ones = np.ones(len(c))
         what = "NystromTableau"
@@ -167,14 +211,14 @@ class NystromTableau:
             )
 
     @property
-    def arrays(self):
+    def arrays(self) -> tuple[Floats, ...]:
         """a (s, s), abar (s, s), b (s,), bbar (s,), c (s,)."""
         s = len(self.c)
         a, abar = _rows(self.a, s, "NystromTableau a"), _rows(self.abar, s, "NystromTableau abar")
         return a, abar, np.array(self.b), np.array(self.bbar), np.array(self.c)
 
     @cached_property
-    def numbers(self):
+    def numbers(self) -> Floats:
         """The numbers as the step kernel reads them: s; a stage's same-place flag, c, rows of abar and a; bbar; b."""
         a, abar, b, bbar, c = self.arrays
         stages = []

@@ -1,4 +1,4 @@
-"""Phi, Phi_q, Phi_t, gamma and forces of a whole system: one call by address for each kind that it has."""
+"""Phi, Phi_q, Phi_t, gamma and applied forces of a system: one call by address for each kind present."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The bodies, constraints and forces of a packed scene, where their coordinates are, and which angles runs count."""
+"""Handles of a packed scene: bodies, constraints, forces, their coordinates, and the angles that runs count."""
 
 from typing import NamedTuple
 
@@ -105,7 +105,7 @@ class Handles:
 
 
 def _begins(item):
-    """Whether the angles of an item may begin elsewhere than near zero."""
+    """Return True if the angles of an item may begin elsewhere than near zero."""
     return type(item).counted_from is not Attachment.counted_from or np.any(item.angle_near)
 
 

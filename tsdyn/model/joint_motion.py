@@ -5,8 +5,8 @@
     thetadd = (E Fdd - F Edd) / (E^2 + F^2) - 2 thetad (E Ed + F Fd) / (E^2 + F^2)        (1)
     d = x_other - x_own,  s = e.d,  sd = e.dd + ed.d,  sdd = e.ddd + 2 ed.dd + edd.d      (2)
 
-For theta, thetad, E and F see joint_turns.py. q, qd and qdd are (n,) for one instant or (k, n) for k of them; what is
-returned is a number or an array (k,).
+theta, thetad, E and F are defined in joint_turns.py. q, qd and qdd are (n,) for one instant or (k, n) for k instants;
+results are numbers or arrays (k,).
 """
 
 import numpy as np

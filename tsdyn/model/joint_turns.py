@@ -1,12 +1,12 @@
-"""Turns of joints, counted in a run: the angle of each joint is followed from one accepted point to the next.
+"""Turn counts of joints: the angle of each joint is tracked from one accepted step to the next.
 
     v = A_own^T A_other h,  theta = atan2(g.v, f.v) + 2 pi turns                    see joint_coordinates.py
     thetad = (E Fd - F Ed) / (E^2 + F^2),  E = f.v,  F = g.v,  vd = w x v           (1)
              w = A_own^T A_other omega_other' - omega_own'
     theta(t + h) ~ theta(t) + h (thetad(t) + thetad(t + h)) / 2                     (2)
 
-Eq. (2) says which turn a long step has come to. The angle followed is right to a tenth of a radian, which is all that
-counting needs: results are worked out from q, on the turn nearest to it.
+Eq. (2) predicts the turn after a long step. The tracked angle is accurate to a tenth of a radian, enough for counting:
+results are computed from q, on the turn nearest to the tracked angle.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The packed system: what the kernels see of a scene, as a named tuple of arrays whose type never changes."""
+"""The packed system: the arrays that kernels read, in a named tuple whose type is the same for every scene."""
 
 import os
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Forces packed for the kernels: one row a kind, each instance's places and numbers in the shared arrays."""
+"""Forces packed for the kernels: one row a kind; indices and parameters of each instance in shared arrays."""
 
 from typing import NamedTuple
 

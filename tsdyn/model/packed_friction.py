@@ -1,4 +1,4 @@
-"""The frictions of joints in the graph of a scene: whose reaction each follows from, and on which bodies it acts."""
+"""Joint friction in the constraint graph: the joint whose reaction enters, and the bodies on which friction acts."""
 
 import numpy as np
 

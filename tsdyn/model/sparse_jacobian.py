@@ -1,4 +1,4 @@
-"""Phi_q row by row, 14 numbers each, 7 of body a and 7 of body b: what is O(N) to keep and to multiply with."""
+"""Sparse Phi_q: 14 numbers a row, 7 for body a and 7 for body b; storage and products cost O(N)."""
 
 import numpy as np
 

@@ -2,12 +2,14 @@
 
 Imports jit and maths.
 
-Begin with expressions.py: smooth motions such as `Sine` and `Polynomial`. prescribed.py makes a `Motion` of whatever
-a driver is given, signals.py a load of time; tables.py and piecewise.py are data and splines, and program.py is what
-the kernels evaluate.
+Begin with expressions.py: smooth motions and their arithmetic; elementary.py has `Sine`, `Polynomial` and the like.
+prescribed.py makes a `Motion` of whatever a driver is given, plain Python functions included, signals.py a load of
+time; those of time and state are in elements/user_functions.py. tables.py and piecewise.py are data and splines,
+program.py is what kernels evaluate.
 """
 
-from .expressions import Constant, Exponential, Piecewise, Polynomial, Ramp, Sine, Smooth, time
+from .elementary import Constant, Exponential, Piecewise, Polynomial, Ramp, Sine, time
+from .expressions import Smooth
 
 __all__ = ["Constant", "Exponential", "Piecewise", "Polynomial", "Ramp", "Sine", "Smooth", "time"]
 

@@ -1,16 +1,18 @@
-"""Smooth motions: functions of time that know their derivatives and their Taylor series, and compile nothing.
+"""Smooth motions: functions of time with exact derivatives and Taylor series, without compilation.
 
     Polynomial, Constant, Ramp, Sine, Exponential, and time itself
     Piecewise, of data: tables and SciPy's splines
     + - * / of them and of numbers, powers, and np.sin, cos, tan, exp, log, sqrt, sinh, cosh, tanh, arctan of them
 
-A motion is a graph of operations. Its value and two derivatives follow in Python by `jet`, its series in a run by
-`motion_program`; neither knows of the other.
+A motion is a graph of operations. `jet` evaluates value and two derivatives in Python, `motion_program` the series in a
+run; the two are independent.
 """
+
+from __future__ import annotations
 
 import math
 import operator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,9 +20,11 @@ from ..calls import fitting
 from ..errors import InvalidArgument
 from ..maths.power_series import Truncated
 from ..maths.two_jets import Jet
-from ..validation import floats, number
+from ..validation import number
 from . import program as code
-from .tables import Table, is_data, pieces_of
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, Floats, Value
 
 
 class Operation(NamedTuple):
@@ -57,38 +61,48 @@ _OPERATIONS = {
 
 
 class Smooth:
-    """Base of all smooth motions: one operation on others, or a polynomial of the time, whole or in pieces."""
+    """Base of all smooth motions: one operation on others, or a polynomial of the time, whole or in pieces.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> t = ts.motions.time
+    >>> chirp = 0.1 * np.sin(3.0 * t + t**2)
+    >>> print(f"{chirp(0.0):.3f}, rate {chirp.rate(0.0):.3f}, acceleration {chirp.acceleration(0.0):.3f}")
+    0.000, rate 0.300, acceleration 0.200
+    """
 
     @fitting
-    def __init__(self, operation, operands=(), numbers=()):
+    def __init__(self, operation: str, operands: tuple[Smooth, ...] = (), numbers: Any = ()) -> None:
         self._operation, self._operands, self._numbers = operation, operands, numbers
 
     def _become(self, other):
         Smooth.__init__(self, other._operation, other._operands, other._numbers)
 
-    def __call__(self, t):
+    def __call__(self, t: ArrayLike) -> Value:
         """The value at a time or times, s."""
         return self._on(t)
 
-    def rate(self, t):
+    def rate(self, t: ArrayLike) -> Value:
         """The first derivative at a time or times."""
         return self._jet(t).xd + 0.0 * t
 
-    def acceleration(self, t):
+    def acceleration(self, t: ArrayLike) -> Value:
         """The second derivative at a time or times."""
         return self._jet(t).xdd + 0.0 * t
 
-    def jerk(self, t):
+    def jerk(self, t: ArrayLike) -> Value:
         """The third derivative at a time or times."""
         series = [self._on(Truncated([time, 1.0, 0.0, 0.0])) for time in np.ravel(t).tolist()]
         return 6.0 * np.reshape([x.c[3] for x in series], np.shape(t))[()]
 
     @property
-    def pieces(self):
+    def pieces(self) -> list[Any]:
         """The `Pieces` that it is made of."""
         return [node._numbers for node in self._order() if node._operation == "piecewise"]
 
-    def sides(self, t):
+    def sides(self, t: ArrayLike) -> Floats:
         """Value and rate at times t (k,), by the pieces that end there and by those that begin: (2, 2, k)."""
         found = [Jet.of(self._on(Jet(t, 1.0), left)) for left in (True, False)]
         return np.array([[x.x + 0.0 * t, x.xd + 0.0 * t] for x in found])
@@ -126,7 +140,7 @@ class Smooth:
                 waiting += [(operand, False) for operand in node._operands]
         return ready
 
-    def program(self):
+    def program(self) -> list[float]:
         """The numbers that `motion_program` runs, with room for its rows."""
         row, constants, instructions, rows = {}, [], [], 0
         for node in self._order():
@@ -145,49 +159,49 @@ class Smooth:
         head = [0.0, len(instructions) // code.STEP, *places, rows, row[id(self)]]
         return [float(x) for x in (*head, *instructions, *constants)] + [0.0] * (rows * code.WIDTH)
 
-    def __add__(self, other):
+    def __add__(self, other: Smooth | float) -> Smooth:
         return _binary("add", self, other)
 
-    def __radd__(self, other):
+    def __radd__(self, other: Smooth | float) -> Smooth:
         return _binary("add", other, self)
 
-    def __sub__(self, other):
+    def __sub__(self, other: Smooth | float) -> Smooth:
         return _binary("subtract", self, other)
 
-    def __rsub__(self, other):
+    def __rsub__(self, other: Smooth | float) -> Smooth:
         return _binary("subtract", other, self)
 
-    def __mul__(self, other):
+    def __mul__(self, other: Smooth | float) -> Smooth:
         return _binary("multiply", self, other)
 
-    def __rmul__(self, other):
+    def __rmul__(self, other: Smooth | float) -> Smooth:
         return _binary("multiply", other, self)
 
-    def __truediv__(self, other):
+    def __truediv__(self, other: Smooth | float) -> Smooth:
         return _binary("divide", self, other)
 
-    def __rtruediv__(self, other):
+    def __rtruediv__(self, other: Smooth | float) -> Smooth:
         return _binary("divide", other, self)
 
-    def __neg__(self):
+    def __neg__(self) -> Smooth:
         return _binary("multiply", -1.0, self)
 
-    def __pos__(self):
+    def __pos__(self) -> Smooth:
         return self
 
-    def __pow__(self, n):
+    def __pow__(self, n: float) -> Smooth:
         n = _plain(n)
         if n != int(n) or n < 0:
             return Smooth("power", (self,), (n,))
         if n < 2:
-            return self if n else Constant(1.0)
+            return self if n else constant(1.0)
         half = self ** (n // 2)
         return half * half * self if n % 2 else half * half
 
-    def __bool__(self):
+    def __bool__(self) -> bool:
         raise TypeError("a motion is neither true nor false: it has no branches.")
 
-    def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **keywords: Any) -> Any:
         """NumPy's functions of a motion, and its arithmetic with one on the right."""
         if method == "__call__" and not keywords:
             if len(inputs) == 1 and ufunc.__name__ in FUNCTIONS:
@@ -196,133 +210,19 @@ class Smooth:
                 return self ** inputs[1]
             if len(inputs) == 2 and ufunc.__name__ in ("add", "subtract", "multiply", "divide"):
                 return _binary(ufunc.__name__, *inputs)
-        raise TypeError(f"np.{ufunc.__name__} of a motion is not known here; there are {', '.join(FUNCTIONS)}.")
+        raise TypeError(f"np.{ufunc.__name__} of a motion is not supported; there are {', '.join(FUNCTIONS)}.")
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self(0.0):g} at t = 0>"
 
 
-class Polynomial(Smooth):
-    """c_0 + c_1 t + c_2 t^2 + ...
-
-    Parameters
-    ----------
-    coefficients : array_like (n,)
-        c_0 first; in the unit of what is moved, over s^k.
-
-    Raises
-    ------
-    InvalidArgument
-        If they are no finite numbers.
-    """
-
-    @fitting
-    def __init__(self, coefficients):
-        c = floats(coefficients)
-        if c.ndim != 1 or not c.size or not np.isfinite(c).all():
-            raise InvalidArgument(
-                f"{type(self).__name__}: coefficients must be finite numbers, c_0 first, got {coefficients!r}."
-            )
-        super().__init__("polynomial", (), tuple(c.tolist()))
-
-
-class Constant(Polynomial):
+def constant(value: float) -> Smooth:
     """A value that stays."""
-
-    @fitting
-    def __init__(self, value):
-        super().__init__(_demand(self, value=value))
-
-
-class Ramp(Polynomial):
-    """start + rate t: uniform motion."""
-
-    @fitting
-    def __init__(self, start=0.0, rate=1.0):
-        super().__init__(_demand(self, start=start, rate=rate))
-
-
-class Piecewise(Smooth):
-    """A motion from data: a spline or another piecewise polynomial of the time.
-
-    Parameters
-    ----------
-    source : ts.Table, (times, values), or SciPy's PPoly (CubicSpline, PchipInterpolator, ...), BPoly or BSpline
-        Of numbers. Outside its times it goes on where SciPy's object says so by `extrapolate`; else a run that leaves
-        them is refused.
-
-    Raises
-    ------
-    InvalidArgument
-        If it is none of these, its times don't increase, or its values are not real numbers.
-
-    Notes
-    -----
-    Steps of a run end at the knots, so a method keeps its order. A constraint follows no jump of value or rate, and a
-    run over one is refused; jumps of acceleration are followed.
-    """
-
-    @fitting
-    def __init__(self, source):
-        if not is_data(source):
-            raise InvalidArgument(
-                f"Piecewise: source must be a ts.Table, (times, values), or SciPy's CubicSpline, PPoly, BPoly or "
-                f"BSpline, got {source!r}."
-            )
-        parts = pieces_of(source)
-        if len(parts) != 1:
-            raise InvalidArgument(f"Piecewise: source must have one value a time, it has {len(parts)}.")
-        super().__init__("piecewise", (), parts[0])
-
-    @classmethod
-    def each(cls, source):
-        """One motion for each component of a source of vectors."""
-        if not isinstance(source, Table):
-            return tuple(cls._of(pieces) for pieces in pieces_of(source))
-        if source.motions is None:  # many may share a table's numbers
-            source.motions = tuple(cls._of(pieces) for pieces in source.pieces())
-        return source.motions
-
-    @classmethod
-    def _of(cls, pieces):
-        motion = cls.__new__(cls)
-        Smooth.__init__(motion, "piecewise", (), pieces)
-        return motion
-
-    def __repr__(self):
-        return f"<Piecewise: {self._numbers!r}>"
-
-
-class Sine(Smooth):
-    """offset + amplitude sin(frequency t + phase), frequency in rad/s and phase in rad."""
-
-    @fitting
-    def __init__(self, amplitude, frequency, phase=0.0, offset=0.0):
-        a, w, phi, c = _demand(self, amplitude=amplitude, frequency=frequency, phase=phase, offset=offset)
-        wave = a * np.sin(Ramp(phi, w))
-        self._become(c + wave if c else wave)
-
-
-class Exponential(Smooth):
-    """offset + amplitude exp(rate t), rate in 1/s."""
-
-    @fitting
-    def __init__(self, amplitude, rate, offset=0.0):
-        a, r, c = _demand(self, amplitude=amplitude, rate=rate, offset=offset)
-        growth = a * np.exp(Ramp(0.0, r))
-        self._become(c + growth if c else growth)
-
-
-def _demand(motion, **given):
-    """The numbers, or an error that names the one that is none."""
-    for name, value in given.items():
-        if not math.isfinite(number(value)):
-            raise InvalidArgument(f"{type(motion).__name__}: {name} must be a finite number, got {value!r}.")
-    return [number(value) for value in given.values()]
+    return Smooth("polynomial", (), (value,))
 
 
 def _binary(operation, x, y):
-    return Smooth(operation, tuple(v if isinstance(v, Smooth) else Constant(_plain(v)) for v in (x, y)))
+    return Smooth(operation, tuple(v if isinstance(v, Smooth) else constant(_plain(v)) for v in (x, y)))
 
 
 def _plain(value):
@@ -352,4 +252,3 @@ FUNCTIONS = {
     "negative": lambda x: -x,
     "positive": lambda x: x,
 }
-time = Ramp(0.0, 1.0)

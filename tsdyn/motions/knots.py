@@ -1,4 +1,4 @@
-"""The knots of a scene's piecewise motions and loads: where steps of a run end, and what a run may not cross."""
+"""Knots of piecewise motions and loads: stops of a run, and jumps that no run may cross."""
 
 import numpy as np
 

@@ -1,6 +1,6 @@
-"""Polynomials of the time, one after the other: the data of splines, and their values in Python.
+"""Piecewise polynomials in time: data of splines, and their values in Python.
 
-On piece i the value is sum_k c[i, k] (t - knots[i])^k. At a knot the piece that begins there counts, as in SciPy.
+On piece i the value is sum_k c[i, k] (t - knots[i])^k. At a knot the piece to its right holds, as in SciPy.
 `motion_program` evaluates the same data in a run.
 """
 

@@ -1,8 +1,11 @@
-"""A prescribed function of time with its two derivatives: compiled and reached by address, or a program of numbers."""
+"""A prescribed function of time with two derivatives: compiled and called by address, or a program of numbers."""
+
+from __future__ import annotations
 
 import math
 from functools import partial
 from types import FunctionType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba.core.errors import NumbaError
@@ -12,11 +15,16 @@ from ..errors import InvalidArgument, InvalidConstraint
 from ..jit.compiled_once import compiled_once
 from ..jit.kernels import Callback, caller, kernel, specialised
 from ..validation import number
-from . import expressions as motions
-from .expressions import Piecewise, Smooth
+from .elementary import Constant, Piecewise, time
+from .expressions import FUNCTIONS, Smooth
 from .knots import demand_covered, demand_followed
 from .program import run_program
 from .tables import is_data
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from ..hints import Data, Floats, Prescribed, TimeFunction
 
 SIGNATURE = "d"
 UNNAMED = "motion"
@@ -35,10 +43,24 @@ class Motion:
         `ts.motions`, for which nothing is compiled and Taylor has the series.
     what : str
         What error messages call it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> wave = ts.Motion(lambda t: 0.1 * np.sin(2.0 * t))
+    >>> print(wave.value(0.0))  # f, fd, fdd
+    (0.0, 0.2, 0.0)
     """
 
     @fitting
-    def __init__(self, f, fd=None, fdd=None, what=UNNAMED):
+    def __init__(
+        self,
+        f: TimeFunction | Data,
+        fd: TimeFunction | None = None,
+        fdd: TimeFunction | None = None,
+        what: str = UNNAMED,
+    ) -> None:
         self.what, self.smooth, self.given = what, None, (f, fd, fdd)
         if is_data(f) and fd is fdd is None:
             (f,) = self.components(f, 1, what)
@@ -53,35 +75,35 @@ class Motion:
         self.value(self.origin)
 
     @property
-    def functions(self):
+    def functions(self) -> tuple[Callable[..., Any], ...]:
         """f, fd and fdd, for Python."""
         smooth = self.smooth
         return self.given if smooth is None else (smooth, smooth.rate, smooth.acceleration)
 
     @property
-    def has_series(self):
-        """Whether it is one of `ts.motions`: of a user's own function no series is taken."""
+    def has_series(self) -> bool:
+        """True for one of `ts.motions`; a user's function has no series."""
         return not self.given
 
     @property
-    def motions(self):
+    def motions(self) -> tuple[Smooth, ...]:
         """The motions of `ts.motions` that it is made of."""
         return () if self.smooth is None else (self.smooth,)
 
     @property
-    def origin(self):
+    def origin(self) -> float:
         """The time that is nearest to t = 0 among those for which it has a value, s."""
         covers = [pieces.covers for motion in self.motions for pieces in motion.pieces]
         return float(min([max([0.0, *(first for first, _ in covers)]), *(last for _, last in covers)]))
 
     @classmethod
-    def always(cls, value, what):
+    def always(cls, value: Prescribed, what: str) -> Motion:
         """Return a Motion, of a number too."""
         value = cls.wrap(value, what)
-        return value if isinstance(value, Motion) else cls(motions.Constant(value), what=what)
+        return value if isinstance(value, Motion) else cls(Constant(value), what=what)
 
     @classmethod
-    def wrap(cls, value, what):
+    def wrap(cls, value: Prescribed, what: str) -> Motion | float:
         """Return a Motion for functions, one of `ts.motions`, data or a Motion; a finite float for a number."""
         if isinstance(value, Motion):
             what = what if value.what == UNNAMED else value.what  # a part's motion is its joint's
@@ -101,7 +123,7 @@ class Motion:
         return result
 
     @staticmethod
-    def components(value, count, what):
+    def components(value: Data, count: int, what: str) -> tuple[Piecewise, ...]:
         """The motions of so many components that data say; each a `Piecewise`."""
         try:
             motions = Piecewise.each(value)
@@ -112,21 +134,21 @@ class Motion:
         return motions
 
     @staticmethod
-    def numbers(given):
+    def numbers(given: Iterable[Motion | float]) -> list[float]:
         """Parameters as kernels have them: a Motion is its value, rate and acceleration at its origin."""
         return [x for value in given for x in (value.value(value.origin) if isinstance(value, Motion) else (value,))]
 
     @staticmethod
-    def places(value):
+    def places(value: Motion | float) -> tuple[Motion | float, ...]:
         """What a prescribed value contributes to `parameters()`: three places for value, rate and acceleration."""
         return (value,) if isinstance(value, Motion) else (value, 0.0, 0.0)
 
     @staticmethod
-    def at_start(value):
+    def at_start(value: Motion | float) -> float:
         """The value itself, or that of a Motion at its origin: t = 0, or the time nearest to it that data cover."""
         return value.value(value.origin)[0] if isinstance(value, Motion) else value
 
-    def value(self, t):
+    def value(self, t: float) -> tuple[float, ...]:
         """Return (f, fd, fdd) at t, by the plain Python functions."""
         t = t if self.smooth is None else np.float64(t)  # so that nothing raises
         try:
@@ -138,7 +160,7 @@ class Motion:
             raise InvalidConstraint(f"{self.what}: the motion is not finite at t = {t:g}: (f, fd, fdd) = {result}.")
         return result
 
-    def check(self, t0, t1):
+    def check(self, t0: float, t1: float) -> None:
         """Refuse derivatives that are not those of f, by difference quotients at a few times; data with a jump.
 
         Several quotients are tried at each time, and most times must fail: a kink or a short wave is no error.
@@ -164,7 +186,7 @@ class Motion:
                     f"{given[0]:g}, and a difference quotient of {names[0]} does not. Correct the derivatives."
                 )
 
-    def over(self, times):
+    def over(self, times: Floats) -> Floats:
         """f, fd and fdd at times (k,), shape (3, k)."""
         if self.smooth is not None:
             return np.array([function(times) for function in self.functions])
@@ -182,14 +204,14 @@ class Motion:
     def __getstate__(self):
         return {**self.__dict__, "_callbacks": None}  # machine code is not for pickling
 
-    def forget(self):
+    def forget(self) -> None:
         """Drop what was compiled or derived; it is made again when asked for."""
         self._callbacks = None
         if self.given and self.smooth is not None:
             self.smooth = _derived(self.given[0], self.what)
 
     @property
-    def addresses(self):
+    def addresses(self) -> tuple[int, ...]:
         """The addresses of the three compiled functions; of a program, what runs it and two zeros."""
         if self.smooth is not None:
             return run_program.address, 0, 0
@@ -222,18 +244,18 @@ def _derived(f, what):
     known = {name: _of_motions(value) for name, value in plain.__globals__.items()}
     twin = FunctionType(plain.__code__, known, plain.__name__, plain.__defaults__, plain.__closure__)
     try:
-        result = twin(motions.time)
+        result = twin(time)
     except Exception as error:
         raise InvalidConstraint(
             f"{what}: its derivatives can't be derived from f alone ({type(error).__name__}: {error}). Give three "
             "functions of time (f, fd, fdd), or write f with arithmetic and "
-            f"{', '.join(motions.FUNCTIONS)} of NumPy, without branches."
+            f"{', '.join(FUNCTIONS)} of NumPy, without branches."
         ) from error
     if isinstance(result, Smooth):
         return result
     if not math.isfinite(number(result)):
         raise InvalidConstraint(f"{what}: the function must return a number, it gave {result!r} of the time.")
-    return motions.Constant(number(result))
+    return Constant(number(result))
 
 
 def _of_motions(value):

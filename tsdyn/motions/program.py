@@ -1,9 +1,9 @@
-"""Taylor series of a smooth motion at a time: one kernel for all motions, which runs a short program of numbers.
+"""Taylor series of a prescribed motion at a time: one kernel interprets the programs of all motions.
 
-A program begins with (t, instructions, place of the constants, place of the rows, rows, row of the result); then come
-four numbers an instruction: what it does, the row that it writes, and two operands, rows or the place of a constant.
-A row is a series, [i] its coefficient of (time - t)^i. `Smooth.program` writes them. What is piecewise finds
-its piece by the time, until a run holds it in one (`HOLD` for the count).
+A program starts with (t, instructions, offset of the constants, offset of the rows, rows, row of the result), followed
+by four numbers an instruction: operation, row of the result, two operands (rows, or the offset of a constant). A row is
+a series; [i] is its coefficient of (time - t)^i. `motions.Smooth.program` writes the programs. A piecewise motion finds
+its piece from the time, unless a run holds the piece (`HOLD`, for the count of pieces).
 """
 
 import numpy as np

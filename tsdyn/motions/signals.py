@@ -1,4 +1,4 @@
-"""A load as a function of time: a plain function of t, smooth motions, or data, evaluated once a time of a run."""
+"""Time-dependent inputs: a function of t, a motion or data, evaluated once for each time of a run."""
 
 import math
 from functools import partial
@@ -11,7 +11,8 @@ from ..errors import InvalidArgument
 from ..jit.compiled_once import compiled_once
 from ..jit.kernels import Callback, caller, kernel, specialised, vector
 from ..validation import floats, number
-from .expressions import Constant, Piecewise, Smooth
+from .elementary import Constant, Piecewise
+from .expressions import Smooth
 from .knots import demand_covered
 from .program import run_program
 from .tables import is_data
@@ -92,7 +93,7 @@ class Signal:
 
     @staticmethod
     def is_zero(value):
-        """Whether a load is zero at all times."""
+        """Return True if a load is zero at all times."""
         return not isinstance(value, Signal) and not np.any(value)
 
     def value(self, t):

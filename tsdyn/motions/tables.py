@@ -1,7 +1,10 @@
-"""Motions and loads from data: tables, and SciPy's piecewise polynomials."""
+"""Motions and loads from data: tables and SciPy's piecewise polynomials."""
+
+from __future__ import annotations
 
 import math
 import sys
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,6 +12,9 @@ from ..calls import fitting
 from ..errors import InvalidArgument
 from ..validation import floats
 from .piecewise import Pieces
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, Value
 
 
 class Table:
@@ -30,10 +36,17 @@ class Table:
     -----
     A run must stay within the times. For other joints between the values, or for values beyond the ends, give a SciPy
     object instead: CubicSpline, PchipInterpolator, make_interp_spline(...), any PPoly or BSpline.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> table = ts.Table(times=(0, 1, 2, 3), values=(0, 1, 4, 9))
+    >>> print(f"{table(1.5):.4f}")
+    2.2500
     """
 
     @fitting
-    def __init__(self, times, values):
+    def __init__(self, times: ArrayLike, values: ArrayLike) -> None:
         self.times, self.values = floats(times), floats(values)
         k = self.times.size
         if self.times.ndim != 1 or k < 2 or not np.isfinite(self.times).all() or not (np.diff(self.times) > 0.0).all():
@@ -50,20 +63,20 @@ class Table:
         self.times.setflags(write=False)
         self.values.setflags(write=False)
 
-    def __call__(self, t):
+    def __call__(self, t: ArrayLike) -> Value:
         """The values at a time or times; NaN outside the table."""
         return self._spline(t)
 
-    def pieces(self):
+    def pieces(self) -> list[Any]:
         """One `Pieces` a component."""
         return pieces_of(self._spline)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<Table of {self.times.size} values, {self.times[0]:g} to {self.times[-1]:g} s>"
 
 
 def is_data(value):
-    """Whether `pieces_of` takes it: a Table, a SciPy object, or (times, values)."""
+    """Return True for data that `pieces_of` accepts: a Table, a SciPy object, or (times, values)."""
     if isinstance(value, (tuple, list)):
         return len(value) == 2 and all(isinstance(part, (np.ndarray, list, tuple)) for part in value)
     return isinstance(value, (Table, *_scipy()))

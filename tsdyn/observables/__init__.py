@@ -1,4 +1,4 @@
-"""What follows from t, q, qd, qdd: positions, energy, momentum, constraint errors, multipliers, reactions.
+"""Quantities derived from t, q, qd, qdd: positions, energy, momentum, constraint errors, multipliers, reactions.
 
 Imports formulations and below. States and solutions share it.
 

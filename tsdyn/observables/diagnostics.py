@@ -1,10 +1,12 @@
-"""Constraint errors, energy and momentum of a trajectory, recomputed in NumPy from nothing but t, q, qd, qdd.
+"""Constraint errors, energy and momentum of a trajectory, recomputed in NumPy from t, q, qd, qdd alone.
 
-Nothing here calls the solver's kernels. Constraint errors carry each marker's value, velocity and acceleration through
-the primitive's phi as a truncated Taylor series, so neither its jacobian nor its gamma is used.
+The solver's kernels are not used. Constraint errors come from each primitive's phi, evaluated on second-order Taylor
+numbers of the marker coordinates, so neither its jacobian nor its gamma enters.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,15 +16,18 @@ from ..jit.kernels import twin
 from ..maths.two_jets import Jet
 from ..motions.prescribed import Motion
 
+if TYPE_CHECKING:
+    from ..hints import Floats
+
 AT_ONCE = 1 << 16  # numbers in an array: constraints and bodies are taken together up to that
 
 
 class ConstraintError(NamedTuple):
     """Maximum norms of the left-hand sides of Eqs. 1, 2 and 3 at every output, shapes (k,)."""
 
-    position: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
 
 
 def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0, memory=None):

@@ -1,18 +1,23 @@
-"""What the solver sees at one state, in plain NumPy, exactly as the paper writes it: `scene.evaluate(q, qd, t)`."""
+"""`scene.evaluate(q, qd, t)`: the paper's quantities at one state, in plain NumPy."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..calls import fitting
 from ..elements.bodies import transform_g
 from ..errors import InvalidArgument, SingularConfiguration
-from ..formulations.redundancy import dependent_rows
+from ..formulations.dependent_rows import dependent_rows
 from ..maths.row_rank import RANK_TOL, dependent, farthest_first
 from ..model.equations import evaluate_constraints
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..validation import finite_vector, number
 from .generalised_forces import applied_loads, velocity_forces
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, Floats, Matrix, Scene
 
 NOT_UNIQUE = (
     "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
@@ -28,19 +33,19 @@ LARGE = 1000  # coordinates from which on matrices are sparse
 class Evaluation(NamedTuple):
     """Everything in the equations of motion at one state; n coordinates, m rows."""
 
-    Phi: np.ndarray  # (m,) constraints, Eq. 1
-    Phi_q: np.ndarray  # (m, n) their Jacobian
-    Phi_t: np.ndarray  # (m,) their explicit time derivative
-    gamma: np.ndarray  # (m,) Phi_q qdd + gamma = 0, Eq. 3
-    M: np.ndarray  # (n, n) mass matrix
-    Q_A: np.ndarray  # (n,) applied forces
-    S: np.ndarray  # (n,) velocity terms, on the right-hand side
-    multipliers: np.ndarray  # (m,) M qdd + Phi_q^T lam = Q_A + S
-    qdd: np.ndarray  # (n,) accelerations
+    Phi: Floats  # (m,) constraints, Eq. 1
+    Phi_q: Matrix  # (m, n) their Jacobian
+    Phi_t: Floats  # (m,) their explicit time derivative
+    gamma: Floats  # (m,) Phi_q qdd + gamma = 0, Eq. 3
+    M: Matrix  # (n, n) mass matrix
+    Q_A: Floats  # (n,) applied forces
+    S: Floats  # (n,) velocity forces, on the right-hand side: S of the paper, Q_v of docs/notation.md
+    multipliers: Floats  # (m,) M qdd + Phi_q^T lam = Q_A + Q_v
+    qdd: Floats  # (n,) accelerations
 
 
 @fitting
-def evaluate(scene, q=None, qd=None, t=0.0):
+def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = None, t: float = 0.0) -> Evaluation:
     """Evaluate constraints, masses, forces, multipliers and accelerations at one state.
 
     Parameters
@@ -64,7 +69,17 @@ def evaluate(scene, q=None, qd=None, t=0.0):
 
     Notes
     -----
-    Haug 2018, Eqs. 1-4. Multipliers and accelerations solve [M, Phi_q^T; Phi_q, 0] (qdd, lam) = (Q_A + S, -gamma).
+    Haug 2018, Eqs. 1-4. Multipliers and accelerations solve [M, Phi_q^T; Phi_q, 0] (qdd, lam) = (Q_A + Q_v, -gamma).
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+    >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+    >>> at_start = scene.evaluate()
+    >>> print(at_start.Phi_q, at_start.qdd + 0.0)
+    [[1. 0. 0.]] [ 0.    0.   -9.81]
     """
     system = scene.system
     start = scene.start

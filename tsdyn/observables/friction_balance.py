@@ -1,4 +1,4 @@
-"""Friction and reactions together at one state, in plain NumPy, for `scene.evaluate`."""
+"""Coupled friction and reactions at one state, in plain NumPy, for `scene.evaluate`."""
 
 import numpy as np
 
@@ -13,8 +13,8 @@ SWEEPS = 50
 ROUNDING = 1e-15
 STEP = 1e-40  # of complex steps
 JAMMED = (
-    "no reactions could be found with which the joints' friction is in balance: the coefficients may be so large that "
-    "the mechanism jams here."
+    "no reactions are consistent with the friction of the joints: with large coefficients of friction the mechanism "
+    "may jam here."
 )
 
 

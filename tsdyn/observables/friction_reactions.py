@@ -1,4 +1,4 @@
-"""The normal loads of joints' frictions, from positions, velocities and accelerations."""
+"""Normal loads of joint friction, from positions, velocities and accelerations."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from ..model.equations import set_time
 from ..rows.evaluation import factorise_rows, run_loops
 from ..rows.schur_complement import weigh
 from ..sparse.constraint_graph import REDUCED
-from ..sparse.networks import network_of
+from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
 from .generalised_forces import applied_loads, inertial_forces, velocity_forces
 

@@ -1,4 +1,4 @@
-"""Among redundant constraints reactions may not be unique, and friction that follows from such a one is refused."""
+"""Refusal of joint friction that depends on a reaction which redundant constraints leave undetermined."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from ..formulations.friction_solve import normal_load
 from ..jit.kernels import entry, resident, stack
 from ..model.packed_friction import FR_COUNT, FR_FIRST
 from ..sparse.constraint_graph import REDUCED
-from ..sparse.networks import network_of
+from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
 from .uniqueness import NEXT_TO_NOTHING, find_rows, find_stress
 
@@ -50,7 +50,7 @@ def demand_unique(packed, q, t):
         names = ", ".join(force.name for force in wrong)
         joints = ", ".join(force.joint.name for force in wrong)
         raise RedundantConstraints(
-            f"{names}: the normal load follows from a reaction of {joints} that is not unique, since constraint rows "
-            "are redundant: how they share it is not determined by rigid bodies.\nUse joints with fewer rows, so that "
-            "the reaction is unique (scene.mobility() names the rows), or leave out what of it causes friction."
+            f"{names}: the normal load depends on a reaction of {joints} that is not unique, since constraint rows are "
+            "redundant (statically indeterminate).\nUse joints with fewer rows, so that the reaction is unique "
+            "(scene.mobility() names the rows), or remove the part of the friction that depends on it."
         )

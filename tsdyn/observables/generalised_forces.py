@@ -1,4 +1,4 @@
-"""Generalised forces along a trajectory, (k, n): applied loads Q_A, velocity terms S, and M qdd."""
+"""Generalised forces along a trajectory, (k, n): applied forces Q_A, velocity forces Q_v, and M qdd."""
 
 import numpy as np
 

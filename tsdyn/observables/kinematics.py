@@ -1,6 +1,8 @@
-"""Motion of bodies, of their points and of joints, at one instant or along a run: what states and solutions share."""
+"""Kinematics of bodies, points and joints at one instant or along a run: common to states and solutions."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -11,6 +13,9 @@ from ..model import joint_motion
 from ..validation import vector3
 from .diagnostics import angular_velocity
 
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, Floats, Handles, ItemLike, PointMass
+
 
 class Anchor(NamedTuple):
     """A point of the run in the same step, from which the turns of the joints' angles are known."""
@@ -20,44 +25,53 @@ class Anchor(NamedTuple):
     levels: tuple = ()  # q, qd there, (n,) or (k, n); empty for the point itself
 
 
+Coordinate = TypeVar("Coordinate")  # of a joint: a number at one instant, an array along a run
+
+
 @fitting_methods
-class Kinematics:
+class Kinematics(Generic[Coordinate]):
     """Mixed into what has `handles`, q, qd and qdd, (n,) at one instant or (k, n) along a run, and an `anchor`.
 
     A body is a handle or a name, and so is a joint. Along a run there is a leading k in every shape given here.
     """
 
     __slots__ = ()
+    t: Any
+    q: Floats
+    qd: Floats
+    qdd: Floats
+    handles: Handles
+    anchor: Anchor
 
-    def position(self, body, point=None):
+    def position(self, body: PointMass | str, point: ArrayLike | None = None) -> Floats:
         """Position (3,) of the centroid, or of a point (3,) in the body frame; m, ground frame."""
         return self._place(body, point, 0)
 
-    def velocity(self, body, point=None):
+    def velocity(self, body: PointMass | str, point: ArrayLike | None = None) -> Floats:
         """Velocity (3,) of the centroid, or of a point (3,) in the body frame; m/s, ground frame."""
         return self._place(body, point, 1)
 
-    def acceleration(self, body, point=None):
+    def acceleration(self, body: PointMass | str, point: ArrayLike | None = None) -> Floats:
         """Acceleration (3,) of the centroid, or of a point (3,) in the body frame; m/s^2, ground frame."""
         return self._place(body, point, 2)
 
-    def orientation(self, body):
+    def orientation(self, body: PointMass | str) -> Floats:
         """Euler parameters (4,), body to ground, scalar first."""
         return self.q[..., self._parameters(body)]
 
-    def rotation(self, body):
+    def rotation(self, body: PointMass | str) -> Floats:
         """Rotation matrix A(p) (3, 3), body to ground."""
         return rotation_matrix(self.orientation(body))
 
-    def angular_velocity(self, body):
+    def angular_velocity(self, body: PointMass | str) -> Floats:
         """Angular velocity (3,), rad/s, body frame."""
         return angular_velocity(self.orientation(body), self.qd[..., self._parameters(body)])
 
-    def angular_acceleration(self, body):
+    def angular_acceleration(self, body: PointMass | str) -> Floats:
         """Angular acceleration (3,), rad/s^2, body frame."""
         return angular_velocity(self.orientation(body), self.qdd[..., self._parameters(body)])
 
-    def angle(self, joint):
+    def angle(self, joint: ItemLike) -> Coordinate:
         """Angle of a joint, rad: of b against a about its axis (right hand), counted over any number of turns.
 
         Zero as built, or between the references of a joint that has them. A run begins within half a turn of zero,
@@ -76,15 +90,15 @@ class Kinematics:
         row = self.handles.row(joint, "angle")
         return _one([self._counted(j, geometry) for j, geometry in enumerate(row.angles, row.first)])
 
-    def angle_rate(self, joint):
+    def angle_rate(self, joint: ItemLike) -> Coordinate:
         """Rate of the `angle` of a joint, rad/s."""
         return self._coordinate(joint, "angle", 1)
 
-    def angle_acceleration(self, joint):
+    def angle_acceleration(self, joint: ItemLike) -> Coordinate:
         """Second time derivative of the `angle` of a joint, rad/s^2."""
         return self._coordinate(joint, "angle", 2)
 
-    def displacement(self, joint):
+    def displacement(self, joint: ItemLike) -> Coordinate:
         """Displacement of a joint, m: of its point of b from that of a along the axis; a number, or (k,) along a run.
 
         Raises
@@ -94,16 +108,16 @@ class Kinematics:
         """
         return self._coordinate(joint, "displacement", 0)
 
-    def displacement_rate(self, joint):
+    def displacement_rate(self, joint: ItemLike) -> Coordinate:
         """Rate of the `displacement` of a joint, m/s."""
         return self._coordinate(joint, "displacement", 1)
 
-    def displacement_acceleration(self, joint):
+    def displacement_acceleration(self, joint: ItemLike) -> Coordinate:
         """Second time derivative of the `displacement` of a joint, m/s^2."""
         return self._coordinate(joint, "displacement", 2)
 
     @property
-    def angles(self):
+    def angles(self) -> Floats:
         """All angles that the run counts (count,), in the order of the joints."""
         counted = [self._counted(row.first + i, g) for row in self.handles.rows for i, g in enumerate(row.angles)]
         return np.stack(counted, axis=-1) if counted else np.zeros((*np.shape(self.q)[:-1], 0))

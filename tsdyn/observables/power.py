@@ -1,9 +1,9 @@
-"""Energy and power of forces along a trajectory, from their Python twins: potential, dissipation, applied power.
+"""Energy and power of forces along a trajectory, by their Python twins: potential, dissipation, applied power.
 
     applied = f . xd + dU/dt + dissipation
 
-so that d(kinetic + potential)/dt = applied + driving power - dissipation. dU/dt is carried through the potential as a
-truncated Taylor series.
+so that d(kinetic + potential)/dt = applied + driving power - dissipation. dU/dt follows from the potential by truncated
+Taylor arithmetic.
 """
 
 from typing import NamedTuple

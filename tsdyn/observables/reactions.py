@@ -1,4 +1,4 @@
-"""Multipliers and the forces of constraints, from positions, velocities and accelerations."""
+"""Multipliers and constraint reactions, from positions, velocities and accelerations."""
 
 import math
 from collections import Counter
@@ -17,8 +17,8 @@ from ..model.sparse_jacobian import WIDTH, with_short_rows
 from ..rows.evaluation import factorise_rows, run_loops
 from ..rows.schur_complement import gather, scatter
 from ..sparse.constraint_graph import REDUCED
+from ..sparse.constraint_graphs import network_of
 from ..sparse.factorisation import solve
-from ..sparse.networks import network_of
 from ..workspaces.workspace import load_parts, parts
 from .friction_reactions import with_normal_loads
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
@@ -71,7 +71,7 @@ def solve_multipliers(context, t, q, r, rows, out):
 
 
 def multipliers(packed, t, q, qd, qdd, memory=None):
-    """Multipliers (k, m) of M qdd + Phi_q^T lam = Q_A + S; NaN where Phi_q has lost rank.
+    """Multipliers (k, m) of M qdd + Phi_q^T lam = Q_A + Q_v; NaN where Phi_q has lost rank.
 
     memory (k, slots) is what forces remember, zeros by default.
     """

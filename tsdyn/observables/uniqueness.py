@@ -1,8 +1,8 @@
-"""Which reactions are unique among redundant constraints: those that no self-stress has a part in.
+"""Uniqueness of reactions among redundant constraints: reactions to which no self-stress contributes.
 
-Where a row h of H follows from the kept ones, H^T z = 0 for z = 1 in its place and -(H W H^T)^-1 H W h^T in theirs: any
-multiple of z may be added to the multipliers, and nothing moves otherwise. A constraint's reaction is unique where all
-such z leave its load on the body zero.
+A dropped row h of H gives a self-stress z, H^T z = 0, with z = 1 for h and -(H W H^T)^-1 H W h^T for the kept rows. Any
+multiple of z may be added to the multipliers without effect on the motion. The reaction of a constraint is unique if no
+self-stress loads a body through it.
 """
 
 import math
@@ -16,8 +16,8 @@ from ..model.packed import index_of
 from ..rows.evaluation import factorise_rows, run_loops
 from ..rows.schur_complement import gather, weigh
 from ..sparse.constraint_graph import REDUCED
+from ..sparse.constraint_graphs import network_of
 from ..sparse.factorisation import solve
-from ..sparse.networks import network_of
 from ..workspaces.workspace import load_parts, parts
 
 NEXT_TO_NOTHING = 1e-7  # of the rows' own size
@@ -77,7 +77,7 @@ def free_loads(context, t, q, rows, sides, whole, out):
 
 
 def unique(solution, rows, body):
-    """Whether the reaction of these rows, a slice, on a body is unique; bool (k,)."""
+    """Determine whether the reaction of these rows, a slice, on a body is unique: bool (k,)."""
     network = network_of(solution.packed, REDUCED)
     if not network.dropped.size:
         return np.ones(solution.t.size, bool)

@@ -1,5 +1,5 @@
-"""`ts.profile`: where the time of a run goes, phase by phase, and what to change.
+"""`ts.profile`: run time of a call by phases, with advice.
 
-Imports benchmarking, simulation and below. Begin with profile.py; instrumentation.py puts timers (timers.py) into the
-memory of a run, phases.py puts together what these found, advice.py draws conclusions.
+Imports benchmarking, simulation and below. Begin with profile.py; instrumentation.py installs timers (timers.py) in the
+workspace of a run, phases.py collects their readings, advice.py draws conclusions.
 """

@@ -1,7 +1,7 @@
-"""What to change about a call that has been profiled: each said from a number that was measured, with that number.
+"""Advice on a profiled call, each item with the measurement that supports it.
 
-Alternatives are tried, by calls of their own, and told of where they are quicker; with a change that may cost accuracy
-goes how far apart the two ends are.
+Alternatives are run in separate calls and reported only where they are faster. Where an alternative may cost accuracy,
+the difference between the two final states is reported with it.
 """
 
 import copy
@@ -134,7 +134,7 @@ def _alternatives(profile, run, plain, options, limit):
     if options.get("integrator") is not None:
         found = attempt(integrator=None, **tolerances)
         if found and found.method != solution.method:
-            yield f"Without a method named it is run by {found.method}, at {given}, {_quicker(found, limit)}."
+            yield f"The default method, {found.method} at {given}, is {_quicker(found, limit)}."
     if solution.stats.stiff and not method.implicit and adaptive and solution.q.shape[1] <= LARGEST_PILOT:
         found = attempt(integrator=SDIRK54(method.rtol, method.atol))
         if found:
@@ -163,9 +163,9 @@ def _alternatives(profile, run, plain, options, limit):
             yield f"Without chart_interval, which forces charts, it is {_quicker(found, limit)}."
     if astray:
         yield (
-            f"What would be quicker ends elsewhere, by up to {max(astray):.1e} (m, or of a rotation matrix): the end "
-            "of this run depends on the method and its tolerances more than they allow for. Tighten them, or shorten "
-            "the interval, until the end stays where it is."
+            f"Faster alternatives end elsewhere, by up to {max(astray):.1e} (m, or of a rotation matrix): the final "
+            "state depends on the method by more than the tolerances. Tighten them, or shorten the interval, until the "
+            "final state converges."
         )
 
 

@@ -1,4 +1,4 @@
-"""The figure of `profile`: a bar a phase, a colour a group."""
+"""The figure of `profile`: one bar a phase, one colour a group."""
 
 from ..benchmarking.figure import COLOURS
 from ..drawing import GREY, demand_matplotlib

@@ -1,4 +1,4 @@
-"""Timers in the memory of a run: put in before it, read after it."""
+"""Instrumentation of a run: timers installed in its workspace before the run and read afterwards."""
 
 import time
 from typing import NamedTuple
@@ -6,9 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements import primitive
-from ..elements.loops import constraint_rows as body_loops
-from ..elements.loops import force_series
-from ..elements.loops import forces as force_loops
+from ..elements.loops import constraint_rows, force_series
 from ..formulations.locked_orientations import instances
 from ..model.packed import COUNT, FIRST_INT
 from ..model.packed_forces import F_COUNT, F_FIRST_INT, F_REMEMBER, FORCE, members_of
@@ -134,7 +132,7 @@ class Timekeeper(Stopwatch):
         places = c.expansion.places[:, :1] if series else np.zeros((len(joints), 1), np.int64)
 
         rows = [
-            (row[N_FIRST_INT], row[N_COUNT] * body_loops.INTS, [*row[:IN_ORDERS], *place], _of_constraints(kind))
+            (row[N_FIRST_INT], row[N_COUNT] * constraint_rows.INTS, [*row[:IN_ORDERS], *place], _of_constraints(kind))
             for kind, row, place in zip(joints, network.kinds, places, strict=True)
         ]
         table, firsts = self._headed(network.table, rows)
@@ -148,7 +146,7 @@ class Timekeeper(Stopwatch):
             for kind, row in zip(classes, system.kinds, strict=True)
         ]
         rows += [
-            (row[F_FIRST_INT], row[F_COUNT] * force_loops.INTS, row[[FORCE, F_REMEMBER]], _of_forces(members))
+            (row[F_FIRST_INT], row[F_COUNT] * forces.INTS, row[[FORCE, F_REMEMBER]], _of_forces(members))
             for members, row in zip(forces, system.forces, strict=True)
         ]
         table, firsts = self._headed(system.table, rows)

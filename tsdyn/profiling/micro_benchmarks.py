@@ -1,4 +1,4 @@
-"""What parts of a placement and an evaluation cost, that no address parts: they are run again at a run's last state."""
+"""Micro-benchmarks, at the final state of a run, of costs that timers can't separate."""
 
 import time
 
@@ -7,7 +7,7 @@ from ..formulations.null_space import reduced_mass, velocities
 from ..formulations.tangent import solve_velocities
 from ..jit.kernels import entry, kernel
 from ..maths.dense_linalg import copy
-from ..rows.selection import factor_rows
+from ..rows.evaluation import factor_rows
 from ..runs.run_state import T, load_run
 from ..taylor.workspace import load_series
 from ..workspaces.workspace import load

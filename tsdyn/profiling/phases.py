@@ -1,4 +1,6 @@
-"""The phases of a run, put together from what a `Timekeeper` has found and what parts of it cost alone."""
+"""The phases of a profiled run, from the readings of a `Timekeeper` and from micro-benchmarks of its parts."""
+
+from __future__ import annotations
 
 from typing import NamedTuple
 
@@ -31,7 +33,7 @@ class Phase(NamedTuple):
     seconds: float
 
     @property
-    def each(self):
+    def each(self) -> float:
         """Seconds a call; nan for what isn't called."""
         return self.seconds / self.calls if self.calls else float("nan")
 

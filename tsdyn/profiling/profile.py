@@ -1,8 +1,11 @@
-"""`profile`: where the time of a call of `simulate` goes, phase by phase, and what to change."""
+"""`profile`: run time of a call of `simulate` by phases, with advice."""
+
+from __future__ import annotations
 
 import copy
 import time
 from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +16,7 @@ from ..jit.cache import statistics
 from ..jit.kernels import DEBUG
 from ..observables.state import remembered
 from ..runs.arguments import interval, method_of, state_arrays
-from ..simulation import method_choice as choice
+from ..simulation import method_choice
 from ..simulation.scene import Scene
 from ..simulation.scene_cache import prepared
 from ..simulation.simulate import DRIVERS, simulate
@@ -24,25 +27,28 @@ from .phases import Phase, of_series, of_steps, orders
 from .report import Profile
 from .timers import own_cost
 
+if TYPE_CHECKING:
+    from ..hints import Span
+
 SAMPLE, FEWEST, MOST = 1.0, 2, 40  # s of calls of each sort, and how many
 LONG = 5.0  # s, of calls that are made as few times as can be
 OUTPUTS = {"t_eval": "times of t_eval", "dense_output": "dense output", "events": "events"}
 
 
 @fitting
-def profile(scene, t_span=(0.0, 10.0), *, advice=True, **options):
-    """Measure where the time of `simulate(scene, t_span, **options)` goes; the scene is not changed.
+def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **options: Any) -> Profile:
+    """Measure the run time of `simulate(scene, t_span, **options)` by phases; the scene is not changed.
 
-    The call is made several times as it is, and as often with its two ends as the only output, once with nothing but a
-    stopwatch around the compiled driver and once with timers in place of what the driver calls by address. So no run
-    but those pays for it, and the sum of the phases can be held against the time of the call as it is.
+    The call is repeated unchanged, and with its two ends as the only output; once more with a stopwatch around the
+    compiled driver, and once with timers in place of the addresses that the driver calls. Other runs pay nothing, and
+    the sum of the phases is compared with the time of the unchanged call.
 
     Parameters
     ----------
     scene : Scene
     t_span : (float, float), s
     advice : bool
-        Whether to try what might be quicker: another method, looser tolerances. Those calls take time of their own.
+        Whether to run alternatives that may be faster, such as another method or looser tolerances.
     **options
         As for `simulate`, but progress.
 
@@ -55,6 +61,16 @@ def profile(scene, t_span=(0.0, 10.0), *, advice=True, **options):
     ------
     TsdynError
         As `simulate`, before anything is measured; StepFailure if the run makes no step.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> report = ts.profile(scene, (0, 0.1), advice=False)
+    >>> report.solution.success, report.seconds > 0.0
+    (True, True)
     """
     if DEBUG:
         raise InvalidArgument("profile times compiled kernels, and with TSDYN_DEBUG=1 there are none.")
@@ -122,7 +138,7 @@ def _without(options):
 def _first(scene, options):
     """The method that a call begins with where none is named."""
     series = options.get("formulation", "tangent") == "tangent" and options.get("chart_interval") is None
-    return choice.explicit(prepared(scene), options.get("rtol"), options.get("atol"), series)
+    return method_choice.explicit(prepared(scene), options.get("rtol"), options.get("atol"), series)
 
 
 def _method(scene, solution, options):
@@ -130,7 +146,7 @@ def _method(scene, solution, options):
     if options.get("integrator") is not None:
         return method_of(options["integrator"], options.get("rtol"), options.get("atol"))
     method = _first(scene, options)
-    return method if repr(method) == solution.method else choice.implicit(method)
+    return method if repr(method) == solution.method else method_choice.implicit(method)
 
 
 def _observed(method, observer):

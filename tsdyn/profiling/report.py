@@ -1,6 +1,12 @@
-"""What `profile` hands back: phases, the table they make, what was skipped, what to change, and the figure."""
+"""The result of `profile`: phases and their table, skipped work, advice, and the figure."""
+
+from __future__ import annotations
 
 import html
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..hints import Integrator, Phase, Scene, Solution
 
 from .units import duration
 
@@ -38,26 +44,38 @@ class Profile:
     solution : Solution
     """
 
-    def __init__(self, scene, solution, method, span, seconds, driver, phases, once, loaded, orders):
+    def __init__(
+        self,
+        scene: Scene,
+        solution: Solution,
+        method: Integrator,
+        span: tuple[float, float],
+        seconds: float,
+        driver: float,
+        phases: tuple[Phase, ...],
+        once: dict[str, float],
+        loaded: dict[str, Any],
+        orders: tuple[tuple[int, float], ...],
+    ) -> None:
         self.scene, self.solution, self.method, self.span = scene, solution, method, span
         self.seconds, self.driver, self.phases, self.once = seconds, driver, phases, once
         self.loaded, self.orders, self.advice = loaded, orders, ()
 
     @property
-    def accounted(self):
+    def accounted(self) -> float:
         """The share of the driver's time that its phases add up to: what timers add and what they miss is off it."""
         return sum(p.seconds for p in self.phases if p.group not in _OUTSIDE) / self.driver
 
     @property
-    def skipped(self):
+    def skipped(self) -> dict[str, int]:
         """What was not needed, by its name in `Solution.stats`."""
         return {name: getattr(self.solution.stats, name) for name in SKIPPED}
 
-    def share(self, group, part=None):
+    def share(self, group: str, part: str | None = None) -> float:
         """The share of the call that a group takes, or a part of it."""
         return sum(p.seconds for p in self.phases if p.group == group and part in (None, p.part)) / self.seconds
 
-    def groups(self):
+    def groups(self) -> dict[str, float]:
         """Seconds of each group."""
         return {
             name: sum(p.seconds for p in self.phases if p.group == name)
@@ -99,7 +117,7 @@ class Profile:
         yield "Skipped", skipped or ["nothing"]
         yield "What to change", list(self.advice) or ["nothing stands out"]
 
-    def __str__(self):
+    def __str__(self) -> str:
         lines = [HEAD, *(cells for _, cells in self._rows())]
         names = [line[0] if own else f"  {line[0]}" for own, line in [(True, HEAD), *self._rows()]]
         widths = [max(map(len, column)) for column in (names, *list(zip(*lines, strict=True))[1:])]
@@ -110,14 +128,14 @@ class Profile:
         notes = [text for title, items in self._notes() for text in (f"{title}:", *(f"- {item}" for item in items))]
         return "\n".join(["Profile: " + ";\n".join(self._facts()) + ".", "", *map(str.rstrip, table), "", *notes])
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         largest = max(self.groups().items(), key=lambda pair: pair[1])
         return (
             f"<Profile: {duration(self.seconds)} a call by {self.solution.method}, {largest[0]} "
             f"{100.0 * largest[1] / self.seconds:.0f} %, {len(self.advice)} to change>"
         )
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The same in a notebook."""
         rows = ["".join(f"<th>{cell}</th>" for cell in HEAD)]
         for own, cells in self._rows():

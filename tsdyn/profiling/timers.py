@@ -1,9 +1,9 @@
-"""Timers: callbacks around callbacks that take the time, so that the kernels of every other run stay as they are.
+"""Timers: callbacks that wrap callbacks, so that profiling needs no change of a kernel.
 
-What kernels call by address is given the address of a timer instead. It reads the clock, calls what it stands for, and
-reads the clock again; the time between two readings belongs to whatever was running, so that all of a run is
-accounted for once. A timer finds its notes by a word that stands before what it is given: before the context, and
-before the table of a kind of constraint or force.
+A profiled run replaces each called address by the address of a timer. The timer reads the clock, calls the original and
+reads the clock again; time between two readings is attributed to the phase that was running, so the phases add up to
+the whole run. A timer finds its record through a word stored in front of its argument: the context, or the table of a
+kind of constraint or force.
 """
 
 import ctypes

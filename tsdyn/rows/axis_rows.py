@@ -1,7 +1,6 @@
-"""Products of axis rows (massless_axes.py): their part of S, of matrices like it, and of right-hand sides.
+"""Products of axis rows (massless_axes.py): contributions to S, to matrices of its pattern and right-hand sides.
 
-In H such a row is zero, so what is gathered for a projection has zeros there, as it should; in Y = W H^T it stands
-whole.
+An axis row is zero in H, since a projection onto the constraint manifold ignores it; in Y = W H^T it is present.
 """
 
 from ..jit.kernels import kernel

@@ -1,4 +1,4 @@
-"""The rows of H at the poses, with those left out that are dropped, and S from them."""
+"""Row evaluation: H at the current poses with redundant rows zeroed, and S = H W H^T."""
 
 from typing import NamedTuple
 
@@ -7,8 +7,10 @@ import numpy as np
 from ..elements.loops.constraint_rows import call_body_loop
 from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, vector
 from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS, REDUCED, Network, no_network
-from .axis_rows import clear_axes
-from .selection import WORSE, drop, drop_rows, factor_rows, select, weakest
+from ..sparse.factorisation import factor
+from .axis_rows import clear_axes, leave_axes_out, multiply_axes, weigh_axes
+from .independent_rows import WORSE, drop, drop_diagonal, drop_rows, select, weakest
+from .schur_complement import multiply_rows, weigh_rows
 from .tangent_workspace import UNHELD, WEAKEST, Free, no_free
 from .tolerances import ZERO_PIVOT
 
@@ -17,7 +19,7 @@ HELD = 1e6  # times rounding: what dropped rows may be off by, as a start may
 
 @kernel
 def run_loops(network, reals, column, f, t, out, H):
-    """One of the loops of body_loops, for every kind that has it; zeros for welds, axes and dropped rows."""
+    """One of the loops of constraint_rows.py, for every kind that has it; zeros for welds, axes and dropped rows."""
     for i in range(network.kinds.shape[0]):
         kind = network.kinds[i]
         if kind[column] != 0:
@@ -60,6 +62,24 @@ def serve_still(network, f, S):
 def held(f, floor):
     """Whether the dropped rows hold at a place on the manifold, by the last H taken there."""
     return f.dropped[0] == 0 or f.sizes[UNHELD] <= HELD * floor
+
+
+@kernel
+def factor_rows(network, f, H, Y, S, axes):
+    """Y = W H^T and the factors of S = H W H^T, of H without the dropped rows; the row that fails, or -1.
+
+    Without the `axes` W is that of the inertias given, which serves as a metric; accelerations need them.
+    """
+    weigh_rows(network, H, Y)
+    multiply_rows(network, H, Y, S)
+    drop_diagonal(network, f.dropped, S)
+    if network.axes.rows.shape[0] > 0:
+        weigh_axes(network, Y)
+        if axes:
+            multiply_axes(network, H, Y, S)
+        else:
+            leave_axes_out(network, S)
+    return factor(network.pattern, S, ZERO_PIVOT)
 
 
 class Choice(NamedTuple):
@@ -126,7 +146,7 @@ else:
 def factorise_rows(network, reals, f, t, b, H, Y, S, axes):
     """Y = W H^T and the factors of S of the present H; of redundant rows others are chosen where these serve no more.
 
-    Whether there are any. Then b and H are those of the new choice. `axes` (0 or 1) as in `selection.factor_rows`.
+    Whether there are any. Then b and H are those of the new choice. `axes` (0 or 1) as in `factor_rows`.
     """
     regular = factor_rows(network, f, H, Y, S, axes) < 0
     if f.dropped[0] == 0 or f.anew[0] == 0 or (regular and serve_still(network, f, S)):

@@ -1,6 +1,6 @@
-"""Products with H, the rows of [Phi_r, Phi_pi'] of a network: S = H W H^T, its sides, and the way to and from bodies.
+"""The Schur complement S = H W H^T (Delassus operator) of the constraint rows H = [Phi_r, Phi_pi'], and products by H.
 
-Quantities of bodies are rows of eight floats, (linear, 0, angular in the body frame, 0); the last row is the ground's.
+Body quantities are rows of eight floats, (linear, 0, angular in the body frame, 0); the last row is the ground's.
 """
 
 from ..jit.kernels import kernel

@@ -1,10 +1,11 @@
-"""How near Phi_q is to losing rank: the share of its diagonal entry that elimination leaves of the weakest row.
+"""Singularity indicator: the smallest pivot of S relative to its diagonal entry.
 
-It falls as the square of the distance from a singular configuration, and is compared with the largest of the run.
+The indicator falls as the square of the distance to a singular configuration. It is compared with its largest value
+in the run.
 """
 
 from ..jit.kernels import kernel
-from .selection import weakest
+from .independent_rows import weakest
 from .tangent_workspace import LARGEST_SHARE, SHARE
 
 NEAR = 0.02  # of the largest share: a place with less is near a singular configuration

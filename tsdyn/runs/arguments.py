@@ -1,4 +1,4 @@
-"""The arguments of `simulate`, checked: times, the method, the state to start from."""
+"""Validation of the arguments of `simulate`: times, method, initial state."""
 
 import math
 

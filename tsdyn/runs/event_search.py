@@ -1,9 +1,9 @@
-"""Events along a run: zeros of users' functions, found inside every step on the manifold.
+"""Event location: zeros of users' functions inside every step, on states of the manifold.
 
-The driver is called one step at a time and never learns of events, so they change no step. Within a step the functions
-are sampled on states of its dense output, as finely as each asks for (root_isolation.py), and Brent's method finds the
-zeros. A change of sign is an event, and so is a value of zero: exactly at a time that is looked at, or within rounding
-where the function touches zero without changing sign. A touch counts once, in either direction.
+The driver is called one step at a time and is unaware of events, so events change no step. Functions are sampled on
+the dense output of the step, as finely as each requires (root_isolation.py), and Brent's method locates the zeros. A
+sign change is an event. A zero value is an event, too: exact at a sampled time, or within rounding where the function
+touches zero without a sign change. A touch counts once, in either direction.
 """
 
 import math

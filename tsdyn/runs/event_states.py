@@ -1,4 +1,4 @@
-"""States within the step that a run has just made, for events."""
+"""States inside the last step of a run, for event location."""
 
 import numpy as np
 

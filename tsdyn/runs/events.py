@@ -1,4 +1,4 @@
-"""Events as a user gives them: functions of time and state, with the attributes that SciPy's solve_ivp knows."""
+"""Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp."""
 
 import math
 from typing import NamedTuple

@@ -1,6 +1,6 @@
-"""Histories of steps and charts in little memory: eight bytes a step, and none for charts that are made every step.
+"""Compact histories of steps and charts: eight bytes a step, nothing for charts that change at every step.
 
-The few of a short run are kept as they are: a run of 0.1 ms has no time for more.
+Short histories are stored uncompressed, since a run of 0.1 ms leaves no time for more.
 """
 
 import numpy as np

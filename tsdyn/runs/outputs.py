@@ -1,4 +1,4 @@
-"""What a driver keeps of accepted states."""
+"""Outputs of a driver: the records of accepted states."""
 
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import copy

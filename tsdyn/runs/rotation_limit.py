@@ -1,7 +1,7 @@
-"""How far bodies may turn in a step of a driven scene.
+"""Rotation limit of a step in driven scenes.
 
-What is driven follows its motion whatever the step is, so no error says that a step is long; but a body that has turned
-by a whole turn stands where it stood, and nothing would show it.
+A prescribed coordinate is exact for any step length, so an error estimate never limits the step; and after a full turn
+a body is back in its orientation, so a chart doesn't either.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The memory that one run of the step driver writes to, made once and used by one run after the other."""
+"""Run workspace of the step driver, allocated once and reused by successive runs."""
 
 import numpy as np
 

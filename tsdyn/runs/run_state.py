@@ -1,4 +1,4 @@
-"""The memory of one run, as the driver's kernels see it: arrays, and what stands where in them."""
+"""The state of one run in the driver's kernels: arrays and their layout."""
 
 from typing import NamedTuple
 
@@ -39,7 +39,7 @@ class Run(NamedTuple):
     y_low_old: np.ndarray  # (ny,)
     now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point
     before: np.ndarray  # (3, n)  at the one before; kept for a first-order system and for implicit methods
-    warm: np.ndarray  # what `dense.keep` copies while dense output moves it
+    warm: np.ndarray  # what `trajectory.keep` copies while dense output moves it
     xs: np.ndarray  # (nx,)  dense output and the guess of a first step
     ys: np.ndarray  # (ny,)
     yds: np.ndarray  # (ny,)

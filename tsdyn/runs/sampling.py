@@ -1,7 +1,7 @@
-"""Sample and hold: loads on joints whose functions are called in Python at instants k period, between slices of a run.
+"""Sample and hold: joint loads whose Python functions are evaluated at times k period, between slices of a run.
 
-A step ends at each instant. There the driver comes back, the functions that are due are asked, what they say goes where
-the forces remember it, and the driver goes on from the accelerations after it.
+A step ends at each sampling time. The driver returns, the functions that are due are evaluated, their values are stored
+in the memory of the forces, and the driver continues from the new accelerations.
 """
 
 import math
@@ -108,7 +108,7 @@ def sampled(packed):
 
 
 def is_due(t, period):
-    """Whether t is an instant of a period."""
+    """Return True if t is an instant of a period."""
     return abs(t - round(t / period) * period) <= SAME * period
 
 

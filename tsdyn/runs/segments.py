@@ -1,4 +1,4 @@
-"""What the parts of one run, made by different methods, hand on to each other."""
+"""Run segments: state and records passed between the parts of one run that different methods integrate."""
 
 from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
 from .event_search import Watch

@@ -1,4 +1,4 @@
-"""A run slice by slice: the compiled driver is called, with room for what each slice records."""
+"""A run in slices: repeated calls of the compiled driver, with room for the records of each slice."""
 
 import time
 from typing import NamedTuple
@@ -68,9 +68,9 @@ class Pace:
         self.t, self.tries, self.before = t, 0, now
         if now > 0.0 and (end - t <= HOPELESS * now or now > 2.0 * before):
             return Status.SLICE_DONE, ""
-        left = f"{(end - t) / now:.0e} more" if now > 0.0 else "for ever"
+        left = f"{(end - t) / now:.0e} more" if now > 0.0 else "infinitely many more"
         return Status.STEP_COLLAPSED, (
-            f"At the pace of the last {PACED} steps the rest would take {left}; with max_steps given it would go on."
+            f"At the pace of the last {PACED} steps the rest would take {left}; give max_steps to continue."
         )
 
 

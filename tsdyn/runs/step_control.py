@@ -1,4 +1,4 @@
-"""How long the next step is: the first one, the judgement of each, and whether the motion has become stiff."""
+"""Step-size control: the initial step, acceptance and rejection, stiffness detection."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The driver of methods that go step by step with a kernel of theirs: memory, drive, and what a run leaves."""
+"""Front end of the step driver, for methods with a step kernel: memory, driver loop, outcome."""
 
 import time
 
@@ -23,12 +23,12 @@ from ..workspaces.workspace import (
     UNVERIFIED,
 )
 from .arguments import step_count
-from .request import Outcome
 from .run_memory import Memory
 from .run_state import CHART_ROWS, FILLED, IN_CHART, LANDED, MAY_PASS, NEAR_STEPS, REJECTED, STEPS, STIFF, STORED, T
 from .sampling import Sampled
 from .segments import Relay
 from .slices import drive
+from .task import Outcome
 from .trajectory import Reader, Trajectory
 
 

@@ -1,4 +1,4 @@
-"""The driver: steps, outputs, charts. One kernel for every scene, method and formulation; it calls them by address.
+"""The step driver: steps, outputs, charts. One kernel serves every scene, method and formulation by address.
 
 A step is proposed (where it ends), attempted (x and y at its end, from the method), and rejected or accepted.
 """
@@ -15,6 +15,7 @@ from ..model.equations import is_rheonomic, remember, set_time
 from ..model.joint_turns import count_turns
 from ..rows.singularity import WITHIN_A_STEP, is_below
 from ..workspaces.workspace import CONTRACTION, load
+from .breakpoints import SHORT, amend, cut_fixed, is_sampled, next_stop, take_pieces
 from .chart_changes import begin_chart, has_hardly_turned
 from .outputs import record, restore_now, store_now
 from .rotation_limit import GAIN, longest_step, too_far
@@ -51,7 +52,6 @@ from .run_state import (
 )
 from .step_control import accept, first_step, gets_on, stretch, watch_stiffness
 from .step_outputs import record_step
-from .stops import SHORT, amend, cut_fixed, is_sampled, next_stop, take_pieces
 from .trajectory import A_ACCELERATE, A_CHECK, A_COMPLETE, A_PLACE, A_STEP, bring_back, call_complete, evaluate, keep
 
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)

@@ -1,7 +1,7 @@
-"""States between the steps, on the manifold: interpolated in the chart, then placed as every stage is.
+"""Dense output on the manifold: v and vd are interpolated in the chart, then positions and velocities are solved for.
 
-The driver uses it at the times of t_eval, `Solution.at` and the events through a `Reader`, which makes the chart of a
-step anew (a chart follows from its q0 and time alone) in a workspace of its own.
+The driver uses it at the times of t_eval. `Solution.at` and events use it through a `Reader`, which rebuilds the chart
+of a step (q0 and the time determine it) in a separate workspace.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
-"""`Scene`, `simulate` and `Solution`: what a user calls.
+"""`Scene`, `simulate` and `Solution`: the user's interface.
 
 Imports configuration and below.
 
-Begin with simulate.py. scene_cache.py keeps what the runs of one scene share, method_choice.py chooses the default
-method, singularity_crossing.py carries step methods past singular configurations, termination.py says how a run
-ended.
+Begin with simulate.py. scene_cache.py holds data shared by the runs of a scene, method_choice.py chooses the default
+method, singularity_crossing.py takes step methods across singular configurations, termination.py reports the end of
+a run.
 """

@@ -1,4 +1,4 @@
-"""What energy was kept of a run next to singular configurations, where nothing drives or damps the scene."""
+"""Energy error of an undriven and undamped run near singular configurations."""
 
 from types import SimpleNamespace
 

@@ -1,6 +1,9 @@
-"""Scenes that change: a body, constraint or force taken out again, and a copy of the whole."""
+"""Editing of scenes: removal of bodies, constraints and forces, and copies of a scene."""
+
+from __future__ import annotations
 
 from copy import deepcopy
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -9,11 +12,14 @@ from ..elements.bodies import Ground, PointMass
 from ..elements.names import named
 from ..errors import InvalidArgument, InvalidBody
 
+if TYPE_CHECKING:
+    from ..hints import Scene
+
 SHOWN = 5  # in a message
 WHAT = "body, constraint or force"  # has a name
 
 
-def remove(scene, item):
+def remove(scene: Scene, item: Any) -> Any:
     """Take a body, constraint, joint or force out of the scene; solutions made before go on to serve.
 
     Parameters
@@ -30,6 +36,17 @@ def remove(scene, item):
     ------
     InvalidArgument
         If the scene has no such thing, the name is that of several, or a constraint or force refers to it.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bar = scene.add_body(**ts.shapes.cylinder(0.02, 1.0, axis="x", mass=1.0), position=(0.5, 0, 0))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    >>> scene.remove("hinge")
+    <Revolute 'hinge': 5 rows>
+    >>> scene.mobility().degrees_of_freedom
+    6
     """
     item = found(scene, item)
     users = _users(scene, item)
@@ -90,13 +107,24 @@ def _users(scene, item):
     ]
 
 
-def copy(scene):
+def copy(scene: Scene) -> Scene:
     """An independent scene with handles of its own: `copy[handle]` is that of a handle of this one.
 
     Returns
     -------
     Scene
         With the same names, numbers and functions; objects that are asked as controllers are copied, too.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bar = scene.add_body(**ts.shapes.cylinder(0.02, 1.0, axis="x", mass=1.0), position=(0.5, 0, 0))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    >>> heavy = scene.copy()
+    >>> heavy[bar].mass = 5.0
+    >>> float(bar.mass), heavy[hinge]
+    (1.0, <Revolute 'hinge': 5 rows>)
     """
     memo = {}
     twin = deepcopy(scene, memo)

@@ -1,8 +1,8 @@
-"""Scenes far from the origin: run in coordinates whose origin is among the bodies, and handed back in the scene's own.
+"""Scenes far from the origin: runs use a local origin among the bodies; results are in the scene's coordinates.
 
-Constraints and forces see differences of positions, and a position of 1e6 m has no digits below 1e-10 m. So where the
-bodies that are joined, and the points of the ground that they are joined to, lie close together and far away, the run
-takes positions relative to an origin there. It is a multiple of a power of two, so nothing is rounded on the way.
+Constraints and forces depend on differences of positions, and a position of 1e6 m has no digits below 1e-10 m. If the
+jointed bodies and their ground points lie close together but far from the origin, positions are taken relative to a
+local origin. Its coordinates are multiples of a power of two, so the shift is exact.
 """
 
 from types import SimpleNamespace
@@ -61,7 +61,7 @@ def _points(packed):
 
 
 def _sees_differences(packed):
-    """Whether there are constraints or forces, and none that may depend on positions as they are."""
+    """Return True if there are constraints or forces, and none that may depend on positions as they are."""
     items = [*packed.constraints, *(load.force for load in packed.loads)]
     joined = packed.loads or not all(constraint.normalises for constraint in packed.constraints)
     own = joined and all(type(item).__module__.startswith("tsdyn.") for item in items)

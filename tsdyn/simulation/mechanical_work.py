@@ -1,4 +1,4 @@
-"""Work along a trajectory, by Gauss quadrature of the power on the dense output of every step."""
+"""Mechanical work along a trajectory: Gauss quadrature of power on the dense output of every step."""
 
 from types import SimpleNamespace
 

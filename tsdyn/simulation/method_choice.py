@@ -1,8 +1,8 @@
-"""The method for a motion that none was named for: Taylor, DOP853 where a part has no series, SDIRK54 if stiff.
+"""Choice of the default method: Taylor; DOP853 where a part of the scene has no series; SDIRK54 where it is stiff.
 
-The first two watch for steps that something other than the visible motion keeps short: DOP853 for its limit of
-stability, Taylor for many steps in which nothing moves far. When there have been enough of them, a pilot of SDIRK54
-goes on from there, and the evaluations that both need for a second of motion decide.
+The two explicit methods monitor stiffness: DOP853 by its stability limit, Taylor by a count of steps in which nothing
+moves far. When stiffness is detected, a pilot run of SDIRK54 continues from there, and the numbers of evaluations per
+second of motion decide.
 """
 
 from types import SimpleNamespace

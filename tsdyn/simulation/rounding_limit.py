@@ -1,4 +1,4 @@
-"""Tolerances that rounding leaves: a step's error can't be told below what positions lose far from the origin."""
+"""The smallest attainable tolerances: cancellation in positions far from the origin bounds the error estimate."""
 
 import copy
 

@@ -1,14 +1,17 @@
-"""The scene: what a user assembles from bodies, constraints and forces, checked piece by piece."""
+"""The scene: bodies, constraints and forces, validated as they are added."""
+
+from __future__ import annotations
 
 from collections import Counter
 from itertools import count
+from typing import TYPE_CHECKING, Any, Never
 
 import numpy as np
 
 from ..calls import fitting, fitting_methods
-from ..configuration.assemble import assemble
-from ..configuration.mobility import mobility
-from ..configuration.setting import set_joint
+from ..configuration.assemble import assemble as _assemble
+from ..configuration.mobility import mobility as _mobility
+from ..configuration.set_joint_coordinates import set_joint
 from ..constraints.euler_normalization import EulerNormalization
 from ..elements.bodies import IDENTITY, Body, Ground, PointMass
 from ..elements.force import Force
@@ -21,9 +24,14 @@ from ..jit.cache import deep_hash
 from ..model.packed import pack, user_functions
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
-from ..observables.evaluate import evaluate
+from ..observables.evaluate import evaluate as _evaluate
 from ..validation import counted, demand_known, label, vector3
-from .editing import WHAT, copy, demand_present, found, remove
+from .editing import WHAT, demand_present, found
+from .editing import copy as _copy
+from .editing import remove as _remove
+
+if TYPE_CHECKING:
+    from ..hints import AnyBody, ArrayLike, Floats, Item, Orientation, Packed, System
 
 
 @fitting_methods
@@ -40,20 +48,33 @@ class Scene:
     ground : Ground
         The inertial frame, to attach constraints to.
     bodies, constraints : tuple
-        In the order added, joints whole; the normalisations of the rigid bodies come last, in body order.
+        In the order added, joints as a whole; normalisation rows of the rigid bodies are last, in body order.
     primitives : tuple
-        The constraints in the order of their rows, joints taken apart.
+        The primitives in the order of their rows, those of joints included.
     forces : tuple
         In the order added.
 
     Notes
     -----
-    A scene can be run as often as you like; `simulate` never changes it. Set a body's mass, inertia, position,
-    orientation or velocities and run again: nothing is rebuilt but the numbers that changed.
+    `simulate` never changes a scene, so a scene may be run repeatedly. After an attribute of a body (mass, inertia,
+    position, orientation, velocity) is set, the next run updates the changed numbers only.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> scene
+    <Scene of 1 point mass: 3 coordinates, 1 constraint row>
+    >>> scene.mobility().degrees_of_freedom
+    2
+    >>> print(f"{ts.simulate(scene, (0, 0.5)).position('bob')[-1, 2]:.6f} m")
+    -0.928200 m
     """
 
     @fitting
-    def __init__(self, gravity=(0.0, 0.0, -9.81)):
+    def __init__(self, gravity: ArrayLike = (0.0, 0.0, -9.81)) -> None:
         self.ground = Ground(self)
         self._bodies, self._added, self._forces, self._normalisations = [], [], [], {}
         self._waiting, self._titles = {}, None  # see membership.py
@@ -61,53 +82,55 @@ class Scene:
         self._twins = None  # handle of the scene that this one is a copy of -> handle here
         self.gravity = gravity
 
-    def __setattr__(self, name, value):
+    ground: AnyBody
+
+    def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute that there is; a misspelt one is refused."""
         demand_known(self, name, ("ground",))
         super().__setattr__(name, value)
 
     @property
-    def gravity(self):
+    def gravity(self) -> Floats:
         """Acceleration of free fall, ground frame, m/s^2, shape (3,)."""
         return self._gravity
 
     @gravity.setter
-    def gravity(self, value):
+    def gravity(self, value: ArrayLike) -> None:
         self._gravity = vector3(value, "gravity (m/s^2)", InvalidArgument)
         self._gravity.setflags(write=False)
         self.touch()
 
     @property
-    def bodies(self):
+    def bodies(self) -> tuple[Body | Any, ...]:
         """The bodies, in the order added."""
         return tuple(self._bodies)
 
     @property
-    def constraints(self):
-        """The constraints, in the order of their rows; joints whole."""
+    def constraints(self) -> tuple[Primitive | Joint, ...]:
+        """The constraints in the order of their rows, joints as a whole."""
         return (*self._added, *self._normalisations.values())
 
     @property
-    def primitives(self):
-        """The constraints, in the order of their rows; joints taken apart."""
+    def primitives(self) -> tuple[Primitive, ...]:
+        """The primitives in the order of their rows, those of joints included."""
         return tuple(part for constraint in self.constraints for part in constraint.parts)
 
     @property
-    def forces(self):
+    def forces(self) -> tuple[Force, ...]:
         """The forces, in the order added."""
         return tuple(self._forces)
 
     @fitting
     def add_body(
         self,
-        mass,
-        inertia,
-        position=(0.0, 0.0, 0.0),
-        orientation=IDENTITY,
-        velocity=(0.0, 0.0, 0.0),
-        angular_velocity=(0.0, 0.0, 0.0),
-        name="",
-    ):
+        mass: float,
+        inertia: ArrayLike,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        orientation: Orientation = IDENTITY,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+        name: str = "",
+    ) -> Body:
         """Add a rigid body and return its handle.
 
         Parameters
@@ -123,7 +146,7 @@ class Scene:
         angular_velocity : array_like (3,), rad/s
             Body frame.
         name : str, optional
-            What messages call it; default "body1", "body2", ...
+            Name in messages and lookups; default "body1", "body2", ...
 
         Returns
         -------
@@ -132,7 +155,15 @@ class Scene:
         Raises
         ------
         InvalidBody
-            If a value is impossible, not finite or of a wrong shape, or the name is taken.
+            If a value is inadmissible, not finite or of a wrong shape, or the name is in use.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene()
+        >>> top = scene.add_body(mass=30.0, inertia=(90, 90, 30), position=(0, 0, 1), angular_velocity=(0.5, 0, 12))
+        >>> print(top, top.inertia.diagonal())
+        <Body 'body1'> [90. 90. 30.]
         """
         values = {
             "mass": mass,
@@ -148,8 +179,19 @@ class Scene:
         return body
 
     @fitting
-    def add_point_mass(self, mass, position=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), name=""):
-        """Add a particle of three coordinates and return its handle; arguments as for `add_body`."""
+    def add_point_mass(
+        self, mass: float, position: ArrayLike = (0.0, 0.0, 0.0), velocity: ArrayLike = (0.0, 0.0, 0.0), name: str = ""
+    ) -> PointMass:
+        """Add a particle of three coordinates and return its handle; arguments as for `add_body`.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene()
+        >>> ball = scene.add_point_mass(mass=1.0, position=(0, 0, 2), name="ball")
+        >>> print(ball, ball.q)
+        <PointMass 'ball'> [0. 0. 2.]
+        """
         return self._admit(PointMass, name, {"mass": mass, "position": position, "velocity": velocity})
 
     def _admit(self, kind, name, values):
@@ -166,13 +208,22 @@ class Scene:
         self.touch()
         return body
 
-    def add(self, item):
-        """Add a constraint or a force and return it; a second EulerNormalization of a body gives back the one it has.
+    def add(self, item: Item) -> Item:
+        """Add a constraint or a force and return it; a second EulerNormalization of a body returns the existing one.
 
         Raises
         ------
         InvalidConstraint, InvalidForce
             If it is neither, belongs to another scene, or has been added before.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene(gravity=(0, 0, -10))
+        >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+        >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+        >>> scene["rod"] is rod
+        True
         """
         if not isinstance(item, (Primitive, Joint, Force)):
             raise InvalidConstraint(
@@ -200,7 +251,7 @@ class Scene:
         self.touch()
         return item
 
-    def refresh(self):
+    def refresh(self) -> None:
         """Compile those functions of a user's again of which a global has changed since the scene was packed."""
         if self._packed is not None and self._users and _marks(self._users) != self._functions:
             for owner, _ in self._users:
@@ -212,12 +263,12 @@ class Scene:
         gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins"))
         return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
 
-    def touch(self):
+    def touch(self) -> None:
         """Forget the packed numbers: something has changed."""
         self._packed = self._start = self._prepared = None
 
     @property
-    def packed(self):
+    def packed(self) -> Packed:
         """Bodies, constraints and their numbers as they are now, a `Packed`; made again after a change only."""
         if not self._bodies:
             raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
@@ -228,30 +279,30 @@ class Scene:
         return self._packed
 
     @property
-    def system(self):
+    def system(self) -> System:
         """What the kernels see, a `System`."""
         return self.packed.system
 
-    def motions(self):
+    def motions(self) -> list[Any]:
         """The functions of time and tables that constraints and forces are given."""
         given = [*self.packed.parameters, *(load.parameters for load in self.packed.loads)]
         return [value for values in given for value in values if isinstance(value, (Motion, Signal))]
 
     @property
-    def start(self):
+    def start(self) -> tuple[Floats, Floats]:
         """(q, qd) that the bodies say, shapes (n,), (n,)."""
         if self._start is None:
             self._start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
         return tuple(array.copy() for array in self._start)
 
-    def body(self, name):
+    def body(self, name: str) -> Body | Any:
         """Return the body of this name."""
         for body in self._bodies:
             if isinstance(name, str) and body.name == name:
                 return body
         raise InvalidBody(f"no body is named {name!r}; there are {', '.join(b.name for b in self._bodies) or 'none'}.")
 
-    def __getitem__(self, item):
+    def __getitem__(self, item: Any) -> Any:
         """The body, constraint or force of this name; in a copy also that of a handle of the scene it was made of."""
         if isinstance(item, str):
             return named([self.ground, *self._bodies, *self.constraints, *self._forces], item, WHAT)
@@ -259,7 +310,7 @@ class Scene:
         twin = self._twins.get(item) if self._twins is not None and known else None
         return found(self, item) if twin is None else twin
 
-    def row_names(self):
+    def row_names(self) -> list[str]:
         """Name the rows of Phi, in order: a constraint's title, with the row's label where it has several."""
         names, seen = [], Counter()
         for constraint in self.constraints:
@@ -269,22 +320,22 @@ class Scene:
             names += [f"{title}{again}{label}" for label in constraint.row_labels]
         return names
 
-    def place(self, q, qd):
+    def place(self, q: Floats, qd: Floats) -> None:
         """Write coordinates q (n,) and velocities qd (n,) into the bodies as their values at the start."""
         at = 0
         for body in self._bodies:
             span = slice(at, at := at + body.dimension)
             body.place(q[span], qd[span])
 
-    evaluate = evaluate
-    assemble = assemble
-    mobility = mobility
+    evaluate = _evaluate
+    assemble = _assemble
+    mobility = _mobility
     set = set_joint
-    remove = remove
-    copy = copy
-    __copy__ = copy
+    remove = _remove
+    copy = _copy
+    __copy__ = _copy
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         rows = sum(constraint.rows for constraint in self.constraints)
         n = sum(body.dimension for body in self._bodies)
         rigid = len(self._normalisations)

@@ -1,4 +1,4 @@
-"""What the runs of one scene share: all that follows from the packed scene alone, until the scene changes."""
+"""Cache of data derived from a packed scene, shared by its runs until the scene changes."""
 
 from functools import cached_property
 

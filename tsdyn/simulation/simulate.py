@@ -1,6 +1,9 @@
-"""`simulate`: check everything, hand a task to the method's driver, make a Solution of what it hands back."""
+"""`simulate`: validate the arguments, pass a run request to the driver of the method, return a Solution."""
+
+from __future__ import annotations
 
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,11 +18,11 @@ from ..motions.knots import stops_of
 from ..observables.state import remembered
 from ..runs.arguments import interval, method_of, output_times, state_arrays
 from ..runs.events import prepare
-from ..runs.request import Task, between
 from ..runs.sampling import Sampling, instants_of, sampled
+from ..runs.task import Task, between
 from ..taylor.series_run import run_series
 from ..validation import one_of, positive, whole
-from . import method_choice as choice
+from . import method_choice
 from .local_origin import origin_of, run_near
 from .progress import reporter
 from .rounding_limit import within_rounding
@@ -28,34 +31,39 @@ from .scene_cache import prepared
 from .singularity_crossing import run_past
 from .solution import Solution
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..hints import ArrayLike, Event, Formulation, Method, Progress, Redundancy, Span, State
+
 DRIVERS = {
     "steps": run_past,
     "series": run_series,
-}  # by Integrator.driver, if it isn't one itself; see request.py
+}  # by Integrator.driver, if it isn't one itself; see task.py
 
 
 @fitting
 def simulate(
-    scene,
-    t_span,
+    scene: Scene,
+    t_span: Span,
     *,
-    integrator=None,
-    rtol=None,
-    atol=None,
-    formulation="tangent",
-    constraint_tol=1e-12,
-    initial_tol=1e-9,
-    redundancy="drop",
-    t_eval=None,
-    dense_output=False,
-    events=None,
-    max_steps=None,
-    max_step=None,
-    history=True,
-    progress=None,
-    chart_interval=None,
-    state=None,
-):
+    integrator: Method | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    formulation: Formulation = "tangent",
+    constraint_tol: float = 1e-12,
+    initial_tol: float = 1e-9,
+    redundancy: Redundancy = "drop",
+    t_eval: ArrayLike | None = None,
+    dense_output: bool = False,
+    events: Event | Sequence[Event] | None = None,
+    max_steps: int | None = None,
+    max_step: float | None = None,
+    history: bool = True,
+    progress: Progress | None = None,
+    chart_interval: int | None = None,
+    state: State | None = None,
+) -> Solution:
     """Integrate a scene over an interval of time; the scene is not changed.
 
     Parameters
@@ -64,60 +72,75 @@ def simulate(
     t_span : (float, float), s
         Start and end, the end later.
     integrator : Integrator or str, optional
-        A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor,
-        DOP853 where a part of the scene has no series, and SDIRK54 from the start where the motion turns out to be
-        stiff and evaluations are saved by it.
+        A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor;
+        DOP853 where a part of the scene has no series; SDIRK54, from the start, where the motion is found stiff and
+        SDIRK54 needs fewer evaluations.
     rtol, atol : float, optional
-        Tolerances of the default method, or of an adaptive method that is given by its name; 1e-8 if not given. An
-        instance has its own, and rtol or atol beside one is refused.
+        Tolerances of the default method, or of an adaptive method given by name; default 1e-8. An instance has its own
+        tolerances; rtol or atol beside an instance is refused.
     formulation : {"tangent", "null-space", "maggi-kane"}
-        "tangent": the tangent-space ODE without a basis, at a cost that grows with the scene's size and fill;
-        "null-space": the same by Eq. 26, as in the paper; "maggi-kane": Eqs. 17-18, which drift off the constraints,
-        for comparison. Implicit methods solve Eq. 26 in either of the first two.
+        "tangent": the tangent-space ODE without a basis, in O(N) for chains and trees; "null-space": Eq. 26, as in the
+        paper; "maggi-kane": Eqs. 17-18, the baseline that drifts off the constraints. Implicit methods solve Eq. 26 in
+        either of the first two.
     constraint_tol : float
         u_tol and B_tol of Eqs. 28-29: bound on |Phi| (m) and on |Phi_q U B - I|.
     initial_tol : float
-        Residuals of the start, relative to 1 + max |q| or 1 + max |qd|, up to which it is accepted and projected.
+        Largest residual of a start, relative to 1 + max |q| or 1 + max |qd|, that is accepted; the start is then
+        projected onto the constraints.
     redundancy : {"drop", "refuse"}
-        What to do about constraint rows that follow from the others: "drop" leaves them out of the equations where
-        they are sure to hold (independent rows are chosen anew where those that were chosen come close to depending on
-        one another); "refuse" raises RedundantConstraints.
+        Treatment of redundant constraint rows: "drop" removes them from the equations if they hold wherever the others
+        hold (the selection is renewed when the kept rows come close to dependence); "refuse" raises
+        RedundantConstraints.
     t_eval : array_like, s, optional
-        Increasing output times within t_span, from dense output on the manifold, which never changes the steps;
-        None gives every accepted step and both ends.
+        Increasing output times within t_span, from dense output on the manifold; they never change the steps. None
+        gives every accepted step and both ends.
     dense_output : bool
-        Keep every step's interpolant, for `solution.at(t)` at any time.
+        Keep the interpolant of every step, for `solution.at(t)` at any time.
     events : callable or list of callables, optional
-        f(t, state) -> float, state being a `State`. Every zero within every step is found on the manifold and recorded
-        in `solution.t_events`, which never changes the steps: changes of sign, and touches of zero within rounding,
-        which count once. As for scipy.integrate.solve_ivp, an attribute `direction` > 0 or < 0 restricts to changes
-        that rise or fall, and `terminal` = True, or a number of occurrences, ends the run there. A function that
-        raises, or gives no finite number, ends it too, with success=False.
+        f(t, state) -> float with a `State`. All zeros inside every step are located on the manifold and recorded in
+        `solution.t_events`: sign changes, and touches of zero within rounding, which count once. Events never change
+        the steps. As for scipy.integrate.solve_ivp, an attribute `direction` > 0 or < 0 selects rising or falling
+        zeros, and `terminal` = True, or a number of occurrences, ends the run. A function that raises, or returns no
+        finite number, ends the run with success=False.
     max_steps : int, optional
-        End the run after so many steps.
+        Largest number of steps; the run ends there.
     max_step : float, s, optional
-        The longest step, for every method; a fixed step that is longer becomes this one.
+        Longest step, for every method; a longer fixed step is reduced to it.
     history : bool
         Keep `solution.steps` and `solution.charts`: 8 bytes a step, 16 to 40 more for each step rejected and each
         chart.
     progress : bool or callable, optional
-        True shows a bar (needs tqdm); a callable is given the fraction done, 0 to 1.
+        True shows a bar (needs tqdm); a callable receives the fraction done, 0 to 1.
     chart_interval : int, optional
-        Make a new chart every so many steps, whatever the criteria say; for experiments.
+        Number of steps after which a new chart is made regardless of the criteria; for experiments.
     state : State, optional
         Positions and velocities to start from instead of those of the bodies, such as `solution.state`.
 
     Returns
     -------
     Solution
-        Also of a run that ended early, by Ctrl-C too: see `.success`, `.status`, `.message`; in a loop over runs call
+        Partial if the run ended early, by Ctrl-C for example: see `.success`, `.status`, `.message`, or call
         `.raise_if_failed()`.
 
     Raises
     ------
     TsdynError
-        One of its kinds, before anything runs: InvalidArgument, InvalidBody, InconsistentState, RedundantConstraints,
+        A subclass, before the run starts: InvalidArgument, InvalidBody, InconsistentState, RedundantConstraints,
         SingularConfiguration.
+
+    Examples
+    --------
+    A pendulum of 1 m, released from the horizontal:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> solution = ts.simulate(scene, (0, 1), t_eval=[0.0, 0.5, 1.0])
+    >>> print(solution.position(bob)[:, 2].round(6) + 0.0)
+    [ 0.       -0.9282   -0.148328]
+    >>> bool(solution.constraint_error.position.max() < 1e-12)
+    True
     """
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
@@ -147,7 +170,7 @@ def simulate(
     prepare_first_run(scene, method, form, within, default)
     kept = prepared(scene)
     if method is None:
-        method = choice.explicit(kept, *default)
+        method = method_choice.explicit(kept, *default)
     if longest is not None:
         method = method.bounded(longest)
     report = reporter(progress)
@@ -165,7 +188,7 @@ def simulate(
     choose = None
     if integrator is None and sampling is None:  # what is asked in Python is asked once
         options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol, "max_step": max_step}
-        choose = choice.chooser(simulate, scene, method, span[1], options)
+        choose = method_choice.chooser(simulate, scene, method, span[1], options)
     task = Task(
         kept, method, form, span, q, qd, memory, times, bool(dense_output),
         watched, constraint_tol, max_steps, chart_interval or 0, report, bool(history), choose, stops, sampling,
@@ -181,7 +204,7 @@ def simulate(
         return simulate(
             scene,
             t_span,
-            integrator=choice.implicit(method),
+            integrator=method_choice.implicit(method),
             formulation=formulation,
             constraint_tol=constraint_tol,
             initial_tol=initial_tol,

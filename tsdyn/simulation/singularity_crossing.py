@@ -1,9 +1,9 @@
-"""Runs of methods that go by stages, past singular configurations: series carry the motion over each of them.
+"""Passage through singular configurations: Runge-Kutta methods hand over to the Taylor integrator near the singularity.
 
-Next to such a place the charts of these methods reach less and less far, while the series of a motion that passes it
-smoothly knows nothing of it. So where a chart is made next to one, or a fixed step can't be made near one, a run by
-series goes on from there until the configuration is regular again, and the method from there as from a start. A
-method with a fixed step goes on at a time of its own grid. Nothing of this is loaded by runs that meet no such place.
+Near a singular configuration charts shrink towards zero, while the Taylor series of a motion that passes it smoothly is
+regular. If a chart is made near a singularity, or a fixed step fails near one, a Taylor run continues until the
+configuration is regular again; the method then restarts. A fixed-step method restarts on its own time grid. Runs that
+meet no singular configuration load none of this.
 """
 
 import math

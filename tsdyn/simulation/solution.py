@@ -1,9 +1,11 @@
-"""What a run hands back: the trajectory, how it went, and everything that follows from it."""
+"""The result of a run: trajectory, termination, statistics and derived quantities."""
+
+from __future__ import annotations
 
 import html
 from functools import cached_property
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -11,36 +13,39 @@ from ..calls import fitting_methods
 from ..errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from ..formulations.chart_validity import REASONS
 from ..model.packed import member_of
-from ..observables import diagnostics, power, reactions, uniqueness
+from ..observables import diagnostics, reactions, uniqueness
 from ..observables.friction_reactions import with_normal_loads
 from ..observables.kinematics import Anchor, Kinematics
 from ..observables.state import RememberingState
 from ..validation import counted, floats
+from .balances import Balances
 from .conservation import energy_error
-from .mechanical_work import work as integrate_work
 from .termination import account
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike, Bools, ConstraintError, Floats, Integers, ItemLike, Scene
 
 
 class Steps(NamedTuple):
-    """Every step tried: where it began, s, its length, s, and whether it was accepted."""
+    """Every attempted step: its start, s, its length, s, and whether it was accepted."""
 
-    t: np.ndarray
-    h: np.ndarray
-    accepted: np.ndarray
+    t: Floats
+    h: Floats
+    accepted: Bools
 
 
 class Charts(NamedTuple):
-    """Every chart: its instant, s, why it was made, and on leaving it its condition, contraction and steps."""
+    """Every chart: its time, s, the reason for it, and at its end condition, contraction and number of steps."""
 
-    t: np.ndarray
-    reason: tuple
-    condition: np.ndarray
-    contraction: np.ndarray
-    steps: np.ndarray
+    t: Floats
+    reason: tuple[str, ...]
+    condition: Floats
+    contraction: Floats
+    steps: Integers
 
 
 @fitting_methods
-class Solution(Kinematics):
+class Solution(Balances, Kinematics["Floats"]):
     """The result of `simulate`; k outputs, n coordinates, m constraint rows.
 
     Attributes
@@ -49,29 +54,49 @@ class Solution(Kinematics):
     q, qd, qdd : ndarray (k, n)
         7 coordinates a rigid body (r, then p) and 3 a point mass, in the order added.
     multipliers : ndarray (k, m)
-        M qdd + Phi_q^T lam = Q_A + S; rows in the order added, then the normalisations in body order. NaN for rows
+        M qdd + Phi_q^T lam = Q_A + Q_v; rows in the order added, then the normalisations in body order. NaN for rows
         that were left out as redundant, see `reaction_unique`.
     success : bool
         Whether the run reached the end of the interval, or a terminal event.
     status : Status
     message : str
-        What happened, where, and what to try.
+        What happened, where, and the remedy.
     t_events : list of ndarray (k_i,), s, or None
         Times of each event; q_events and qd_events are lists of (k_i, n).
     stats : SimpleNamespace
-        steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds; of
+        steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds; for
         implicit methods also jacobians, iteration_matrices, stage_iterations; stiff: whether an explicit adaptive
-        method has met its limit of stability for a while. What was not needed: solves_skipped, placements that lay on
-        the constraints to rounding already; checks_skipped, those whose last correction was known to suffice;
-        factorizations_skipped, for which older factors served or still contracted; gyroscopic_skipped, torques of
-        bodies whose inertia is a sphere's, rotations_skipped, of bodies that their joints never let turn, and
-        forces_skipped, of scenes without any, one an evaluation; columns_skipped, constant ones of series, an order.
-        Of series: steps_near_singular, which began or ended next to a singular configuration; largest_landing, how far
-        (m, rad) the constraints moved a body at the end of one of them; energy_error, the largest change of the energy
-        in such a run, of the largest kinetic energy, None where energy isn't constant.
+        method was limited by stability. Skipped work: solves_skipped, position solves that start at rounding;
+        checks_skipped, checks after a correction known to suffice; factorizations_skipped, where older factors still
+        serve; gyroscopic_skipped, gyroscopic torques of bodies with spherical inertia, rotations_skipped, rotations of
+        bodies with locked orientation, and forces_skipped, forces of scenes without any, each counted once an
+        evaluation; columns_skipped, series of constant columns, counted once an order. For Taylor runs near singular
+        configurations: steps_near_singular; largest_landing, the largest displacement (m, rad) of a body by the
+        projection at the end of such a step; energy_error, the largest change of energy relative to the largest
+        kinetic energy, None where energy isn't constant.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> solution = ts.simulate(scene, (0, 1), dense_output=True)
+    >>> solution.success, solution.message
+    (True, 'The run reached the end of the interval.')
+    >>> print(f"z = {solution.at(0.5).position(bob)[2]:.6f} m, tension {solution.multipliers[-1, 0]:.3f} N")
+    z = -0.928200 m, tension 4.450 N
     """
 
-    def __init__(self, scene, task, outcome, seconds):
+    status: Status
+    message: str
+    stats: SimpleNamespace
+    t: Floats
+    t_events: list[Floats] | Any  # None where no events were asked for
+    q_events: list[Floats] | Any
+    qd_events: list[Floats] | Any
+
+    def __init__(self, scene: Scene, task: Any, outcome: Any, seconds: dict[str, float]) -> None:
         self.scene, self.packed = scene, task.prepared.packed
         self.method, self.formulation, self.span = repr(task.method), task.form.name, task.span
         self.system = self.packed.system
@@ -96,31 +121,31 @@ class Solution(Kinematics):
         self.__dict__.update(state, system=state["packed"].system)
 
     @property
-    def success(self):
-        """Whether the run reached the end of the interval, or a terminal event."""
+    def success(self) -> bool:
+        """True if the run reached the end of the interval, or a terminal event."""
         return self.status in (Status.SUCCESS, Status.EVENT)
 
-    def raise_if_failed(self):
+    def raise_if_failed(self) -> Self:
         """Raise StepFailure, with this solution as `.solution`, if the run ended early; return self otherwise."""
         if not self.success:
             raise StepFailure(self.message, self)
         return self
 
     @property
-    def reached(self):
-        """The time that the run has come to, s."""
+    def reached(self) -> float:
+        """The time reached by the run, s."""
         return self._reached
 
     @property
-    def state(self):
-        """The last point reached, to go on from: simulate(scene, (state.t, t_end), state=state)."""
+    def state(self) -> RememberingState:
+        """The last state reached, to continue from: simulate(scene, (state.t, t_end), state=state)."""
         q, qd, qdd = (a.copy() for a in self._last)
         t, memory = np.array([self._reached]), self._remembered[None]
         lam = reactions.multipliers(self.packed, t, q[None], qd[None], qdd[None], memory)[0]
         remembered = self.handles, self._remembered.copy(), Anchor(self._angles)
         return RememberingState.of(*remembered, self._reached, q, qd, qdd, lam)
 
-    def at(self, t):
+    def at(self, t: ArrayLike) -> RememberingState:
         """State at any time of a run with dense_output=True, on the manifold as the steps are.
 
         Parameters
@@ -140,6 +165,16 @@ class Solution(Kinematics):
             If the run kept no dense output, or t isn't finite, one time or a vector of them, or is outside the run.
         StepFailure
             If the constraints can't be solved there.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene()
+        >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+        >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+        >>> solution = ts.simulate(scene, (0, 1), dense_output=True)
+        >>> print(solution.at([0.25, 0.75]).position(ball)[:, 2].round(4))
+        [-0.3009 -0.7823]
         """
         if self._trajectory is None:
             raise InvalidArgument("at(t) needs the steps' interpolants: simulate(..., dense_output=True) keeps them.")
@@ -171,12 +206,12 @@ class Solution(Kinematics):
         return Anchor(angles, t - start, (states[back, 0], states[back, 1]))
 
     @property
-    def steps(self):
+    def steps(self) -> Steps:
         """History of the steps, a `Steps`; raises InvalidArgument if the run kept none."""
         return Steps(*self._kept(self._step_log).arrays())
 
     @property
-    def charts(self):
+    def charts(self) -> Charts:
         """History of the charts, a `Charts`; raises InvalidArgument if the run kept none."""
         t, reasons, condition, contraction, steps = self._kept(self._chart_log).arrays()
         return Charts(t, tuple(REASONS[int(i)] for i in reasons.tolist()), condition, contraction, steps.astype(int))
@@ -193,29 +228,39 @@ class Solution(Kinematics):
         return with_normal_loads(self.packed, self.t, self.q, self.qd, self.qdd, self._remembers)
 
     @cached_property
-    def multipliers(self):
+    def multipliers(self) -> Floats:
         """Multipliers (k, m), computed when first asked for."""
         return reactions.multipliers(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
 
     @cached_property
-    def constraint_error(self):
-        """Maximum norms of Eqs. 1-3 at every output, recomputed by code that is not the solver's."""
+    def constraint_error(self) -> ConstraintError:
+        """Maximum norms of Eqs. 1-3 at every output, recomputed independently of the solver."""
         return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
 
-    def reaction(self, item, on=None):
+    def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
         """Force (N) and torque (N m) that a constraint, a joint as a whole, or a force exerts: (k, 3) each.
 
         Parameters
         ----------
         item : constraint, force, or name of one
         on : Body or str, optional
-            Which of its bodies they act on; by default a, or b where a is the ground (`item.on`).
+            The body on which force and torque act; by default a, or b if a is the ground (`item.on`).
 
         Returns
         -------
         force, torque : ndarray (k, 3)
             In the ground frame; the torque is about the item's first point on that body (`point_a`), or the centroid
             where it has none.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene()
+        >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+        >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+        >>> force, torque = ts.simulate(scene, (0, 1)).reaction(rod)
+        >>> print(force[-1].round(3) + 0.0)
+        [4.79  0.    0.801]
         """
         item = self.handles.item(item)
         load = reactions.loads_of(self.packed).get(id(item))
@@ -224,19 +269,19 @@ class Solution(Kinematics):
         member = self._member(item)
         return reactions.reaction(self, member, self._acted(item, on))
 
-    def reaction_unique(self, item, on=None):
+    def reaction_unique(self, item: ItemLike, on: BodyLike | None = None) -> Bools:
         """Whether what `reaction` gives is the only answer, at each output: bool (k,).
 
-        Redundant constraints share their loads in many ways, all of which move the bodies alike; `reaction` is then
-        one of them, with the multipliers of dropped rows, NaN in `multipliers`, taken as zero.
+        Redundant constraints can share their loads in many ways with the same motion; `reaction` is then one of them,
+        with the multipliers of dropped rows (NaN in `multipliers`) taken as zero.
         """
         item = self.handles.item(item)
         if id(item) in reactions.loads_of(self.packed):
             return np.ones(self.t.size, bool)
         return uniqueness.unique(self, self._member(item).rows, self._acted(item, on))
 
-    def rows(self, constraint):
-        """Which columns of `multipliers` are those of a constraint, a slice."""
+    def rows(self, constraint: ItemLike) -> slice:
+        """The columns of `multipliers` that belong to a constraint, as a slice."""
         return self._member(self.handles.item(constraint)).rows
 
     def _member(self, constraint):
@@ -256,87 +301,6 @@ class Solution(Kinematics):
             raise InvalidBody(f"{item.name}: what acts on the ground is the opposite of what acts on {item.on.name!r}.")
         raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
 
-    @cached_property
-    def kinetic_energy(self):
-        """Kinetic energy (k,), J."""
-        return diagnostics.kinetic_energy(self.system, self.q, self.qd)
-
-    @cached_property
-    def potential_energy(self):
-        """Potential energy (k,), J, of gravity, zero at the ground's origin, and of springs; loads have none."""
-        return diagnostics.potential_energy(self.system, self.q) + self._force_powers.potential
-
-    @property
-    def energy(self):
-        """Kinetic and potential energy together (k,), J."""
-        return self.kinetic_energy + self.potential_energy
-
-    @cached_property
-    def _force_powers(self):
-        return power.force_powers(self)
-
-    @cached_property
-    def power(self):
-        """Power (k,), W, of applied forces, actuators and driven constraints: dE/dt = power - dissipation."""
-        return self._force_powers.applied + power.driving_power(self)
-
-    @property
-    def dissipation(self):
-        """Power (k,), W, that dampers and friction take; not negative."""
-        return self._force_powers.dissipation
-
-    @cached_property
-    def work(self):
-        """Work (k,), J, since the start: of applied and driving forces, less what dampers and friction have taken.
-
-        energy - work is constant but for the method's error. It is integrated over the dense output.
-
-        Raises
-        ------
-        InvalidArgument
-            If the run kept no dense output.
-        """
-        return self._integrated(None)
-
-    def power_of(self, item):
-        """Power (k,), W, that one constraint or force, or that of a name, puts in: what dE/dt owes to it.
-
-        Of a motor or a driver: of its force or torque along the motion prescribed. Of a force: of its loads and
-        actuators, less what it dissipates; what a spring stores is energy, not power. Of any other constraint: zero.
-        """
-        return power.power_of(self, self._part(item))
-
-    def work_of(self, item):
-        """Work (k,), J, since the start, of `power_of` one constraint or force: the energy that a motor has put in.
-
-        Raises
-        ------
-        InvalidArgument
-            If the run kept no dense output.
-        """
-        return self._integrated(self._part(item))
-
-    def _part(self, item):
-        """The `Load` of a force, or the `Member` of a constraint."""
-        item = self.handles.item(item)
-        load = reactions.loads_of(self.packed).get(id(item))
-        return self._member(item) if load is None else load
-
-    def _integrated(self, part):
-        if self._trajectory is None:
-            raise InvalidArgument("work is integrated over dense output: simulate(..., dense_output=True) keeps it.")
-        return integrate_work(self, self._trajectory, part)
-
-    @cached_property
-    def linear_momentum(self):
-        """Linear momentum (k, 3), kg m/s, ground frame."""
-        return diagnostics.linear_momentum(self.system, self.q, self.qd)
-
-    @cached_property
-    def angular_momentum(self):
-        """Angular momentum about the ground's origin (k, 3), kg m^2/s, ground frame."""
-        return diagnostics.angular_momentum(self.system, self.q, self.qd)
-
     def _facts(self):
         s = self.stats
         sweeps = f", {counted(s.newton_iterations, 'Newton sweep')}" if s.newton_iterations else ""
@@ -350,17 +314,17 @@ class Solution(Kinematics):
             "time": f"{s.seconds['run']:.3g} s, {s.seconds['prepare']:.2g} s to prepare",
         }
 
-    def __str__(self):
+    def __str__(self) -> str:
         lines = [f"  {name:8}{fact}" for name, fact in self._facts().items()]
         return "\n".join(["Solution", *lines, *([] if self.success else ["  " + self.message])])
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The same in a notebook."""
         facts = self._facts() | ({} if self.success else {"message": self.message})
         rows = "".join(f"<tr><th>{name}</th><td>{html.escape(fact)}</td></tr>" for name, fact in facts.items())
         return f"<table><caption>Solution</caption>{rows}</table>"
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         s = self.stats
         return (
             f"<Solution: {self.status.name.lower()} at t = {self._reached:g} s by {self.method}, {self.formulation}: "

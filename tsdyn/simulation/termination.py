@@ -1,12 +1,12 @@
-"""How a run ended, in words: what happened, where, and what to try."""
+"""Termination report of a run: what happened, where, and what to try."""
 
 import numpy as np
 
 from ..configuration.rank import weakest_row
 from ..errors import Status
-from ..formulations.redundancy import dependent_rows
+from ..formulations.dependent_rows import dependent_rows
 from ..observables.evaluate import constraint_arrays
-from ..sparse.networks import dropped_rows
+from ..sparse.constraint_graphs import dropped_rows
 from ..taylor.layout import without_series
 from ..validation import counted
 
@@ -35,15 +35,14 @@ def account(solution, scene, reason):
 
 
 def _kept(stats):
-    """The accuracy that was kept next to singular configurations, as energy and landings tell."""
+    """The accuracy near singular configurations, from energy and projections."""
     if not stats.steps_near_singular:
         return ""
-    energy = (
-        "" if stats.energy_error is None else f"energy was kept to {stats.energy_error:.1e} of the kinetic energy, "
-    )
+    error = stats.energy_error
+    energy = "" if error is None else f"the energy error is {error:.1e} of the kinetic energy and "
     return (
-        f"Next to singular configurations ({stats.steps_near_singular} steps) {energy}constraints moved bodies by at "
-        f"most {stats.largest_landing:.1e} (m, rad) at the end of a step."
+        f"Near singular configurations ({stats.steps_near_singular} steps) {energy}the projection onto the constraints "
+        f"moved bodies by at most {stats.largest_landing:.1e} (m, rad) at the end of a step."
     )
 
 
@@ -53,15 +52,15 @@ def _locked(solution):
     still = redundant and not solution.system.rheonomic[0]
     if not (still and solution.q.shape[1] == len(solution.system.segments) - redundant):
         return ""
-    return "Nothing can move: the constraints, redundant ones among them, leave no degree of freedom."
+    return "The mechanism is immobile: the constraints, some of them redundant, leave no degree of freedom."
 
 
 def _growth(solution):
-    """Say that the motion is stiff, or that its speed has grown beyond all measure."""
-    said = "The motion is stiff: an implicit method, such as SDIRK54, may go on. " if solution.stats.stiff else ""
+    """Report that the motion is stiff, or that its velocities diverge."""
+    said = "The motion is stiff: an implicit method, such as SDIRK54, may succeed. " if solution.stats.stiff else ""
     first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (solution.qd[:1], solution._last[1]))
     if last > BLOW_UP * (1.0 + first):
-        said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion itself blows up."
+        said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion diverges."
     return said.strip()
 
 

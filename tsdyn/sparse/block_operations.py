@@ -1,8 +1,8 @@
-"""Steps of block elimination, in local scalars: up to three pivots at a time, and whole links of chains.
+"""Elementary operations of block elimination in local scalars: up to three pivots at a time, and whole links of chains.
 
-A step works on rows of a panel (see symbolic.py) from the first pivot on, rows `width` apart: in u, or for a matrix
-that isn't symmetric in u and, transposed, in l. It puts the pivots' reciprocals in their places, and returns which
-pivot fails, or -1. `kept` holds the diagonal as it was before elimination, and its sign is the pivot's.
+An operation works on rows of a panel (see symbolic.py), `width` floats apart, from the first pivot on: in u, and for an
+unsymmetric matrix also in l, transposed. It stores the reciprocals of the pivots and returns the index of the pivot
+that failed, or -1. `kept` holds the diagonal before elimination; its sign is the sign that the pivot must have.
 """
 
 import math

@@ -1,14 +1,13 @@
-"""Bodies at which many constraints meet, cut into parts: their rows are all coupled, and would be one dense block.
+"""Body splitting: a body with many joints (a hub) couples all their rows into one dense block of S.
 
-A hub becomes a tree of parts, welded together by as many rows as it has degrees of freedom, with its mass and inertia
-shared out among them. Few rows meet at a part, so few are coupled, and the whole is as sparse as a tree of bodies. It
-is the same system: parts that are welded move as one body does, so that with S = H W H^T of the parts, and zeros on the
-right for the welds, the multipliers are those of the hub in one piece. S of the parts is positive definite wherever the
-rows are independent, as for any mechanism; each level of the tree has an equal share of the mass, so that no digits are
-lost on the way up.
+A hub is split into a tree of parts, each welded to its parent by as many rows as the body has degrees of freedom; mass
+and inertia are distributed over the parts. Few rows meet at a part, so the graph is as sparse as a tree of bodies. The
+system is equivalent: welded parts move as one body, so S = H W H^T of the parts, with zeros on the right-hand side for
+the welds, gives the multipliers of the undivided body. S of the parts is positive definite wherever the rows are
+independent; each level of the tree carries an equal share of the mass, which keeps S well conditioned.
 
-Constraints are dealt out to the parts along a walk through the rest of the scene, so that those which are close to one
-another there meet at parts that are close.
+Constraints are assigned to parts along a traversal of the rest of the scene, so that constraints close to each other
+in the graph meet at neighbouring parts.
 """
 
 from typing import NamedTuple

@@ -1,8 +1,8 @@
-"""The graph of a scene for the basis-free forms: which rows meet at which bodies, and where their products go.
+"""The constraint graph of a scene for the basis-free forms: rows, bodies, and the addresses of their products.
 
-Normalisation rows are no part of it: in terms of (dr, dpi') every body's is fulfilled (see body_loops). What is left
-of Phi_q W Phi_q^T, S = H W H^T, couples rows that share a body; its blocks, their order of elimination and all places
-are found once for a scene.
+It has no normalisation rows: displacements (dr, dpi') satisfy them (constraint_rows.py). The Schur complement S =
+H W H^T couples rows that share a body; its blocks, their elimination order and all addresses are determined once for a
+scene.
 """
 
 from typing import NamedTuple
@@ -28,7 +28,7 @@ class Network(NamedTuple):
 
     bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length: 7, 3, or poses.STILL of what never turns
     kinds: np.ndarray  # int64 (kinds, N_COLUMNS); more than one of a kind where instances between them are left out
-    table: np.ndarray  # int64: body_loops.INTS for each instance
+    table: np.ndarray  # int64: constraint_rows.INTS for each instance
     sides: np.ndarray  # int64 (m, 2): the bodies of a row; nb is the ground
     row: np.ndarray  # int64 (m,): its place among the rows of Phi; -1 for a weld's or an axis's
     products: np.ndarray  # int64 (products, P_WIDTH): rows of sides that meet at a body, and where their product goes
@@ -41,7 +41,9 @@ class Network(NamedTuple):
     scales: np.ndarray  # (products,): what they are multiplied by
     welds: np.ndarray  # int64 (rows of welds, 2): which row, of which body
     diagonal: np.ndarray  # int64 (m,): where the diagonal entry of a row is in a value array of the pattern
-    dropped: np.ndarray  # int64: rows that follow from the others, as chosen at the first start; see selection.py
+    dropped: (
+        np.ndarray
+    )  # int64: rows that follow from the others, as chosen at the first start; see independent_rows.py
     frictions: np.ndarray  # int64 (frictions, FR_COLUMNS): those that follow from reactions; see packed_friction.py
     friction_rows: np.ndarray  # int64 (rows of their joints, 2): which row, and on which side its reaction is taken
     rub: np.ndarray  # int64 (1,): address of what solves for them, as the form needs it

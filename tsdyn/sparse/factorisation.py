@@ -1,12 +1,11 @@
-"""Numeric part of the sparse factorisation: block elimination in the panels that blocks.analyse laid out.
+"""Numeric part of the sparse factorisation: block elimination in the panels laid out by symbolic.analyse.
 
     S = U^T D^-1 U    symmetric and, but for late nodes (see symbolic.py), positive definite; values hold U
     N = L D^-1 U      any other, without pivoting: `upper` holds U, `lower` holds L^T
 
-D is the diagonal of U and of L; the arrays hold its reciprocals. With U = L^T both are the same, so that one pair of
-kernels solves with either, and a matrix's transpose is solved by handing its arrays over in the other order. Only the
-upper triangle of a diagonal block is read. After the panels comes room for the diagonal as it was before elimination,
-against which pivots are judged.
+D is the diagonal of U and of L; the arrays hold its reciprocals. A symmetric matrix has U = L^T, so one pair of kernels
+solves both kinds, and a transposed system is solved with the two arrays exchanged. Only the upper triangle of a
+diagonal block is read. The diagonal before elimination is stored after the panels: each pivot is judged relative to it.
 """
 
 from ..jit.kernels import kernel

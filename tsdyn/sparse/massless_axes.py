@@ -1,14 +1,14 @@
-"""Axes about which a body has next to no inertia: the network has a row for each, and masses that can be inverted.
+"""Axes of bodies with negligible inertia: an axis row for each keeps the mass matrix invertible and the motion exact.
 
-The moment of inertia j about such an axis e is raised to J. A multiplier mu takes from the equation of motion what that
-adds to it, c^2 = J - j:
+The moment of inertia j about such an axis e is raised to J. A multiplier lam_e removes the added inertia c^2 = J - j
+from the equation of motion:
 
-    (J' + c^2 e e^T) omega'd = n' - H^T lam - c e mu,        c e . omega'd + mu = 0
+    (J' + c^2 e e^T) omega'd = tau' - H^T lam - c e lam_e,        c e . omega'd + lam_e = 0
 
-The motion is that of J', whatever J is. The second equation is an axis row of S: the products of c e with the other
-rows at the body, and -j / J on the diagonal. It is eliminated after those rows. Its pivot is minus the share of J that
-they hold, or that j is, so S needs no exchange of rows wherever the constraints hold the axis, and is as well
-conditioned as with the inertia J. A body that is small for the length of its levers has three such axes.
+The motion is that of J' for any J. The second equation is an axis row of S: products of c e with the other rows at the
+body, and -j / J on the diagonal. It is eliminated after those rows. Its pivot is minus the part of J that these rows
+and j account for, so S needs no pivoting wherever the constraints hold the axis, and is as well conditioned as with
+inertia J. A body that is small compared with its lever arms has three such axes.
 """
 
 from typing import NamedTuple
@@ -114,7 +114,7 @@ def axes_of(shares, lean, joints, inside, starts, where):
     starts : ndarray of int64
         Where each node's rows begin.
     where : callable
-        As `blocks.analyse` returns it.
+        As `symbolic.analyse` returns it.
     """
     rows, values, products, scales = [], [], [], []
     for share in shares:

@@ -1,14 +1,14 @@
-"""Symbolic part of the sparse factorisation: a fill-reducing order, dense blocks, and where every number goes.
+"""Symbolic part of the sparse factorisation: fill-reducing ordering, supernodes, and the address of every entry.
 
-The matrix is symmetric in its pattern. Its rows come in nodes (all constraint rows between two bodies), and nodes at
-one body are coupled: a clique. Nodes are eliminated in an order of little fill; nodes that are eliminated one after
-the other, with nearly the same rows left, become one dense block. Block j keeps its rows of the upper triangle as one
-dense panel, row by row: its own columns first, then those of the rows below that elimination reaches,
+The pattern is symmetric. Rows are grouped into nodes (all constraint rows between two bodies); the nodes at one body
+form a clique. Nodes are eliminated in a fill-reducing order; consecutive nodes with nearly equal remaining patterns are
+merged into one dense block (a supernode). Block j stores its rows of the upper triangle as one dense row-major panel:
+its own columns first, then the columns of later rows that elimination reaches,
 
     values[heads[j] + r * widths[j] + c],   r < size of j,   c < widths[j] = size of j + rows reached.
 
-Eliminating block j subtracts products of its panel's columns from panels of later blocks. Which go where is listed
-once, here, so that the kernels in factorisation.py neither search nor allocate.
+Elimination of block j updates the panels of later blocks by products of its columns. The targets are listed here once,
+so the kernels in factorisation.py neither search nor allocate.
 """
 
 import heapq

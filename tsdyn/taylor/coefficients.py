@@ -2,11 +2,11 @@
 
     (k+1) A_{k+1}           = sum_j A_j omega'~_{k-j}                                            (1)
     (k+1)(k+2) m r_{k+2}    = F_k - [Phi_r^T lam]_k                                              (2)
-    (k+1) J' omega'_{k+1}   = T_k - sum_j omega'_j x (J' omega')_{k-j} - [Phi_pi'^T lam]_k       (3)
+    (k+1) J' omega'_{k+1}   = tau'_k - sum_j omega'_j x (J' omega')_{k-j} - [Phi_pi'^T lam]_k    (3)
     Phi_{k+2}               = 0                                                                  (4)
 
-(4) is linear in lam_k: S lam_k = (k+1)(k+2) Phi_{k+2} with what (1)-(3) give for lam_k = 0, and S = H W H^T at order
-zero for every k, factorised once a step.
+(4) is linear in lam_k: S lam_k = (k+1)(k+2) Phi_{k+2}, the right-hand side evaluated by (1)-(3) with lam_k = 0. The
+Schur complement S = H W H^T is that of order zero for every k, so it is factorised once a step.
 """
 
 from fractions import Fraction
@@ -18,8 +18,8 @@ from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OM
 from ..jit.kernels import kernel
 from ..jit.simd import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times, total
 from ..maths.dense_linalg import copy
+from ..rows.independent_rows import drop
 from ..rows.schur_complement import scatter, weigh
-from ..rows.selection import drop
 from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS
 from ..sparse.factorisation import solve
 from ..sparse.massless_axes import AXIS_BODY, AXIS_H, AXIS_ROW

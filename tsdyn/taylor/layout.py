@@ -1,4 +1,4 @@
-"""The memory of a Taylor run, and which parts of a scene have no series."""
+"""Memory layout of a Taylor run, and the parts of a scene that have no series."""
 
 import numpy as np
 
@@ -83,7 +83,7 @@ def room(highest):
 
 
 def is_far(network, highest):
-    """Whether the series are so long that each loop finds nothing in the caches near by."""
+    """Return True if the series exceed the near caches."""
     return len(network.bodies) * room(highest) > FAR
 
 

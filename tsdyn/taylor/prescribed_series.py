@@ -1,4 +1,4 @@
-"""The series of motions, for Taylor runs of scenes that they drive."""
+"""Taylor series of prescribed motions, for Taylor runs of driven scenes."""
 
 from ..jit.kernels import kernel
 from ..motions.program import call_smooth

@@ -1,4 +1,4 @@
-"""The memory that one Taylor run writes to, made once for a scene and used by one run after the other."""
+"""Run workspace of the Taylor driver, allocated once a scene and reused by successive runs."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from ..runs.run_state import (
 )
 from ..runs.trajectory import B_DATA
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
-from ..sparse.networks import with_loops
+from ..sparse.constraint_graphs import with_loops
 from ..workspaces.tangent_memory import allocate_free, drop_as_at_first
 from ..workspaces.workspace import SIZE, U_TOL, plain_work
 from .layout import allocate_expansion, masks
@@ -43,7 +43,7 @@ class Series:
     ----------
     packed : Packed
     found : str
-        Its `expansion_pack.refusal`.
+        Its `layout.refusal`.
 
     Raises
     ------

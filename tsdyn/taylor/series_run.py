@@ -1,16 +1,16 @@
-"""The driver of Taylor series from Python's side; see request.py."""
+"""The Python side of the Taylor driver; see task.py."""
 
 import time
 
 import numpy as np
 
 from ..errors import InvalidArgument, Status
-from ..runs.request import Outcome
 from ..runs.run_state import CHART_ROWS, FILLED, STORED, T
 from ..runs.sampling import Sampled
 from ..runs.segments import Relay
 from ..runs.slices import drive
 from ..runs.step_run import counts
+from ..runs.task import Outcome
 from ..runs.trajectory import Trajectory
 from .layout import is_far, refusal, room
 from .run_memory import Series, SeriesMemory

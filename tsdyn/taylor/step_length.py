@@ -1,4 +1,4 @@
-"""How long a Taylor step is, by the radius of convergence; and how near to a singular configuration it ends."""
+"""Length of a Taylor step from the radius of convergence, and the singularity indicator at its end."""
 
 import math
 

@@ -1,6 +1,6 @@
-"""The parts of a Taylor step as callbacks: each is compiled once, and loaded where a run needs it.
+"""The parts of a Taylor step as callbacks, each compiled once and loaded only if a run needs it.
 
-They get the address of a `SeriesContext`.
+Their argument is the address of a `SeriesContext`.
 """
 
 from ..elements.loops.body_poses import write_accelerations, write_positions, write_velocities
@@ -13,7 +13,7 @@ from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import is_finite
 from ..model.equations import set_time
 from ..rows.evaluation import run_loops
-from ..rows.selection import select, weakest
+from ..rows.independent_rows import select, weakest
 from ..rows.singularity import NEAR
 from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
 from ..sparse.constraint_graph import REDUCED

@@ -1,7 +1,7 @@
-"""The driver of the Taylor integrator: series, step length, landing. One kernel for every scene.
+"""The Taylor driver: series, step length, projection. One kernel serves every scene.
 
-Each step is a chart of its own: the series gives q and qd at its end up to the truncation error, and landing puts both
-back on the manifold along W Phi_q^T.
+Each step has its own chart: the series gives q and qd at the end of the step to truncation error, and a projection
+along W Phi_q^T returns both to the constraint manifold.
 """
 
 import math
@@ -13,8 +13,9 @@ from ..jit.kernels import entry, kernel
 from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import remember, set_time
 from ..model.joint_turns import count_turns
-from ..rows.selection import weakest
+from ..rows.independent_rows import weakest
 from ..rows.tangent_workspace import END_SHARE, LARGEST_SHARE, MOVED, RESIDUAL, SHARE
+from ..runs.breakpoints import cut_fixed, is_sampled, next_stop, take_pieces
 from ..runs.outputs import record, store_now
 from ..runs.run_state import (
     ADAPTIVE,
@@ -46,12 +47,11 @@ from ..runs.run_state import (
     no_record,
 )
 from ..runs.step_control import gets_on, stretch
-from ..runs.stops import cut_fixed, is_sampled, next_stop, take_pieces
 from ..runs.trajectory import B_CHART, B_DATA, B_END, B_H, B_START
 from ..workspaces.workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
+from .breakpoints import cross_stop, lower_order
 from .step_length import is_near, is_next_to, longest, loosest, radius, step_length, weights
 from .step_parts import EXPAND, NEXT_TO_SINGULAR, PASS, REACH, call_expand, call_reach, state_within
-from .stops import cross_stop, lower_order
 from .workspace import NEXT, ORDERS, TOP, load_series
 
 SLICE_DONE, STEP_COLLAPSED = int(Status.SLICE_DONE), int(Status.STEP_COLLAPSED)

@@ -1,4 +1,4 @@
-"""States between the steps of a Taylor run: the sum of a step's own series, put on the manifold."""
+"""Dense output of a Taylor run: the series of a step, evaluated and projected onto the manifold."""
 
 import numpy as np
 
@@ -54,7 +54,7 @@ class SeriesReader:
     size : float
         Of the numbers in the constraints.
     steps : ndarray
-        Addresses, series_steps.EXPAND ... WITHIN.
+        Addresses, step_parts.EXPAND ... WITHIN.
     """
 
     shift = 0

@@ -1,4 +1,4 @@
-"""What a Taylor run works on: the series of one step, and with them all that its kernels use."""
+"""The Taylor workspace: the series of one step and everything else that the kernels use."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ class Expansion(NamedTuple):
     order: np.ndarray  # int64 (6,): TOP of omega', one less than that of r and A; room for; the next step's; bounds;
     # how many orders of lam, from zero on, are refined
     bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
-    constraints: np.ndarray  # each kind's instances; series_loops.series
+    constraints: np.ndarray  # each kind's instances; constraint_series.series
     places: np.ndarray  # int64 (kinds, 3): addresses of the loops; where a kind's series begin, floats of an instance
     forces: np.ndarray  # int64 (kinds, 7): address, first of loads, instances, reals each, first in table, in reals;
     # and floats of an instance

@@ -1,4 +1,4 @@
-"""Checks for authors of plug-ins (`ts.testing`): constraints, forces and integrators against what they have to keep.
+"""Checks of plug-ins (`ts.testing`): constraints, forces and integrators against the properties they must have.
 
 Imports simulation and below. Begin with primitive_checks.py: Phi_q, gamma and series of a constraint against complex
 steps and truncated power series; force_checks.py and integrator_checks.py do the same for forces and methods.

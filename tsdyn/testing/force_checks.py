@@ -1,4 +1,8 @@
-"""The checker of forces: `tsdyn.testing.check_force`."""
+"""The check of a force plug-in: `tsdyn.testing.check_force`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +16,11 @@ from ..observables.generalised_forces import force_loads
 from ..observables.power import load_powers, marker_states
 from ..simulation.scene import Scene
 from .series_checks import check_force_series
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..hints import AnyBody
 
 SPACING = 4e-3  # of central differences of sixth order
 QUOTIENT = 1e-8  # what they leave, relative to the size of the Jacobian
@@ -36,7 +45,7 @@ def jacobians(packed, q, qd, t):
     return Q_q, Q_qd
 
 
-def check_force(kind, *, seed=0, states=3):
+def check_force(kind: type[Force] | Callable[[AnyBody, AnyBody], Force], *, seed: int = 0, states: int = 3) -> None:
     """Check a force's kernels; return None, or raise naming the wrong entry.
 
     Parameters
@@ -53,6 +62,11 @@ def check_force(kind, *, seed=0, states=3):
     CheckFailed
         If the compiled force differs from the Python one, its Jacobians from differences of sixth order, dissipation is
         negative, or a force without loads gives or takes power that is in neither its potential nor its dissipation.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.testing.check_force(ts.forces.Spring, states=1)
     """
     rng = np.random.default_rng(seed)
     for arrangement in ("body to body", "body to ground", "ground to body"):

@@ -1,6 +1,8 @@
-"""`check_integrator`: what every integration method has to keep, tried on scenes with known solutions."""
+"""`check_integrator`: properties required of every integration method, tested on scenes with known solutions."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -10,6 +12,9 @@ from ..methods.integrator import Integrator
 from ..observables.diagnostics import ConstraintError, constraint_error
 from ..simulation.simulate import simulate
 from .integrator_scenes import GRID, cases, distance, mean_distance
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 EPS = np.finfo(float).eps
 LEVELS = (50.0, 500.0, 5000.0)  # of eps: position, velocity, acceleration
@@ -33,7 +38,9 @@ class Finding(NamedTuple):
     errors: tuple  # (tolerance, error) of an adaptive method
 
 
-def check_integrator(method, *, order=None, dense_order=None):
+def check_integrator(
+    method: type[Integrator] | Callable[..., Integrator], *, order: int | None = None, dense_order: int | None = None
+) -> tuple[Finding, ...]:
     """Check an integration method on scenes with known solutions; raise naming what failed and by how much.
 
     Parameters
@@ -72,6 +79,17 @@ def check_integrator(method, *, order=None, dense_order=None):
     - adaptive methods: errors below 100 tolerances, that follow the tolerance; number of steps that grows as the order
       of the estimate says; first_step and max_step; rejected steps leave no trace;
     - output times change no step, and a run repeated gives the same bits.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> class Boaster(ts.integrators.RK45):
+    ...     order = 6
+    >>> try:
+    ...     ts.testing.check_integrator(Boaster)
+    ... except ts.testing.CheckFailed:
+    ...     print("refused")
+    refused
     """
     kind = _make(method, step=1e-2)
     adaptive = kind.embedded_order > 0
@@ -137,7 +155,7 @@ def _finished(solution, where):
 
 
 def _serves(case, method, form):
-    """Whether the method takes this formulation."""
+    """Return True if the method takes this formulation."""
     try:
         _run(case, method, form, max_steps=1)
     except InvalidArgument:
@@ -243,12 +261,12 @@ def _repeats(make, case, form, where):
     first = _finished(_run(case, method, form), where)
     again = _run(case, make(), form)
     if not all(_same(a, b) for a, b in zip(_bits(first), _bits(again), strict=True)):
-        raise CheckFailed(f"{where}: {method!r} gives other numbers when it is run again.")
+        raise CheckFailed(f"{where}: {method!r} is not reproducible: a second run gives other numbers.")
     other = _run(case, make(), form, t_eval=case.inner, dense_output=True)
     if not (_same(first.steps.t, other.steps.t) and _same(first.steps.h, other.steps.h)):
-        raise CheckFailed(f"{where}: {method!r} makes other steps when output is asked for between them.")
+        raise CheckFailed(f"{where}: {method!r} takes other steps when output between the steps is requested.")
     if not (_same(first.state.q, other.state.q) and _same(first.state.qd, other.state.qd)):
-        raise CheckFailed(f"{where}: {method!r} ends elsewhere when output is asked for between its steps.")
+        raise CheckFailed(f"{where}: {method!r} ends elsewhere when output between the steps is requested.")
 
 
 def _bits(solution):

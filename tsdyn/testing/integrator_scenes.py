@@ -1,4 +1,4 @@
-"""The scenes that `check_integrator` tries a method on, with reference solutions of their own."""
+"""Test scenes of `check_integrator`, with their reference solutions."""
 
 from collections.abc import Callable
 from typing import NamedTuple

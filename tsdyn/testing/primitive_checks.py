@@ -1,7 +1,10 @@
-"""What authors of plug-ins, and the project's own tests, check their work with."""
+"""Checks of plug-ins, for their authors and for the project's tests."""
+
+from __future__ import annotations
 
 import warnings
 from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba.core.errors import NumbaError
@@ -17,6 +20,11 @@ from ..observables.evaluate import constraint_arrays
 from ..simulation.scene import Scene
 from .series_checks import check_constraint_series
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..hints import AnyBody
+
 STEP = 1e-40  # of complex steps: no cancellation, so as small as can be
 TOLERANCE = 1e-11  # relative to the size of what is compared
 NOT_HOLONOMIC = (
@@ -25,7 +33,9 @@ NOT_HOLONOMIC = (
 _AXES = "xyz"
 
 
-def check_primitive(kind, *, seed=0, states=3):
+def check_primitive(
+    kind: type[Primitive | Joint] | Callable[[AnyBody, AnyBody], Primitive | Joint], *, seed: int = 0, states: int = 3
+) -> None:
     """Check a primitive's kernels against complex steps of its phi; return None, or raise naming the wrong entry.
 
     Parameters
@@ -52,6 +62,11 @@ def check_primitive(kind, *, seed=0, states=3):
     difference quotients of the complex-step kind too), gamma with the complex step of Phi_x xd + Phi_t along (xd, 1):
     (Phi_x xd)_x xd + 2 Phi_xt xd + Phi_tt (Haug 2018, Eq. 3). Then the compiled, assembled arrays are compared with
     phi carried along the motion as a truncated Taylor series, which uses neither jacobian nor gamma.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.testing.check_primitive(ts.constraints.Distance, states=1)
     """
     rng = np.random.default_rng(seed)
     for arrangement in ("body to body", "body to ground", "ground to body"):

@@ -1,8 +1,7 @@
 """The checks of `series` in `check_primitive` and `check_force`, against truncated Taylor arithmetic.
 
-The bodies go through random analytic motions. Along them phi, its jacobian or the law, run on truncated series, give
-the coefficients that `series` must give: first the Python kernel, one coefficient after the other, then the compiled
-loops.
+The bodies perform random analytic motions. Along them phi, its jacobian or the law, evaluated on truncated series, give
+the coefficients that `series` must return: first for the Python kernel, order by order, then for the compiled loops.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
-"""The memory of a chart on the network: where it touches, the normal space there, and how far bodies have gone.
+"""The chart workspace of the tangent form: base point q0, normal space at q0, chart coordinates of the bodies.
 
-A body's coordinates in the chart are a row of eight floats, (rho, 0, eta, 0): r = r0 + rho, p = p0 o (d0, d) with
-d = eta / 2 and d0 = sqrt(1 - |d|^2), so that p has length one. It is the chart q = q0 + xi - U u of the paper with U
-the range of W0 Phi_q0^T, W0 the inverse of the masses: xi_p is at right angles to p0, and a normalisation row's part of
-u is d0 - 1.
+The chart coordinates of a body are a row of eight floats, (rho, 0, eta, 0): r = r0 + rho, p = p0 o (d0, d) with
+d = eta / 2 and d0 = sqrt(1 - |d|^2), so that p has length one. It is the paper's chart q = q0 + V v - U u with xi = V v
+and U spanning W0 Phi_q0^T, W0 the inverse mass matrix: xi_p is orthogonal to p0, and the component of u along a
+normalisation row is d0 - 1.
 """
 
 from typing import NamedTuple
@@ -16,15 +16,15 @@ from ..jit.aligned_arrays import zeros
 class Local(NamedTuple):
     """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
 
-    base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; local_chart.touch
-    d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 of the present place; displacement.displace
+    base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; chart_validity.touch
+    d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 of the present place; chart_coordinates.displace
     x: np.ndarray  # ((b + 1) * 8,)  its coordinates; tangent.place
     y: np.ndarray  # ((b + 1) * 8,)  their rates; tangent.accelerate
-    H0: np.ndarray  # (m * 16,)  rows of [Phi_r, Phi_pi'] at q0; local_chart.touch
+    H0: np.ndarray  # (m * 16,)  rows of [Phi_r, Phi_pi'] at q0; chart_validity.touch
     Y0: np.ndarray  # (m * 16,)  W0 H0^T
     S0: np.ndarray  # factors of H0 W0 H0^T
-    X: np.ndarray  # (m * 16,)  C Y0, displacement.turn_rows
-    lower: np.ndarray  # factors of N = H C Y0; displacement.factorise_normal
+    X: np.ndarray  # (m * 16,)  C Y0; chart_coordinates.factorise_normal
+    lower: np.ndarray  # factors of N = H C Y0; chart_coordinates.factorise_normal
     upper: np.ndarray
     drift: np.ndarray  # (m,)  Phi_t
     numbers: np.ndarray  # (NUMBERS,)  below

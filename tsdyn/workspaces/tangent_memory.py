@@ -1,4 +1,4 @@
-"""The scratch memory of the basis-free forms, laid out."""
+"""Layout of the tangent-form workspace."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The scratch memory of one run: every array laid out once, before the first step."""
+"""The workspace of a run: all arrays are laid out once, before the first step."""
 
 import math
 from typing import NamedTuple
@@ -19,35 +19,35 @@ class Work(NamedTuple):
     "computed by" names the kernel. What belongs to a row that is left out is zero, on the diagonal of N and B one.
     """
 
-    q: np.ndarray  # (n,)    positions; computed by newton.solve_positions
+    q: np.ndarray  # (n,)    positions; computed by newton_iterations.solve_positions
     qd: np.ndarray  # (n,)   velocities; computed by null_space.velocities
     qdd: np.ndarray  # (n,)  accelerations; computed by null_space.complete
-    Phi: np.ndarray  # (m,)  constraints at q; newton.solve_positions, and scratch of null_space.complete
+    Phi: np.ndarray  # (m,)  constraints at q; newton_iterations.solve_positions, and scratch of null_space.complete
     Phi_t: np.ndarray  # (m,)  their time derivative; null_space.velocities
     gamma: np.ndarray  # (m,)  acceleration bias; null_space.reduced_acceleration
-    z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; newton.solve_positions, null_space; scratch elsewhere
-    Phi_q: np.ndarray  # (m, n)  Jacobian at q; chart.tangent_map, new_chart
-    q0: np.ndarray  # (n,)   where the chart touches; chart.new_chart
-    U: np.ndarray  # (n, m)  spans W0 Phi_q(q0)^T, in place of Eq. 5; chart.new_chart
-    V: np.ndarray  # (n, k)  orthonormal basis of ker Phi_q(q0); chart.new_chart
-    L: np.ndarray  # (n, k)  transposed: V^T P0, P0 the projection along U; chart.new_chart
-    B: np.ndarray  # (m, m)  (Phi_q U)^-1, Eqs. 7, 28, warm-started; newton.update_b
-    u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; newton.solve_positions, tangent.place
-    T: np.ndarray  # (m, k)  B Phi_q V = du/dv; chart.tangent_map
-    v: np.ndarray  # (k,)    tangent coordinates of the latest u; newton.solve_positions
-    base: np.ndarray  # (n,)   q0 + V v; newton.solve_positions
-    N: np.ndarray  # (m, m)  Phi_q U; chart.tangent_map
-    R: np.ndarray  # (m, m)  residual of Eq. 28, and scratch of factorisations; newton.update_b
-    X: np.ndarray  # (m, k)  Phi_q V, or U^T V; chart.tangent_map, new_chart
-    D: np.ndarray  # (n, k)  (I - U B Phi_q) V, Eq. 9; chart.tangent_map
+    z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; newton_iterations, null_space; scratch elsewhere
+    Phi_q: np.ndarray  # (m, n)  Jacobian at q; null_space_chart.tangent_map, new_chart
+    q0: np.ndarray  # (n,)   base point of the chart; null_space_chart.new_chart
+    U: np.ndarray  # (n, m)  spans W0 Phi_q(q0)^T, in place of Eq. 5; null_space_chart.new_chart
+    V: np.ndarray  # (n, k)  orthonormal basis of ker Phi_q(q0); null_space_chart.new_chart
+    L: np.ndarray  # (n, k)  transposed: V^T P0, P0 the projection along U; null_space_chart.new_chart
+    B: np.ndarray  # (m, m)  (Phi_q U)^-1, Eqs. 7, 28, warm-started; newton_iterations.update_b
+    u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; newton_iterations, tangent.place
+    T: np.ndarray  # (m, k)  B Phi_q V = du/dv; null_space_chart.tangent_map
+    v: np.ndarray  # (k,)    tangent coordinates of the latest u; newton_iterations.solve_positions
+    base: np.ndarray  # (n,)   q0 + V v; newton_iterations.solve_positions
+    N: np.ndarray  # (m, m)  Phi_q U; null_space_chart.tangent_map
+    R: np.ndarray  # (m, m)  residual of Eq. 28, and scratch of factorisations; newton_iterations.update_b
+    X: np.ndarray  # (m, k)  Phi_q V, or U^T V; null_space_chart.tangent_map, new_chart
+    D: np.ndarray  # (n, k)  (I - U B Phi_q) V, Eq. 9; null_space_chart.tangent_map
     E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.reduced_mass
     A: np.ndarray  # (k, k)  D^T M D, then its Cholesky factor; null_space.reduced_mass
     Q: np.ndarray  # (n,)    applied forces without gravity; null_space.reduced_acceleration
     h: np.ndarray  # (n,)    -U B gamma; null_space.reduced_acceleration
-    householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; linalg.null_space
+    householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; dense_linalg.null_space
     control: np.ndarray  # (CONTROLS,)  tolerances and criteria, below
     counters: np.ndarray  # int64 (COUNTERS,)  what was done how often, below
-    left_out: np.ndarray  # int64 (d + 1,)  how many rows of Phi are redundant and left out, and which; chart.new_chart
+    left_out: np.ndarray  # int64 (d + 1,)  number of redundant rows of Phi, and which; null_space_chart.new_chart
 
 
 U_TOL, B_TOL, SIZE, FLOOR, RATE, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(9)
@@ -64,26 +64,26 @@ class Linear(NamedTuple):
     Body frame means: of a body's displacement, the components A^T dr and dpi' = 2 G dp.
     """
 
-    K: np.ndarray  # (n, n)  stiffness in q, then scratch; linearise.linearise
-    C: np.ndarray  # (n, n)  damping in q, then scratch; linearise.linearise
-    G1: np.ndarray  # (m, n)  (Phi_q qd + Phi_t)_q; assembly.constraint_curvature
-    G2: np.ndarray  # (m, n)  (Phi_q qdd + gamma)_q; assembly.constraint_curvature
-    UB: np.ndarray  # (n, m)  U B; linearise.linearise
-    Y: np.ndarray  # (n, n)  U B G1; linearise.linearise
-    Z: np.ndarray  # (n, n)  U B G2; linearise.linearise
-    lam: np.ndarray  # (m,)  multipliers; linearise.linearise
-    r: np.ndarray  # (n,)  Q_A + S - M qdd; linearise.linearise
-    K_body: np.ndarray  # (l, l)  stiffness in body frames, kept over steps and charts; linearise.linearise
-    C_body: np.ndarray  # (l, l)  damping in body frames; linearise.linearise
-    F: np.ndarray  # (l, k)  D in body frames; linearise.reduce
+    K: np.ndarray  # (n, n)  stiffness in q, then scratch; linearisation.linearise
+    C: np.ndarray  # (n, n)  damping in q, then scratch; linearisation.linearise
+    G1: np.ndarray  # (m, n)  (Phi_q qd + Phi_t)_q; equations.constraint_curvature
+    G2: np.ndarray  # (m, n)  (Phi_q qdd + gamma)_q; equations.constraint_curvature
+    UB: np.ndarray  # (n, m)  U B; linearisation.linearise
+    Y: np.ndarray  # (n, n)  U B G1; linearisation.linearise
+    Z: np.ndarray  # (n, n)  U B G2; linearisation.linearise
+    lam: np.ndarray  # (m,)  multipliers; linearisation.linearise
+    r: np.ndarray  # (n,)  Q_A + S - M qdd; linearisation.linearise
+    K_body: np.ndarray  # (l, l)  stiffness in body frames, kept over steps and charts; linearisation.linearise
+    C_body: np.ndarray  # (l, l)  damping in body frames; linearisation.linearise
+    F: np.ndarray  # (l, k)  D in body frames; linearisation.reduce
     X: np.ndarray  # (n, k)  scratch
     X2: np.ndarray  # (n, k)  scratch
-    Q_q: np.ndarray  # (n, n)  stiffness of the forces; linearise.reduce
-    Q_qd: np.ndarray  # (n, n)  their damping; linearise.reduce
-    kept: np.ndarray  # derivatives of the forces' laws; force_loops.jacobian
-    K_hat: np.ndarray  # (k, k)  F^T K_body F; linearise.reduce
-    C_hat: np.ndarray  # (k, k)  F^T C_body F; linearise.reduce
-    P: np.ndarray  # (k, k)  LU factors of D^T M D - g C_hat + g^2 K_hat; linearise.factorise
+    Q_q: np.ndarray  # (n, n)  stiffness of the forces; linearisation.reduce
+    Q_qd: np.ndarray  # (n, n)  their damping; linearisation.reduce
+    kept: np.ndarray  # derivatives of the forces' laws; forces.jacobian
+    K_hat: np.ndarray  # (k, k)  F^T K_body F; linearisation.reduce
+    C_hat: np.ndarray  # (k, k)  F^T C_body F; linearisation.reduce
+    P: np.ndarray  # (k, k)  LU factors of D^T M D - g C_hat + g^2 K_hat; linearisation.factorise
     b: np.ndarray  # (k,)  scratch
     pivots: np.ndarray  # int64 (k,)  row exchanges of P
     now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point; the run's own array

@@ -1,4 +1,4 @@
-"""Poses: what the basis-free forms know of each body, one row of floats, and the markers on it in those terms.
+"""Body poses of the basis-free form, one row of floats a body, and markers in terms of them.
 
     A      12   the columns of A(p), four floats each, the fourth 0
     r       4   centroid
@@ -6,8 +6,8 @@
     omega   4   omega', body frame
     p       4   Euler parameters
 
-The ground is the last row, A = I and all else 0, so no kernel asks which body is the ground. A point mass never turns,
-nor does a rigid body whose length in the network is STILL: where bodies are placed, its orientation is taken as it is.
+The ground is the last row, with A = I and zeros, so kernels need no special case for it. Point masses don't rotate, nor
+do rigid bodies with locked orientation (length STILL in the network), whose orientation is kept when bodies are placed.
 """
 
 from ...jit.kernels import kernel

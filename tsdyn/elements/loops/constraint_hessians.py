@@ -1,11 +1,11 @@
 """Second derivatives of the constraints, for implicit methods: one loop over all instances of a kind of primitive.
 
     K  += (Phi_q^T lam)_q                          (n, n)
-    G1  = (Phi_q qd)_q + Phi_qt                    (m, n)   what Phi_q qd + Phi_t changes by, with q
-    G2  = (Phi_q qdd)_q + gamma_q                  (m, n)   what Phi_q qdd + gamma changes by, with q
+    G1  = (Phi_q qd)_q + Phi_qt                    (m, n)   derivative of Phi_q qd + Phi_t with respect to q
+    G2  = (Phi_q qdd)_q + gamma_q                  (m, n)   derivative of Phi_q qdd + gamma with respect to q
 
-The primitive's own part comes from complex steps of its jacobian and gamma in the marker coordinates x and xd, which is
-exact to rounding; the chain rule x(q) is quadratic in q, so its second derivative is `rotate_gradient` with another p.
+Complex steps of the primitive's jacobian and gamma in the marker coordinates x and xd give its own part, exact to
+rounding. The chain rule x(q) is quadratic in q, so its second derivative is `rotate_gradient` with another p.
 """
 
 from ...jit.kernels import ANY, complex_stack, complex_stack2, integers, kernel, matrix, stack, stack2, vector

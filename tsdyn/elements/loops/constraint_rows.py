@@ -1,7 +1,7 @@
-"""The loops over all constraints of a kind in terms of poses: rows of [Phi_r, Phi_pi'], 2 x 8 floats, instead of Phi_q.
+"""Constraint rows from body poses, one loop a kind: rows of [Phi_r, Phi_pi'], 2 x 8 floats, in place of Phi_q.
 
-A virtual displacement of a body is (dr, dpi'), dpi' = 2 G dp in the body frame, so six numbers do and no normalisation
-is needed; a row of H holds those of body a, then those of body b, each as (force, 0, body torque, 0).
+A virtual displacement of a body is (dr, dpi') with dpi' = 2 G dp in the body frame: six numbers and no normalisation
+row. A row of H holds the entries of body a, then of body b, each as (force, 0, body torque, 0).
 """
 
 from ...jit.kernels import ANY, caller, integers, stack, stack2, vector

@@ -1,21 +1,21 @@
-"""Taylor series of constraints: one loop a kind, over all its instances, order by order.
+"""Taylor series of constraints: one loop a kind over all its instances, order by order.
 
-A primitive says how its Jacobian's series follows from that of x; the rest is the same for all:
+The kernel `series` of a primitive gives the series of Phi_x from that of x; the rest is common to all primitives:
 
     x_k             = r_k + A_k s                        markers
     (Phi_x)_k       by the primitive's kernel `series`
     k Phi_k         = sum_j j (Phi_x)_{k-j} x_j          d/dt Phi = Phi_x xd                         (1)
     f_k             = - sum_j (Phi_x)_j^T lam_{k-j}      force on a marker                           (2)
-    T_k             = s x sum_j A_j^T f_{k-j}            its torque about the centroid, body frame   (3)
+    tau'_k          = s x sum_j A_j^T f_{k-j}            its torque about the centroid, body frame   (3)
 
-A series lies in memory order by order. That of a body is A (its columns, 4 floats each), omega', r, J' omega' (4 each).
-An instance begins with order zero of x (4 a marker) and Phi_x (4 a row and marker); then come the series f (4 a
-marker), lam (1 a row), x and Phi_x, and its own scratch. A marker whose columns of Phi_x are constant, as all of
-Spherical's, takes no part in (1) beyond order zero, nor in (2); that of the ground has no force. Where no instance of a
-kind has others, they end with f.
+Series are stored order by order. The series of a body holds A (by columns, 4 floats each), omega', r, J' omega' (4
+each). An instance starts with order zero of x (4 a marker) and Phi_x (4 a row and marker), followed by the series f (4
+a marker), lam (1 a row), x and Phi_x, and its scratch. A marker with constant columns of Phi_x, such as every marker of
+Spherical, drops out of (1) beyond order zero and out of (2); a marker on the ground has no force. If all markers of a
+kind are of these sorts, an instance ends with f.
 
-What is prescribed (a length that is a motion) adds its own part to (1): the coefficients of Phi_t, by the kernel
-`series_t`. The motions' own series are the last rows of the scratch, written there when a step begins.
+A prescribed quantity (a length that is a motion) adds the coefficients of Phi_t to (1), by the kernel `series_t`. The
+series of the motions are the last rows of the scratch, written at the start of a step.
 """
 
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, stack, stack2, vector

@@ -1,8 +1,8 @@
-"""Frames that go along with a force, so that the derivatives of its law, kept from an earlier place, stay of use.
+"""Corotated frames of forces: derivatives of a law that are kept from an earlier configuration stay accurate in them.
 
-A spring's stiffness lies along the spring, a bushing's along the axes of its body: seen in such a frame a law changes
-little while the mechanism moves. The frame's turn since the derivatives were taken is a rotation r (Euler parameters),
-which turns the 3-vectors among x and xd by A(r), and Euler parameters p into r p.
+The stiffness of a spring lies along the spring, that of a bushing along the axes of its body: in such a frame a law
+changes little as the mechanism moves. The rotation r (Euler parameters) of the frame since the derivatives were taken
+rotates 3-vectors among x and xd by A(r) and takes Euler parameters p to r p.
 """
 
 import math

@@ -1,17 +1,17 @@
-"""Taylor series of forces: one loop a kind, over all its instances, order by order.
+"""Taylor series of forces: one loop a kind over all its instances, order by order.
 
-A force says how the series of its law follows from those of x and xd, by its kernel `series`; the rest is the same for
-all. Order k of the law needs x up to k and xd up to k, which is x up to k + 1:
+The kernel `series` of a force gives the series of its law from those of x and xd; the rest is common to all forces.
+Order k of the law needs x and xd up to k, hence x up to k + 1:
 
     x_k             = r_k + A_k s                                   Point; of a Vector without r_k
     (k+1) p_{k+1}   = 1/2 sum_j G(p_j)^T omega'_{k-j}               Parameters, x = p                   (1)
     xd_k            = (k+1) x_{k+1};  sum_j A_j omega'_{k-j}        all others; Turn                    (2)
-    T_k             = s x sum_j A_j^T f_{k-j}                       torque about the centroid, body     (3)
+    tau'_k          = s x sum_j A_j^T f_{k-j}                       torque about the centroid, body     (3)
                       sum_j A_j^T f_{k-j};  1/2 sum_j G(p_j) f_{k-j}    frame: of a Turn; of Parameters
 
 The series of an instance holds p and the forces (4 floats a marker and order each, p of Parameters only), then its own
-scratch, then for each marker the last order at which its force is not zero: (3) ends there, at once for what is
-constant. What a law makes no use of isn't stored, so that the compiler leaves it out.
+scratch, then for each marker the last order at which its force is not zero: (3) ends there, at order zero for a
+constant force. Series that a law doesn't use aren't stored, so the compiler removes their evaluation.
 """
 
 from ...jit.kernels import ANY, data_of, integers, kernel, matrix, stack, vector

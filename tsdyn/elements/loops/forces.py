@@ -1,11 +1,11 @@
-"""The loops over all instances of a force: forces, their Jacobians, what they remember.
+"""Loops over all instances of a force kind: generalised forces, their Jacobians, memory.
 
     Q      += W^T f
     dQ/dq  += W^T (f_x X + f_xd Y) + (W^T f)_q
     dQ/dqd += W^T f_xd W
 
 with W = xd_qd, X = x_q, Y = xd_q of the markers. f_x and f_xd are complex steps of the force, exact to rounding, or
-central differences where it is not analytic. The names in capitals and kernel_* are filled in by `force.callbacks`.
+central differences where it is not analytic. `force.callbacks` supplies the names in capitals and kernel_*.
 """
 
 from ...jit.kernels import ANY, complex_stack, integers, stack, stack2, vector

@@ -1,6 +1,6 @@
-"""What the solver asks of one friction: what it does for a normal load of one, and the normal load of a reaction.
+"""Kernels of one friction for the solver: its generalised force for unit normal load, and its normal load.
 
-The names in capitals and kernel_* are filled in by `force.callbacks`.
+`force.callbacks` supplies the names in capitals and kernel_*.
 """
 
 from ...jit.kernels import ANY, caller, complex_stack, integers, kernel, stack, stack2, vector

@@ -1,6 +1,6 @@
-"""What forces need of markers: x and xd, the way of a force back to the coordinates, and the derivatives of both.
+"""Marker Jacobians for forces: x and xd, the pull-back of a force to the coordinates, and derivatives of both.
 
-W = xd_qd is what a force f conjugate to the marker is carried back by, Q = W^T f. X = x_q is W, but zero for a Turn.
+W = xd_qd pulls a force f conjugate to the marker back to Q = W^T f. X = x_q equals W, except for a Turn, where X = 0.
 
     Point, Vector   A(p) s is quadratic in p: (A s)_p pd = 2 A(p, pd) s, symmetric and bilinear
     Parameters      W = I

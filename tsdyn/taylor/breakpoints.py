@@ -1,11 +1,11 @@
-"""Stops of a run by series: what follows a step that has been cut at one."""
+"""Stops of a Taylor run: continuation after a step that ends at a stop."""
 
 from ..errors import Status
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import is_finite
+from ..runs.breakpoints import amend, take_pieces
 from ..runs.outputs import store_now
 from ..runs.run_state import T
-from ..runs.stops import amend, take_pieces
 from .step_parts import EXPAND, REACH, call_expand, call_reach
 from .workspace import LOWEST, NEXT, TOP
 

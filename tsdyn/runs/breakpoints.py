@@ -1,8 +1,8 @@
-"""Stops: times at which a step of a run ends, whatever its length: knots of motions and loads, instants of sampling.
+"""Stops: times at which a step must end, such as knots of motions and loads and sampling times.
 
-A step that would pass a stop is cut there. At the stop everything piecewise goes over to the piece that begins, and
-accelerations are worked out anew, for the output there and for the next step. A step of a fixed length that is cut is
-followed by one to the next time of its grid.
+A step that would pass a stop is shortened to end there. At the stop all piecewise functions switch to their next piece,
+and accelerations are re-evaluated for the output and for the next step. After a shortened step of fixed length, the
+next step ends on the original time grid.
 """
 
 import math

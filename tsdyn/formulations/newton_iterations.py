@@ -1,4 +1,4 @@
-"""The two Newton iterations of Haug 2018, section 5: u by Eq. 29 and B by Eq. 28, both warm-started."""
+"""The two Newton iterations of Haug (2018), section 5: Eq. 29 for u and Eq. 28 for B, both warm-started."""
 
 import math
 

@@ -1,7 +1,7 @@
-"""A run as its driver sees it: what is asked of it, and what it hands back.
+"""The run request (`Task`) that a driver receives, and the `Outcome` that it returns.
 
-A method has a driver, the attribute `driver`: a name in simulate.DRIVERS, or the driver itself, a function of a `Task`
-that returns an `Outcome`.
+The attribute `driver` of a method is a name in simulate.DRIVERS, or a driver function that takes a `Task` and returns
+an `Outcome`.
 """
 
 from typing import NamedTuple
@@ -46,7 +46,7 @@ class Task(NamedTuple):
 
     @property
     def within(self):
-        """Whether anything is asked for between the ends of steps."""
+        """True if output between the ends of steps is requested."""
         return self.dense_output or self.events is not None or between(self.times, self.span)
 
 

@@ -1,4 +1,4 @@
-"""Which rows of Phi_q follow from the others at one configuration of a large scene, at a cost of O(N)."""
+"""Redundant rows of Phi_q at one configuration of a large scene, by sparse factorisation in O(N)."""
 
 import numpy as np
 
@@ -7,9 +7,9 @@ from ..jit.kernels import entry, resident
 from ..model.derived import Derived
 from ..model.equations import set_time
 from ..rows.evaluation import run_loops
-from ..rows.selection import select
+from ..rows.independent_rows import select
 from ..sparse.constraint_graph import REDUCED
-from ..sparse.networks import network_of
+from ..sparse.constraint_graphs import network_of
 from ..workspaces.tangent_memory import allocate_free
 from ..workspaces.workspace import load_parts, parts
 
@@ -29,8 +29,8 @@ def _choose(context, q, t, share):
 def dependent_rows(packed, q, t, share):
     """Rows of Phi that are left less than a share of their diagonal entries of H W H^T by elimination, int64 (k,).
 
-    None where no choice among them is independent. Normalisations are none of them. See selection.py: of many rows
-    the choice is made within blocks, and may have one too many or too few.
+    None where no choice among them is independent. Normalisations are none of them. See independent_rows.py: of many
+    rows the choice is made within blocks, and may have one too many or too few.
     """
     own, known = packed, packed.derived
     if known.dropped is None:

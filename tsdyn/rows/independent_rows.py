@@ -1,12 +1,12 @@
-"""Independent rows of H among redundant ones: chosen by elimination that reveals the rank, the others left out.
+"""Selection of independent rows of H among redundant ones, by rank-revealing elimination of S.
 
-Rows that depend on the others hold by themselves wherever those do. Such a row is dropped: its H and its right-hand
-sides are zero and its diagonal entry of S and N is one, so that its multiplier is zero and every pattern stays as it
-is. Which rows are dropped is chosen anew where those that were kept have come close to depending on one another.
+A redundant row holds wherever the rows that it depends on hold. It is dropped: its row of H and its right-hand sides
+are zero and its diagonal entry of S and N is one, so its multiplier is zero and every sparsity pattern is unchanged.
+The selection is renewed when the kept rows come close to dependence.
 
-The row that elimination has left the largest share of its diagonal entry goes first (Cholesky with diagonal pivoting),
-and rows that are left less than a share are dropped. With many rows that holds within the blocks of the pattern, whose
-order is that of little fill: a choice that is independent, but further from the best.
+Rows are ordered by diagonally pivoted Cholesky, pivots relative to the diagonal entry; rows with negligible pivots are
+dropped. In large scenes pivoting is confined to the blocks of the fill-reducing order: the selection is independent,
+but not the best conditioned.
 """
 
 import math
@@ -14,8 +14,8 @@ import math
 from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import put, splat
 from ..sparse.block_operations import eliminate, subtract_products
-from ..sparse.factorisation import factor, keep_diagonal, record
-from .axis_rows import leave_axes_out, multiply_axes, weigh_axes
+from ..sparse.factorisation import keep_diagonal, record
+from .axis_rows import leave_axes_out
 from .schur_complement import inner, multiply_rows, weigh_rows
 from .tolerances import ZERO_PIVOT
 
@@ -140,7 +140,7 @@ def _choose(size, width, panel, kept, joints, share, A, order):
 def _eliminate_choosing(network, values, share, dropped, A, order):
     """Factor S in place but for the rows that are left less than a share of their diagonal entry; how many they are.
 
-    As block_kernels.factor; what is left in `values` serves nothing. Negative where a row that must be kept can't be.
+    As factorisation.factor; what is left in `values` serves nothing. Negative where a row that must be kept can't be.
     """
     pattern = network.pattern
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
@@ -207,21 +207,3 @@ def select(network, f, H, Y, S, wanted, least):
         share *= FINER
         if count < wanted or share < least:
             return False
-
-
-@kernel
-def factor_rows(network, f, H, Y, S, axes):
-    """Y = W H^T and the factors of S = H W H^T, of H without the dropped rows; the row that fails, or -1.
-
-    Without the `axes` W is that of the inertias given, which serves as a metric; accelerations need them.
-    """
-    weigh_rows(network, H, Y)
-    multiply_rows(network, H, Y, S)
-    drop_diagonal(network, f.dropped, S)
-    if network.axes.rows.shape[0] > 0:
-        weigh_axes(network, Y)
-        if axes:
-            multiply_axes(network, H, Y, S)
-        else:
-            leave_axes_out(network, S)
-    return factor(network.pattern, S, ZERO_PIVOT)

@@ -1,11 +1,14 @@
 """`scene.set`: the coordinates of a joint at the start, and the rest of the scene assembled around it.
 
-Where the joint is the only link between two parts of the scene, one part is moved against the other as a rigid body:
-all other joints stay as they are. In a loop the joint is driven to its value in small steps, each of which is
-assembled, so that the mechanism stays on its branch.
+If the joint is the only link between two parts of the scene, one part is moved rigidly relative to the other; all other
+joints keep their values. In a loop the joint is driven to its value in small steps, each followed by an assembly, so
+that the mechanism stays on its branch.
 """
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +20,15 @@ from ..elements.membership import settle
 from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
 from ..model import joint_motion
 from ..model.handles import handles_of
-from ..motions.expressions import Polynomial
+from ..motions.elementary import Polynomial
 from ..validation import floats, number
 from .assemble import assemble
 from .rigid_shift import RigidShift
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..hints import ArrayLike, AssemblyReport, ItemLike, Scene
 
 STEP, SHARE = 0.25, 0.05  # of a joint in a loop: rad; of the scene's size
 LEAST = 2.0**-8  # of the way, of a step that is halved where it can't be assembled
@@ -47,8 +55,17 @@ class Goal:
 
 
 def set_joint(
-    scene, joint, *, angle=None, displacement=None, rate=None, angle_rate=None, displacement_rate=None, keep=(), t=0.0
-):
+    scene: Scene,
+    joint: ItemLike,
+    *,
+    angle: ArrayLike | None = None,
+    displacement: float | None = None,
+    rate: ArrayLike | None = None,
+    angle_rate: ArrayLike | None = None,
+    displacement_rate: float | None = None,
+    keep: Sequence[ItemLike] = (),
+    t: float = 0.0,
+) -> AssemblyReport:
     """Give a joint's coordinates and their rates at the start, and assemble the rest of the scene.
 
     Parameters
@@ -85,6 +102,16 @@ def set_joint(
     What is not given stays as it is. In a tree of joints, the bodies beyond the joint follow as one: no other joint
     changes. In closed loops the joint goes to its value in small steps, on the branch of the configuration that the
     scene has; what is nearest in the metric of kinetic energy decides about other freedoms.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bar = scene.add_body(**ts.shapes.cylinder(0.02, 1.0, axis="x", mass=1.0), position=(0.5, 0, 0))
+    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    >>> report = scene.set(hinge, angle=0.5, rate=2.0)
+    >>> print(bar.position.round(4) + 0.0, bar.angular_velocity.round(4) + 0.0)
+    [ 0.4388  0.     -0.2397] [0. 2. 0.]
     """
     if isinstance(keep, str) or not hasattr(keep, "__iter__"):
         raise InvalidArgument(f"set: keep must be a sequence of joints or names, such as (joint,), got {keep!r}.")
@@ -98,7 +125,7 @@ def set_joint(
     _link(joint, given)
     given = {kind: pair for kind, pair in given.items() if any(x is not None for x in pair)}
     if not given:
-        raise InvalidArgument(f"set: nothing is said of {joint!r}; give angle=, displacement= or rate=.")
+        raise InvalidArgument(f"set: no value is given for {joint!r}; give angle=, displacement= or rate=.")
     goals = [goal for kind, pair in given.items() for goal in _goals(scene, handles, joint, kind, pair, t)]
     others = [other for other in map(handles.item, keep) if other is not joint]
     held = [(other, goal) for other in others for goal in _present(scene, handles, other, t)]

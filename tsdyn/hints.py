@@ -1,0 +1,150 @@
+"""Types of annotations: what public functions take and return, in terms of NumPy and of the scene's own classes.
+
+Imported by type checkers alone, so that annotations cost nothing at run time.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, Protocol, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .benchmarking.reference_solution import Reference
+from .benchmarking.report import Benchmark
+from .configuration.assemble import AssemblyReport
+from .configuration.mobility import Mobility, RedundantRow
+from .elements.bodies import Attribute, Body, Ground, PointMass
+from .elements.element import Attachment
+from .elements.force import Force
+from .elements.joint import Joint
+from .elements.primitive import Primitive
+from .errors import TsdynError
+from .methods.integrator import Integrator
+from .model.handles import Handles
+from .model.packed import Packed, System
+from .motions.prescribed import Motion
+from .motions.tables import Table
+from .observables.diagnostics import ConstraintError
+from .observables.evaluate import Evaluation
+from .observables.kinematics import Kinematics
+from .observables.state import RememberingState, State
+from .profiling.phases import Phase
+from .profiling.report import Profile
+from .simulation.scene import Scene
+from .simulation.solution import Charts, Solution, Steps
+
+
+class Rotation(Protocol):
+    """What is used of scipy.spatial.transform.Rotation."""
+
+    @property
+    def as_quat(self) -> Callable[..., Any]:
+        """The quaternion, scalar last."""
+
+    @property
+    def as_matrix(self) -> Callable[..., Any]:
+        """The matrix."""
+
+
+Floats: TypeAlias = NDArray[np.float64]
+Bools: TypeAlias = NDArray[np.bool_]
+Integers: TypeAlias = NDArray[np.int64]
+Random: TypeAlias = np.random.Generator
+Matrix: TypeAlias = Any  # dense, or a sparse array of SciPy's
+Value: TypeAlias = np.float64 | Any  # of a function of time: a number at one time, an array at many
+
+AnyBody: TypeAlias = PointMass | Ground
+BodyLike: TypeAlias = PointMass | Ground | str  # a handle, or a name
+ItemLike: TypeAlias = Attachment | str
+Orientation: TypeAlias = ArrayLike | Rotation
+Span: TypeAlias = Sequence[float] | Floats
+
+TimeFunction: TypeAlias = Callable[[float], float]
+Data: TypeAlias = Table | Callable[[Any], Any] | tuple[ArrayLike, ArrayLike]  # callable: a spline of SciPy's
+Prescribed: TypeAlias = float | Motion | Data | Sequence[TimeFunction]  # one of ts.motions is callable
+Path: TypeAlias = Sequence[Prescribed] | Data | Floats
+Load: TypeAlias = float | Table | Callable[[Any], Any]
+VectorLoad: TypeAlias = ArrayLike | Table | Callable[..., Any]  # a function of t, or of t and state
+JointLaw: TypeAlias = Callable[[float, float, float], float]
+Event: TypeAlias = Callable[[float, State], float]
+Progress: TypeAlias = bool | Callable[[float], object]
+
+Formulation: TypeAlias = Literal["tangent", "null-space", "maggi-kane"]
+Redundancy: TypeAlias = Literal["drop", "refuse"]
+Folds: TypeAlias = Literal["keep", "free"]
+Frame: TypeAlias = Literal["ground", "body"]
+Axis: TypeAlias = Literal["x", "y", "z"]
+Method: TypeAlias = Integrator | type[Integrator] | str
+Methods: TypeAlias = Sequence[str | Callable[..., Integrator]] | Mapping[str, str | Callable[..., Integrator]]
+StepKernel: TypeAlias = tuple[Any, Floats, Callable[[int, int], int]]  # with its numbers, and floats of memory
+
+Item = TypeVar("Item", bound=Attachment)
+Class = TypeVar("Class", bound=type)
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+__all__ = [
+    "AnyBody",
+    "ArrayLike",
+    "AssemblyReport",
+    "Attachment",
+    "Attribute",
+    "Axis",
+    "Benchmark",
+    "Body",
+    "BodyLike",
+    "Bools",
+    "Charts",
+    "Class",
+    "ConstraintError",
+    "Data",
+    "Evaluation",
+    "Event",
+    "Floats",
+    "Folds",
+    "Force",
+    "Formulation",
+    "Frame",
+    "Function",
+    "Ground",
+    "Handles",
+    "Integers",
+    "Integrator",
+    "Item",
+    "ItemLike",
+    "Joint",
+    "JointLaw",
+    "Kinematics",
+    "Load",
+    "Matrix",
+    "Method",
+    "Methods",
+    "Mobility",
+    "Motion",
+    "Orientation",
+    "Packed",
+    "Path",
+    "Phase",
+    "PointMass",
+    "Prescribed",
+    "Primitive",
+    "Profile",
+    "Progress",
+    "Random",
+    "Redundancy",
+    "RedundantRow",
+    "Reference",
+    "RememberingState",
+    "Rotation",
+    "Scene",
+    "Solution",
+    "Span",
+    "State",
+    "StepKernel",
+    "Steps",
+    "System",
+    "Table",
+    "TimeFunction",
+    "TsdynError",
+    "Value",
+    "VectorLoad",
+]

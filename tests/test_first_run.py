@@ -273,6 +273,7 @@ class Terminal:
 def test_one_line_counts_on_a_terminal(monkeypatch):
     monkeypatch.setattr(sys, "stderr", Terminal())
     monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.delenv("TSDYN_QUIET", raising=False)
     with waiting.Waiting(2) as line:
         for name in ("tsdyn.configuration.initial_conditions _look", "tsdyn.constraints.distance Distance.phi_loop"):
             line.begin(name)

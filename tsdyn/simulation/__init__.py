@@ -1,6 +1,6 @@
 """`Scene`, `simulate` and `Solution`: the user's interface.
 
-Imports configuration and below.
+Imports ahead and below.
 
 Begin with simulate.py. scene_cache.py holds data shared by the runs of a scene, method_choice.py chooses the default
 method, singularity_crossing.py takes step methods across singular configurations, termination.py reports the end of

@@ -41,6 +41,8 @@ from .thread import place
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike
 
+_dot, _cross = vectors.dot, vectors.cross  # by name: `twin` follows the names of kernels
+
 
 class Gear(Primitive):
     """Let two wheels turn in a fixed ratio, measured against the line between their centres.
@@ -162,23 +164,23 @@ class Gear(Primitive):
     def phi(x, par, t, out):
         """Eq. (2)."""
         u, f, h, l = _parts(x)
-        one = angle_near(vectors.dot(u, vectors.cross(l, f)), vectors.dot(l, f), par[2])
+        one = angle_near(_dot(u, _cross(l, f)), _dot(l, f), par[2])
         goal = par[0] * one + par[1]
-        out[0] = angle_near(vectors.dot(u, vectors.cross(l, h)), vectors.dot(l, h), goal.real) - goal
+        out[0] = angle_near(_dot(u, _cross(l, h)), _dot(l, h), goal.real) - goal
 
     @staticmethod
     def jacobian(x, par, t, out):
         """By Eq. (3)."""
         u, f, h, l = _parts(x)
-        sides = vectors.cross(u, l)
+        sides = _cross(u, l)
         for j in range(2):
             factor = -par[0] if j == 0 else 1.0
             w = f if j == 0 else h
-            turned = vectors.cross(l, w)
-            X, Y = vectors.dot(l, w), vectors.dot(u, turned)
+            turned = _cross(l, w)
+            X, Y = _dot(l, w), _dot(u, turned)
             S = X * X + Y * Y
             X, Y = factor * X / S, factor * Y / S
-            wide = vectors.cross(w, u)
+            wide = _cross(w, u)
             for i in range(3):
                 out[0, i] += X * turned[i]
                 out[0, 3 + 3 * j + i] = X * sides[i] - Y * l[i]
@@ -197,7 +199,7 @@ class Gear(Primitive):
     def remember(x, par, t):
         """theta_a."""
         u, f, _, l = _parts(x)
-        return angle_near(vectors.dot(u, vectors.cross(l, f)), vectors.dot(l, f), par[2])
+        return angle_near(_dot(u, _cross(l, f)), _dot(l, f), par[2])
 
     @staticmethod
     def series(x, par, k, s, out):
@@ -256,11 +258,11 @@ def _parts(x):
 @kernel
 def _second(u, w, l, ud, wd, ld):
     """Eq. (4)."""
-    turned = vectors.cross(l, w)
-    X, Y = vectors.dot(l, w), vectors.dot(u, turned)
-    Xd, Xdd = vectors.dot(ld, w) + vectors.dot(l, wd), 2.0 * vectors.dot(ld, wd)
-    one, two = vectors.cross(ld, w), vectors.cross(l, wd)
-    Yd = vectors.dot(ud, turned) + vectors.dot(u, one) + vectors.dot(u, two)
-    Ydd = 2.0 * (vectors.dot(ud, one) + vectors.dot(ud, two) + vectors.dot(u, vectors.cross(ld, wd)))
+    turned = _cross(l, w)
+    X, Y = _dot(l, w), _dot(u, turned)
+    Xd, Xdd = _dot(ld, w) + _dot(l, wd), 2.0 * _dot(ld, wd)
+    one, two = _cross(ld, w), _cross(l, wd)
+    Yd = _dot(ud, turned) + _dot(u, one) + _dot(u, two)
+    Ydd = 2.0 * (_dot(ud, one) + _dot(ud, two) + _dot(u, _cross(ld, wd)))
     S = X * X + Y * Y
     return (X * Ydd - Y * Xdd) / S - 2.0 * (X * Xd + Y * Yd) * (X * Yd - Y * Xd) / (S * S)

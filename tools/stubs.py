@@ -48,7 +48,7 @@ def _class(cls: type, public: set[str]) -> str:
     lines = [f"class {cls.__name__}({', '.join(base.__name__ for base in bases)}):", *_attributes(cls)]
     lines += _function("__init__", inspect.signature(cls.__init__))
     inherited = {name for base in bases for name in dir(base)} - {"at"}
-    inherited |= {name for base in cls.__mro__ for name in vars(base).get("__annotations__", ())}
+    inherited |= {name for base in cls.__mro__ for name in inspect.get_annotations(base)}
     inherited |= {*inspect.signature(cls).parameters}  # said by _attributes
     for name in [name for name in dir(cls) if not name.startswith("_") and name not in inherited]:
         value = inspect.getattr_static(cls, name)

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..elements import primitive
 from ..elements.loops import constraint_rows, force_series
+from ..elements.loops import forces as force_loops
 from ..formulations.locked_orientations import instances
 from ..model.packed import COUNT, FIRST_INT
 from ..model.packed_forces import F_COUNT, F_FIRST_INT, F_REMEMBER, FORCE, members_of
@@ -146,7 +147,7 @@ class Timekeeper(Stopwatch):
             for kind, row in zip(classes, system.kinds, strict=True)
         ]
         rows += [
-            (row[F_FIRST_INT], row[F_COUNT] * forces.INTS, row[[FORCE, F_REMEMBER]], _of_forces(members))
+            (row[F_FIRST_INT], row[F_COUNT] * force_loops.INTS, row[[FORCE, F_REMEMBER]], _of_forces(members))
             for members, row in zip(forces, system.forces, strict=True)
         ]
         table, firsts = self._headed(system.table, rows)

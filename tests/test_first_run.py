@@ -46,7 +46,9 @@ print(failed, len(started), counts["misses"], counts["hits"], any(worker.poll() 
 def python(*arguments, folder, code=None, **environment):
     """Run Python in a folder with an empty cache beside it; returns what it has printed, as (out, err)."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("TSDYN_")}
-    kept |= {"NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONPATH": str(ROOT), **environment}
+    scratch = folder.with_name(f"{folder.name}-scratch")  # kernels are read from the temporary folder, too
+    scratch.mkdir(exist_ok=True)
+    kept |= {"NUMBA_CACHE_DIR": str(folder / "cache"), "TMPDIR": str(scratch), "PYTHONPATH": str(ROOT), **environment}
     command = [sys.executable, *arguments]
     result = subprocess.run(command, input=code, cwd=folder, env=kept, text=True, capture_output=True, timeout=300)
     assert result.returncode == 0, result.stderr
@@ -144,7 +146,8 @@ except KeyboardInterrupt:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal can be sent to one process")
 def test_interrupt_ends_the_workers_and_leaves_no_halves(tmp_path):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT), "TSDYN_QUIET": ""}
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "TMPDIR": str(tmp_path)}
+    environment |= {"PYTHONPATH": str(ROOT), "TSDYN_QUIET": ""}
     process = subprocess.Popen(
         [sys.executable, "-c", INTERRUPTED], env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )

@@ -7,8 +7,8 @@ from ..formulations.registry import FORMULATIONS
 from ..integrators import Taylor
 from ..jit import cache
 from ..jit.compiled import DEBUG, is_declared, is_stored
+from ..jit.compiler import is_ours
 from .first_run import of_constraint, of_force, of_method
-from .worker import PACKAGE
 from .workers import compile_ahead, name_of
 
 
@@ -40,9 +40,9 @@ def _default():
 def _all():
     for kind in _built_in({**primitive.registered(), **force.registered()}):
         yield from getattr(kind, "own_kernels", kind.kernels).values()
-    for module in [value for name, value in sys.modules.items() if name.startswith(f"{PACKAGE}.")]:
+    for module in [value for name, value in sys.modules.items() if is_ours(name)]:
         yield from filter(is_declared, vars(module).values())
 
 
 def _built_in(registered):
-    return [kind for name, kind in registered.items() if name.startswith(f"{PACKAGE}.")]
+    return [kind for name, kind in registered.items() if is_ours(name)]

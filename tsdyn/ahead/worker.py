@@ -12,13 +12,12 @@ from importlib import import_module
 
 from ..elements import force, primitive
 from ..jit.compiled import is_declared, load
-
-PACKAGE = __package__.partition(".")[0]
+from ..jit.compiler import is_ours
 
 
 def find(module, name):
     """The kernel of this module and name, of tsdyn's own; None where there is none."""
-    if module.partition(".")[0] != PACKAGE:
+    if not is_ours(module):
         return None
     found = _loops().get((module, name)) or getattr(import_module(module), name, None)
     return found if is_declared(found) else None
@@ -28,8 +27,12 @@ def find(module, name):
 def _loops():
     """{(module, name): kernel} of constraints and forces."""
     kinds = {**primitive.registered(), **force.registered()}.values()
-    ours = [kind for kind in kinds if kind.__module__.partition(".")[0] == PACKAGE]
-    kernels = [kernel for kind in ours for kernel in getattr(kind, "own_kernels", kind.kernels).values()]
+    kernels = [
+        kernel
+        for kind in kinds
+        if is_ours(kind.__module__)
+        for kernel in getattr(kind, "own_kernels", kind.kernels).values()
+    ]
     return {(kernel.py_func.__module__, kernel.py_func.__qualname__): kernel for kernel in kernels}
 
 

@@ -15,8 +15,9 @@ from pathlib import Path
 
 from ..jit import cache
 from ..jit.compiled import DEBUG, is_loaded, is_stored, load
+from ..jit.compiler import is_ours
 from ..jit.waiting import Waiting
-from .worker import PACKAGE, find
+from .worker import find
 
 MOST = 16  # processes: each takes some 300 MB
 _turn = threading.Lock()
@@ -30,7 +31,7 @@ def compile_ahead(kernels, asked=False):
     if DEBUG:
         return {}
     with _turn:  # threads that begin together
-        ours = [kernel for kernel in kernels if not is_loaded(kernel) and kernel.py_func.__module__.startswith(PACKAGE)]
+        ours = [kernel for kernel in kernels if not is_loaded(kernel) and is_ours(kernel.py_func.__module__)]
         missing = {name: kernel for kernel in ours if not is_stored(kernel) and (name := name_of(kernel))}
         if not missing:
             return {}

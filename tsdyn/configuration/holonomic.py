@@ -8,6 +8,7 @@ import numpy as np
 
 from ..elements.loops.marker_jacobians import state
 from ..errors import InvalidConstraint
+from ..jit.compiler import is_ours
 from ..jit.kernels import twin
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import starts_of
@@ -25,7 +26,7 @@ def demand_holonomic(packed, q, t, form):
     for constraint, given, places in zip(packed.constraints, packed.parameters, packed.coordinates, strict=True):
         kind = type(constraint)
         seen[kind] = seen.get(kind, 0) + 1
-        if kind.__module__.startswith("tsdyn.") or seen[kind] > TRIED:
+        if is_ours(kind.__module__) or seen[kind] > TRIED:
             continue
         par = [x for value in given for x in (value.value(t) if isinstance(value, Motion) else (value,))]
         par += [0.0] * kind.memory

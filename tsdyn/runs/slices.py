@@ -22,6 +22,8 @@ from .run_state import (
     Record,
     T,
 )
+from .sampling import Sampled
+from .task import Outcome
 
 SLICE_SECONDS = 0.2  # how often a run comes back to Python: progress, interrupts
 LARGEST_SLICE, CHART_ROOM = 1 << 17, 64
@@ -45,6 +47,25 @@ class Recorded(NamedTuple):
         if self.passed is not None:
             self.passed.add(charts, self.steps)
         return self.passed
+
+
+class Driven(NamedTuple):
+    """A run that has been driven to its end."""
+
+    status: Status
+    reason: str
+    recorded: Recorded
+    watch: object  # of its events, or None
+    began: float  # time.perf_counter() then
+
+    def outcome(self, task, run, charts, counted, trajectory):
+        """The `Outcome`; counted is what `Solution.stats` has of it, charts are those left at the end."""
+        recorded, watch = self.recorded, self.watch
+        found = None if watch is None else watch.found(task.prepared.n)
+        return Outcome(
+            self.status, self.reason, recorded.out, recorded.steps, recorded.log(charts), float(run.clock[T]),
+            run.now.copy(), run.remembered.copy(), counted, trajectory, found, self.began,
+        )  # fmt: skip
 
 
 class Pace:
@@ -72,6 +93,17 @@ class Pace:
         return Status.STEP_COLLAPSED, (
             f"At the pace of the last {PACED} steps the rest would take {left}; give max_steps to continue."
         )
+
+
+def drive_part(memory, task, relay, reading, past=None):
+    """Drive a run that goes on from what the relay knows; `Driven`. `past(memory)` makes what is driven of it."""
+    relay.enter(memory)
+    watch = relay.watching(task, reading)
+    began = time.perf_counter()
+    driven = memory if task.sampling is None else Sampled(memory, task.sampling)
+    status, reason, recorded = drive(driven if past is None else past(driven), task, watch)
+    relay.leave(memory)
+    return Driven(status, reason, recorded, watch, began)
 
 
 def drive(memory, task, watch):

@@ -1,7 +1,5 @@
 """Front end of the step driver, for methods with a step kernel: memory, driver loop, outcome."""
 
-import time
-
 import numpy as np
 
 from ..errors import Status
@@ -24,11 +22,9 @@ from ..workspaces.workspace import (
 )
 from .arguments import step_count
 from .run_memory import Memory
-from .run_state import CHART_ROWS, FILLED, IN_CHART, LANDED, MAY_PASS, NEAR_STEPS, REJECTED, STEPS, STIFF, STORED, T
-from .sampling import Sampled
+from .run_state import CHART_ROWS, FILLED, IN_CHART, LANDED, MAY_PASS, NEAR_STEPS, REJECTED, STEPS, STIFF, STORED
 from .segments import Relay
-from .slices import drive
-from .task import Outcome
+from .slices import drive_part
 from .trajectory import Reader, Trajectory
 
 
@@ -62,14 +58,8 @@ def run_steps(task, observe=None, relay=None):
     if observe is not None:
         observe(memory)
     run.numbers[MAY_PASS] = relay is not None
-    relay = relay or Relay()
-    relay.enter(memory)
-    watch = relay.watching(task, reading)
-
-    began = time.perf_counter()
-    driven = memory if task.sampling is None else Sampled(memory, task.sampling)
-    status, reason, recorded = drive(driven, task, watch)
-    relay.leave(memory)
+    driven = drive_part(memory, task, relay or Relay(), reading)
+    recorded = driven.recorded
     charts = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy()
     charts[-1, 2:] = control[CONDITION], control[CONTRACTION], run.numbers[IN_CHART]
     last = run.now.copy()
@@ -79,26 +69,11 @@ def run_steps(task, observe=None, relay=None):
         again = read_again, packed, method, form.name, task.constraint_tol
         sides = task.span[0], last, task.angles, task.stops
         trajectory = Trajectory(reading, again, recorded.blocks, charts, points, *sides)
-    outcome = Outcome(
-        status,
-        reason,
-        recorded.out,
-        recorded.steps,
-        recorded.log(charts),
-        float(run.clock[T]),
-        last,
-        run.remembered.copy(),
-        counts(
-            run,
-            memory.work.counters.tolist(),
-            packed,
-            *((prepared.spheres, prepared.still) if form.basis_free else (0, 0)),
-        ),
-        trajectory,
-        None if watch is None else watch.found(n),
-        began,
+    counted = counts(
+        run, memory.work.counters.tolist(), packed, *((prepared.spheres, prepared.still) if form.basis_free else (0, 0))
     )
-    if observe is None and status != Status.NOT_FINITE:  # NaN may be left in what a run takes as its own
+    outcome = driven.outcome(task, run, charts, counted, trajectory)
+    if observe is None and outcome.status != Status.NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give((form.name, *kind), memory)
     return outcome
 

@@ -12,6 +12,7 @@ import numpy as np
 from ..elements.bodies import Ground
 from ..elements.markers import POINT
 from ..elements.user_functions import Kernels
+from ..jit.compiler import is_ours
 from ..model.derived import Derived
 from ..model.packed import FIRST_REAL, REALS, classes
 from ..model.packed_forces import F_FIRST_REAL
@@ -64,7 +65,7 @@ def _sees_differences(packed):
     """Return True if there are constraints or forces, and none that may depend on positions as they are."""
     items = [*packed.constraints, *(load.force for load in packed.loads)]
     joined = packed.loads or not all(constraint.normalises for constraint in packed.constraints)
-    own = joined and all(type(item).__module__.startswith("tsdyn.") for item in items)
+    own = joined and all(is_ours(type(item).__module__) for item in items)
     return own and not any(isinstance(load.force.kernels, Kernels) for load in packed.loads)
 
 

@@ -1,16 +1,12 @@
 """The Python side of the Taylor driver; see task.py."""
 
-import time
-
 import numpy as np
 
 from ..errors import InvalidArgument, Status
-from ..runs.run_state import CHART_ROWS, FILLED, STORED, T
-from ..runs.sampling import Sampled
+from ..runs.run_state import CHART_ROWS, FILLED, STORED
 from ..runs.segments import Relay
-from ..runs.slices import drive
+from ..runs.slices import drive_part
 from ..runs.step_run import counts
-from ..runs.task import Outcome
 from ..runs.trajectory import Trajectory
 from .layout import is_far, refusal, room
 from .run_memory import Series, SeriesMemory
@@ -62,40 +58,17 @@ def run_series(task, observe=None, relay=None, past=None):
         reading = _reading(packed, prepared.series.network, order[2], memory.steps)
     if observe is not None:
         observe(memory)
-    relay = relay or Relay()
-    relay.enter(memory)
-    watch = relay.watching(task, reading)
-
-    began = time.perf_counter()
-    driven = memory if task.sampling is None else Sampled(memory, task.sampling)
-    status, reason, recorded = drive(driven if past is None else past(driven), task, watch)
-    relay.leave(memory)
+    driven = drive_part(memory, task, relay or Relay(), reading, past)
+    recorded = driven.recorded
     charts, last = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy(), run.now.copy()
     trajectory = None
     if task.dense_output:
         again, sides = (read_again, packed, order[2]), (task.span[0], last, task.angles, task.stops)
         trajectory = Trajectory(reading, again, recorded.blocks, charts, recorded.points, *sides)
-    outcome = Outcome(
-        status,
-        reason,
-        recorded.out,
-        recorded.steps,
-        recorded.log(charts),
-        float(run.clock[T]),
-        last,
-        run.remembered.copy(),
-        counts(
-            run,
-            memory.work.counters.tolist(),
-            packed,
-            prepared.spheres,
-            prepared.still,
-            prepared.series.constant_columns,
-        ),
-        trajectory,
-        None if watch is None else watch.found(prepared.n),
-        began,
+    counted = counts(
+        run, memory.work.counters.tolist(), packed, prepared.spheres, prepared.still, prepared.series.constant_columns
     )
-    if observe is None and status != Status.NOT_FINITE:  # NaN may be left in what a run takes as its own
+    outcome = driven.outcome(task, run, charts, counted, trajectory)
+    if observe is None and outcome.status != Status.NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give(kind, memory)
     return outcome

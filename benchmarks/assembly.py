@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 import tsdyn as ts
-from tests.helpers.sketches import CLEAR, MECHANISMS
+from tests.helpers.sketched_mechanisms import MECHANISMS
+from tests.helpers.sketches import CLEAR
 from tsdyn.configuration.continuation import close
 from tsdyn.configuration.kinetic_metric import Metric
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.sketches import MECHANISMS, Builder, polar, turned
+from tests.helpers.sketched_mechanisms import MECHANISMS
+from tests.helpers.sketches import Builder, polar, turned
 from tsdyn.configuration.kinetic_metric import Metric
 from tsdyn.configuration.loop_folds import Folds
 

@@ -5,7 +5,8 @@ import pytest
 
 import tsdyn as ts
 from benchmarks import mechanisms
-from tests.helpers.sketches import MECHANISMS, Builder, polar
+from tests.helpers.sketched_mechanisms import MECHANISMS
+from tests.helpers.sketches import Builder, polar
 from tsdyn.configuration import kinetic_metric as kinetic
 from tsdyn.observables.evaluate import constraint_arrays
 

@@ -1,8 +1,4 @@
-"""Joints as users meet them: their rows, names, geometry from the ground frame, what is set later, what is refused."""
-
-import copy
-import math
-import pickle
+"""Joints as users meet them: their rows, row names, geometry from the ground frame."""
 
 import numpy as np
 import pytest
@@ -10,44 +6,11 @@ from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tests.helpers import minimal_coordinates as minimal
+from tests.helpers.joints import JOINTS, X, Y, Z, build, made, posed, residuals
 from tests.helpers.scenes import EPS
 from tsdyn.elements.joint import across
-from tsdyn.observables.evaluate import constraint_arrays
 
 C = ts.constraints
-JOINTS = [kind for kind in C.registered_joints() if kind.__module__.startswith("tsdyn.")]
-NAMES = {kind.__name__ for kind in JOINTS}
-X, Y, Z = np.eye(3)
-NAN, INF = math.nan, math.inf
-
-
-def build():
-    scene = ts.Scene()
-    rod = scene.add_body(1.0, (1.0, 1.1, 1.2), position=(1.0, 0.0, 0.0), name="rod")
-    arm = scene.add_body(1.0, (1.0, 1.1, 1.2), position=(3.0, 0.0, 0.0), name="arm")
-    return scene, rod, arm
-
-
-def posed(rng):
-    scene, rod, arm = build()
-    for body in (rod, arm):
-        body.position, body.orientation = rng.normal(size=3), Rotation.random(random_state=rng)
-    return scene, rod, arm
-
-
-def made(kind, a, b, **arguments):
-    """A joint on the x axis at x = 2, between rod and arm as `build` has them, or the ground."""
-    geometry = {
-        "Parallel": {"axis": X},
-        "ConstantAngle": {"axis_a": X, "axis_b": Y},
-        "Universal": {"point": (2, 0, 0), "axis": Z},
-    }.get(kind, {"point": (2, 0, 0), "axis": X})
-    return getattr(C, kind).at(a, b, **geometry, **arguments)
-
-
-def residuals(scene):
-    """Phi at the start, singular or not."""
-    return constraint_arrays(scene.system, *scene.start, 0.0)[0]
 
 
 # what they are made of
@@ -312,107 +275,3 @@ def test_an_angle_that_is_left_out_is_that_of_the_bodies(rng):
     joint = C.ConstantAngle.at(rod, arm, axis_a=u, axis_b=v)
     assert joint.angle == pytest.approx(np.arccos(u @ v / np.linalg.norm(u) / np.linalg.norm(v)), rel=1e-12)
     assert C.ConstantAngle(rod, arm, axis_a=X, axis_b=X, angle=1.0).parts[0].value == np.cos(1.0)
-
-
-# what is set later
-
-
-def test_what_is_set_on_a_joint_reaches_its_rows():
-    scene, rod, arm = build()
-    hinge = scene.add(made("Revolute", rod, arm, name="hinge"))
-    assert np.abs(residuals(scene)).max() == 0.0
-    hinge.point_b = (-1.0, 0.0, 0.5)
-    np.testing.assert_array_equal(residuals(scene)[:3], (0, 0, -0.5))
-    hinge.axis_b = (0, 2, 0)
-    assert np.abs(residuals(scene)[3:5]).max() == 1.0
-    with pytest.raises(ts.InvalidConstraint, match=r"hinge: axis_b has length zero"):
-        hinge.axis_b = (0, 0, 0)
-    with pytest.raises(ts.UnknownAttribute, match="did you mean"):
-        hinge.axsi_a = X
-    with pytest.raises(ts.InvalidConstraint, match=r"Revolute 'hinge' axis\[0\].*set axis_b there"):
-        hinge.parts[1].axis_b = X
-    cone = scene.add(made("ConstantAngle", rod, arm))
-    cone.angle = 1.0
-    assert residuals(scene)[5] == pytest.approx(-np.cos(1.0))
-    with pytest.raises(ts.InvalidConstraint, match="angle"):
-        cone.angle = 0.0
-    assert cone.angle == 1.0
-    slide = scene.add(made("Translational", rod, arm))
-    with pytest.raises(ts.InvalidConstraint, match="reference_a is parallel"):
-        slide.reference_a = slide.axis_a
-
-
-def test_a_solution_keeps_the_joint_it_was_run_with():
-    scene, rod, arm = build()
-    hinge = scene.add(made("Revolute", scene.ground, rod))
-    scene.add(made("Universal", rod, arm))
-    solution, expected = (ts.simulate(scene, (0.0, 0.1)) for _ in range(2))
-    before = expected.reaction(hinge)
-    hinge.point_b = hinge.point_a = (5.0, 0.0, 0.0)
-    np.testing.assert_array_equal(solution.reaction(hinge), before)
-    for twin in (pickle.loads(pickle.dumps(solution)), copy.deepcopy(solution)):
-        again = twin.scene.constraints[0]
-        np.testing.assert_array_equal(twin.reaction(again), before)
-        np.testing.assert_array_equal(twin.q, solution.q)
-
-
-def test_scenes_with_joints_survive_copies():
-    scene, rod, arm = build()
-    scene.add(made("Revolute", scene.ground, rod))
-    scene.add(made("Translational", rod, arm, name="slide"))
-    end = ts.simulate(scene, (0.0, 0.1)).q[-1]
-    for twin in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene)):
-        np.testing.assert_array_equal(ts.simulate(twin, (0.0, 0.1)).q[-1], end)
-        assert twin.row_names() == scene.row_names()
-        twin.constraints[1].point_a = (0, 0, 9)
-        assert np.abs(residuals(twin)).max() > 1.0
-    assert np.abs(residuals(scene)).max() < EPS
-
-
-# mirrored starts
-
-MIRRORED = {
-    "Revolute": ("Revolute", Y),
-    "Cylindrical": ("Cylindrical", Y),
-    "Parallel": ("Parallel", Y),
-    "Planar": ("Planar", Y),
-    "Translational, axis turned over": ("Translational", Y),
-    "Translational, half a turn about the axis": ("Translational", X),
-    "Fixed, half a turn about x": ("Fixed", X),
-    "Fixed, half a turn about y": ("Fixed", Y),
-    "Fixed, half a turn about z": ("Fixed", Z),
-}
-
-
-@pytest.mark.parametrize(("kind", "axis"), MIRRORED.values(), ids=MIRRORED)
-def test_a_mirrored_start_is_refused(kind, axis):
-    """Half a turn of b about the joint's point meets every row, and is another joint."""
-    scene, rod, arm = build()
-    scene.add(made(kind, rod, arm, name="mine"))
-    ts.simulate(scene, (0.0, 0.01))
-    turn = Rotation.from_rotvec(np.pi * axis)
-    arm.orientation, arm.position = turn, np.add((2, 0, 0), turn.apply((1, 0, 0)))
-    assert np.abs(residuals(scene)).max() < 4 * EPS
-    for call in (lambda: ts.simulate(scene, (0.0, 0.01)), scene.assemble):
-        with pytest.raises(ts.InconsistentState, match=f"{kind} 'mine'.*opposite ways.*other sign"):
-            call()
-    np.testing.assert_array_equal(arm.position, np.add((2, 0, 0), turn.apply((1, 0, 0))))
-
-
-@pytest.mark.parametrize("kind", ["Universal", "PointOnLine", "ConstantAngle"])
-def test_joints_that_have_no_mirrored_branch_start_anywhere(kind):
-    scene, rod, arm = build()
-    scene.add(made(kind, rod, arm))
-    turn = Rotation.from_rotvec(np.pi * X)
-    arm.orientation, arm.position = turn, np.add((2, 0, 0), turn.apply((1, 0, 0)))
-    ts.simulate(scene, (0.0, 0.01)).raise_if_failed()
-
-
-def test_a_state_to_go_on_from_is_checked_too():
-    scene, rod, arm = build()
-    scene.add(made("Revolute", rod, arm, name="hinge"))
-    state = ts.simulate(scene, (0.0, 0.1)).state
-    q = state.q.copy()
-    q[7:10], q[10:] = (1.0, 0.0, 0.0), (0, 0, 1, 0)
-    with pytest.raises(ts.InconsistentState, match="'hinge'"):
-        ts.simulate(scene, (0.0, 1.0), state=state._replace(q=q, qd=np.zeros(14)))

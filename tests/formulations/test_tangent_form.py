@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import tsdyn as ts
 from examples import pendulum_chain
-from tests.constraints.test_constraints_hold import chains, check
+from tests.helpers.constraint_levels import chains, check
 from tests.helpers.reference import NAMES, load
 from tests.helpers.scenes import BETWEEN, EPS, MOTION, PRIMITIVES, build, random_body, random_chain, random_pair
 from tsdyn.formulations.registry import formulation

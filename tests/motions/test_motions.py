@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tsdyn.jit.kernels import entry
+from tests.helpers.motion_series import ORDER, series
 from tsdyn.maths.power_series import Truncated
-from tsdyn.motions.program import call_smooth, run_program
 
 M = ts.motions
-ORDER = 20
 t = M.time
 MOTIONS = {
     "constant": M.Constant(1.5),
@@ -30,18 +28,6 @@ MOTIONS = {
     "nested": np.sin(np.exp(0.3 * np.cos(t * t)) / (1.0 + np.tanh(t) ** 2)),
 }
 TIMES = (0.0, 0.37, 1.1)
-
-
-@entry
-def _series(address, program, time, out):
-    call_smooth(address, program, time, out.size, out)
-
-
-def series(motion, time, count=ORDER):
-    """The coefficients about a time, by the compiled program."""
-    out = np.zeros(count)
-    _series(run_program.address, np.array(motion.program()), time, out)
-    return out
 
 
 @pytest.mark.parametrize("time", TIMES)

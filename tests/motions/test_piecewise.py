@@ -16,7 +16,7 @@ from scipy.interpolate import (
 )
 
 import tsdyn as ts
-from tests.motions.test_motions import series
+from tests.helpers.motion_series import series
 
 C, F, I, M = ts.constraints, ts.forces, ts.integrators, ts.motions
 KNOTS = np.array([0.0, 0.13, 0.3, 0.5, 0.77, 1.0])

@@ -8,8 +8,8 @@ import pytest
 import tsdyn as ts
 from benchmarks import stiff
 from examples import drive_train, pendulum_chain, top, two_body_pendulum
+from tests.helpers.processes import REPORT, run
 from tests.helpers.scenes import build, random_chain
-from tests.jit.test_cache import REPORT, run
 from tsdyn.cli.command import main
 from tsdyn.profiling.timers import TIMERS
 from tsdyn.simulation.scene_cache import prepared

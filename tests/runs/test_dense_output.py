@@ -9,6 +9,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.closed_forms import point_pendulum
+from tests.helpers.driven_rod import driven
 from tests.helpers.reference import load
 from tests.helpers.scenes import EPS
 from tsdyn.observables.diagnostics import constraint_error
@@ -24,18 +25,6 @@ METHODS = {
 }
 methods = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 END = 4.0  # s
-
-
-def driven():
-    """A point mass on a rod whose length is a function of time."""
-    scene = ts.Scene()
-    bead = scene.add_point_mass(1.0, (1.0, 0.0, 0.0), name="bead")
-    motion = (lambda t: 1.0 + 0.2 * np.sin(3.0 * t), lambda t: 0.6 * np.cos(3.0 * t), lambda t: -1.8 * np.sin(3.0 * t))
-    scene.add(C.Distance(bead, scene.ground, length=motion))
-    scene.assemble()
-    return scene
-
-
 SCENES = {
     "sliding_top": lambda: load("sliding_top")[0],
     "spatial": lambda: load("two_body_pendulum_spatial")[0],

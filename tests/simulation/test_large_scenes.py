@@ -8,7 +8,7 @@ import pytest
 
 import tsdyn as ts
 from benchmarks import mechanisms
-from tests.constraints.test_constraints_hold import check
+from tests.helpers.constraint_levels import check
 from tests.helpers.scenes import random_body, random_primitive
 from tsdyn.configuration import initial_conditions as start
 from tsdyn.configuration import kinetic_metric as kinetic

@@ -5,8 +5,8 @@ import pytest
 
 import tsdyn as ts
 from examples import pendulum_chain, two_body_pendulum
+from tests.helpers.processes import REPORT, run
 from tests.helpers.reference import load
-from tests.jit.test_cache import REPORT, run
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 METHODS = {"nystrom4": I.Nystrom4(step=1e-2), "dop853": I.DOP853(1e-8, 1e-8), "taylor": I.Taylor(1e-10)}

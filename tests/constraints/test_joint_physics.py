@@ -16,12 +16,6 @@ TIMES = np.linspace(0.0, 0.5, 26)
 SYMMETRIC = ("Revolute", "Cylindrical", "Screw", "Translational", "Fixed", "Planar", "Parallel")
 
 
-def test_every_joint_is_here():
-    """A new joint joins these tests by a line in minimal.JOINTS."""
-    built_in = {kind.__name__ for kind in C.registered_joints() if kind.__module__.startswith("tsdyn.")}
-    assert built_in - {"RotationMotor", "TranslationMotor", "PointDriver", "RackAndPinion"} == set(COMPOSED)
-
-
 def links_of(rng, *kinds):
     return [random_link(rng, kind) for kind in kinds]
 

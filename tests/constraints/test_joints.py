@@ -6,7 +6,8 @@ from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tests.helpers import minimal_coordinates as minimal
-from tests.helpers.joints import JOINTS, X, Y, Z, build, made, posed, residuals
+from tests.helpers.built_in import JOINTS, by_name
+from tests.helpers.joints import X, Y, Z, build, made, posed, residuals
 from tests.helpers.scenes import EPS
 from tsdyn.elements.joint import across
 
@@ -16,7 +17,7 @@ C = ts.constraints
 # what they are made of
 
 
-@pytest.mark.parametrize("kind", JOINTS, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", JOINTS, **by_name)
 @pytest.mark.parametrize("seed", range(3))
 def test_parts_and_assembled_rows_are_derivatives_of_phi(kind, seed):
     """Of Phi: Phi_q, gamma and the series, kernels and assembled, by complex steps and truncated series."""

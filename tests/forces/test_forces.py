@@ -6,11 +6,11 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
+from tests.helpers.built_in import FORCES, by_name
 from tests.helpers.scenes import product, rotate, rotation, unit
 from tsdyn.observables.generalised_forces import force_loads
 
 F = ts.forces
-BUILT_IN = [kind for kind in F.registered() if kind.__module__.startswith("tsdyn.forces.")]
 CLOSE = {"rtol": 1e-12, "atol": 1e-12}
 
 
@@ -55,15 +55,11 @@ def expect(scene, body, force, torque_about_centroid, t=0.0):
     np.testing.assert_allclose(got[1], torque_about_centroid, **CLOSE)
 
 
-def test_every_force_is_registered():
-    names = {"Bushing", "CoulombFriction", "PointForce", "Spring", "Torque", "TorsionalSpring", "UserForce"}
-    frictions = {"ViscousFriction", "RevoluteFriction", "TranslationalFriction", "ContactFriction"}
-    joint_loads = {"JointForce", "JointTorque"}
-    assert {kind.__name__ for kind in BUILT_IN} == names | frictions | joint_loads
-    assert set(F.__all__) == {kind.__name__ for kind in BUILT_IN} | {"registered"}
+def test_every_force_is_public():
+    assert set(F.__all__) == {kind.__name__ for kind in FORCES} | {"registered"}
 
 
-@pytest.mark.parametrize("kind", BUILT_IN, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", FORCES, **by_name)
 @pytest.mark.parametrize("seed", range(2))
 def test_kernels_jacobians_and_power(kind, seed):
     ts.testing.check_force(kind, seed=seed)
@@ -262,7 +258,7 @@ def test_one_function_is_compiled_once(rng):
     assert len(scene.system.forces) == 1
 
 
-INTERNAL = [kind for kind in BUILT_IN if kind not in (F.PointForce, F.Torque)]
+INTERNAL = [kind for kind in FORCES if kind not in (F.PointForce, F.Torque)]
 
 
 @pytest.mark.parametrize("kind", INTERNAL, ids=lambda kind: kind.__name__)

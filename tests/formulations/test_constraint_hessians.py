@@ -6,6 +6,7 @@ import pytest
 import tsdyn as ts
 from examples.bead_on_surface import OnEllipsoid
 from examples.driven_pivot import DrivenPivot
+from tests.helpers import built_in
 from tests.helpers.reduced_ode import difference, evaluate_curvature
 from tests.helpers.scenes import EPS, rotation, unit
 from tsdyn.elements.joint_load import JointLoad
@@ -22,7 +23,7 @@ TRANSCENDENTAL, SMOOTH = ("Thread", "Gear"), 2e-3  # constraints with sines and 
 POLYNOMIAL = 0.05  # of differences of polynomials of degree six and less, which they are exact for
 C, F = ts.constraints, ts.forces
 WAVE = (lambda t: 0.5 + 0.3 * np.sin(2.0 * t), lambda t: 0.6 * np.cos(2.0 * t), lambda t: -1.2 * np.sin(2.0 * t))
-KINDS = {kind.__name__: kind.example for kind in C.registered() if kind.__module__.startswith("tsdyn.")}
+KINDS = {kind.__name__: kind.example for kind in built_in.PRIMITIVES}
 KINDS |= {kind.__name__: kind.example for kind in (OnEllipsoid, DrivenPivot)}
 KINDS |= {
     f"{name}, driven": lambda rng, a, b, name=name, word=word: getattr(C, name)(
@@ -167,7 +168,7 @@ def test_turn_block(code_row, code_column, rng):
     assert np.isfinite(out).sum() == n * m
 
 
-INTERNAL = [kind for kind in F.registered() if kind not in (F.PointForce, F.Torque, F.UserForce)]
+INTERNAL = [kind for kind in built_in.FORCES if kind not in (F.PointForce, F.Torque, F.UserForce)]
 INTERNAL = [k for k in INTERNAL if k.__module__.startswith("tsdyn.") and not issubclass(k, JointLoad)]
 
 

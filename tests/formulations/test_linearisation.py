@@ -5,6 +5,7 @@ import pytest
 
 import tsdyn as ts
 from benchmarks.stiff import hung, jointed
+from tests.helpers import built_in
 from tests.helpers.every_force import everything
 from tests.helpers.reduced_ode import Tangent, difference
 from tests.helpers.reference import load
@@ -54,7 +55,7 @@ def test_jacobian_with_every_constraint(name, between, rng):
 
 @pytest.mark.parametrize(
     "kind",
-    [k for k in F.registered() if not issubclass(k, (ts.JointFriction, JointLoad))],
+    [k for k in built_in.FORCES if not issubclass(k, (ts.JointFriction, JointLoad))],
     ids=lambda kind: kind.__name__,
 )
 def test_jacobian_with_every_force(kind, rng):

@@ -9,8 +9,6 @@ import tsdyn as ts
 from tsdyn.observables.evaluate import constraint_arrays
 
 C = ts.constraints
-JOINTS = [kind for kind in C.registered_joints() if kind.__module__.startswith("tsdyn.")]
-NAMES = {kind.__name__ for kind in JOINTS}
 X, Y, Z = np.eye(3)
 NAN, INF = math.nan, math.inf
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.helpers.built_in import INTEGRATORS
 from tsdyn.elements.primitive import ANY
 from tsdyn.maths.dense_linalg import copy
 from tsdyn.methods import integrator
@@ -12,7 +13,6 @@ from tsdyn.methods.interpolants import HERMITE, VALUE, Interpolant
 from tsdyn.testing import integrator_checks, integrator_scenes
 
 I = ts.integrators
-BUILT_IN = [kind for kind in I.registered() if kind.__module__.startswith("tsdyn.")]
 CLASSICAL = I.Nystrom4.first_order
 
 
@@ -31,7 +31,7 @@ def one_scene(monkeypatch):
     monkeypatch.setattr(integrator_scenes, "SCENES", {"sliding top": (integrator_scenes.sliding_top, 10.0)})
 
 
-@pytest.mark.parametrize("kind", BUILT_IN)
+@pytest.mark.parametrize("kind", INTEGRATORS)
 def test_built_in(kind):
     series = kind is I.Taylor
     findings = ts.testing.check_integrator((lambda **given: I.Taylor(order=6, **given)) if series else kind)

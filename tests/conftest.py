@@ -1,10 +1,13 @@
-"""What every test may use: a seeded random generator, and hypothesis without clocks or a data base."""
+"""For every test: a seeded random generator, hypothesis without clocks or a data base, kernels compiled ahead."""
 
 import zlib
 
 import hypothesis
 import numpy as np
 import pytest
+
+from tests.helpers.shared_kernels import shared_kernels
+from tsdyn.ahead.workers import compile_ahead
 
 hypothesis.settings.register_profile("tsdyn", deadline=None, derandomize=True, database=None)
 hypothesis.settings.load_profile("tsdyn")
@@ -14,3 +17,11 @@ hypothesis.settings.load_profile("tsdyn")
 def rng(request):
     """A random generator, seeded by the name of the test: the same in every run, another in every test."""
     return np.random.default_rng(zlib.crc32(request.node.name.encode()))
+
+
+def pytest_sessionstart(session):
+    """Compile by all processors what most tests need, so that no worker of pytest-xdist waits for another's kernel."""
+    config = session.config
+    whole = config.args_source is config.ArgsSource.TESTPATHS  # not some files alone
+    if whole and not config.option.collectonly and not hasattr(config, "workerinput"):
+        compile_ahead(dict.fromkeys(shared_kernels()))

@@ -1,7 +1,10 @@
 """Snippets and commands of README, CONTRIBUTING and docs run as they are printed."""
 
+import os
 import re
 import shlex
+import subprocess
+import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -34,6 +37,32 @@ def commands():
         lines = [part for block in blocks for line in block.splitlines() for part in line.split("&&")]
         for command in (*re.findall(r"`([^`\n]+)`", file.read_text()), *lines):
             yield command.strip().replace(".venv/bin/", "")
+
+
+# verbs and modules that the pages name, and that run in seconds and offline; installs, the suite itself and benchmarks,
+# which take minutes to hours, have tests of their own
+RUN = ("python examples/", "tsdyn tables", "tsdyn compile", "tsdyn profile")
+
+
+def runnable():
+    """Each such command once; `file.py` stands for a file of the reader's."""
+    found = (command.partition("#")[0].strip() for command in commands())
+    named = (command.replace("file.py", "examples/top.py") for command in found if command.startswith(RUN))
+    return sorted({command for command in named if command not in ("tsdyn profile", "tsdyn compile --all")})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", runnable())
+def test_commands_run(command, tmp_path):
+    words = [str(ROOT / word) if word.endswith(".py") else word for word in shlex.split(command)]
+    words = [sys.executable, *(("-m", *words) if words[0] == "tsdyn" else words[1:])]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"}
+    result = subprocess.run(words, cwd=tmp_path, env=environment, text=True, capture_output=True, timeout=900)
+    assert result.returncode == 0, result.stderr
+
+
+def test_there_are_commands_to_run():
+    assert {"python examples/top.py", "tsdyn tables", "tsdyn compile", "tsdyn profile examples/top.py"} <= {*runnable()}
 
 
 def test_commands_of_the_docs_exist():

@@ -5,7 +5,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.built_in import INTEGRATORS
-from tsdyn.elements.primitive import ANY
+from tsdyn.jit.kernels import ANY
 from tsdyn.maths.dense_linalg import copy
 from tsdyn.methods import integrator
 from tsdyn.methods.explicit import call_accelerate, call_place, callback, step_kernel, vector

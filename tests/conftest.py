@@ -1,6 +1,7 @@
 """For every test: a seeded random generator, hypothesis without clocks or a data base, kernels compiled ahead."""
 
 import zlib
+from fnmatch import fnmatchcase
 
 import hypothesis
 import numpy as np
@@ -25,3 +26,20 @@ def pytest_sessionstart(session):
     whole = config.args_source is config.ArgsSource.TESTPATHS  # not some files alone
     if whole and not config.option.collectonly and not hasattr(config, "workerinput"):
         compile_ahead(dict.fromkeys(shared_kernels()))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Mark as slow what `slow_but` and `slow_for` say, before `-m` selects."""
+    idle = set()
+    used = set()
+    for item in items:
+        for mark in (*item.iter_markers("slow_but"), *item.iter_markers("slow_for")):
+            found = [pattern for pattern in mark.args if fnmatchcase(item.callspec.id, pattern.removeprefix("!"))]
+            chosen = bool(found) and not any(pattern.startswith("!") for pattern in found)
+            if chosen == (mark.name == "slow_for"):
+                item.add_marker("slow")
+            idle |= {(item.originalname, pattern) for pattern in mark.args}
+            used |= {(item.originalname, pattern) for pattern in found}
+    if idle - used and config.args_source is config.ArgsSource.TESTPATHS:
+        raise pytest.UsageError(f"slow_but or slow_for with patterns that match no test: {sorted(idle - used)}")

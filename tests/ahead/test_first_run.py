@@ -78,6 +78,7 @@ print(sorted(map(label, used - asked)), sorted(map(label, {kernel for kernel in 
 """
 
 
+@pytest.mark.slow_but("top-*-within")
 @pytest.mark.parametrize(
     ("name", "method", "form", "times"),
     [

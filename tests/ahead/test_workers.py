@@ -59,6 +59,7 @@ def in_a_namespace(folder):
     )
 
 
+@pytest.mark.slow_but("as_script")
 @pytest.mark.parametrize("way", [as_script, from_standard_input, in_a_namespace], ids=lambda way: way.__name__)
 def test_workers_fill_the_cache_without_running_the_program_again(tmp_path, way):
     out, err = way(tmp_path)
@@ -71,6 +72,7 @@ def test_workers_fill_the_cache_without_running_the_program_again(tmp_path, way)
     assert (again, err) == ("{} 0 0 3 False", "")
 
 
+@pytest.mark.slow_but("one processor")
 @pytest.mark.parametrize(
     ("change", "started"),
     [
@@ -88,6 +90,7 @@ def test_without_workers_kernels_are_compiled_in_process(tmp_path, change, start
     assert python("script.py", folder=tmp_path, TSDYN_QUIET="1") == (f"{{}} {started} {IN_PROCESS}", "")
 
 
+@pytest.mark.slow
 def test_a_full_disk_costs_time_and_a_warning(tmp_path):
     pytest.importorskip("resource")
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))"
@@ -123,6 +126,7 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal can be sent to one process")
 def test_interrupt_ends_the_workers_and_leaves_no_halves(tmp_path):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "TMPDIR": str(tmp_path)}

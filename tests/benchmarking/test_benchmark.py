@@ -62,6 +62,7 @@ def test_errors_below_what_is_trusted_are_marked():
     assert marked.reference_digits == pytest.approx(3.0)
 
 
+@pytest.mark.slow
 def test_all_adaptive_methods_by_default():
     rows = ts.benchmark(two_body_pendulum(), tolerances=(1e-3,), t_span=(0.0, 0.2), repeats=1).rows
     assert {"Taylor", "RK45", "DOP853", "SDIRK54", "ImplicitTrapezoid"} <= {row.method for row in rows}
@@ -142,6 +143,7 @@ def test_text_and_notebook(small):
     assert "RK45" in shown
 
 
+@pytest.mark.slow
 def test_plot(small, tmp_path):
     pytest.importorskip("matplotlib")
     figure = small.plot(tmp_path / "figure.png")

@@ -20,6 +20,7 @@ print(main(["compile"]))
 """
 
 
+@pytest.mark.slow
 def test_compile_command(tmp_path):
     out, err = python("-c", COMMAND, folder=tmp_path)
     assert out.startswith("2 kernels are in ")
@@ -32,6 +33,7 @@ def test_compile_command(tmp_path):
     assert (again, err) == (out, "")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs the limits of POSIX")
 def test_compile_command_that_can_not_store_says_so(tmp_path):
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))"

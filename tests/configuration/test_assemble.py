@@ -123,6 +123,7 @@ def test_small_position_correction_is_the_smallest_in_kinetic_energy(seed, rng):
     np.testing.assert_allclose(scene.start[0] - before, expected, rtol=0.0, atol=2e-5 * np.abs(expected).max())
 
 
+@pytest.mark.slow_but("*-0", "*-1")
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("chosen", [(0,), (1,), (2,), (3,), (0, 3), (1, 2)], ids=str)
 def test_fixed_bodies_stay_where_they_are(seed, chosen):

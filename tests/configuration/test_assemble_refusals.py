@@ -57,6 +57,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow_for("two cosines", "too far")
 @pytest.mark.parametrize(("build", "error"), REFUSED.values(), ids=REFUSED.keys())
 def test_what_cannot_be_met_is_named_and_nothing_changes(build, error):
     scene, names = build()
@@ -89,6 +90,7 @@ def test_a_row_that_vanishes_where_it_is_met_is_refused():
         scene.assemble(t=1.0)
 
 
+@pytest.mark.slow_but("nan-f")
 @pytest.mark.parametrize("part", [0, 1], ids=["f", "fd"])
 @pytest.mark.parametrize("value", [math.nan, math.inf], ids=str)
 def test_motion_that_is_no_number_at_t_is_named_and_nothing_changes(part, value):

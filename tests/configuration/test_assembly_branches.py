@@ -13,6 +13,7 @@ C = ts.constraints
 COUNT = 20
 
 
+@pytest.mark.slow_but("four_bar", "hooke_joint")
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_sketches_assemble_on_their_branch(name):
     """Each body is off by up to 0.3 of its link and 0.5 rad; starts are 0.1 rad and more from a dead centre.
@@ -104,6 +105,7 @@ def test_a_frame_has_two_branches_and_the_sketch_says_which():
         np.testing.assert_allclose(one.position, b / 2, atol=1e-12)
 
 
+@pytest.mark.slow_but("four_bar")
 @pytest.mark.parametrize("name", ["four_bar", "rssr", "parallelogram", "scissor", "double_rocker"])
 def test_no_other_branch_is_chosen_silently(name):
     """Sketches that are off by even more: where links show a side and end on the other, the report says so."""

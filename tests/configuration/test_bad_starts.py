@@ -98,6 +98,7 @@ class Parabola(ts.Primitive):
         out[0] = 2.0 * xd[2] * xd[2]
 
 
+@pytest.mark.slow_for("row that vanishes")
 @pytest.mark.parametrize(("change", "error", "words"), [s[1:] for s in SCENES], ids=[s[0] for s in SCENES])
 def test_scenes(change, error, words):
     w = build()

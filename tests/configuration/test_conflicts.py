@@ -86,6 +86,7 @@ def door_off_its_hinges():
 CONFLICTS = (triangle, open_four_bar, contradicting_welds, rod_against_ball, door_off_its_hinges)
 
 
+@pytest.mark.slow_but("rod_against_ball-alone", "contradicting_welds-alone")
 @pytest.mark.parametrize("company", [False, True], ids=["alone", "in company"])
 @pytest.mark.parametrize("build", CONFLICTS)
 def test_the_smallest_set_is_named(build, company):
@@ -99,6 +100,7 @@ def test_the_smallest_set_is_named(build, company):
     assert not any(name in message for name in ("hook", "table", "string", "rope", "pivot", "lean"))
 
 
+@pytest.mark.slow_but("contradicting_welds")
 @pytest.mark.parametrize("build", CONFLICTS)
 def test_without_any_of_them_the_rest_can_be_met(build):
     _, names = refused(build()[0])
@@ -109,6 +111,7 @@ def test_without_any_of_them_the_rest_can_be_met(build):
         assert scene.assemble(folds="free").residual < 1e-12
 
 
+@pytest.mark.slow
 def test_bodies_held_fixed_are_part_of_it():
     scene = ts.Scene()
     one, two = (scene.add_body(1.0, (0.1, 0.1, 0.1), x, name=f"part at {x[0]}") for x in ((0, 0, 0), (3.0, 0, 0)))
@@ -134,6 +137,7 @@ def test_one_that_nothing_can_meet():
     assert len(names) == 1
 
 
+@pytest.mark.slow
 def test_many_suspects():
     """A chain of ten links that is too short for its ends: all of it conflicts, and the rod across it doesn't."""
     m, points = Builder(), [0.5 * i * polar(0.0) for i in range(11)]
@@ -148,6 +152,7 @@ def test_many_suspects():
     assert "and 3 more" in message
 
 
+@pytest.mark.slow
 def test_a_rod_whose_ends_a_ball_holds_together():
     """At the least that is left over the rod has no length, nor a derivative; it isn't the rod alone."""
     m, points = Builder(), [0.5 * i * polar(0.0) for i in range(6)]

@@ -44,6 +44,7 @@ def test_the_checker_refuses_a_row_on_velocities():
         ts.testing.check_primitive(KnifeEdge)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "form"),
     [("rk45", "null-space"), (None, "null-space"), ("rk45", "maggi-kane"), ("sdirk54", "tangent")],

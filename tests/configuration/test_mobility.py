@@ -144,6 +144,7 @@ def test_sparse_matrices_say_the_same(name, monkeypatch, rng):
     assert str(sparse) == str(dense)
 
 
+@pytest.mark.slow
 def test_large_scenes(monkeypatch):
     found = mechanisms.build(mechanisms.tree(9)).mobility()
     assert (found.degrees_of_freedom, found.redundant) == (3 * 511, ())

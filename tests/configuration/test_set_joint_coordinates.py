@@ -96,6 +96,7 @@ def test_joints_of_a_loop_are_kept_where_asked_for():
     assert coordinates(scene)[[0, 4]] == pytest.approx(np.array([[0.2, 1.0], [-0.1, 0.5]]), abs=1e-10)
 
 
+@pytest.mark.slow
 def test_a_goal_out_of_reach_leaves_the_bodies_as_they_were():
     scene = four_bar()
     before = scene.start

@@ -130,6 +130,7 @@ def test_rigid_bodies_and_point_masses(rng):
     check(run(scene, 2.0, t_eval=between_steps(rng, 2.0), constraint_tol=EPS))
 
 
+@pytest.mark.slow_but("Dot2", "Spherical")
 @pytest.mark.parametrize("name", PRIMITIVES)
 def test_the_errors_reported_are_the_errors(name, rng):
     """constraint_error against formulas of the tests' own, off the constraints as well as on them."""
@@ -172,6 +173,7 @@ def test_maggi_kane_drifts_in_position_only(name):
     assert drift.max() / finer.max() > 2**3.85
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(definition=chains(), seed=st.integers(0, 100))
 def test_random_chains_of_mixed_joints(definition, seed):

@@ -13,6 +13,7 @@ from tsdyn.taylor import layout as expansion_pack
 C, M = ts.constraints, ts.motions
 
 
+@pytest.mark.slow
 def test_all_methods_agree():
     scene = everything()
     end = 1.0
@@ -26,6 +27,7 @@ def test_all_methods_agree():
     assert ts.simulate(scene, (0.0, 0.1)).method.startswith("Taylor")
 
 
+@pytest.mark.slow
 def test_series_of_many_bodies_are_the_same(monkeypatch):
     """The loops that bring numbers into the cache ahead."""
     ends = []
@@ -126,6 +128,7 @@ def pushed(load, torque):
     return scene
 
 
+@pytest.mark.slow
 def test_loads_may_be_motions():
     """As functions of a user's, without compiling any; Taylor has no series of loads."""
     wave = M.Sine(2.0, 3.0, 0.1)

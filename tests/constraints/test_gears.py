@@ -13,6 +13,7 @@ X, Y, Z = np.eye(3)
 C, M = ts.constraints, ts.motions
 
 
+@pytest.mark.slow_for("*sdirk54*")
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
 @pytest.mark.parametrize("lead", [0.05, -0.3])
 def test_a_screw_over_many_turns(lead, options):
@@ -34,6 +35,7 @@ def test_a_screw_over_many_turns(lead, options):
     np.testing.assert_allclose(force[:, 2], 2.0 * (9.81 + lead * gain), rtol=1e-7 * loose(options))
 
 
+@pytest.mark.slow_for("*sdirk54*")
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
 def test_a_rack_drives_its_pinion(options):
     """(m + J / r^2) x'' = force, the rack sliding in the ground and the pinion turning there."""
@@ -58,6 +60,7 @@ def test_a_rack_drives_its_pinion(options):
     assert apart(turn(solution, pinion), solution.position(rack)[:, 0] / radius).max() < 1e-11
 
 
+@pytest.mark.slow_for("*sdirk54*")
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
 @pytest.mark.parametrize("ratio", [-math.sqrt(2.0), 0.37])
 def test_a_gear_pair_over_many_turns(ratio, options):

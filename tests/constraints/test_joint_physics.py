@@ -47,6 +47,7 @@ def test_a_joint_allows_its_motions_and_no_other(kind, swapped, rng):
         assert values[-1] > 1e-3 * values[0]
 
 
+@pytest.mark.slow_but("*'Universal', 'Cylindrical'*", "*'Screw', 'Revolute'*")
 @pytest.mark.parametrize("kinds", [(k, "Revolute") for k in COMPOSED] + [("Universal", k) for k in COMPOSED], ids=str)
 def test_motion_and_reactions_are_those_of_minimal_coordinates(kinds, rng):
     links = links_of(rng, *kinds)

@@ -17,6 +17,7 @@ C = ts.constraints
 # what they are made of
 
 
+@pytest.mark.slow_but("0-Revolute", "0-Parallel")
 @pytest.mark.parametrize("kind", JOINTS, **by_name)
 @pytest.mark.parametrize("seed", range(3))
 def test_parts_and_assembled_rows_are_derivatives_of_phi(kind, seed):

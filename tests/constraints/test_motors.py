@@ -16,6 +16,7 @@ X, Y, Z = np.eye(3)
 # motors
 
 
+@pytest.mark.slow_for("*sdirk54*")
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
 def test_a_motor_turns_on_and_on(options):
     """Fifty turns at a constant speed: nothing is counted, and nothing is lost."""
@@ -29,6 +30,7 @@ def test_a_motor_turns_on_and_on(options):
     np.testing.assert_allclose(torque, 0.0, atol=1e-9)
 
 
+@pytest.mark.slow_for("*sdirk54*")
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
 def test_a_motor_that_goes_to_and_fro(options):
     """Eight turns either way about an off-centre arm: angle, torque and power are the closed form's."""
@@ -109,6 +111,7 @@ def test_an_angle_that_is_set_later():
     assert apart(turn(still, wheel), 0.0).max() < 1e-13
 
 
+@pytest.mark.slow_for("*sdirk54*")
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
 def test_a_translation_motor(options):
     travel = M.Sine(0.2, 3.0)
@@ -121,6 +124,7 @@ def test_a_translation_motor(options):
     np.testing.assert_allclose(solution.power, force[:, 2] * travel.rate(solution.t), atol=1e-9)
 
 
+@pytest.mark.slow_for("*sdirk54*")
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
 def test_a_point_is_led_in_the_frame_of_a_body_that_turns(options):
     """A bead led along a path on a turning disc: its place, and the force with Coriolis and all."""

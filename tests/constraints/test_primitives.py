@@ -44,6 +44,7 @@ def test_every_primitive_and_joint_is_public():
     assert {kind.__name__ for kind in PRIMITIVES + JOINTS} <= set(C.__all__)
 
 
+@pytest.mark.slow_but("0-*")
 @pytest.mark.parametrize("kind", [*PRIMITIVES, OnEllipsoid, DrivenPivot], ids=lambda kind: kind.__name__)
 @pytest.mark.parametrize("seed", range(3))
 def test_kernels_are_the_derivatives_of_phi(kind, seed):
@@ -55,6 +56,7 @@ def test_kernels_with_a_motion(make):
     ts.testing.check_primitive(make)
 
 
+@pytest.mark.slow_but("*-motion")
 @pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
 @pytest.mark.parametrize("make", DRIVEN.values(), ids=DRIVEN)
 def test_kernels_and_series_of_what_is_driven(make, given):

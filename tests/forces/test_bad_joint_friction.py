@@ -36,6 +36,7 @@ class SuddenFriction(F.ContactFriction):
         out[0], out[6] = f * xd[0], -f * xd[0]
 
 
+@pytest.mark.slow
 def test_jamming_on_the_way_ends_the_run():
     scene = rod(1.1, 1.0, SuddenFriction)
     solution = ts.simulate(scene, (0.0, 1.0), **EXACT)
@@ -81,6 +82,7 @@ class BallFriction(ts.JointFriction, ts.Force):
         return {"radius": rng.uniform(0.5, 1.0)}
 
 
+@pytest.mark.slow
 def test_a_plug_in():
     ts.testing.check_force(BallFriction)
     scene = ts.Scene()

@@ -181,12 +181,14 @@ class Quartic(ts.Force):
         return r * r / 4
 
 
+@pytest.mark.slow
 def test_checker_accepts_a_plug_in():
     ts.testing.check_force(Quartic)
     with pytest.raises(ts.InvalidArgument):
         ts.testing.check_force(3)
 
 
+@pytest.mark.slow
 def test_checker_sees_what_is_wrong():
     class NoPotential(Quartic):
         potential = None

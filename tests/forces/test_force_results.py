@@ -33,6 +33,7 @@ def energy_rates(solution):
     return sum(w * (energy(k * h) - energy(-k * h)) for k, w in {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}.items()) / h
 
 
+@pytest.mark.slow
 def test_energy_power_and_dissipation_balance(rng):
     scene, _ = everything(rng)
     solution = ts.simulate(scene, (0, 1), integrator=FINE).raise_if_failed()
@@ -213,6 +214,7 @@ def fails_late_between(t, a, b, par, out):
     out[0] = par[10]  # beyond its end
 
 
+@pytest.mark.slow_for("<lambda>1")
 @pytest.mark.parametrize("make", [
     lambda m: F.PointForce(m, force=fails_late),
     lambda m: F.PointForce(m, force=fails_late_by_state),

@@ -59,6 +59,7 @@ def test_every_force_is_public():
     assert set(F.__all__) == {kind.__name__ for kind in FORCES} | {"registered"}
 
 
+@pytest.mark.slow_but("0-Spring", "0-Torque")
 @pytest.mark.parametrize("kind", FORCES, **by_name)
 @pytest.mark.parametrize("seed", range(2))
 def test_kernels_jacobians_and_power(kind, seed):
@@ -76,6 +77,7 @@ def follow(t, state):
 TABLE = ts.Table(np.linspace(0, 1, 9), np.sin(np.arange(27.0)).reshape(9, 3))
 
 
+@pytest.mark.slow_but("*constant-ground")
 @pytest.mark.parametrize("frame", ["ground", "body"])
 @pytest.mark.parametrize("load", [(1, 2, 3), wave, follow, TABLE], ids=["constant", "time", "state", "table"])
 @pytest.mark.parametrize(("kind", "word"), [(F.PointForce, "force"), (F.Torque, "torque")])
@@ -217,6 +219,7 @@ def gravitation(t, a, b, par, out):
         out[i] = -par[0] * d[i] / r**3
 
 
+@pytest.mark.slow
 def test_user_force_between_point_masses():
     """A circular orbit of two masses."""
     scene = ts.Scene(gravity=(0, 0, 0))
@@ -228,6 +231,7 @@ def test_user_force_between_point_masses():
     np.testing.assert_allclose(solution.q[-1], solution.q[0], atol=1e-7)
 
 
+@pytest.mark.slow
 def test_user_force_has_all_of_both_states(rng):
     scene, a, b = pair(rng)
     one, two = rng.normal(size=(2, 3))

@@ -130,6 +130,7 @@ def test_the_collar_and_the_length_of_a_pin():
     assert np.linalg.norm(solution.reaction(friction)[1][-1]) == pytest.approx(0.1 * 0.02 * N, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_many_rough_joints_against_the_equations_in_numpy():
     """The solver's accelerations and reactions against `evaluate`, which solves the dense equations by its own code."""
     scene, joints = chain(6)
@@ -148,6 +149,7 @@ def test_many_rough_joints_against_the_equations_in_numpy():
     np.testing.assert_allclose(*last, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_evaluate_of_a_large_scene():
     scene, _ = chain(150)
     seen = scene.evaluate()
@@ -158,6 +160,7 @@ def test_evaluate_of_a_large_scene():
     assert np.abs(residual).max() < 1e-9 * scale
 
 
+@pytest.mark.slow
 def test_redundant_constraints_whose_needed_reactions_are_unique():
     scene, joints = four_bar()
     solution = ts.simulate(scene, (0.0, 1.0), dense_output=True, **EXACT)

@@ -68,6 +68,7 @@ def test_jacobian_with_every_force(kind, rng):
     demand_derivatives(scene, rng)
 
 
+@pytest.mark.slow
 def test_jacobian_with_loads_on_joints(rng):
     """Of the angle and the displacement, not linear."""
     scene = ts.Scene()
@@ -82,6 +83,7 @@ def test_jacobian_with_loads_on_joints(rng):
     demand_derivatives(scene, rng)
 
 
+@pytest.mark.slow
 def test_jacobian_with_all_forces_and_a_driven_rod(rng):
     demand_derivatives(everything(rng)[0], rng)
 

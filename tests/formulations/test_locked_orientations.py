@@ -47,6 +47,7 @@ def references():
     return reference
 
 
+@pytest.mark.slow_for("hub-*")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", SCENES)
 def test_the_motion_is_that_with_every_rotation(name, method, references):
@@ -272,6 +273,7 @@ class Upright(ts.Primitive):
             out[i] = 0.0
 
 
+@pytest.mark.slow
 def test_a_constraint_of_a_users_own_holds_a_body():
     scene = ts.Scene()
     body = block(scene, (0.0, 0.0, 0.0), 0.4)
@@ -293,12 +295,14 @@ def test_forms_with_a_basis_keep_every_coordinate(form):
     assert solution.stats.rotations_skipped == 0
 
 
+@pytest.mark.slow
 def test_implicit_methods_keep_every_coordinate():
     solution = run(slides(), "", integrator=I.SDIRK54(1e-9, 1e-9), formulation="tangent")
     assert solution.stats.rotations_skipped == 0
     np.testing.assert_allclose(solution.q[-1], run(slides()).q[-1], rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["dop853", "taylor"])
 def test_the_profile_accounts_for_it(method):
     found = ts.profile(slides(), (0.0, END), t_eval=(0.0, END), advice=False, **METHODS[method])

@@ -40,6 +40,7 @@ def demand_same(one, two, growth):
 GROWTH = {"sliding_top": 2e3, "two_body_pendulum": 2e4, "two_body_pendulum_spatial": 2e4, "chain_4": 2e4}
 
 
+@pytest.mark.slow_for("chain_4*")
 @pytest.mark.parametrize("interval", [None, 7])
 @pytest.mark.parametrize("name", GROWTH)
 def test_thousands_of_steps_and_many_charts(name, interval):
@@ -105,6 +106,7 @@ def test_without_any_constraint():
     assert np.abs(one.position(mass) - expected).max() < 1e-12
 
 
+@pytest.mark.slow_but("*body to body")
 @pytest.mark.parametrize("between", BETWEEN)
 @pytest.mark.parametrize("name", PRIMITIVES)
 def test_every_primitive(name, between, rng):
@@ -119,6 +121,7 @@ def test_every_primitive(name, between, rng):
     demand_same(one, two, 1e4)
 
 
+@pytest.mark.slow
 @given(definition=chains(), seed=st.integers(0, 100))
 def test_random_chains(definition, seed):
     def make():

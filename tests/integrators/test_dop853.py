@@ -35,6 +35,7 @@ def test_tableau_meets_its_order_conditions():
         RungeKuttaTableau(tableau.a, tableau.b, tableau.c, 8, error=(1.0, -1.0))
 
 
+@pytest.mark.slow_for("*maggi-kane")
 @pytest.mark.parametrize("formulation", FORMS)
 @pytest.mark.parametrize("name", SCENES[1:])
 def test_order_with_a_chart_every_step(name, formulation):
@@ -113,6 +114,7 @@ def test_by_its_name_and_with_settings():
         DOP853(rtol=-1.0)
 
 
+@pytest.mark.slow
 def test_scipy_integrate_is_imported_when_needed():
     code = (
         "import sys, tsdyn; m = tsdyn.integrators.DOP853(); a = 'scipy.integrate' in sys.modules; m.tableau;"

@@ -19,6 +19,7 @@ by_name = {"ids": lambda x: getattr(x, "__name__", str(x))}
 # order, errors
 
 
+@pytest.mark.slow_but("sliding_top-*")
 @pytest.mark.parametrize(
     ("method", "counts", "interval"),
     [(ImplicitTrapezoid, (200, 400, 800, 1600), None), (SDIRK54, (160, 240, 320, 480), 1)],
@@ -33,6 +34,7 @@ def test_order(name, method, counts, interval):
     assert abs(slope - method.order) < 0.2
 
 
+@pytest.mark.slow_but("sliding_top")
 @pytest.mark.parametrize("name", SCENES)
 def test_order_of_sdirk54_with_charts_by_the_criteria(name):
     counts = (120, 160, 240, 320)
@@ -41,6 +43,7 @@ def test_order_of_sdirk54_with_charts_by_the_criteria(name):
     assert abs(np.polyfit(-np.log(counts), np.log([off for _, off in found]), 1)[0] - 5.0) < 0.2
 
 
+@pytest.mark.slow_but("sliding_top-*")
 @pytest.mark.parametrize(
     ("method", "tol"),
     [(SDIRK54, tol) for tol in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)] + [(ImplicitTrapezoid, tol) for tol in (1e-3, 1e-5)],
@@ -55,6 +58,7 @@ def test_error_follows_the_tolerance(name, method, tol):
     assert solution.stats.jacobians == 1
 
 
+@pytest.mark.slow_for("chain_16*")
 @pytest.mark.parametrize(
     ("name", "method", "tol", "end"),
     [
@@ -103,6 +107,7 @@ def test_a_first_step_of_any_length(method, first):
 # dense output
 
 
+@pytest.mark.slow_but("<lambda>0*")
 @pytest.mark.parametrize("method", [ImplicitTrapezoid(1e-3, 1e-3), SDIRK54(1e-7, 1e-7), SDIRK54(1e-2, 1e-2)], ids=repr)
 @pytest.mark.parametrize("make", [lambda: load(SCENES[0])[0], lambda: load(SCENES[2])[0], driven, jointed, hung])
 def test_dense_output_is_on_the_manifold_and_changes_nothing(make, method, rng):
@@ -116,6 +121,7 @@ def test_dense_output_is_on_the_manifold_and_changes_nothing(make, method, rng):
     np.testing.assert_array_equal(dense.steps.h, plain.steps.h)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "counts"), [(ImplicitTrapezoid, (200, 400, 800)), (SDIRK54, (80, 120, 160, 240))], **by_name
 )

@@ -70,6 +70,7 @@ def test_order(name):
         assert len(own) >= 10
 
 
+@pytest.mark.slow_but("sliding_top")
 @pytest.mark.parametrize("name", SCENES)
 def test_order_with_charts_at_given_instants(name):
     """A new chart every 1/32 s."""
@@ -78,6 +79,7 @@ def test_order_with_charts_at_given_instants(name):
     assert all("chart_interval" in solution.charts.reason for solution in solutions)
 
 
+@pytest.mark.slow_but("*sliding_top")
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("interval", [1, 10, 50])
 def test_a_chart_every_so_many_steps_keeps_the_order(name, interval):
@@ -110,6 +112,7 @@ def test_below_truncation_a_chart_changes_rounding_only(name, interval):
     assert change(free, forced) < 2 * EPS * np.sqrt(forced.stats.charts) * (1 + angle)
 
 
+@pytest.mark.slow_but("sliding_top")
 @pytest.mark.parametrize("name", SCENES)
 def test_order_of_maggi_kane(name):
     """The first-order equivalent, the classical Runge-Kutta method, on Eqs. 17-18; a new V every 1/32 s."""

@@ -40,6 +40,7 @@ def cheapest(make, method, target):
     return next(stiff(make, method, tol) for tol in LADDER if off_by(make, method, tol) <= target)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("make", "end"), [(jointed, 0.3), (hung, 0.05)], **by_name)
 def test_the_reference_of_stiff_scenes(make, end):
     """From beginning to end of the fast motion, and on, against RK45 at tight tolerances."""
@@ -53,12 +54,14 @@ def test_the_reference_of_stiff_scenes(make, end):
     assert 0.0 < finer < 1e-8  # what is compared with errors of 1e-6 and more
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "times"), [(ImplicitTrapezoid, 8), (SDIRK54, 50)], **by_name)
 @pytest.mark.parametrize("make", STIFF, **by_name)
 def test_fewer_steps_than_rk45(make, method, times):
     assert times * cheapest(make, method, TARGET).stats.steps < cheapest(make, RK45, TARGET).stats.steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", STIFF, **by_name)
 def test_sdirk54_beats_the_trapezoid_where_accuracy_counts(make):
     """From tolerances of 1e-6 on, fewer evaluations for no larger an error."""
@@ -67,6 +70,7 @@ def test_sdirk54_beats_the_trapezoid_where_accuracy_counts(make):
     assert 2 * own.stats.evaluations < other.stats.evaluations
 
 
+@pytest.mark.slow_for("jointed-SDIRK54-*")
 @pytest.mark.parametrize(
     ("make", "method", "tol"),
     [(jointed, SDIRK54, tol) for tol in (1e-1, 1e-2, 1e-3, 1e-4)]
@@ -80,6 +84,7 @@ def test_a_hundred_times_stiffer_takes_no_more_steps(make, method, tol):
     assert off_by(make, method, tol, 100.0) < 100.0 * tol
 
 
+@pytest.mark.slow_but("hung-*")
 @pytest.mark.parametrize("method", METHODS, **by_name)
 @pytest.mark.parametrize("make", STIFF, **by_name)
 def test_stiff_scenes_reuse_their_jacobian(make, method):
@@ -89,6 +94,7 @@ def test_stiff_scenes_reuse_their_jacobian(make, method):
         demand_on_the_manifold(solution, solution)
 
 
+@pytest.mark.slow_but("hung")
 @pytest.mark.parametrize("make", STIFF, **by_name)
 def test_work_balance(make):
     """What the energy loses is what dampers take, by Simpson's rule over the steps, which resolve the fast motion."""

@@ -15,12 +15,14 @@ ROOT = Path(__file__).parents[2]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX file permissions, limits or locks")
 
 
+@pytest.mark.slow
 def test_first_compilation_is_announced_once(tmp_path):
     result, errors = run(SMALL, {"NUMBA_CACHE_DIR": str(tmp_path)})
     assert result["misses"] == KERNELS
     assert errors.count("compiling kernels") == 1
 
 
+@pytest.mark.slow_but("<lambda>0")
 @pytest.mark.parametrize("damage", [lambda b: b[: len(b) // 2], lambda b: b"", lambda b: b[:-9] + b"\0" * 9])
 def test_damaged_kernels_are_compiled_anew(tmp_path, damage):
     environment = {"NUMBA_CACHE_DIR": str(tmp_path)}
@@ -33,6 +35,7 @@ def test_damaged_kernels_are_compiled_anew(tmp_path, damage):
     assert (again.get("damaged", 0), again["misses"]) == (0, 0)
 
 
+@pytest.mark.slow
 @posix
 def test_full_disk_costs_a_warning_and_not_the_run(tmp_path):
     full = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
@@ -45,6 +48,7 @@ def test_full_disk_costs_a_warning_and_not_the_run(tmp_path):
 WITHOUT_PRIVILEGE = ["setpriv", "--bounding-set=-dac_override,-dac_read_search"]  # root heeds permissions, too
 
 
+@pytest.mark.slow
 @posix
 def test_complete_cache_that_can_not_be_written_is_used(tmp_path):
     as_root = hasattr(os, "getuid") and os.getuid() == 0
@@ -86,11 +90,13 @@ print(twice(1.0), signal.getsignal(signal.SIGINT) is signal.default_int_handler)
 """
 
 
+@pytest.mark.slow
 def test_interrupt_while_llvm_works_is_a_keyboard_interrupt(tmp_path):
     process = command(INTERRUPTED, {"NUMBA_CACHE_DIR": str(tmp_path), "TSDYN_QUIET": "1"}, ROOT)
     assert process.communicate(timeout=300) == ("interrupted\n2.0 True\n", "")
 
 
+@pytest.mark.slow
 @posix
 def test_no_writable_home_falls_back_to_the_temporary_folder(package):
     blocked = package / "file"
@@ -106,6 +112,7 @@ def test_no_writable_home_falls_back_to_the_temporary_folder(package):
     assert (first["misses"], second["misses"]) == (KERNELS, 0)
 
 
+@pytest.mark.slow
 @posix
 def test_processes_starting_together_compile_once(tmp_path):
     environment = {"NUMBA_CACHE_DIR": str(tmp_path)}

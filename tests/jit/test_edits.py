@@ -14,6 +14,7 @@ def edit(file, old, new):
     file.write_text(text.replace(old, new))
 
 
+@pytest.mark.slow
 def test_edited_callee_in_another_file_is_seen(package):
     environment = {"NUMBA_CACHE_DIR": str(package / "cache")}
     before, _ = run(SMALL, environment, package)
@@ -55,6 +56,7 @@ def test_kernels_in_a_sub_package_follow_an_edit_of_their_callees(package):
     assert (edited["value"], edited["misses"]) == (10.0, 1)
 
 
+@pytest.mark.slow
 def test_an_edit_of_a_docstring_compiles_nothing(package):
     file = package / "tsdyn" / "documented.py"
     file.write_text('from .jit.kernels import entry\n@entry\ndef twice(x):\n    """Double."""\n    return 2.0 * x\n')
@@ -140,6 +142,7 @@ def plug_run(folder, environment):
     return run(PLUG_IN, {"PYTHONPATH": os.pathsep.join([str(ROOT), str(folder)]), **environment}, folder)[0]
 
 
+@pytest.mark.slow
 def test_plug_in_is_cached_and_its_edits_are_seen(plug_in, warm):
     _, environment = warm(SMALL.replace("length=3.0", "length=3 * (lambda t: 3.0,)"))  # all of Distance is in the cache
     first = plug_run(plug_in, environment)
@@ -155,6 +158,7 @@ def test_plug_in_is_cached_and_its_edits_are_seen(plug_in, warm):
     assert plug_run(plug_in, environment)["Phi"] == 23.0
 
 
+@pytest.mark.slow
 def test_functions_on_one_line_are_told_apart(plug_in, warm):
     # f and fdd differ in a constant only: same file, line, name and byte code
     _, environment = warm(SMALL.replace("length=3.0", "length=3 * (lambda t: 3.0,)"))

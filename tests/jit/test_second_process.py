@@ -53,6 +53,7 @@ report(q=solution.q[-1].tolist(), forces=loaded("force"), jacobians=loaded("jaco
 )
 
 
+@pytest.mark.slow
 def test_forces_are_cached_and_only_those_used_are_loaded(warm):
     first, environment = warm(FORCES)
     second, _ = run(FORCES, environment)
@@ -89,6 +90,7 @@ report(explicit=explicit, implicit=loaded(scene), q=ends.tolist())
 )
 
 
+@pytest.mark.slow
 def test_implicit_methods_are_cached_and_load_what_explicit_ones_do_not(warm):
     first, environment = warm(IMPLICIT)
     second, errors = run(IMPLICIT, environment)
@@ -99,6 +101,7 @@ def test_implicit_methods_are_cached_and_load_what_explicit_ones_do_not(warm):
         assert result["implicit"] == [3, 1, 5]  # Spherical, Dot1 and normalisations; TorsionalSpring; all
 
 
+@pytest.mark.slow
 def test_plug_in_integrator_is_cached(warm):
     code = (
         REPORT
@@ -118,6 +121,7 @@ report()
     assert run(code, environment)[0]["misses"] == 0
 
 
+@pytest.mark.slow
 def test_threads_that_start_together(warm):
     """In a process that has loaded nothing yet."""
     code = (
@@ -135,6 +139,7 @@ report(same=all(end == ends[0] for end in ends))
     assert (result["same"], result["misses"]) == (True, 0)
 
 
+@pytest.mark.slow
 def test_debug_mode_runs_plain_python():
     code = (
         REPORT
@@ -182,6 +187,7 @@ report(q=ends)
 )
 
 
+@pytest.mark.slow
 def test_new_motions_compile_nothing(warm):
     """Whatever is prescribed is numbers for kernels that are there."""
     few, more = "(M.Ramp(), M.Ramp())", "(np.tanh(M.Ramp(0.0, 3.0)), M.Exponential(1.0, 2.0) * M.Sine(1.0, 3.0))"
@@ -192,6 +198,7 @@ def test_new_motions_compile_nothing(warm):
     assert second["q"][0] == first["q"][0]
 
 
+@pytest.mark.slow
 def test_a_scene_without_motions_loads_none_of_it():
     code = (
         REPORT

@@ -91,6 +91,7 @@ CALLABLES = {
 }
 
 
+@pytest.mark.slow_but("built-in", "partial")
 @pytest.mark.parametrize("motion", CALLABLES.values(), ids=CALLABLES.keys())
 def test_other_callables_run_or_are_refused(motion):
     try:

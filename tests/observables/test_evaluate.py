@@ -95,6 +95,9 @@ def test_start_is_that_of_the_bodies(definition):
         close(a, b, 1e5 * EPS)  # qdd may be ill-conditioned; q and qd agree to rounding
 
 
+@pytest.mark.slow_but(
+    "chain of 1", "free", "Dot2, body to body", "Spherical, body to ground", "Distance, driven, body to body"
+)
 @cases
 def test_mass_matrix_and_forces(definition, rng):
     scene = build(definition)
@@ -212,6 +215,7 @@ def test_evaluation_leaves_its_arguments_and_the_scene_alone(rng):
     np.testing.assert_array_equal(scene.bodies[0].position, definition["bodies"][0]["position"])
 
 
+@pytest.mark.slow_but("ring")
 @pytest.mark.parametrize(
     ("scene", "redundant"),
     [

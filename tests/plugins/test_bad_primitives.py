@@ -119,6 +119,7 @@ def jacobian_nan(x, par, t, out):
     out[0, 2] = np.nan
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "use", [lambda s: ts.simulate(s, (0, 1)), lambda s: s.assemble()], ids=["simulate", "assemble"]
 )

@@ -41,6 +41,7 @@ def by_stages():
 # what is measured
 
 
+@pytest.mark.slow_but("by_steps")
 @pytest.mark.parametrize("name", ["by_steps", "by_series", "by_stages"])
 def test_phases_add_up(name, request):
     found = request.getfixturevalue(name)
@@ -143,6 +144,7 @@ def test_timers_change_no_number_and_stay_in_no_memory():
     assert not any(timers & set(memory.addresses.tolist()) for memory in spare)
 
 
+@pytest.mark.slow
 def test_a_run_loads_no_timer():
     code = (
         REPORT
@@ -198,6 +200,7 @@ def test_a_costly_form():
     assert "formulation='tangent' is" in advice(pendulum_chain.build(6), (0.0, 0.3), formulation="null-space")
 
 
+@pytest.mark.slow
 def test_a_stiff_motion_by_an_explicit_method():
     said = advice(stiff.hung(), (0.0, 2.0), integrator=I.DOP853(1e-4, 1e-4))
     assert "The motion is stiff: SDIRK54(rtol=0.0001, atol=0.0001) is" in said
@@ -259,6 +262,7 @@ def test_what_is_no_scene():
         ts.profile("top", (0.0, 1.0))
 
 
+@pytest.mark.slow
 def test_debug_mode_has_no_kernels_to_time():
     code = (
         REPORT

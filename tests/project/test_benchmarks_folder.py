@@ -38,6 +38,7 @@ def test_chains_are_those_of_the_reference_files(links):
             np.testing.assert_allclose(value, other[key], rtol=0, atol=1e-16)
 
 
+@pytest.mark.slow_for("hub*", "net*")
 @pytest.mark.parametrize(
     ("definition", "bodies", "rows"),
     [
@@ -71,6 +72,7 @@ def test_every_scene_has_a_reference():
         assert reference.trusted < 1e-11, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contender", by_hand.CONTENDERS, ids=lambda one: one.name)
 @pytest.mark.parametrize(
     "name",
@@ -86,6 +88,7 @@ def test_kernels_by_hand_agree_with_references(contender, name):
     assert fine < 5e-12
 
 
+@pytest.mark.slow
 def test_kernels_by_hand_agree_on_a_long_chain():
     one, two = (contender.prepare(SCENES["chain of 64"])(1e-13) for contender in by_hand.CONTENDERS)
     assert one.error(two.r, two.A) < 1e-10
@@ -110,6 +113,7 @@ def test_peers_say_what_they_are(peer):
 GOOD = {"tolerance": 1e-8, "step": 3e-4}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("peer", PEERS, ids=lambda one: one.name)
 @pytest.mark.parametrize("name", SMALL)
 def test_peers_that_are_installed_agree_with_references(peer, name):
@@ -205,6 +209,7 @@ def test_figures_are_drawn(tmp_path):
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_one_command():
     result = subprocess.run([sys.executable, "-m", "benchmarks", "--help"], capture_output=True, text=True, check=True)
     assert "work-precision" in result.stdout

@@ -46,6 +46,7 @@ MECHANISMS = {
 }
 
 
+@pytest.mark.slow_for("driven_pivot")
 @pytest.mark.parametrize(("module", "build", "end", "step"), RUNS.values(), ids=RUNS.keys())
 def test_example(module, build, end, step):
     solution = ts.simulate(build(), (0.0, end), integrator=ts.integrators.Nystrom4(step=step))
@@ -63,6 +64,7 @@ def test_mechanism(module, end):
         module.check(rough)
 
 
+@pytest.mark.slow
 def test_a_rheonomic_pendulum():
     """As a plug-in and built in: to 1e-9 by DOP853 at 1e-11; by Taylor what is built in."""
     method = ts.integrators.DOP853(rtol=1e-11, atol=1e-11)
@@ -72,6 +74,7 @@ def test_a_rheonomic_pendulum():
     driven_pivot.check(solution, tol=1e-9)
 
 
+@pytest.mark.slow
 def test_stick_slip():
     """To 1e-9 by DOP853 at 1e-11, in both forms, and by SDIRK54; energy less work stays."""
     for given in ({}, {"formulation": "null-space"}):
@@ -84,6 +87,7 @@ def test_stick_slip():
     )
 
 
+@pytest.mark.slow_but("examples.top", "examples.slider_crank")
 @pytest.mark.parametrize(
     "module",
     [

@@ -21,6 +21,7 @@ def snippets():
             yield pytest.param(blocks, id=file.stem)
 
 
+@pytest.mark.slow_but("README", "parallel")
 @pytest.mark.parametrize("blocks", list(snippets()))
 def test_snippets_run(blocks, request, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -86,6 +86,7 @@ def demand_exact(scene, solution, tol=1e-11):
     assert errors.acceleration.max() < 1e-11
 
 
+@pytest.mark.slow_for("*-hub")
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("method", METHODS, ids=str)
 def test_accelerations_are_exact(name, method):
@@ -93,6 +94,7 @@ def test_accelerations_are_exact(name, method):
     demand_exact(scene, ts.simulate(scene, (0.0, 0.3), integrator=method))
 
 
+@pytest.mark.slow
 def test_many_bodies():
     scene = chain(120, range(0, 120, 2))
     demand_exact(scene, ts.simulate(scene, (0.0, 0.05), integrator=METHODS[0]), 1e-9)

@@ -23,6 +23,7 @@ METHODS = {
 }
 
 
+@pytest.mark.slow_for("sdirk54")
 @pytest.mark.parametrize("method", METHODS)
 def test_the_motion_is_that_without_the_redundant_rows(method):
     whole, reduced = (
@@ -117,6 +118,7 @@ def test_many_loops_side_by_side():
     assert alone.success
 
 
+@pytest.mark.slow_for("400", "150")
 @pytest.mark.parametrize("count", [20, 150, 400])
 def test_a_closed_ring_of_many_links(count):
     """What a link may turn by without shifting those far away by more than their length falls with the size."""

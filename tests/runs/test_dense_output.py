@@ -217,6 +217,7 @@ def test_a_solution_outlives_a_change_of_its_scene():
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.slow
 def test_a_method_loads_its_own_interpolant_only():
     code = """
 import tsdyn as ts

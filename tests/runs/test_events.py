@@ -186,6 +186,7 @@ def test_a_terminal_event_at_the_start_and_at_the_end():
 # what a function is given, and what it gives
 
 
+@pytest.mark.slow
 def test_a_function_is_given_a_state():
     seen = []
 

@@ -231,6 +231,7 @@ def test_a_function_with_too_many_turns_says_so(monkeypatch):
 # the search itself
 
 
+@pytest.mark.slow
 def test_the_search_finds_what_samples_find(rng):
     """Sums of waves, their powers, angles and absolute values, at random."""
     dense, spent = np.linspace(0.0, 1.0, 5001), 0

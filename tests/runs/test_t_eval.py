@@ -14,6 +14,7 @@ FORMULATIONS = ("tangent", "null-space", "maggi-kane")
 # t_eval
 
 
+@pytest.mark.slow_but("*sliding_top")
 @scenes
 @formulations
 def test_t_eval_changes_no_step(make, formulation, rng):
@@ -51,6 +52,7 @@ def test_outputs_come_from_the_manifold(make, rng):
     assert (error.acceleration <= 5000 * EPS * (1 + np.abs(solution.qdd).max(axis=1))).all()
 
 
+@pytest.mark.slow_but("*sliding_top")
 @pytest.mark.parametrize("name", ["sliding_top", "two_body_pendulum", "two_body_pendulum_spatial"])
 @pytest.mark.parametrize("formulation", ["tangent", "maggi-kane"])
 def test_dense_values_are_of_order_four(name, formulation):

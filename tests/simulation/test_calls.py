@@ -50,6 +50,7 @@ def same(one, two):
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.slow_but("chain")
 @pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
 def test_a_run_is_the_same_whatever_ran_before(make, rng):
     first = {way: run(make(), way) for way in WAYS}
@@ -133,6 +134,7 @@ def test_a_start_is_looked_at_once_and_again_when_it_changes(monkeypatch):
         run(scene, "default")
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_number_of_runs():
     scene = top.build()
 

@@ -14,6 +14,7 @@ C = ts.constraints
 # axes without inertia
 
 
+@pytest.mark.slow_for("ball-*")
 @pytest.mark.parametrize("formulation", FORMS)
 @pytest.mark.parametrize("joint", [None, "ball"])
 def test_free_axis_without_inertia_is_refused_whatever_the_pose(joint, formulation, rng):

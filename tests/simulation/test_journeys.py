@@ -76,6 +76,9 @@ def runs():
     return [(*case, 3 * i + i // 16) for i, case in enumerate(cases)]
 
 
+@pytest.mark.slow_but(
+    "None-tangent-[!f]*", "*-tangent-one body-*", "*-null-space-one body-*", "*-maggi-kane-one body-*"
+)
 @pytest.mark.parametrize(("method", "form", "scene", "index"), runs(), ids=str)
 def test_every_result_answers_everything(method, form, scene, index):
     scene, given = SCENES[scene](), options(index)

@@ -81,6 +81,7 @@ def test_memory_grows_as_the_scene_does(family):
     assert memory(large) < fill * ratio * memory(small)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
 @pytest.mark.parametrize(
     "definition",
@@ -94,6 +95,7 @@ def test_constraints_hold_for_a_thousand_bodies(definition, options):
 HUBS = {"hub": lambda: mechanisms.build(mechanisms.hub(40)), "wheel": lambda: wheel(40), "spider": lambda: spider(100)}
 
 
+@pytest.mark.slow_for("*null-space")
 @pytest.mark.parametrize("options", [*METHODS.values(), {"formulation": "null-space"}], ids=[*METHODS, "null-space"])
 @pytest.mark.parametrize("scene", HUBS.values(), ids=HUBS)
 def test_a_hub_moves_as_in_one_piece(scene, options, monkeypatch):
@@ -136,6 +138,7 @@ def test_rows_that_depend_on_each_other_at_a_hub(large, monkeypatch):
         ts.simulate(scene, (0.0, 1.0), redundancy="refuse")
 
 
+@pytest.mark.slow
 def test_series_that_are_far_from_the_processor(monkeypatch):
     """What is brought into the cache ahead of its use changes no number."""
     runs = []
@@ -145,6 +148,7 @@ def test_series_that_are_far_from_the_processor(monkeypatch):
     np.testing.assert_array_equal(runs[0].q, runs[1].q)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
 def test_an_interrupt_is_answered_soon(options):
     """A run comes back from its kernels when it has made so many steps, fewer in a larger scene."""
@@ -215,6 +219,7 @@ def crowd(rng):
     return scene
 
 
+@pytest.mark.slow
 def test_errors_of_many_constraints_at_once(rng):
     """What constraint_error is made of is Phi and Phi_q qd + Phi_t, whatever the constraints have in common."""
     scene = crowd(rng)
@@ -277,6 +282,7 @@ def test_assembly_with_sparse_matrices(rng, monkeypatch):
         scene.assemble()
 
 
+@pytest.mark.slow
 def test_assembly_of_a_thousand_bodies(rng):
     scene = moved(mechanisms.build(mechanisms.chain(1000)), rng)
     report = scene.assemble()

@@ -202,6 +202,7 @@ def test_the_same_source_and_constants_are_compiled_once():
     assert of_state[0] is of_state[1]
 
 
+@pytest.mark.slow
 def test_scenes_leave_nothing_behind():
     def run():
         scene = pendulum()

@@ -96,6 +96,7 @@ class Rotten(ts.Primitive):
             out[i] = 0.0 * np.sqrt(0.505 - t)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", FORMS)
 @pytest.mark.parametrize("kind", ["rigid body", "point mass"])
 def test_plug_in_stops_being_a_number(kind, formulation):

@@ -134,6 +134,7 @@ def chain(definition):
     return np.concatenate([begin(b) for b in bodies]), rates, outputs
 
 
+@pytest.mark.slow_but("sliding_top", "chain_4")
 @pytest.mark.parametrize("name", NAMES)
 def test_digits_from_other_equations(name):
     asleep, kind = "sleeping" in name, {"top": top, "pendulum": pendulum, "chain": chain}[sort(name)]

@@ -74,6 +74,7 @@ def test_a_state_that_does_not_say_its_turns_is_refused():
         ts.simulate(scene, (0.9, 1.0), state=ts.State(*end))
 
 
+@pytest.mark.slow_for("of time and state")
 @pytest.mark.parametrize("force", [pull, push], ids=["of time and state", "of time"])
 def test_functions_see_their_globals_as_they_are(force, monkeypatch):
     scene = ts.Scene(gravity=(0.0, 0.0, 0.0))
@@ -85,6 +86,7 @@ def test_functions_see_their_globals_as_they_are(force, monkeypatch):
         assert ts.simulate(scene, (0.0, 1.0), **TIGHT).q[-1, 0] == pytest.approx(expected, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_pickles_run_in_another_process(tmp_path):
     """Scenes, and solutions with all that they compute by kernels."""
     solutions = [ts.simulate(module.build(), (0.0, 0.3), **TIGHT) for module in (drive_train, driven_pivot)]
@@ -108,6 +110,7 @@ print("done")
     assert result.stdout.strip() == "done", result.stderr
 
 
+@pytest.mark.slow_but("None-tangent")
 @pytest.mark.parametrize(("method", "form"), [(None, "tangent"), ("dop853", "tangent"), ("rk45", "null-space")])
 def test_dense_output_is_pickled(method, form, tmp_path):
     solution = ts.simulate(top.build(), (0.0, 0.3), integrator=method, formulation=form, dense_output=True)
@@ -129,6 +132,7 @@ print("done")
     assert result.stdout.strip() == "done", result.stderr
 
 
+@pytest.mark.slow
 def test_charts_have_room_when_a_run_of_many_fails(monkeypatch):
     monkeypatch.setattr("tsdyn.runs.slices.CHART_ROOM", 8)
     scene = ts.Scene()

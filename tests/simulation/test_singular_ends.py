@@ -139,6 +139,7 @@ class Fading(ts.Primitive):
         out[0] = 2.0 * par[1] * xd[2] + par[2] * x[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", FORMS)
 def test_lost_rank(formulation):
     scene = ts.Scene()

@@ -68,6 +68,7 @@ METHODS = {
 }
 
 
+@pytest.mark.slow_but("*-alone", "!sdirk54-*", "!*null-space-*")
 @pytest.mark.parametrize("shape", ["alone", "plane rows", "a row of four"])
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_passes(method, shape):
@@ -106,6 +107,7 @@ def released(loops, heavy=2.0, **scene):
     return closed_loops.parallelogram(0.5 * np.pi, -1.0, 1.0, loops=loops, heavy=heavy, **scene), angle
 
 
+@pytest.mark.slow_for("40-*")
 @pytest.mark.parametrize(
     ("loops", "options", "off"),
     [
@@ -244,6 +246,7 @@ def test_a_motion_that_ends_there_stops_with_an_account():
         assert solution.constraint_error.position.max() < 1e-12
 
 
+@pytest.mark.slow
 def test_series_are_not_loaded_before_they_are_needed():
     code = """
 from tests.helpers import closed_loops

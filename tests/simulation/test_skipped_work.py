@@ -144,12 +144,14 @@ def alone():
     return run(LOADED.replace("BEFORE", ""), {})[0]
 
 
+@pytest.mark.slow
 def test_counts_are_those_of_a_process_that_never_heard_of_the_rest(alone):
     after = run(LOADED.replace("BEFORE", "everything_else()"), {})[0]
     for name in ("found", "within", "steps"):
         assert after[name][0] == alone[name][0]
 
 
+@pytest.mark.slow
 def test_kernels_of_other_kinds_and_methods_are_never_loaded(alone):
     _, names, of_steps, of_series = alone["found"]
     kinds = {name.split(".")[0] for name in names if name.endswith("_loop")}
@@ -158,11 +160,13 @@ def test_kernels_of_other_kinds_and_methods_are_never_loaded(alone):
     assert (of_steps, of_series) == (0, 1)  # the driver of the other methods is not loaded either
 
 
+@pytest.mark.slow
 def test_accelerations_between_the_steps_are_loaded_where_an_output_asks(alone):
     assert "accelerate_here" not in alone["found"][1]
     assert set(alone["within"][1]) - set(alone["found"][1]) == {"accelerate_here", "pass_singular"}
 
 
+@pytest.mark.slow
 def test_a_method_loads_its_own_step_and_nothing_between_the_steps(alone):
     new = set(alone["steps"][1]) - set(alone["within"][1])
     assert {"second_order_step", "place", "accelerate", "complete", "check", "start_chart", "error_norm"} <= new

@@ -181,6 +181,7 @@ def test_chains_cost_the_same_for_each_body(size):
         assert len(one.heads) >= 490
 
 
+@pytest.mark.slow
 def test_nothing_but_loops_of_many_nodes_needs_scipy():
     code = """
 import sys, tsdyn.sparse.symbolic

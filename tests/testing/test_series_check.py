@@ -45,11 +45,13 @@ def test_series_of_forces(make):
     ts.testing.check_force(make, states=1)
 
 
+@pytest.mark.slow
 def test_series_of_plug_ins():
     ts.testing.check_force(Soft)
     ts.testing.check_primitive(Rod)
 
 
+@pytest.mark.slow
 def test_the_example_of_the_docs(tmp_path, monkeypatch):
     text = (Path(__file__).parents[2] / "docs" / "plug-ins.md").read_text().split("# Taylor series of your own")[1]
     (tmp_path / "series_of_the_docs.py").write_text(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1])
@@ -94,6 +96,7 @@ def pair():
     return scene, *scene.bodies, rng
 
 
+@pytest.mark.slow_but("Spherical")
 @pytest.mark.parametrize(
     "kind", [C.Spherical, C.Distance, C.Dot1, C.Dot2, C.PlaneContact, C.AngleDriver, C.Thread, C.Gear, Rod]
 )
@@ -108,6 +111,7 @@ def test_checker_names_the_coefficient_of_a_constraint(kind):
                 check_constraint_series(scene, constraint, "Broken", rng)
 
 
+@pytest.mark.slow_but("Spring")
 @pytest.mark.parametrize(
     "kind", [F.Spring, F.TorsionalSpring, F.Bushing, F.ViscousFriction, F.PointForce, F.Torque, Soft]
 )
@@ -122,6 +126,7 @@ def test_checker_names_the_coefficient_of_a_force(kind):
                 check_force_series(scene, force, "Broken", rng)
 
 
+@pytest.mark.slow
 def test_checkers_run_the_series():
     class Flat(Rod):
         @staticmethod
@@ -141,6 +146,7 @@ def test_checkers_run_the_series():
         ts.testing.check_force(Still)
 
 
+@pytest.mark.slow
 def test_checker_sees_scratch_memory_that_is_too_small_or_read_too_early():
     class Short(Soft):
         slots = 16
@@ -228,6 +234,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow_for("of state", "plug-in", "user", "plug-in force")
 @pytest.mark.parametrize(("make", "message"), REFUSED.values(), ids=REFUSED.keys())
 def test_scenes_without_series_are_refused_by_name(make, message):
     scene, a, b, _ = pair()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.rough_joints import EXACT, demand_balance, four_bar, pendulum, rod
+from tests.helpers.rough_joints import PRECISE, demand_balance, four_bar, pendulum, rod
 
 C, F = ts.constraints, ts.forces
 
@@ -19,9 +19,9 @@ def test_friction_from_a_reaction_that_is_not_unique_is_refused():
 
 def test_a_mechanism_that_jams_says_so():
     """Above mu = (1 + 3 c^2) / (3 s c), 4 / 3 at 1.1 rad, no reaction is in balance with its friction."""
-    assert ts.simulate(rod(1.1, 1.3), (0.0, 0.01), **EXACT).success
+    assert ts.simulate(rod(1.1, 1.3), (0.0, 0.01), **PRECISE).success
     with pytest.raises(ts.InconsistentState, match="mechanism may jam"):
-        ts.simulate(rod(1.1, 1.4), (0.0, 0.01), **EXACT)
+        ts.simulate(rod(1.1, 1.4), (0.0, 0.01), **PRECISE)
     with pytest.raises(ts.SingularConfiguration, match="mechanism may jam"):
         rod(1.1, 1.4).evaluate()
 
@@ -39,7 +39,7 @@ class SuddenFriction(F.ContactFriction):
 @pytest.mark.slow
 def test_jamming_on_the_way_ends_the_run():
     scene = rod(1.1, 1.0, SuddenFriction)
-    solution = ts.simulate(scene, (0.0, 1.0), **EXACT)
+    solution = ts.simulate(scene, (0.0, 1.0), **PRECISE)
     assert not solution.success
     assert solution.status == ts.Status.JAMMED
     assert solution.reached == pytest.approx(0.004, abs=1e-6)
@@ -90,7 +90,7 @@ def test_a_plug_in():
     body.velocity = np.cross((1, 2, 3), (0.5, 0, 0))
     ball = scene.add(C.Spherical(body, scene.ground, point_a=(-0.5, 0, 0)))
     friction = scene.add(BallFriction(ball, radius=0.05, kinetic=0.2, slip_velocity=0.01))
-    ends = [ts.simulate(scene, (0, 0.5), formulation=form, **EXACT) for form in ("tangent", "null-space")]
+    ends = [ts.simulate(scene, (0, 0.5), formulation=form, **PRECISE) for form in ("tangent", "null-space")]
     np.testing.assert_allclose(ends[0].q[-1], ends[1].q[-1], atol=1e-9)
     assert (ends[0].dissipation > 0).all()
     demand_balance(scene, ends[0], (ball, friction))
@@ -105,13 +105,13 @@ def test_taylor_refuses_by_name_and_the_default_takes_another():
 
 def test_attributes_can_be_set_and_geometry_is_the_joints():
     scene, _bar, pin, friction = pendulum()
-    before = ts.simulate(scene, (0.0, 0.5), **EXACT).q[-1]
+    before = ts.simulate(scene, (0.0, 0.5), **PRECISE).q[-1]
     friction.static = None
     friction.kinetic = 0.0005
-    smooth = ts.simulate(scene, (0.0, 0.5), **EXACT).q[-1]
+    smooth = ts.simulate(scene, (0.0, 0.5), **PRECISE).q[-1]
     assert np.abs(before - smooth).max() > 1e-3
     friction.kinetic, friction.static = 0.3, 0.4
-    np.testing.assert_array_equal(ts.simulate(scene, (0.0, 0.5), **EXACT).q[-1], before)
+    np.testing.assert_array_equal(ts.simulate(scene, (0.0, 0.5), **PRECISE).q[-1], before)
     np.testing.assert_array_equal(friction.axis_a, pin.axis_a)
     with pytest.raises(ts.InvalidForce, match="axis_a is that of its joint"):
         friction.axis_a = (1, 0, 0)
@@ -121,7 +121,7 @@ def test_attributes_can_be_set_and_geometry_is_the_joints():
 
 def test_solutions_are_pickled():
     scene, _, _pin, _friction = pendulum()
-    solution = ts.simulate(scene, (0.0, 0.5), **EXACT)
+    solution = ts.simulate(scene, (0.0, 0.5), **PRECISE)
     again = pickle.loads(pickle.dumps(solution))
     np.testing.assert_array_equal(again.multipliers, solution.multipliers)
     np.testing.assert_array_equal(again.dissipation, solution.dissipation)

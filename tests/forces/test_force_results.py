@@ -13,7 +13,7 @@ from tsdyn.observables.power import load_powers
 
 C, F = ts.constraints, ts.forces
 RK45 = ts.integrators.RK45
-FINE = RK45(rtol=1e-9, atol=1e-9)
+BY_RK45 = RK45(rtol=1e-9, atol=1e-9)
 SPACING = 2e-4  # s, of differences of the energy
 
 
@@ -36,7 +36,7 @@ def energy_rates(solution):
 @pytest.mark.slow
 def test_energy_power_and_dissipation_balance(rng):
     scene, _ = everything(rng)
-    solution = ts.simulate(scene, (0, 1), integrator=FINE).raise_if_failed()
+    solution = ts.simulate(scene, (0, 1), integrator=BY_RK45).raise_if_failed()
     rounding = 20 * np.finfo(float).eps * solution.kinetic_energy.max() / SPACING
     assert np.abs(energy_rates(solution) - solution.power + solution.dissipation).max() < rounding
     assert np.abs(solution.power).max() > 1.0
@@ -73,7 +73,7 @@ def test_harmonic_oscillator():
 def test_reactions_of_forces_and_constraints_are_what_moves_the_bodies(rng):
     """Newton and Euler for each body from all reactions."""
     scene, _ = everything(rng)
-    solution = ts.simulate(scene, (0, 1), integrator=FINE, t_eval=[0.0, 0.45, 1.0]).raise_if_failed()
+    solution = ts.simulate(scene, (0, 1), integrator=BY_RK45, t_eval=[0.0, 0.45, 1.0]).raise_if_failed()
     total = {body: [np.zeros((3, 3)), np.zeros((3, 3))] for body in scene.bodies}
     for item in (*scene.constraints, *scene.forces):
         if item.b is not None and item.a.dimension and item.b.dimension:
@@ -102,7 +102,7 @@ def test_newton_euler_of_a_body(rng):
     ]
     points = [(0, 0, 0.5), (0.3, 0, 0), (0, 0.2, 0), (0, 0, 0), (0.1, 0, 0)]
     scene.assemble()
-    solution = ts.simulate(scene, (0, 0.5), integrator=FINE, t_eval=[0, 0.2, 0.5]).raise_if_failed()
+    solution = ts.simulate(scene, (0, 0.5), integrator=BY_RK45, t_eval=[0, 0.2, 0.5]).raise_if_failed()
     for i in range(3):
         A = rotation(solution.orientation(body)[i])
         force, torque = np.array([0, 0, -1.3 * 9.81]), np.zeros(3)

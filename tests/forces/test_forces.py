@@ -11,7 +11,7 @@ from tests.helpers.scenes import product, rotate, rotation, unit
 from tsdyn.observables.generalised_forces import force_loads
 
 F = ts.forces
-CLOSE = {"rtol": 1e-12, "atol": 1e-12}
+FORMULA = {"rtol": 1e-12, "atol": 1e-12}
 
 
 def pair(rng):
@@ -51,8 +51,8 @@ def turning(body):
 
 def expect(scene, body, force, torque_about_centroid, t=0.0):
     got = load_of(scene, body, t)
-    np.testing.assert_allclose(got[0], force, **CLOSE)
-    np.testing.assert_allclose(got[1], torque_about_centroid, **CLOSE)
+    np.testing.assert_allclose(got[0], force, **FORMULA)
+    np.testing.assert_allclose(got[1], torque_about_centroid, **FORMULA)
 
 
 def test_every_force_is_public():
@@ -142,7 +142,7 @@ def test_bushing(rng):
     expect(scene, b, -force, np.cross(y - b.position, -force) - torque)
     before = load_of(scene, b)
     b.orientation = -b.orientation  # the same attitude
-    np.testing.assert_allclose(load_of(scene, b), before, **CLOSE)
+    np.testing.assert_allclose(load_of(scene, b), before, **FORMULA)
 
 
 def test_bushing_is_linear_for_small_turns(rng):

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 import tsdyn as ts
 from tests.helpers.rough_joints import (
-    EXACT,
+    PRECISE,
     G,
     block,
     chain,
@@ -24,7 +24,7 @@ C, F = ts.constraints, ts.forces
 @pytest.mark.parametrize("formulation", ["tangent", "null-space", "maggi-kane"])
 def test_a_block_on_a_slope_brakes_as_it_should(formulation):
     scene, body, contact, friction, along = block(0.3, 0.5, 3.0, slip_velocity=1e-7)
-    solution = ts.simulate(scene, (0.0, 0.4), formulation=formulation, **EXACT)
+    solution = ts.simulate(scene, (0.0, 0.4), formulation=formulation, **PRECISE)
     rate = -G * (np.sin(0.5) + 0.3 * np.cos(0.5))
     assert solution.success
     np.testing.assert_allclose(solution.position(body)[-1], (3.0 * 0.4 + rate * 0.08) * along, atol=1e-12)
@@ -64,7 +64,7 @@ def test_stribecks_peak():
 def test_a_pendulum_on_a_rough_pin(formulation):
     """Against minimal coordinates in SciPy: it comes to rest, through many turns of the direction."""
     scene, bar, pin, friction = pendulum()
-    solution = ts.simulate(scene, (0.0, 3.0), formulation=formulation, **EXACT)
+    solution = ts.simulate(scene, (0.0, 3.0), formulation=formulation, **PRECISE)
     angle, rate = solve_ivp(pendulum_rates, (0, 3), (0, 0), method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
     np.testing.assert_allclose(solution.position(bar)[-1], (0.8 * np.cos(angle), 0, -0.8 * np.sin(angle)), atol=1e-10)
     np.testing.assert_allclose(solution.angular_velocity(bar)[-1], (0, rate, 0), atol=1e-10)
@@ -80,7 +80,7 @@ def test_a_pendulum_on_a_rough_pin(formulation):
 
 def test_implicit_and_fixed_steps_and_dense_output_agree():
     scene, _bar, *_ = pendulum()
-    exact = ts.simulate(scene, (0.0, 1.0), dense_output=True, **EXACT)
+    exact = ts.simulate(scene, (0.0, 1.0), dense_output=True, **PRECISE)
     for method in (
         ts.integrators.SDIRK54(1e-9, 1e-9),
         ts.integrators.Nystrom4(step=1e-3),
@@ -90,7 +90,7 @@ def test_implicit_and_fixed_steps_and_dense_output_agree():
         assert np.abs(solution.q[-1] - exact.q[-1]).max() < 1e-8
     np.testing.assert_allclose(exact.energy - exact.work, exact.energy[0], atol=1e-9)
     state = exact.at(0.5)
-    again = ts.simulate(scene, (0.5, 1.0), state=state, **EXACT)
+    again = ts.simulate(scene, (0.5, 1.0), state=state, **PRECISE)
     np.testing.assert_allclose(again.q[-1], exact.q[-1], atol=1e-10)
     np.testing.assert_allclose(again.multipliers[0], state.multipliers, atol=1e-11)
 
@@ -105,7 +105,7 @@ def test_a_slide_that_is_tilted_in_its_guide(length, width, formulation):
     N += 0.0 if length is None else 2.0 / length * np.hypot(1.8, 1.2)
     acceleration = (6.0 - 0.25 * N) / 2.0
     end = min(0.5, 0.9 * 1.5 / max(-acceleration, 1e-9))  # while it slides on
-    solution = ts.simulate(scene, (0.0, end), formulation=formulation, **EXACT)
+    solution = ts.simulate(scene, (0.0, end), formulation=formulation, **PRECISE)
     np.testing.assert_allclose(solution.position(body)[-1, 0], 1.5 * end + 0.5 * acceleration * end**2, atol=1e-11)
     np.testing.assert_allclose(solution.reaction(friction)[0][:, 0], -0.25 * N, rtol=1e-11)
     demand_balance(scene, solution, (guide, friction, *scene.forces[1:]))
@@ -125,7 +125,7 @@ def test_the_collar_and_the_length_of_a_pin():
     scene.add(F.PointForce(wheel, force=(0, 7.0, 0)))
     scene.add(F.Torque(wheel, torque=(0.4, 0, 0)))
     N = 5.0 + 3.0 * G + 1.5 * 7.0 + 20.0 * 0.4
-    solution = ts.simulate(scene, (0.0, 1.0), **EXACT)
+    solution = ts.simulate(scene, (0.0, 1.0), **PRECISE)
     np.testing.assert_allclose(solution.angular_velocity(wheel)[-1], (0, 0, 20.0 - 0.1 * 0.02 * N / 0.1), atol=1e-10)
     assert np.linalg.norm(solution.reaction(friction)[1][-1]) == pytest.approx(0.1 * 0.02 * N, rel=1e-12)
 
@@ -163,11 +163,11 @@ def test_evaluate_of_a_large_scene():
 @pytest.mark.slow
 def test_redundant_constraints_whose_needed_reactions_are_unique():
     scene, joints = four_bar()
-    solution = ts.simulate(scene, (0.0, 1.0), dense_output=True, **EXACT)
+    solution = ts.simulate(scene, (0.0, 1.0), dense_output=True, **PRECISE)
     assert solution.success
     assert not solution.reaction_unique(joints[0]).any()
     np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=1e-8)
-    other = ts.simulate(scene, (0.0, 1.0), formulation="null-space", **EXACT)
+    other = ts.simulate(scene, (0.0, 1.0), formulation="null-space", **PRECISE)
     np.testing.assert_allclose(solution.q[-1], other.q[-1], atol=1e-9)
     seen = scene.evaluate(solution.q[3], solution.qd[3], solution.t[3])
     np.testing.assert_allclose(seen.qdd, solution.qdd[3], atol=1e-9)

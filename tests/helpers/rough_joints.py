@@ -6,7 +6,7 @@ import tsdyn as ts
 
 C, F = ts.constraints, ts.forces
 G = 9.81
-EXACT = {"integrator": "dop853", "rtol": 1e-11, "atol": 1e-11}
+PRECISE = {"integrator": "dop853", "rtol": 1e-11, "atol": 1e-11}
 
 
 def coefficient(v, mu, static, stribeck, slip):

@@ -21,11 +21,11 @@ from tests.helpers.scenes import (
 )
 
 COMPLEX = 1e-40  # a complex step: nothing cancels
-ALGEBRA = 200 * EPS  # times the size of what is compared: a few dozen operations
+DOZENS = 200 * EPS  # times the size of what is compared: a few dozen operations
 CAUCHY = 2000 * EPS  # second derivatives by Cauchy's integral
 
 
-def close(got, expected, tolerance=ALGEBRA, size=0.0):
+def close(got, expected, tolerance=DOZENS, size=0.0):
     scale = 1.0 + max(np.abs(expected).max(initial=0.0), np.abs(size).max(initial=0.0))
     np.testing.assert_allclose(got, expected, atol=tolerance * scale, rtol=0)
 
@@ -154,10 +154,10 @@ def test_first_row_of_a_solution(definition, formulation):
         scene, (0.0, 1e-3), integrator=ts.integrators.Nystrom4(1e-3), formulation=formulation, constraint_tol=EPS
     )
     condition = np.linalg.cond(got.Phi_q) ** 2 if got.Phi_q.size else 1.0
-    tolerance = ALGEBRA * condition * (1 + np.abs(got.qdd).max())
+    tolerance = DOZENS * condition * (1 + np.abs(got.qdd).max())
     np.testing.assert_allclose(solution.qdd[0], got.qdd, atol=tolerance, rtol=0)
     forces = np.abs(got.M).max() * (1 + np.abs(got.qdd).max())
-    np.testing.assert_allclose(solution.multipliers[0], got.multipliers, atol=ALGEBRA * condition * forces, rtol=0)
+    np.testing.assert_allclose(solution.multipliers[0], got.multipliers, atol=DOZENS * condition * forces, rtol=0)
 
 
 def test_every_row_of_a_solution(rng):

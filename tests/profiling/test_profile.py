@@ -70,6 +70,7 @@ def test_calls_of_steps_are_those_counted(by_steps):
     assert rows >= len(kinds) * (stats.newton_iterations - stats.checks_skipped)
 
 
+@pytest.mark.slow
 def test_calls_of_a_series_are_those_counted(by_series):
     stats = by_series.solution.stats
     orders = stats.steps + 1  # order zero
@@ -80,6 +81,7 @@ def test_calls_of_a_series_are_those_counted(by_series):
     assert sum(count for count, _ in by_series.orders) == calls(by_series, "coefficients", "bodies and solves")
 
 
+@pytest.mark.slow
 def test_calls_of_stages_are_those_counted(by_stages):
     stats = by_stages.solution.stats
     assert calls(by_stages, "stage equations", "Jacobians") == stats.jacobians
@@ -88,6 +90,7 @@ def test_calls_of_stages_are_those_counted(by_stages):
     assert calls(by_stages, "accelerations", "D^T M D and its factors") == stats.placements
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", ["null-space", "maggi-kane"])
 def test_other_forms(formulation):
     found = ts.profile(top.build(), (0.0, 0.5), integrator="rk45", formulation=formulation, advice=False)
@@ -97,6 +100,7 @@ def test_other_forms(formulation):
     assert found.solution.formulation == formulation
 
 
+@pytest.mark.slow
 def test_scenes_without_constraints_or_of_point_masses():
     scene = ts.Scene()
     scene.add_point_mass(1.0)
@@ -106,6 +110,7 @@ def test_scenes_without_constraints_or_of_point_masses():
         assert not any(phase.part == "constraint rows" for phase in found.phases)
 
 
+@pytest.mark.slow
 def test_what_is_asked_for_besides_is_told_apart():
     times = np.linspace(0.0, 1.0, 300)
     found = ts.profile(
@@ -120,6 +125,7 @@ def test_what_is_asked_for_besides_is_told_apart():
     assert found.share("outputs") > 0.0
 
 
+@pytest.mark.slow
 def test_choosing_the_method_is_a_phase():
     found = ts.profile(stiff.hung(), (0.0, 1.0), rtol=1e-5, atol=1e-5, advice=False)
     assert found.solution.method.startswith("SDIRK54")
@@ -130,6 +136,7 @@ def test_choosing_the_method_is_a_phase():
 # the run itself is left alone
 
 
+@pytest.mark.slow
 def test_timers_change_no_number_and_stay_in_no_memory():
     scene = drive_train.build()
     before = ts.simulate(scene, (0.0, 0.5), integrator="dop853")
@@ -165,6 +172,7 @@ def advice(scene, span=(0.0, 1.0), **options):
     return "\n".join(ts.profile(scene, span, **options).advice)
 
 
+@pytest.mark.slow
 def test_a_method_that_is_slower_than_the_default():
     said = advice(top.build(), (0.0, 10.0), integrator="rk45", rtol=1e-9, atol=1e-9)
     assert "The default method, Taylor(rtol=1e-09, atol=1e-09) at" in said
@@ -172,6 +180,7 @@ def test_a_method_that_is_slower_than_the_default():
     assert "the ends differ by" in said
 
 
+@pytest.mark.slow
 def test_what_refuses_series_and_what_it_costs():
     said = advice(drive_train.build())
     assert "Torque 'motor': its torque is a function of time; CoulombFriction 'brake'" in said
@@ -180,6 +189,7 @@ def test_what_refuses_series_and_what_it_costs():
     assert len(scene.forces) == 4
 
 
+@pytest.mark.slow
 def test_no_advice_ruins_the_answer():
     """The end of a chaotic motion to few digits is metres away by any other method or tolerance."""
     said = advice(two_body_pendulum.build(), (0.0, 60.0), integrator="rk45", rtol=1e-3, atol=1e-3)
@@ -187,15 +197,18 @@ def test_no_advice_ruins_the_answer():
     assert "Faster alternatives end elsewhere" in said
 
 
+@pytest.mark.slow
 def test_outputs_that_cost():
     assert "t_eval with 20001 outputs costs" in advice(top.build(), t_eval=np.linspace(0.0, 1.0, 20001))
 
 
+@pytest.mark.slow
 def test_steps_held_back():
     said = advice(top.build(), integrator=I.DOP853(1e-6, 1e-6, max_step=1e-3))
     assert "Without max_step, which sets most of the steps, it is" in said
 
 
+@pytest.mark.slow
 def test_a_costly_form():
     assert "formulation='tangent' is" in advice(pendulum_chain.build(6), (0.0, 0.3), formulation="null-space")
 
@@ -206,6 +219,7 @@ def test_a_stiff_motion_by_an_explicit_method():
     assert "The motion is stiff: SDIRK54(rtol=0.0001, atol=0.0001) is" in said
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_early():
     said = advice(top.build(), (0.0, 10.0), integrator="dop853", max_steps=20)
     assert said.startswith("The run ended early: The run reached max_steps.")
@@ -214,6 +228,7 @@ def test_a_run_that_ends_early():
 # what it looks like, and what it refuses
 
 
+@pytest.mark.slow
 def test_text_notebook_and_one_line(by_steps, by_series):
     text = str(by_series)
     assert "coefficients" in text
@@ -281,6 +296,7 @@ except ts.InvalidArgument as error:
 # the command
 
 
+@pytest.mark.slow
 def test_command_on_an_example(capsys, tmp_path):
     pytest.importorskip("matplotlib")
     figure = tmp_path / "profile.png"
@@ -293,6 +309,7 @@ def test_command_on_an_example(capsys, tmp_path):
     assert figure.exists()
 
 
+@pytest.mark.slow
 def test_command_on_a_file(capsys, tmp_path):
     file = tmp_path / "two.py"
     file.write_text(

@@ -184,6 +184,7 @@ def test_results_are_written_and_read(tmp_path):
     assert found[0].rows[1].error == np.inf
 
 
+@pytest.mark.slow
 def test_scaling_measures_a_size():
     from benchmarks import scaling
 
@@ -194,6 +195,7 @@ def test_scaling_measures_a_size():
     assert "chain" in scaling.table([small])
 
 
+@pytest.mark.slow
 def test_figures_are_drawn(tmp_path):
     pytest.importorskip("matplotlib")
     from benchmarks import figures

@@ -10,7 +10,7 @@ from tsdyn.observables.diagnostics import constraint_error
 
 I = ts.integrators
 END = 3.0  # s
-TIGHT = I.DOP853(1e-13, 1e-13)
+REFERENCE = I.DOP853(1e-13, 1e-13)
 
 
 def event(function, **attributes):
@@ -39,7 +39,7 @@ def run(events, method=None, scene=None, span=(0.0, END), **options):
 @pytest.mark.parametrize("make", [point_pendulum, compound_pendulum])
 def test_a_pendulum_passes_its_lowest_point(make):
     scene, quarter = make()
-    solution = run([lowest(), lowest(direction=1), lowest(direction=-1)], TIGHT, scene, (0.0, 10.0)).raise_if_failed()
+    solution = run([lowest(), lowest(direction=1), lowest(direction=-1)], REFERENCE, scene, (0.0, 10.0)).raise_if_failed()
     both, rising, falling = solution.t_events
     np.testing.assert_allclose(both, (2 * np.arange(both.size) + 1) * quarter, rtol=0, atol=1e-11)
     assert both[-1] + 2 * quarter > 10.0
@@ -56,7 +56,7 @@ def test_a_heavy_top_nutates():
     """Its tilt's extremes, the first of them the start, where the function is exactly zero."""
     scene, half = heavy_top()
     vertical = lambda t, state: state.qd[2]  # noqa: E731
-    (times,) = run(vertical, TIGHT, scene, (0.0, 10.0)).raise_if_failed().t_events
+    (times,) = run(vertical, REFERENCE, scene, (0.0, 10.0)).raise_if_failed().t_events
     np.testing.assert_allclose(times, np.arange(times.size) * half, rtol=0, atol=1e-11)
     assert times.size == 1 + int(10.0 / half)
 
@@ -141,7 +141,7 @@ def test_a_terminal_event_ends_the_run(t_eval):
     scene, quarter = point_pendulum()
     down = lowest(terminal=2)
     down.__name__ = "down"
-    solution = run(down, TIGHT, scene, t_eval=t_eval, dense_output=True)
+    solution = run(down, REFERENCE, scene, t_eval=t_eval, dense_output=True)
     assert (solution.success, solution.status) == (True, ts.Status.EVENT)
     assert solution.raise_if_failed() is solution
     assert "event 0 (down)" in solution.message
@@ -167,7 +167,7 @@ def test_going_on_from_a_terminal_event():
     scene, quarter = point_pendulum()
     events, times, state, start = lowest(terminal=True), [], None, 0.0
     for _ in range(4):
-        solution = run(events, TIGHT, scene, (start, 10.0), state=state)
+        solution = run(events, REFERENCE, scene, (start, 10.0), state=state)
         state, start = solution.state, solution.state.t
         times.append(start)
     np.testing.assert_allclose(times, quarter * np.array([1, 3, 5, 7]), rtol=0, atol=1e-11)

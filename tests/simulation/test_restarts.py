@@ -13,7 +13,7 @@ import tsdyn as ts
 from examples import drive_train, driven_pivot, top
 
 ROOT = Path(__file__).parents[2]
-TIGHT = {"integrator": "dop853", "rtol": 1e-10, "atol": 1e-10}
+PRECISE = {"integrator": "dop853", "rtol": 1e-10, "atol": 1e-10}
 stiffness = 5.0
 
 
@@ -59,17 +59,17 @@ def test_every_state_of_a_run_goes_on_counting_turns():
             seen.append(state)
         return 1.0
 
-    full = ts.simulate(scene, (0.0, 3.0), dense_output=True, events=late, **TIGHT)
+    full = ts.simulate(scene, (0.0, 3.0), dense_output=True, events=late, **PRECISE)
     states = {"at": full.at(0.9), "replaced": full.at(0.9)._replace(t=0.9), "event": seen[0]}
     assert full.at([0.5, 0.9]).memory.shape == (2, 1)
     for state in states.values():
-        again = ts.simulate(scene, (state.t, 3.0), state=state, **TIGHT)
+        again = ts.simulate(scene, (state.t, 3.0), state=state, **PRECISE)
         np.testing.assert_allclose(again.qd[-1], full.qd[-1], atol=1e-6)
 
 
 def test_a_state_that_does_not_say_its_turns_is_refused():
     scene = wound()
-    end = ts.simulate(scene, (0.0, 0.9), **TIGHT).state
+    end = ts.simulate(scene, (0.0, 0.9), **PRECISE).state
     with pytest.raises(ts.InvalidArgument, match="turns"):
         ts.simulate(scene, (0.9, 1.0), state=ts.State(*end))
 
@@ -83,13 +83,13 @@ def test_functions_see_their_globals_as_they_are(force, monkeypatch):
     for value in (5.0, 20.0):
         monkeypatch.setattr(sys.modules[__name__], "stiffness", value)
         expected = np.cos(np.sqrt(value)) if force is pull else 1.0 - 0.5 * value
-        assert ts.simulate(scene, (0.0, 1.0), **TIGHT).q[-1, 0] == pytest.approx(expected, abs=1e-8)
+        assert ts.simulate(scene, (0.0, 1.0), **PRECISE).q[-1, 0] == pytest.approx(expected, abs=1e-8)
 
 
 @pytest.mark.slow
 def test_pickles_run_in_another_process(tmp_path):
     """Scenes, and solutions with all that they compute by kernels."""
-    solutions = [ts.simulate(module.build(), (0.0, 0.3), **TIGHT) for module in (drive_train, driven_pivot)]
+    solutions = [ts.simulate(module.build(), (0.0, 0.3), **PRECISE) for module in (drive_train, driven_pivot)]
     (tmp_path / "pickle").write_bytes(pickle.dumps([(solution.scene, solution) for solution in solutions]))
     code = f"""
 import pickle, sys

@@ -138,6 +138,7 @@ def test_symmetric(problem, seed):
     assert np.linalg.norm(A @ x[to] - b) <= bound(A, x)
 
 
+@pytest.mark.slow
 @given(draw_sizes(), st.integers(0, 1000))
 def test_not_symmetric(problem, seed):
     (_, cliques), sizes = problem

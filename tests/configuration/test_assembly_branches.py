@@ -6,6 +6,7 @@ import pytest
 import tsdyn as ts
 from tests.helpers.sketched_mechanisms import MECHANISMS
 from tests.helpers.sketches import Builder, polar, turned
+from tests.helpers.tolerances import ALGEBRA, COARSE, HELD
 from tsdyn.configuration.kinetic_metric import Metric
 from tsdyn.configuration.loop_folds import Folds
 
@@ -32,7 +33,7 @@ def test_sketches_assemble_on_their_branch(name):
             refused += 1
             continue
         np.testing.assert_array_equal(np.sign(mechanism.branch()), side)
-        assert report.residual < 1e-13
+        assert report.residual < ALGEBRA
     assert refused <= 1
 
 
@@ -59,7 +60,7 @@ def test_what_is_found_is_nearest(name):
     for way in np.eye(free.shape[1]):
         h = 1e-4 * size
         slope = (distance(h * way) - distance(-h * way)) / (2.0 * h)
-        assert abs(slope) < 1e-5
+        assert abs(slope) < COARSE
         assert distance(h * way) + distance(-h * way) >= 2.0 * distance(0.0 * way) * (1.0 - 1e-12)
 
 
@@ -102,7 +103,7 @@ def test_a_frame_has_two_branches_and_the_sketch_says_which():
             body.position = body.position + 0.2 * rng.normal(size=3)
             body.orientation = turned(body.orientation, 0.2 * rng.normal(size=3))
         m.scene.assemble()
-        np.testing.assert_allclose(one.position, b / 2, atol=1e-12)
+        np.testing.assert_allclose(one.position, b / 2, atol=HELD)
 
 
 @pytest.mark.slow_but("four_bar")
@@ -146,8 +147,8 @@ def test_another_branch_is_refused_with_the_reason_or_taken_when_asked_for():
         np.testing.assert_array_equal(one, other)
     report = scene.assemble(folds="free")
     assert "Revolute 'B'" in report.folded
-    assert report.residual < 1e-13
-    assert scene.bodies[0].position[1] == pytest.approx(0.3, abs=1e-12)
+    assert report.residual < ALGEBRA
+    assert scene.bodies[0].position[1] == pytest.approx(0.3, abs=HELD)
 
 
 @pytest.mark.parametrize("folds", ["Keep", None, True, ""])

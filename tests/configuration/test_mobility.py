@@ -7,6 +7,7 @@ import tsdyn as ts
 from benchmarks import mechanisms
 from tests.helpers.sketched_mechanisms import MECHANISMS
 from tests.helpers.sketches import Builder, polar
+from tests.helpers.tolerances import CLOSE
 from tsdyn.configuration import kinetic_metric as kinetic
 from tsdyn.observables.evaluate import constraint_arrays
 
@@ -71,7 +72,7 @@ def test_rows_named_are_those_that_can_go(name, rng):
     for row in found.redundant:
         others = [names.index(other) for other in row.depends_on] + own  # unit length of p goes without saying
         left = Phi_q[others].T @ np.linalg.lstsq(Phi_q[others].T, Phi_q[names.index(row.name)], rcond=None)[0]
-        np.testing.assert_allclose(left, Phi_q[names.index(row.name)], atol=1e-9)
+        np.testing.assert_allclose(left, Phi_q[names.index(row.name)], atol=CLOSE)
         assert any(row.name.startswith(constraint.title) for constraint in [row.constraint])
 
 

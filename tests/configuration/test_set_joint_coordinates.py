@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.helpers.tolerances import CLOSE, FINE, HELD, TIGHT
 from tsdyn import constraints as c
 
 
@@ -51,18 +52,18 @@ def test_the_other_joints_of_a_tree_stay_as_they_are(moving_base):
     scene.set("hinge2", angle=-0.4, rate=0.5)
     before = coordinates(scene)
     scene.set("hinge1", angle=-1.2, rate=-3.0)
-    assert coordinates(scene) == pytest.approx(np.vstack((before[0], [-1.2, -3.0], before[2])), abs=1e-12)
+    assert coordinates(scene) == pytest.approx(np.vstack((before[0], [-1.2, -3.0], before[2])), abs=HELD)
     scene.set("hinge0", rate=7.0)
-    assert coordinates(scene)[:, 1] == pytest.approx([7.0, -3.0, 0.5], abs=1e-12)
+    assert coordinates(scene)[:, 1] == pytest.approx([7.0, -3.0, 0.5], abs=HELD)
 
 
 def test_angles_of_any_number_of_turns_are_counted_on_from():
     scene = arms()
     scene.set("hinge0", angle=20.0)
-    assert coordinates(scene)[0, 0] == pytest.approx(20.0, abs=1e-12)
+    assert coordinates(scene)[0, 0] == pytest.approx(20.0, abs=HELD)
     turned = scene.body("arm0").position
     scene.set("hinge0", angle=20.0 - 6.0 * np.pi)
-    assert scene.body("arm0").position == pytest.approx(turned, abs=1e-12)
+    assert scene.body("arm0").position == pytest.approx(turned, abs=HELD)
 
 
 def test_a_joint_whose_first_body_hangs_on_the_second():
@@ -79,9 +80,9 @@ def test_a_loop_goes_round_on_its_branch():
     scene = four_bar()
     for angle in (0.5, 3.0, 6.0):
         scene.set("hinge0", angle=angle, rate=2.0)
-        assert coordinates(scene)[0] == pytest.approx([angle, 2.0], abs=1e-10)
+        assert coordinates(scene)[0] == pytest.approx([angle, 2.0], abs=FINE)
     scene.set("hinge0", angle=2.0 * np.pi, rate=0.0)
-    assert coordinates(scene)[1:, 0] == pytest.approx([0, 0, 0], abs=1e-9)  # back where it was built
+    assert coordinates(scene)[1:, 0] == pytest.approx([0, 0, 0], abs=CLOSE)  # back where it was built
 
 
 def test_joints_of_a_loop_are_kept_where_asked_for():
@@ -93,7 +94,7 @@ def test_joints_of_a_loop_are_kept_where_asked_for():
         scene.add(c.Revolute.at(bodies[i], bodies[i + 1], point=point, axis=(0, 1, 0), name=f"hinge{i}"))
     scene.set("hinge0", angle=0.2, rate=1.0)
     scene.set("hinge4", angle=-0.1, rate=0.5, keep=["hinge0"])
-    assert coordinates(scene)[[0, 4]] == pytest.approx(np.array([[0.2, 1.0], [-0.1, 0.5]]), abs=1e-10)
+    assert coordinates(scene)[[0, 4]] == pytest.approx(np.array([[0.2, 1.0], [-0.1, 0.5]]), abs=FINE)
 
 
 @pytest.mark.slow
@@ -117,7 +118,7 @@ def test_angle_and_displacement_of_one_joint():
     solution = start(scene)
     for joint, values in ((guide, (1.0, 3.0, 2.0, 4.0)), (thread, (20.0, 1.0, 2.0, 0.1))):
         found = [getattr(solution, x)(joint)[0] for x in ("angle", "angle_rate", "displacement", "displacement_rate")]
-        assert found == pytest.approx(values, abs=1e-11)
+        assert found == pytest.approx(values, abs=TIGHT)
 
 
 def test_two_angles_of_a_universal_joint():

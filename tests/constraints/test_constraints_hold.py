@@ -12,7 +12,6 @@ from tests.helpers.minimal_coordinates import balance
 from tests.helpers.reference import NAMES, load
 from tests.helpers.scenes import (
     BETWEEN,
-    EPS,
     MOTION,
     PRIMITIVES,
     build,
@@ -22,6 +21,7 @@ from tests.helpers.scenes import (
     random_pair,
     random_primitive,
 )
+from tests.helpers.tolerances import EPS
 
 C = ts.constraints
 # the default tolerance, and the tightest that means anything

@@ -7,7 +7,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.driven import METHODS, Z, everything, held, rotor
-from tests.helpers.scenes import EPS
+from tests.helpers.tolerances import CLOSE, EPS, HELD, NEAR, ROUNDING, TIGHT
 from tsdyn.taylor import layout as expansion_pack
 
 C, M = ts.constraints, ts.motions
@@ -54,13 +54,13 @@ def test_energy_less_work_stays(options):
     held(solution)
     size = np.abs(solution.kinetic_energy).max() + np.ptp(solution.potential_energy)
     assert np.ptp(solution.energy) > 1e-2 * size
-    assert np.ptp(solution.energy - solution.work) < 1e-8 * size
+    assert np.ptp(solution.energy - solution.work) < NEAR * size
 
 
 def test_dense_output_of_a_driven_scene_is_on_the_manifold():
     solution = ts.simulate(everything(), (0.0, 1.0), dense_output=True, rtol=1e-10, atol=1e-10)
     again = ts.simulate(everything(), (0.0, 1.0), t_eval=np.linspace(0.0, 1.0, 38), rtol=1e-10, atol=1e-10)
-    np.testing.assert_allclose(solution.at(again.t).q, again.q, atol=1e-9)
+    np.testing.assert_allclose(solution.at(again.t).q, again.q, atol=CLOSE)
 
 
 def shaken(t):
@@ -81,7 +81,7 @@ def test_a_function_alone_is_derived(form):
     scene.add(C.Distance(bead, scene.ground, length=length, name="string"))
     solution = ts.simulate(scene, (0.0, 1.0), integrator="dop853", rtol=1e-10, atol=1e-10, t_eval=[0.0, 1.0])
     held(solution)
-    assert np.linalg.norm(solution.q[-1]) == pytest.approx(shaken(1.0), abs=1e-14)
+    assert np.linalg.norm(solution.q[-1]) == pytest.approx(shaken(1.0), abs=ROUNDING)
     if form == "motion":
         assert ts.simulate(scene, (0.0, 1.0), integrator="taylor").success
     else:
@@ -117,7 +117,7 @@ def test_a_constant_angle_that_is_driven():
         solution = ts.simulate(scene, (0.0, 1.0), **options)
         held(solution)
         line = solution.rotation(body) @ (np.sin(1.0), 0, np.cos(1.0))
-        np.testing.assert_allclose(np.arccos(line[:, 2]), angle(solution.t), atol=1e-12)
+        np.testing.assert_allclose(np.arccos(line[:, 2]), angle(solution.t), atol=HELD)
 
 
 def pushed(load, torque):
@@ -140,9 +140,9 @@ def test_loads_may_be_motions():
     )
     assert first.method == second.method
     assert first.method.startswith("DOP853")
-    np.testing.assert_allclose(first.q, second.q, atol=1e-12)
-    np.testing.assert_allclose(first.power, second.power, atol=1e-11)
-    assert np.ptp(first.energy - first.work) < 1e-8
+    np.testing.assert_allclose(first.q, second.q, atol=HELD)
+    np.testing.assert_allclose(first.power, second.power, atol=TIGHT)
+    assert np.ptp(first.energy - first.work) < NEAR
     with pytest.raises(ts.InvalidArgument, match="'left': its actuator is a function of time"):
         ts.simulate(one, (0.0, 1.0), integrator="taylor")
 

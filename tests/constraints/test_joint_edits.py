@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tests.helpers.joints import X, Y, Z, build, made, residuals
-from tests.helpers.scenes import EPS
+from tests.helpers.tolerances import EPS
 
 
 def test_what_is_set_on_a_joint_reaches_its_rows():

@@ -6,7 +6,7 @@ import pytest
 import tsdyn as ts
 from tests.helpers import minimal_coordinates as minimal
 from tests.helpers.minimal_coordinates import JOINTS, balance, build, motion, moves, place, random_link
-from tests.helpers.scenes import EPS
+from tests.helpers.tolerances import CLOSE, EPS, FAIR, HELD, NEAR
 
 C = ts.constraints
 GRAVITY = np.array([1.0, -2.0, -9.81])
@@ -66,15 +66,15 @@ def demand_same(solution, links, joints, coordinates):
         loads = minimal.reactions(links, *state, GRAVITY)
         for link, pose, body, joint, (force, torque) in zip(links, found, scene.bodies, joints, loads, strict=True):
             A = solution.rotation(body)[k]
-            np.testing.assert_allclose(solution.position(body)[k], pose.r, atol=1e-9)
-            np.testing.assert_allclose(A, pose.A @ link.turn, atol=1e-9)
-            np.testing.assert_allclose(solution.velocity(body)[k], pose.v, atol=1e-8)
-            np.testing.assert_allclose(A @ solution.angular_velocity(body)[k], pose.w, atol=1e-8)
+            np.testing.assert_allclose(solution.position(body)[k], pose.r, atol=CLOSE)
+            np.testing.assert_allclose(A, pose.A @ link.turn, atol=CLOSE)
+            np.testing.assert_allclose(solution.velocity(body)[k], pose.v, atol=NEAR)
+            np.testing.assert_allclose(A @ solution.angular_velocity(body)[k], pose.w, atol=NEAR)
             given_force, given_torque = (part[k] for part in solution.reaction(joint, on=body))
             own = getattr(joint, "point_b", np.zeros(3))  # the torque is about the joint's point of this body
             about = solution.position(body)[k] + A @ own
-            np.testing.assert_allclose(given_force, force, atol=1e-7)
-            np.testing.assert_allclose(given_torque, torque - np.cross(about - pose.point, force), atol=1e-7)
+            np.testing.assert_allclose(given_force, force, atol=FAIR)
+            np.testing.assert_allclose(given_torque, torque - np.cross(about - pose.point, force), atol=FAIR)
 
 
 def everything(rng):
@@ -108,7 +108,7 @@ def test_all_methods_agree(rng):
     scene = everything(rng)
     ends = [ts.simulate(scene, (0.0, 0.3), **options).raise_if_failed().q[-1] for options in RUNS.values()]
     for end in ends[1:]:
-        np.testing.assert_allclose(end, ends[0], atol=1e-7)
+        np.testing.assert_allclose(end, ends[0], atol=FAIR)
 
 
 @pytest.mark.parametrize("kind", COMPOSED)
@@ -174,5 +174,5 @@ def test_hookes_ratio_of_speeds(bend):
     w1, w2 = (solution.angular_velocity(body)[:, 0] for body in (driving, driven))
     cosine = solution.rotation(driving)[:, 2, 2]
     ratio = np.cos(bend) / (1.0 - np.sin(bend) ** 2 * (1.0 - cosine**2))
-    np.testing.assert_allclose(w2 / w1, ratio, atol=1e-12)
+    np.testing.assert_allclose(w2 / w1, ratio, atol=HELD)
     assert np.abs(cosine).min() < 0.3  # it has turned

@@ -7,7 +7,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.driven import METHODS, SPEED, TURNS, J, apart, held, pair, rotor, slider, turn
-from tests.helpers.scenes import EPS
+from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, TIGHT
 
 C, M = ts.constraints, ts.motions
 X, Y, Z = np.eye(3)
@@ -24,10 +24,10 @@ def test_a_motor_turns_on_and_on(options):
     scene, wheel, motor = rotor(M.Ramp(0.0, SPEED), SPEED)
     solution = ts.simulate(scene, (0.0, end), t_eval=np.linspace(0.0, end, 301), **options)
     held(solution)
-    assert apart(turn(solution, wheel), SPEED * solution.t).max() < 1e-12
-    np.testing.assert_allclose(solution.angular_velocity(wheel)[:, 2], SPEED, rtol=1e-12)
+    assert apart(turn(solution, wheel), SPEED * solution.t).max() < HELD
+    np.testing.assert_allclose(solution.angular_velocity(wheel)[:, 2], SPEED, rtol=HELD)
     _, torque = solution.reaction(motor, on=wheel)
-    np.testing.assert_allclose(torque, 0.0, atol=1e-9)
+    np.testing.assert_allclose(torque, 0.0, atol=CLOSE)
 
 
 @pytest.mark.slow_for("*sdirk54*")
@@ -40,13 +40,13 @@ def test_a_motor_that_goes_to_and_fro(options):
     solution = ts.simulate(scene, (0.0, 2.5), t_eval=np.linspace(0.0, 2.5, 101), **options)
     held(solution)
     theta, rate, gain = angle(solution.t), angle.rate(solution.t), angle.acceleration(solution.t)
-    assert apart(turn(solution, wheel), theta).max() < 2e-12
-    np.testing.assert_allclose(solution.angular_velocity(wheel)[:, 2], rate, atol=1e-11 * amplitude * w)
+    assert apart(turn(solution, wheel), theta).max() < 2 * HELD
+    np.testing.assert_allclose(solution.angular_velocity(wheel)[:, 2], rate, atol=TIGHT * amplitude * w)
     expected = (J + 2.0 * arm**2) * gain + 2.0 * 9.81 * arm * np.cos(theta)
     _, torque = solution.reaction(motor, on=wheel)
-    np.testing.assert_allclose(torque[:, 2], expected, atol=1e-9 * np.abs(expected).max())
-    np.testing.assert_allclose(torque[:, :2], 0.0, atol=1e-9 * np.abs(expected).max())
-    np.testing.assert_allclose(solution.power, expected * rate, atol=1e-9 * np.abs(expected * rate).max())
+    np.testing.assert_allclose(torque[:, 2], expected, atol=CLOSE * np.abs(expected).max())
+    np.testing.assert_allclose(torque[:, :2], 0.0, atol=CLOSE * np.abs(expected).max())
+    np.testing.assert_allclose(solution.power, expected * rate, atol=CLOSE * np.abs(expected * rate).max())
 
 
 @pytest.mark.parametrize("name", ["dop853", "null-space", "rk45"])
@@ -60,8 +60,8 @@ def test_a_driven_step_never_turns_by_a_whole_turn(name):
     held(solution)
     theta = 5.0 * solution.t + 40.0 * solution.t**2 + 10.0 * solution.t**3
     assert np.diff(theta).max() < 2.0
-    assert apart(turn(solution, one), theta).max() < 1e-11
-    assert apart(turn(solution, other), -math.sqrt(2.0) * theta).max() < 1e-10
+    assert apart(turn(solution, one), theta).max() < TIGHT
+    assert apart(turn(solution, other), -math.sqrt(2.0) * theta).max() < FINE
     assert solution.stats.rejected < 0.2 * solution.stats.steps
 
 
@@ -93,7 +93,7 @@ def test_the_opposed_start_is_refused_at_any_time():
     ts.simulate(scene, (0.0, 0.01), initial_tol=10.0)
     for t in (0.0, 2.0):
         wheel.orientation, wheel.angular_velocity = (0, 0, 0, 1), (0, 0, math.pi)
-        assert np.abs(scene.evaluate(t=t).Phi).max() < 1e-12
+        assert np.abs(scene.evaluate(t=t).Phi).max() < HELD
         with pytest.raises(ts.InconsistentState, match=r"'motor'.*opposite ways"):
             ts.simulate(scene, (t, t + 0.01))
         assert ts.simulate(scene, (t + 1.0, t + 1.01)).success
@@ -104,11 +104,11 @@ def test_an_angle_that_is_set_later():
     motor.angle = lambda t: 1.0 * t + 0.5 * t**2
     solution = ts.simulate(scene, (0.0, 2.0), integrator="dop853", rtol=1e-10, atol=1e-10)
     held(solution)
-    assert apart(turn(solution, wheel), solution.t + 0.5 * solution.t**2).max() < 1e-12
+    assert apart(turn(solution, wheel), solution.t + 0.5 * solution.t**2).max() < HELD
     motor.angle = 0.0
     wheel.angular_velocity = (0, 0, 0)
     still = ts.simulate(scene, (0.0, 1.0))
-    assert apart(turn(still, wheel), 0.0).max() < 1e-13
+    assert apart(turn(still, wheel), 0.0).max() < ALGEBRA
 
 
 @pytest.mark.slow_for("*sdirk54*")
@@ -118,10 +118,10 @@ def test_a_translation_motor(options):
     scene, block, drive = slider(travel)
     solution = ts.simulate(scene, (0.0, 2.0), **options)
     held(solution)
-    np.testing.assert_allclose(solution.position(block)[:, 2], travel(solution.t), atol=1e-13)
+    np.testing.assert_allclose(solution.position(block)[:, 2], travel(solution.t), atol=ALGEBRA)
     force, _ = solution.reaction(drive, on=block)
-    np.testing.assert_allclose(force[:, 2], 2.0 * (travel.acceleration(solution.t) + 9.81), atol=1e-9)
-    np.testing.assert_allclose(solution.power, force[:, 2] * travel.rate(solution.t), atol=1e-9)
+    np.testing.assert_allclose(force[:, 2], 2.0 * (travel.acceleration(solution.t) + 9.81), atol=CLOSE)
+    np.testing.assert_allclose(solution.power, force[:, 2] * travel.rate(solution.t), atol=CLOSE)
 
 
 @pytest.mark.slow_for("*sdirk54*")
@@ -145,8 +145,8 @@ def test_a_point_is_led_in_the_frame_of_a_body_that_turns(options):
     r = np.transpose([path[0](t), path[1](t), 0.25 + 0 * t])
     rd = np.transpose([path[0].rate(t), path[1].rate(t), 0 * t])
     rdd = np.transpose([path[0].acceleration(t), path[1].acceleration(t), 0 * t])
-    np.testing.assert_allclose(solution.position(bead), np.einsum("kij,kj->ki", A, r), atol=1e-12)
+    np.testing.assert_allclose(solution.position(bead), np.einsum("kij,kj->ki", A, r), atol=HELD)
     w = np.array([0, 0, 2.0])
     inside = rdd + 2.0 * np.cross(w, rd) + np.cross(w, np.cross(w, r))
     force, _ = solution.reaction(driver, on=bead)
-    np.testing.assert_allclose(force, 0.7 * np.einsum("kij,kj->ki", A, inside), atol=1e-9)
+    np.testing.assert_allclose(force, 0.7 * np.einsum("kij,kj->ki", A, inside), atol=CLOSE)

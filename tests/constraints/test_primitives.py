@@ -9,6 +9,7 @@ import tsdyn as ts
 from examples.bead_on_surface import OnEllipsoid
 from examples.driven_pivot import DrivenPivot
 from tests.helpers.built_in import JOINTS, PRIMITIVES
+from tests.helpers.tolerances import ALGEBRA
 from tsdyn.testing.series_checks import check_constraint_series
 
 C = ts.constraints
@@ -154,7 +155,7 @@ def test_moving_the_whole_scene_changes_nothing(kind):
     after = scene.evaluate().Phi[: constraint.rows]
     if kind is C.Spherical:
         before = matrix(turn) @ before
-    np.testing.assert_allclose(after, before, atol=1e-13)
+    np.testing.assert_allclose(after, before, atol=ALGEBRA)
 
 
 def unit(rng):

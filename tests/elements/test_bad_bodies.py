@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tests.helpers.refusals import INF, NAN, NO_NUMBERS, added, build, case, refuse, text
+from tests.helpers.tolerances import EXACT
 
 C = ts.constraints
 MASSES = (0.0, -1.0, NAN, INF, "x", "5", None, [1.0], [1.0, 2.0], (), 1j, np.complex128(1.0), 10**400)
@@ -131,7 +132,7 @@ def test_what_is_unusual_and_right():
     tilted = w.scene.add_body(1, np.eye(3) * 2, orientation=np.array([1.0 + 5e-7, 0, 0, 0]))
     assert np.array_equal(tilted.orientation, (1, 0, 0, 0))
     turned = w.scene.add_body(np.float32(1), [1, 1, 2], orientation=Rotation.from_euler("z", 90, degrees=True))
-    np.testing.assert_allclose(turned.orientation, (math.sqrt(0.5), 0, 0, math.sqrt(0.5)), atol=1e-15)
+    np.testing.assert_allclose(turned.orientation, (math.sqrt(0.5), 0, 0, math.sqrt(0.5)), atol=EXACT)
     normalisation = w.scene.add(C.EulerNormalization(w.rod))
     assert normalisation is w.scene.add(C.EulerNormalization(w.rod))
     assert normalisation in w.scene.constraints

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
+from tests.helpers.tolerances import CLOSE, FAIR, HELD, LOOSE, NEAR, ROUGH, ROUNDING
 from tsdyn import constraints as c
 
 SPEED = 20.0  # rad/s of the arm; the wheel turns against it by -4 times as much
@@ -56,7 +57,7 @@ def test_turns_are_counted_however_few_outputs_there_are(method):
     sparse = ts.simulate(carousel(), (0, end), integrator=integrator, t_eval=[1.1, end], **tolerances)
     every = ts.simulate(carousel(), (0, end), integrator=integrator, **tolerances)
     for solution in (sparse, every):
-        assert solution.angle("hinge") == pytest.approx(SPEED * solution.t, abs=1e-4)
+        assert solution.angle("hinge") == pytest.approx(SPEED * solution.t, abs=LOOSE)
         assert solution.angle("hub") == pytest.approx(-4.0 * SPEED * solution.t, abs=1e-3)
         assert solution.angle_rate("hub") == pytest.approx(np.full(solution.t.size, -4.0 * SPEED), abs=1e-3)
 
@@ -67,11 +68,11 @@ def test_turns_are_counted_between_the_steps_and_on_from_a_state(method):
     scene = carousel()
     first = ts.simulate(scene, (0, 2), dense_output=True, **options)
     t = np.linspace(0, 2, 301)
-    assert first.at(t).angle("hub") == pytest.approx(-4.0 * SPEED * t, abs=1e-6)
-    assert first.at(1.3).angle("hub") == pytest.approx(-4.0 * SPEED * 1.3, abs=1e-6)
+    assert first.at(t).angle("hub") == pytest.approx(-4.0 * SPEED * t, abs=ROUGH)
+    assert first.at(1.3).angle("hub") == pytest.approx(-4.0 * SPEED * 1.3, abs=ROUGH)
     for state in (first.state, first.at(2.0), pickle.loads(pickle.dumps(first.state))):
         rest = ts.simulate(scene, (2, 3), state=state, t_eval=[2.9], **options)
-        assert rest.angle("hub") == pytest.approx([-4.0 * SPEED * 2.9], abs=1e-6)
+        assert rest.angle("hub") == pytest.approx([-4.0 * SPEED * 2.9], abs=ROUGH)
     again = pickle.loads(pickle.dumps(first))
     assert (again.angle("hub") == first.angle("hub")).all()
 
@@ -87,10 +88,10 @@ def test_events_know_angles_over_turns():
 
     enough.terminal = True
     solution = ts.simulate(scene, (0, 5), events=[turned, enough])
-    assert solution.t_events[0] == pytest.approx([9.0 * np.pi / SPEED], rel=1e-8)
-    assert solution.reached == pytest.approx(150.0 / (4.0 * SPEED), rel=1e-8)
-    assert solution.angle("hub")[-1] == pytest.approx(-150.0, abs=1e-6)
-    assert solution.state.angle("hub") == pytest.approx(-150.0, abs=1e-6)
+    assert solution.t_events[0] == pytest.approx([9.0 * np.pi / SPEED], rel=NEAR)
+    assert solution.reached == pytest.approx(150.0 / (4.0 * SPEED), rel=NEAR)
+    assert solution.angle("hub")[-1] == pytest.approx(-150.0, abs=ROUGH)
+    assert solution.state.angle("hub") == pytest.approx(-150.0, abs=ROUGH)
 
 
 def test_events_are_given_positions_and_rates():
@@ -113,10 +114,10 @@ def test_an_angle_is_that_of_the_rotation_between_the_bodies():
     solution = ts.simulate(scene, (0, 2), dense_output=True, rtol=1e-11, atol=1e-11)
     between = [solution.rotation("a").transpose(0, 2, 1)] @ solution.rotation("b")
     turn = Rotation.from_matrix(between[0]).as_rotvec() @ joint.axis_a
-    assert np.angle(np.exp(1j * (solution.angle(joint) - turn))) == pytest.approx(0, abs=1e-12)
+    assert np.angle(np.exp(1j * (solution.angle(joint) - turn))) == pytest.approx(0, abs=HELD)
     apart = solution.position("b", point=joint.point_b) - solution.position("a", point=joint.point_a)
     along = (solution.rotation("a") @ joint.axis_a * apart).sum(axis=1)
-    assert solution.displacement(joint) == pytest.approx(along, abs=1e-14)
+    assert solution.displacement(joint) == pytest.approx(along, abs=ROUNDING)
 
 
 @pytest.mark.parametrize(
@@ -132,9 +133,9 @@ def test_rates_and_accelerations_are_derivatives(kind, arguments, coordinates):
     solution = ts.simulate(scene, (0, 2), dense_output=True, rtol=1e-11, atol=1e-11)
     for name in coordinates:
         value, rate = (lambda t, n=n: getattr(solution.at(t), n)(joint) for n in (name, f"{name}_rate"))
-        assert rate(0.7) == pytest.approx(quotient(value, 0.7), rel=1e-7, abs=1e-7)
+        assert rate(0.7) == pytest.approx(quotient(value, 0.7), rel=FAIR, abs=FAIR)
         gain = getattr(solution.at(0.7), f"{name}_acceleration")(joint)
-        assert gain == pytest.approx(quotient(rate, 0.7), rel=1e-7, abs=1e-7)
+        assert gain == pytest.approx(quotient(rate, 0.7), rel=FAIR, abs=FAIR)
         assert getattr(solution, f"{name}_acceleration")(joint).shape[0] == solution.t.size
 
 
@@ -148,7 +149,7 @@ def test_angles_of_a_universal_joint_turn_the_bodies():
     A, B = (Rotation.from_quat(np.roll(p, -1)) for p in start)
     built = first[0].inv() * (A.inv() * B) * second[0].inv()  # as it was before scene.assemble
     expected = (first * built * second).as_matrix()
-    assert solution.rotation("a").transpose(0, 2, 1) @ solution.rotation("b") == pytest.approx(expected, abs=1e-9)
+    assert solution.rotation("a").transpose(0, 2, 1) @ solution.rotation("b") == pytest.approx(expected, abs=CLOSE)
 
 
 def test_points_of_bodies_move_with_them():
@@ -157,9 +158,9 @@ def test_points_of_bodies_move_with_them():
     s = (0.3, -0.2, 0.5)
     state = solution.at(0.7)
     assert state.position("b", s) == pytest.approx(state.position("b") + state.rotation("b") @ s)
-    assert state.velocity("b", s) == pytest.approx(quotient(lambda t: solution.at(t).position("b", s), 0.7), abs=1e-8)
+    assert state.velocity("b", s) == pytest.approx(quotient(lambda t: solution.at(t).position("b", s), 0.7), abs=NEAR)
     assert state.acceleration("b", point=s) == pytest.approx(
-        quotient(lambda t: solution.at(t).velocity("b", s), 0.7), abs=1e-7
+        quotient(lambda t: solution.at(t).velocity("b", s), 0.7), abs=FAIR
     )
     assert solution.acceleration("b", point=s).shape == (solution.t.size, 3)
 
@@ -176,14 +177,14 @@ def test_a_motor_and_its_joint_have_the_angle_prescribed():
     )
     solution = ts.simulate(scene, (0, 4), t_eval=[0, 3.0, 4.0], dense_output=True)
     for item in (hinge, "motor"):
-        assert solution.angle(item) == pytest.approx([0, 36, 48], abs=1e-9)
+        assert solution.angle(item) == pytest.approx([0, 36, 48], abs=CLOSE)
     _, torque = solution.reaction("motor", on=arm)
     assert solution.power_of(motor) == pytest.approx(12.0 * torque[:, 1])
     assert solution.power_of("motor") + solution.power_of(brake) == pytest.approx(solution.power - solution.dissipation)
     put_in, lost = solution.work_of(motor), solution.work_of(brake)
     assert lost[-1] < 0.0
-    assert put_in + lost == pytest.approx(solution.energy - solution.energy[0], abs=1e-8)
-    assert solution.power_of(hinge) == pytest.approx([0, 0, 0], abs=1e-12)
+    assert put_in + lost == pytest.approx(solution.energy - solution.energy[0], abs=NEAR)
+    assert solution.power_of(hinge) == pytest.approx([0, 0, 0], abs=HELD)
 
 
 def test_a_screw_counts_the_turns_that_its_travel_says():
@@ -191,8 +192,8 @@ def test_a_screw_counts_the_turns_that_its_travel_says():
     nut = scene.add_body(1.0, (0.1, 0.1, 0.1), (0, 0, 0.5), velocity=(0, 0, 0.2), angular_velocity=(0, 0, 20))
     screw = scene.add(c.Screw(scene.ground, nut, axis_a=(0, 0, 1), axis_b=(0, 0, 1), lead=0.01))
     solution = ts.simulate(scene, (0, 3), t_eval=[0, 3])
-    assert solution.displacement(screw) == pytest.approx([0.5, 1.1], abs=1e-9)
-    assert solution.angle(screw) == pytest.approx([50, 110], abs=1e-6)
+    assert solution.displacement(screw) == pytest.approx([0.5, 1.1], abs=CLOSE)
+    assert solution.angle(screw) == pytest.approx([50, 110], abs=ROUGH)
 
 
 class Hinge(ts.Joint):

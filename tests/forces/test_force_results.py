@@ -8,6 +8,7 @@ import pytest
 import tsdyn as ts
 from tests.helpers.every_force import everything, pull
 from tests.helpers.scenes import rotation, unit
+from tests.helpers.tolerances import CLOSE, COARSE, FAIR, FINE, HELD, LOOSE, NEAR, ROUGH, ROUNDING
 from tsdyn.observables.diagnostics import kinetic_energy, potential_energy
 from tsdyn.observables.power import load_powers
 
@@ -44,8 +45,8 @@ def test_energy_power_and_dissipation_balance(rng):
     assert solution.dissipation.max() > 0.1
     for i in range(0, solution.t.size, 50):
         found = scene.evaluate(solution.q[i], solution.qd[i], solution.t[i])
-        np.testing.assert_allclose(solution.qdd[i], found.qdd, atol=1e-9)
-        np.testing.assert_allclose(solution.multipliers[i], found.multipliers, atol=1e-9)
+        np.testing.assert_allclose(solution.qdd[i], found.qdd, atol=CLOSE)
+        np.testing.assert_allclose(solution.multipliers[i], found.multipliers, atol=CLOSE)
 
 
 def test_a_spring_and_gravity_lose_nothing():
@@ -53,9 +54,9 @@ def test_a_spring_and_gravity_lose_nothing():
     bob = scene.add_body(1.0, (0.1, 0.2, 0.3), (1, 0, 0), angular_velocity=(1, 2, 3))
     scene.add(F.Spring(scene.ground, bob, point_b=(0.2, 0.1, 0), stiffness=40.0))
     solution = ts.simulate(scene, (0, 3), integrator=RK45(1e-11, 1e-11))
-    assert np.ptp(solution.energy) < 1e-8
+    assert np.ptp(solution.energy) < NEAR
     assert np.ptp(solution.potential_energy) > 1.0
-    assert np.abs(solution.power).max() < 1e-12
+    assert np.abs(solution.power).max() < HELD
     assert not solution.dissipation.any()
 
 
@@ -67,7 +68,7 @@ def test_harmonic_oscillator():
     decay, w = 0.1, np.sqrt(4 - 0.1**2)
     t = solution.t
     expected = 1 + 0.5 * np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t))
-    np.testing.assert_allclose(solution.q[:, 0], expected, atol=1e-9)
+    np.testing.assert_allclose(solution.q[:, 0], expected, atol=CLOSE)
 
 
 def test_reactions_of_forces_and_constraints_are_what_moves_the_bodies(rng):
@@ -85,9 +86,9 @@ def test_reactions_of_forces_and_constraints_are_what_moves_the_bodies(rng):
     push = scene.forces[7]
     force, torque = solution.reaction(push)
     A = solution.rotation(push.a)
-    np.testing.assert_allclose(force, [A[i] @ (np.sin(t), 0.2, t) for i, t in enumerate(solution.t)], atol=1e-14)
-    np.testing.assert_allclose(torque, 0.0, atol=1e-14)  # about its own point
-    np.testing.assert_allclose(solution.reaction(scene.forces[8])[1], [(0.1, 0.2, 0.3)] * 3, atol=1e-14)
+    np.testing.assert_allclose(force, [A[i] @ (np.sin(t), 0.2, t) for i, t in enumerate(solution.t)], atol=ROUNDING)
+    np.testing.assert_allclose(torque, 0.0, atol=ROUNDING)  # about its own point
+    np.testing.assert_allclose(solution.reaction(scene.forces[8])[1], [(0.1, 0.2, 0.3)] * 3, atol=ROUNDING)
 
 
 def test_newton_euler_of_a_body(rng):
@@ -109,10 +110,10 @@ def test_newton_euler_of_a_body(rng):
         for item, s in zip(items, points, strict=True):
             f, n = (part[i] for part in solution.reaction(item))
             force, torque = force + f, torque + n + np.cross(A @ s, f)
-        np.testing.assert_allclose(1.3 * solution.acceleration(body)[i], force, atol=1e-10)
+        np.testing.assert_allclose(1.3 * solution.acceleration(body)[i], force, atol=FINE)
         w, J = solution.angular_velocity(body)[i], np.diag((0.2, 0.3, 0.4))
         euler = J @ solution.angular_acceleration(body)[i] + np.cross(w, J @ w)
-        np.testing.assert_allclose(euler, A.T @ torque, atol=1e-10)
+        np.testing.assert_allclose(euler, A.T @ torque, atol=FINE)
 
 
 # turns
@@ -138,10 +139,10 @@ def test_turns_are_counted(t_eval, speed, formulation):
     options = {"integrator": RK45(1e-10, 1e-10), "t_eval": t_eval, "formulation": formulation}
     solution = ts.simulate(scene, (0, 4), **options).raise_if_failed()
     angle = speed / 0.8 * np.sin(0.8 * solution.t)
-    np.testing.assert_allclose(solution.reaction(spring)[1][:, 2], -0.32 * angle, atol=1e-5)
-    np.testing.assert_allclose(solution.potential_energy, 0.16 * angle**2, atol=1e-4)
-    np.testing.assert_allclose(solution.energy, 0.25 * speed**2, rtol=1e-6)
-    assert np.abs(solution.power).max() < 1e-10 * 0.32 * 25 * 20  # of torque times speed
+    np.testing.assert_allclose(solution.reaction(spring)[1][:, 2], -0.32 * angle, atol=COARSE)
+    np.testing.assert_allclose(solution.potential_energy, 0.16 * angle**2, atol=LOOSE)
+    np.testing.assert_allclose(solution.energy, 0.25 * speed**2, rtol=ROUGH)
+    assert np.abs(solution.power).max() < FINE * 0.32 * 25 * 20  # of torque times speed
     assert solution.q.shape == (solution.t.size, 7)
 
 
@@ -151,10 +152,10 @@ def test_turns_are_counted_on_from_a_state():
     first = ts.simulate(scene, (0, 1.9), integrator=RK45(1e-10, 1e-10), t_eval=[0.0])
     state = pickle.loads(pickle.dumps(first.state))
     assert len(state) == 5
-    assert state.memory[0] == pytest.approx(25 * np.sin(0.8 * 1.9), rel=1e-7)
+    assert state.memory[0] == pytest.approx(25 * np.sin(0.8 * 1.9), rel=FAIR)
     second = ts.simulate(scene, (state.t, 4), state=state, integrator=RK45(1e-10, 1e-10))
-    np.testing.assert_allclose(second.q[-1], whole.q[-1], atol=1e-6)
-    np.testing.assert_allclose(second.reaction(spring)[1][-1, 2], whole.reaction(spring)[1][-1, 2], atol=1e-6)
+    np.testing.assert_allclose(second.q[-1], whole.q[-1], atol=ROUGH)
+    np.testing.assert_allclose(second.reaction(spring)[1][-1, 2], whole.reaction(spring)[1][-1, 2], atol=ROUGH)
     other = ts.Scene()
     other.add_body(1, (1, 1, 1))
     with pytest.raises(ts.InvalidArgument, match="remembers"):
@@ -167,9 +168,9 @@ def test_torsional_damper_and_actuator():
     solution = ts.simulate(scene, (0, 3), integrator=RK45(1e-10, 1e-10))
     w = 3.0 / 0.7 * (1 - np.exp(-0.7 / 0.5 * solution.t))
     body = scene.bodies[0]
-    np.testing.assert_allclose(solution.angular_velocity(body)[:, 2], w, atol=1e-8)
-    np.testing.assert_allclose(solution.power, 3.0 * w, atol=1e-7)
-    np.testing.assert_allclose(solution.dissipation, 0.7 * w**2, atol=1e-7)
+    np.testing.assert_allclose(solution.angular_velocity(body)[:, 2], w, atol=NEAR)
+    np.testing.assert_allclose(solution.power, 3.0 * w, atol=FAIR)
+    np.testing.assert_allclose(solution.dissipation, 0.7 * w**2, atol=FAIR)
 
 
 # ends

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 import tsdyn as ts
 from tests.helpers.built_in import FORCES, by_name
 from tests.helpers.scenes import product, rotate, rotation, unit
+from tests.helpers.tolerances import COARSE, FAIR, ROUNDING, TIGHT
 from tsdyn.observables.generalised_forces import force_loads
 
 F = ts.forces
@@ -102,7 +103,7 @@ def test_spring(rng):
 def test_spring_is_free_at_the_start(rng):
     scene, a, b = pair(rng)
     spring = scene.add(F.Spring(a, b, point_a=(1, 2, 3), stiffness=3.0))
-    assert spring.free_length == pytest.approx(np.linalg.norm(place(a, (1, 2, 3))[0] - b.position), rel=1e-14)
+    assert spring.free_length == pytest.approx(np.linalg.norm(place(a, (1, 2, 3))[0] - b.position), rel=ROUNDING)
     expect(scene, a, (0, 0, 0), (0, 0, 0))
 
 
@@ -151,7 +152,7 @@ def test_bushing_is_linear_for_small_turns(rng):
     b.orientation = product(a.orientation, np.append(1.0, small / 2) / np.sqrt(1 + small @ small / 4))
     scene.add(F.Bushing(a, b, torsional_stiffness=(1, 2, 3)))
     torque = rotate(a.orientation, np.array([1, 2, 3]) * small)
-    np.testing.assert_allclose(load_of(scene, a)[1], torque, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(load_of(scene, a)[1], torque, rtol=0, atol=TIGHT)
 
 
 def test_point_force_and_torque(rng):
@@ -207,7 +208,7 @@ def test_coulomb_friction_stops_a_mass_where_it_should():
     mass = scene.add_point_mass(2.0, velocity=(3, 0, 0))
     scene.add(F.CoulombFriction(mass, scene.ground, force=4.0, slip_velocity=1e-3))
     solution = ts.simulate(scene, (0, 2), integrator=ts.integrators.RK45(1e-8, 1e-8)).raise_if_failed()
-    assert solution.q[-1, 0] == pytest.approx(3.0**2 / (2 * 4.0 / 2.0), abs=1e-5)
+    assert solution.q[-1, 0] == pytest.approx(3.0**2 / (2 * 4.0 / 2.0), abs=COARSE)
 
 
 def gravitation(t, a, b, par, out):
@@ -228,7 +229,7 @@ def test_user_force_between_point_masses():
     scene.add(F.UserForce(one, two, function=gravitation, parameters=[1.0]))
     period = 4 * np.pi
     solution = ts.simulate(scene, (0, period), integrator=ts.integrators.RK45(1e-10, 1e-10)).raise_if_failed()
-    np.testing.assert_allclose(solution.q[-1], solution.q[0], atol=1e-7)
+    np.testing.assert_allclose(solution.q[-1], solution.q[0], atol=FAIR)
 
 
 @pytest.mark.slow
@@ -271,8 +272,8 @@ def test_internal_forces_keep_the_momentum(kind, rng):
     scene.add(kind.example(rng, a, b))
     (f, n), (g, m) = load_of(scene, a, 0.5), load_of(scene, b, 0.5)
     size = 1 + np.abs((f, n, g, m)).max() * 10
-    assert np.abs(f + g).max() < 1e-14 * size
-    assert np.abs(n + np.cross(a.position, f) + m + np.cross(b.position, g)).max() < 1e-14 * size
+    assert np.abs(f + g).max() < ROUNDING * size
+    assert np.abs(n + np.cross(a.position, f) + m + np.cross(b.position, g)).max() < ROUNDING * size
 
 
 @pytest.mark.parametrize("kind", [k for k in INTERNAL if k is not F.UserForce], ids=lambda kind: kind.__name__)

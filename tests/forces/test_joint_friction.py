@@ -17,6 +17,7 @@ from tests.helpers.rough_joints import (
     pendulum_rates,
     slide,
 )
+from tests.helpers.tolerances import ALGEBRA, CLOSE, FAIR, FINE, HELD, NEAR, TIGHT
 
 C, F = ts.constraints, ts.forces
 
@@ -27,12 +28,12 @@ def test_a_block_on_a_slope_brakes_as_it_should(formulation):
     solution = ts.simulate(scene, (0.0, 0.4), formulation=formulation, **PRECISE)
     rate = -G * (np.sin(0.5) + 0.3 * np.cos(0.5))
     assert solution.success
-    np.testing.assert_allclose(solution.position(body)[-1], (3.0 * 0.4 + rate * 0.08) * along, atol=1e-12)
+    np.testing.assert_allclose(solution.position(body)[-1], (3.0 * 0.4 + rate * 0.08) * along, atol=HELD)
     force, torque = solution.reaction(friction)
-    np.testing.assert_allclose(force, np.broadcast_to(-0.3 * 2 * G * np.cos(0.5) * along, force.shape), rtol=1e-12)
+    np.testing.assert_allclose(force, np.broadcast_to(-0.3 * 2 * G * np.cos(0.5) * along, force.shape), rtol=HELD)
     assert not torque.any()
-    np.testing.assert_allclose(solution.dissipation, -(force * solution.velocity(body)).sum(axis=1), rtol=1e-12)
-    assert np.abs(solution.power).max() < 1e-13
+    np.testing.assert_allclose(solution.dissipation, -(force * solution.velocity(body)).sum(axis=1), rtol=HELD)
+    assert np.abs(solution.power).max() < ALGEBRA
     demand_balance(scene, solution, (contact, friction))
 
 
@@ -43,7 +44,7 @@ def test_a_block_that_sticks_creeps_at_the_speed_of_the_regularisation():
     assert "SDIRK54" in solution.method
     ratio = np.tan(0.5) / 0.8
     creep = 1e-3 * ratio / np.sqrt(1.0 - ratio**2)
-    np.testing.assert_allclose(solution.velocity(body)[-1], -creep * along, atol=1e-9)
+    np.testing.assert_allclose(solution.velocity(body)[-1], -creep * along, atol=CLOSE)
 
 
 def test_stribecks_peak():
@@ -57,7 +58,7 @@ def test_stribecks_peak():
         assert (speed > 1.0) == slides
         if slides:
             size = np.linalg.norm(solution.reaction(friction)[0][-1])
-            assert size == pytest.approx(0.3 * 2 * G * np.cos(angle), rel=1e-9)
+            assert size == pytest.approx(0.3 * 2 * G * np.cos(angle), rel=CLOSE)
 
 
 @pytest.mark.parametrize("formulation", ["tangent", "null-space"])
@@ -66,15 +67,15 @@ def test_a_pendulum_on_a_rough_pin(formulation):
     scene, bar, pin, friction = pendulum()
     solution = ts.simulate(scene, (0.0, 3.0), formulation=formulation, **PRECISE)
     angle, rate = solve_ivp(pendulum_rates, (0, 3), (0, 0), method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
-    np.testing.assert_allclose(solution.position(bar)[-1], (0.8 * np.cos(angle), 0, -0.8 * np.sin(angle)), atol=1e-10)
-    np.testing.assert_allclose(solution.angular_velocity(bar)[-1], (0, rate, 0), atol=1e-10)
+    np.testing.assert_allclose(solution.position(bar)[-1], (0.8 * np.cos(angle), 0, -0.8 * np.sin(angle)), atol=FINE)
+    np.testing.assert_allclose(solution.angular_velocity(bar)[-1], (0, rate, 0), atol=FINE)
     errors = solution.constraint_error
-    assert max(errors.position.max(), errors.velocity.max()) < 1e-13
-    assert errors.acceleration.max() < 1e-12
+    assert max(errors.position.max(), errors.velocity.max()) < ALGEBRA
+    assert errors.acceleration.max() < HELD
     F_pin, _ = solution.reaction(pin)
     v = 0.05 * solution.angular_velocity(bar)[:, 1]
     torque = -0.05 * coefficient(v, 0.3, 0.4, 0.05, 0.01) * np.hypot(F_pin[:, 0], F_pin[:, 2])
-    np.testing.assert_allclose(solution.reaction(friction)[1][:, 1], torque, atol=1e-12)
+    np.testing.assert_allclose(solution.reaction(friction)[1][:, 1], torque, atol=HELD)
     demand_balance(scene, solution, (pin, friction))
 
 
@@ -87,12 +88,12 @@ def test_implicit_and_fixed_steps_and_dense_output_agree():
         ts.integrators.RK45(1e-9, 1e-9),
     ):
         solution = ts.simulate(scene, (0.0, 1.0), integrator=method)
-        assert np.abs(solution.q[-1] - exact.q[-1]).max() < 1e-8
-    np.testing.assert_allclose(exact.energy - exact.work, exact.energy[0], atol=1e-9)
+        assert np.abs(solution.q[-1] - exact.q[-1]).max() < NEAR
+    np.testing.assert_allclose(exact.energy - exact.work, exact.energy[0], atol=CLOSE)
     state = exact.at(0.5)
     again = ts.simulate(scene, (0.5, 1.0), state=state, **PRECISE)
-    np.testing.assert_allclose(again.q[-1], exact.q[-1], atol=1e-10)
-    np.testing.assert_allclose(again.multipliers[0], state.multipliers, atol=1e-11)
+    np.testing.assert_allclose(again.q[-1], exact.q[-1], atol=FINE)
+    np.testing.assert_allclose(again.multipliers[0], state.multipliers, atol=TIGHT)
 
 
 @pytest.mark.parametrize("formulation", ["tangent", "null-space"])
@@ -106,8 +107,8 @@ def test_a_slide_that_is_tilted_in_its_guide(length, width, formulation):
     acceleration = (6.0 - 0.25 * N) / 2.0
     end = min(0.5, 0.9 * 1.5 / max(-acceleration, 1e-9))  # while it slides on
     solution = ts.simulate(scene, (0.0, end), formulation=formulation, **PRECISE)
-    np.testing.assert_allclose(solution.position(body)[-1, 0], 1.5 * end + 0.5 * acceleration * end**2, atol=1e-11)
-    np.testing.assert_allclose(solution.reaction(friction)[0][:, 0], -0.25 * N, rtol=1e-11)
+    np.testing.assert_allclose(solution.position(body)[-1, 0], 1.5 * end + 0.5 * acceleration * end**2, atol=TIGHT)
+    np.testing.assert_allclose(solution.reaction(friction)[0][:, 0], -0.25 * N, rtol=TIGHT)
     demand_balance(scene, solution, (guide, friction, *scene.forces[1:]))
 
 
@@ -126,8 +127,8 @@ def test_the_collar_and_the_length_of_a_pin():
     scene.add(F.Torque(wheel, torque=(0.4, 0, 0)))
     N = 5.0 + 3.0 * G + 1.5 * 7.0 + 20.0 * 0.4
     solution = ts.simulate(scene, (0.0, 1.0), **PRECISE)
-    np.testing.assert_allclose(solution.angular_velocity(wheel)[-1], (0, 0, 20.0 - 0.1 * 0.02 * N / 0.1), atol=1e-10)
-    assert np.linalg.norm(solution.reaction(friction)[1][-1]) == pytest.approx(0.1 * 0.02 * N, rel=1e-12)
+    np.testing.assert_allclose(solution.angular_velocity(wheel)[-1], (0, 0, 20.0 - 0.1 * 0.02 * N / 0.1), atol=FINE)
+    assert np.linalg.norm(solution.reaction(friction)[1][-1]) == pytest.approx(0.1 * 0.02 * N, rel=HELD)
 
 
 @pytest.mark.slow
@@ -142,11 +143,11 @@ def test_many_rough_joints_against_the_equations_in_numpy():
         for k in range(0, solution.t.size, 7):
             seen = scene.evaluate(solution.q[k], solution.qd[k], solution.t[k])
             scale = np.abs(seen.qdd).max()
-            np.testing.assert_allclose(solution.qdd[k], seen.qdd, atol=1e-11 * scale)
-            np.testing.assert_allclose(solution.multipliers[k], seen.multipliers, atol=1e-11 * scale)
+            np.testing.assert_allclose(solution.qdd[k], seen.qdd, atol=TIGHT * scale)
+            np.testing.assert_allclose(solution.multipliers[k], seen.multipliers, atol=TIGHT * scale)
         demand_balance(scene, solution, (*joints, *scene.forces), tol=1e-10)
     last = [solution.q[-1] for solution in every.values()]
-    np.testing.assert_allclose(*last, atol=1e-7)
+    np.testing.assert_allclose(*last, atol=FAIR)
 
 
 @pytest.mark.slow
@@ -155,9 +156,9 @@ def test_evaluate_of_a_large_scene():
     seen = scene.evaluate()
     solution = ts.simulate(scene, (0.0, 1e-4), integrator="rk45", max_steps=1)
     scale = np.abs(seen.qdd).max()
-    np.testing.assert_allclose(solution.qdd[0], seen.qdd, atol=1e-10 * scale)
+    np.testing.assert_allclose(solution.qdd[0], seen.qdd, atol=FINE * scale)
     residual = seen.M @ seen.qdd + seen.Phi_q.T @ seen.multipliers - seen.Q_A - seen.S
-    assert np.abs(residual).max() < 1e-9 * scale
+    assert np.abs(residual).max() < CLOSE * scale
 
 
 @pytest.mark.slow
@@ -166,8 +167,8 @@ def test_redundant_constraints_whose_needed_reactions_are_unique():
     solution = ts.simulate(scene, (0.0, 1.0), dense_output=True, **PRECISE)
     assert solution.success
     assert not solution.reaction_unique(joints[0]).any()
-    np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=1e-8)
+    np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=NEAR)
     other = ts.simulate(scene, (0.0, 1.0), formulation="null-space", **PRECISE)
-    np.testing.assert_allclose(solution.q[-1], other.q[-1], atol=1e-9)
+    np.testing.assert_allclose(solution.q[-1], other.q[-1], atol=CLOSE)
     seen = scene.evaluate(solution.q[3], solution.qd[3], solution.t[3])
-    np.testing.assert_allclose(seen.qdd, solution.qdd[3], atol=1e-9)
+    np.testing.assert_allclose(seen.qdd, solution.qdd[3], atol=CLOSE)

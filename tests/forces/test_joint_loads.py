@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.helpers.tolerances import COARSE, FINE, HELD, LOOSE, NEAR, ROUGH, ROUNDING
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 PERIOD, INERTIA = 0.1, 2.0
@@ -70,19 +71,19 @@ def test_a_controller_is_asked_at_its_instants_and_held(options):
     x, v = exact(goal, 30, INERTIA)
     calls = np.array(motor.function.calls)
     assert len(calls) == 30
-    np.testing.assert_allclose(calls[:, 0], PERIOD * np.arange(30), atol=1e-14)
-    np.testing.assert_allclose(calls[:, 1:], np.stack([x, v], axis=1)[:30], atol=1e-6)
-    assert solution.angle(hinge)[-1] == pytest.approx(x[30], abs=1e-6)
-    assert solution.constraint_error.acceleration.max() < 1e-10
-    at = np.isclose(solution.t[:, None], calls[:, 0], rtol=0.0, atol=1e-12).any(axis=1)
+    np.testing.assert_allclose(calls[:, 0], PERIOD * np.arange(30), atol=ROUNDING)
+    np.testing.assert_allclose(calls[:, 1:], np.stack([x, v], axis=1)[:30], atol=ROUGH)
+    assert solution.angle(hinge)[-1] == pytest.approx(x[30], abs=ROUGH)
+    assert solution.constraint_error.acceleration.max() < FINE
+    at = np.isclose(solution.t[:, None], calls[:, 0], rtol=0.0, atol=HELD).any(axis=1)
     assert at.sum() == 30
     gains = solution.angular_acceleration("wheel")[at, 2]
-    np.testing.assert_allclose(gains, np.diff(v) / PERIOD, atol=1e-5)
-    np.testing.assert_allclose(solution.reaction(motor, on=scene.bodies[0])[1][at, 2], INERTIA * gains, atol=1e-6)
-    np.testing.assert_allclose(solution.power[at], INERTIA * gains * v[:30], atol=1e-4)
-    np.testing.assert_allclose(solution.energy, solution.work, atol=1e-5)
+    np.testing.assert_allclose(gains, np.diff(v) / PERIOD, atol=COARSE)
+    np.testing.assert_allclose(solution.reaction(motor, on=scene.bodies[0])[1][at, 2], INERTIA * gains, atol=ROUGH)
+    np.testing.assert_allclose(solution.power[at], INERTIA * gains * v[:30], atol=LOOSE)
+    np.testing.assert_allclose(solution.energy, solution.work, atol=COARSE)
     state = solution.at(solution.t)
-    np.testing.assert_allclose(state.qdd, solution.qdd, atol=1e-6)
+    np.testing.assert_allclose(state.qdd, solution.qdd, atol=ROUGH)
 
 
 def test_a_force_along_a_guide():
@@ -90,9 +91,9 @@ def test_a_force_along_a_guide():
     solution = ts.simulate(scene, (0.0, 2.0), t_eval=PERIOD * np.arange(21), dense_output=True).raise_if_failed()
     x, v = exact(1.0, 20, INERTIA)
     assert solution.method.startswith("Taylor")
-    np.testing.assert_allclose(solution.displacement(guide), x, atol=1e-12)
-    np.testing.assert_allclose(solution.displacement_rate(guide), v, atol=1e-12)
-    np.testing.assert_allclose(solution.energy, solution.work, atol=1e-12)
+    np.testing.assert_allclose(solution.displacement(guide), x, atol=HELD)
+    np.testing.assert_allclose(solution.displacement_rate(guide), v, atol=HELD)
+    np.testing.assert_allclose(solution.energy, solution.work, atol=HELD)
     assert scene.forces == (drive,)
 
 
@@ -109,7 +110,7 @@ def test_a_run_that_goes_on_holds_what_was_held():
         if state is first.state:
             break
         motor.function.integral = integral
-    np.testing.assert_allclose(rest.q[-1], whole.q[-1], atol=1e-12)
+    np.testing.assert_allclose(rest.q[-1], whole.q[-1], atol=HELD)
     ts.simulate(scene, (0.0, 0.2), **METHODS["taylor"])
     assert len(motor.function.calls) == 2  # reset
 
@@ -139,7 +140,7 @@ def test_two_periods_and_a_table():
     area = ts.motions.Piecewise(table).pieces[0]
     knots, c = area.knots, area.c
     pushed = 2.0 * sum((c[i, k] * h ** (k + 1) / (k + 1)) for i, h in enumerate(np.diff(knots)) for k in range(4))
-    assert solution.angular_velocity("wheel")[-1, 2] == pytest.approx((1.0 + held + pushed) / INERTIA, abs=1e-12)
+    assert solution.angular_velocity("wheel")[-1, 2] == pytest.approx((1.0 + held + pushed) / INERTIA, abs=HELD)
 
 
 def spring_and_damper(t, x, rate):
@@ -160,9 +161,9 @@ def test_a_continuous_load(make):
         lambda t, y: (y[1], spring_and_damper(t, *y) / INERTIA), (0.0, 3.0), (0.0, 0.0), "DOP853", solution.t,
         rtol=1e-12, atol=1e-12,
     ).y[0]  # fmt: skip
-    np.testing.assert_allclose(x, expected, atol=1e-8)
+    np.testing.assert_allclose(x, expected, atol=NEAR)
     assert x.max() > 2.0 * np.pi
-    np.testing.assert_allclose(solution.energy, solution.work, atol=1e-6)
+    np.testing.assert_allclose(solution.energy, solution.work, atol=ROUGH)
     with pytest.raises(ts.InvalidArgument, match=r"with period= it has"):
         ts.simulate(scene, (0.0, 1.0), integrator="taylor")
 
@@ -206,7 +207,7 @@ def test_the_joint_says_where():
     scene.add(F.JointTorque(joint, function=lambda t, x, rate: 6.0, period=1.0, which=1))
     assert scene.evaluate().qdd[4:] == pytest.approx(0.0)  # nothing is held before a run
     solution = ts.simulate(scene, (0.0, 0.01))
-    np.testing.assert_allclose(solution.angular_acceleration("cross")[0], (0.0, 2.0, 0.0), atol=1e-12)
+    np.testing.assert_allclose(solution.angular_acceleration("cross")[0], (0.0, 2.0, 0.0), atol=HELD)
 
 
 BAD = {

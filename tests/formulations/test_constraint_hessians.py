@@ -8,7 +8,8 @@ from examples.bead_on_surface import OnEllipsoid
 from examples.driven_pivot import DrivenPivot
 from tests.helpers import built_in
 from tests.helpers.reduced_ode import difference, evaluate_curvature
-from tests.helpers.scenes import EPS, rotation, unit
+from tests.helpers.scenes import rotation, unit
+from tests.helpers.tolerances import EPS
 from tsdyn.elements.joint_load import JointLoad
 from tsdyn.elements.loops.corotated_frames import turn_block, turn_of_bodies, turn_of_directions
 from tsdyn.elements.markers import PARAMETERS, POINT
@@ -173,7 +174,7 @@ INTERNAL = [kind for kind in built_in.FORCES if kind not in (F.PointForce, F.Tor
 INTERNAL = [k for k in INTERNAL if k.__module__.startswith("tsdyn.") and not issubclass(k, JointLoad)]
 
 
-@pytest.mark.slow_but('Spring-*')
+@pytest.mark.slow_but("Spring-*")
 @pytest.mark.parametrize("swapped", [False, True], ids=["a to b", "b to a"])
 @pytest.mark.parametrize("kind", INTERNAL, ids=lambda kind: kind.__name__)
 def test_kept_derivatives_are_exact_in_a_scene_turned_as_a_whole(kind, swapped, rng):

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 import tsdyn as ts
 from tests.helpers.locked_scenes import SCENES, C, F, X, Y, Z, block, floating, slider_crank, slides, welded
 from tests.helpers.minimal_coordinates import balance
+from tests.helpers.tolerances import ALGEBRA, CLOSE, EXACT, FAIR, FINE, HELD, ROUGH, ROUNDING, TIGHT
 from tsdyn.formulations.locked_orientations import keep_turning, moving_network, still
 from tsdyn.sparse.constraint_graphs import network_of
 
@@ -69,10 +70,10 @@ def test_the_motion_is_that_with_every_rotation(name, method, references):
 def test_constraints_hold_and_reactions_balance(name, method):
     solution = run(SCENES[name][0](), method)
     error = solution.constraint_error
-    assert error.position.max() < 2e-14
-    assert error.velocity.max() < 2e-14 * (1.0 + np.abs(solution.qd).max())
-    assert error.acceleration.max() < 2e-13 * (1.0 + np.abs(solution.qdd).max())
-    assert balance(solution) < 1e-11
+    assert error.position.max() < 2 * ROUNDING
+    assert error.velocity.max() < 2 * ROUNDING * (1.0 + np.abs(solution.qd).max())
+    assert error.acceleration.max() < 2 * ALGEBRA * (1.0 + np.abs(solution.qdd).max())
+    assert balance(solution) < TIGHT
     for i in still(solution.packed).bodies:
         body = solution.scene.bodies[i]
         assert (solution.orientation(body) == solution.orientation(body)[0]).all()
@@ -86,7 +87,7 @@ def test_steps_are_those_with_every_rotation(name):
     one, other = run(SCENES[name][0]()), run(turning(SCENES[name][0]()))
     assert other.stats.rotations_skipped == 0
     assert abs(one.stats.steps - other.stats.steps) <= 0.02 * other.stats.steps
-    np.testing.assert_allclose(one.q, other.q, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(one.q, other.q, rtol=0, atol=TIGHT)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -118,12 +119,12 @@ def test_a_start_that_is_off_is_put_right(method):
     solution = run(scene, method, state=state)
     assert solution.stats.rotations_skipped > 0
     error = solution.constraint_error
-    assert error.position.max() < 2e-14
-    assert error.velocity.max() < 2e-13
-    np.testing.assert_allclose(solution.q, exact.q, rtol=0, atol=1e-7)
+    assert error.position.max() < 2 * ROUNDING
+    assert error.velocity.max() < 2 * ALGEBRA
+    np.testing.assert_allclose(solution.q, exact.q, rtol=0, atol=FAIR)
     for i in still(solution.packed).bodies:
         p = solution.orientation(scene.bodies[i])
-        assert (np.abs((p * p).sum(axis=1) - 1.0) < 1e-15).all()
+        assert (np.abs((p * p).sum(axis=1) - 1.0) < EXACT).all()
         assert not solution.angular_velocity(scene.bodies[i]).any()
 
 
@@ -146,13 +147,13 @@ def test_a_run_goes_on_from_a_state_and_from_a_file(name, method):
     scene = SCENES[name][0]()
     half = ts.simulate(scene, (0.0, 0.5), **METHODS[method]).raise_if_failed()
     rest = ts.simulate(scene, (0.5, END), state=half.state, **METHODS[method]).raise_if_failed()
-    np.testing.assert_allclose(rest.q[-1], whole.q[-1], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(rest.q[-1], whole.q[-1], rtol=0, atol=FINE)
     again = pickle.loads(pickle.dumps(half))
     np.testing.assert_array_equal(again.multipliers, half.multipliers)
     rest = ts.simulate(again.scene, (0.5, END), state=again.state, **METHODS[method]).raise_if_failed()
     assert rest.stats.rotations_skipped > 0
-    np.testing.assert_allclose(rest.q[-1], whole.q[-1], rtol=0, atol=1e-10)
-    np.testing.assert_allclose(whole.at(0.5).q, half.q[-1], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(rest.q[-1], whole.q[-1], rtol=0, atol=FINE)
+    np.testing.assert_allclose(whole.at(0.5).q, half.q[-1], rtol=0, atol=FINE)
 
 
 @pytest.mark.parametrize("method", ["dop853", "taylor"])
@@ -164,11 +165,11 @@ def test_states_between_the_steps_and_events(method):
     other = run(scene, "null-space", t_eval=None, dense_output=True)
     times = np.linspace(0.0, END, 57)
     found, expected = solution.at(times), other.at(times)
-    np.testing.assert_allclose(found.q, expected.q, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(found.qd, expected.qd, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.q, expected.q, rtol=0, atol=FINE)
+    np.testing.assert_allclose(found.qd, expected.qd, rtol=0, atol=CLOSE)
     assert (found.q[:, 17:21] == found.q[0, 17:21]).all()
     assert len(solution.t_events[0]) > 0
-    np.testing.assert_allclose([q[14] for q in solution.q_events[0]], 0.65, rtol=0, atol=1e-12)
+    np.testing.assert_allclose([q[14] for q in solution.q_events[0]], 0.65, rtol=0, atol=HELD)
     np.testing.assert_array_equal(solution.q_events[0][:, 17:21], found.q[: len(solution.t_events[0]), 17:21])
 
 
@@ -211,7 +212,7 @@ def test_what_a_function_of_time_turns_is_not_still():
     for method in ("dop853", "taylor"):
         solution = run(scene, method)
         assert solution.stats.rotations_skipped == 0
-        np.testing.assert_allclose(solution.angular_velocity(body)[:, 2], 2.0, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(solution.angular_velocity(body)[:, 2], 2.0, rtol=0, atol=HELD)
 
 
 def test_a_value_that_becomes_a_function_of_time_sets_a_body_free():
@@ -223,7 +224,7 @@ def test_a_value_that_becomes_a_function_of_time_sets_a_body_free():
     solution = run(scene)
     assert solution.stats.rotations_skipped == 0
     other = run(scene, "null-space")
-    np.testing.assert_allclose(solution.q, other.q, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(solution.q, other.q, rtol=0, atol=FINE)
     row.value = value
     assert run(scene).stats.rotations_skipped > 0
 
@@ -240,7 +241,7 @@ def test_rows_that_hold_no_orientation_hold_nothing():
     body.angular_velocity = (0.0, 0.0, 1.0)
     solution, other = run(scene), run(scene, "null-space")
     assert solution.stats.rotations_skipped == 0
-    np.testing.assert_allclose(solution.q, other.q, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(solution.q, other.q, rtol=0, atol=FINE)
     assert np.abs(solution.angular_velocity(body)).max() > 0.1
 
 
@@ -283,10 +284,10 @@ def test_a_constraint_of_a_users_own_holds_a_body():
     scene.add(C.Spherical.at(body, bob, point=(0.1, 0.0, 0.0)))
     solution, other = run(scene), run(scene, "null-space")
     assert solution.stats.rotations_skipped == solution.stats.evaluations
-    np.testing.assert_allclose(solution.q, other.q, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(solution.q, other.q, rtol=0, atol=TIGHT)
     lam = solution.multipliers[:, solution.rows(row)]
     assert np.abs(lam).max() > 0.1
-    np.testing.assert_allclose(lam, other.multipliers[:, other.rows(row)], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(lam, other.multipliers[:, other.rows(row)], rtol=0, atol=CLOSE)
 
 
 @pytest.mark.parametrize("form", ["null-space", "maggi-kane"])
@@ -299,7 +300,7 @@ def test_forms_with_a_basis_keep_every_coordinate(form):
 def test_implicit_methods_keep_every_coordinate():
     solution = run(slides(), "", integrator=I.SDIRK54(1e-9, 1e-9), formulation="tangent")
     assert solution.stats.rotations_skipped == 0
-    np.testing.assert_allclose(solution.q[-1], run(slides()).q[-1], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(solution.q[-1], run(slides()).q[-1], rtol=0, atol=ROUGH)
 
 
 @pytest.mark.slow
@@ -334,4 +335,4 @@ def test_reactions_among_redundant_rows_are_as_unique_as_before():
     whole = run(turning(SCENES["rails"][0]()))
     for one, two in zip(scene.constraints, whole.scene.constraints, strict=True):
         for ours, theirs in zip(solution.reaction(one), whole.reaction(two), strict=True):
-            np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-9 * (1.0 + np.abs(theirs).max()))
+            np.testing.assert_allclose(ours, theirs, rtol=0, atol=CLOSE * (1.0 + np.abs(theirs).max()))

@@ -9,7 +9,8 @@ import tsdyn as ts
 from examples import pendulum_chain
 from tests.helpers.constraint_levels import chains, check
 from tests.helpers.reference import NAMES, load
-from tests.helpers.scenes import BETWEEN, EPS, MOTION, PRIMITIVES, build, random_body, random_chain, random_pair
+from tests.helpers.scenes import BETWEEN, MOTION, PRIMITIVES, build, random_body, random_chain, random_pair
+from tests.helpers.tolerances import CLOSE, COARSE, EPS, FINE, HELD, ROUGH, TIGHT
 from tsdyn.formulations.registry import formulation
 from tsdyn.sparse.constraint_graphs import network_of
 
@@ -28,8 +29,8 @@ def both(make, end, integrator, **options):
 def demand_same(one, two, growth):
     """The same steps and charts, and states that rounding has driven apart by no more than `growth` eps."""
     assert one.charts.reason == two.charts.reason
-    np.testing.assert_allclose(one.charts.t, two.charts.t, rtol=1e-9)
-    np.testing.assert_allclose(one.steps.h, two.steps.h, rtol=1e-6)
+    np.testing.assert_allclose(one.charts.t, two.charts.t, rtol=CLOSE)
+    np.testing.assert_allclose(one.steps.h, two.steps.h, rtol=ROUGH)
     np.testing.assert_array_equal(one.steps.accepted, two.steps.accepted)
     for name in ("q", "qd", "qdd"):
         a, b = getattr(one, name), getattr(two, name)
@@ -61,8 +62,8 @@ def test_steps_do_not_depend_on_the_form(name, method):
     assert one.charts.reason == two.charts.reason
     np.testing.assert_array_equal(one.charts.steps, two.charts.steps)
     np.testing.assert_array_equal(one.steps.accepted, two.steps.accepted)
-    np.testing.assert_allclose(one.steps.h[:-1], two.steps.h[:-1], rtol=3e-5)
-    np.testing.assert_allclose(one.q, two.q, atol=1e-11)
+    np.testing.assert_allclose(one.steps.h[:-1], two.steps.h[:-1], rtol=3 * COARSE)
+    np.testing.assert_allclose(one.q, two.q, atol=TIGHT)
 
 
 def driven():
@@ -87,7 +88,7 @@ def test_motions_forces_point_masses_and_loose_parts():
     demand_same(one, two, 2e4)
     check(one)
     scale = 1.0 + np.abs(two.multipliers).max()
-    assert np.abs(one.multipliers - two.multipliers).max() < 1e-10 * scale
+    assert np.abs(one.multipliers - two.multipliers).max() < FINE * scale
 
 
 def free_bodies():
@@ -103,7 +104,7 @@ def test_without_any_constraint():
     assert set(one.charts.reason) == {"start", "turn of a body"}
     mass = one.scene.bodies[1]
     expected = mass.position + np.outer(one.t, mass.velocity) + 0.5 * np.outer(one.t**2, one.scene.gravity)
-    assert np.abs(one.position(mass) - expected).max() < 1e-12
+    assert np.abs(one.position(mass) - expected).max() < HELD
 
 
 @pytest.mark.slow_but("*body to body")
@@ -149,9 +150,9 @@ def test_a_long_chain_is_on_its_constraints():
     solution = ts.simulate(scene, (0.0, 0.2), **options).raise_if_failed()
     check(solution)
     at = scene.evaluate(solution.q[-1], solution.qd[-1], solution.t[-1])
-    assert np.abs(at.qdd - solution.qdd[-1]).max() < 1e-9 * np.abs(at.qdd).max()
+    assert np.abs(at.qdd - solution.qdd[-1]).max() < CLOSE * np.abs(at.qdd).max()
     lam = solution.multipliers[-1]
-    assert np.abs(at.multipliers - lam).max() < 1e-9 * np.abs(lam).max()
+    assert np.abs(at.multipliers - lam).max() < CLOSE * np.abs(lam).max()
 
 
 def test_no_matrix_grows_with_the_square(monkeypatch):

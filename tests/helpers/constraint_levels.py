@@ -4,12 +4,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 import tsdyn as ts
-from tests.helpers.scenes import (
-    EPS,
-    build,
-    random_body,
-    random_primitive,
-)
+from tests.helpers.scenes import build, random_body, random_primitive
+from tests.helpers.tolerances import EPS
 
 # times 1 + the largest |r|, |qd|, |qdd| of the output
 BOUNDS = {"position": 50 * EPS, "velocity": 500 * EPS, "acceleration": 5000 * EPS}

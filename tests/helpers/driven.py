@@ -3,7 +3,7 @@
 import numpy as np
 
 import tsdyn as ts
-from tests.helpers.scenes import EPS
+from tests.helpers.tolerances import EPS
 
 C, M = ts.constraints, ts.motions
 X, Y, Z = np.eye(3)

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 import tsdyn as ts
-from tests.helpers.scenes import EPS, build
+from tests.helpers.scenes import build
+from tests.helpers.tolerances import EPS
 from tsdyn.observables.diagnostics import constraint_error
 
 FOLDER = Path(__file__).parents[1] / "references"

@@ -11,8 +11,6 @@ import numpy as np
 
 import tsdyn as ts
 
-EPS = np.finfo(float).eps
-
 
 def build(definition):
     """The scene of a definition."""

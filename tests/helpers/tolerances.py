@@ -1,4 +1,4 @@
-"""Tolerances by name. A bound that scales with a size or a condition is written as a multiple of EPS where it stands."""
+"""Tolerances by name. A bound that scales with a size or a condition is a multiple of EPS where it stands."""
 
 import numpy as np
 

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import tsdyn as ts
 from tests.helpers.reference import error, load
-from tests.helpers.scenes import EPS
+from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, LOOSE
 from tsdyn.methods.tableau import NystromTableau, RungeKuttaTableau
 
 SCENES = ("sliding_top", "two_body_pendulum", "two_body_pendulum_spatial")
@@ -62,8 +62,8 @@ def change(one, two):
 @pytest.mark.parametrize("name", SCENES)
 def test_order(name):
     solutions, errors, _ = study(name)
-    assert 1e-5 < errors[0] < 1e-4
-    assert errors[-1] < 1e-10
+    assert 1e-5 < errors[0] < LOOSE
+    assert errors[-1] < FINE
     assert abs(slope(errors) - 4.0) < ORDER_TOL
     for solution in solutions:
         own = [reason for reason in solution.charts.reason if reason not in ("start", "chart_interval")]
@@ -106,7 +106,7 @@ def test_below_truncation_a_chart_changes_rounding_only(name, interval):
     """
     step, end = 1 / 16384, 1.0
     free, reference = run(name, step, end)
-    assert error(free, reference) < 1e-13
+    assert error(free, reference) < ALGEBRA
     forced, _ = run(name, step, end, chart_interval=interval)
     angle = sum(np.linalg.norm(w) for w in reference.w_body[0]) * end
     assert change(free, forced) < 2 * EPS * np.sqrt(forced.stats.charts) * (1 + angle)
@@ -120,7 +120,7 @@ def test_order_of_maggi_kane(name):
     steps = tuple(factor * h for h in STEPS)
     intervals = tuple(5 * 2**j // factor or 1 for j in range(len(STEPS)))
     _, errors, _ = study(name, steps=steps, intervals=intervals, formulation="maggi-kane")
-    assert errors[-1] < 1e-9
+    assert errors[-1] < CLOSE
     assert abs(slope(errors, steps) - 4.0) < ORDER_TOL
 
 

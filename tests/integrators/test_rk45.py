@@ -5,6 +5,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.reference import error, load, run
+from tests.helpers.tolerances import CLOSE, FINE, HELD, ROUGH, ROUNDING
 
 C = ts.constraints
 RK45 = ts.integrators.RK45
@@ -61,10 +62,10 @@ def test_rejected_steps_leave_no_trace(formulation):
         assert history.accepted.sum() == solution.stats.steps
         assert (~history.accepted).sum() == solution.stats.rejected
         accepted = history.t[history.accepted]
-        np.testing.assert_allclose(np.diff(accepted), history.h[history.accepted][:-1], rtol=1e-9)
+        np.testing.assert_allclose(np.diff(accepted), history.h[history.accepted][:-1], rtol=CLOSE)
         if first == 1.0:
             assert solution.stats.rejected > 2
-    np.testing.assert_allclose(*ends, atol=1e-6)
+    np.testing.assert_allclose(*ends, atol=ROUGH)
 
 
 def test_evaluations_are_counted():
@@ -85,9 +86,9 @@ def test_output_changes_no_step():
 def test_largest_step_and_fixed_step():
     scene, _ = load("sliding_top")
     bounded = ts.simulate(scene, (0.0, 1.0), integrator=RK45(1e-3, 1e-3, max_step=0.01))
-    assert bounded.steps.h.max() <= 0.01 * (1 + 1e-12)
+    assert bounded.steps.h.max() <= 0.01 * (1 + HELD)
     fixed = ts.simulate(scene, (0.0, 1.0), integrator=RK45(step=0.03))
-    np.testing.assert_allclose(fixed.steps.h, [*[0.03] * 33, 0.01], rtol=1e-12)
+    np.testing.assert_allclose(fixed.steps.h, [*[0.03] * 33, 0.01], rtol=HELD)
 
 
 def test_driven_and_free_scenes():
@@ -98,10 +99,10 @@ def test_driven_and_free_scenes():
     scene.add(C.Distance(bead, scene.ground, length=motion))
     scene.assemble()
     solution = ts.simulate(scene, (0.0, 2.0), integrator=RK45(1e-10, 1e-10)).raise_if_failed()
-    assert solution.constraint_error.position.max() < 1e-14
-    assert solution.constraint_error.acceleration.max() < 1e-12
+    assert solution.constraint_error.position.max() < ROUNDING
+    assert solution.constraint_error.acceleration.max() < HELD
     height = 5.0 * solution.t - 0.5 * 9.81 * solution.t**2
-    np.testing.assert_allclose(solution.position(scene.body("ball"))[:, 2], height, atol=1e-10)
+    np.testing.assert_allclose(solution.position(scene.body("ball"))[:, 2], height, atol=FINE)
 
 
 def test_collapsing_step_says_where_and_hands_back_what_it_had():

@@ -11,6 +11,7 @@ import tsdyn as ts
 from benchmarks.stiff import hung, jointed
 from tests.helpers.closed_forms import compound_pendulum, point_pendulum
 from tests.helpers.reference import demand_on_the_manifold
+from tests.helpers.tolerances import CLOSE, HELD, NEAR
 
 I = ts.integrators
 by_name = {"ids": lambda x: getattr(x, "__name__", str(x))}
@@ -48,10 +49,10 @@ def test_the_reference_of_stiff_scenes(make, end):
         ts.simulate(make(), (0.0, end), integrator=m, t_eval=[0.0, 0.2 * end, end])
         for m in (SDIRK54(1e-9, 1e-9), RK45(1e-11, 1e-11))
     )
-    np.testing.assert_allclose(one.q, two.q, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(one.qd, two.qd, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(one.q, two.q, rtol=0, atol=HELD)
+    np.testing.assert_allclose(one.qd, two.qd, rtol=0, atol=CLOSE)
     finer = off_by(make, SDIRK54, 1e-8)
-    assert 0.0 < finer < 1e-8  # what is compared with errors of 1e-6 and more
+    assert 0.0 < finer < NEAR  # what is compared with errors of 1e-6 and more
 
 
 @pytest.mark.slow
@@ -102,8 +103,8 @@ def test_work_balance(make):
     lost = simpson(solution.dissipation, x=solution.t)
     loss = solution.energy[0] - solution.energy[-1]
     swing = np.ptp(solution.kinetic_energy)
-    assert np.abs(solution.power).max() < 1e-12 * swing
-    assert abs(loss - lost) < 1e-8 * swing
+    assert np.abs(solution.power).max() < HELD * swing
+    assert abs(loss - lost) < NEAR * swing
     if make is hung:  # there it is much more than what the error of the run could be
         assert loss > 1e-4 * swing
 

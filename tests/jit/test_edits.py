@@ -6,6 +6,7 @@ import os
 import pytest
 
 from tests.helpers.processes import REPORT, ROOT, SMALL, run
+from tests.helpers.tolerances import ROUNDING
 
 
 def edit(file, old, new):
@@ -165,6 +166,6 @@ def test_functions_on_one_line_are_told_apart(plug_in, warm):
     for _ in range(2):
         found = plug_run(plug_in, environment)
         length = 0.1 * math.sin(1.0) + 2.0
-        assert found["Phi_t"] == pytest.approx(-length * 0.1 * math.cos(1.0) / 2.0, rel=1e-14)
+        assert found["Phi_t"] == pytest.approx(-length * 0.1 * math.cos(1.0) / 2.0, rel=ROUNDING)
         expected = (-((0.1 * math.cos(1.0)) ** 2) + length * 0.1 * math.sin(1.0)) / 2.0
-        assert found["gamma"] == pytest.approx(expected, rel=1e-14)
+        assert found["gamma"] == pytest.approx(expected, rel=ROUNDING)

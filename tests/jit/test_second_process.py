@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.helpers.processes import REPORT, run
+from tests.helpers.tolerances import EXACT
 
 
 def test_second_process_compiles_nothing(warm):
@@ -154,7 +155,7 @@ report(q=end.q.tolist(), debug=_kernel.DEBUG)
     plain, _ = run(code, {"TSDYN_DEBUG": "1"})
     assert (compiled["debug"], plain["debug"]) == (False, True)
     assert plain["misses"] == plain["hits"] == 0
-    assert [pytest.approx(row, abs=1e-15) for row in compiled["q"]] == plain["q"]
+    assert [pytest.approx(row, abs=EXACT) for row in compiled["q"]] == plain["q"]
 
 
 DRIVEN = (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.helpers.scenes import EPS
+from tests.helpers.tolerances import CLOSE, EPS
 from tsdyn.jit.kernels import entry
 from tsdyn.maths.dense_linalg import lu, lu_solve
 
@@ -29,7 +29,7 @@ def test_lu(n, rng):
         assert factor_and_solve(A.copy(), pivots, x)
         residual = np.abs(A @ x - b)
         assert (residual <= 20 * n * EPS * (np.abs(A) @ np.abs(x) + np.abs(b))).all()
-        np.testing.assert_allclose(x, np.linalg.solve(A, b), rtol=1e-9 * np.linalg.cond(A / np.abs(A).max(1)[:, None]))
+        np.testing.assert_allclose(x, np.linalg.solve(A, b), rtol=CLOSE * np.linalg.cond(A / np.abs(A).max(1)[:, None]))
 
 
 @pytest.mark.parametrize("bad", [0.0, np.nan, np.inf])

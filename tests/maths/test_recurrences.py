@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tests.helpers.scenes import rotation as matrix_of
+from tests.helpers.tolerances import EPS
 from tsdyn.jit.kernels import twin
 from tsdyn.maths import recurrences as R
 from tsdyn.maths.power_series import Truncated
 
 K = 12
-EPS = np.finfo(float).eps
 
 
 def rows(rng, n, positive=()):

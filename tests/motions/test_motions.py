@@ -7,6 +7,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.motion_series import ORDER, series
+from tests.helpers.tolerances import ALGEBRA, HELD, ROUNDING, TIGHT
 from tsdyn.maths.power_series import Truncated
 
 M = ts.motions
@@ -36,8 +37,8 @@ def test_the_program_gives_the_series(motion, time):
     expected = motion(Truncated([time, 1.0, *[0.0] * (ORDER - 2)])).c
     got = series(motion, time)
     scale = np.maximum.accumulate(np.abs(expected)) + 1e-300
-    assert (np.abs(got - expected) / scale).max() < 1e-12
-    np.testing.assert_allclose(series(motion, time, 3), got[:3], rtol=1e-14, atol=1e-14)
+    assert (np.abs(got - expected) / scale).max() < HELD
+    np.testing.assert_allclose(series(motion, time, 3), got[:3], rtol=ROUNDING, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("time", TIMES)
@@ -45,7 +46,7 @@ def test_the_program_gives_the_series(motion, time):
 def test_the_series_sums_to_the_motion(motion, time):
     for step in (0.03, -0.08):
         value = np.polynomial.polynomial.polyval(step, series(motion, time, 30))
-        assert value == pytest.approx(motion(time + step), rel=1e-13, abs=1e-13)
+        assert value == pytest.approx(motion(time + step), rel=ALGEBRA, abs=ALGEBRA)
 
 
 @pytest.mark.parametrize("time", TIMES)
@@ -53,9 +54,9 @@ def test_the_series_sums_to_the_motion(motion, time):
 def test_value_and_derivatives_are_those_of_the_series(motion, time):
     c = series(motion, time, 3)
     given = float(motion(time)), float(motion.rate(time)), float(motion.acceleration(time))
-    np.testing.assert_allclose(given, (c[0], c[1], 2.0 * c[2]), rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(given, (c[0], c[1], 2.0 * c[2]), rtol=HELD, atol=ALGEBRA)
     step = motion(time + 1e-30j).imag / 1e-30 if not isinstance(motion, M.Constant) else 0.0
-    assert given[1] == pytest.approx(step, rel=1e-12, abs=1e-13)
+    assert given[1] == pytest.approx(step, rel=HELD, abs=ALGEBRA)
 
 
 @pytest.mark.parametrize("motion", MOTIONS.values(), ids=MOTIONS)
@@ -63,7 +64,7 @@ def test_arrays_of_times(motion):
     times = np.array(TIMES)
     for function in (motion, motion.rate, motion.acceleration):
         assert function(times).shape == times.shape
-        np.testing.assert_allclose(function(times), [function(x) for x in TIMES], rtol=1e-14, atol=1e-14)
+        np.testing.assert_allclose(function(times), [function(x) for x in TIMES], rtol=ROUNDING, atol=ROUNDING)
 
 
 def test_what_is_used_twice_is_computed_once():
@@ -72,12 +73,12 @@ def test_what_is_used_twice_is_computed_once():
         motion = 0.5 * motion * motion + 0.1
     assert len(motion.program()) < 20000
     assert math.isfinite(motion(0.5))
-    assert series(motion, 0.5, 3)[0] == pytest.approx(motion(0.5), rel=1e-13)
+    assert series(motion, 0.5, 3)[0] == pytest.approx(motion(0.5), rel=ALGEBRA)
 
 
 def test_long_sums():
     motion = sum((M.Sine(1.0 / n, n) for n in range(1, 1200)), M.Constant(0.0))
-    assert series(motion, 0.3, 3)[0] == pytest.approx(motion(0.3), rel=1e-11)
+    assert series(motion, 0.3, 3)[0] == pytest.approx(motion(0.3), rel=TIGHT)
 
 
 BAD = {
@@ -152,9 +153,9 @@ def test_functions_of_math_are_known():
     motion = ts.Motion(imported)
     for time in TIMES:
         value, rate, gain = motion.value(time)
-        assert value == pytest.approx(imported(time), rel=1e-14)
+        assert value == pytest.approx(imported(time), rel=ROUNDING)
         c = motion.smooth(Truncated([time, 1.0, 0.0])).c
-        assert (rate, gain) == (pytest.approx(c[1], rel=1e-12), pytest.approx(2.0 * c[2], rel=1e-12))
+        assert (rate, gain) == (pytest.approx(c[1], rel=HELD), pytest.approx(2.0 * c[2], rel=HELD))
     assert not motion.has_series
     assert ts.Motion(t).has_series
 

@@ -17,6 +17,7 @@ from scipy.interpolate import (
 
 import tsdyn as ts
 from tests.helpers.motion_series import series
+from tests.helpers.tolerances import ALGEBRA, CLOSE, FINE, HELD, TIGHT
 
 C, F, I, M = ts.constraints, ts.forces, ts.integrators, ts.motions
 KNOTS = np.array([0.0, 0.13, 0.3, 0.5, 0.77, 1.0])
@@ -58,11 +59,11 @@ def test_values_and_series_are_those_of_scipy(spline):
         given = [float(f(t)) for f in (motion, motion.rate, motion.acceleration, motion.jerk)]
         expected = [float(value(spline, t, n)) for n in range(4)]
         scale = np.maximum(np.abs(expected), 1.0)
-        np.testing.assert_allclose(given / scale, expected / scale, atol=1e-9)
+        np.testing.assert_allclose(given / scale, expected / scale, atol=CLOSE)
         c = series(motion, t, 6) * [math.factorial(n) for n in range(6)]
-        np.testing.assert_allclose(c[:4] / scale, expected / scale, atol=1e-9)
+        np.testing.assert_allclose(c[:4] / scale, expected / scale, atol=CLOSE)
     times = np.linspace(0.0, 1.0, 7)
-    np.testing.assert_allclose(motion(times), value(spline, times), atol=1e-12)
+    np.testing.assert_allclose(motion(times), value(spline, times), atol=HELD)
 
 
 def test_arithmetic_of_data():
@@ -70,8 +71,8 @@ def test_arithmetic_of_data():
     motion = 0.5 * M.Piecewise(spline) ** 2 + np.sin(M.time)
     t = np.array([0.2, 0.3, 0.9])
     x, v, a = (spline(t, n) for n in range(3))
-    np.testing.assert_allclose(motion.rate(t), x * v + np.cos(t), atol=1e-13)
-    np.testing.assert_allclose(motion.acceleration(t), x * a + v * v - np.sin(t), atol=1e-12)
+    np.testing.assert_allclose(motion.rate(t), x * v + np.cos(t), atol=ALGEBRA)
+    np.testing.assert_allclose(motion.acceleration(t), x * a + v * v - np.sin(t), atol=HELD)
     assert pickle.loads(pickle.dumps(motion))(0.3) == motion(0.3)
 
 
@@ -94,14 +95,14 @@ def test_steps_end_at_knots_and_constraints_hold(options):
     solution = ts.simulate(scene, (0.0, 1.0), dense_output=True, **options).raise_if_failed()
     assert set(KNOTS) <= set(solution.t)
     error = solution.constraint_error
-    assert max(error.position.max(), error.velocity.max()) < 1e-13
-    assert error.acceleration.max() < 1e-11
+    assert max(error.position.max(), error.velocity.max()) < ALGEBRA
+    assert error.acceleration.max() < TIGHT
     inner = np.append(KNOTS[:-1], [0.2, 0.6])
     state = solution.at(inner)
-    np.testing.assert_allclose(np.linalg.norm(state.q, axis=1), spline(inner), atol=1e-13)
+    np.testing.assert_allclose(np.linalg.norm(state.q, axis=1), spline(inner), atol=ALGEBRA)
     r, rd, rdd = state.q, state.qd, state.qdd
     radial = (np.einsum("ki,ki->k", r, rdd) + np.einsum("ki,ki->k", rd, rd) - spline(inner, 1) ** 2) / spline(inner)
-    np.testing.assert_allclose(radial, spline(inner, 2), atol=1e-9)
+    np.testing.assert_allclose(radial, spline(inner, 2), atol=CLOSE)
     loose = 1e-5 if options["integrator"].step else 1e-8
     assert np.ptp(solution.energy - solution.work) < loose
 
@@ -144,7 +145,7 @@ def test_a_fast_crank_by_a_table():
     hinge = scene.add(C.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1)))
     scene.add(C.RotationMotor.of(hinge, angle=(t, 20.0 * t**2)))
     solution = ts.simulate(scene, (0.0, 2.0), t_eval=t).raise_if_failed()
-    np.testing.assert_allclose(solution.angle(hinge), 20.0 * t**2, atol=1e-9)
+    np.testing.assert_allclose(solution.angle(hinge), 20.0 * t**2, atol=CLOSE)
     assert solution.method.startswith("Taylor")
 
 
@@ -162,15 +163,15 @@ def test_a_path_of_data(path):
     body = scene.add_body(1.0, (1.0, 1.1, 1.2), (1.0, 0.0, 0.0), velocity=(SPLINES["cubic"](0.0, 1), 0.0, -1.0))
     scene.add(C.PointDriver(scene.ground, body, path=path))
     solution = ts.simulate(scene, (0.0, 1.0), t_eval=KNOTS).raise_if_failed()
-    np.testing.assert_allclose(solution.position(body), PATHS["spline"](KNOTS), atol=1e-13)
+    np.testing.assert_allclose(solution.position(body), PATHS["spline"](KNOTS), atol=ALGEBRA)
 
 
 def test_periods_go_on():
     spline = CubicSpline(0.1 * np.arange(4), [1.0, 1.2, 0.9, 1.0], bc_type="periodic")
     scene, _ = bead(spline)
     solution = ts.simulate(scene, (0.0, 2.0), **METHODS["taylor"]).raise_if_failed()
-    assert np.isclose(solution.t[:, None], 0.1 * np.arange(21), atol=1e-12).any(axis=0).all()
-    assert solution.constraint_error.acceleration.max() < 1e-11
+    assert np.isclose(solution.t[:, None], 0.1 * np.arange(21), atol=HELD).any(axis=0).all()
+    assert solution.constraint_error.acceleration.max() < TIGHT
 
 
 def test_where_runs_begin_and_end():
@@ -182,8 +183,8 @@ def test_where_runs_begin_and_end():
     half = ts.simulate(scene, (5.0, 5.3), **METHODS["taylor"])
     rest = ts.simulate(scene, (5.3, 6.0), state=half.state, **METHODS["taylor"])
     whole = ts.simulate(scene, (5.0, 6.0), **METHODS["taylor"])
-    np.testing.assert_allclose(rest.q[-1], whole.q[-1], atol=1e-10)
-    np.testing.assert_allclose(half.qdd[-1], rest.qdd[0], atol=1e-9)
+    np.testing.assert_allclose(rest.q[-1], whole.q[-1], atol=FINE)
+    np.testing.assert_allclose(half.qdd[-1], rest.qdd[0], atol=CLOSE)
 
 
 @pytest.mark.parametrize("name", ["taylor", "dop853"])
@@ -231,8 +232,8 @@ def test_steps_end_at_knots_of_loads(load):
     t = 0.5 * (knots[1:] + knots[:-1])[:, None] + 0.5 * np.diff(knots)[:, None] * nodes
     f = load(t.ravel()) if isinstance(load, M.Smooth) else parts(t.ravel())
     expected = (0.5 * np.diff(knots) * (f.reshape(t.shape) @ weights)).sum()
-    assert solution.qd[-1, 0] == pytest.approx(expected, abs=1e-13)
-    assert np.ptp(solution.energy - solution.work) < 1e-12
+    assert solution.qd[-1, 0] == pytest.approx(expected, abs=ALGEBRA)
+    assert np.ptp(solution.energy - solution.work) < HELD
 
 
 def hinge_driven(angle):

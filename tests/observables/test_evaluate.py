@@ -7,7 +7,6 @@ import tsdyn as ts
 from tests.helpers import closed_loops
 from tests.helpers.scenes import (
     BETWEEN,
-    EPS,
     PRIMITIVES,
     build,
     constraints,
@@ -19,6 +18,7 @@ from tests.helpers.scenes import (
     taylor,
     unit,
 )
+from tests.helpers.tolerances import CLOSE, EPS
 
 COMPLEX = 1e-40  # a complex step: nothing cancels
 DOZENS = 200 * EPS  # times the size of what is compared: a few dozen operations
@@ -231,11 +231,11 @@ def test_redundant_rows_of_scenes_of_any_size(scene, redundant):
     lam = np.where(np.isnan(found.multipliers), 0.0, found.multipliers)
     assert np.isnan(found.multipliers).sum() == redundant
     size = np.abs(found.Q_A).max()
-    np.testing.assert_allclose(found.M @ found.qdd + found.Phi_q.T @ lam, found.Q_A + found.S, atol=1e-9 * size)
-    np.testing.assert_allclose(found.Phi_q @ found.qdd, -found.gamma, atol=1e-9 * (1.0 + np.abs(found.qdd).max()))
+    np.testing.assert_allclose(found.M @ found.qdd + found.Phi_q.T @ lam, found.Q_A + found.S, atol=CLOSE * size)
+    np.testing.assert_allclose(found.Phi_q @ found.qdd, -found.gamma, atol=CLOSE * (1.0 + np.abs(found.qdd).max()))
     if redundant < 900:
         start = ts.simulate(scene, (0.0, 1e-3))
-        np.testing.assert_allclose(found.qdd, start.qdd[0], atol=1e-9 * (1.0 + np.abs(found.qdd).max()))
+        np.testing.assert_allclose(found.qdd, start.qdd[0], atol=CLOSE * (1.0 + np.abs(found.qdd).max()))
     tumbling = np.random.default_rng(1).normal(size=found.qdd.size)
     with pytest.raises(ts.SingularConfiguration, match="not unique"):
         scene.evaluate(qd=tumbling)  # what redundant rows ask for contradicts the others

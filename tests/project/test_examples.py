@@ -25,6 +25,7 @@ from examples import (
     top,
     two_body_pendulum,
 )
+from tests.helpers.tolerances import CLOSE, NEAR
 
 ROOT = Path(__file__).parents[2]
 RUNS = {
@@ -81,7 +82,7 @@ def test_stick_slip():
         method = ts.integrators.DOP853(rtol=1e-11, atol=1e-11)
         solution = ts.simulate(stick_slip.build(), (0.0, 1.0), integrator=method, dense_output=True, **given)
         stick_slip.check(solution)
-        assert np.abs(solution.energy - solution.work - solution.energy[0]).max() < 1e-9
+        assert np.abs(solution.energy - solution.work - solution.energy[0]).max() < CLOSE
     stick_slip.check(
         ts.simulate(stick_slip.build(), (0.0, 1.0), integrator=ts.integrators.SDIRK54(1e-8, 1e-8)), tol=1e-6
     )
@@ -126,7 +127,7 @@ def test_energy_less_work_is_constant(build, end):
     """To the tolerance, relative to what the energy's parts are."""
     solution = ts.simulate(build(), (0.0, end), rtol=1e-9, atol=1e-9, dense_output=True).raise_if_failed()
     size = np.abs(solution.kinetic_energy).max() + np.ptp(solution.potential_energy)
-    assert np.ptp(solution.energy - solution.work) < 1e-8 * size
+    assert np.ptp(solution.energy - solution.work) < NEAR * size
 
 
 @pytest.mark.parametrize("formulation", ["tangent", "maggi-kane"])

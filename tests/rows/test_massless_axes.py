@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.helpers.tolerances import ALGEBRA, FINE, HELD, NEAR, ROUGH, TIGHT
 
 C, I, F = ts.constraints, ts.integrators, ts.forces
 GRAVITY = (4.0, -3.0, -8.0)
@@ -80,10 +81,10 @@ def demand_exact(scene, solution, tol=1e-11):
         np.testing.assert_allclose(solution.qdd[i], state.qdd, rtol=0.0, atol=tol * size)
         kept = ~np.isnan(state.multipliers) & ~np.isnan(solution.multipliers[i])
         assert kept.any()
-    np.testing.assert_allclose(solution.energy, solution.energy[0], rtol=0.0, atol=1e-8 * (1 + abs(solution.energy[0])))
+    np.testing.assert_allclose(solution.energy, solution.energy[0], rtol=0.0, atol=NEAR * (1 + abs(solution.energy[0])))
     errors = solution.constraint_error
-    assert max(errors.position.max(), errors.velocity.max()) < 1e-13
-    assert errors.acceleration.max() < 1e-11
+    assert max(errors.position.max(), errors.velocity.max()) < ALGEBRA
+    assert errors.acceleration.max() < TIGHT
 
 
 @pytest.mark.slow_for("*-hub")
@@ -107,7 +108,7 @@ def test_both_forms_agree(name):
         ts.simulate(scene, (0.0, 0.3), integrator=I.Nystrom4(step=5e-3), formulation=form)
         for form in ("tangent", "null-space")
     )
-    np.testing.assert_allclose(free.q, basis.q, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(free.q, basis.q, rtol=0.0, atol=HELD)
     np.testing.assert_array_equal(free.charts.t, basis.charts.t)
 
 
@@ -117,7 +118,7 @@ def test_next_to_no_inertia_is_next_to_none(inertia):
         ts.simulate(chain(4, range(4), j), (0.0, 0.3), integrator=METHODS[0]).raise_if_failed() for j in (0.0, inertia)
     )
     assert little.stats.steps == none.stats.steps
-    np.testing.assert_allclose(little.q[-1], none.q[-1], rtol=0.0, atol=1e-13 + 10.0 * inertia)
+    np.testing.assert_allclose(little.q[-1], none.q[-1], rtol=0.0, atol=ALGEBRA + 10.0 * inertia)
 
 
 def test_friction_of_a_joint():
@@ -125,7 +126,7 @@ def test_friction_of_a_joint():
     scene.add(F.RevoluteFriction(scene.constraints[1], kinetic=0.2, radius=0.05))
     solution = ts.simulate(scene, (0.0, 0.2), integrator=METHODS[1]).raise_if_failed()
     state = scene.evaluate(solution.q[-1], solution.qd[-1], solution.t[-1])
-    np.testing.assert_allclose(solution.qdd[-1], state.qdd, rtol=0.0, atol=1e-10 * np.abs(state.qdd).max())
+    np.testing.assert_allclose(solution.qdd[-1], state.qdd, rtol=0.0, atol=FINE * np.abs(state.qdd).max())
     assert solution.stats.b_iterations == 0
 
 
@@ -133,7 +134,7 @@ def test_a_free_rod_with_little_inertia_spins_on():
     scene = ts.Scene(gravity=(0.0, 0.0, 0.0))
     rod = scene.add_body(1.0, (1.0, 1.0, 1e-11), angular_velocity=(0.3, 0.0, 5.0))
     solution = ts.simulate(scene, (0.0, 1.0)).raise_if_failed()
-    np.testing.assert_allclose(solution.angular_velocity(rod)[:, 2], 5.0, rtol=1e-6)
+    np.testing.assert_allclose(solution.angular_velocity(rod)[:, 2], 5.0, rtol=ROUGH)
 
 
 def test_two_bodies_whose_common_axis_is_free():

@@ -11,7 +11,7 @@ import tsdyn as ts
 from tests.helpers.closed_forms import point_pendulum
 from tests.helpers.driven_rod import driven
 from tests.helpers.reference import load
-from tests.helpers.scenes import EPS
+from tests.helpers.tolerances import CLOSE, EPS, EXACT, ROUNDING
 from tsdyn.observables.diagnostics import constraint_error
 
 C, I = ts.constraints, ts.integrators
@@ -64,7 +64,7 @@ def test_at_the_steps_it_is_the_steps(make, method, formulation):
         values = getattr(solution, name)
         np.testing.assert_allclose(getattr(state, name), values, rtol=0, atol=growth * EPS * (1 + np.abs(values).max()))
     np.testing.assert_allclose(
-        state.multipliers, solution.multipliers, atol=1e-9 * (1 + np.abs(state.multipliers).max())
+        state.multipliers, solution.multipliers, atol=CLOSE * (1 + np.abs(state.multipliers).max())
     )
     plain = run(make(), method, formulation=formulation, dense_output=False)
     times = run(make(), method, formulation=formulation, t_eval=np.linspace(0.0, END, 37))
@@ -173,7 +173,7 @@ def test_a_failed_run_keeps_what_it_had():
     solution = ts.simulate(scene, (0.0, 2.0), integrator=I.DOP853(1e-8, 1e-8), dense_output=True)
     assert not solution.success
     state = solution.at(solution.t[-1])
-    np.testing.assert_allclose(state.q, solution.q[-1], atol=1e-9)
+    np.testing.assert_allclose(state.q, solution.q[-1], atol=CLOSE)
     demand_on_the_manifold(solution, solution.at(np.linspace(0.0, 0.9, 30)))
     with pytest.raises(ts.InvalidArgument, match="t must"):
         solution.at(1.9)
@@ -191,7 +191,7 @@ def test_an_ended_run_keeps_what_it_had():
 def test_more_charts_than_there_was_room_for():
     solution = run(point_pendulum()[0], I.Nystrom4(END / 9000), chart_interval=1)
     assert solution.stats.charts == 9000
-    np.testing.assert_allclose(solution.at(solution.t[::50]).q, solution.q[::50], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(solution.at(solution.t[::50]).q, solution.q[::50], rtol=0, atol=ROUNDING)
 
 
 def test_a_run_of_no_steps():
@@ -199,7 +199,7 @@ def test_a_run_of_no_steps():
     start = lambda t, state: t  # noqa: E731
     start.terminal = True
     solution = run(point_pendulum()[0], METHODS["dop853"], events=start)
-    np.testing.assert_allclose(solution.at(0.0).q, solution.q[0], atol=1e-15)
+    np.testing.assert_allclose(solution.at(0.0).q, solution.q[0], atol=EXACT)
     with pytest.raises(ts.InvalidArgument, match="t must"):
         solution.at(1e-9)
 

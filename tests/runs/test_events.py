@@ -5,7 +5,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.closed_forms import LENGTH, compound_pendulum, heavy_top, point_pendulum
-from tests.helpers.scenes import EPS
+from tests.helpers.tolerances import EPS, EXACT, NEAR, ROUNDING, TIGHT
 from tsdyn.observables.diagnostics import constraint_error
 
 I = ts.integrators
@@ -39,14 +39,16 @@ def run(events, method=None, scene=None, span=(0.0, END), **options):
 @pytest.mark.parametrize("make", [point_pendulum, compound_pendulum])
 def test_a_pendulum_passes_its_lowest_point(make):
     scene, quarter = make()
-    solution = run([lowest(), lowest(direction=1), lowest(direction=-1)], REFERENCE, scene, (0.0, 10.0)).raise_if_failed()
+    solution = run(
+        [lowest(), lowest(direction=1), lowest(direction=-1)], REFERENCE, scene, (0.0, 10.0)
+    ).raise_if_failed()
     both, rising, falling = solution.t_events
-    np.testing.assert_allclose(both, (2 * np.arange(both.size) + 1) * quarter, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(both, (2 * np.arange(both.size) + 1) * quarter, rtol=0, atol=TIGHT)
     assert both[-1] + 2 * quarter > 10.0
     np.testing.assert_array_equal(falling, both[0::2])
     np.testing.assert_array_equal(rising, both[1::2])
     q, qd = solution.q_events[0], solution.qd_events[0]
-    assert np.abs(q[:, 0]).max() < 1e-14
+    assert np.abs(q[:, 0]).max() < ROUNDING
     levels = constraint_error(solution.packed, both, q, qd, np.zeros_like(q))
     assert levels.position.max() < 50 * EPS * (1 + np.abs(q).max())
     assert levels.velocity.max() < 500 * EPS * (1 + np.abs(qd).max())
@@ -57,7 +59,7 @@ def test_a_heavy_top_nutates():
     scene, half = heavy_top()
     vertical = lambda t, state: state.qd[2]  # noqa: E731
     (times,) = run(vertical, REFERENCE, scene, (0.0, 10.0)).raise_if_failed().t_events
-    np.testing.assert_allclose(times, np.arange(times.size) * half, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(times, np.arange(times.size) * half, rtol=0, atol=TIGHT)
     assert times.size == 1 + int(10.0 / half)
 
 
@@ -66,7 +68,7 @@ def test_a_heavy_top_nutates():
 def test_with_every_method(method, formulation):
     scene, quarter = point_pendulum()
     (times,) = run(lowest(), method, scene, formulation=formulation).t_events
-    np.testing.assert_allclose(times, quarter * np.array([1, 3, 5])[: times.size], atol=1e-8)
+    np.testing.assert_allclose(times, quarter * np.array([1, 3, 5])[: times.size], atol=NEAR)
     assert times.size == int((END / quarter + 1) / 2)
 
 
@@ -89,7 +91,7 @@ def test_long_runs_and_max_steps():
     solution = run(lowest(), I.Nystrom4(2e-4), scene, max_steps=5000)
     assert solution.status == ts.Status.MAX_STEPS
     assert solution.t.size == 5001
-    np.testing.assert_allclose(solution.t_events[0], [quarter], atol=1e-8)
+    np.testing.assert_allclose(solution.t_events[0], [quarter], atol=NEAR)
 
 
 # by SciPy's rules
@@ -121,8 +123,8 @@ def test_rules_are_those_of_solve_ivp():
     ours = run(functions, I.RK45(1e-6, 1e-6, max_step=0.05))
     assert theirs.t[-1] == pytest.approx(1.9)
     for a, b in zip(ours.t_events, theirs.t_events, strict=True):
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-14)
-    assert ours.state.t == pytest.approx(1.9, abs=1e-14)
+        np.testing.assert_allclose(a, b, rtol=0, atol=ROUNDING)
+    assert ours.state.t == pytest.approx(1.9, abs=ROUNDING)
 
 
 def test_in_order_of_time_and_none_after_a_terminal_one():
@@ -147,7 +149,7 @@ def test_a_terminal_event_ends_the_run(t_eval):
     assert "event 0 (down)" in solution.message
     assert f"t = {3 * quarter:.9g} s" in solution.message
     state = solution.state
-    assert abs(state.t - 3 * quarter) < 1e-11
+    assert abs(state.t - 3 * quarter) < TIGHT
     np.testing.assert_array_equal(solution.t_events[0][1], state.t)
     np.testing.assert_array_equal(solution.q_events[0][1], state.q)
     if t_eval is None:
@@ -156,7 +158,7 @@ def test_a_terminal_event_ends_the_run(t_eval):
         np.testing.assert_array_equal(solution.qdd[-1], state.qdd)
     else:
         np.testing.assert_array_equal(solution.t, t_eval[t_eval <= state.t])
-    assert solution.constraint_error.position.max() < 1e-14
+    assert solution.constraint_error.position.max() < ROUNDING
     np.testing.assert_array_equal(solution.at(state.t).q, state.q)
     with pytest.raises(ts.InvalidArgument, match="t must"):
         solution.at(state.t + 1e-6)
@@ -170,7 +172,7 @@ def test_going_on_from_a_terminal_event():
         solution = run(events, REFERENCE, scene, (start, 10.0), state=state)
         state, start = solution.state, solution.state.t
         times.append(start)
-    np.testing.assert_allclose(times, quarter * np.array([1, 3, 5, 7]), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(times, quarter * np.array([1, 3, 5, 7]), rtol=0, atol=TIGHT)
 
 
 def test_a_terminal_event_at_the_start_and_at_the_end():
@@ -202,12 +204,12 @@ def test_a_function_is_given_a_state():
     plain, solution = run(None), run(tension)
     np.testing.assert_array_equal(plain.q, solution.q)
     _, length, along, one, two = np.transpose(seen)
-    np.testing.assert_allclose(length, LENGTH, atol=1e-15)
-    np.testing.assert_allclose(along, 0.0, atol=1e-14)
+    np.testing.assert_allclose(length, LENGTH, atol=EXACT)
+    np.testing.assert_allclose(along, 0.0, atol=ROUNDING)
     np.testing.assert_array_equal(one, two)
     assert solution.t_events[0].size > 2
     for q in solution.q_events[0]:
-        assert np.linalg.norm(q) == pytest.approx(LENGTH, abs=1e-15)
+        assert np.linalg.norm(q) == pytest.approx(LENGTH, abs=EXACT)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, None, "1", [1.0], 1j, True], ids=str)

@@ -5,6 +5,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.closed_forms import point_pendulum
+from tests.helpers.tolerances import ALGEBRA, CLOSE, FAIR, FINE, HELD, LOOSE, ROUNDING
 from tsdyn.maths.root_isolation import Search
 
 I = ts.integrators
@@ -34,7 +35,7 @@ def hum(**attributes):
 def test_every_zero_of_a_fast_function_of_time(method):
     events = [hum(), hum(direction=1), hum(direction=-1)]
     both, rising, falling = ts.simulate(thrown(), (0.0, 1.0), integrator=method, events=events).t_events
-    np.testing.assert_allclose(both, (np.arange(1, 201) * np.pi - 0.1) / (200.0 * np.pi), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(both, (np.arange(1, 201) * np.pi - 0.1) / (200.0 * np.pi), rtol=0, atol=ROUNDING)
     np.testing.assert_array_equal(falling, both[0::2])
     np.testing.assert_array_equal(rising, both[1::2])
 
@@ -51,7 +52,7 @@ def test_by_every_form(method, formulation):
 @every_method
 def test_both_passages_of_a_height(method):
     (times,) = ts.simulate(thrown(), (0.0, 1.0), integrator=method, events=lambda t, state: state.q[2] - 1.0).t_events
-    np.testing.assert_allclose(times, 0.5 + 0.05**0.5 * np.array([-1.0, 1.0]), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(times, 0.5 + 0.05**0.5 * np.array([-1.0, 1.0]), rtol=0, atol=ALGEBRA)
 
 
 @every_method
@@ -60,7 +61,7 @@ def test_every_passage_of_a_mass_on_a_spring(method):
     mass = scene.add_point_mass(1.0, position=(1.5, 0.0, 0.0))
     scene.add(ts.forces.Spring(mass, scene.ground, stiffness=4.0 * np.pi**2, free_length=1.0))
     (times,) = ts.simulate(scene, (0.0, 10.0), integrator=method, events=lambda t, state: state.q[0] - 1.0).t_events
-    np.testing.assert_allclose(times, 0.25 + 0.5 * np.arange(20), rtol=0, atol=1e-4)
+    np.testing.assert_allclose(times, 0.25 + 0.5 * np.arange(20), rtol=0, atol=LOOSE)
 
 
 def test_random_polynomials_and_angles_change_sign_as_often_as_samples_do(rng):
@@ -100,7 +101,7 @@ def test_events_change_no_step():
 def test_a_pair_of_close_zeros(gap):
     function = lambda t, state: (t - 0.3) * (t - 0.3 - gap)  # noqa: E731
     (times,) = ts.simulate(thrown(), (0.0, 1.0), events=function).t_events
-    np.testing.assert_allclose(times, [0.3, 0.3 + gap], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(times, [0.3, 0.3 + gap], rtol=0, atol=CLOSE)
 
 
 @pytest.mark.parametrize("direction", [-1, 0, 1])
@@ -109,7 +110,7 @@ def test_a_touch_counts_once_in_either_direction(instant, direction):
     touch = event(lambda t, state: (t - instant) ** 2, direction=direction)
     near = event(lambda t, state: (t - instant) ** 2 + 1e-9, direction=direction)
     touched, missed = ts.simulate(thrown(), (0.0, 1.0), events=[touch, near]).t_events
-    np.testing.assert_allclose(touched, [instant], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(touched, [instant], rtol=0, atol=HELD)
     assert missed.size == 0
 
 
@@ -117,7 +118,7 @@ def test_the_top_of_a_throw():
     """1.25 m is touched, a nanometre less is passed twice, a nanometre more is not reached."""
     events = [lambda t, state, h=h: state.q[2] - h for h in (1.25, 1.25 - 1e-9, 1.25 + 1e-9)]
     touched, passed, missed = ts.simulate(thrown(), (0.0, 1.0), events=events).t_events
-    np.testing.assert_allclose(touched, [0.5], rtol=0, atol=1e-7)
+    np.testing.assert_allclose(touched, [0.5], rtol=0, atol=FAIR)
     assert (passed.size, missed.size) == (2, 0)
 
 
@@ -141,8 +142,8 @@ def test_kinks_and_jumps():
     ]
     smooth, jumps, kinks, clipped, dips = ts.simulate(thrown(), (0.0, 1.0), events=functions).t_events
     for times in (jumps, kinks, clipped):
-        np.testing.assert_allclose(times, smooth, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(dips, 0.3 + np.array([-1e-6, 1e-6]), rtol=0, atol=1e-12)
+        np.testing.assert_allclose(times, smooth, rtol=0, atol=FINE)
+    np.testing.assert_allclose(dips, 0.3 + np.array([-1e-6, 1e-6]), rtol=0, atol=HELD)
     assert calls < 1500
 
 
@@ -175,7 +176,7 @@ def test_a_bouncing_ball_never_falls_through(direction):
         assert state.t >= t
         t, state = state.t, state._replace(qd=-0.5 * state.qd)
     fall = 0.2**0.5
-    assert t == pytest.approx(3.0 * fall, abs=1e-9)
+    assert t == pytest.approx(3.0 * fall, abs=CLOSE)
 
 
 # failures
@@ -195,7 +196,7 @@ def test_what_was_found_before_a_failure_is_kept():
     assert [times.tolist() for times in solution.t_events] == [[0.2], [0.1], []]
     first = event(lambda t, state: t - 0.25, terminal=True)
     solution = ts.simulate(scene, (0.0, 1.0), events=[odd, first])
-    assert (solution.status, solution.state.t) == (ts.Status.EVENT, pytest.approx(0.25, abs=1e-14))
+    assert (solution.status, solution.state.t) == (ts.Status.EVENT, pytest.approx(0.25, abs=ROUNDING))
     assert solution.t_events[0] == pytest.approx([0.2])
 
 
@@ -213,7 +214,7 @@ def test_an_interrupt_in_the_last_step_is_no_success(method):
     assert (solution.status, solution.success) == (ts.Status.INTERRUPTED, False)
     assert solution.t[-1] == solution.state.t < 0.995
     np.testing.assert_array_equal(solution.q[-1], solution.state.q)
-    np.testing.assert_allclose(solution.at(solution.t).q, solution.q, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(solution.at(solution.t).q, solution.q, rtol=0, atol=ROUNDING)
     patient = True
     rest = ts.simulate(scene, (solution.state.t, 1.0), integrator=method, state=solution.state, events=function)
     assert rest.t_events[0] == pytest.approx([0.995])

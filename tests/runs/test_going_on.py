@@ -8,7 +8,8 @@ import pytest
 import tsdyn as ts
 from tests.helpers.fixed_steps import ARRAYS, SCENES, STEP, formulations, rows, run, same, same_history, scenes
 from tests.helpers.reference import Reference, error, load
-from tests.helpers.scenes import EPS, build, random_chain, rotation
+from tests.helpers.scenes import build, random_chain, rotation
+from tests.helpers.tolerances import EPS, FINE, HELD
 
 FORMULATIONS = ("tangent", "null-space", "maggi-kane")
 
@@ -135,7 +136,7 @@ def test_a_result_outlives_a_change_of_its_scene():
     for name, value in expected.items():
         np.testing.assert_array_equal(getattr(two, name), value, err_msg=name)
     np.testing.assert_array_equal(one.reaction(scene.constraints[0]), two.reaction(scene.constraints[0]))
-    assert two.constraint_error.acceleration.max() < 1e-10
+    assert two.constraint_error.acceleration.max() < FINE
 
 
 def test_runs_in_threads_are_the_runs_one_after_the_other():
@@ -179,7 +180,7 @@ def test_results_by_body_are_slices_of_q(rng):
         np.testing.assert_array_equal(solution.orientation(body), p)
         np.testing.assert_allclose(solution.rotation(body), rotation(p), atol=8 * EPS)
         A_d = np.einsum("kij,kjl->kil", solution.rotation(body), skew(solution.angular_velocity(body)))
-        np.testing.assert_allclose(np.imag(rotation(p + 1e-40j * pd)) / 1e-40, A_d, atol=1e-12)
+        np.testing.assert_allclose(np.imag(rotation(p + 1e-40j * pd)) / 1e-40, A_d, atol=HELD)
         at += 4
     assert at == solution.q.shape[1]
 

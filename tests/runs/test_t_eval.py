@@ -6,7 +6,7 @@ import pytest
 import tsdyn as ts
 from tests.helpers.fixed_steps import SCENES, STEP, formulations, rows, run, same, same_history, scenes
 from tests.helpers.reference import error, load
-from tests.helpers.scenes import EPS
+from tests.helpers.tolerances import CLOSE, EPS, HELD
 
 FORMULATIONS = ("tangent", "null-space", "maggi-kane")
 
@@ -112,8 +112,8 @@ def test_history_of_steps_and_charts(make, formulation, span):
     np.testing.assert_array_equal(solution.t[:-1], t)
     assert (solution.t[0], solution.t[-1]) == span
     np.testing.assert_allclose(h, np.diff(solution.t), rtol=0, atol=0)
-    np.testing.assert_allclose(h[:-1], STEP, rtol=1e-12)
-    assert 0 < h[-1] <= STEP * (1 + 1e-9)
+    np.testing.assert_allclose(h[:-1], STEP, rtol=HELD)
+    assert 0 < h[-1] <= STEP * (1 + CLOSE)
     assert stats.charts == len(charts.t) == len(charts.reason)
     assert charts.steps.sum() == stats.steps
     assert charts.reason[0] == "start"

@@ -10,6 +10,7 @@ import tsdyn as ts
 from examples import door, slider_crank, stick_slip, top
 from tests.helpers.built_in import INTEGRATORS
 from tests.helpers.journeys import displayed, visit
+from tests.helpers.tolerances import HELD
 
 ROOT = Path(__file__).parents[2]
 METHODS = [None, *sorted(kind.__name__.lower() for kind in INTEGRATORS)]
@@ -85,7 +86,7 @@ def test_every_result_answers_everything(method, form, scene, index):
     solution = ts.simulate(scene, (0.0, 0.03), integrator=method, formulation=form, initial_tol=1e-6, **given)
     assert solution.success, solution.message
     if given["events"]:
-        assert solution.t_events[1] == pytest.approx([0.011], abs=1e-12)
+        assert solution.t_events[1] == pytest.approx([0.011], abs=HELD)
     visit(scene, solution)
     went_on = ts.simulate(scene, (0.03, 0.04), integrator=method, formulation=form, state=solution.state)
     assert went_on.raise_if_failed().t[-1] == 0.04

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tests.fuzz.calls import fuzz
+from tests.helpers.tolerances import EXACT, HELD
 from tsdyn.calls import fitting
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
@@ -244,14 +245,14 @@ def test_the_axis_and_references_of_a_torsional_spring_are_derived():
     for i, spring in enumerate(springs):
         spring.name = f"spring {i}"
         scene.add(spring)
-        np.testing.assert_allclose(spring.axis_a, axis, atol=1e-15)
-        np.testing.assert_allclose(spring.axis_b, own, atol=1e-15)
+        np.testing.assert_allclose(spring.axis_a, axis, atol=EXACT)
+        np.testing.assert_allclose(spring.axis_b, own, atol=EXACT)
     solution = ts.simulate(scene, (0.0, 0.02))
-    assert np.abs(solution.reaction(springs[0])[1]).max() < 1e-12
+    assert np.abs(solution.reaction(springs[0])[1]).max() < HELD
     body.angular_velocity = own
     moved = ts.simulate(scene, (0.0, 0.02))
     for spring in springs:
-        np.testing.assert_allclose(moved.angle(spring)[-1], moved.angle(springs[0])[-1], atol=1e-12)
+        np.testing.assert_allclose(moved.angle(spring)[-1], moved.angle(springs[0])[-1], atol=HELD)
     springs[0].axis_b = own
     with pytest.raises(ts.InvalidForce, match="axis_b is not along axis_a"):
         F.TorsionalSpring(scene.ground, body, axis_a=axis, axis_b=axis, stiffness=2.0)

@@ -6,7 +6,8 @@ from scipy.integrate import simpson
 
 import tsdyn as ts
 from tests.helpers.pendulums import GRAVITY, INERTIA, LENGTH, MASS, pendulum, run, size
-from tests.helpers.scenes import BETWEEN, EPS, PRIMITIVES, build, random_chain, random_pair
+from tests.helpers.scenes import BETWEEN, PRIMITIVES, build, random_chain, random_pair
+from tests.helpers.tolerances import EPS, NEAR
 
 C = ts.constraints
 
@@ -143,4 +144,4 @@ def test_energy_comes_from_the_driven_constraint(rng):
     work = simpson(power, x=solution.t)  # of order 4 as well
     gained = solution.energy[-1] - solution.energy[0]
     assert abs(gained) > 0.1
-    assert abs(gained - work) < 1e-8 * size(solution.energy)
+    assert abs(gained - work) < NEAR * size(solution.energy)

@@ -11,6 +11,7 @@ import pytest
 
 import tsdyn as ts
 from examples import drive_train, driven_pivot, top
+from tests.helpers.tolerances import CLOSE, FINE, HELD, NEAR, ROUGH
 
 ROOT = Path(__file__).parents[2]
 PRECISE = {"integrator": "dop853", "rtol": 1e-10, "atol": 1e-10}
@@ -64,7 +65,7 @@ def test_every_state_of_a_run_goes_on_counting_turns():
     assert full.at([0.5, 0.9]).memory.shape == (2, 1)
     for state in states.values():
         again = ts.simulate(scene, (state.t, 3.0), state=state, **PRECISE)
-        np.testing.assert_allclose(again.qd[-1], full.qd[-1], atol=1e-6)
+        np.testing.assert_allclose(again.qd[-1], full.qd[-1], atol=ROUGH)
 
 
 def test_a_state_that_does_not_say_its_turns_is_refused():
@@ -83,7 +84,7 @@ def test_functions_see_their_globals_as_they_are(force, monkeypatch):
     for value in (5.0, 20.0):
         monkeypatch.setattr(sys.modules[__name__], "stiffness", value)
         expected = np.cos(np.sqrt(value)) if force is pull else 1.0 - 0.5 * value
-        assert ts.simulate(scene, (0.0, 1.0), **PRECISE).q[-1, 0] == pytest.approx(expected, abs=1e-8)
+        assert ts.simulate(scene, (0.0, 1.0), **PRECISE).q[-1, 0] == pytest.approx(expected, abs=NEAR)
 
 
 @pytest.mark.slow
@@ -147,7 +148,7 @@ def test_charts_have_room_when_a_run_of_many_fails(monkeypatch):
             scene, (0.0, 1.0), integrator=ts.integrators.RK45(max_step=0.01), chart_interval=interval
         )
         assert solution.status == ts.Status.NOT_FINITE
-        assert solution.t[-1] == pytest.approx(0.5, abs=1e-9)
+        assert solution.t[-1] == pytest.approx(0.5, abs=CLOSE)
         assert solution.charts.t.size >= solution.stats.steps // interval
 
 
@@ -157,10 +158,10 @@ def test_a_stiff_transient_may_change_velocities_at_once():
     mass = scene.add_point_mass(1.0, (0.01, 0.0, 0.0))
     scene.add(ts.forces.Spring(mass, scene.ground, point_b=(1, 0, 0), stiffness=1e5, damping=1e3, free_length=1.0))
     solution = ts.simulate(scene, (0.0, 0.5), integrator=ts.integrators.SDIRK54(step=0.01)).raise_if_failed()
-    assert np.abs(solution.q[-1]).max() < 1e-10
+    assert np.abs(solution.q[-1]).max() < FINE
 
 
 def test_the_first_step_is_bounded_too():
     scene = driven_pivot.build()
     solution = ts.simulate(scene, (0.0, 0.1), integrator=ts.integrators.RK45(first_step=0.05, max_step=0.001))
-    assert solution.steps.h.max() <= 0.001 * (1 + 1e-12) * 1.001
+    assert solution.steps.h.max() <= 0.001 * (1 + HELD) * 1.001

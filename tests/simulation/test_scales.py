@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.helpers.tolerances import CLOSE, FAIR, FINE, NEAR, ROUGH, ROUNDING
 
 C, I, F = ts.constraints, ts.integrators, ts.forces
 X, _, Z = np.eye(3)
@@ -35,14 +36,14 @@ def test_a_pendulum_far_away_moves_as_one_at_the_origin(joint, method):
     assert far.success
     assert abs(far.stats.steps - near.stats.steps) <= 2
     body, other = near.scene.bodies[0], far.scene.bodies[0]
-    np.testing.assert_allclose(far.position(other) - AWAY, near.position(body), rtol=0.0, atol=2e-9)
-    np.testing.assert_allclose(far.qd, near.qd, rtol=0.0, atol=1e-10)
-    np.testing.assert_allclose(far.at(0.55).q[:3] - AWAY, near.at(0.55).q[:3], rtol=0.0, atol=2e-9)
-    np.testing.assert_allclose(far.t_events[0], near.t_events[0], rtol=0.0, atol=1e-8)
-    np.testing.assert_allclose(far.q_events[0][:, :3] - AWAY, near.q_events[0][:, :3], rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(far.position(other) - AWAY, near.position(body), rtol=0.0, atol=2 * CLOSE)
+    np.testing.assert_allclose(far.qd, near.qd, rtol=0.0, atol=FINE)
+    np.testing.assert_allclose(far.at(0.55).q[:3] - AWAY, near.at(0.55).q[:3], rtol=0.0, atol=2 * CLOSE)
+    np.testing.assert_allclose(far.t_events[0], near.t_events[0], rtol=0.0, atol=NEAR)
+    np.testing.assert_allclose(far.q_events[0][:, :3] - AWAY, near.q_events[0][:, :3], rtol=0.0, atol=FAIR)
     if joint == "Revolute":  # whose velocity rows know nothing of positions
-        assert far.constraint_error.velocity.max() < 1e-14
-    assert far.constraint_error.position.max() < 1e-9
+        assert far.constraint_error.velocity.max() < ROUNDING
+    assert far.constraint_error.position.max() < CLOSE
     again = ts.simulate(far.scene, (1.0, 1.5), integrator=method, state=far.state)
     assert again.success
 
@@ -69,7 +70,7 @@ def test_a_function_of_the_state_is_given_the_scene_s_own_positions():
     scene.add(F.PointForce(scene.bodies[0], force=attraction))
     solution = ts.simulate(scene, (0.0, 0.01), integrator=I.Nystrom4(step=0.01))
     state = scene.evaluate(solution.q[-1], solution.qd[-1], solution.t[-1])
-    np.testing.assert_allclose(solution.qdd[-1], state.qdd, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(solution.qdd[-1], state.qdd, rtol=0.0, atol=ROUGH)
 
 
 def test_where_no_origin_can_be_moved_tolerances_are_what_rounding_allows():
@@ -120,4 +121,4 @@ def test_a_four_bar_of_nanometres(method):
         solution = ts.simulate(four_bar(size), (0.0, 0.3 * time), integrator=method(step=0.01 * time))
         assert solution.success, solution.message
         runs.append(solution.orientation(solution.scene.bodies[1])[-1])
-    np.testing.assert_allclose(runs[1], runs[0], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(runs[1], runs[0], rtol=0.0, atol=CLOSE)

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 import tsdyn as ts
 from tests.helpers import closed_loops
 from tests.helpers.closed_loops import angles
+from tests.helpers.tolerances import ALGEBRA, CLOSE, COARSE, EXACT, FAIR, HELD, LOOSE, NEAR, ROUGH, ROUNDING
 
 ROOT = Path(__file__).parents[2]
 SHAPES = {
@@ -31,10 +32,12 @@ def test_a_parallelogram_turns_over_and_over(shape, tol):
     assert solution.success, solution.message
     turned = angles(solution)
     assert turned[0][-1] - turned[0][0] > 16.0 * np.pi
-    assert max(np.abs(other - turned[0]).max() for other in turned) < 1e-9  # a crank that turns back is another branch
+    assert max(np.abs(other - turned[0]).max() for other in turned) < CLOSE  # a crank that turns back is another branch
     assert np.ptp(solution.energy) < max(1e-6, 100.0 * tol) * np.abs(solution.energy).max()
-    assert solution.constraint_error.position.max() < 1e-13
-    assert solution.constraint_error.acceleration.max() < 1e-5  # next to the flat place by the series: to the tolerance
+    assert solution.constraint_error.position.max() < ALGEBRA
+    assert (
+        solution.constraint_error.acceleration.max() < COARSE
+    )  # next to the flat place by the series: to the tolerance
     assert np.isfinite(solution.q).all()
     assert np.isfinite(solution.qdd).all()
 
@@ -47,8 +50,8 @@ def test_outputs_at_the_flat_place_itself(planar, off):
     solution = ts.simulate(scene, (0.0, 1.0), t_eval=[0.0, 0.1 + off, 1.0]).raise_if_failed()
     angle = 6.0 * off
     wanted = -18.0 * np.array([np.cos(angle), np.sin(angle), 0.0])
-    np.testing.assert_allclose(solution.acceleration(scene.body("crank 0"))[1], wanted, atol=1e-6)
-    assert solution.constraint_error.position.max() < 1e-14
+    np.testing.assert_allclose(solution.acceleration(scene.body("crank 0"))[1], wanted, atol=ROUGH)
+    assert solution.constraint_error.position.max() < ROUNDING
 
 
 @pytest.mark.parametrize("planar", [False, True])
@@ -78,11 +81,11 @@ def test_every_method_passes(method, shape):
     solution = ts.simulate(scene, (0.0, end), t_eval=np.linspace(0.0, end, 301), **METHODS[method]).raise_if_failed()
     turned = angles(solution)
     fine = ts.simulate(scene, (0.0, end), t_eval=solution.t, rtol=1e-13, atol=1e-13)
-    assert max(np.abs(other - turned[0]).max() for other in turned) < 1e-9
-    assert np.abs(turned[0] - angles(fine)[0]).max() < 1e-6
-    assert np.ptp(solution.energy) < 1e-6 * np.abs(solution.energy).max()
-    assert solution.constraint_error.position.max() < 1e-13
-    assert solution.constraint_error.acceleration.max() < 1e-5
+    assert max(np.abs(other - turned[0]).max() for other in turned) < CLOSE
+    assert np.abs(turned[0] - angles(fine)[0]).max() < ROUGH
+    assert np.ptp(solution.energy) < ROUGH * np.abs(solution.energy).max()
+    assert solution.constraint_error.position.max() < ALGEBRA
+    assert solution.constraint_error.acceleration.max() < COARSE
     assert "Taylor series carried the motion past a singular configuration" in solution.message
     assert "step of a series" in solution.charts.reason
     if shape == "alone":
@@ -127,8 +130,8 @@ def test_accuracy_is_kept_over_ten_turns(loops, options, off):
     stats, energy = solution.stats, solution.energy
     assert stats.steps_near_singular > 0
     kept = np.abs(energy - energy[0]).max() / solution.kinetic_energy.max()
-    np.testing.assert_allclose(stats.energy_error, kept, rtol=1e-6, atol=1e-15)
-    assert 0.0 <= stats.largest_landing < 1e-9
+    np.testing.assert_allclose(stats.energy_error, kept, rtol=ROUGH, atol=EXACT)
+    assert 0.0 <= stats.largest_landing < CLOSE
     assert f"energy error is {stats.energy_error:.1e}" in solution.message
 
 
@@ -146,7 +149,7 @@ def test_rods_of_little_inertia_about_their_axes_pass(loops, thin):
     scene, angle = released(loops, thin=thin, last="spherical" if thin > 1e-5 else "cylindrical")
     t = np.linspace(0.0, 1.2, 13)
     solution = ts.simulate(scene, (0.0, 1.2), t_eval=t, integrator=I.Nystrom4(step=2e-3)).raise_if_failed()
-    assert np.abs(np.array(angles(solution)) - angle(t)).max() < 1e-6
+    assert np.abs(np.array(angles(solution)) - angle(t)).max() < ROUGH
 
 
 def test_a_passage_is_a_part_of_one_run():
@@ -161,23 +164,23 @@ def test_a_passage_is_a_part_of_one_run():
     assert solution.t[[0, -1]].tolist() == [0.0, 1.0]
     steps = solution.steps
     assert steps.accepted.sum() == solution.stats.steps == solution.t.size - 1
-    np.testing.assert_allclose(steps.t[steps.accepted] + steps.h[steps.accepted], solution.t[1:], atol=1e-15)
+    np.testing.assert_allclose(steps.t[steps.accepted] + steps.h[steps.accepted], solution.t[1:], atol=EXACT)
     assert solution.stats.charts == len(solution.charts.t)
     assert (np.diff(fractions) >= 0.0).all()
     assert fractions[-1] == 1.0
     times = np.linspace(0.0, 1.0, 101)
     fine = ts.simulate(scene, (0.0, 1.0), t_eval=times, events=lowest, rtol=1e-13, atol=1e-13)
-    np.testing.assert_allclose(solution.at(times).q, fine.q, atol=1e-8)
-    np.testing.assert_allclose(solution.at(times[::-1]).qd, fine.qd[::-1], atol=1e-6)
+    np.testing.assert_allclose(solution.at(times).q, fine.q, atol=NEAR)
+    np.testing.assert_allclose(solution.at(times[::-1]).qd, fine.qd[::-1], atol=ROUGH)
     assert fine.t_events[0].size == 2
-    np.testing.assert_allclose(solution.t_events[0], fine.t_events[0], atol=1e-9)
+    np.testing.assert_allclose(solution.t_events[0], fine.t_events[0], atol=CLOSE)
     for steps in (1, 40, solution.stats.steps - 1):
         partial = ts.simulate(scene, (0.0, 1.0), integrator=I.DOP853(1e-10, 1e-10), max_steps=steps)
         assert partial.status == ts.Status.MAX_STEPS
         assert partial.stats.steps == steps
         np.testing.assert_array_equal(partial.q, solution.q[: steps + 1])
     again = ts.simulate(scene, (partial.state.t, 1.0), integrator=I.DOP853(1e-10, 1e-10), state=partial.state)
-    np.testing.assert_allclose(again.q[-1], solution.q[-1], atol=1e-8)
+    np.testing.assert_allclose(again.q[-1], solution.q[-1], atol=NEAR)
 
 
 @pytest.mark.parametrize("step", [1e-3, 1e-2, 0.1])
@@ -193,10 +196,10 @@ def test_fixed_steps_keep_their_grid(step):
     solution = ts.simulate(scene, (0.0, 7.0), integrator=I.Nystrom4(step=step)).raise_if_failed()
     for mass, x in zip(pins, (0.0, 2.0), strict=True):
         place = np.stack((x + np.cos(0.5 + solution.t), np.sin(0.5 + solution.t), 0.0 * solution.t), axis=1)
-        np.testing.assert_allclose(solution.position(mass), place, atol=1e-9 + 0.5 * step**4)
+        np.testing.assert_allclose(solution.position(mass), place, atol=CLOSE + 0.5 * step**4)
     off = np.abs(solution.t / step - np.rint(solution.t / step))
     assert (off > 1e-9).sum() < 12  # of the steps of series
-    assert np.count_nonzero(off < 1e-9) > 6.0 / step
+    assert np.count_nonzero(off < CLOSE) > 6.0 / step
 
 
 @pytest.mark.parametrize("method", ["taylor", *METHODS])
@@ -208,15 +211,15 @@ def test_a_run_may_end_at_the_flat_place(method, off):
     angle, crank = 6.0 * end - 0.6, scene.body("crank 0")
     toward = np.array([np.cos(angle), np.sin(angle), 0.0])
     assert solution.t[-1] == end
-    np.testing.assert_allclose(solution.position(crank)[-1], 0.5 * toward, atol=1e-7)
-    np.testing.assert_allclose(solution.velocity(crank)[-1], 3.0 * np.array([-toward[1], toward[0], 0.0]), atol=1e-6)
-    np.testing.assert_allclose(solution.acceleration(crank)[-1], -18.0 * toward, atol=1e-4)
-    np.testing.assert_allclose(angles(solution)[1], angles(solution)[0], atol=1e-9)
-    assert solution.constraint_error.position.max() < 1e-14
+    np.testing.assert_allclose(solution.position(crank)[-1], 0.5 * toward, atol=FAIR)
+    np.testing.assert_allclose(solution.velocity(crank)[-1], 3.0 * np.array([-toward[1], toward[0], 0.0]), atol=ROUGH)
+    np.testing.assert_allclose(solution.acceleration(crank)[-1], -18.0 * toward, atol=LOOSE)
+    np.testing.assert_allclose(angles(solution)[1], angles(solution)[0], atol=CLOSE)
+    assert solution.constraint_error.position.max() < ROUNDING
     if method == "taylor":
         many = ts.simulate(scene, (0.0, end), t_eval=[0.05, 0.0999, end], dense_output=True).raise_if_failed()
-        np.testing.assert_allclose(many.q[-1], solution.q[-1], atol=1e-12)
-        np.testing.assert_allclose(many.at(end).q, solution.q[-1], atol=1e-12)
+        np.testing.assert_allclose(many.q[-1], solution.q[-1], atol=HELD)
+        np.testing.assert_allclose(many.at(end).q, solution.q[-1], atol=HELD)
 
 
 def test_a_scene_without_series_stops_and_says_why():
@@ -241,9 +244,9 @@ def test_a_motion_that_ends_there_stops_with_an_account():
         solution = ts.simulate(scene, (0.0, 2.0), **method)
         assert not solution.success
         assert "near to losing rank" in solution.message
-        assert 0.98 < solution.t[-1] < 1.0 + 1e-9
+        assert 0.98 < solution.t[-1] < 1.0 + CLOSE
         assert np.isfinite(solution.q).all()
-        assert solution.constraint_error.position.max() < 1e-12
+        assert solution.constraint_error.position.max() < HELD
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import tsdyn as ts
 from examples import pendulum_chain, two_body_pendulum
 from tests.helpers.processes import REPORT, run
 from tests.helpers.reference import load
+from tests.helpers.tolerances import ALGEBRA, COARSE, HELD
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 METHODS = {"nystrom4": I.Nystrom4(step=1e-2), "dop853": I.DOP853(1e-8, 1e-8), "taylor": I.Taylor(1e-10)}
@@ -45,7 +46,7 @@ def test_a_sphere_turns_as_it_does_with_the_torque():
     nearly = bodies((0.1, 0.1, np.nextafter(0.1, 1.0)))
     one, other = (ts.simulate(scene, (0.0, 2.0), rtol=1e-10, atol=1e-10) for scene in (bodies((0.1, 0.1, 0.1)), nearly))
     assert (one.stats.gyroscopic_skipped > 0, other.stats.gyroscopic_skipped) == (True, 0)
-    np.testing.assert_allclose(one.q[-1], other.q[-1], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(one.q[-1], other.q[-1], rtol=0, atol=ALGEBRA)
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -83,7 +84,7 @@ def test_factors_that_still_serve(name):
     other = ts.simulate(
         scene, (0.0, 1.0), integrator=I.Nystrom4(step=1e-3), chart_interval=10, formulation="null-space"
     )  # which always looks anew
-    np.testing.assert_allclose(solution.charts.contraction, other.charts.contraction, rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(solution.charts.contraction, other.charts.contraction, rtol=COARSE, atol=HELD)
 
 
 def test_factors_far_from_the_place_are_not_taken():

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.helpers.tolerances import CLOSE, EPS
 from tsdyn.sparse.factorisation import factor, factor_lu, solve, solve_lu, solve_lu_transposed
 from tsdyn.sparse.symbolic import Pattern, analyse
 
 ROOT = Path(__file__).parents[2]
-EPS = np.finfo(float).eps
 
 
 def chain(n):
@@ -295,7 +295,7 @@ def test_late_nodes_have_negative_pivots(seed):
     b = np.zeros(len(whole))
     b[order] = whole @ x
     solve(pattern, values, b)
-    np.testing.assert_allclose(b[order], x, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(b[order], x, rtol=0.0, atol=CLOSE)
     assert sorted(pattern.negative.tolist()) == sorted(rows[n:].tolist())
 
 

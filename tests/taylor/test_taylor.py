@@ -6,7 +6,7 @@ import pytest
 import tsdyn as ts
 from tests.helpers.closed_loops import bricard
 from tests.helpers.reference import demand_on_the_manifold, error, load
-from tests.helpers.scenes import EPS
+from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, NEAR, ROUNDING, TIGHT
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 TOLERANCES = (1e-4, 1e-8, 1e-12)
@@ -19,7 +19,7 @@ def test_errors_keep_to_the_tolerance(name, tol):
     scene, reference = load(name)
     reference = reference.until(SPANS[name])
     solution = ts.simulate(scene, (0.0, SPANS[name]), integrator=I.Taylor(tol), t_eval=reference.t)
-    assert error(solution, reference) < 100.0 * tol + 1e-12
+    assert error(solution, reference) < 100.0 * tol + HELD
     demand_on_the_manifold(solution, solution)
     assert solution.stats.rejected == 0
 
@@ -28,7 +28,7 @@ def test_full_accuracy_by_default():
     scene, reference = load("sliding_top")
     reference = reference.until(10.0)
     solution = ts.simulate(scene, (0.0, 10.0), integrator=I.Taylor(), t_eval=reference.t)
-    assert error(solution, reference) < 2e-13
+    assert error(solution, reference) < 2 * ALGEBRA
     assert solution.stats.steps < 60
 
 
@@ -55,8 +55,8 @@ def test_point_masses():
         ts.simulate(scene, (0.0, 3.0), integrator=method, t_eval=np.linspace(0.0, 3.0, 7))
         for method in (I.Taylor(1e-13), I.DOP853(1e-12, 1e-12))
     ]
-    assert np.abs(runs[0].position(mass) - runs[1].position(mass)).max() < 1e-10
-    assert np.ptp(runs[0].energy) < 1e-12
+    assert np.abs(runs[0].position(mass) - runs[1].position(mass)).max() < FINE
+    assert np.ptp(runs[0].energy) < HELD
 
 
 def test_a_free_body_without_any_constraint():
@@ -66,10 +66,10 @@ def test_a_free_body_without_any_constraint():
     )
     solution = ts.simulate(scene, (0.0, 2.0), integrator=I.Taylor(1e-12), t_eval=np.linspace(0.0, 2.0, 400))
     t = solution.t[:, None]
-    assert np.abs(solution.position(body) - (t * [1.0, 0.0, 3.0] + t * t * [0.0, 0.0, -1.0])).max() < 1e-12
+    assert np.abs(solution.position(body) - (t * [1.0, 0.0, 3.0] + t * t * [0.0, 0.0, -1.0])).max() < HELD
     angle = 20.0 * solution.t  # half the angle: p itself goes on, without a change of sign, over many turns
     p = np.stack([np.cos(angle), 0.0 * angle, np.sin(angle), 0.0 * angle], axis=1)
-    assert np.abs(solution.orientation(body) - p).max() < 1e-11
+    assert np.abs(solution.orientation(body) - p).max() < TIGHT
 
 
 def test_bodies_that_are_not_spherical_tumble():
@@ -77,8 +77,8 @@ def test_bodies_that_are_not_spherical_tumble():
     J = [[3.0, 0.2, 0.1], [0.2, 2.0, 0.0], [0.1, 0.0, 1.2]]
     scene.add_body(mass=1.0, inertia=J, angular_velocity=(0.1, 6.0, 0.1))
     solution = ts.simulate(scene, (0.0, 10.0), integrator=I.Taylor(1e-13))
-    assert np.ptp(solution.energy) < 1e-11
-    assert np.ptp(solution.angular_momentum, axis=0).max() < 1e-11
+    assert np.ptp(solution.energy) < TIGHT
+    assert np.ptp(solution.angular_momentum, axis=0).max() < TIGHT
 
 
 def test_output_between_steps_is_the_series_and_changes_nothing():
@@ -91,17 +91,17 @@ def test_output_between_steps_is_the_series_and_changes_nothing():
     assert np.array_equal(plain.q, dense.q)
     assert asked.stats.steps == plain.stats.steps
     state = dense.at(times)
-    assert np.abs(state.q - asked.q).max() < 1e-14 * (1.0 + np.abs(asked.q).max())
-    assert np.abs(state.qd - asked.qd).max() < 1e-13 * (1.0 + np.abs(asked.qd).max())
-    assert np.abs(state.qdd - asked.qdd).max() < 1e-11 * (1.0 + np.abs(asked.qdd).max())
+    assert np.abs(state.q - asked.q).max() < ROUNDING * (1.0 + np.abs(asked.q).max())
+    assert np.abs(state.qd - asked.qd).max() < ALGEBRA * (1.0 + np.abs(asked.qd).max())
+    assert np.abs(state.qdd - asked.qdd).max() < TIGHT * (1.0 + np.abs(asked.qdd).max())
     demand_on_the_manifold(dense, state)
     ends = dense.at(dense.t)
-    assert np.abs(ends.q - dense.q).max() < 1e-14 * (1.0 + np.abs(dense.q).max())
+    assert np.abs(ends.q - dense.q).max() < ROUNDING * (1.0 + np.abs(dense.q).max())
     h = 1e-3  # the states are derivatives of each other
     fine = dense.at(1.0 + h * np.arange(-3, 4))
     quotient = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / (60.0 * h)
-    assert np.abs(quotient @ fine.q - fine.qd[3]).max() < 1e-9
-    assert np.abs(quotient @ fine.qd - fine.qdd[3]).max() < 1e-8
+    assert np.abs(quotient @ fine.q - fine.qd[3]).max() < CLOSE
+    assert np.abs(quotient @ fine.qd - fine.qdd[3]).max() < NEAR
 
 
 def test_events_and_going_on():
@@ -113,10 +113,10 @@ def test_events_and_going_on():
     lowest.terminal = True
     solution = ts.simulate(scene, (0.0, 3.0), integrator=I.Taylor(1e-13), events=lowest)
     assert solution.status == ts.Status.EVENT
-    assert abs(solution.q_events[0][0, 0]) < 1e-13
+    assert abs(solution.q_events[0][0, 0]) < ALGEBRA
     rest = ts.simulate(scene, (solution.state.t, 3.0), integrator=I.Taylor(1e-13), state=solution.state)
     whole = ts.simulate(scene, (0.0, 3.0), integrator=I.Taylor(1e-13))
-    assert np.abs(rest.q[-1] - whole.q[-1]).max() < 1e-12
+    assert np.abs(rest.q[-1] - whole.q[-1]).max() < HELD
 
 
 def test_turns_are_counted():
@@ -130,13 +130,13 @@ def test_turns_are_counted():
     times = np.linspace(0.0, 5.0, 11)
     solution = ts.simulate(scene, (0.0, 5.0), integrator=I.Taylor(1e-12), t_eval=times)
     rate = np.sqrt(2.0 / 0.5)  # J angle'' = -k angle, over more than two turns
-    assert np.abs(solution.angular_velocity(wheel)[:, 2] - 30.0 * np.cos(rate * times)).max() < 1e-9
+    assert np.abs(solution.angular_velocity(wheel)[:, 2] - 30.0 * np.cos(rate * times)).max() < CLOSE
 
 
 def test_steps_can_be_bounded_and_fixed():
     scene, _ = load("chain_4")
     fixed = ts.simulate(scene, (0.0, 0.1), integrator=I.Taylor(step=0.004, order=6))
-    assert np.allclose(fixed.steps.h, 0.004, rtol=1e-12)
+    assert np.allclose(fixed.steps.h, 0.004, rtol=HELD)
     assert len(fixed.t) == 26
     bounded = ts.simulate(scene, (0.0, 0.1), integrator=I.Taylor(1e-6, max_step=0.01, first_step=0.001))
     assert bounded.steps.h[0] == 0.001

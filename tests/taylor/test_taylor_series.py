@@ -17,6 +17,7 @@ from tests.helpers.scenes import (
     rotation,
     unit,
 )
+from tests.helpers.tolerances import ALGEBRA, FINE, HELD, ROUNDING, TIGHT
 from tsdyn.elements.bodies import transform_g
 from tsdyn.elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from tsdyn.runs.trajectory import B_DATA, B_H
@@ -96,15 +97,15 @@ def solves_the_equations(scene):
             qd.append(value(r, t, 1))
             expected.append(value(r, t, 2))
             if body.dimension == 7:
-                np.testing.assert_allclose(value(A, t).T @ value(A, t), np.eye(3), rtol=0, atol=1e-14)
+                np.testing.assert_allclose(value(A, t).T @ value(A, t), np.eye(3), rtol=0, atol=ROUNDING)
                 p = np.roll(Rotation.from_matrix(value(A, t)).as_quat(), 1)
                 q.append(p if p @ body.orientation > 0 else -p)
                 qd.append(product(q[-1], np.append(0.0, value(omega, t))) / 2)
                 expected.append(value(omega, t, 1))
         q, qd = np.concatenate(q), np.concatenate(qd)
         at = scene.evaluate(q, qd)
-        assert np.abs(at.Phi).max(initial=0.0) < 1e-13
-        assert np.abs(at.Phi_q @ qd).max(initial=0.0) < 1e-12
+        assert np.abs(at.Phi).max(initial=0.0) < ALGEBRA
+        assert np.abs(at.Phi_q @ qd).max(initial=0.0) < HELD
         got, i = [], 0
         for body in scene.bodies:
             got.append(at.qdd[i : i + 3])
@@ -112,7 +113,7 @@ def solves_the_equations(scene):
                 got.append(2 * transform_g(q[None, i + 3 : i + 7])[0] @ at.qdd[i + 3 : i + 7])
             i += body.dimension
         got, expected = np.concatenate(got), np.concatenate(expected)
-        np.testing.assert_allclose(expected, got, rtol=0, atol=1e-12 * (1 + np.abs(got).max()))
+        np.testing.assert_allclose(expected, got, rtol=0, atol=HELD * (1 + np.abs(got).max()))
 
 
 def follows_the_same_path(scene, end=0.6):
@@ -124,7 +125,7 @@ def follows_the_same_path(scene, end=0.6):
     size = 1 + np.abs(reference.qdd).max()  # how fast errors of the velocities grow
     for name in ("q", "qd", "qdd"):
         got, expected = getattr(run, name), getattr(reference, name)
-        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-11 * size * (size if name == "qdd" else 1))
+        np.testing.assert_allclose(got, expected, rtol=0, atol=TIGHT * size * (size if name == "qdd" else 1))
 
 
 def chain(rng):
@@ -217,8 +218,8 @@ def test_turns_are_counted_over_many_steps():
     angle = w / rate * np.sin(rate * times)
     assert np.ptp(angle) > 4 * np.pi
     A = np.stack([rotation(p) for p in solution.q[:, 3:]])
-    np.testing.assert_allclose(A[:, 0, 0], np.cos(angle), rtol=0, atol=1e-10)
-    np.testing.assert_allclose(A[:, 1, 0], np.sin(angle), rtol=0, atol=1e-10)
+    np.testing.assert_allclose(A[:, 0, 0], np.cos(angle), rtol=0, atol=FINE)
+    np.testing.assert_allclose(A[:, 1, 0], np.sin(angle), rtol=0, atol=FINE)
 
 
 def test_forces_that_are_absent_leave_nothing_to_run(rng):

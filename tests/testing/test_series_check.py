@@ -40,7 +40,7 @@ def torsional(a, b, **numbers):
     return F.TorsionalSpring(a, b, axis_a=(0, 0.2, 1), reference_a=(1, 0, 0), reference_b=(0.2, 1, 0.3), **numbers)
 
 
-@pytest.mark.slow_but('Spring*', 'ViscousFriction*')
+@pytest.mark.slow_but("Spring*", "ViscousFriction*")
 @pytest.mark.parametrize("make", SMOOTH.values(), ids=SMOOTH.keys())
 def test_series_of_forces(make):
     ts.testing.check_force(make, states=1)

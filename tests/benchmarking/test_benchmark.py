@@ -74,6 +74,7 @@ def test_all_adaptive_methods_by_default():
     assert not {"SDIRK54", "ImplicitTrapezoid"} & {row.method for row in rows}
 
 
+@pytest.mark.slow
 def test_failures_are_rows():
     def broken(rtol, atol):
         raise ValueError("no such luck")

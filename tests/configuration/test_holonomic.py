@@ -55,6 +55,7 @@ def test_forms_with_a_basis_refuse_it(method, form):
         ts.simulate(skate(), (0.0, 1.0), integrator=method, formulation=form)
 
 
+@pytest.mark.slow
 def test_the_tangent_form_runs_it_right():
     turn = 1.3
 

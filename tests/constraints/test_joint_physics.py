@@ -93,6 +93,7 @@ RUNS = {
 }
 
 
+@pytest.mark.slow_for("sdirk54")
 @pytest.mark.parametrize("options", RUNS.values(), ids=RUNS)
 def test_reactions_balance_newton_and_euler(options, rng):
     """To rounding; to its tolerance for an implicit method, which interpolates its stages' accelerations."""

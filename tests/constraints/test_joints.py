@@ -133,6 +133,7 @@ def test_redundant_rows_are_named():
     assert "Revolute 'upper' axis[0]" in message
 
 
+@pytest.mark.slow
 def test_taylor_names_the_joint_whose_part_has_no_series():
     class Bare(C.Dot1):
         series = None

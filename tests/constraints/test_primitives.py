@@ -45,7 +45,7 @@ def test_every_primitive_and_joint_is_public():
     assert {kind.__name__ for kind in PRIMITIVES + JOINTS} <= set(C.__all__)
 
 
-@pytest.mark.slow_but("0-*")
+@pytest.mark.slow_but("0-*", "!0-OnEllipsoid", "!0-DrivenPivot")
 @pytest.mark.parametrize("kind", [*PRIMITIVES, OnEllipsoid, DrivenPivot], ids=lambda kind: kind.__name__)
 @pytest.mark.parametrize("seed", range(3))
 def test_kernels_are_the_derivatives_of_phi(kind, seed):

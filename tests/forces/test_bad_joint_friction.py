@@ -12,12 +12,14 @@ from tests.helpers.tolerances import CLOSE, ROUGH
 C, F = ts.constraints, ts.forces
 
 
+@pytest.mark.slow
 def test_friction_from_a_reaction_that_is_not_unique_is_refused():
     scene, _ = four_bar(rough_at=(1,), length=0.1)
     with pytest.raises(ts.RedundantConstraints, match=r"RevoluteFriction\(pin1\).*not unique"):
         ts.simulate(scene, (0.0, 1.0))
 
 
+@pytest.mark.slow
 def test_a_mechanism_that_jams_says_so():
     """Above mu = (1 + 3 c^2) / (3 s c), 4 / 3 at 1.1 rad, no reaction is in balance with its friction."""
     assert ts.simulate(rod(1.1, 1.3), (0.0, 0.01), **PRECISE).success
@@ -97,6 +99,7 @@ def test_a_plug_in():
     demand_balance(scene, ends[0], (ball, friction))
 
 
+@pytest.mark.slow
 def test_taylor_refuses_by_name_and_the_default_takes_another():
     scene, *_ = pendulum()
     with pytest.raises(ts.InvalidArgument, match=r"RevoluteFriction\(pin\): its magnitude depends on a reaction"):
@@ -120,6 +123,7 @@ def test_attributes_can_be_set_and_geometry_is_the_joints():
         friction.radus = 1.0
 
 
+@pytest.mark.slow
 def test_solutions_are_pickled():
     scene, _, _pin, _friction = pendulum()
     solution = ts.simulate(scene, (0.0, 0.5), **PRECISE)

@@ -22,6 +22,7 @@ from tests.helpers.tolerances import ALGEBRA, CLOSE, FAIR, FINE, HELD, NEAR, TIG
 C, F = ts.constraints, ts.forces
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", ["tangent", "null-space", "maggi-kane"])
 def test_a_block_on_a_slope_brakes_as_it_should(formulation):
     scene, body, contact, friction, along = block(0.3, 0.5, 3.0, slip_velocity=1e-7)
@@ -37,6 +38,7 @@ def test_a_block_on_a_slope_brakes_as_it_should(formulation):
     demand_balance(scene, solution, (contact, friction))
 
 
+@pytest.mark.slow
 def test_a_block_that_sticks_creeps_at_the_speed_of_the_regularisation():
     scene, body, _, _, along = block(0.8, 0.5, slip_velocity=1e-3)
     solution = ts.simulate(scene, (0.0, 2.0))
@@ -47,6 +49,7 @@ def test_a_block_that_sticks_creeps_at_the_speed_of_the_regularisation():
     np.testing.assert_allclose(solution.velocity(body)[-1], -creep * along, atol=CLOSE)
 
 
+@pytest.mark.slow
 def test_stribecks_peak():
     """Held up to the static coefficient, and braked by the kinetic one when it slides."""
     given = {"static": 0.7, "slip_velocity": 1e-5, "stribeck_velocity": 1e-2}
@@ -61,6 +64,7 @@ def test_stribecks_peak():
             assert size == pytest.approx(0.3 * 2 * G * np.cos(angle), rel=CLOSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", ["tangent", "null-space"])
 def test_a_pendulum_on_a_rough_pin(formulation):
     """Against minimal coordinates in SciPy: it comes to rest, through many turns of the direction."""
@@ -79,6 +83,7 @@ def test_a_pendulum_on_a_rough_pin(formulation):
     demand_balance(scene, solution, (pin, friction))
 
 
+@pytest.mark.slow
 def test_implicit_and_fixed_steps_and_dense_output_agree():
     scene, _bar, *_ = pendulum()
     exact = ts.simulate(scene, (0.0, 1.0), dense_output=True, **PRECISE)
@@ -96,6 +101,7 @@ def test_implicit_and_fixed_steps_and_dense_output_agree():
     np.testing.assert_allclose(again.multipliers[0], state.multipliers, atol=TIGHT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", ["tangent", "null-space"])
 @pytest.mark.parametrize(("length", "width"), [(None, None), (0.5, None), (None, 0.4), (0.5, 0.4)])
 def test_a_slide_that_is_tilted_in_its_guide(length, width, formulation):
@@ -112,6 +118,7 @@ def test_a_slide_that_is_tilted_in_its_guide(length, width, formulation):
     demand_balance(scene, solution, (guide, friction, *scene.forces[1:]))
 
 
+@pytest.mark.slow
 def test_the_collar_and_the_length_of_a_pin():
     """A wheel on a horizontal shaft: its weight across, a push along, and a torque that tilts."""
     scene = ts.Scene()

@@ -62,6 +62,7 @@ def slider(goal=1.0, **options):
     return scene, guide, scene.add(F.JointForce(guide, **options, name="drive"))
 
 
+@pytest.mark.slow_for("sdirk54")
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
 def test_a_controller_is_asked_at_its_instants_and_held(options):
     """A wheel that is turned by more than a turn: every method is as exact as the recursion of the sampled motion."""

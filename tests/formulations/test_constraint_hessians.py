@@ -78,7 +78,7 @@ def instances(name, rng):
         yield scene
 
 
-@pytest.mark.slow_but("Spherical*", "Dot1*")
+@pytest.mark.slow_but("Distance")
 @pytest.mark.parametrize("name", KINDS)
 def test_second_derivatives_of_constraints(name, rng):
     """At states that satisfy nothing, |p| other than one; every row against differences of Phi_q, Phi_t and gamma."""

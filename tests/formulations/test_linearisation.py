@@ -34,17 +34,20 @@ def demand_derivatives(scene, rng, spread=0.05, t=0.2, h=SPACING):
     return ode, v, vd
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sliding_top", "two_body_pendulum", "two_body_pendulum_spatial", "chain_4"])
 def test_jacobian_of_reference_scenes(name, rng):
     for _ in range(3):
         demand_derivatives(load(name)[0], rng)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("links", [1, 2, 3, 5])
 def test_jacobian_of_random_chains(links, rng):
     demand_derivatives(build(random_chain(rng, links)), rng)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("between", BETWEEN)
 @pytest.mark.parametrize("name", PRIMITIVES)
 def test_jacobian_with_every_constraint(name, between, rng):
@@ -54,6 +57,7 @@ def test_jacobian_with_every_constraint(name, between, rng):
     demand_derivatives(scene, rng)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind",
     [k for k in built_in.FORCES if not issubclass(k, (ts.JointFriction, JointLoad))],
@@ -108,12 +112,14 @@ def test_jacobian_of_point_masses(rng):
     demand_derivatives(points(rng), rng)
 
 
+@pytest.mark.slow_but("hung-*")
 @pytest.mark.parametrize(("make", "scale"), [(jointed, 1e-5), (hung, 1e-4)], ids=lambda x: getattr(x, "__name__", x))
 def test_jacobian_of_stiff_scenes(make, scale, rng):
     """Softened, so that differences of f don't drown in the rounding of its size."""
     demand_derivatives(make(scale), rng)
 
 
+@pytest.mark.slow
 def test_kept_derivatives_serve_where_a_body_has_turned_to(rng):
     """What is kept of a bushing, its axes all different, serves where its body has turned to."""
     scene = ts.Scene()
@@ -133,6 +139,7 @@ def test_kept_derivatives_serve_where_a_body_has_turned_to(rng):
     assert np.abs(kept[0] - exact[0]).max() < LOOSE * size  # gravity's and the joint's are those of before
 
 
+@pytest.mark.slow
 def test_solve_and_soften_are_dense_solves(rng):
     ode, *_ = demand_derivatives(build(random_chain(rng, 3)), rng)
     f_v, f_vd = ode.jacobians(0.2)

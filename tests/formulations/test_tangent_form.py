@@ -208,6 +208,7 @@ def test_levers_of_any_length_run_alike(length, form):
 # what it falls back to, and what it skips
 
 
+@pytest.mark.slow
 def test_implicit_methods_keep_the_basis():
     form = formulation("tangent")
     assert not form.serving(I.SDIRK54()).basis_free

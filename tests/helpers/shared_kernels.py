@@ -1,15 +1,17 @@
-"""The kernels that most tests need: every method and form once, and all constraints and forces with the default method.
+"""The kernels that most tests need: every method and form, all constraints and forces with the default method.
 
-What is rare (Hessians of most constraints, series of a thousand bodies, friction by every form) isn't among them: tests
-of it are `slow`, or compile what they need.
+What is rare isn't among them, and tests of it are `slow`: implicit methods on constraints other than Distance, series
+of a thousand bodies, joint friction.
 """
 
 import tsdyn as ts
 from tests.helpers.built_in import FORCES, PRIMITIVES
 from tsdyn.ahead.first_run import of_constraint, of_force, of_method
+from tsdyn.configuration import initial_conditions
 from tsdyn.formulations.registry import FORMULATIONS
-
-IMPLICIT = ("Spherical", "Dot1", "Distance", "EulerNormalization")  # constraints with implicit methods
+from tsdyn.jit.compiled import is_declared
+from tsdyn.motions.program import run_program
+from tsdyn.rows.evaluation import choose_anew
 
 
 def shared_kernels():
@@ -19,8 +21,11 @@ def shared_kernels():
         yield from of_method(method, tangent, True)
     for form in others:
         yield from of_method(I.DOP853(1e-8, 1e-8), form, True)
+    yield from filter(is_declared, vars(initial_conditions).values())  # those of assembly
+    yield from (choose_anew, run_program)
     for kind in PRIMITIVES:
         for moving in (False, *[True] * ("phi_t" in kind.kernels)):
-            yield from of_constraint(kind, moving, implicit=kind.__name__ in IMPLICIT)
+            yield from of_constraint(kind, moving, implicit=kind is ts.constraints.Distance)
     for kind in FORCES:
-        yield from of_force(kind.own_kernels)
+        if not issubclass(kind, ts.JointFriction):
+            yield from of_force(kind.own_kernels, implicit=kind is ts.forces.Spring)

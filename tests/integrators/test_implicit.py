@@ -19,7 +19,7 @@ by_name = {"ids": lambda x: getattr(x, "__name__", str(x))}
 # order, errors
 
 
-@pytest.mark.slow_but("sliding_top-*")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "counts", "interval"),
     [(ImplicitTrapezoid, (200, 400, 800, 1600), None), (SDIRK54, (160, 240, 320, 480), 1)],
@@ -34,7 +34,7 @@ def test_order(name, method, counts, interval):
     assert abs(slope - method.order) < 0.2
 
 
-@pytest.mark.slow_but("sliding_top")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_order_of_sdirk54_with_charts_by_the_criteria(name):
     counts = (120, 160, 240, 320)
@@ -43,7 +43,7 @@ def test_order_of_sdirk54_with_charts_by_the_criteria(name):
     assert abs(np.polyfit(-np.log(counts), np.log([off for _, off in found]), 1)[0] - 5.0) < 0.2
 
 
-@pytest.mark.slow_but("sliding_top-*")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "tol"),
     [(SDIRK54, tol) for tol in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)] + [(ImplicitTrapezoid, tol) for tol in (1e-3, 1e-5)],
@@ -58,7 +58,7 @@ def test_error_follows_the_tolerance(name, method, tol):
     assert solution.stats.jacobians == 1
 
 
-@pytest.mark.slow_for("chain_16*")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "method", "tol", "end"),
     [
@@ -88,6 +88,7 @@ def test_driven_scene(method):
     demand_on_the_manifold(solution, solution)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [3.0, 1.0, 1e-5])
 @pytest.mark.parametrize("method", METHODS, **by_name)
 def test_a_first_step_of_any_length(method, first):
@@ -107,7 +108,7 @@ def test_a_first_step_of_any_length(method, first):
 # dense output
 
 
-@pytest.mark.slow_but("<lambda>0*")
+@pytest.mark.slow_but("driven-*", "hung-*")
 @pytest.mark.parametrize("method", [ImplicitTrapezoid(1e-3, 1e-3), SDIRK54(1e-7, 1e-7), SDIRK54(1e-2, 1e-2)], ids=repr)
 @pytest.mark.parametrize("make", [lambda: load(SCENES[0])[0], lambda: load(SCENES[2])[0], driven, jointed, hung])
 def test_dense_output_is_on_the_manifold_and_changes_nothing(make, method, rng):
@@ -144,6 +145,7 @@ def test_order_of_dense_output(method, counts, rng):
 # what is counted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tol", [1e-3, 1e-5])
 @pytest.mark.parametrize("method", METHODS, **by_name)
 def test_work_is_counted(method, tol):
@@ -183,6 +185,7 @@ def demand_a_failed_stage(solution):
     assert caught.value.solution is solution
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS, **by_name)
 def test_a_stage_that_fails_midway(method):
     """The run hands back what it had, which an adaptive one goes on from, past the same place."""
@@ -209,6 +212,7 @@ def test_maggi_kane_is_refused(method):
         assert "'sdirk54'" not in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS, **by_name)
 def test_by_its_name_and_with_settings(method):
     scene, _ = load("sliding_top")
@@ -256,6 +260,7 @@ def governor():
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_velocity_constraints_hold_as_by_explicit_methods(method):
     solution = ts.simulate(governor(), (0.0, 2.0), integrator=method(rtol=1e-5, atol=1e-5))

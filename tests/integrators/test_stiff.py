@@ -71,7 +71,7 @@ def test_sdirk54_beats_the_trapezoid_where_accuracy_counts(make):
     assert 2 * own.stats.evaluations < other.stats.evaluations
 
 
-@pytest.mark.slow_for("jointed-SDIRK54-*")
+@pytest.mark.slow_but("hung-*")
 @pytest.mark.parametrize(
     ("make", "method", "tol"),
     [(jointed, SDIRK54, tol) for tol in (1e-1, 1e-2, 1e-3, 1e-4)]
@@ -158,6 +158,7 @@ def test_the_trapezoid_is_the_trapezoidal_rule(step):
     assert solution.stats.jacobians == 1
 
 
+@pytest.mark.slow_but("point_pendulum-*")
 @pytest.mark.parametrize("method", [ImplicitTrapezoid(1e-4, 1e-4), SDIRK54(1e-6, 1e-6)], ids=repr)
 @pytest.mark.parametrize("make", [point_pendulum, compound_pendulum], **by_name)
 def test_a_pendulum_keeps_its_energy(make, method):

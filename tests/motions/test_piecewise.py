@@ -87,6 +87,7 @@ def bead(length, tangential=0.0):
     return scene, body
 
 
+@pytest.mark.slow_for("sdirk54")
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
 def test_steps_end_at_knots_and_constraints_hold(options):
     """With jumps of acceleration at every knot: outputs there have the acceleration after it, as SciPy's object has."""
@@ -107,6 +108,7 @@ def test_steps_end_at_knots_and_constraints_hold(options):
     assert np.ptp(solution.energy - solution.work) < loose
 
 
+@pytest.mark.slow_for("sdirk54")
 @pytest.mark.parametrize("name", ["taylor", "dop853", "nystrom4", "sdirk54"])
 def test_all_methods_agree_over_knots(name):
     """A quadratic spline: its acceleration jumps, and no method sees that as an error of its own."""

@@ -72,6 +72,7 @@ def test_without_redundancy_all_is_unique():
     assert all(solution.reaction_unique(joint).all() for joint in solution.scene.constraints[:3])
 
 
+@pytest.mark.slow_for("sdirk54")
 @pytest.mark.parametrize("method", METHODS)
 def test_rows_are_chosen_anew_on_the_way(method):
     """A flap on two ball joints, carried round: which of the balls' rows is one too many turns with it.

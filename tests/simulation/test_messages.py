@@ -136,6 +136,7 @@ def test_scenes_print_their_bodies():
     assert repr(scene) == words
 
 
+@pytest.mark.slow_for("sdirk54")
 @pytest.mark.parametrize("method", [None, "rk45", "nystrom4", "sdirk54"])
 def test_solutions_print(method):
     solution = ts.simulate(pendulum(), (0.0, 0.02), integrator=method)

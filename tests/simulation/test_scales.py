@@ -113,6 +113,7 @@ def four_bar(size):
     return scene
 
 
+@pytest.mark.slow_for("SDIRK54")
 @pytest.mark.parametrize("method", [I.SDIRK54, I.DOP853])
 def test_a_four_bar_of_nanometres(method):
     runs = []

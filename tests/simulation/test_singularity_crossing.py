@@ -202,6 +202,7 @@ def test_fixed_steps_keep_their_grid(step):
     assert np.count_nonzero(off < CLOSE) > 6.0 / step
 
 
+@pytest.mark.slow_for("*-sdirk54")
 @pytest.mark.parametrize("method", ["taylor", *METHODS])
 @pytest.mark.parametrize("off", [0.0, 1e-9, -1e-9, 1e-8, 1e-6, 1e-4])
 def test_a_run_may_end_at_the_flat_place(method, off):

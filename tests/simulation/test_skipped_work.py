@@ -94,6 +94,7 @@ def test_factors_far_from_the_place_are_not_taken():
     assert stats.factorizations_skipped - (stats.charts - 1) < 0.2 * stats.steps
 
 
+@pytest.mark.slow
 def test_implicit_methods_keep_their_matrices():
     stats = counts(two_body_pendulum.build(), I.SDIRK54(1e-6, 1e-6))
     kept = stats["stage_iterations"] - stats["iteration_matrices"]

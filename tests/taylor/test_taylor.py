@@ -187,6 +187,7 @@ def test_the_default_is_taylor_where_everything_has_a_series():
     assert ts.simulate(scene, (0.0, 0.1)).method.startswith("DOP853")
 
 
+@pytest.mark.slow
 def test_a_stiff_motion_is_handed_to_an_implicit_method():
     scene = ts.Scene()
     arm = scene.add_body(

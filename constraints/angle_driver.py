@@ -19,7 +19,7 @@ import numpy as np
 from ..plugins import Motion, Primitive, Vector, dot, product, scaled, sine_cosine
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Prescribed
+    from ..hints import BodyLike, Prescribed
 
 
 class AngleDriver(Primitive):
@@ -37,12 +37,6 @@ class AngleDriver(Primitive):
         The direction of b that is at the angle.
     angle : one of ts.motions, function(s) of time, or float, rad
         The angle prescribed; it may go on over any number of turns.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If a direction is missing or zero, or the angle is no motion, or a body is wrong.
 
     Examples
     --------
@@ -62,18 +56,8 @@ class AngleDriver(Primitive):
     prescribed = "angle"
     slots = 14
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        reference_a: ArrayLike | None = None,
-        across_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
-        angle: Prescribed = 0.0,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (reference_a, across_a, reference_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, angle: Prescribed = 0.0, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.angle = angle
 
     def __setattr__(self, name, value):

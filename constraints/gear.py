@@ -13,7 +13,7 @@ last accepted step, so a step must rotate by less than half a turn. Singular if 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,7 +39,7 @@ from ..plugins import (
 from .thread import place
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 _dot, _cross = vectors.dot, vectors.cross  # by name: `twin` follows the names of kernels
 
@@ -53,8 +53,6 @@ class Gear(Primitive):
         The wheels, on parallel axes that joints to the ground or to a common carrier hold.
     point_a, point_b : array_like (3,), m
         Their centres, in the bodies' own frames.
-    axis_a : array_like (3,)
-        The axis, in the frame of a; scaled to unit length.
     reference_a, reference_b : array_like (3,), optional
         Directions across the axis in the bodies' own frames, whose angles from the line of centres are counted; by
         default both are along it now.
@@ -63,7 +61,6 @@ class Gear(Primitive):
         positive for one inside the other. Not zero.
     offset : float, rad; optional
         theta_b - ratio theta_a; None takes that of the bodies as they stand now.
-    name : str, optional
 
     Raises
     ------
@@ -97,20 +94,9 @@ class Gear(Primitive):
     memory = 1
 
     def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = None,
-        reference_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        ratio: float | None = None,
-        offset: float | None = None,
-        name: str = "",
+        self, a: BodyLike, b: BodyLike, *, ratio: float | None = None, offset: float | None = None, **places: Any
     ) -> None:
-        super().__init__(a, b, (axis_a, reference_a, reference_b, point_a, point_b), name)
+        super().__init__(a, b, **places)
         self.ratio = ratio
         u, f, h, l = self._now()
         for word, v in (("reference_a", f), ("reference_b", h), ("the line of centres", l)):

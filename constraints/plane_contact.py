@@ -10,12 +10,12 @@ Never singular by itself.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Point, Primitive, Vector
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class PlaneContact(Primitive):
@@ -25,18 +25,10 @@ class PlaneContact(Primitive):
     ----------
     a, b : Body or ground
         a carries the point, b the plane.
-    point_a : array_like (3,), m
-        The point, in a's frame.
     point_b : array_like (3,), m
         A point of the plane, in b's frame.
     normal_b : array_like (3,)
         Normal of the plane, in b's frame; scaled to unit length.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If the normal is missing or zero, or a point or body is wrong.
 
     Notes
     -----
@@ -58,17 +50,8 @@ class PlaneContact(Primitive):
     rows = 1
     markers = (Point("a"), Point("b"), Vector("b", "normal_b"))
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        normal_b: ArrayLike | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, normal_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
 
     @staticmethod
     def phi(x, par, t, out):

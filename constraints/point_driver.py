@@ -7,7 +7,7 @@ Never singular.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ..plugins import InvalidConstraint, Joint, Motion, Point, is_data
 from .dot2 import Dot2
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Path
+    from ..hints import BodyLike, Path
 
 
 class PointDriver(Joint):
@@ -32,12 +32,6 @@ class PointDriver(Joint):
     path : sequence of three, m
         The coordinates along the axes of a: one of ts.motions, a function f of time or three (f, fd, fdd), data, or a
         float. Or data of vectors: a ts.Table, a spline of SciPy's, or (t, x) with x (k, 3).
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If the path is not three motions or numbers, or a point or body is wrong.
 
     Notes
     -----
@@ -60,17 +54,8 @@ class PointDriver(Joint):
 
     markers = (Point("a"), Point("b"))
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        path: Path | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, path: Path | None = None, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.path = path
         self.check()
 

@@ -15,7 +15,7 @@ if h is along f x g.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from ..plugins import (
 )
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class Thread(Primitive):
@@ -53,12 +53,6 @@ class Thread(Primitive):
         The points whose distance along axis_a is the travel.
     lead : float, m/rad
         Travel over turn, not zero; negative for a left-handed thread.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If the lead is zero or not finite, or a direction, point or body is wrong.
 
     Examples
     --------
@@ -84,21 +78,8 @@ class Thread(Primitive):
     )
     slots = 21
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        reference_a: ArrayLike | None = None,
-        across_a: ArrayLike | None = None,
-        axis_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        lead: float | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (reference_a, across_a, axis_a, reference_b, point_a, point_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, lead: float | None = None, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.lead = lead
         self.check()
 

@@ -28,19 +28,11 @@ class Universal(Joint):
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
     point_a, point_b : array_like (3,), m
         Where the axes meet, in the bodies' own frames.
     axis_a, axis_b : array_like (3,)
         The axis that each body turns about on the cross between them, in the body's own frame; scaled to unit length.
         Both are across the shafts that the joint connects, and at right angles to each other.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If an axis is missing or zero, or a point or body is wrong.
 
     Notes
     -----
@@ -62,18 +54,8 @@ class Universal(Joint):
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(direction="axis_b"), Angle("axis_b", direction="axis_a"))
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
 
     @Placing
     def at(

@@ -135,12 +135,17 @@ class Force(Attachment):
             _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
     def __init__(
-        self, a: BodyLike, b: BodyLike | None = None, coordinates: Sequence[ArrayLike | None] = (), name: str = ""
+        self,
+        a: BodyLike,
+        b: BodyLike | None = None,
+        coordinates: Sequence[ArrayLike | None] = (),
+        name: str = "",
+        **places: ArrayLike | None,
     ) -> None:
         """Attach the force to its bodies; coordinates has an entry for each marker, in the body frame."""
         if not self.markers:
             raise InvalidForce("Force is the base of forces and has no law; use one of them, or a subclass.")
-        super().__init__(a, b, coordinates, name)
+        super().__init__(a, b, coordinates, name, **places)
 
     def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked by `quantities`."""

@@ -50,6 +50,13 @@ class JointFriction:
         Normal load besides that of the reaction.
     name : str, optional
 
+    Raises
+    ------
+    InvalidForce
+        If the joint is of another class or isn't in its scene, or a number is negative, not finite or impossible.
+    RedundantConstraints
+        When a run begins, if the reaction that it needs isn't unique.
+
     Attributes
     ----------
     joints : tuple of classes

@@ -12,6 +12,7 @@ has r only.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from inspect import Parameter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,8 @@ from ..maths.euler_parameters import rotate, rotate_gradient, rotate_rate
 from ..validation import vector3
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from ..hints import AnyBody, ArrayLike, Floats, TsdynError
 
 POINT, VECTOR, PARAMETERS, TURN = 0, 1, 2, 3  # codes in kernels
@@ -36,12 +39,20 @@ class Marker:
     code = POINT
     size = 3
     prefix = "point_"
+    placed = True  # by an argument, three body-frame coordinates
+    default = (0.0, 0.0, 0.0)
+    meaning = "array_like (3,), m\n    A point in the {}; by default the centroid."
 
     def __post_init__(self) -> None:
         if self.body not in ("a", "b"):
             raise InvalidConstraint(f"a marker belongs to body 'a' or 'b', not to {self.body!r}.")
         if not self.argument:
             object.__setattr__(self, "argument", self.prefix + self.body)
+
+    def parameter(self) -> Parameter:
+        """Return the argument that places it, as one of a signature."""
+        annotation = "ArrayLike | None" if self.default is None else "ArrayLike"
+        return Parameter(self.argument, Parameter.KEYWORD_ONLY, default=self.default, annotation=annotation)
 
     def coordinates(
         self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
@@ -84,6 +95,8 @@ class Vector(Marker):
 
     code = VECTOR
     prefix = "axis_"
+    default = None
+    meaning = "array_like (3,)\n    A direction in the {}; scaled to unit length."
 
     def coordinates(
         self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
@@ -113,6 +126,8 @@ class Parameters(Marker):
     code = PARAMETERS
     size = 4
     prefix = "parameters_"
+    placed = False
+    default = None
 
     def coordinates(
         self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
@@ -134,6 +149,8 @@ class Turn(Marker):
 
     code = TURN
     prefix = "turn_"
+    placed = False
+    default = None
 
     def coordinates(
         self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
@@ -141,6 +158,17 @@ class Turn(Marker):
         """Nothing to place: all points of a body turn alike."""
         _needs_rotation(body, where)
         return np.zeros(3)
+
+
+def entries(markers: Sequence[Marker]) -> Iterator[str]:
+    """Entries of a docstring for the arguments that place markers; one for a pair on both bodies."""
+    pairs = {}
+    for marker in markers:
+        if marker.placed:
+            pairs.setdefault((marker.code, marker.argument.removesuffix(f"_{marker.body}")), []).append(marker)
+    for one, *others in pairs.values():
+        arguments = ", ".join(marker.argument for marker in (one, *others))
+        yield f"{arguments} : {one.meaning.format('frame of each body' if others else f'frame of {one.body}')}"
 
 
 def _needs_rotation(body, where):

@@ -129,14 +129,19 @@ class Primitive(Attachment):
         _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
     def __init__(
-        self, a: BodyLike, b: BodyLike | None = None, coordinates: Sequence[ArrayLike | None] = (), name: str = ""
+        self,
+        a: BodyLike,
+        b: BodyLike | None = None,
+        coordinates: Sequence[ArrayLike | None] = (),
+        name: str = "",
+        **places: ArrayLike | None,
     ) -> None:
         """Attach the primitive to its bodies; coordinates has an entry for each marker, in the body frame."""
         if not self.rows:
             raise InvalidConstraint(
                 "Primitive is the base of constraints and has no rows; use one of them, or a subclass."
             )
-        super().__init__(a, b, coordinates, name)
+        super().__init__(a, b, coordinates, name, **places)
 
     def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; a prescribed one may be a number or three functions of time."""

@@ -38,7 +38,6 @@ class CoulombFriction(Force):
         Regularisation: at this velocity the force is 71% of its size.
     slip_rate : float, rad/s
         The same for the torque.
-    name : str, optional
 
     Raises
     ------
@@ -78,7 +77,7 @@ class CoulombFriction(Force):
         slip_rate: float = 1e-3,
         name: str = "",
     ) -> None:
-        super().__init__(a, b, (point_a, None, (0.0, 0.0, 0.0), None), name)
+        super().__init__(a, b, point_a=point_a, name=name)
         self.force, self.torque, self.slip_velocity, self.slip_rate = force, torque, slip_velocity, slip_rate
         self.check()
 

@@ -27,7 +27,6 @@ class JointForce(JointLoad, Force):
         As for JointTorque.
     which : int
         Which displacement, of a joint that has several.
-    name : str, optional
 
     Raises
     ------

@@ -32,7 +32,6 @@ class JointTorque(JointLoad, Force):
         end there, and every method keeps its order.
     which : int
         Which angle, of a joint that has several (Universal).
-    name : str, optional
 
     Raises
     ------

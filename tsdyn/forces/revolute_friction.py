@@ -38,21 +38,10 @@ class RevoluteFriction(JointFriction, Force):
         Added to its scene.
     radius : float, m
         Of the pin.
-    kinetic : float
-        Coefficient of friction while sliding.
-    **given
-        static, slip_velocity, stribeck_velocity (of the pin's surface, m/s), preload (N), name: see `ts.JointFriction`.
     collar_radius : float, m
         Where the force along the axis rubs; 0: it causes no friction.
     length : float, m, optional
         Of the bearing, which carries torques that tilt the pin as a pair of forces; None: they cause no friction.
-
-    Raises
-    ------
-    InvalidForce
-        If joint is no Revolute of the scene, or a number is negative, not finite or impossible.
-    RedundantConstraints
-        When a run begins, if the reaction that it needs isn't unique.
 
     Examples
     --------

@@ -12,7 +12,7 @@ Singular at l = 0: a run ends there.
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from ..plugins import (
 )
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Load
+    from ..hints import BodyLike, Load
 
 
 class Spring(Force):
@@ -40,17 +40,12 @@ class Spring(Force):
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    point_a, point_b : array_like (3,), m
-        The points in the bodies' own frames.
     stiffness : float, N/m
     damping : float, N s/m
     free_length : float, m; optional
         None takes the distance of the bodies as they stand now.
     actuator : float, function of time, or ts.Table, N
         A tension of its own; its power is applied power.
-    name : str, optional
 
     Raises
     ------
@@ -83,15 +78,13 @@ class Spring(Force):
         a: BodyLike,
         b: BodyLike,
         *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
         stiffness: float = 0.0,
         damping: float = 0.0,
         free_length: float | None = None,
         actuator: Load = 0.0,
-        name: str = "",
+        **places: Any,
     ) -> None:
-        super().__init__(a, b, (point_a, point_b), name)
+        super().__init__(a, b, **places)
         ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
         length = np.linalg.norm(ends[0] - ends[1])
         if not length > 0.0:

@@ -38,7 +38,6 @@ class Torque(Given, Force):
         (m/s) and angular velocity (rad/s), ground frame.
     frame : {"ground", "body"}
         The axes in which the torque is given.
-    name : str, optional
 
     Raises
     ------
@@ -79,8 +78,7 @@ class Torque(Given, Force):
     def __init__(
         self, a: Body | str, *, torque: VectorLoad | None = None, frame: Frame = "ground", name: str = ""
     ) -> None:
-        places = [(0.0, 0.0, 0.0) if marker.code == Point.code else None for marker in self.markers]
-        super().__init__(a, None, places, name)
+        super().__init__(a, None, name=name)
         self.take(torque, frame, "(Nx, Ny, Nz) in N m")
 
     @classmethod

@@ -67,7 +67,6 @@ class TorsionalSpring(Force):
         The angle at the start lies in (-pi, pi].
     actuator : float, function of time, or ts.Table, N m
         Torque about the axis on b, the opposite on a; its power is applied power.
-    name : str, optional
 
     Raises
     ------
@@ -104,18 +103,15 @@ class TorsionalSpring(Force):
         a: BodyLike,
         b: BodyLike,
         *,
-        axis_a: ArrayLike | None = None,
         axis_b: ArrayLike | None = None,
-        reference_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
         stiffness: float = 0.0,
         damping: float = 0.0,
         free_angle: float = 0.0,
         actuator: Load = 0.0,
-        name: str = "",
+        **places: Any,
     ) -> None:
         self.__dict__["_given"] = axis_b
-        super().__init__(a, b, (axis_a, reference_a, reference_b, None, None), name)
+        super().__init__(a, b, **places)
         self.reference_a = self.coordinates[1]
         self.stiffness, self.damping, self.free_angle, self.actuator = stiffness, damping, free_angle, actuator
         axis, _, reference = (self._turned(i) for i in range(3))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -56,11 +56,8 @@ class UserForce(ByState, Force):
         parameters, velocity of the point (m/s), angular velocity (rad/s), all in the ground frame; those of the ground
         are point_b, (1, 0, 0, 0) and zeros. It writes out (6,): force on a at point_a (N), torque on a (N m), ground
         frame. It may compare and allocate; what it raises ends the run. A NaN does, too.
-    point_a, point_b : array_like (3,), m
-        Body frame.
     parameters : array_like, optional
         Numbers that the function gets as par; to be changed as `force.values`.
-    name : str, optional
 
     Raises
     ------
@@ -102,14 +99,12 @@ class UserForce(ByState, Force):
         b: BodyLike | None = None,
         *,
         function: Callable[..., object],
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
         parameters: ArrayLike = (),
-        name: str = "",
+        **places: Any,
     ) -> None:
         if b is None:
             b = getattr(getattr(a, "scene", None), "ground", None)
-        super().__init__(a, b, (point_a, None, None, point_b, None, None), name)
+        super().__init__(a, b, **places)
         self.values = parameters
         self.function = function
         self.check()

@@ -29,7 +29,6 @@ class ViscousFriction(Force):
         Where the force acts, body frame of a.
     damping : float, N s/m
     torsional_damping : float, N m s/rad
-    name : str, optional
 
     Raises
     ------
@@ -62,7 +61,7 @@ class ViscousFriction(Force):
         torsional_damping: float = 0.0,
         name: str = "",
     ) -> None:
-        super().__init__(a, b, (point_a, None, (0.0, 0.0, 0.0), None), name)
+        super().__init__(a, b, point_a=point_a, name=name)
         self.damping, self.torsional_damping = damping, torsional_damping
         self.check()
 

@@ -20,7 +20,13 @@ import numba
 from llvmlite import ir
 
 _LIBRARIES = ("numpy", "numba", "math", "cmath", "scipy")  # their versions say all about them
-_GENERATORS = ("compiler.py", "kernels.py", "simd.py")  # code that no function names: types and their lowering
+_GENERATORS = (
+    "arrays.py",
+    "compiler.py",
+    "kernels.py",
+    "resident.py",
+    "simd.py",
+)  # code that no function names: types and their lowering
 _PACKAGE = __name__.partition(".")[0]
 _known = {}  # function: hash; the function is kept alive, so that the key stays its own
 

@@ -1,0 +1,98 @@
+"""Records of a workspace: numbers with names, which kernels and Python share."""
+
+import copy
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from tsdyn.jit.code_hash import deep_hash
+from tsdyn.jit.kernels import Record, entry, kernel, loader, resident
+
+
+class Counts(Record):
+    """Of steps."""
+
+    size: float
+    steps: int
+
+
+class Inner(NamedTuple):
+    """Behind another array."""
+
+    values: np.ndarray
+    counts: Counts
+
+
+class Outer(NamedTuple):
+    """What a kernel is given."""
+
+    values: np.ndarray
+    inner: Inner
+
+
+def outer():
+    """An example, all zero."""
+    return Outer(np.zeros(3), Inner(np.zeros(2), Counts()))
+
+
+load = loader(outer())
+
+
+@kernel
+def _add(counts, k):
+    counts.steps += k
+    counts.size = 2.0 * counts.size + k
+
+
+@entry
+def count(address, k):
+    """Count k steps."""
+    x = load(address)
+    _add(x.inner.counts, k)
+    if x.inner.counts.steps > 3:
+        x.inner.counts.steps -= 1
+    x.inner.values[0] += x.inner.counts.size
+    return x.inner.counts.steps
+
+
+def test_kernels_and_python_share_a_record():
+    x = outer()
+    address, _keep = resident(x)
+    assert [count(address, 2) for _ in range(3)] == [2, 3, 4]
+    assert x.inner.counts.as_dict() == {"size": 14.0, "steps": 4}
+    assert x.inner.values.tolist() == [22.0, 0.0]
+    x.inner.counts.steps = 10
+    assert count(address, 1) == 10
+
+
+def test_a_record_is_cleared_and_copied():
+    counts = Counts(1.5, 7)
+    other = copy.copy(counts)
+    counts.clear()
+    assert counts.as_dict() == {"size": 0.0, "steps": 0}
+    assert other.as_dict() == {"size": 1.5, "steps": 7}
+
+
+def test_a_whole_number_stays_whole():
+    with pytest.raises((TypeError, ValueError)):
+        Counts().steps = "many"
+
+
+def test_the_layout_is_part_of_the_hash():
+    class Wider(Record):
+        size: float
+        charts: int
+        steps: int
+
+    def hash_with(kind):
+        example = Outer(np.zeros(3), Inner(np.zeros(2), kind()))
+        read = loader(example)
+
+        def steps(address):
+            return read(address).inner.counts.steps
+
+        return deep_hash(steps)
+
+    if not isinstance(load, type(lambda: 0)):  # there is a layout only where kernels are compiled
+        assert hash_with(Counts) == hash_with(Counts) != hash_with(Wider)

@@ -1,0 +1,149 @@
+"""Arrays of kernels: on the stack, and over memory that somebody else owns."""
+
+import platform
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.errors import RequireLiteralValue
+from numba.extending import intrinsic
+from numba.np.arrayobj import populate_array
+
+from .compiled import DEBUG
+
+ANY = 1 << 40  # the length of arrays whose length a kernel doesn't need
+_i64, _f64 = ir.IntType(64), ir.DoubleType()
+_vector = types.Array(types.float64, 1, "C")
+_matrix = types.Array(types.float64, 2, "C")
+_integers = types.Array(types.int64, 1, "C")
+
+
+def array_over(context, builder, kind, pointer, shape):
+    """An array over memory that somebody else owns."""
+    array = context.make_array(kind)(context, builder)
+    size = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
+    strides = [size]
+    for length in reversed(shape[1:]):
+        strides.insert(0, builder.mul(strides[0], length))
+    data = builder.bitcast(pointer, array.data.type)
+    populate_array(array, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None, parent=None)
+    return array._getvalue()
+
+
+def _literal(value):
+    if not isinstance(value, types.IntegerLiteral):
+        raise RequireLiteralValue("the size of a stack array is a constant")
+    return value.literal_value
+
+
+def _stacker(kind, cell):
+    """Make the kernels of vectors and matrices of some kind of number on the stack; their content is undefined."""
+
+    @intrinsic(prefer_literal=True)
+    def one(typing, n):
+        length = _literal(n)
+
+        def generate(context, builder, signature, arguments):
+            pointer = cgutils.alloca_once(builder, ir.ArrayType(cell, length))
+            return array_over(
+                context, builder, signature.return_type, pointer, [context.get_constant(types.intp, length)]
+            )
+
+        return types.Array(kind, 1, "C")(n), generate
+
+    @intrinsic(prefer_literal=True)
+    def two(typing, n, m):
+        shape = _literal(n), _literal(m)
+
+        def generate(context, builder, signature, arguments):
+            pointer = cgutils.alloca_once(builder, ir.ArrayType(cell, shape[0] * shape[1]))
+            lengths = [context.get_constant(types.intp, s) for s in shape]
+            return array_over(context, builder, signature.return_type, pointer, lengths)
+
+        return types.Array(kind, 2, "C")(n, m), generate
+
+    return one, two
+
+
+# stack(n) is a vector of n floats on the stack, stack2(n, m) a matrix; n and m are constants
+stack, stack2 = _stacker(types.float64, _f64)
+complex_stack, complex_stack2 = _stacker(types.complex128, ir.LiteralStructType([_f64, _f64]))
+
+
+def _viewer(kind):
+    @intrinsic
+    def view(typing, address, *shape):
+        def generate(context, builder, signature, arguments):
+            pointer = builder.inttoptr(arguments[0], _f64.as_pointer())
+            parts = cgutils.unpack_tuple(builder, arguments[1]) if len(arguments) == 2 else list(arguments[1:])
+            return array_over(context, builder, kind, pointer, list(parts))
+
+        return kind(types.int64, types.StarArgTuple([types.intp] * len(shape))), generate
+
+    return view
+
+
+vector = _viewer(_vector)
+matrix = _viewer(_matrix)
+integers = _viewer(_integers)
+
+
+@intrinsic
+def data_of(typing, array):
+    """The address of an array's first number."""
+
+    def generate(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, value=arguments[0]).data
+        return builder.ptrtoint(data, _i64)
+
+    return types.int64(array), generate
+
+
+HAS_CYCLES = platform.machine().lower() in ("x86_64", "amd64")
+
+
+@intrinsic
+def cycles(typing):
+    """The processor's time stamp, a few nanoseconds to read; zero where HAS_CYCLES says that none may be read."""
+
+    def generate(context, builder, signature, arguments):
+        if not HAS_CYCLES:
+            return context.get_constant(types.int64, 0)
+        function = builder.module.declare_intrinsic("llvm.readcyclecounter", (), ir.FunctionType(_i64, ()))
+        return builder.call(function, ())
+
+    return types.int64(), generate
+
+
+if DEBUG:
+
+    def stack(n):
+        """A vector of n floats."""
+        return np.zeros(n)
+
+    def stack2(n, m):
+        """An n x m matrix."""
+        return np.zeros((n, m))
+
+    def complex_stack(n):
+        """A vector of n complex numbers."""
+        return np.zeros(n, complex)
+
+    def complex_stack2(n, m):
+        """An n x m complex matrix."""
+        return np.zeros((n, m), complex)
+
+    def vector(array, n):
+        """The array itself: in debug mode nothing is passed by address."""
+        return array[:n] if array.ndim == 1 else array.reshape(-1)[:n]
+
+    def matrix(array, n, m):
+        """The array as an n x m matrix."""
+        return array.reshape(-1)[: n * m].reshape(n, m)
+
+    integers = vector
+
+    def data_of(array):
+        """The array itself."""
+        return array

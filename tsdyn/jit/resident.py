@@ -1,0 +1,153 @@
+"""Workspaces that kernels find by one address: named tuples of arrays and of records.
+
+A `Record` holds single numbers under names, in place of an array with an index for each:
+
+    class Control(Record):
+        floor: float  # |Phi| that rounding leaves
+        steps: int
+
+    class Work(NamedTuple):
+        q: np.ndarray
+        control: Control
+
+Kernels read and write `work.control.floor` and `work.control.steps += 1`, and so does Python.
+"""
+
+import ctypes
+from hashlib import sha256
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model, typeof_impl
+
+from .arrays import array_over
+from .compiled import DEBUG
+
+_i64, _f64 = ir.IntType(64), ir.DoubleType()
+_NUMBERS = {float: (ctypes.c_double, types.float64), int: (ctypes.c_int64, types.int64)}
+
+
+class _Layout(type(ctypes.Structure)):
+    def __init__(cls, *arguments):
+        super().__init__(*arguments)
+        cls._fields_ = [(name, _NUMBERS[kind][0]) for name, kind in getattr(cls, "__annotations__", {}).items()]
+
+
+class Record(ctypes.Structure, metaclass=_Layout):
+    """Numbers with names, zero at first: floats and integers of 64 bits, as a subclass annotates them."""
+
+    def clear(self):
+        """Set all to zero."""
+        ctypes.memset(ctypes.addressof(self), 0, ctypes.sizeof(self))
+
+    def as_dict(self):
+        """The numbers by name."""
+        return {name: getattr(self, name) for name in type(self).__annotations__}
+
+    if DEBUG:  # numbers come from arrays there, which ctypes refuses
+
+        def __setattr__(self, name, value):
+            """Set a number."""
+            super().__setattr__(name, type(self).__annotations__[name](value))
+
+
+@typeof_impl.register(Record)
+def _type_of_record(value, context):
+    return types.Record.make_c_struct([(name, _NUMBERS[kind][1]) for name, kind in type(value).__annotations__.items()])
+
+
+def resident(value, header=()):
+    """Put a named tuple into memory for the kernels that use its `loader`; return its address, and what keeps it there.
+
+    Passing the tuple itself takes 0.2 us an array in each call. The header's integers stand before it.
+    """
+    if DEBUG:
+        return value, None
+    image = np.array([*header, *image_of(value)], np.int64)
+    return image.ctypes.data + 8 * len(header), (image, value)
+
+
+def image_of(value):
+    """The words of an array (the address of its numbers, its lengths), of a record (its address), or of a tuple."""
+    if isinstance(value, tuple):
+        return [word for field in value for word in image_of(field)]
+    if isinstance(value, Record):
+        return [ctypes.addressof(value)]
+    assert value.flags.c_contiguous
+    return [value.ctypes.data, *value.shape]
+
+
+def _words(kind):
+    """How many words the image of a type takes."""
+    if isinstance(kind, types.Array):
+        return 1 + kind.ndim
+    return 1 if isinstance(kind, types.Record) else sum(map(_words, kind))
+
+
+class _Seen(types.Type):
+    """A named tuple of arrays and records that is in memory; a kernel reads of it what it uses, when it uses it."""
+
+    def __init__(self, kind):
+        self.kind = kind
+        super().__init__(name=f"Seen({kind.instance_class.__name__} {sha256(str(kind).encode()).hexdigest()[:12]})")
+
+
+@register_model(_Seen)
+class _SeenModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, _i64)
+
+
+@infer_getattr
+class _SeenFields(AttributeTemplate):
+    key = _Seen
+
+    def generic_resolve(self, seen, name):
+        """The type of a field: an array, a record, or again something seen."""
+        if name in seen.kind.fields:
+            field = seen.kind.types[seen.kind.fields.index(name)]
+            return _Seen(field) if isinstance(field, types.BaseTuple) else field
+        return None
+
+
+@lower_getattr_generic(_Seen)
+def _seen_field(context, builder, seen, address, name):
+    at = seen.kind.fields.index(name)
+    field = seen.kind.types[at]
+    place = builder.add(address, _i64(8 * sum(map(_words, seen.kind.types[:at]))))
+    if isinstance(field, types.BaseTuple):
+        return place
+    words = builder.inttoptr(place, _i64.as_pointer())
+    if isinstance(field, types.Record):
+        return builder.inttoptr(_word(builder, words, 0), context.get_value_type(field))
+    pointer, *shape = (_word(builder, words, i) for i in range(1 + field.ndim))
+    return array_over(context, builder, field, builder.inttoptr(pointer, _f64.as_pointer()), shape)
+
+
+def _word(builder, words, i):
+    """A word of memory that no kernel changes, which says so to the compiler."""
+    word = builder.load(builder.gep(words, [_i64(i)]))
+    word.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return word
+
+
+def loader(example):
+    """Make the kernel that gives sight of a named tuple of example's type by its address.
+
+    Passed as a value it would be hundreds of words for every kernel, most of them unused, and slow to compile.
+    """
+    if DEBUG:
+        return lambda value: value
+    kind = _Seen(numba.typeof(example))
+
+    @intrinsic
+    def load(typing, address):
+        def generate(context, builder, signature, arguments):
+            return arguments[0]
+
+        return kind(types.int64), generate
+
+    return load

@@ -21,15 +21,10 @@ if TYPE_CHECKING:
 class Cylindrical(Joint):
     """Let one body turn about an axis of another and slide along it.
 
-    Parameters
-    ----------
-    point_a, point_b : array_like (3,), m
-        A point of the axis on each body, in its own frame.
-
     Notes
     -----
-    Rows: axis[0], axis[1], line[0], line[1]. `Cylindrical.at(a, b, point=, axis=)` takes a point and the direction of
-    the axis in the ground frame.
+    The points lie on the axis. Rows: axis[0], axis[1], line[0], line[1]. `Cylindrical.at(a, b, point=, axis=)` takes a
+    point and the direction of the axis in the ground frame.
 
     Examples
     --------

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import InvalidConstraint, Motion, Point, Primitive, rotation_matrix, square
+from ..plugins import Motion, Point, Primitive, ground_point, square
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Prescribed
@@ -56,7 +56,7 @@ class Distance(Primitive):
     def __init__(self, a: BodyLike, b: BodyLike, *, length: Prescribed | None = None, **places: Any) -> None:
         super().__init__(a, b, **places)
         if length is None:
-            ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
+            ends = [ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
             length = np.linalg.norm(ends[0] - ends[1])
         self.length = length
         self.check()
@@ -65,7 +65,7 @@ class Distance(Primitive):
         """A positive length."""
         initial = Motion.at_start(self.length)
         if not initial > 0.0:
-            raise InvalidConstraint(
+            raise self.error(
                 f"{self.name}: the length is {initial:g} m and must be positive; "
                 "to hold two points together use Spherical."
             )
@@ -113,7 +113,3 @@ class Distance(Primitive):
             d = (x[i] - x[3 + i]) * scale
             out[0, i] = d
             out[0, 3 + i] = -d
-
-
-def _ground_point(body, s):
-    return body.position + (rotation_matrix(body.orientation) @ s if body.dimension != 3 else 0.0)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import InvalidConstraint, Motion, Primitive, Vector
+from ..plugins import Motion, Primitive, Vector
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Prescribed
@@ -50,7 +50,7 @@ class Dot1(Primitive):
         """A cosine."""
         initial = Motion.at_start(self.value)
         if not -1.0 < initial < 1.0:
-            raise InvalidConstraint(
+            raise self.error(
                 f"{self.name}: value is the cosine of an angle and must lie between -1 and 1, got {initial:g}; "
                 "to make two axes parallel, keep each of two directions across one of them perpendicular to the other."
             )

@@ -28,16 +28,15 @@ class Fixed(FramedJoint):
 
     Parameters
     ----------
-    point_a, point_b : array_like (3,), m
-        The points that coincide, in the bodies' own frames.
     axis_a, axis_b, reference_a, reference_b : array_like (3,), optional
         An axis and a direction beside it, in the bodies' own frames, that the joint keeps parallel; what is left out
         follows from the bodies as they stand now. Without any, the bodies keep the orientation that they have.
 
     Notes
     -----
-    Rows: point[0] to point[2], axis[0], axis[1], turn. `Fixed.at(a, b)` takes the bodies as they stand now; the point,
-    in the ground frame, is the centroid of b, or of a where b is the ground, unless `point=` says another.
+    The points coincide. Rows: point[0] to point[2], axis[0], axis[1], turn. `Fixed.at(a, b)` takes the bodies as they
+    stand now; the point, in the ground frame, is the centroid of b, or of a where b is the ground, unless `point=` says
+    another.
 
     Examples
     --------

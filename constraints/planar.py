@@ -21,17 +21,10 @@ if TYPE_CHECKING:
 class Planar(Joint):
     """Let one body slide on a plane of another and turn about its normal, flat on it on either side.
 
-    Parameters
-    ----------
-    point_a, point_b : array_like (3,), m
-        A point of the plane on each body, in its own frame.
-    axis_a, axis_b : array_like (3,)
-        The normal of the plane, in the bodies' own frames; scaled to unit length.
-
     Notes
     -----
-    Rows: axis[0], axis[1], plane. `Planar.at(a, b, point=, axis=)` takes a point and the normal of the plane in the
-    ground frame. A single point on a plane is a PlaneContact.
+    The points lie in the plane, the axes are its normals. Rows: axis[0], axis[1], plane. `Planar.at(a, b, point=,
+    axis=)` takes a point and the normal of the plane in the ground frame. A single point on a plane is a PlaneContact.
 
     Examples
     --------

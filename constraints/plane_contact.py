@@ -24,11 +24,7 @@ class PlaneContact(Primitive):
     Parameters
     ----------
     a, b : Body or ground
-        a carries the point, b the plane.
-    point_b : array_like (3,), m
-        A point of the plane, in b's frame.
-    normal_b : array_like (3,)
-        Normal of the plane, in b's frame; scaled to unit length.
+        a carries the point point_a, b the plane through point_b with the normal normal_b.
 
     Notes
     -----

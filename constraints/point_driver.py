@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import InvalidConstraint, Joint, Motion, Point, is_data
+from ..plugins import Joint, Motion, Point, is_data
 from .dot2 import Dot2
 
 if TYPE_CHECKING:
@@ -24,14 +24,10 @@ class PointDriver(Joint):
     Parameters
     ----------
     a, b : Body or ground
-        Two different bodies of one scene; the path is in the frame of a, often the ground.
-    point_a : array_like (3,), m
-        Where the path is measured from, in the frame of a.
-    point_b : array_like (3,), m
-        The point that is led, in the frame of b.
+        Two different bodies of one scene; a is often the ground.
     path : sequence of three, m
-        The coordinates along the axes of a: one of ts.motions, a function f of time or three (f, fd, fdd), data, or a
-        float. Or data of vectors: a ts.Table, a spline of SciPy's, or (t, x) with x (k, 3).
+        The coordinates of point_b against point_a along the axes of a: one of ts.motions, a function f of time or three
+        (f, fd, fdd), data, or a float. Or data of vectors: a ts.Table, a spline of SciPy's, or (t, x) with x (k, 3).
 
     Notes
     -----
@@ -65,7 +61,7 @@ class PointDriver(Joint):
             if is_data(value):
                 value = Motion.components(value, 3, f"{self.name}: path")
             if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 3:
-                raise InvalidConstraint(
+                raise self.error(
                     f"{self.name}: path must be three motions or numbers, the coordinates along the axes of a, got "
                     f"{value!r}."
                 )

@@ -22,11 +22,7 @@ class PointOnLine(Joint):
     Parameters
     ----------
     a, b : Body or ground
-        a carries the point, b the line.
-    point_b : array_like (3,), m
-        A point of the line, in b's frame.
-    axis_b : array_like (3,)
-        The line's direction, in b's frame; scaled to unit length.
+        a carries the point point_a, b the line through point_b along axis_b.
 
     Notes
     -----

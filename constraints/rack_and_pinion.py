@@ -16,7 +16,6 @@ from ..plugins import (
     PARALLEL,
     Angle,
     Displacement,
-    InvalidConstraint,
     Joint,
     Point,
     Vector,
@@ -105,12 +104,12 @@ class RackAndPinion(Joint):
         """A radius, a rack across the axis, and a reference beside it."""
         demand_lead(self, "radius", self.radius)
         if abs(self.axis_a @ self.direction_a) > PARALLEL:
-            raise InvalidConstraint(
+            raise self.error(
                 f"{self.name}: direction_a must be across axis_a, the pinion's axis; they are at an angle of "
                 f"{np.degrees(np.arccos(np.clip(self.axis_a @ self.direction_a, -1, 1))):g} degrees."
             )
         if np.linalg.norm(np.cross(self.axis_b, self.reference_b)) < PARALLEL:
-            raise InvalidConstraint(
+            raise self.error(
                 f"{self.name}: reference_b is parallel to axis_b; choose a direction across the pinion's axis."
             )
 

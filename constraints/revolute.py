@@ -21,15 +21,10 @@ if TYPE_CHECKING:
 class Revolute(Joint):
     """Let one body turn about an axis of another, and do nothing else: a hinge.
 
-    Parameters
-    ----------
-    point_a, point_b : array_like (3,), m
-        A point of the axis, in the bodies' own frames.
-
     Notes
     -----
-    Rows: point[0] to point[2], axis[0], axis[1]. `Revolute.at(a, b, point=, axis=)` takes the point and the axis in the
-    ground frame, the bodies being where they stand now.
+    The points lie on the axis. Rows: point[0] to point[2], axis[0], axis[1]. `Revolute.at(a, b, point=, axis=)` takes
+    the point and the axis in the ground frame, the bodies being where they stand now.
 
     Examples
     --------

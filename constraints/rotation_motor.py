@@ -26,8 +26,6 @@ class RotationMotor(FramedJoint):
     ----------
     a, b : Body or ground
         Two different bodies of one scene, held on a common axis by a joint (Revolute, Cylindrical, ...).
-    point_a, point_b : array_like (3,), m; optional
-        Where reactions are taken about, in the bodies' own frames; the row itself knows no point.
     reference_a, reference_b : array_like (3,), optional
         Directions beside the axis, in the bodies' own frames; the angle goes from the first to the second about the
         axis (right hand). What is left out follows from the bodies as they stand now: their angle is that at t = 0,
@@ -42,9 +40,9 @@ class RotationMotor(FramedJoint):
 
     Notes
     -----
-    One row: turn. `RotationMotor.of(joint, angle=)` drives a joint that has an axis; `RotationMotor.at(a, b, axis=,
-    angle=)` takes the axis in the ground frame. The torque on b about the axis is that of `solution.reaction(motor,
-    on=b)`, its power part of `solution.power`.
+    One row: turn; the points are those about which reactions are given. `RotationMotor.of(joint, angle=)` drives a
+    joint that has an axis; `RotationMotor.at(a, b, axis=, angle=)` takes the axis in the ground frame. The torque on b
+    about the axis is that of `solution.reaction(motor, on=b)`, its power part of `solution.power`.
 
     Examples
     --------

@@ -27,8 +27,6 @@ class Screw(FramedJoint):
 
     Parameters
     ----------
-    point_a, point_b : array_like (3,), m
-        A point of the axis on each body, in its own frame.
     reference_a, reference_b : array_like (3,), optional
         Directions beside the axis, in the bodies' own frames, which point the same way where the points coincide; what
         is left out follows from the bodies as they stand now.
@@ -43,8 +41,8 @@ class Screw(FramedJoint):
 
     Notes
     -----
-    Rows: axis[0], axis[1], line[0], line[1], thread. `Screw.at(a, b, point=, axis=, lead=)` takes a point and the
-    direction of the axis in the ground frame. A thread of one pitch p in m has lead = p / (2 pi).
+    The points lie on the axis. Rows: axis[0], axis[1], line[0], line[1], thread. `Screw.at(a, b, point=, axis=, lead=)`
+    takes a point and the direction of the axis in the ground frame. A thread of one pitch p in m has lead = p / (2 pi).
 
     Examples
     --------

@@ -25,6 +25,7 @@ from ..plugins import (
     Primitive,
     Vector,
     dot,
+    ground_point,
     number,
     product,
     rotation_matrix,
@@ -186,9 +187,4 @@ def demand_lead(constraint, word, value):
 
 def travel(a, b, direction, point_a, point_b):
     """How far the point of b is from that of a along a direction of a, as the bodies stand now."""
-    return float((rotation_matrix(a.orientation) @ direction) @ (place(b, point_b) - place(a, point_a)))
-
-
-def place(body, s):
-    """Where a point of a body is now, ground frame."""
-    return body.position + (rotation_matrix(body.orientation) @ s if body.dimension != 3 else 0.0)
+    return float((rotation_matrix(a.orientation) @ direction) @ (ground_point(b, point_b) - ground_point(a, point_a)))

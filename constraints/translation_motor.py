@@ -24,10 +24,8 @@ class TranslationMotor(Joint):
     ----------
     a, b : Body or ground
         Two different bodies of one scene, held by a joint that lets them slide (Translational, Cylindrical, ...).
-    point_a, point_b : array_like (3,), m
-        The points whose distance along the axis is prescribed, in the bodies' own frames.
     displacement : one of ts.motions, a function f of time or three (f, fd, fdd), or float, m
-        How far the point of b is from that of a, along the axis.
+        Of point_b against point_a along axis_a.
 
     Notes
     -----

@@ -26,16 +26,14 @@ class Translational(FramedJoint):
 
     Parameters
     ----------
-    point_a, point_b : array_like (3,), m
-        A point of the axis on each body, in its own frame.
     reference_a, reference_b : array_like (3,), optional
         Directions beside the axis, in the bodies' own frames, that the joint keeps parallel; what is left out follows
         from the bodies as they stand now.
 
     Notes
     -----
-    Rows: axis[0], axis[1], turn, line[0], line[1]. `Translational.at(a, b, point=, axis=)` takes a point and the
-    direction of the axis in the ground frame.
+    The points lie on the axis. Rows: axis[0], axis[1], turn, line[0], line[1]. `Translational.at(a, b, point=, axis=)`
+    takes a point and the direction of the axis in the ground frame.
 
     Examples
     --------

@@ -28,15 +28,14 @@ class Universal(Joint):
 
     Parameters
     ----------
-    point_a, point_b : array_like (3,), m
-        Where the axes meet, in the bodies' own frames.
     axis_a, axis_b : array_like (3,)
         The axis that each body turns about on the cross between them, in the body's own frame; scaled to unit length.
         Both are across the shafts that the joint connects, and at right angles to each other.
 
     Notes
     -----
-    Rows: point[0] to point[2], cross. `Universal.at(a, b, point=, axis=, axis_b=)` takes them in the ground frame.
+    The points are where the axes meet. Rows: point[0] to point[2], cross. `Universal.at(a, b, point=, axis=, axis_b=)`
+    takes them in the ground frame.
 
     Examples
     --------

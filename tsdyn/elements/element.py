@@ -72,6 +72,7 @@ class Attachment:
     coordinates: tuple[Floats, ...]
     markers: tuple[Marker, ...] = ()
     error: type[TsdynError] = InvalidConstraint
+    lacks = ""  # what a base class is the base of, and has none of itself
     particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
     joint_coordinates: tuple[Angle | Displacement, ...] = ()  # Angle and Displacement, see tsdyn/joint_coordinates.py
     angle_near = 0.0  # on which turn its angles begin: set by `Scene.set`
@@ -86,7 +87,7 @@ class Attachment:
         cls.__init__ = fitting(by_name(cls.__init__), then=note)
         if unwrap(cls.__init__).__code__.co_flags & CO_VARKEYWORDS:
             cls.__init__.__signature__ = complete_signature(cls)
-        if "__new__" in vars(cls):  # else the signature would be that of __new__
+        if cls.__new__ is not object.__new__:  # else the signature would be that of __new__
             cls.__signature__ = signature(MethodType(cls.__init__, cls))
         raises = f"{cls.error.__name__}\n    If an argument is inadmissible or missing, or the bodies don't fit."
         complete_docstring(cls, (*ENTRIES, *entries(cls.markers)), raises)
@@ -103,8 +104,10 @@ class Attachment:
 
         A subclass whose `__init__` passes `**places` on has the arguments of its markers, and `name`.
         """
-        self.a, self.b = a, b
         kind = self._kind()
+        if self.lacks and not self.markers:
+            raise self.error(f"{kind} is the base of {self.lacks}; use one of them, or a subclass.")
+        self.a, self.b = a, b
         name = label(name, kind, self.error)
         needed = {marker.body for marker in self.markers} | {"a"}
         bodies = [body for body, letter in ((a, "a"), (b, "b")) if body is not None or letter in needed]

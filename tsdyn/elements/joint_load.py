@@ -9,13 +9,10 @@ import numpy as np
 from ..errors import InvalidForce
 from ..validation import label, positive
 from .markers import TURN
-from .user_functions import arguments_of
+from .user_functions import ByState, arguments_of, variant
 
 if TYPE_CHECKING:
-    from ..hints import AnyBody, Floats, Random
-
-if TYPE_CHECKING:
-    from ..hints import Attachment, JointLaw
+    from ..hints import AnyBody, Attachment, Floats, JointLaw, Random
 
 
 def instants(value, what, error):
@@ -40,6 +37,11 @@ class JointLoad:
     memory = 1
     coordinate = ""  # "angle" or "displacement"
     remembers_angle = False  # of its joint, from the start of a run on
+
+    def __new__(cls, *given: Any, period: float | None = None, **others: Any) -> Self:
+        """Choose the kernel: held, or by the function; a copy has its class already."""
+        continuous = (given or others) and period is None
+        return super().__new__(variant(cls, ByState) if continuous else cls)
 
     def __init__(
         self, joint: Attachment, *, function: JointLaw, period: float | None = None, which: int = 0, name: str = ""

@@ -58,8 +58,16 @@ class Marker:
         self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
     ) -> Floats:
         """Check the body-frame coordinates that a user gave, return them as an array (3,)."""
-        place = vector3(value, f"{where}: {self.argument}", error)
+        if not self.placed:
+            _needs_rotation(body, where)
+            return np.zeros(3)
+        what = f"{where}: {self.argument}"
+        place = self.fitted(vector3(value, what, error), body, what, error)
         place.setflags(write=False)
+        return place
+
+    def fitted(self, place: Floats, body: AnyBody, what: str, error: type[TsdynError]) -> Floats:
+        """Return the coordinates of a marker of this kind, or raise an error where the body has none such."""
         return place
 
 
@@ -73,14 +81,11 @@ class Point(Marker):
     ('point_a', 'tip_b')
     """
 
-    def coordinates(
-        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
-    ) -> Floats:
-        """Check the coordinates; a point mass has no other point than itself."""
-        value = super().coordinates(body, value, where, error)
-        if body.dimension == 3 and value.any():
-            raise error(f"{where}: {self.argument} must be (0, 0, 0) on the point mass {body.name!r}.")
-        return value
+    def fitted(self, place: Floats, body: AnyBody, what: str, error: type[TsdynError]) -> Floats:
+        """Return the coordinates; a point mass has no other point than itself."""
+        if body.dimension == 3 and place.any():
+            raise error(f"{what} must be (0, 0, 0) on the point mass {body.name!r}.")
+        return place
 
 
 class Vector(Marker):
@@ -98,19 +103,14 @@ class Vector(Marker):
     default = None
     meaning = "array_like (3,)\n    A direction in the {}; scaled to unit length."
 
-    def coordinates(
-        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
-    ) -> Floats:
-        """Check and normalise the direction."""
-        value = super().coordinates(body, value, where, error)
-        _needs_rotation(body, f"{where}: {self.argument}")
-        size = np.abs(value).max()
+    def fitted(self, place: Floats, body: AnyBody, what: str, error: type[TsdynError]) -> Floats:
+        """Return the direction at unit length."""
+        _needs_rotation(body, what)
+        size = np.abs(place).max()
         if not size > 0.0:
-            raise error(f"{where}: {self.argument} has length zero; give a direction, such as (0, 0, 1).")
-        value = np.ldexp(value, -np.frexp(size)[1])  # by a power of two: no square overflows, no bit changes
-        value = value / np.linalg.norm(value)
-        value.setflags(write=False)
-        return value
+            raise error(f"{what} has length zero; give a direction, such as (0, 0, 1).")
+        place = np.ldexp(place, -np.frexp(size)[1])  # by a power of two: no square overflows, no bit changes
+        return place / np.linalg.norm(place)
 
 
 class Parameters(Marker):
@@ -129,13 +129,6 @@ class Parameters(Marker):
     placed = False
     default = None
 
-    def coordinates(
-        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
-    ) -> Floats:
-        """Nothing to place: the marker is p."""
-        _needs_rotation(body, where)
-        return np.zeros(3)
-
 
 class Turn(Marker):
     """The turning of a rigid body, for forces: xd is its angular velocity, conjugate is a torque, ground frame.
@@ -151,13 +144,6 @@ class Turn(Marker):
     prefix = "turn_"
     placed = False
     default = None
-
-    def coordinates(
-        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
-    ) -> Floats:
-        """Nothing to place: all points of a body turn alike."""
-        _needs_rotation(body, where)
-        return np.zeros(3)
 
 
 def entries(markers: Sequence[Marker]) -> Iterator[str]:

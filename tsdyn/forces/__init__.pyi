@@ -15,16 +15,6 @@ class Bushing(Points, Force):
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., stiffness: ArrayLike = ..., damping: ArrayLike = ..., torsional_stiffness: ArrayLike = ..., torsional_damping: ArrayLike = ..., name: str = ...) -> Self: ...
 
-class CoulombFriction(Force):
-    point_a: Attribute[ArrayLike, Floats]
-    force: float
-    torque: float
-    slip_velocity: float
-    slip_rate: float
-    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., force: float = ..., torque: float = ..., slip_velocity: float = ..., slip_rate: float = ..., name: str = ...) -> None: ...
-    @classmethod
-    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., point_a: ArrayLike = ..., force: float = ..., torque: float = ..., slip_velocity: float = ..., slip_rate: float = ..., name: str = ...) -> Self: ...
-
 class Spring(Points, Force):
     stiffness: float
     damping: float
@@ -43,14 +33,6 @@ class TorsionalSpring(Axes, References, Force):
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., axis_a: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., stiffness: float = ..., damping: float = ..., free_angle: float = ..., actuator: Load = ..., name: str = ...) -> Self: ...
 
-class ViscousFriction(Force):
-    point_a: Attribute[ArrayLike, Floats]
-    damping: float
-    torsional_damping: float
-    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., damping: float = ..., torsional_damping: float = ..., name: str = ...) -> None: ...
-    @classmethod
-    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., point_a: ArrayLike = ..., damping: float = ..., torsional_damping: float = ..., name: str = ...) -> Self: ...
-
 class ContactFriction(JointFriction, Force):
     @property
     def joint(self) -> Attachment: ...
@@ -62,6 +44,16 @@ class ContactFriction(JointFriction, Force):
     def __init__(self, joint: Attachment, *, kinetic: float, static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, joint: Attachment, *, kinetic: float, static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> Self: ...
+
+class CoulombFriction(Force):
+    force: float
+    torque: float
+    slip_velocity: float
+    slip_rate: float
+    point_a: Attribute[ArrayLike, Floats]
+    def __init__(self, a: BodyLike, b: BodyLike, *, force: float = ..., torque: float = ..., slip_velocity: float = ..., slip_rate: float = ..., point_a: ArrayLike = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., force: float = ..., torque: float = ..., slip_velocity: float = ..., slip_rate: float = ..., point_a: ArrayLike = ..., name: str = ...) -> Self: ...
 
 class JointForce(Force):
     @property
@@ -143,5 +135,13 @@ class UserForce(Points, Force):
     def forget(self) -> None: ...
     @property
     def function_of_state(self) -> Any: ...
+
+class ViscousFriction(Force):
+    damping: float
+    torsional_damping: float
+    point_a: Attribute[ArrayLike, Floats]
+    def __init__(self, a: BodyLike, b: BodyLike, *, damping: float = ..., torsional_damping: float = ..., point_a: ArrayLike = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., damping: float = ..., torsional_damping: float = ..., point_a: ArrayLike = ..., name: str = ...) -> Self: ...
 
 def registered() -> tuple[type[Force], ...]: ...

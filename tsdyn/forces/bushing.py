@@ -69,9 +69,8 @@ class Bushing(Force):
 
     markers = (Point("a"), Point("b"), Parameters("a"), Parameters("b"), Turn("a"), Turn("b"))
     slots = 45
-    quantities = MappingProxyType(
-        dict.fromkeys(("stiffness", "damping", "torsional_stiffness", "torsional_damping"), _three)
-    )
+    sources = ("stiffness", "damping", "torsional_stiffness", "torsional_damping")
+    quantities = MappingProxyType(dict.fromkeys(sources, _three))
 
     def __init__(
         self,
@@ -88,10 +87,6 @@ class Bushing(Force):
         self.stiffness, self.damping = stiffness, damping
         self.torsional_stiffness, self.torsional_damping = torsional_stiffness, torsional_damping
         self.check()
-
-    def check(self):
-        """It must do something."""
-        self.demand_any(*self.quantities)
 
     def parameters(self):
         """K, C, K_t, C_t."""

@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles, instants, law_of_joint, specialised
+from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles, instants, law_of_joint
 
 
 class JointTorque(JointLoad, Force):
@@ -64,11 +64,6 @@ class JointTorque(JointLoad, Force):
     quantities = MappingProxyType({"function": law_of_joint, "period": instants})
     geometries = staticmethod(angles)
 
-    def __new__(cls, *given, period=None, **others):
-        """Choose the kernel: held, or by the function; a copy has its class already."""
-        continuous = (given or others) and period is None
-        return super().__new__(_ContinuousTorque if cls is JointTorque and continuous else cls)
-
     @staticmethod
     def directions(geometry):
         """The axis."""
@@ -100,39 +95,7 @@ class JointTorque(JointLoad, Force):
         return Revolute(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3))
 
 
-class _ContinuousTorque(ByState, JointTorque):
-    """By the function at every evaluation, Eq. (2); what it remembers is the angle."""
-
-    remembers_angle = True
-    markers = (Vector("a", "axis"), Vector("a", "reference"), Vector("b", "direction"), Turn("a"), Turn("b"))
-    given = "function"
-    series = None
-    no_series = "it is a function of the joint's angle, of which only values are known; with period= it has a series"
-    check = JointLoad.check
-
-    @staticmethod
-    def directions(geometry):
-        """The axis, and the directions whose angle it is."""
-        return np.cross(geometry.f, geometry.g), geometry.f, geometry.h
-
-    @staticmethod
-    def wrap(inner, owner):
-        """The kernel of a user's function."""
-        return specialised(_law, f"{owner.__qualname__}.joint_torque", owner, function=inner)
-
-    @staticmethod
-    def law(x, xd, par, t, out):
-        """Of no function: what instances replace."""
-        for i in range(15):
-            out[i] = math.nan
-
-    @staticmethod
-    def remember(x, xd, par, t):
-        """The angle."""
-        return angle_about(x, par[0])
-
-
-function = None  # filled in by `wrap`
+function = None  # filled in by `ByState`
 
 
 def _law(x, xd, par, t, out):
@@ -147,3 +110,25 @@ def _law(x, xd, par, t, out):
         out[i] = 0.0
     for i in range(3):
         out[9 + i], out[12 + i] = -torque * x[i], torque * x[i]
+
+
+class _ContinuousTorque(ByState, JointTorque):
+    """By the function at every evaluation, Eq. (2); what it remembers is the angle."""
+
+    remembers_angle = True
+    markers = (Vector("a", "axis"), Vector("a", "reference"), Vector("b", "direction"), Turn("a"), Turn("b"))
+    given = "function"
+    template = staticmethod(_law)
+    series = None
+    no_series = "it is a function of the joint's angle, of which only values are known; with period= it has a series"
+    check = JointLoad.check
+
+    @staticmethod
+    def directions(geometry):
+        """The axis, and the directions whose angle it is."""
+        return np.cross(geometry.f, geometry.g), geometry.f, geometry.h
+
+    @staticmethod
+    def remember(x, xd, par, t):
+        """The angle."""
+        return angle_about(x, par[0])

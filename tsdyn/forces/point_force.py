@@ -9,18 +9,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import (
-    Force,
-    Given,
-    GivenByState,
-    GivenInBody,
-    Parameters,
-    Point,
-    Turn,
-    arguments_of,
-    state_load,
-    vector_load,
-)
+from ..plugins import Force, Given, GivenByState, GivenInBody, Parameters, Point, Turn, state_load, vector_load
 
 if TYPE_CHECKING:
     from ..hints import Frame, PointMass, VectorLoad
@@ -36,13 +25,6 @@ class PointForce(Given, Force):
     force : array_like (3,), ts.Table, or function of t or of (t, state); N
         A function returns a tuple of three; state (13,) is the position of the point (m), Euler parameters, velocity of
         the point (m/s) and angular velocity (rad/s), ground frame.
-    frame : {"ground", "body"}
-        The axes in which the force is given.
-
-    Raises
-    ------
-    InvalidForce
-        If the force is not three finite numbers or such a function, is zero, or the frame is unknown.
 
     Notes
     -----
@@ -64,14 +46,6 @@ class PointForce(Given, Force):
     quantities = MappingProxyType({"force": vector_load})
     loads = ("force",)
     given = "force"
-
-    def __new__(cls, *others, force=None, frame="ground", **more):
-        """Choose the kernel by frame and by the sort of the force."""
-        if cls is PointForce and arguments_of(force) == 2:
-            cls = _StatePointForce
-        elif cls is PointForce and isinstance(frame, str) and frame == "body":
-            cls = _BodyPointForce
-        return super().__new__(cls)
 
     def __init__(
         self, a: PointMass | str, *, force: VectorLoad | None = None, frame: Frame = "ground", **places: Any

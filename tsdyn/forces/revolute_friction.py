@@ -24,8 +24,8 @@ from ..plugins import (
     along_and_across,
     coefficient,
     not_negative,
-    optional_length,
-    positive_number,
+    optional,
+    positive,
 )
 
 
@@ -61,9 +61,9 @@ class RevoluteFriction(JointFriction, Force):
     quantities = MappingProxyType(
         {
             **JointFriction.quantities,
-            "radius": positive_number,
+            "radius": positive,
             "collar_radius": not_negative,
-            "length": optional_length,
+            "length": optional(positive),
         }
     )
 

@@ -18,15 +18,14 @@ import numpy as np
 
 from ..plugins import (
     Force,
-    InvalidForce,
     Point,
     Signal,
     dot,
+    ground_point,
     inverse_root,
     load,
     not_negative,
     product,
-    rotation_matrix,
     scaled,
     square,
 )
@@ -71,6 +70,7 @@ class Spring(Force):
         {"stiffness": not_negative, "damping": not_negative, "free_length": not_negative, "actuator": load}
     )
     loads = ("actuator",)
+    sources = ("stiffness", "damping", "actuator")
     slots = 11
 
     def __init__(
@@ -85,19 +85,15 @@ class Spring(Force):
         **places: Any,
     ) -> None:
         super().__init__(a, b, **places)
-        ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
+        ends = [ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
         length = np.linalg.norm(ends[0] - ends[1])
         if not length > 0.0:
-            raise InvalidForce(
+            raise self.error(
                 f"{self.name}: its two points coincide at the start, so it has no direction; move point_a or point_b."
             )
         self.stiffness, self.damping, self.actuator = stiffness, damping, actuator
         self.free_length = length if free_length is None else free_length
         self.check()
-
-    def check(self):
-        """It must do something."""
-        self.demand_any("stiffness", "damping", "actuator")
 
     def parameters(self):
         """(k, c, l0, actuator)."""
@@ -149,7 +145,3 @@ class Spring(Force):
         """A random spring and damper."""
         numbers = dict(zip(("stiffness", "damping", "free_length"), rng.uniform(0.5, 2.0, 3), strict=True))
         return cls(a, b, point_a=rng.normal(size=3), point_b=rng.normal(size=3), **numbers)
-
-
-def _ground_point(body, s):
-    return body.position + (rotation_matrix(body.orientation) @ s if body.dimension != 3 else 0.0)

@@ -97,6 +97,7 @@ class TorsionalSpring(Force):
         {"stiffness": not_negative, "damping": not_negative, "free_angle": finite, "actuator": load}
     )
     loads = ("actuator",)
+    sources = ("stiffness", "damping", "actuator")
 
     def __init__(
         self,
@@ -116,7 +117,7 @@ class TorsionalSpring(Force):
         self.stiffness, self.damping, self.free_angle, self.actuator = stiffness, damping, free_angle, actuator
         axis, _, reference = (self._turned(i) for i in range(3))
         if np.linalg.norm(np.cross(axis, reference)) < PARALLEL:
-            raise InvalidForce(
+            raise self.error(
                 f"{self.name}: reference_b is parallel to the axis at the start; choose one across it, such as the one "
                 "that coincides with reference_a at the angle zero."
             )
@@ -157,7 +158,7 @@ class TorsionalSpring(Force):
             if axis_a is None:
                 axis_a = along
             elif not np.linalg.norm(np.cross(self._place(self.markers[0], axis_a), along)) < PARALLEL:
-                raise InvalidForce(f"{self.name}: axis_b is not along axis_a as the bodies stand; give one of them.")
+                raise self.error(f"{self.name}: axis_b is not along axis_a as the bodies stand; give one of them.")
         axis_a = self._place(self.markers[0], axis_a)
         if reference_a is None:
             free = reference_b is None
@@ -194,12 +195,8 @@ class TorsionalSpring(Force):
         value = vector3(value, f"{self.name}: reference_a", InvalidForce)
         across = value - axis * (axis @ value)
         if not np.linalg.norm(across) > PARALLEL * np.linalg.norm(value):
-            raise InvalidForce(f"{self.name}: reference_a is parallel to axis_a; choose a direction across the axis.")
+            raise self.error(f"{self.name}: reference_a is parallel to axis_a; choose a direction across the axis.")
         return across
-
-    def check(self):
-        """It must do something."""
-        self.demand_any("stiffness", "damping", "actuator")
 
     def parameters(self):
         """(k, c, free angle, actuator), and the angle remembered."""

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.translational import Translational
-from ..plugins import AXIS, Force, JointFriction, act, along_and_across, coefficient, optional_length, slip
+from ..plugins import AXIS, Force, JointFriction, act, along_and_across, coefficient, optional, positive, slip
 
 
 class TranslationalFriction(JointFriction, Force):
@@ -47,7 +47,9 @@ class TranslationalFriction(JointFriction, Force):
 
     joints = (Translational,)
     markers = AXIS
-    quantities = MappingProxyType({**JointFriction.quantities, "length": optional_length, "width": optional_length})
+    quantities = MappingProxyType(
+        {**JointFriction.quantities, "length": optional(positive), "width": optional(positive)}
+    )
 
     def __init__(
         self,

@@ -18,14 +18,12 @@ import numpy as np
 from ..plugins import (
     ByState,
     Force,
-    InvalidForce,
     Parameters,
     Point,
     Turn,
     arguments_of,
     fill_state,
     floats,
-    specialised,
     stack,
 )
 
@@ -41,6 +39,27 @@ def _numbers(value, what, error):
         raise error(f"{what} must be a list of finite numbers, got {value!r}.")
     result.setflags(write=False)
     return result
+
+
+function = None  # filled in by `ByState`
+
+
+def _law(x, xd, par, t, out):
+    a, b, load = stack(13), stack(13), stack(6)
+    fill_state(x, xd, 0, a)
+    fill_state(x, xd, 10, b)
+    for i in range(6):
+        load[i] = 0.0
+    try:
+        function(t, a, b, par, load)
+    except Exception:
+        load[0] = math.nan
+    d0, d1, d2 = x[0] - x[10], x[1] - x[11], x[2] - x[12]
+    for i in range(3):
+        out[i], out[7 + i], out[10 + i] = load[i], load[3 + i], -load[i]
+    out[17] = -load[3] - (d1 * load[2] - d2 * load[1])
+    out[18] = -load[4] - (d2 * load[0] - d0 * load[2])
+    out[19] = -load[5] - (d0 * load[1] - d1 * load[0])
 
 
 class UserForce(ByState, Force):
@@ -91,6 +110,7 @@ class UserForce(ByState, Force):
     particles = True
     loads = ("function",)
     given = "function"
+    template = staticmethod(_law)
     quantities = MappingProxyType({"values": _numbers})
 
     def __init__(
@@ -112,7 +132,7 @@ class UserForce(ByState, Force):
     def check(self):
         """A plain function of five arguments."""
         if arguments_of(self.function) != 5:
-            raise InvalidForce(
+            raise self.error(
                 f"{self.name}: function must be a plain Python function of five arguments (t, a, b, par, out), got "
                 f"{self.function!r}."
             )
@@ -121,42 +141,10 @@ class UserForce(ByState, Force):
         """The numbers given."""
         return tuple(self.values)
 
-    @staticmethod
-    def wrap(inner, owner):
-        """The kernel of a user's function."""
-        return specialised(_law, f"{owner.__qualname__}.law", owner, function=inner)
-
-    @staticmethod
-    def law(x, xd, par, t, out):
-        """Eq. (1), of no function: the base that instances replace."""
-        for i in range(20):
-            out[i] = math.nan
-
     @classmethod
     def example(cls, rng, a, b):
         """A drag that depends on everything."""
         return cls(a, b, function=_example, point_a=rng.normal(size=3), point_b=rng.normal(size=3), parameters=(0.7,))
-
-
-function = None  # filled in by `wrap`
-
-
-def _law(x, xd, par, t, out):
-    a, b, load = stack(13), stack(13), stack(6)
-    fill_state(x, xd, 0, a)
-    fill_state(x, xd, 10, b)
-    for i in range(6):
-        load[i] = 0.0
-    try:
-        function(t, a, b, par, load)
-    except Exception:
-        load[0] = math.nan
-    d0, d1, d2 = x[0] - x[10], x[1] - x[11], x[2] - x[12]
-    for i in range(3):
-        out[i], out[7 + i], out[10 + i] = load[i], load[3 + i], -load[i]
-    out[17] = -load[3] - (d1 * load[2] - d2 * load[1])
-    out[18] = -load[4] - (d2 * load[0] - d0 * load[2])
-    out[19] = -load[5] - (d0 * load[1] - d1 * load[0])
 
 
 def _example(t, a, b, par, out):

@@ -36,7 +36,7 @@ class Distance(Primitive):
 
     Examples
     --------
-    A pendulum of 2 m, released from the horizontal:
+    A pendulum, 2 m long, passes its lowest point:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))

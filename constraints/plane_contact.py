@@ -21,14 +21,10 @@ if TYPE_CHECKING:
 class PlaneContact(Primitive):
     """Keep a point of one body in a plane fixed to another, without friction and without lifting off.
 
-    Parameters
-    ----------
-    a, b : Body or ground
-        a carries the point point_a, b the plane through point_b with the normal normal_b.
-
     Notes
     -----
-    The force on a is -lam n: the plane pushes where lam < 0.
+    Body a carries the point point_a, b the plane through point_b with the normal normal_b. The force
+    on a is -lam n: the plane pushes where lam < 0.
 
     Examples
     --------

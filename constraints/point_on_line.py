@@ -19,14 +19,10 @@ if TYPE_CHECKING:
 class PointOnLine(Joint):
     """Keep a point of one body on a line fixed to another.
 
-    Parameters
-    ----------
-    a, b : Body or ground
-        a carries the point point_a, b the line through point_b along axis_b.
-
     Notes
     -----
-    Rows: line[0], line[1]. `PointOnLine.at(a, b, point=, axis=)` takes the point and the direction in the ground frame.
+    Body a carries the point point_a, b the line through point_b along axis_b. Rows: line[0], line[1].
+    `PointOnLine.at(a, b, point=, axis=)` takes the point and the direction in the ground frame.
 
     Examples
     --------

@@ -12,17 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    PARALLEL,
-    Angle,
-    Displacement,
-    Joint,
-    Point,
-    Vector,
-    beside,
-    carried,
-    turned_about,
-)
+from ..plugins import PARALLEL, Angle, Displacement, Joint, Point, Vector, beside, carried, turned_about
 from .thread import Thread, demand_lead, travel
 
 if TYPE_CHECKING:

@@ -26,12 +26,14 @@ from ..plugins import (
     Vector,
     dot,
     ground_point,
+    kernel,
     number,
     product,
     rotation_matrix,
     scaled,
     sine_cosine,
 )
+from .angle_driver import sine_cosine_rates
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
@@ -95,23 +97,13 @@ class Thread(Primitive):
     @staticmethod
     def phi(x, par, t, out):
         """Eq. (2)."""
-        E, F, s = 0.0, 0.0, 0.0
-        for i in range(3):
-            E += x[i] * x[9 + i]
-            F += x[3 + i] * x[9 + i]
-            s += x[6 + i] * (x[15 + i] - x[12 + i])
-        s /= par[0]
+        E, F, s = turn_and_travel(x, par[0])
         out[0] = par[0] * (np.cos(s) * F - np.sin(s) * E)
 
     @staticmethod
     def jacobian(x, par, t, out):
         """Eq. (4)."""
-        E, F, s = 0.0, 0.0, 0.0
-        for i in range(3):
-            E += x[i] * x[9 + i]
-            F += x[3 + i] * x[9 + i]
-            s += x[6 + i] * (x[15 + i] - x[12 + i])
-        s /= par[0]
+        E, F, s = turn_and_travel(x, par[0])
         sine, cosine = np.sin(s), np.cos(s)
         C = cosine * E + sine * F
         sine, cosine = par[0] * sine, par[0] * cosine
@@ -126,14 +118,9 @@ class Thread(Primitive):
     @staticmethod
     def gamma(x, xd, par, t, out):
         """Eq. (5)."""
-        E, F, Ed, Fd, Edd, Fdd, s, sd, sdd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        E, F, Ed, Fd, Edd, Fdd = sine_cosine_rates(x, xd, 9)
+        s, sd, sdd = 0.0, 0.0, 0.0
         for i in range(3):
-            E += x[i] * x[9 + i]
-            F += x[3 + i] * x[9 + i]
-            Ed += xd[i] * x[9 + i] + x[i] * xd[9 + i]
-            Fd += xd[3 + i] * x[9 + i] + x[3 + i] * xd[9 + i]
-            Edd += 2.0 * xd[i] * xd[9 + i]
-            Fdd += 2.0 * xd[3 + i] * xd[9 + i]
             d, dd = x[15 + i] - x[12 + i], xd[15 + i] - xd[12 + i]
             s += x[6 + i] * d
             sd += xd[6 + i] * d + x[6 + i] * dd
@@ -172,6 +159,17 @@ class Thread(Primitive):
         """A random instance."""
         places = {marker.argument: rng.normal(size=3) for marker in cls.markers}
         return cls(a, b, **places, lead=rng.uniform(0.5, 2.0))
+
+
+@kernel
+def turn_and_travel(x, lead):
+    """E, F of Eq. (1) and the travel over the lead, rad."""
+    E, F, s = 0.0, 0.0, 0.0
+    for i in range(3):
+        E += x[i] * x[9 + i]
+        F += x[3 + i] * x[9 + i]
+        s += x[6 + i] * (x[15 + i] - x[12 + i])
+    return E, F, s / lead
 
 
 def demand_lead(constraint, word, value):

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 class TranslationMotor(Joint):
     """Move one body along an axis of another as a function of time says: a linear drive on a slider.
 
+    A joint lets them slide (Translational, Cylindrical, ...).
+
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene, held by a joint that lets them slide (Translational, Cylindrical, ...).
     displacement : one of ts.motions, a function f of time or three (f, fd, fdd), or float, m
         Of point_b against point_a along axis_a.
 

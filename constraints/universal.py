@@ -18,7 +18,7 @@ from .dot1 import Dot1
 from .spherical import Spherical
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 ALONG = 1e-6  # sine of the angle below which an arm would lie along the shaft
 
@@ -57,16 +57,7 @@ class Universal(Joint):
         super().__init__(a, b, **places)
 
     @Placing
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike | None = None,
-        *,
-        point: ArrayLike | None = None,
-        axis: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        **arguments: Any,
-    ) -> Self:
+    def at(cls, a: BodyLike, b: BodyLike | None = None, **arguments: Any) -> Self:
         """Make one from its point and axes in the ground frame, the bodies being where they stand now.
 
         Parameters
@@ -78,11 +69,12 @@ class Universal(Joint):
             The axis fixed in b; None takes the one across `axis` and the line from the point to the centroid of b (of
             a, where b is the ground), which is right where b is a shaft with its centroid on its line.
         """
+        axis, axis_b = arguments.pop("axis", None), arguments.pop("axis_b", None)
         axis = arguments.pop("axis_a", axis)
-        joint = super().at(a, b, point=point, axis_a=axis, axis_b=axis if axis_b is None else axis_b, **arguments)
+        joint = super().at(a, b, axis_a=axis, axis_b=axis if axis_b is None else axis_b, **arguments)
         if axis_b is None:
             body, marker = b if b.dimension else a, joint.markers[3]
-            shaft = body.position - point
+            shaft = body.position - arguments["point"]
             arm = np.cross(axis, shaft)
             if not np.linalg.norm(arm) > ALONG * np.linalg.norm(axis) * np.linalg.norm(shaft):
                 raise InvalidConstraint(

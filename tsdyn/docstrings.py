@@ -48,9 +48,10 @@ def _entries(section: str) -> list[str]:
 
 
 def _in_order(entries: list[str], arguments: Iterable[str]) -> list[str]:
-    """For each argument, in their order, the first entry that names it; an entry of several names once."""
+    """For each argument, in their order, the first entry that names it and arguments alone; each entry once."""
+    named = [(entry, re.findall(r"\w+", entry.split("\n")[0].split(" :")[0])) for entry in entries]
     found = []
     for argument in arguments:
-        naming = [entry for entry in entries if argument in re.findall(r"\w+", entry.split("\n")[0].split(" :")[0])]
+        naming = [entry for entry, names in named if argument in names and {*names} <= {*arguments}]
         found += [entry for entry in naming[:1] if entry not in found]
     return found

@@ -14,7 +14,7 @@ from .elements.friction_laws import BodyFriction, act, along_and_across, coeffic
 from .elements.joint import Joint, across
 from .elements.joint_coordinates import Angle, Displacement, angles, displacements
 from .elements.joint_friction import AXIS, JointFriction, optional
-from .elements.joint_load import JointLoad, instants, law_of_joint
+from .elements.joint_load import JointLoad
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
 from .elements.tolerances import PARALLEL
@@ -122,11 +122,9 @@ __all__ = [
     "floats",
     "ground_point",
     "in_frame",
-    "instants",
     "inverse_root",
     "is_data",
     "kernel",
-    "law_of_joint",
     "linear_second",
     "load",
     "not_negative",

@@ -123,10 +123,6 @@ class ExudynConstraints(Exudyn):
     name, setting = "Exudyn, constraints", "step"
     values = tuple(10.0 ** (-k / 2) for k in range(4, 11))
 
-    def serves(self, scene):
-        """What its own joints describe."""
-        return scene.definition is not None and scene.size <= 64
-
     def fill(self, exu, mbs, definition):
         """Bodies and joints; returns a pair of sensors a body."""
         from exudyn import utilities as ex

@@ -26,7 +26,11 @@ if TYPE_CHECKING:
     from ..hints import AnyBody, ArrayLike, BodyLike, Floats, Function, Scene, TsdynError
     from .joint_coordinates import Angle, Displacement
 
-ENTRIES = ("a, b : Body or ground\n    Two different bodies of one scene.", "name : str, optional")  # of docstrings
+ENTRIES = (  # of docstrings
+    "a, b : Body or ground\n    Two different bodies of one scene.",
+    "a : Body\n    A body of the scene.",
+    "name : str, optional",
+)
 
 
 def by_name(function: Function) -> Function:

@@ -81,8 +81,8 @@ class Force(Attachment):
     >>> import tsdyn as ts
     >>> class Pole(ts.Force):
     ...     markers = (ts.Point("a"),)
-    ...     def __init__(self, a, *, point_a=(0, 0, 0), stiffness=1.0, name=""):
-    ...         super().__init__(a, None, (point_a,), name)
+    ...     def __init__(self, a, *, stiffness=1.0, **places):
+    ...         super().__init__(a, None, **places)
     ...         self.stiffness = float(stiffness)
     ...     def parameters(self):
     ...         return (self.stiffness,)

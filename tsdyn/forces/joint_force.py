@@ -9,9 +9,9 @@ The power of (1) is F sd for any motion of the bodies.
 """
 
 import math
-from types import MappingProxyType
 
-from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements, instants, law_of_joint
+from ..constraints.translational import Translational
+from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements
 
 
 class JointForce(JointLoad, Force):
@@ -50,7 +50,7 @@ class JointForce(JointLoad, Force):
 
     markers = (Vector("a", "axis"), Point("a", "own_point"), Point("b", "other_point"))
     coordinate = "displacement"
-    quantities = MappingProxyType({"function": law_of_joint, "period": instants})
+    kind_of_example = Translational
     geometries = staticmethod(displacements)
 
     @staticmethod
@@ -74,13 +74,6 @@ class JointForce(JointLoad, Force):
     def remember(x, xd, par, t):
         """The force, as it is held."""
         return par[0]
-
-    @staticmethod
-    def joint_of_example(rng, a, b):
-        """A guide."""
-        from ..constraints.translational import Translational
-
-        return Translational(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3))
 
 
 function = None  # filled in by `ByState`

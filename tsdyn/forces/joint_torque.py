@@ -8,11 +8,11 @@ The power of (1) is T times the rate of the angle if the joint holds the axis.
 """
 
 import math
-from types import MappingProxyType
 
 import numpy as np
 
-from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles, instants, law_of_joint
+from ..constraints.revolute import Revolute
+from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles
 
 
 class JointTorque(JointLoad, Force):
@@ -61,7 +61,7 @@ class JointTorque(JointLoad, Force):
 
     markers = (Vector("a", "axis"), Turn("a"), Turn("b"))
     coordinate = "angle"
-    quantities = MappingProxyType({"function": law_of_joint, "period": instants})
+    kind_of_example = Revolute
     geometries = staticmethod(angles)
 
     @staticmethod
@@ -86,13 +86,6 @@ class JointTorque(JointLoad, Force):
     def remember(x, xd, par, t):
         """The torque, as it is held."""
         return par[0]
-
-    @staticmethod
-    def joint_of_example(rng, a, b):
-        """A hinge."""
-        from ..constraints.revolute import Revolute
-
-        return Revolute(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3))
 
 
 function = None  # filled in by `ByState`

@@ -17,16 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.revolute import Revolute
-from ..plugins import (
-    AXIS,
-    Force,
-    JointFriction,
-    along_and_across,
-    coefficient,
-    not_negative,
-    optional,
-    positive,
-)
+from ..plugins import AXIS, Force, JointFriction, along_and_across, coefficient, not_negative, optional, positive
 
 
 class RevoluteFriction(JointFriction, Force):

@@ -16,19 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    Force,
-    Point,
-    Signal,
-    dot,
-    ground_point,
-    inverse_root,
-    load,
-    not_negative,
-    product,
-    scaled,
-    square,
-)
+from ..plugins import Force, Point, Signal, dot, ground_point, inverse_root, load, not_negative, product, scaled, square
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Load

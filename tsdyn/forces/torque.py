@@ -16,20 +16,17 @@ if TYPE_CHECKING:
 
 
 class Torque(Given, Force):
-    """Turn a body.
+    """Turn a rigid body.
 
     Parameters
     ----------
-    a : Body
-        A rigid body.
     torque : array_like (3,), ts.Table, or function of t or of (t, state); N m
         A function returns a tuple of three; state (13,) is the position of the centroid (m), Euler parameters, velocity
         (m/s) and angular velocity (rad/s), ground frame.
 
     Notes
     -----
-    Its power is applied power. Whether it is a function of state is settled when it is made; a new function of the same
-    sort may be set.
+    Its power is applied power. A new function of the same sort may be set, as of PointForce.
 
     Examples
     --------

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..plugins import (
+    PARALLEL,
     Angle,
     Force,
     InvalidForce,
@@ -43,8 +44,6 @@ from ..plugins import (
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Floats, Load
-
-PARALLEL = 1e-6  # sine of the angle below which a reference has no direction about the axis
 
 
 class TorsionalSpring(Force):
@@ -124,16 +123,7 @@ class TorsionalSpring(Force):
         self.check()
 
     @Placing
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike | None = None,
-        *,
-        axis: ArrayLike | None = None,
-        reference: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        **arguments: Any,
-    ) -> Self:
+    def at(cls, a: BodyLike, b: BodyLike | None = None, **arguments: Any) -> Self:
         """Make one from directions in the ground frame, the bodies being where they stand now.
 
         Parameters
@@ -142,11 +132,8 @@ class TorsionalSpring(Force):
         reference : array_like (3,), optional
             Of both bodies: the angle is zero now.
         """
-        arguments.setdefault("axis_a", axis)
-        for name in ("reference_a", "reference_b"):
-            arguments.setdefault(name, reference)
-        if axis_b is not None:
-            arguments["axis_b"] = in_frame(b, Vector("b"), axis_b)
+        if arguments.get("axis_b") is not None:
+            arguments["axis_b"] = in_frame(b, Vector("b"), arguments["axis_b"])
         return super().at(a, b, **arguments)
 
     def _places(self, given):

@@ -15,17 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    ByState,
-    Force,
-    Parameters,
-    Point,
-    Turn,
-    arguments_of,
-    fill_state,
-    floats,
-    stack,
-)
+from ..plugins import ByState, Force, Parameters, Point, Turn, arguments_of, fill_state, floats, stack
 
 if TYPE_CHECKING:
     from collections.abc import Callable

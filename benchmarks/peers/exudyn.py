@@ -120,7 +120,7 @@ class ExudynTree(Exudyn):
 class ExudynConstraints(Exudyn):
     """Bodies with Euler parameters, joints by multipliers."""
 
-    name, setting = "Exudyn, constraints", "step"
+    name, setting, largest = "Exudyn, constraints", "step", 64
     values = tuple(10.0 ** (-k / 2) for k in range(4, 11))
 
     def fill(self, exu, mbs, definition):

@@ -17,12 +17,11 @@ from .continuation import close
 from .kinetic_metric import Metric, unit_tangent
 from .row_dependence import divide, partners, put_aside
 from .start_violations import demand_finite, demand_small
+from .tolerances import ASIDE, CONSISTENT, NEIGHBOUR_MET
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Attachment, Scene
 
-CONSISTENT = 1e-9  # of 1 + max |q|
-ASIDE = 0.02  # of the scene's size, and rad: how far the neighbours are at which the rank is compared
 TRIES = 3
 MOST_ROWS = 3000  # of closed loops, which take a dense factorisation
 
@@ -231,7 +230,7 @@ def _neighbours(metric, q, A):
         if step is None:
             return
         other, Phi, _ = close(metric, metric.moved(q, ASIDE * step))
-        if np.abs(Phi).max(initial=0.0) <= 1e-10 * (1.0 + np.abs(q).max()):
+        if np.abs(Phi).max(initial=0.0) <= NEIGHBOUR_MET * (1.0 + np.abs(q).max()):
             yield other
 
 

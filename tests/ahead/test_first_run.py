@@ -10,7 +10,7 @@ import tsdyn as ts
 from examples import top
 from tests.helpers.processes import python
 from tsdyn.ahead import all_kernels, first_run, workers
-from tsdyn.configuration.initial_conditions import _look
+from tsdyn.configuration.start_kernels import evaluate_start
 from tsdyn.jit.compiled import _types
 from tsdyn.runs.stepper import advance
 from tsdyn.taylor.stepper import advance_series
@@ -55,7 +55,7 @@ def test_every_kernel_of_the_package_is_found_by_its_name():
 
 
 def test_longest_first():
-    names = workers.weight(advance_series.py_func), workers.weight(_look.py_func)
+    names = workers.weight(advance_series.py_func), workers.weight(evaluate_start.py_func)
     small = [workers.weight(kernel.py_func) for kernel in ts.constraints.EulerNormalization.kernels.values()]
     assert min(names) > max(small)
 
@@ -97,7 +97,7 @@ def test_what_a_run_needs_is_asked_for_and_no_more(tmp_path, name, method, form,
 def test_signatures_are_those_of_the_calls():
     ts.simulate(top.build(), (0.0, 0.01))
     ts.simulate(top.build(), (0.0, 0.01), integrator="dop853")
-    for kernel in (_look, advance_series, advance):
+    for kernel in (evaluate_start, advance_series, advance):
         assert list(kernel.overloads) == [_types(kernel)]
 
 

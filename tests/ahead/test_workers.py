@@ -59,7 +59,7 @@ def in_a_namespace(folder):
     )
 
 
-@pytest.mark.slow_but("as_script")
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [as_script, from_standard_input, in_a_namespace], ids=lambda way: way.__name__)
 def test_workers_fill_the_cache_without_running_the_program_again(tmp_path, way):
     out, err = way(tmp_path)

@@ -7,7 +7,7 @@ of a thousand bodies, joint friction.
 import tsdyn as ts
 from tests.helpers.built_in import FORCES, PRIMITIVES
 from tsdyn.ahead.first_run import of_constraint, of_force, of_method
-from tsdyn.configuration import initial_conditions
+from tsdyn.configuration import start_kernels
 from tsdyn.formulations.registry import FORMULATIONS
 from tsdyn.jit.compiled import is_declared
 from tsdyn.motions.program import run_program
@@ -21,7 +21,7 @@ def shared_kernels():
         yield from of_method(method, tangent, True)
     for form in others:
         yield from of_method(I.DOP853(1e-8, 1e-8), form, True)
-    yield from filter(is_declared, vars(initial_conditions).values())  # those of assembly
+    yield from filter(is_declared, vars(start_kernels).values())  # those of assembly
     yield from (choose_anew, run_program)
     for kind in PRIMITIVES:
         for moving in (False, *[True] * ("phi_t" in kind.kernels)):

@@ -10,15 +10,24 @@ from ..jit.kernels import entry, kernel, resident
 from ..maths.row_rank import dependent
 from ..model.equations import set_time
 from ..observables.evaluate import constraint_arrays
-from ..rows.axis_rows import is_axis
-from ..rows.evaluation import factor_rows, run_loops
-from ..rows.independent_rows import drop_rows, select
-from ..rows.schur_complement import gather, scatter
+from ..rows.interface import (
+    DYNAMICS,
+    METRIC,
+    allocate_free,
+    evaluate_rows,
+    factorise_selected_rows,
+    is_axis,
+    keep_every_row,
+    multiply_rows,
+    project,
+    redundant_of,
+    restore_selection,
+    select_rows,
+    set_selection,
+)
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
-from ..sparse.constraint_graphs import drop, network_of
-from ..sparse.factorisation import solve
+from ..sparse.constraint_graphs import network_of, set_redundant
 from ..sparse.massless_axes import axis_of
-from ..workspaces.tangent_memory import allocate_free
 from ..workspaces.workspace import FLOOR, SIZE, U_TOL, load_parts, parts
 from .rank import check_rank
 from .start_violations import ROUNDING, demand_finite, demand_small
@@ -39,21 +48,28 @@ DEPENDENT = (
 )
 
 
-@entry("pvvdv")
-def _look(context, q, qd, t, velocity):
-    """f.b = Phi and velocity = Phi_q qd + Phi_t of the network's rows, and H; the row that depends on others, or -1."""
+@entry("pvvdvi")
+def _look(context, q, qd, t, velocity, every):
+    """f.b = Phi and velocity = Phi_q qd + Phi_t of the network's rows, and H; the row that depends on others, or -1.
+
+    With `every` = 1 of every row, with 0 without the redundant ones.
+    """
     c = load_parts(context)
     network, system, f = c.network, c.system, c.free
     set_time(system, t)
     place_bodies(network.bodies, q, f.poses)
     move_bodies(network.bodies, q, qd, f.poses)
-    run_loops(network, system.reals, REDUCED, f, t, f.b, f.H)
+    count = keep_every_row(f) if every == 1 else -1
+    evaluate_rows(network, system, f, f.rows, t)
     gather_speeds(network, f)
     find_drift(network, system, f, t)
-    gather(network, f.H, f.Z, velocity)
+    multiply_rows(network, f.rows, f.Z, velocity)
     for e in range(velocity.size):
         velocity[e] += f.gamma[e]
-    return factor_rows(network, f, f.H, f.Y, f.S, 0)
+    failed = factorise_selected_rows(network, f, f.rows, METRIC)
+    if every == 1:
+        restore_selection(f, count)
+    return failed
 
 
 @entry("pd")
@@ -74,14 +90,13 @@ def _land(context, t):
     return 0
 
 
-@entry("pd")
-def _choose(context, share):
-    """Choose the rows to drop of those that `_look` has evaluated, those left less than a share; how many they are."""
+@entry("pdd")
+def _select(context, t, share):
+    """Select redundant rows at the poses, those with pivots below a share; return their number, or -1."""
     c = load_parts(context)
-    f = c.free
-    select(c.network, f, f.H, f.Y, f.S, -1, share)
-    drop_rows(f.dropped, f.H)
-    return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, 0) < 0 else -1
+    network, f = c.network, c.free
+    count = select_rows(network, c.system, f, t, share)
+    return count if factorise_selected_rows(network, f, f.rows, METRIC) < 0 else -1
 
 
 @entry("pvd")
@@ -91,9 +106,9 @@ def _hold_axes(context, q, t):
     network, f = c.network, c.free
     set_time(c.system, t)
     place_bodies(network.bodies, q, f.poses)
-    run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)
-    failed = factor_rows(network, f, f.H, f.Y, f.S, 1)
-    return failed if is_axis(network, f.S, failed) else -1
+    evaluate_rows(network, c.system, f, f.rows, t)
+    failed = factorise_selected_rows(network, f, f.rows, DYNAMICS)
+    return failed if is_axis(network, f.rows, failed) else -1
 
 
 @entry("pdvd")
@@ -111,9 +126,7 @@ def _wander(context, t, way, far):
         f.Z[i] = way[i]
     wanted = _farthest(c)
     for _ in range(2):
-        gather(network, f.H, f.Z, f.b)
-        solve(network.pattern, f.S, f.b)
-        scatter(network, f.Y, f.b, f.Z)
+        project(network, f.rows, f.Z, f.b)
     found = _farthest(c)
     scale = far / found if found > NO_WAY * wanted else 0.0
     for i in range(f.Z.size):
@@ -136,7 +149,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     """Check positions and velocities against the constraints, then remove what rounding is left. Returns (q, qd).
 
     Positions and velocities change by the least in the metric of kinetic energy. Where redundant rows are `allowed` and
-    there are some, the networks of the packed scene drop them from now on.
+    there are some, the networks of the packed scene are without them from now on.
     """
     packed = scene.packed
     start = _Start(scene, system, q, qd, t, tol)
@@ -145,24 +158,24 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         _refuse(scene, start, dependent)
         dependent = -1
     start.demand_velocities()
-    known = packed.derived.dropped
+    known = packed.derived.redundant
     if dependent < 0:
         if known is not None:  # another start had too many rows
-            drop(packed, None)
+            set_redundant(packed, None)
             start = start.again()
         start.demand_inertia()
-        settle(packed, start.network, start.free.H)
+        settle(packed, start.network, start.free.rows.H)
         return start.landed()
     if known is None:
-        drop(packed, np.zeros(0, np.int64))
+        set_redundant(packed, np.zeros(0, np.int64))
         start = start.again()
     rows = start.redundant_rows()
     if known is None or len(known) != len(rows):
-        drop(packed, rows if len(rows) else None)
+        set_redundant(packed, rows if len(rows) else None)
         start = start.again()
     elif still(packed).bodies.size:
         start.check()  # for H where it starts
-    settle(packed, start.network, start.free.H)
+    settle(packed, start.network, start.free.rows.H)
     return start.landed()
 
 
@@ -176,7 +189,7 @@ class _Start:
         system = system._replace(reals=system.reals.copy())
         self.m = len(system.segments)
         whole = parts(system, self.network, q.size)
-        if self.packed.derived.dropped is not None:
+        if self.packed.derived.redundant is not None:
             whole = whole._replace(free=allocate_free(self.network, q.size, redundant=True))
         self.free, self.work, self.rates = whole.free, whole.work, np.zeros(len(self.network.row))
         self.context, *self._keep = resident(whole)
@@ -220,16 +233,14 @@ class _Start:
     def check(self):
         """Refuse what is off; the row of H that depends on those before it, or -1."""
         scene, network, free, q, qd = self.scene, self.network, self.free, self.q, self.qd
-        dropped, free.dropped[0] = free.dropped[0], 0
-        dependent = _look(self.context, q, qd, self.t, self.rates)
-        free.dropped[0] = dropped
+        dependent = _look(self.context, q, qd, self.t, self.rates, 1)
         rows, real = network.normals[network.normals >= 0], network.row >= 0
         Phi, velocity = np.zeros(self.m), np.zeros(self.m)
         Phi[network.row[real]], velocity[network.row[real]] = free.b[real], self.rates[real]
         p, pd = q[self.at], qd[self.at]
         Phi[rows], velocity[rows] = 0.5 * ((p * p).sum(axis=1) - 1.0), (p * pd).sum(axis=1)
         H = np.ones((self.m, 1))
-        H[network.row[real], 0] = free.H.reshape(-1, 16)[real].sum(axis=1)
+        H[network.row[real], 0] = free.rows.H.reshape(-1, 16)[real].sum(axis=1)
         demand_finite(scene, Phi, H, velocity)
         demand_small(scene, Phi, self.tol * (1.0 + np.abs(q).max()), "position", "Phi")
         self.velocity = velocity
@@ -239,7 +250,7 @@ class _Start:
 
     def redundant_rows(self):
         """The rows that follow from others, here and near by; a singular configuration is refused."""
-        names, row, H = self.scene.row_names(), self.network.row, self.free.H.reshape(-1, 16)
+        names, row, H = self.scene.row_names(), self.network.row, self.free.rows.H.reshape(-1, 16)
         gone = np.flatnonzero(~H.any(axis=1) & (row >= 0))
         if gone.size:
             _refuse_vanished(names[row[gone[0]]])
@@ -248,14 +259,13 @@ class _Start:
         way[-1] = way[:, 3] = way[:, 7] = 0.0
         loose = -1
         for share in SHARES:
-            self.free.dropped[0] = 0
-            _look(self.context, self.q, self.qd, self.t, self.rates)
-            if _choose(self.context, share) < 0:
+            _look(self.context, self.q, self.qd, self.t, self.rates, 1)
+            if _select(self.context, self.t, share) < 0:
                 raise SingularConfiguration(NO_CHOICE)
             loose = self.loose_axis()
             if loose >= 0:
                 continue
-            rows = self.free.dropped[1 : 1 + self.free.dropped[0]].copy()
+            rows = redundant_of(self.free)
             if self.hold_near_by(way.ravel()):
                 return rows
         self.refuse_axis(loose)
@@ -284,13 +294,12 @@ class _Start:
         return joints[np.sort(dependent(A))]
 
     def serve(self, rows):
-        """Drop these rows; whether S of the others is regular."""
-        self.free.dropped[0] = rows.size
-        self.free.dropped[1 : 1 + rows.size] = rows
-        return _look(self.context, self.q, self.qd, self.t, self.rates) < 0 and self.loose_axis() < 0
+        """Take these rows for redundant; whether S of the others is regular."""
+        set_selection(self.free, rows)
+        return _look(self.context, self.q, self.qd, self.t, self.rates, 0) < 0 and self.loose_axis() < 0
 
     def hold_near_by(self, way):
-        """Whether the rows that are dropped hold on the way to a place near by: in one go, or in shorter legs."""
+        """Whether the redundant rows hold on the way to a place near by: in one go, or in shorter legs."""
         gone, leg = 0.0, WANDER
         while gone < WANDER:
             here = self.free.poses.copy()
@@ -331,7 +340,7 @@ def _refuse(scene, start, dependent):
         hub = scene.bodies[dict(network.welds.tolist())[dependent]].name
         raise RedundantConstraints(f"the constraints at {hub} depend on one another: {DEPENDENT}")
     name = scene.row_names()[network.row[dependent]]
-    if not free.H[16 * dependent : 16 * dependent + 16].any():
+    if not free.rows.H[16 * dependent : 16 * dependent + 16].any():
         _refuse_vanished(name)
     raise RedundantConstraints(f"{name} depends on other constraint rows: {DEPENDENT}")
 

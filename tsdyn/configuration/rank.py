@@ -25,10 +25,10 @@ def check_rank(scene, Phi_q):
     if rank == m:
         return
     names, order = scene.row_names(), _pivots(scene, scaled)
-    kept, dropped = order[:rank], order[rank:]
-    stories, dropped = [], np.sort(dropped)
-    every, *_ = np.linalg.lstsq(scaled[kept].T, scaled[dropped].T, rcond=None)
-    for row, weights in zip(dropped, every.T, strict=True):
+    kept, dependent = order[:rank], order[rank:]
+    stories, dependent = [], np.sort(dependent)
+    every, *_ = np.linalg.lstsq(scaled[kept].T, scaled[dependent].T, rcond=None)
+    for row, weights in zip(dependent, every.T, strict=True):
         partners = sorted(kept[np.abs(weights) > 1e-6])
         stories.append(f"  {names[row]} depends on " + (", ".join(names[i] for i in partners[:8]) or "nothing else"))
     raise RedundantConstraints(

@@ -15,10 +15,9 @@ from ..maths.dense_linalg import cholesky_solve, copy, largest, lu, lu_solve
 from ..model.packed_friction import FR_BODY, FR_COUNT, FR_FIRST, FR_ON
 from ..workspaces.workspace import load
 from .friction_solve import RUB, normal_load, unit_friction
+from .tolerances import BASIS_LOAD_ROUNDING, DAMPED, DAMPED_SHARE, LOAD_SWEEPS
 
 OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
-SWEEPS, DAMPED = 40, 12
-ROUNDING = 4e-16  # of the largest normal load
 
 
 @kernel
@@ -163,7 +162,7 @@ def rub(context, t, vdd):
     for i in range(frictions):
         loads[i] = r.load[7 * i] if abs(r.load[7 * i]) < math.inf else 0.0
     done, before = False, math.inf
-    for sweep in range(SWEEPS):
+    for sweep in range(LOAD_SWEEPS):
         copy(lam_0, lam)
         for j in range(frictions):
             for e in range(m):
@@ -183,13 +182,14 @@ def rub(context, t, vdd):
         if not lu(r.J, r.pivots, frictions):
             return JAMMED
         lu_solve(r.J, r.pivots, b, frictions)
-        change, share, size = largest(b[:frictions]), 1.0 if sweep < DAMPED else 0.5, 0.0
+        change, share, size = largest(b[:frictions]), 1.0 if sweep < DAMPED else DAMPED_SHARE, 0.0
         if not change < math.inf:
             return JAMMED
         for i in range(frictions):
             loads[i] += share * b[i]
             size = max(size, abs(loads[i]))
-        done = change <= ROUNDING * size or (sweep > 0 and change * change <= ROUNDING * size * before)
+        least = BASIS_LOAD_ROUNDING * size
+        done = change <= least or (sweep > 0 and change * change <= least * before)
         before = change
     for i in range(frictions):
         N = loads[i]

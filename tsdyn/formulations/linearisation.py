@@ -18,6 +18,7 @@ from ..maths.euler_parameters import matrix_a, matrix_g
 from ..model.equations import applied_forces, constraint_curvature, force_jacobian
 from ..workspaces.workspace import ITERATION_MATRICES, JACOBIANS, load
 from .newton_iterations import NOT_FINITE, OK, SINGULAR
+from .tolerances import HUGE
 
 
 @kernel
@@ -202,7 +203,7 @@ def linearise(context, t):
     _to_body_frames(s, w.q, l.K, l.Z, l.K_body)
     _to_body_frames(s, w.q, l.C, l.Z, l.C_body)
     w.counters[JACOBIANS] += 1
-    return OK if total < 1e300 else NOT_FINITE
+    return OK if total < HUGE else NOT_FINITE
 
 
 @kernel

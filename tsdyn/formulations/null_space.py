@@ -16,17 +16,17 @@ from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
 from ..maths.dense_linalg import cholesky, cholesky_solve, is_finite, transposed_times
 from ..methods.explicit import ACCELERATE, NORM, PLACE
-from ..model.equations import acceleration_bias, applied_forces, is_rheonomic, set_time, time_derivative
-from ..rows.evaluation import held, run_loops
-from ..sparse.constraint_graph import REDUCED
+from ..model.equations import applied_forces, is_rheonomic, set_time
+from ..rows.interface import evaluate_rows, redundant_rows_hold
 from ..workspaces.chart_workspace import TIME
 from ..workspaces.workspace import EVALUATIONS, FACTORIZATIONS, FLOOR, PLACEMENTS, load
 from .chart_validity import measure_turns, turning
+from .dense_rows import correct, evaluate_dense_bias, evaluate_dense_drift, multiply_dense_row
 from .friction_solve import call_rub, forget_loads
-from .newton_iterations import NOT_FINITE, OK, leave_out, solve_positions, subtract_normal
+from .newton_iterations import NOT_FINITE, OK, solve_positions
 from .null_space_chart import new_chart, tangent_map
+from .tolerances import MASS_PIVOT
 
-PIVOT_LIMIT = 1e-14  # of D^T M D: less than this is rounding
 MASS_SINGULAR, UNHELD = int(Status.MASS_SINGULAR), int(Status.UNHELD)
 
 
@@ -61,7 +61,7 @@ def reduced_mass(s, w):
                 for j in range(i + 1):
                     w.A[i, j] += f * x[j] + g * y[j] + h * z[j]
     w.counters[FACTORIZATIONS] += 1
-    return OK if cholesky(w.A, k, PIVOT_LIMIT) else MASS_SINGULAR
+    return OK if cholesky(w.A, k, MASS_PIVOT) else MASS_SINGULAR
 
 
 @kernel
@@ -74,9 +74,8 @@ def velocities(s, w, t, vd):
             x += w.D[i, j] * vd[j]
         w.qd[i] = x
     if is_rheonomic(s):
-        time_derivative(s, w.q, t, w.Phi_t)
-        leave_out(w, w.Phi_t)
-        _correct(w, w.Phi_t, w.qd)
+        evaluate_dense_drift(s, w, t)
+        correct(w, w.Phi_t, w.qd)
 
 
 @kernel
@@ -84,42 +83,18 @@ def _refine_velocities(s, w):
     """qd -= U B (Phi_q qd + Phi_t)."""
     driven = is_rheonomic(s)
     for i in range(w.Phi.size):
-        w.Phi[i] = (w.Phi_t[i] if driven else 0.0) + _row_times(s, w, i, w.qd)
-    _correct(w, w.Phi, w.qd)
-
-
-@kernel
-def _row_times(s, w, i, x):
-    """Row i of Phi_q x."""
-    total = 0.0
-    for part in range(0, 4, 2):
-        begin = s.segments[i, part]
-        for j in range(begin, begin + s.segments[i, part + 1]):
-            total += w.Phi_q[i, j] * x[j]
-    return total
-
-
-@kernel
-def _correct(w, f, out):
-    """out -= U B f, by z = B f."""
-    m = f.size
-    for i in range(m):
-        x = 0.0
-        for j in range(m):
-            x += w.B[i, j] * f[j]
-        w.z[i] = x
-    subtract_normal(w, out)
+        w.Phi[i] = (w.Phi_t[i] if driven else 0.0) + multiply_dense_row(s, w, i, w.qd)
+    correct(w, w.Phi, w.qd)
 
 
 @kernel
 def reduced_acceleration(s, w, t, vdd):
     """vdd of Eq. 26 at the present q and qd. Status."""
     n, k = w.q.size, vdd.size
-    acceleration_bias(s, w.q, w.qd, t, w.gamma)
-    leave_out(w, w.gamma)
+    evaluate_dense_bias(s, w, t)
     for i in range(n):
         w.h[i] = 0.0
-    _correct(w, w.gamma, w.h)  # h = -U B gamma, what qdd is at vdd = 0
+    correct(w, w.gamma, w.h)  # h = -U B gamma, what qdd is at vdd = 0
     for j in range(k):
         vdd[j] = 0.0
     for b in range(s.mass.size):
@@ -228,7 +203,7 @@ def complete(context, vdd):
             for j in range(begin, begin + s.segments[i, part + 1]):
                 x += w.Phi_q[i, j] * w.qdd[j]
         w.Phi[i] = x
-    _correct(w, w.Phi, w.qdd)
+    correct(w, w.Phi, w.qdd)
     return OK
 
 
@@ -244,7 +219,7 @@ def look(c):
     w, f, l, network = c.work, c.free, c.local, c.network
     place_bodies(network.bodies, w.q, f.poses)
     measure_turns(network, w.q, l)
-    run_loops(network, c.system.reals, REDUCED, f, l.numbers[TIME], f.b, f.H)
+    evaluate_rows(network, c.system, f, f.rows, l.numbers[TIME])
     return turning(network, w, f, l)
 
 
@@ -284,7 +259,7 @@ def start_chart(context, t, v, vd, vdd, unused):
     for j in range(k):
         v[j] = 0.0
     project(w, vector(vd, k), vector(vdd, k))
-    return UNHELD if status == OK and not held(c.free, w.control[FLOOR]) else status
+    return UNHELD if status == OK and not redundant_rows_hold(c.free, w.control[FLOOR]) else status
 
 
 @kernel

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from types import ModuleType
 
+from ..rows.interface import redundancy
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..validation import unknown_name
@@ -32,11 +33,12 @@ class Formulation:
             network.rub[0] = (friction_solve if self.basis_free else friction_basis).rub.address
         return network
 
-    def sizes(self, n, rank, bodies):
-        """Lengths of x and y; rank is that of Phi_q."""
+    def sizes(self, n, m, network):
+        """Lengths of x and y of a network, with n coordinates and m constraint rows."""
         if self.basis_free:
-            return 8 * bodies, 8 * bodies
-        return n if self.first_order else n - rank, n - rank
+            return 8 * len(network.bodies), 8 * len(network.bodies)
+        k = n - m + redundancy(network)
+        return n if self.first_order else k, k
 
     def addresses(self):
         """Addresses in the order that the driver expects; loads or compiles them."""

@@ -19,11 +19,23 @@ from ..jit.kernels import callback, kernel, vector
 from ..maths.dense_linalg import copy, is_finite, largest
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import is_rheonomic, set_time
-from ..rows.axis_rows import is_axis
-from ..rows.evaluation import factor_rows, held, run_loops
-from ..rows.schur_complement import gather, scatter
+from ..rows.interface import (
+    DYNAMICS,
+    apply_multipliers,
+    constrain,
+    evaluate_drift,
+    evaluate_residuals,
+    evaluate_rows,
+    factorise_selected_rows,
+    is_axis,
+    multiply_rates,
+    multiply_rows,
+    project,
+    redundant_rows_hold,
+    solve_product,
+    solve_rows,
+)
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
-from ..sparse.factorisation import solve, solve_lu
 from ..workspaces.chart_workspace import END, FACTORED, OFF, TIME
 from ..workspaces.workspace import (
     AT_ROUNDING,
@@ -44,21 +56,28 @@ from .accelerations import solve_accelerations
 from .chart_coordinates import (
     displace,
     factorise_normal,
-    gather_rates,
     largest_rates,
     turn_rates,
     write_back,
 )
-from .chart_validity import BY_FAILURE, CONTRACTION_LOST, touch, turning
+from .chart_validity import BY_FAILURE, touch, turning
 from .friction_solve import call_rub
+from .tolerances import (
+    CONTRACTION_LOST,
+    CURVATURE,
+    RENEWALS,
+    ROUNDING_AT_MOST,
+    SLOW,
+    SLOW_VELOCITIES,
+    SPEED_ROUNDING,
+    STALLED,
+    SWEEPS,
+)
 
 OK, SINGULAR, MASS_SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR), int(Status.MASS_SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
 CHART_LOST, UNHELD = int(Status.CHART_LOST), int(Status.UNHELD)
 COLUMNS = REDUCED, VALUES, BIAS, DRIFT  # the loops of a network that are called
-SWEEPS, RENEWALS = 24, 4
-CURVATURE = 1.0  # 1 / m: what Newton's method leaves of an error, over its square, where none has been measured
-SPEED_ROUNDING = 2e-16
 
 
 @callback(PLACE)
@@ -74,9 +93,9 @@ def place(context, t, x):
     for attempt in range(2):
         copy(x, l.x)
         if attempt == 1:  # a long step: from the tangent plane, P0 x
-            gather(network, l.H0, l.x, w.u)
-            solve(network.pattern, l.S0, w.u)
-        scatter(network, l.Y0, w.u, l.x)
+            multiply_rows(network, l.rows0, l.x, w.u)
+            solve_rows(network, l.rows0, w.u)
+        apply_multipliers(network, l.rows0, w.u, l.x)
         status = _solve_positions(network, s, w, f, l, t, RENEWALS * attempt)
         if status == OK or f.b.size == 0:
             break
@@ -84,9 +103,9 @@ def place(context, t, x):
         return status
     if f.b.size > 0:
         w.counters[FACTORIZATIONS] += 1
-        failed = factor_rows(network, f, f.H, f.Y, f.S, 1)
+        failed = factorise_selected_rows(network, f, f.rows, DYNAMICS)
         if failed >= 0:
-            return MASS_SINGULAR if is_axis(network, f.S, failed) else SINGULAR
+            return MASS_SINGULAR if is_axis(network, f.rows, failed) else SINGULAR
     if s.forces.shape[0] > 0:
         write_positions(network.bodies, f.poses, w.q)
     return OK
@@ -102,47 +121,50 @@ def _solve_positions(network, s, w, f, l, t, renewals):
     floor = w.control[FLOOR]
     tol = max(w.control[U_TOL], floor)
     left = max(tol * math.sqrt(tol), floor)
-    column, before, rate, ending, anew = REDUCED, math.inf, 0.0, False, 0
+    with_H, before, rate, ending, anew = True, math.inf, 0.0, False, 0
     l.numbers[FACTORED] = 0.0
     for sweep in range(SWEEPS):
         if not displace(network, l, f.poses):
             return CHART_LOST
         if f.b.size == 0:
             return OK
-        run_loops(network, s.reals, column, f, t, f.b, f.H)
+        if with_H:
+            evaluate_rows(network, s, f, f.rows, t)
+        else:
+            evaluate_residuals(network, s, f, t)
         worst = largest(f.b)
         if not worst < math.inf:
             return NOT_FINITE
-        slow = worst > 0.25 * before
-        if worst <= left or ending or (slow and worst <= 100.0 * floor):
-            if column == REDUCED:
+        slow = worst > SLOW * before
+        if worst <= left or ending or (slow and worst <= ROUNDING_AT_MOST * floor):
+            if with_H:
                 w.counters[AT_ROUNDING if sweep == 0 else UNVERIFIED] += 0 if ending else 1
                 return OK
-            column, ending = REDUCED, True  # once more, for H
+            with_H = ending = True  # once more, for H
             continue
         if slow:  # N was that of another place
             anew += 1
             if anew > renewals:
                 return NEWTON_FAILED
             l.numbers[FACTORED] = 0.0
-            if column != REDUCED:
-                column, before = REDUCED, math.inf
+            if not with_H:
+                with_H, before = True, math.inf
                 continue
         elif before < math.inf:
-            if worst > 100.0 * floor and rate == 0.0:
+            if worst > ROUNDING_AT_MOST * floor and rate == 0.0:
                 w.control[RATE] = worst / (before * before)
             rate = worst / before
         if l.numbers[FACTORED] == 0.0:
             if not factorise_normal(network, w, f, l):
                 return SINGULAR
             l.numbers[FACTORED], l.numbers[OFF], rate = 1.0, w.control[RATE] * worst, 0.0
-        solve_lu(network.pattern, l.lower, l.upper, f.b)
+        solve_product(network, l.lower, l.upper, f.b)
         w.counters[NEWTON] += 1
-        scatter(network, l.Y0, f.b, l.x)
+        apply_multipliers(network, l.rows0, f.b, l.x)
         for e in range(f.b.size):
             w.u[e] += f.b[e]
         expected = worst * (rate if rate > 0.0 else w.control[RATE] * worst)
-        column, before = REDUCED if expected <= left else VALUES, worst
+        with_H, before = expected <= left, worst
     return NEWTON_FAILED
 
 
@@ -155,13 +177,13 @@ def solve_velocities(network, s, w, f, l, t):
     """
     rheonomic = is_rheonomic(s)
     if rheonomic:
-        run_loops(network, s.reals, DRIFT, f, t, l.drift, f.H)
+        evaluate_drift(network, s, f, t, l.drift)
     factored = l.numbers[FACTORED] > 0.0
     if not factored and network.axes.rows.shape[0] > 0:  # S is of another metric than the chart
         if not factorise_normal(network, w, f, l):
             return False
         factored, l.numbers[FACTORED], l.numbers[OFF] = True, 1.0, 0.0
-    lower, upper = l.lower if factored else f.S, l.upper if factored else f.S
+    lower, upper = l.lower if factored else f.rows.S, l.upper if factored else f.rows.S
     floor, before = 0.0, math.inf
     for sweep in range(SWEEPS):
         turn_rates(network, l, l.y, f.poses)
@@ -170,23 +192,23 @@ def solve_velocities(network, s, w, f, l, t):
         if sweep == 0:
             speed, spin = largest_rates(network, f.poses)
             floor = SPEED_ROUNDING * (speed + w.control[SIZE] * spin)
-        gather_rates(network, f.H, f.poses, f.b)
+        multiply_rates(network, f.rows, f.poses, f.b)
         if rheonomic:
             for e in range(f.b.size):
                 f.b[e] += l.drift[e]
         worst = largest(f.b)
         if not worst < math.inf:
             return False
-        if worst <= floor or (factored and worst > 0.5 * before and worst <= 100.0 * floor):
+        if worst <= floor or (factored and worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):
             w.counters[KEPT] += 0 if factored else 1
             return True
-        if not factored and worst > 0.1 * before:
+        if not factored and worst > SLOW_VELOCITIES * before:
             if not factorise_normal(network, w, f, l):
                 return False
             lower, upper, factored = l.lower, l.upper, True
             l.numbers[FACTORED], l.numbers[OFF] = 1.0, 0.0
-        solve_lu(network.pattern, lower, upper, f.b)
-        scatter(network, l.Y0, f.b, l.y)
+        solve_product(network, lower, upper, f.b)
+        apply_multipliers(network, l.rows0, f.b, l.y)
         before = worst
     return True
 
@@ -220,11 +242,7 @@ def complete(context, yd):
     c = load(context)
     w, f, network = c.work, c.free, c.network
     if f.b.size > 0:
-        gather(network, f.H, f.Z, f.b)
-        for e in range(f.b.size):
-            f.b[e] += f.gamma[e]
-        solve(network.pattern, f.S, f.b)
-        scatter(network, f.Y, f.b, f.Z)
+        constrain(network, f.rows, f.gamma, f.Z, f.b)
     write_positions(network.bodies, f.poses, w.q)
     write_velocities(network.bodies, f.poses, w.qd)
     write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
@@ -238,7 +256,7 @@ def check(context):
     w, f, l = c.work, c.free, c.local
     reason = turning(c.network, w, f, l)
     l.numbers[END] = w.counters[PLACEMENTS] if w.control[CONTRACTION] < CONTRACTION_LOST else 0.0
-    if not held(f, w.control[FLOOR]):
+    if not redundant_rows_hold(f, w.control[FLOOR]):
         return BY_FAILURE  # the next chart can't be made, and says why
     return reason
 
@@ -266,7 +284,7 @@ def start_chart(context, t, x, y, yd, unused):
             _spin(w.q, w.qdd, i + 3, yd, o + 4)
     if not regular:
         return SINGULAR
-    return OK if held(f, w.control[FLOOR]) else UNHELD
+    return OK if redundant_rows_hold(f, w.control[FLOOR]) else UNHELD
 
 
 @kernel
@@ -300,9 +318,7 @@ def _weighted_square(network, f, l, e, values, old, at, rtol, atol):
     for i in range(e.size, f.Z.size):
         f.Z[i] = 0.0
     if f.b.size > 0:
-        gather(network, l.H0, f.Z, f.b)
-        solve(network.pattern, l.S0, f.b)
-        scatter(network, l.Y0, f.b, f.Z)
+        project(network, l.rows0, f.Z, f.b)
     total = 0.0
     for b in range(network.bodies.shape[0]):
         i, o = network.bodies[b, 0], 8 * b

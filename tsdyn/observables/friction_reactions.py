@@ -6,8 +6,7 @@ from ..elements.loops.body_poses import place_bodies, take_loads
 from ..formulations.friction_solve import find_reactions
 from ..jit.kernels import entry, resident
 from ..model.equations import set_time
-from ..rows.evaluation import factorise_rows, run_loops
-from ..rows.schur_complement import weigh
+from ..rows.interface import METRIC, evaluate_rows, factorise_rows, weigh_bodies
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
@@ -26,11 +25,10 @@ def _solve(context, t, q, qd, r, out):
     for k in range(t.size):
         set_time(s, t[k])
         place_bodies(bodies, q[k], f.poses)
-        run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
-        found = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, 0)
+        evaluate_rows(network, s, f, f.rows, t[k])
+        found = factorise_rows(network, s, f, f.rows, t[k], METRIC)
         take_loads(bodies, q[k], r[k], f.Z)
-        for b in range(bodies.shape[0]):
-            weigh(network.inverse, b, f.Z, 8 * b, f.Z, 8 * b)
+        weigh_bodies(network, f.Z)
         for e in range(f.gamma.size):
             f.gamma[e] = 0.0
         found = found and find_reactions(network, s, f, q[k], qd[k], t[k])

@@ -14,11 +14,9 @@ from ..maths.dense_linalg import copy
 from ..model.equations import constraint_jacobian, set_time
 from ..model.packed import COUNT, FIRST_INT, FIRST_REAL, REALS, classes, index_of
 from ..model.sparse_jacobian import WIDTH, with_short_rows
-from ..rows.evaluation import factorise_rows, run_loops
-from ..rows.schur_complement import gather, scatter
+from ..rows.interface import METRIC, balance_loads, evaluate_rows, factorise_rows, mark_redundant
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
-from ..sparse.factorisation import solve
 from ..workspaces.workspace import load_parts, parts
 from .friction_reactions import with_normal_loads
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
@@ -37,17 +35,15 @@ def solve_multipliers(context, t, q, r, rows, out):
     for k in range(t.size):
         set_time(s, t[k])
         place_bodies(bodies, q[k], f.poses)
-        run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
-        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, 0)
+        evaluate_rows(network, s, f, f.rows, t[k])
+        regular = factorise_rows(network, s, f, f.rows, t[k], METRIC)
         constraint_jacobian(s, q[k], t[k], rows)
         copy(r[k], f.Q)
         take_loads(bodies, q[k], r[k], f.Z)
         for i in range(out.shape[1]):
             out[k, i] = 0.0
         for _ in range(2):
-            gather(network, f.Y, f.Z, f.b)
-            solve(network.pattern, f.S, f.b)
-            scatter(network, f.H, f.b, f.Z)
+            balance_loads(network, f.rows, f.Z, f.b)
             for e in range(f.b.size):
                 if network.row[e] >= 0:
                     out[k, network.row[e]] += f.b[e]
@@ -63,8 +59,7 @@ def solve_multipliers(context, t, q, r, rows, out):
                 for c in range(3, 7):
                     x += f.Q[bodies[b, 0] + c] * q[k, bodies[b, 0] + c]
                 out[k, i] = x
-        for i in range(f.dropped[0]):
-            out[k, network.row[f.dropped[1 + i]]] = math.nan
+        mark_redundant(network, f, math.nan, out[k])
         if not regular:
             for i in range(out.shape[1]):
                 out[k, i] = math.nan
@@ -88,11 +83,11 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
 
 
 def particular(multipliers):
-    """Multipliers (k, m) with zeros where rows are dropped: they solve the same equations."""
-    dropped = np.isnan(multipliers)
-    if not dropped.any():
+    """Multipliers (k, m) with zeros at redundant rows: they solve the same equations."""
+    redundant = np.isnan(multipliers)
+    if not redundant.any():
         return multipliers
-    return np.where(dropped & ~dropped.all(axis=1, keepdims=True), 0.0, multipliers)
+    return np.where(redundant & ~redundant.all(axis=1, keepdims=True), 0.0, multipliers)
 
 
 def reaction(solution, member, body):

@@ -7,7 +7,7 @@ from ..formulations.null_space import reduced_mass, velocities
 from ..formulations.tangent import solve_velocities
 from ..jit.kernels import entry, kernel
 from ..maths.dense_linalg import copy
-from ..rows.evaluation import factor_rows
+from ..rows.interface import DYNAMICS, factorise_selected_rows
 from ..runs.run_state import T, load_run
 from ..taylor.workspace import load_series
 from ..workspaces.workspace import load
@@ -20,7 +20,7 @@ ROUNDS = 5
 @kernel
 def _system(network, f):
     """W H^T, H W H^T and its factors."""
-    factor_rows(network, f, f.H, f.Y, f.S, 1)
+    factorise_selected_rows(network, f, f.rows, DYNAMICS)
 
 
 @entry

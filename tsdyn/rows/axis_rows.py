@@ -51,12 +51,21 @@ def leave_axes_out(network, values):
 
 
 @kernel
-def gather_axes(network, Z, out):
-    """out = c e . Z of the axis rows, Z being accelerations of bodies."""
+def gather_axes(network, values, at, stride, scale, out):
+    """out = scale c e . z of the axis rows, z at values[at + stride * b] being of body b."""
     axes = network.axes
     for i in range(axes.rows.shape[0]):
         e, b = axes.rows[i, AXIS_ROW], axes.rows[i, AXIS_BODY]
-        out[e] = total(times(four(axes.values[i], AXIS_H), four(Z, 8 * b + 4)))
+        out[e] = scale * total(times(four(axes.values[i], AXIS_H), four(values, at + stride * b)))
+
+
+@kernel
+def add_axis_multipliers(network, lam, out):
+    """out += lam of the axis rows: the second term of c e . omega'd + lam_e."""
+    axes = network.axes
+    for i in range(axes.rows.shape[0]):
+        e = axes.rows[i, AXIS_ROW]
+        out[e] += lam[e]
 
 
 @kernel
@@ -68,6 +77,6 @@ def clear_axes(network, out):
 
 
 @kernel
-def is_axis(network, values, e):
-    """Return True if the failed row of an elimination, or -1, is an axis row; values are the partial factors of S."""
-    return e >= 0 and values[network.pattern.shape[1] + e] < 0.0
+def is_axis(network, rows, e):
+    """Return True if the row that failed in the factorisation of S, or -1, is an axis row."""
+    return e >= 0 and rows.S[network.pattern.shape[1] + e] < 0.0

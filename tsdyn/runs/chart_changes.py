@@ -5,7 +5,7 @@ from ..formulations.chart_coordinates import turned_most
 from ..formulations.chart_validity import AT_START
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import copy
-from ..rows.singularity import NEXT_TO, is_below, note_share
+from ..rows.interface import is_next_to_singular, note_indicator
 from ..workspaces.workspace import CONDITION, CONTRACTION
 from .run_state import CHART_ROWS, IN_CHART, MAY_PASS, T
 from .trajectory import A_CHART, call_chart
@@ -33,8 +33,8 @@ def begin_chart(context, c, r, log, at, reason):
         copy(w.q, log.points[i])
     status = call_chart(at[A_CHART], context, r.clock[T], r.x, r.y, r.yd, r.xd)
     if r.numbers[MAY_PASS] == 1:
-        note_share(c.network, c.free, c.local.S0)
-        if status == 0 and reason != AT_START and is_below(c.free, NEXT_TO):
+        note_indicator(c.network, c.free, c.local.rows0)
+        if status == 0 and reason != AT_START and is_next_to_singular(c.free):
             return PASSAGE
     return status
 

@@ -6,7 +6,7 @@ from ..errors import Status
 from ..jit.kernels import resident
 from ..methods.diagonally_implicit import prepare_implicit
 from ..model.packed import System
-from ..workspaces.tangent_memory import drop_as_at_first
+from ..rows.interface import redundancy, reset_selection
 from ..workspaces.workspace import B_TOL, SIZE, U_TOL, Context, allocate, allocate_linear, basis_free_parts
 from .run_state import (
     ADAPTIVE,
@@ -65,7 +65,7 @@ class Memory:
         self.weight = n if self.basis_free else n + n**3 // MATRICES
         self.source, _ = prepared.system(implicit)
         system = System(*(array.copy() for array in self.source))
-        self.network, redundant = network, len(network.dropped)
+        self.network, redundant = network, redundancy(network)
         self.work = allocate(n, m, len(prepared.packed.bodies), 0.0, joint_rows=joint_rows, redundant=redundant)
         slots, angles = system.memory.size, prepared.handles.count
         block = B_DATA + width + angles + slots
@@ -78,7 +78,7 @@ class Memory:
         self._written = [self.work.q.base, self.work.counters, self.run.x.base, self.run.numbers]
         self._written += [linear.numbers.base, linear.pivots, linear.kernels, self.context.local.numbers]
         self._run, *self._keep_run = resident(self.run)
-        self.nbytes = sum(array.nbytes for array in (*self._written, self.context.free.S, self.context.free.poses))
+        self.nbytes = sum(array.nbytes for array in (*self._written, self.context.free.rows.S, self.context.free.poses))
 
     def settle(self, context, header=()):
         """Let the kernels find this context, behind the integers of a header."""
@@ -94,7 +94,7 @@ class Memory:
         """As if it were new, for this task: whatever a run before has left behind is gone."""
         for array in self._written:
             array.fill(0)
-        drop_as_at_first(self.network, self.context.free)
+        reset_selection(self.network, self.context.free)
         system, work = self.context.system, self.work
         source, _ = task.prepared.system(self.implicit)
         if self.source is not source:

@@ -39,7 +39,7 @@ def run_steps(task, observe=None, relay=None):
     steps = None if method.step is None else step_count(*task.span, method.step)
     packed, n, m = prepared.packed, prepared.n, prepared.m
     network = form.network(packed)
-    nx, ny = form.sizes(n, m - len(network.dropped), len(packed.bodies))
+    nx, ny = form.sizes(n, m, network)
     step, tableau, scratch = method.kernel(form.first_order)
     interpolant = method.interpolant(form.first_order)
     _, kept = prepared.system(method.implicit)
@@ -82,7 +82,7 @@ def _reading(packed, form, constraint_tol, addresses):
     """A reader's kind, and what to make one with."""
     n, m = int(packed.system.bodies[:, 1].sum()), len(packed.system.segments)
     network = form.network(packed)
-    sizes = form.sizes(n, m - len(network.dropped), len(packed.bodies))
+    sizes = form.sizes(n, m, network)
     rows = len(network.row) if form.basis_free else None
     given = n, m, len(packed.bodies), constraint_tol, packed.size, rows, network, *sizes
     return Reader, packed.system, given, addresses

@@ -6,14 +6,15 @@ A step is proposed (where it ends), attempted (x and y at its end, from the meth
 import math
 
 from ..errors import Status
-from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL, CONTRACTION_LOST
+from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL
+from ..formulations.tolerances import CONTRACTION_LOST
 from ..jit.kernels import caller, entry, kernel
 from ..maths.dense_linalg import copy
 from ..methods.diagonally_implicit import KNOWN, T_BEFORE
 from ..methods.explicit import call_step
 from ..model.equations import is_rheonomic, remember, set_time
 from ..model.joint_turns import count_turns
-from ..rows.singularity import WITHIN_A_STEP, is_below
+from ..rows.interface import is_singular_within_a_step
 from ..workspaces.workspace import CONTRACTION, load
 from .breakpoints import SHORT, amend, cut_fixed, is_sampled, next_stop, take_pieces
 from .chart_changes import begin_chart, has_hardly_turned
@@ -199,7 +200,7 @@ def _change_chart(context, c, r, log, at, h, status, driven):
     r.numbers[REJECTED] += 1
     if r.numbers[IN_CHART] == 0:
         if r.numbers[ADAPTIVE] == 0:
-            near = is_below(c.free, WITHIN_A_STEP) or (status in OFF_CHART and has_hardly_turned(c))
+            near = is_singular_within_a_step(c.free) or (status in OFF_CHART and has_hardly_turned(c))
             return PASSAGE if near and r.numbers[MAY_PASS] == 1 else status
         r.numbers[FAILED] = status
         r.clock[H] = 0.25 * h

@@ -11,6 +11,7 @@ from ..jit.kernels import caller, entry, kernel, resident
 from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import call_accelerate, call_place
 from ..methods.interpolants import call_value
+from ..rows.interface import redundancy
 from ..workspaces.workspace import RATE, Context, allocate, allocate_linear, basis_free_parts, load
 
 NOT_FINITE = int(Status.NOT_FINITE)
@@ -150,7 +151,7 @@ class Reader:
 
     def __init__(self, system, sizes, addresses):
         *sizes, network, nx, ny = sizes
-        work = allocate(*sizes, redundant=len(network.dropped))
+        work = allocate(*sizes, redundant=redundancy(network))
         system = system._replace(reals=system.reals.copy())  # the motions' places are written to
         linear = allocate_linear(system, sizes[0], sizes[1], False)
         context = Context(system, work, linear, *basis_free_parts(network, sizes[0], sizes[5] is None))

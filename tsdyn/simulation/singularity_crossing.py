@@ -13,7 +13,6 @@ import numpy as np
 from ..errors import Status, TsdynError
 from ..formulations.registry import formulation
 from ..integrators import Taylor
-from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
 from ..runs.history import ChartLog, StepLog
 from ..runs.run_state import STEPS, T_END, T
 from ..runs.segments import Relay
@@ -167,8 +166,8 @@ class Carrier:
         return self.memory.reason
 
     def _is_regular(self):
-        sizes = self.context.free.sizes
-        return sizes[SHARE] >= max(REGULAR * sizes[LARGEST_SHARE], self.share)
+        indicator = self.context.free.indicator
+        return indicator.start >= max(REGULAR * indicator.largest, self.share)
 
     def _next(self):
         """The first time of the grid after the present one."""

@@ -1,6 +1,6 @@
 """Elementary operations of block elimination in local scalars: up to three pivots at a time, and whole links of chains.
 
-An operation works on rows of a panel (see symbolic.py), `width` floats apart, from the first pivot on: in u, and for an
+An operation works on rows of a panel (see panels.py), `width` floats apart, from the first pivot on: in u, and for an
 unsymmetric matrix also in l, transposed. It stores the reciprocals of the pivots and returns the index of the pivot
 that failed, or -1. `kept` holds the diagonal before elimination; its sign is the sign that the pivot must have.
 """

@@ -11,7 +11,8 @@ import numpy as np
 
 from ..model.packed_friction import FR_COLUMNS
 from .massless_axes import Axes, no_axes
-from .symbolic import Pattern, analyse
+from .panels import Pattern
+from .symbolic import analyse
 
 # columns of Network.kinds: addresses of the loops, then where a kind's instances are
 REDUCED, VALUES, BIAS, DRIFT, N_COUNT, N_REALS, N_FIRST_INT, N_FIRST_REAL, N_COLUMNS = range(9)

@@ -18,18 +18,18 @@ def network_of(packed, *columns):
     return known.networks[columns]
 
 
-def drop(packed, rows):
+def set_redundant(packed, rows):
     """Have the networks of a scene made anew, with these rows of them redundant, int64 (k,); None where none are.
 
     Hubs are left whole then: elimination may end with the row of a weld, which can't be left out.
     """
     packed.derived.forget_graphs()
-    packed.derived.dropped = rows
+    packed.derived.redundant = rows
 
 
-def dropped_rows(packed):
+def redundant_rows(packed):
     """Redundant rows of a scene's networks, int64 (k,)."""
-    rows = packed.derived.dropped
+    rows = packed.derived.redundant
     return np.zeros(0, np.int64) if rows is None else rows
 
 

@@ -1,4 +1,4 @@
-"""Numeric part of the sparse factorisation: block elimination in the panels laid out by symbolic.analyse.
+"""Numeric part of the sparse factorisation: block elimination in the panels laid out by panels.py.
 
     S = U^T D^-1 U    symmetric and, but for late nodes (see symbolic.py), positive definite; values hold U
     N = L D^-1 U      any other, without pivoting: `upper` holds U, `lower` holds L^T

@@ -97,7 +97,7 @@ class _Builder:
     def _cut_hubs(self):
         """Parts of hubs, and the cliques: nodes that meet at a body or a part. Frictions couple a hub's rows whole."""
         degrees = np.where(self.rows[:, 1] == 7, 6, 3).tolist()
-        whole = self.packed.derived.dropped is not None or self.system.normals.size
+        whole = self.packed.derived.redundant is not None or self.system.normals.size
         pairs = [tuple(body if body < self.nb else -1 for body in pair) for pair in self.nodes]
         self.parts = [] if whole else cut(pairs, self.sizes, degrees)
         self.hubs, self.cliques = {part.body for part in self.parts}, [[] for _ in range(self.nb)]
@@ -248,9 +248,9 @@ class _Builder:
 
     def _dropped(self):
         if self.still is not None:
-            return np.flatnonzero(np.isin(self.places, self.still.dropped))
-        dropped = self.packed.derived.dropped
-        return np.zeros(0, np.int64) if dropped is None else dropped.copy()
+            return np.flatnonzero(np.isin(self.places, self.still.redundant))
+        redundant = self.packed.derived.redundant
+        return np.zeros(0, np.int64) if redundant is None else redundant.copy()
 
     def network(self):
         """The `Network`, and the classes of its kinds."""

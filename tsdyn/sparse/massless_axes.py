@@ -16,12 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.markers import POINT
+from .tolerances import GIVEN, NONE, THIN
 
-THIN = (
-    1e-6  # of a body's largest moment of inertia, about its centroid or by its levers: what is less takes an axis row
-)
-GIVEN = 0.1  # of it: J
-NONE = 1e-14  # of its largest moment of inertia: what is less is none
 # columns of Axes.rows, of Axes.values, and of Axes.products
 AXIS_ROW, AXIS_BODY = range(2)
 AXIS_H, AXIS_Y, AXIS_OWN, AXIS_WIDTH = 0, 4, 8, 12  # c e; (J' + j e e^T)^-1 c e; the diagonal entry

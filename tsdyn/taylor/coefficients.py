@@ -16,13 +16,10 @@ import numpy as np
 from ..elements.loops.body_poses import OMEGA, POSE, RD, R
 from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R, S_SPIN, call_series
 from ..jit.kernels import kernel
-from ..jit.simd import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times, total
+from ..jit.simd import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times
 from ..maths.dense_linalg import copy
-from ..rows.independent_rows import drop
-from ..rows.schur_complement import scatter, weigh
+from ..rows.interface import solve_series, weigh
 from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS
-from ..sparse.factorisation import solve
-from ..sparse.massless_axes import AXIS_BODY, AXIS_H, AXIS_ROW
 
 MOST_ORDERS = 64
 
@@ -209,18 +206,8 @@ def expand(network, system, k, last, ahead, orders, refine, x, f):
 def _solve(network, system, k, orders, x, f, refined):
     """b = lam_k, or what it lacks to gamma where it is `refined`, and with it Z = -W H^T lam_k."""
     run_loops(network, system.reals, RESIDUAL, k, orders, x.bodies, x.constraints, x.places, f.b, f.Z)
-    for i in range(network.welds.shape[0]):
-        f.b[network.welds[i, 0]] = 0.0
-    for i in range(network.axes.rows.shape[0]):
-        e, b = network.axes.rows[i, AXIS_ROW], network.axes.rows[i, AXIS_BODY]
-        omega = four(x.bodies, (b * BODY_ROW + S_OMEGA) * orders + 4 * (k + 1))
-        f.b[e] = (k + 1.0) * total(times(four(network.axes.values[i], AXIS_H), omega))
-        f.b[e] += f.gamma[e] if refined else 0.0
-    drop(f.dropped, f.b)
-    solve(network.pattern, f.S, f.b)
-    for i in range(f.Z.size):
-        f.Z[i] = 0.0
-    scatter(network, f.Y, f.b, f.Z)
+    at = S_OMEGA * orders + 4 * (k + 1)
+    solve_series(network, f, x.bodies, at, BODY_ROW * orders, k, refined)
 
 
 @kernel

@@ -6,6 +6,7 @@ from ..errors import InvalidArgument, Status
 from ..formulations.locked_orientations import moving_parts
 from ..jit.kernels import resident
 from ..model.packed import System
+from ..rows.interface import allocate_free, reset_selection
 from ..runs.arguments import step_count
 from ..runs.run_state import (
     ADAPTIVE,
@@ -26,7 +27,6 @@ from ..runs.run_state import (
 from ..runs.trajectory import B_DATA
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import with_loops
-from ..workspaces.tangent_memory import allocate_free, drop_as_at_first
 from ..workspaces.workspace import SIZE, U_TOL, plain_work
 from .layout import allocate_expansion, masks
 from .step_parts import PASS, STEPS, pass_singular
@@ -84,7 +84,7 @@ class SeriesMemory:
         self.run = lay_out(n, 0, 0, 0, 0, 0, block, slots, angles)
         self.settle(SeriesContext(system, self.work, series.network, free, expansion))
         self._run, *self._keep_run = resident(self.run)
-        self.nbytes = 8 * (expansion.bodies.size + expansion.constraints.size + free.S.size + self.run.block.size)
+        self.nbytes = 8 * (expansion.bodies.size + expansion.constraints.size + free.rows.S.size + self.run.block.size)
 
     def settle(self, context, header=()):
         """Let the kernels find this context, behind the integers of a header."""
@@ -103,7 +103,7 @@ class SeriesMemory:
         enter_joints(self.run, task.prepared.handles, task.remembered)
         if system.memory.size:
             system.reals[system.memory] = task.remembered[self.run.joints.shape[0] :]
-        drop_as_at_first(self.series.network, self.context.free)
+        reset_selection(self.series.network, self.context.free)
         numbers.fill(0)
         clock.fill(0.0)
         work.counters.fill(0)

@@ -3,11 +3,10 @@
 import math
 
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
-from ..formulations.chart_validity import ROUNDING
+from ..formulations.tolerances import ROUNDING
 from ..jit.kernels import kernel
 from ..jit.simd import first, four, larger, second, splat, third
-from ..rows.singularity import NEAR
-from ..rows.tangent_workspace import END_SHARE, LARGEST_SHARE, SHARE
+from ..rows.interface import is_near_singular
 from ..runs.run_state import ATOL, RTOL
 from ..workspaces.workspace import FLOOR, SIZE
 from .workspace import HIGHEST, LOWEST, NEXT, ORDERS, TOP
@@ -99,19 +98,13 @@ def longest(c, r, tol, most):
 
 
 @kernel
-def is_next_to(share, c):
-    """Return True if a configuration with this indicator is near a singular one."""
-    return share < NEAR * c.free.sizes[LARGEST_SHARE]
-
-
-@kernel
 def loosest(c, tol):
     """The loosest tolerance of a step past a singular configuration: next to it lam has few digits."""
-    return max(tol, PASSING if is_next_to(c.free.sizes[SHARE], c) else FAR_PASSING)
+    return max(tol, PASSING if is_near_singular(c.free, c.free.indicator.start) else FAR_PASSING)
 
 
 @kernel
 def is_near(c, part):
     """Return True if a step ends near a singular configuration: the indicator is below `part` of its start value."""
-    sizes = c.free.sizes
-    return is_next_to(sizes[END_SHARE], c) and sizes[END_SHARE] < part * sizes[SHARE]
+    indicator = c.free.indicator
+    return is_near_singular(c.free, indicator.end) and indicator.end < part * indicator.start

@@ -12,11 +12,13 @@ from ..jit.kernels import callback, caller, kernel
 from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import is_finite
 from ..model.equations import set_time
-from ..rows.evaluation import run_loops
-from ..rows.independent_rows import select, weakest
-from ..rows.singularity import NEAR
-from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
-from ..sparse.constraint_graph import REDUCED
+from ..rows.interface import (
+    is_near_singular,
+    return_to_selection,
+    save_selection,
+    select_rows,
+    singularity_indicator,
+)
 from .coefficients import begin, expand
 from .prescribed_series import expand_motions
 from .workspace import ORDERS, REFINED, TOP, load_series
@@ -48,7 +50,7 @@ def _expand(context, k, ahead):
     if k == 0:
         expand_motions(c.system, x)
         begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
-    near = f.sizes[SHARE] < NEAR * f.sizes[LARGEST_SHARE]  # there rounding of lam grows from order to order
+    near = is_near_singular(f, f.indicator.start)  # there rounding of lam grows from order to order
     refine = orders if near else x.order[REFINED]
     expand(c.network, c.system, k, k > 0 and k + 1 == x.order[TOP], ahead, orders, refine, x, f)
     if k == 0:
@@ -109,14 +111,13 @@ def pass_singular(context, t, h):
     """
     c = load_series(context)
     w, x, f, network = c.work, c.expansion, c.free, c.network
-    count, orders, top = f.dropped[0], x.order[ORDERS], x.order[TOP]
+    orders, top = x.order[ORDERS], x.order[TOP]
+    save_selection(f)
     sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
     status = land(network, c.system, w, f, t)
-    if status == SINGULAR or (status == 0 and weakest(network, f.S) < GONE):
+    if status == SINGULAR or (status == 0 and singularity_indicator(network, f.rows) < GONE):
         sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
-        f.dropped[0] = 0
-        run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)
-        if select(network, f, f.H, f.Y, f.S, -1, GONE):
+        if select_rows(network, c.system, f, t, GONE) >= 0:
             status = land(network, c.system, w, f, t)
     if status == 0:
         _land_rates(c, t)
@@ -130,15 +131,20 @@ def pass_singular(context, t, h):
         write_positions(network.bodies, f.poses, w.q)
         write_velocities(network.bodies, f.poses, w.qd)
         write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
-    f.dropped[0] = count
+    return_to_selection(f)
     return status
+
+
+@kernel
+def is_next_to_singular(c, status):
+    """Return True if `reach` found S singular, or accelerations by S with too few digits."""
+    return status == SINGULAR or (status == 0 and singularity_indicator(c.network, c.free.rows) < NEXT_TO_SINGULAR)
 
 
 @kernel
 def state_within(context, steps, t, h):
     """q, qd, qdd at t, h after the series' origin. Status."""
     status = call_reach(steps[REACH], context, t, h)
-    f = load_series(context).free
-    if status == SINGULAR or (status == 0 and weakest(load_series(context).network, f.S) < NEXT_TO_SINGULAR):
+    if is_next_to_singular(load_series(context), status):
         return call_reach(steps[PASS], context, t, h)
     return call_reach(steps[WITHIN], context, t, h) if status == 0 else status

@@ -8,13 +8,13 @@ import math
 
 from ..elements.loops.body_poses import OMEGA, POSE, RD, move_bodies, place_bodies
 from ..errors import Status
-from ..formulations.chart_validity import AT_START, BY_SERIES, ROUNDING
+from ..formulations.chart_validity import AT_START, BY_SERIES
+from ..formulations.tolerances import ROUNDING
 from ..jit.kernels import entry, kernel
 from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import remember, set_time
 from ..model.joint_turns import count_turns
-from ..rows.independent_rows import weakest
-from ..rows.tangent_workspace import END_SHARE, LARGEST_SHARE, MOVED, RESIDUAL, SHARE
+from ..rows.interface import is_near_singular, singularity_indicator
 from ..runs.breakpoints import cut_fixed, is_sampled, next_stop, take_pieces
 from ..runs.outputs import record, store_now
 from ..runs.run_state import (
@@ -50,12 +50,12 @@ from ..runs.step_control import gets_on, stretch
 from ..runs.trajectory import B_CHART, B_DATA, B_END, B_H, B_START
 from ..workspaces.workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
 from .breakpoints import cross_stop, lower_order
-from .step_length import is_near, is_next_to, longest, loosest, radius, step_length, weights
-from .step_parts import EXPAND, NEXT_TO_SINGULAR, PASS, REACH, call_expand, call_reach, state_within
+from .step_length import is_near, longest, loosest, radius, step_length, weights
+from .step_parts import EXPAND, PASS, REACH, call_expand, call_reach, is_next_to_singular, state_within
 from .workspace import NEXT, ORDERS, TOP, load_series
 
 SLICE_DONE, STEP_COLLAPSED = int(Status.SLICE_DONE), int(Status.STEP_COLLAPSED)
-NOT_FINITE, SINGULAR, PASSAGE = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.PASSAGE)
+NOT_FINITE, PASSAGE = int(Status.NOT_FINITE), int(Status.PASSAGE)
 MISSED = 100.0  # times the tolerance: a landing further away than this is no truncation error
 # of the share at a step's start: one that ends next to such a place with less has come closer; too close to go on from;
 # too close if it has passed
@@ -71,9 +71,9 @@ SMALL, SMALL_STEPS = 0.02, 40  # a step that turns and moves everything by less;
 @kernel
 def _mind_singular(c):
     """Record the singularity indicator after a step."""
-    sizes = c.free.sizes
-    sizes[SHARE] = sizes[END_SHARE]
-    sizes[LARGEST_SHARE] = max(sizes[SHARE], sizes[LARGEST_SHARE])
+    indicator = c.free.indicator
+    indicator.start = indicator.end
+    indicator.largest = max(indicator.start, indicator.largest)
 
 
 @kernel
@@ -139,7 +139,7 @@ def _begin_run(context, c, r, log, steps):
     copy(w.q, r.now[0])
     copy(w.qd, r.now[1])
     status = _stand_at(context, c, r.now, r.clock[T], steps)
-    f.sizes[END_SHARE] = weakest(c.network, f.S) if status == 0 else 0.0
+    f.indicator.end = singularity_indicator(c.network, f.rows) if status == 0 else 0.0
     _open_chart(w, r, log, r.clock[T], AT_START)
     return _accept(context, c, r, log, steps, r.clock[T], False) if status == 0 else status
 
@@ -224,7 +224,7 @@ def advance_series(context, run, log, steps, most):
             call_expand(steps[EXPAND], context, k)
         w.counters[EVALUATIONS] += x.order[TOP]
         h, t1, last, shorter, highest, wanted = step_length(c, r), t0, False, 0, x.order[TOP], tol
-        if adaptive and is_next_to(f.sizes[SHARE], c):
+        if adaptive and is_near_singular(f, f.indicator.start):
             wanted = max(TIGHTER * tol, min(tol, TIGHTEST))
             h = longest(c, r, wanted, highest)
         limit = r.clock[MAX_STEP]
@@ -256,27 +256,27 @@ def advance_series(context, run, log, steps, most):
             row = log.history[r.numbers[HISTORY]]
             row[0], row[1], row[2] = t0, t1 - t0, 0.0
             status, way = call_reach(steps[REACH], context, t1, t1 - t0), REACH
-            if last and (status == SINGULAR or (status == 0 and weakest(c.network, f.S) < NEXT_TO_SINGULAR)):
+            if last and is_next_to_singular(c, status):
                 if steps[PASS] == 0:  # it isn't loaded before it is needed
                     status = _stand_at(context, c, r.now, r.clock[T], steps)
                     call_expand(steps[EXPAND], context, 0)
                     return PASSAGE if status == 0 else status
                 status, way = call_reach(steps[PASS], context, t1, t1 - t0), PASS
-            landed = status == 0 and (not adaptive or f.sizes[RESIDUAL] <= MISSED * (wanted + w.control[FLOOR]))
+            landed = status == 0 and (not adaptive or f.landing.residual <= MISSED * (wanted + w.control[FLOOR]))
             if landed:
-                f.sizes[END_SHARE] = weakest(c.network, f.S)
+                f.indicator.end = singularity_indicator(c.network, f.rows)
             if landed and (not adaptive or shorter == AVOIDING or last):
                 break
             if not adaptive:
                 return status
             if landed and not is_near(c, CLOSER if looser else CLOSE):
                 break
-            if looser and landed and f.sizes[END_SHARE] > before and not is_near(c, PASSED):
+            if looser and landed and f.indicator.end > before and not is_near(c, PASSED):
                 break
             serves = serves or (landed and before == math.inf and not is_near(c, CLOSE))
             longer = 0.0
             if looser and landed and LOOSER * wanted <= loosest(c, tol):
-                before, wanted = f.sizes[END_SHARE], LOOSER * wanted
+                before, wanted = f.indicator.end, LOOSER * wanted
                 longer = min(longest(c, r, wanted, highest), limit)
             if longer > h:
                 h = longer
@@ -295,12 +295,12 @@ def advance_series(context, run, log, steps, most):
                 r.numbers[HISTORY] += 1
         row[2] = 1.0
         r.numbers[HISTORY] += 1
-        if min(f.sizes[END_SHARE], f.sizes[SHARE]) < WARY * f.sizes[LARGEST_SHARE]:
+        if min(f.indicator.end, f.indicator.start) < WARY * f.indicator.largest:
             if r.numbers[NEAR_STEPS] == 0:  # what is lost here is gained elsewhere
                 spare = max(SPARE, min(TIGHTEST / tol, 1.0))
                 tol, r.clock[ATOL], r.clock[RTOL] = spare * tol, spare * r.clock[ATOL], spare * r.clock[RTOL]
             r.numbers[NEAR_STEPS] += 1
-            r.clock[LANDED] = max(r.clock[LANDED], f.sizes[MOVED])
+            r.clock[LANDED] = max(r.clock[LANDED], f.landing.moved)
         if adaptive:
             r.clock[H] = t1 - t0
         leave = False

@@ -4,11 +4,11 @@ import numpy as np
 
 from ..elements.loops.body_poses import place_bodies
 from ..errors import Status
-from ..formulations.chart_validity import ROUNDING
+from ..formulations.tolerances import ROUNDING
 from ..jit.kernels import entry, resident
 from ..maths.dense_linalg import copy
+from ..rows.interface import allocate_free
 from ..runs.trajectory import B_DATA, B_START
-from ..workspaces.tangent_memory import allocate_free
 from ..workspaces.workspace import FLOOR, SIZE, plain_work
 from .step_parts import state_within
 from .workspace import NUMBERS, ORDERS, TOP, Expansion, SeriesContext, load_series

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..jit.kernels import loader
 from ..model.packed import System
-from ..rows.tangent_workspace import Free
+from ..rows.interface import Free
 from ..sparse.constraint_graph import Network
 from ..workspaces.workspace import Work, plain_context
 

@@ -7,16 +7,15 @@ import numpy as np
 
 from ..jit.kernels import loader
 from ..model.packed import System
-from ..rows.tangent_workspace import Free
+from ..rows.interface import Free, allocate_free
 from ..sparse.constraint_graph import Network, no_network
 from .chart_workspace import Local, allocate_local
-from .tangent_memory import allocate_free
 
 
 class Work(NamedTuple):
-    """n coordinates, m constraints, k = n - m + d degrees of freedom, d redundant rows left out, b bodies.
+    """n coordinates, m constraints, k = n - m + d degrees of freedom, d redundant rows, b bodies.
 
-    "computed by" names the kernel. What belongs to a row that is left out is zero, on the diagonal of N and B one.
+    "computed by" names the kernel. What belongs to a redundant row is zero, on the diagonal of N and B one.
     """
 
     q: np.ndarray  # (n,)    positions; computed by newton_iterations.solve_positions
@@ -47,7 +46,7 @@ class Work(NamedTuple):
     householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; dense_linalg.null_space
     control: np.ndarray  # (CONTROLS,)  tolerances and criteria, below
     counters: np.ndarray  # int64 (COUNTERS,)  what was done how often, below
-    left_out: np.ndarray  # int64 (d + 1,)  number of redundant rows of Phi, and which; null_space_chart.new_chart
+    redundant: np.ndarray  # int64 (d + 1,)  number of redundant rows of Phi, and which; dense_rows.take_selection
 
 
 U_TOL, B_TOL, SIZE, FLOOR, RATE, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(9)
@@ -145,7 +144,7 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "A": (k, k),
         "control": (CONTROLS,),
     }
-    work = Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), left_out=np.zeros(redundant + 1, np.int64))
+    work = Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), redundant=np.zeros(redundant + 1, np.int64))
     work.control[U_TOL] = work.control[B_TOL] = constraint_tol
     work.control[SIZE] = size
     return work
@@ -193,10 +192,10 @@ load = loader(plain_context())
 
 def plain_work(n):
     """A `Work` for n coordinates that has no matrices."""
-    whole = ("counters", "left_out")
+    whole = ("counters", "redundant")
     shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name not in whole}
     shapes |= {"q": (n,), "qd": (n,), "qdd": (n,), "control": (CONTROLS,)}
-    return Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), left_out=np.zeros(1, np.int64))
+    return Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), redundant=np.zeros(1, np.int64))
 
 
 def parts(system, network, n):

@@ -141,7 +141,7 @@ def follow(frame, event, argument):
         calls.append((frame.f_back.f_globals["__name__"], name, function))
     if event == "return" and function == "land":
         landing = False
-    if landing and event == "return" and function == "apply_multipliers":
+    if landing and event == "return" and function == "find_correction":
         sys.setprofile(None)
 
 scene = build()
@@ -156,7 +156,7 @@ def test_a_row_gets_from_the_projection_to_its_factor_and_back_in_few_calls():
     options = {"cwd": ROOT, "capture_output": True, "text": True, "check": True}
     result = subprocess.run([sys.executable, "-c", WAY], env={**os.environ, "TSDYN_DEBUG": "1"}, **options)
     calls = result.stdout.splitlines()
-    assert "apply_multipliers" in calls[-1]
+    assert "factorisation" in calls[-1]
     assert 5 < len(calls) - 1 < 15, result.stdout  # the first one is that of `land`
 
 
@@ -168,6 +168,19 @@ def test_packages_say_what_they_are_for(package):
     assert 3 <= len(text.splitlines()) <= 10
     assert "Imports " in text
     assert "Begin with " in text
+
+
+# arguments of kernels that have one order everywhere, and the packages whose kernels keep to it
+ARGUMENTS = ("context", "network", "system", "w", "f", "l", "linear", "q", "qd", "qdd", "t", "out")
+ORDERED = ("rows", "sparse", "formulations", "workspaces", "constraints", "forces", "taylor", "configuration", "maths")
+
+
+@pytest.mark.parametrize("module", [name for name in FILES if _district(name) in ORDERED], ids=str)
+def test_arguments_of_kernels_have_one_order(module):
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if isinstance(node, ast.FunctionDef) and node.decorator_list:
+            places = [ARGUMENTS.index(given.arg) for given in node.args.args if given.arg in ARGUMENTS]
+            assert places == sorted(places), f"{node.name}: {', '.join(ARGUMENTS[place] for place in places)}"
 
 
 def test_few_modules_lie_flat():

@@ -28,7 +28,7 @@ from ..rows.interface import (
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import network_of, set_redundant
 from ..sparse.massless_axes import axis_of
-from ..workspaces.workspace import FLOOR, SIZE, U_TOL, load_parts, parts
+from ..workspaces.workspace import load_parts, parts
 from .rank import check_rank
 from .start_violations import ROUNDING, demand_finite, demand_small
 
@@ -138,7 +138,7 @@ def _wander(context, t, way, far):
 @kernel
 def _farthest(c):
     """The largest entry of Z: of turns, and of shifts as shares of the size."""
-    Z, part, found = c.free.Z, 1.0 / max(c.work.control[SIZE], 1e-3), 0.0
+    Z, part, found = c.free.Z, 1.0 / max(c.work.control.size, 1e-3), 0.0
     for b in range(c.network.bodies.shape[0]):
         for i in range(3):
             found = max(found, max(abs(Z[8 * b + i]) * part, abs(Z[8 * b + 4 + i])))
@@ -197,8 +197,8 @@ class _Start:
         self.at = rigid[:, None] + np.arange(3, 7)
         self.far = self.fast = False
         work = self.work
-        work.control[U_TOL], work.control[SIZE] = tol, self.packed.size
-        work.control[FLOOR] = ROUNDING * (self.packed.size + np.abs(q).max())
+        work.control.u_tol, work.control.size = tol, self.packed.size
+        work.control.floor = ROUNDING * (self.packed.size + np.abs(q).max())
 
     def demand_velocities(self):
         """Refuse those that are off."""

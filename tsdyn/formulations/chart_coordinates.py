@@ -11,7 +11,6 @@ from ..elements.loops.body_poses import OMEGA, POSE, RD, R, orient
 from ..jit.kernels import kernel
 from ..jit.simd import add, cross, first, fma, four, lanes, put, second, splat, third, times, total
 from ..rows.interface import factorise_chart_matrix, rotate_rate
-from ..workspaces.workspace import FACTORIZATIONS
 from .tolerances import FARTHEST
 
 
@@ -53,7 +52,7 @@ def turn_rates(network, l, rates, poses):
 @kernel
 def factorise_normal(network, w, f, l):
     """Factorise N = H C Y0 at the present H; False if N is singular."""
-    w.counters[FACTORIZATIONS] += 1
+    w.counters.factorizations += 1
     return factorise_chart_matrix(network, f, l)
 
 

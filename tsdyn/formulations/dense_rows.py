@@ -10,7 +10,6 @@ from ..jit.kernels import kernel
 from ..maths.dense_linalg import invert
 from ..model.equations import acceleration_bias, constraint_jacobian, constraints, time_derivative
 from ..rows.interface import list_redundant
-from ..workspaces.workspace import FACTORIZATIONS
 
 
 @kernel
@@ -27,53 +26,53 @@ def _zero_redundant(w, out):
 
 
 @kernel
-def evaluate_dense_residuals(s, w, t):
+def evaluate_dense_residuals(system, w, t):
     """Phi at q."""
-    constraints(s, w.q, t, w.Phi)
+    constraints(system, w.q, t, w.Phi)
     _zero_redundant(w, w.Phi)
 
 
 @kernel
-def evaluate_dense_rows(s, w, t):
+def evaluate_dense_rows(system, w, t):
     """Phi_q at q."""
-    constraint_jacobian(s, w.q, t, w.Phi_q)
+    constraint_jacobian(system, w.q, t, w.Phi_q)
     for i in range(w.redundant[0]):
         for j in range(w.q.size):
             w.Phi_q[w.redundant[1 + i], j] = 0.0
 
 
 @kernel
-def evaluate_dense_drift(s, w, t):
+def evaluate_dense_drift(system, w, t):
     """Phi_t at q."""
-    time_derivative(s, w.q, t, w.Phi_t)
+    time_derivative(system, w.q, t, w.Phi_t)
     _zero_redundant(w, w.Phi_t)
 
 
 @kernel
-def evaluate_dense_bias(s, w, t):
+def evaluate_dense_bias(system, w, t):
     """Acceleration bias gamma at q and qd."""
-    acceleration_bias(s, w.q, w.qd, t, w.gamma)
+    acceleration_bias(system, w.q, w.qd, t, w.gamma)
     _zero_redundant(w, w.gamma)
 
 
 @kernel
-def multiply_dense_row(s, w, i, x):
+def multiply_dense_row(system, w, i, x):
     """Return row i of Phi_q x, over its nonzero columns."""
     total = 0.0
     for part in range(0, 4, 2):
-        begin = s.segments[i, part]
-        for j in range(begin, begin + s.segments[i, part + 1]):
+        begin = system.segments[i, part]
+        for j in range(begin, begin + system.segments[i, part + 1]):
             total += w.Phi_q[i, j] * x[j]
     return total
 
 
 @kernel
-def form_normal_matrix(s, w):
+def form_normal_matrix(system, w):
     """N = Phi_q U, over the nonzero columns of Phi_q."""
     m = w.u.size
     for i in range(m):
-        begin, middle = s.segments[i, 0], s.segments[i, 2]
-        end, last = begin + s.segments[i, 1], middle + s.segments[i, 3]
+        begin, middle = system.segments[i, 0], system.segments[i, 2]
+        end, last = begin + system.segments[i, 1], middle + system.segments[i, 3]
         for j in range(m):
             x = 0.0
             for c in range(begin, end):
@@ -93,15 +92,15 @@ def invert_normal_matrix(w):
     for i in range(m):
         for j in range(m):
             w.R[i, j] = w.N[i, j]
-    w.counters[FACTORIZATIONS] += 1
+    w.counters.factorizations += 1
     return invert(w.R, w.B, m)
 
 
 @kernel
-def factorise_dense_rows(s, w, t):
+def factorise_dense_rows(system, w, t):
     """Phi_q, N and B at the present q; return True if N is nonsingular."""
-    evaluate_dense_rows(s, w, t)
-    form_normal_matrix(s, w)
+    evaluate_dense_rows(system, w, t)
+    form_normal_matrix(system, w)
     return invert_normal_matrix(w)
 
 

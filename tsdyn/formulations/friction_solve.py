@@ -15,14 +15,11 @@ pattern of S and a factorisation of comparable cost.
 import math
 
 from ..elements.loops.body_poses import POSE, P, add_torque
-from ..elements.loops.forces import INTS
-from ..elements.loops.friction import call_normal_load, call_unit_friction
 from ..errors import Status
-from ..jit.kernels import callback, caller, kernel, long_kernel, stack
+from ..jit.kernels import callback, kernel, long_kernel, stack
 from ..jit.simd import add, four, put, splat, sub, times
 from ..maths.dense_linalg import copy, largest
-from ..model.packed_forces import F_FIRST_INT, F_FIRST_REAL, F_REALS
-from ..model.packed_friction import FR_BODY, FR_COUNT, FR_FIRST, FR_INDEX, FR_KIND, FR_NORMAL, FR_ON, FR_UNIT
+from ..model.packed_friction import FR_BODY, FR_COUNT, FR_FIRST
 from ..rows.interface import (
     acceleration_residuals,
     add_axis_multipliers,
@@ -37,43 +34,10 @@ from ..rows.interface import (
 )
 from ..workspaces.workspace import load
 from .accelerations import body_forces
-from .tolerances import DAMPED, DAMPED_SHARE, LOAD_ROUNDING, LOAD_SWEEPS, NEWTON_DONE, SLOW_LOADS
+from .friction_loads import RUB, forget_loads, is_settled, normal_load, step_share, unit_friction
+from .tolerances import DAMPED, LOAD_ROUNDING, LOAD_SWEEPS, NEWTON_DONE, SLOW_LOADS
 
 OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
-RUB = "pdp"
-call_rub = caller(RUB)
-
-
-@kernel
-def _instance(system, friction):
-    """Floats of the instance; where its table and its floats begin."""
-    kind = system.forces[friction[FR_KIND]]
-    stride = kind[F_REALS]
-    return stride, kind[F_FIRST_INT] + INTS * friction[FR_INDEX], kind[F_FIRST_REAL] + stride * friction[FR_INDEX]
-
-
-@kernel
-def unit_friction(system, friction, q, qd, t, out):
-    """out (14,) = generalised forces on the bodies a and b, for a normal load of one."""
-    stride, own, real = _instance(system, friction)
-    call_unit_friction(friction[FR_UNIT], stride, system.table[own:], system.reals[real:], q, qd, t, out)
-
-
-@kernel
-def normal_load(system, friction, q, qd, t, derive, reaction, out):
-    """out (7,) = the normal load of a reaction (6,) and, with derive = 1, its derivative by that."""
-    stride, own, real = _instance(system, friction)
-    call_normal_load(
-        friction[FR_NORMAL], stride, system.table[own:], system.reals[real:], q, qd, t, friction[FR_ON], derive,
-        reaction, out,
-    )  # fmt: skip
-
-
-@kernel
-def forget_loads(system):
-    """Set joint friction to zero in the sum of forces."""
-    for i in range(system.normals.size):
-        system.reals[system.normals[i]] = 0.0
 
 
 @kernel
@@ -175,14 +139,13 @@ def find_reactions(network, system, f, q, qd, t):
         if anew and not _factorise(network, f, size == 0.0):
             return False
         solve_product(network, r.lower, r.upper, f.b)
-        change, share = largest(f.b), 1.0 if sweep < DAMPED else DAMPED_SHARE
+        change, share = largest(f.b), step_share(sweep)
         if not change < math.inf:
             return False
         for e in range(f.b.size):
             r.lam[e] += share * f.b[e]
         cold, size = size == 0.0, largest(r.lam)
-        least = LOAD_ROUNDING * size
-        done = change <= least or (share == 1.0 and sweep > 0 and change * change <= least * before)
+        done = is_settled(change, before, share, sweep, LOAD_ROUNDING * size)
         done = done or (anew and not cold and change <= NEWTON_DONE * size)
         anew, before = cold or sweep >= DAMPED or change > SLOW_LOADS * before, change
     return False
@@ -192,13 +155,13 @@ def find_reactions(network, system, f, q, qd, t):
 def rub(context, t, unused):
     """Solve for accelerations as accelerations.solve_accelerations, with joint friction. Status."""
     c = load(context)
-    s, w, f, network = c.system, c.work, c.free, c.network
-    forget_loads(s)
-    body_forces(network, s, w, f, t)
+    system, w, f, network = c.system, c.work, c.free, c.network
+    forget_loads(system)
+    body_forces(network, system, w, f, t)
     weigh_bodies(network, f.Z)
-    evaluate_bias(network, s, f, t)
-    found = find_reactions(network, s, f, w.q, w.qd, t)
-    for i in range(s.normals.size):
-        s.reals[s.normals[i]] = f.friction.load[7 * i]
+    evaluate_bias(network, system, f, t)
+    found = find_reactions(network, system, f, w.q, w.qd, t)
+    for i in range(system.normals.size):
+        system.reals[system.normals[i]] = f.friction.load[7 * i]
     copy(f.friction.lam, f.b)
     return OK if found else JAMMED

@@ -4,7 +4,6 @@ import math
 
 from ..errors import Status
 from ..jit.kernels import kernel
-from ..workspaces.workspace import B_ITERATIONS, B_TOL, FLOOR, NEWTON, RATE, U_TOL
 from .dense_rows import evaluate_dense_residuals, factorise_dense_rows, invert_normal_matrix, subtract_normal
 from .tolerances import B_OUTDATED, B_SWEEPS, HUGE, ROUNDING_AT_MOST, SLOW, STALLED
 
@@ -15,7 +14,7 @@ SINGULAR = int(Status.SINGULAR)
 
 
 @kernel
-def solve_positions(s, w, t, v):
+def solve_positions(system, w, t, v):
     """Find u and q = q0 + V v - U u with Phi(q, t) = 0, Eqs. 19, 20 and 29. Status.
 
     The start is u + T dv, T = du/dv being left over from the place before. Sweeps go on until |Phi| <= u_tol and what
@@ -34,14 +33,14 @@ def solve_positions(s, w, t, v):
         w.base[i] = w.q0[i] + x
     for j in range(k):
         w.v[j] = v[j]
-    floor = w.control[FLOOR]
-    tol = max(w.control[U_TOL], floor)
+    floor = w.control.floor
+    tol = max(w.control.u_tol, floor)
     left = max(tol * math.sqrt(tol), floor)
     before, stuck = math.inf, False
     for _ in range(B_SWEEPS):
         _step_off(w, n, m)
-        evaluate_dense_residuals(s, w, t)
-        w.counters[NEWTON] += 1
+        evaluate_dense_residuals(system, w, t)
+        w.counters.newton += 1
         worst = 0.0
         for i in range(m):
             size = abs(w.Phi[i])
@@ -51,7 +50,7 @@ def solve_positions(s, w, t, v):
         if worst > tol and worst > SLOW * before:
             if stuck and worst <= ROUNDING_AT_MOST * floor:
                 tol, floor = worst, worst  # a fresh B did not help: this is rounding
-            elif not factorise_dense_rows(s, w, t):  # B was out of date
+            elif not factorise_dense_rows(system, w, t):  # B was out of date
                 return SINGULAR
             stuck = True
         for i in range(m):
@@ -61,8 +60,8 @@ def solve_positions(s, w, t, v):
             w.u[i] += d
             w.z[i] = d
         if before < math.inf:
-            w.control[RATE] = worst / before
-        if worst <= floor or (worst <= tol and worst * w.control[RATE] <= left):
+            w.control.rate = worst / before
+        if worst <= floor or (worst <= tol and worst * w.control.rate <= left):
             subtract_normal(w, w.z, w.q)  # q itself, not all of the sum again: a digit less is lost
             return OK
         before = worst
@@ -88,7 +87,7 @@ def update_b(w):
     A start with |R| near one or above is replaced by a factorisation.
     """
     m = w.u.size
-    tol = w.control[B_TOL] * math.sqrt(w.control[B_TOL])
+    tol = w.control.b_tol * math.sqrt(w.control.b_tol)
     before = math.inf
     for _ in range(B_SWEEPS):
         worst = 0.0
@@ -110,7 +109,7 @@ def update_b(w):
             if not invert_normal_matrix(w):
                 return SINGULAR
             continue
-        w.counters[B_ITERATIONS] += 1
+        w.counters.b_iterations += 1
         for i in range(m):  # row i of B R; R is needed whole, B only row by row
             for j in range(m):
                 x = 0.0

@@ -18,11 +18,10 @@ from ..maths.dense_linalg import cholesky, cholesky_solve, is_finite, transposed
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import applied_forces, is_rheonomic, set_time
 from ..rows.interface import evaluate_rows, redundant_rows_hold
-from ..workspaces.chart_workspace import TIME
-from ..workspaces.workspace import EVALUATIONS, FACTORIZATIONS, FLOOR, PLACEMENTS, load
+from ..workspaces.workspace import load
 from .chart_validity import measure_turns, turning
 from .dense_rows import correct, evaluate_dense_bias, evaluate_dense_drift, multiply_dense_row
-from .friction_solve import call_rub, forget_loads
+from .friction_loads import call_rub, forget_loads
 from .newton_iterations import NOT_FINITE, OK, solve_positions
 from .null_space_chart import new_chart, tangent_map
 from .tolerances import MASS_PIVOT
@@ -31,21 +30,21 @@ MASS_SINGULAR, UNHELD = int(Status.MASS_SINGULAR), int(Status.UNHELD)
 
 
 @kernel
-def reduced_mass(s, w):
+def reduced_mass(system, w):
     """E and the Cholesky factor of D^T M D at the present q. Status."""
     k = w.v.size
     for i in range(k):
         for j in range(i + 1):
             w.A[i, j] = 0.0
-    for b in range(s.mass.size):
-        at, mass = s.bodies[b, 0], s.mass[b]
+    for b in range(system.mass.size):
+        at, mass = system.bodies[b, 0], system.mass[b]
         for c in range(at, at + 3):
             for i in range(k):
                 f = mass * w.D[c, i]
                 if f != 0.0:
                     for j in range(i + 1):
                         w.A[i, j] += f * w.D[c, j]
-        if s.bodies[b, 1] == 7:
+        if system.bodies[b, 1] == 7:
             e0, e1, e2, e3 = 2.0 * w.q[at + 3], 2.0 * w.q[at + 4], 2.0 * w.q[at + 5], 2.0 * w.q[at + 6]
             x, y, z = w.E[3 * b], w.E[3 * b + 1], w.E[3 * b + 2]
             d0, d1, d2, d3 = w.D[at + 3], w.D[at + 4], w.D[at + 5], w.D[at + 6]
@@ -53,19 +52,19 @@ def reduced_mass(s, w):
                 x[j] = -e1 * d0[j] + e0 * d1[j] + e3 * d2[j] - e2 * d3[j]
                 y[j] = -e2 * d0[j] - e3 * d1[j] + e0 * d2[j] + e1 * d3[j]
                 z[j] = -e3 * d0[j] + e2 * d1[j] - e1 * d2[j] + e0 * d3[j]
-            J = s.inertia[b]
+            J = system.inertia[b]
             for i in range(k):
                 f = J[0] * x[i] + J[1] * y[i] + J[2] * z[i]
                 g = J[3] * x[i] + J[4] * y[i] + J[5] * z[i]
                 h = J[6] * x[i] + J[7] * y[i] + J[8] * z[i]
                 for j in range(i + 1):
                     w.A[i, j] += f * x[j] + g * y[j] + h * z[j]
-    w.counters[FACTORIZATIONS] += 1
+    w.counters.factorizations += 1
     return OK if cholesky(w.A, k, MASS_PIVOT) else MASS_SINGULAR
 
 
 @kernel
-def velocities(s, w, t, vd):
+def velocities(system, w, t, vd):
     """qd = D vd - U B Phi_t, Eq. 23."""
     n, k = w.q.size, vd.size
     for i in range(n):
@@ -73,41 +72,41 @@ def velocities(s, w, t, vd):
         for j in range(k):
             x += w.D[i, j] * vd[j]
         w.qd[i] = x
-    if is_rheonomic(s):
-        evaluate_dense_drift(s, w, t)
+    if is_rheonomic(system):
+        evaluate_dense_drift(system, w, t)
         correct(w, w.Phi_t, w.qd)
 
 
 @kernel
-def _refine_velocities(s, w):
+def _refine_velocities(system, w):
     """qd -= U B (Phi_q qd + Phi_t)."""
-    driven = is_rheonomic(s)
+    driven = is_rheonomic(system)
     for i in range(w.Phi.size):
-        w.Phi[i] = (w.Phi_t[i] if driven else 0.0) + multiply_dense_row(s, w, i, w.qd)
+        w.Phi[i] = (w.Phi_t[i] if driven else 0.0) + multiply_dense_row(system, w, i, w.qd)
     correct(w, w.Phi, w.qd)
 
 
 @kernel
-def reduced_acceleration(s, w, t, vdd):
+def reduced_acceleration(system, w, t, vdd):
     """vdd of Eq. 26 at the present q and qd. Status."""
     n, k = w.q.size, vdd.size
-    evaluate_dense_bias(s, w, t)
+    evaluate_dense_bias(system, w, t)
     for i in range(n):
         w.h[i] = 0.0
     correct(w, w.gamma, w.h)  # h = -U B gamma, what qdd is at vdd = 0
     for j in range(k):
         vdd[j] = 0.0
-    for b in range(s.mass.size):
-        at, mass = s.bodies[b, 0], s.mass[b]
+    for b in range(system.mass.size):
+        at, mass = system.bodies[b, 0], system.mass[b]
         for c in range(3):
-            f = mass * (s.gravity[c] - w.h[at + c])
+            f = mass * (system.gravity[c] - w.h[at + c])
             for j in range(k):
                 vdd[j] += f * w.D[at + c, j]
-        if s.bodies[b, 1] == 7:
+        if system.bodies[b, 1] == 7:
             e0, e1, e2, e3 = w.q[at + 3], w.q[at + 4], w.q[at + 5], w.q[at + 6]
             d0, d1, d2, d3 = w.qd[at + 3], w.qd[at + 4], w.qd[at + 5], w.qd[at + 6]
             a0, a1, a2, a3 = -2.0 * w.h[at + 3], -2.0 * w.h[at + 4], -2.0 * w.h[at + 5], -2.0 * w.h[at + 6]
-            J = s.inertia[b]
+            J = system.inertia[b]
             x = -e1 * a0 + e0 * a1 + e3 * a2 - e2 * a3  # 2 G (U B gamma)_p
             y = -e2 * a0 - e3 * a1 + e0 * a2 + e1 * a3
             z = -e3 * a0 + e2 * a1 - e1 * a2 + e0 * a3
@@ -134,28 +133,28 @@ def reduced_acceleration(s, w, t, vdd):
                     + s2 * w.D[at + 5, j]
                     + s3 * w.D[at + 6, j]
                 )
-    if s.forces.shape[0] > 0:
+    if system.forces.shape[0] > 0:
         for c in range(n):
             w.Q[c] = 0.0
-        applied_forces(s, w.q, w.qd, t, w.Q)
+        applied_forces(system, w.q, w.qd, t, w.Q)
         for c in range(n):
             f = w.Q[c]
             if f != 0.0:
                 for j in range(k):
                     vdd[j] += f * w.D[c, j]
     cholesky_solve(w.A, vdd, k)
-    w.counters[EVALUATIONS] += 1
+    w.counters.evaluations += 1
     return OK if is_finite(vdd[:k]) else NOT_FINITE
 
 
 @kernel
 def frictional_acceleration(context, c, t, vdd):
     """`reduced_acceleration`, then what the frictions of joints change. Status."""
-    s, network = c.system, c.network
+    system, network = c.system, c.network
     frictions = network.frictions.shape[0] > 0
     if frictions:
-        forget_loads(s)
-    status = reduced_acceleration(s, c.work, t, vdd)
+        forget_loads(system)
+    status = reduced_acceleration(system, c.work, t, vdd)
     return call_rub(network.rub[0], context, t, vdd) if frictions and status == OK else status
 
 
@@ -163,25 +162,25 @@ def frictional_acceleration(context, c, t, vdd):
 def place(context, t, v):
     """Set positions from v: q, Phi_q, B, D and the factor of D^T M D. Status."""
     c = load(context)
-    s, w = c.system, c.work
-    w.counters[PLACEMENTS] += 1
-    c.local.numbers[TIME] = t
-    if not set_time(s, t):
+    system, w = c.system, c.work
+    w.counters.placements += 1
+    c.local.state.time = t
+    if not set_time(system, t):
         return NOT_FINITE
-    status = solve_positions(s, w, t, vector(v, w.v.size))
+    status = solve_positions(system, w, t, vector(v, w.v.size))
     if status == OK:
-        status = tangent_map(s, w, t)
-    return reduced_mass(s, w) if status == OK else status
+        status = tangent_map(system, w, t)
+    return reduced_mass(system, w) if status == OK else status
 
 
 @callback(ACCELERATE)
 def accelerate(context, t, vd, vdd, unused):
     """Set velocities from vd at the current position: qd and vdd. Status."""
     c = load(context)
-    s, w = c.system, c.work
-    velocities(s, w, t, vector(vd, w.v.size))
+    system, w = c.system, c.work
+    velocities(system, w, t, vector(vd, w.v.size))
     if c.linear.K.size > 0:  # of implicit methods, whose long steps leave B less exact
-        _refine_velocities(s, w)
+        _refine_velocities(system, w)
     return frictional_acceleration(context, c, t, vector(vdd, w.v.size))
 
 
@@ -189,7 +188,7 @@ def accelerate(context, t, vd, vdd, unused):
 def complete(context, vdd):
     """Accelerations qdd = D vdd - U B gamma, Eq. 24, after `accelerate`, refined once by Phi_q qdd + gamma."""
     c = load(context)
-    s, w = c.system, c.work
+    system, w = c.system, c.work
     vdd = vector(vdd, w.v.size)
     for i in range(w.q.size):
         x = w.h[i]
@@ -199,8 +198,8 @@ def complete(context, vdd):
     for i in range(w.gamma.size):
         x = w.gamma[i]
         for part in range(0, 4, 2):
-            begin = s.segments[i, part]
-            for j in range(begin, begin + s.segments[i, part + 1]):
+            begin = system.segments[i, part]
+            for j in range(begin, begin + system.segments[i, part + 1]):
                 x += w.Phi_q[i, j] * w.qdd[j]
         w.Phi[i] = x
     correct(w, w.Phi, w.qdd)
@@ -218,8 +217,8 @@ def look(c):
     """Return the reason to abandon the chart at the present q, or zero."""
     w, f, l, network = c.work, c.free, c.local, c.network
     place_bodies(network.bodies, w.q, f.poses)
-    measure_turns(network, w.q, l)
-    evaluate_rows(network, c.system, f, f.rows, l.numbers[TIME])
+    measure_turns(network, l, w.q)
+    evaluate_rows(network, c.system, f, f.rows, l.state.time)
     return turning(network, w, f, l)
 
 
@@ -251,15 +250,15 @@ def error_norm(context, ev, evd, old, rtol, atol):
 def start_chart(context, t, v, vd, vdd, unused):
     """Make a chart at the present q; v = 0, vd = V^T P0 qd, vdd = V^T P0 qdd, Eq. 27. Status."""
     c = load(context)
-    s, w = c.system, c.work
-    set_time(s, t)
-    status = new_chart(s, w, c.free, c.local, c.network, t)
+    system, w = c.system, c.work
+    set_time(system, t)
+    status = new_chart(c.network, system, w, c.free, c.local, t)
     k = w.v.size
     v = vector(v, k)
     for j in range(k):
         v[j] = 0.0
     project(w, vector(vd, k), vector(vdd, k))
-    return UNHELD if status == OK and not redundant_rows_hold(c.free, w.control[FLOOR]) else status
+    return UNHELD if status == OK and not redundant_rows_hold(c.free, w.control.floor) else status
 
 
 @kernel

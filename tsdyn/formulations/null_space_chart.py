@@ -10,20 +10,20 @@ import math
 
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import null_space
-from ..workspaces.workspace import FACTORIZATIONS, KEPT, RATE
 from .chart_validity import touch
+from .dense_products import add_product, add_transposed_product, clear_matrix, multiply
 from .dense_rows import evaluate_dense_rows, form_normal_matrix, invert_normal_matrix, take_selection
 from .newton_iterations import OK, SINGULAR, update_b
 from .tolerances import FIRST_RATE, RANK_LIMIT
 
 
 @kernel
-def new_chart(s, w, f, l, network, t):
+def new_chart(network, system, w, f, l, t):
     """Make a chart at the present q: q0, U, V by SVD, B, L; u = 0, v = 0. Status."""
     n, m, k = w.q.size, w.u.size, w.v.size
-    regular = touch(network, s, w, f, l, t)
+    regular = touch(network, system, w, f, l, t)
     take_selection(network, w, f)
-    evaluate_dense_rows(s, w, t)
+    evaluate_dense_rows(system, w, t)
     kept = 0
     for i in range(n):
         w.q0[i] = w.q[i]
@@ -45,11 +45,11 @@ def new_chart(s, w, f, l, network, t):
     if m > 0 and not (regular and low > RANK_LIMIT * high):
         return SINGULAR
     _normal_space(network, w, l)
-    form_normal_matrix(s, w)
+    form_normal_matrix(system, w)
     if not invert_normal_matrix(w) or update_b(w) != OK:
         return SINGULAR
     _left_inverse(w)
-    w.control[RATE] = FIRST_RATE
+    w.control.rate = FIRST_RATE
     return OK
 
 
@@ -88,67 +88,43 @@ def _normal_space(network, w, l):
 @kernel
 def _left_inverse(w):
     """L = V - Phi_q^T B^T U^T V at q0; T and X are scratch, T zero at the end, as it is at q0."""
-    n, m, k = w.q.size, w.u.size, w.v.size
-    for i in range(m):
-        for j in range(k):
-            w.T[i, j] = 0.0
-            w.X[i, j] = 0.0
-        for c in range(n):
-            f = w.U[c, i]
-            if f != 0.0:
-                for j in range(k):
-                    w.T[i, j] += f * w.V[c, j]
-    for i in range(m):
-        for c in range(m):
-            f = w.B[c, i]
-            for j in range(k):
-                w.X[i, j] += f * w.T[c, j]
-    for i in range(n):
-        for j in range(k):
-            w.L[i, j] = w.V[i, j]
-        for c in range(m):
-            f = w.Phi_q[c, i]
-            if f != 0.0:
-                for j in range(k):
-                    w.L[i, j] -= f * w.X[c, j]
-    for i in range(m):
-        for j in range(k):
-            w.T[i, j] = 0.0
+    clear_matrix(w.T)
+    add_transposed_product(1.0, w.U, w.V, w.T)
+    clear_matrix(w.X)
+    add_transposed_product(1.0, w.B, w.T, w.X)
+    _copy_matrix(w.V, w.L)
+    add_transposed_product(-1.0, w.Phi_q, w.X, w.L)
+    clear_matrix(w.T)
 
 
 @kernel
-def tangent_map(s, w, t):
+def _copy_matrix(A, out):
+    """out = A."""
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            out[i, j] = A[i, j]
+
+
+@kernel
+def tangent_map(system, w, t):
     """Phi_q, N, B, T = B Phi_q V and D = V - U T at the present q, Eqs. 7, 9, 28. Status."""
-    n, m, k = w.q.size, w.u.size, w.v.size
-    evaluate_dense_rows(s, w, t)
-    form_normal_matrix(s, w)
-    made = w.counters[FACTORIZATIONS]
+    m, k = w.u.size, w.v.size
+    evaluate_dense_rows(system, w, t)
+    form_normal_matrix(system, w)
+    made = w.counters.factorizations
     status = update_b(w)
     if status != OK:
         return status
-    w.counters[KEPT] += 1 if w.counters[FACTORIZATIONS] == made and m > 0 else 0
+    w.counters.kept += 1 if w.counters.factorizations == made and m > 0 else 0
+    clear_matrix(w.X)
     for i in range(m):
-        for j in range(k):
-            w.X[i, j] = 0.0
         for part in range(0, 4, 2):
-            begin = s.segments[i, part]
-            for c in range(begin, begin + s.segments[i, part + 1]):
+            begin = system.segments[i, part]
+            for c in range(begin, begin + system.segments[i, part + 1]):
                 f = w.Phi_q[i, c]
                 for j in range(k):
                     w.X[i, j] += f * w.V[c, j]
-    for i in range(m):
-        for j in range(k):
-            w.T[i, j] = 0.0
-        for c in range(m):
-            f = w.B[i, c]
-            for j in range(k):
-                w.T[i, j] += f * w.X[c, j]
-    for i in range(n):
-        for j in range(k):
-            w.D[i, j] = w.V[i, j]
-        for c in range(m):
-            f = w.U[i, c]
-            if f != 0.0:
-                for j in range(k):
-                    w.D[i, j] -= f * w.T[c, j]
+    multiply(w.B, w.X, w.T)
+    _copy_matrix(w.V, w.D)
+    add_product(-1.0, w.U, w.T, w.D)
     return OK

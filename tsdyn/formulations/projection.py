@@ -14,19 +14,17 @@ from ..jit.simd import add, fma, four, put, splat
 from ..maths.dense_linalg import largest
 from ..rows.interface import (
     DYNAMICS,
-    apply_multipliers,
     constrain,
     evaluate_drift,
     evaluate_residuals,
     evaluate_rows,
     factorise_rows,
+    find_correction,
     is_near_singular,
     project,
     redundant_rows_hold,
     singularity_indicator,
-    solve_rows,
 )
-from ..workspaces.workspace import AT_ROUNDING, FACTORIZATIONS, FLOOR, NEWTON
 from .tolerances import LAND_SWEEPS, LEAST_MOVE, MOST_PARTS, ROUNDING_AT_MOST, STALLED
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
@@ -38,14 +36,14 @@ UNHELD = int(Status.UNHELD)
 def factorise(network, system, w, f, t):
     """b = Phi, and H, W H^T and the factors of S, at the present poses. Status."""
     evaluate_rows(network, system, f, f.rows, t)
-    w.counters[FACTORIZATIONS] += 1
+    w.counters.factorizations += 1
     return OK if factorise_rows(network, system, f, f.rows, t, DYNAMICS) else SINGULAR
 
 
 @long_kernel
 def land(network, system, w, f, t):
     """Project positions onto the manifold along W H^T; H, Y and the factors of S are those of the result. Status."""
-    floor, before, moved, renew = w.control[FLOOR], math.inf, 0.0, True
+    floor, before, moved, renew = w.control.floor, math.inf, 0.0, True
     f.landing.residual, f.landing.moved = -1.0, 0.0
     for _ in range(LAND_SWEEPS):
         if renew:
@@ -65,13 +63,12 @@ def land(network, system, w, f, t):
             if worst > ROUNDING_AT_MOST * floor:
                 return NEWTON_FAILED
             if moved <= LEAST_MOVE:
-                w.counters[AT_ROUNDING] += 1 if moved == 0.0 else 0
+                w.counters.at_rounding += 1 if moved == 0.0 else 0
                 return _settle(network, f, floor)
             renew = True
             continue
         before = worst
-        w.counters[NEWTON] += 1
-        solve_rows(network, f.rows, f.b)
+        w.counters.newton += 1
         moved = max(moved, _displace(network, f))
         f.landing.moved = moved
     return NEWTON_FAILED
@@ -86,17 +83,14 @@ def _settle(network, f, floor):
     if not redundant_rows_hold(f, floor):
         return UNHELD
     if is_near_singular(f, singularity_indicator(network, f.rows)):
-        solve_rows(network, f.rows, f.b)
         _displace(network, f)
     return OK
 
 
 @kernel
 def _displace(network, f):
-    """Displace the bodies by -Y b; return the largest displacement."""
-    for i in range(f.Z.size):
-        f.Z[i] = 0.0
-    apply_multipliers(network, f.rows, f.b, f.Z)
+    """Displace the bodies by the smallest correction of the residuals b; return the largest displacement."""
+    find_correction(network, f.rows, f.b, f.Z)
     move_by(network, f)
     return largest(f.Z)
 

@@ -36,20 +36,7 @@ from ..rows.interface import (
     solve_rows,
 )
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
-from ..workspaces.chart_workspace import END, FACTORED, OFF, TIME
 from ..workspaces.workspace import (
-    AT_ROUNDING,
-    CONTRACTION,
-    EVALUATIONS,
-    FACTORIZATIONS,
-    FLOOR,
-    KEPT,
-    NEWTON,
-    PLACEMENTS,
-    RATE,
-    SIZE,
-    U_TOL,
-    UNVERIFIED,
     load,
 )
 from .accelerations import solve_accelerations
@@ -61,7 +48,7 @@ from .chart_coordinates import (
     write_back,
 )
 from .chart_validity import BY_FAILURE, touch, turning
-from .friction_solve import call_rub
+from .friction_loads import call_rub
 from .tolerances import (
     CONTRACTION_LOST,
     CURVATURE,
@@ -84,10 +71,10 @@ COLUMNS = REDUCED, VALUES, BIAS, DRIFT  # the loops of a network that are called
 def place(context, t, x):
     """Set positions from x (8 b,): poses on the manifold, H, W H^T and the factors of S. Status."""
     c = load(context)
-    s, w, f, l, network = c.system, c.work, c.free, c.local, c.network
-    w.counters[PLACEMENTS] += 1
-    l.numbers[TIME] = t
-    if not set_time(s, t):
+    system, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    w.counters.placements += 1
+    l.state.time = t
+    if not set_time(system, t):
         return NOT_FINITE
     x, status = vector(x, l.x.size - 8), NEWTON_FAILED
     for attempt in range(2):
@@ -96,49 +83,52 @@ def place(context, t, x):
             multiply_rows(network, l.rows0, l.x, w.u)
             solve_rows(network, l.rows0, w.u)
         apply_multipliers(network, l.rows0, w.u, l.x)
-        status = _solve_positions(network, s, w, f, l, t, RENEWALS * attempt)
+        status = _solve_positions(network, system, w, f, l, t, RENEWALS * attempt)
         if status == OK or f.b.size == 0:
             break
     if status != OK:
         return status
     if f.b.size > 0:
-        w.counters[FACTORIZATIONS] += 1
+        w.counters.factorizations += 1
         failed = factorise_selected_rows(network, f, f.rows, DYNAMICS)
         if failed >= 0:
             return MASS_SINGULAR if is_axis(network, f.rows, failed) else SINGULAR
-    if s.forces.shape[0] > 0:
+    if system.forces.shape[0] > 0:
         write_positions(network.bodies, f.poses, w.q)
     return OK
 
 
 @kernel
-def _solve_positions(network, s, w, f, l, t, renewals):
+def _solve_positions(network, system, w, f, l, t, renewals):
     """Newton's method for u, N being that of its start or made anew so often; poses and H at the solution. Status.
 
     It ends where what is left, |Phi| or what the convergence so far lets expect of it, is below u_tol^(3/2) or
     rounding; H is taken there, with the last |Phi|.
     """
-    floor = w.control[FLOOR]
-    tol = max(w.control[U_TOL], floor)
+    floor = w.control.floor
+    tol = max(w.control.u_tol, floor)
     left = max(tol * math.sqrt(tol), floor)
     with_H, before, rate, ending, anew = True, math.inf, 0.0, False, 0
-    l.numbers[FACTORED] = 0.0
+    l.state.factored = 0
     for sweep in range(SWEEPS):
         if not displace(network, l, f.poses):
             return CHART_LOST
         if f.b.size == 0:
             return OK
         if with_H:
-            evaluate_rows(network, s, f, f.rows, t)
+            evaluate_rows(network, system, f, f.rows, t)
         else:
-            evaluate_residuals(network, s, f, t)
+            evaluate_residuals(network, system, f, t)
         worst = largest(f.b)
         if not worst < math.inf:
             return NOT_FINITE
         slow = worst > SLOW * before
         if worst <= left or ending or (slow and worst <= ROUNDING_AT_MOST * floor):
             if with_H:
-                w.counters[AT_ROUNDING if sweep == 0 else UNVERIFIED] += 0 if ending else 1
+                if sweep == 0:
+                    w.counters.at_rounding += 1
+                elif not ending:
+                    w.counters.unverified += 1
                 return OK
             with_H = ending = True  # once more, for H
             continue
@@ -146,43 +136,43 @@ def _solve_positions(network, s, w, f, l, t, renewals):
             anew += 1
             if anew > renewals:
                 return NEWTON_FAILED
-            l.numbers[FACTORED] = 0.0
+            l.state.factored = 0
             if not with_H:
                 with_H, before = True, math.inf
                 continue
         elif before < math.inf:
             if worst > ROUNDING_AT_MOST * floor and rate == 0.0:
-                w.control[RATE] = worst / (before * before)
+                w.control.rate = worst / (before * before)
             rate = worst / before
-        if l.numbers[FACTORED] == 0.0:
+        if l.state.factored == 0:
             if not factorise_normal(network, w, f, l):
                 return SINGULAR
-            l.numbers[FACTORED], l.numbers[OFF], rate = 1.0, w.control[RATE] * worst, 0.0
+            l.state.factored, l.state.off, rate = 1, w.control.rate * worst, 0.0
         solve_product(network, l.lower, l.upper, f.b)
-        w.counters[NEWTON] += 1
+        w.counters.newton += 1
         apply_multipliers(network, l.rows0, f.b, l.x)
         for e in range(f.b.size):
             w.u[e] += f.b[e]
-        expected = worst * (rate if rate > 0.0 else w.control[RATE] * worst)
+        expected = worst * (rate if rate > 0.0 else w.control.rate * worst)
         with_H, before = expected <= left, worst
     return NEWTON_FAILED
 
 
 @kernel
-def solve_velocities(network, s, w, f, l, t):
+def solve_velocities(network, system, w, f, l, t):
     """rd and omega' of the poses from the rates l.y, projected onto the tangent space. False if N is singular.
 
     The factors are those of N at the start of the position solve, or, where it needed none, those of S as long as they
     do.
     """
-    rheonomic = is_rheonomic(s)
+    rheonomic = is_rheonomic(system)
     if rheonomic:
-        evaluate_drift(network, s, f, t, l.drift)
-    factored = l.numbers[FACTORED] > 0.0
+        evaluate_drift(network, system, f, t, l.drift)
+    factored = l.state.factored == 1
     if not factored and network.axes.rows.shape[0] > 0:  # S is of another metric than the chart
         if not factorise_normal(network, w, f, l):
             return False
-        factored, l.numbers[FACTORED], l.numbers[OFF] = True, 1.0, 0.0
+        factored, l.state.factored, l.state.off = True, 1, 0.0
     lower, upper = l.lower if factored else f.rows.S, l.upper if factored else f.rows.S
     floor, before = 0.0, math.inf
     for sweep in range(SWEEPS):
@@ -191,7 +181,7 @@ def solve_velocities(network, s, w, f, l, t):
             return True
         if sweep == 0:
             speed, spin = largest_rates(network, f.poses)
-            floor = SPEED_ROUNDING * (speed + w.control[SIZE] * spin)
+            floor = SPEED_ROUNDING * (speed + w.control.size * spin)
         multiply_rates(network, f.rows, f.poses, f.b)
         if rheonomic:
             for e in range(f.b.size):
@@ -200,13 +190,13 @@ def solve_velocities(network, s, w, f, l, t):
         if not worst < math.inf:
             return False
         if worst <= floor or (factored and worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):
-            w.counters[KEPT] += 0 if factored else 1
+            w.counters.kept += 0 if factored else 1
             return True
         if not factored and worst > SLOW_VELOCITIES * before:
             if not factorise_normal(network, w, f, l):
                 return False
             lower, upper, factored = l.lower, l.upper, True
-            l.numbers[FACTORED], l.numbers[OFF] = 1.0, 0.0
+            l.state.factored, l.state.off = 1, 0.0
         solve_product(network, lower, upper, f.b)
         apply_multipliers(network, l.rows0, f.b, l.y)
         before = worst
@@ -217,22 +207,22 @@ def solve_velocities(network, s, w, f, l, t):
 def accelerate(context, t, y, yd, unused):
     """Set velocities from y (8 b,) at the current position: velocities, accelerations and y'. Status."""
     c = load(context)
-    s, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    system, w, f, l, network = c.system, c.work, c.free, c.local, c.network
     n = l.x.size - 8
     yd = vector(yd, n)
     copy(vector(y, n), l.y)
-    if not solve_velocities(network, s, w, f, l, t):
+    if not solve_velocities(network, system, w, f, l, t):
         return NOT_FINITE
-    if s.forces.shape[0] > 0:
+    if system.forces.shape[0] > 0:
         write_velocities(network.bodies, f.poses, w.qd)
     if network.frictions.shape[0] > 0:
         status = call_rub(network.rub[0], context, t, yd)
         if status != OK:
             return status
     else:
-        solve_accelerations(network, s, w, f, t)
+        solve_accelerations(network, system, w, f, t)
     write_back(network, l, f.poses, f.Z, yd)
-    w.counters[EVALUATIONS] += 1
+    w.counters.evaluations += 1
     return OK if is_finite(yd) else NOT_FINITE
 
 
@@ -255,8 +245,8 @@ def check(context):
     c = load(context)
     w, f, l = c.work, c.free, c.local
     reason = turning(c.network, w, f, l)
-    l.numbers[END] = w.counters[PLACEMENTS] if w.control[CONTRACTION] < CONTRACTION_LOST else 0.0
-    if not redundant_rows_hold(f, w.control[FLOOR]):
+    l.state.placement = w.counters.placements if w.control.contraction < CONTRACTION_LOST else 0
+    if not redundant_rows_hold(f, w.control.floor):
         return BY_FAILURE  # the next chart can't be made, and says why
     return reason
 
@@ -265,16 +255,16 @@ def check(context):
 def start_chart(context, t, x, y, yd, unused):
     """Make a chart at the present q: x = 0, y = (rd, omega'), y' = (rdd, omega'd). Status."""
     c = load(context)
-    s, w, f, l, network = c.system, c.work, c.free, c.local, c.network
-    if not set_time(s, t):
+    system, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    if not set_time(system, t):
         return NOT_FINITE
-    regular = touch(network, s, w, f, l, t)
+    regular = touch(network, system, w, f, l, t)
     x, y, yd = vector(x, l.x.size - 8), vector(y, l.x.size - 8), vector(yd, l.x.size - 8)
     for i in range(x.size):
         x[i] = 0.0
     for e in range(w.u.size):
         w.u[e] = 0.0
-    w.control[RATE] = CURVATURE
+    w.control.rate = CURVATURE
     for b in range(network.bodies.shape[0]):
         i, o = network.bodies[b, 0], 8 * b
         for c in range(3):
@@ -284,7 +274,7 @@ def start_chart(context, t, x, y, yd, unused):
             _spin(w.q, w.qdd, i + 3, yd, o + 4)
     if not regular:
         return SINGULAR
-    return OK if redundant_rows_hold(f, w.control[FLOOR]) else UNHELD
+    return OK if redundant_rows_hold(f, w.control.floor) else UNHELD
 
 
 @kernel

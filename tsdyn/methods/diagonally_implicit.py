@@ -14,7 +14,7 @@ import math
 from ..errors import Status
 from ..jit.kernels import ANY, callback, caller, kernel, vector
 from ..maths.dense_linalg import copy, transposed_times
-from ..workspaces.workspace import CHARTS, ROOM, STAGE_ITERATIONS, load
+from ..workspaces.workspace import ROOM, load
 from .explicit import ERROR, STEP, call_accelerate, call_norm, call_place, combine
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
@@ -53,7 +53,7 @@ def _matrix(context, w, l, t, g, f, anew):
         call_linearise(l.kernels[REDUCE], context, t)
         status = call_linearise(l.kernels[FACTORISE], context, g)
     l.numbers[G] = g if status == 0 else 0.0
-    l.numbers[CHART] = w.counters[CHARTS]
+    l.numbers[CHART] = w.counters.charts
     return status
 
 
@@ -76,8 +76,8 @@ def _stage(context, place, accelerate, w, l, t, g, x, y, k, xs, ys, f, dx, guess
             status = call_accelerate(accelerate, context, t, ys, f, f)
         if status != 0:
             return status
-        w.counters[STAGE_ITERATIONS] += 1
-        stale = eager or l.numbers[CHART] != w.counters[CHARTS] or abs(g - l.numbers[G]) > 0.3 * g
+        w.counters.stage_iterations += 1
+        stale = eager or l.numbers[CHART] != w.counters.charts or abs(g - l.numbers[G]) > 0.3 * g
         eager = False
         if stale or (measured and theta > SLOW):
             if not stale:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..errors import RedundantConstraints
-from ..formulations.friction_solve import normal_load
+from ..formulations.friction_loads import normal_load
 from ..jit.kernels import entry, resident, stack
 from ..model.packed_friction import FR_COUNT, FR_FIRST
 from ..rows.interface import count_self_stresses, redundancy, self_stress

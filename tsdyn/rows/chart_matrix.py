@@ -8,21 +8,6 @@ At the parts of a split body N has the products with the welds, whose rows are W
 from ..jit.kernels import kernel, long_kernel, stack
 from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, times, total
 from ..sparse.constraint_graph import (
-    H_BODY,
-    H_COLUMNS,
-    H_KIND,
-    H_LEFT,
-    H_RIGHT,
-    H_ROWS,
-    H_STRIDE,
-    H_TARGET,
-    P_COLUMNS,
-    P_LEFT,
-    P_RIGHT,
-    P_ROWS,
-    P_SAME,
-    P_STRIDE,
-    P_TARGET,
     ROWS,
     ROWS_WELD,
     W_MASS,
@@ -46,10 +31,9 @@ def _multiply_both(network, H, X, lower, upper):
         let(lower, i, 0.0)
     for i in range(products.shape[0]):
         product = products[i]
-        left, right = get(product, P_LEFT), get(product, P_RIGHT)
-        target, stride = get(product, P_TARGET), get(product, P_STRIDE)
-        rows, columns = get(product, P_ROWS), get(product, P_COLUMNS)
-        if get(product, P_SAME) != 0:
+        left, right, rows, columns = product.left, product.right, product.rows, product.columns
+        target, stride = product.target, product.stride
+        if product.same != 0:
             for r in range(rows):
                 more(upper, target + r, inner_both(H, left + 16 * r, X, right + 16 * r))
                 for c in range(r + 1, columns):
@@ -125,8 +109,8 @@ def _multiply_parts(network, H, l):
     t, lower, upper = stack(12), l.lower, l.upper  # t: C W0 of a body
     for i in range(network.parts.shape[0]):
         part, scale = network.parts[i], network.scales[i]
-        left, rows, right, columns = part[H_LEFT], part[H_ROWS], part[H_RIGHT], part[H_COLUMNS]
-        target, stride, kind, b = part[H_TARGET], part[H_STRIDE], part[H_KIND], part[H_BODY]
+        left, rows, right, columns = part.left, part.rows, part.right, part.columns
+        target, stride, kind, b = part.target, part.stride, part.kind, part.body
         light, w = network.inverse[WEIGHTS * b + W_MASS], WEIGHTS * b + W_ROTATION
         if kind != ROWS and network.bodies[b, 1] == 7:
             for c in range(3):

@@ -9,7 +9,7 @@ import math
 
 from ..jit.kernels import kernel, long_kernel
 from ..sparse.block_operations import eliminate, subtract_products
-from ..sparse.factorisation import keep_diagonal, record
+from ..sparse.factorisation import keep_diagonal, update_later_blocks
 from .axis_rows import leave_axes_out
 from .schur_complement import form_schur_complement, inner, weigh_rows
 from .tolerances import FEWER, FIRST_SHARE, ZERO_PIVOT
@@ -112,7 +112,7 @@ def _eliminate_choosing(network, values, share, dropped, A, order):
     As factorisation.factor; what is left in `values` serves nothing. Negative where a row that must be kept can't be.
     """
     pattern = network.pattern
-    starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
+    starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     keep_diagonal(pattern, values)
     kept, count = values[pattern.shape[1] :], 0
     for j in range(heads.size):
@@ -135,11 +135,7 @@ def _eliminate_choosing(network, values, share, dropped, A, order):
             if size - k > 3:
                 out, right = u[3 * (width + 1) :], u[3:]
                 subtract_products(u, 3, width, right, right, out, width, size - k - 3, width - k - 3, True)
-        for e in range(updates[j], updates[j + 1]):
-            at, rows, run, n, target, stride = record(pattern, e)
-            for k in range(0, size, 3):
-                u, r = panel[k * (width + 1) :], panel[k * width :]
-                subtract_products(u, size - k, width, r[at:], r[run:], values[target:], stride, rows, n, at == run)
+        update_later_blocks(pattern, values, panel, j, size, width)
     return count
 
 

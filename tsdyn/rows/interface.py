@@ -11,6 +11,7 @@ Factorise:
 Solve:
     solve_rows              b <- S^-1 b             solve_product           b <- N^-1 b
     multiply_rows           out = H Z               apply_multipliers       Z <- Z - Y^T lam
+    find_correction         lam = S^-1 b, Z = -Y^T lam
     project                 lam = S^-1 H Z, Z <- Z - Y^T lam
     constrain               lam = S^-1 (H Z + c), Z <- Z - Y^T lam
     constrain_accelerations the same with axis rows, for Z = W F and c = gamma
@@ -48,6 +49,7 @@ from .schur_complement import (
     constrain,
     constrain_accelerations,
     factorise_selected_rows,
+    find_correction,
     inner,
     multiply_rates,
     multiply_rows,
@@ -92,6 +94,7 @@ __all__ = [
     "factorise_product",
     "factorise_rows",
     "factorise_selected_rows",
+    "find_correction",
     "inner",
     "is_axis",
     "is_near_singular",

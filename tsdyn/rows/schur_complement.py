@@ -7,21 +7,6 @@ from ..elements.loops.body_poses import POSE, RD
 from ..jit.kernels import kernel
 from ..jit.simd import add, fma, four, get, let, put, splat, times, total
 from ..sparse.constraint_graph import (
-    H_BODY,
-    H_COLUMNS,
-    H_KIND,
-    H_LEFT,
-    H_RIGHT,
-    H_ROWS,
-    H_STRIDE,
-    H_TARGET,
-    P_COLUMNS,
-    P_LEFT,
-    P_RIGHT,
-    P_ROWS,
-    P_SAME,
-    P_STRIDE,
-    P_TARGET,
     ROWS,
     ROWS_WELD,
     W_MASS,
@@ -94,10 +79,9 @@ def form_schur_complement(network, H, Y, values):
         let(values, i, 0.0)
     for i in range(products.shape[0]):
         product = products[i]
-        left, right = get(product, P_LEFT), get(product, P_RIGHT)
-        target, stride = get(product, P_TARGET), get(product, P_STRIDE)
-        rows, columns = get(product, P_ROWS), get(product, P_COLUMNS)
-        if get(product, P_SAME) != 0:
+        left, right, rows, columns = product.left, product.right, product.rows, product.columns
+        target, stride = product.target, product.stride
+        if product.same != 0:
             for r in range(rows):
                 for c in range(r, columns):
                     more(values, target + c, inner_both(H, left + 16 * r, Y, right + 16 * c))
@@ -116,8 +100,8 @@ def _multiply_parts(network, H, Y, values):
     """Add the products at the parts of split bodies."""
     for i in range(network.parts.shape[0]):
         part, scale = network.parts[i], network.scales[i]
-        left, rows, right, columns = part[H_LEFT], part[H_ROWS], part[H_RIGHT], part[H_COLUMNS]
-        target, stride, kind, weights = part[H_TARGET], part[H_STRIDE], part[H_KIND], WEIGHTS * part[H_BODY]
+        left, rows, right, columns = part.left, part.rows, part.right, part.columns
+        target, stride, kind, weights = part.target, part.stride, part.kind, WEIGHTS * part.body
         for r in range(rows):
             for c in range(columns):
                 if kind == ROWS:
@@ -201,6 +185,18 @@ def multiply_rates(network, rows, poses, out):
 def apply_multipliers(network, rows, lam, Z):
     """Z <- Z - Y^T lam."""
     _scatter(network, rows.Y, lam, Z)
+
+
+@kernel
+def find_correction(network, rows, b, Z):
+    """Smallest Z in the metric with H Z = -b; b becomes its multipliers.
+
+    b <- S^-1 b,    Z = -Y^T b
+    """
+    solve(network.pattern, rows.S, b)
+    for i in range(Z.size):
+        Z[i] = 0.0
+    _scatter(network, rows.Y, b, Z)
 
 
 @kernel

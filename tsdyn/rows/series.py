@@ -4,7 +4,7 @@ from ..jit.kernels import kernel
 from .axis_rows import add_axis_multipliers, gather_axes
 from .evaluation import clear_welds
 from .redundant_rows import clear_redundant
-from .schur_complement import apply_multipliers, solve_rows
+from .schur_complement import find_correction
 
 
 @kernel
@@ -21,7 +21,4 @@ def solve_series(network, f, omega, at, stride, k, correction):
     if correction:
         add_axis_multipliers(network, f.gamma, f.b)
     clear_redundant(f, f.b)
-    solve_rows(network, f.rows, f.b)
-    for i in range(f.Z.size):
-        f.Z[i] = 0.0
-    apply_multipliers(network, f.rows, f.b, f.Z)
+    find_correction(network, f.rows, f.b, f.Z)

@@ -6,7 +6,6 @@ from ..formulations.chart_validity import AT_START
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import copy
 from ..rows.interface import is_next_to_singular, note_indicator
-from ..workspaces.workspace import CONDITION, CONTRACTION
 from .run_state import CHART_ROWS, IN_CHART, MAY_PASS, T
 from .trajectory import A_CHART, call_chart
 
@@ -20,7 +19,7 @@ def begin_chart(context, c, r, log, at, reason):
     w, i = c.work, r.numbers[CHART_ROWS]
     if reason != AT_START:
         row = log.charts[i]
-        row[2], row[3], row[4] = w.control[CONDITION], w.control[CONTRACTION], r.numbers[IN_CHART]
+        row[2], row[3], row[4] = w.control.condition, w.control.contraction, r.numbers[IN_CHART]
         i += 1
         r.numbers[CHART_ROWS] = i
     log.charts[i, 0], log.charts[i, 1] = r.clock[T], reason

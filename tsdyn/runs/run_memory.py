@@ -7,7 +7,7 @@ from ..jit.kernels import resident
 from ..methods.diagonally_implicit import prepare_implicit
 from ..model.packed import System
 from ..rows.interface import redundancy, reset_selection
-from ..workspaces.workspace import B_TOL, SIZE, U_TOL, Context, allocate, allocate_linear, basis_free_parts
+from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
 from .run_state import (
     ADAPTIVE,
     ATOL,
@@ -75,8 +75,8 @@ class Memory:
             linear = linear._replace(now=self.run.now, before=self.run.before)
         self.settle(Context(system, self.work, linear, *basis_free_parts(network, n, not self.basis_free)))
         self.addresses = np.zeros(12, np.int64)
-        self._written = [self.work.q.base, self.work.counters, self.run.x.base, self.run.numbers]
-        self._written += [linear.numbers.base, linear.pivots, linear.kernels, self.context.local.numbers]
+        self._written = [self.work.q.base, self.run.x.base, self.run.numbers]
+        self._written += [linear.numbers.base, linear.pivots, linear.kernels]
         self._run, *self._keep_run = resident(self.run)
         self.nbytes = sum(array.nbytes for array in (*self._written, self.context.free.rows.S, self.context.free.poses))
 
@@ -94,6 +94,8 @@ class Memory:
         """As if it were new, for this task: whatever a run before has left behind is gone."""
         for array in self._written:
             array.fill(0)
+        for record in (self.work.control, self.work.counters, self.context.local.state):
+            record.clear()
         reset_selection(self.network, self.context.free)
         system, work = self.context.system, self.work
         source, _ = task.prepared.system(self.implicit)
@@ -108,8 +110,8 @@ class Memory:
         work.q[:], work.qd[:] = task.q, task.qd
         self.run.now[0], self.run.now[1] = task.q, task.qd
         control = work.control
-        control[U_TOL] = control[B_TOL] = task.constraint_tol
-        control[SIZE] = task.prepared.packed.size
+        control.u_tol = control.b_tol = task.constraint_tol
+        control.size = task.prepared.packed.size
 
     def give_method(self, task, tableau, steps, dense, addresses):
         """The numbers of the method and what it is to do; steps is None for an adaptive run."""

@@ -4,22 +4,6 @@ import numpy as np
 
 from ..errors import Status
 from ..formulations.registry import formulation
-from ..workspaces.workspace import (
-    AT_ROUNDING,
-    B_ITERATIONS,
-    CHARTS,
-    CONDITION,
-    CONTRACTION,
-    EVALUATIONS,
-    FACTORIZATIONS,
-    ITERATION_MATRICES,
-    JACOBIANS,
-    KEPT,
-    NEWTON,
-    PLACEMENTS,
-    STAGE_ITERATIONS,
-    UNVERIFIED,
-)
 from .arguments import step_count
 from .run_memory import Memory
 from .run_state import CHART_ROWS, FILLED, IN_CHART, LANDED, MAY_PASS, NEAR_STEPS, REJECTED, STEPS, STIFF, STORED
@@ -61,7 +45,7 @@ def run_steps(task, observe=None, relay=None):
     driven = drive_part(memory, task, relay or Relay(), reading)
     recorded = driven.recorded
     charts = recorded.charts[: run.numbers[CHART_ROWS] + 1].copy()
-    charts[-1, 2:] = control[CONDITION], control[CONTRACTION], run.numbers[IN_CHART]
+    charts[-1, 2:] = control.condition, control.contraction, run.numbers[IN_CHART]
     last = run.now.copy()
     trajectory = None
     if task.dense_output:
@@ -70,7 +54,7 @@ def run_steps(task, observe=None, relay=None):
         sides = task.span[0], last, task.angles, task.stops
         trajectory = Trajectory(reading, again, recorded.blocks, charts, points, *sides)
     counted = counts(
-        run, memory.work.counters.tolist(), packed, *((prepared.spheres, prepared.still) if form.basis_free else (0, 0))
+        run, memory.work.counters, packed, *((prepared.spheres, prepared.still) if form.basis_free else (0, 0))
     )
     outcome = driven.outcome(task, run, charts, counted, trajectory)
     if observe is None and outcome.status != Status.NOT_FINITE:  # NaN may be left in what a run takes as its own
@@ -115,25 +99,25 @@ def counts(run, counters, packed, no_spin, no_turn, constant_columns=0):
 
     Of what each evaluation skips: the torques of no_spin bodies, the rotations of no_turn, so many columns of markers.
     """
-    numbers, evaluations = run.numbers, counters[EVALUATIONS]
+    numbers, evaluations = run.numbers, counters.evaluations
     return {
         "steps": int(numbers[STEPS]),
         "rejected": int(numbers[REJECTED]),
         "evaluations": evaluations,
-        "placements": counters[PLACEMENTS],
-        "newton_iterations": counters[NEWTON],
-        "b_iterations": counters[B_ITERATIONS],
-        "charts": counters[CHARTS],
-        "factorizations": counters[FACTORIZATIONS],
+        "placements": counters.placements,
+        "newton_iterations": counters.newton,
+        "b_iterations": counters.b_iterations,
+        "charts": counters.charts,
+        "factorizations": counters.factorizations,
         "stiff": bool(numbers[STIFF]),
         "steps_near_singular": int(numbers[NEAR_STEPS]),
         "largest_landing": float(run.clock[LANDED]),
-        "jacobians": counters[JACOBIANS],
-        "iteration_matrices": counters[ITERATION_MATRICES],
-        "stage_iterations": counters[STAGE_ITERATIONS],
-        "solves_skipped": counters[AT_ROUNDING],
-        "checks_skipped": counters[UNVERIFIED],
-        "factorizations_skipped": counters[KEPT] + counters[STAGE_ITERATIONS] - counters[ITERATION_MATRICES],
+        "jacobians": counters.jacobians,
+        "iteration_matrices": counters.iteration_matrices,
+        "stage_iterations": counters.stage_iterations,
+        "solves_skipped": counters.at_rounding,
+        "checks_skipped": counters.unverified,
+        "factorizations_skipped": counters.kept + counters.stage_iterations - counters.iteration_matrices,
         "gyroscopic_skipped": no_spin * evaluations,
         "rotations_skipped": no_turn * evaluations,
         "columns_skipped": constant_columns * evaluations,

@@ -15,7 +15,7 @@ from ..methods.explicit import call_step
 from ..model.equations import is_rheonomic, remember, set_time
 from ..model.joint_turns import count_turns
 from ..rows.interface import is_singular_within_a_step
-from ..workspaces.workspace import CONTRACTION, load
+from ..workspaces.workspace import load
 from .breakpoints import SHORT, amend, cut_fixed, is_sampled, next_stop, take_pieces
 from .chart_changes import begin_chart, has_hardly_turned
 from .outputs import record, restore_now, store_now
@@ -283,7 +283,7 @@ def advance(context, run, log, at, most):
         reason = 0
         if status == 0:
             reason = call_check(at[A_CHECK], context)
-            if not w.control[CONTRACTION] < CONTRACTION_LOST or (driven and too_far(c.system.bodies, r.now, w.qd, h)):
+            if not w.control.contraction < CONTRACTION_LOST or (driven and too_far(c.system.bodies, r.now, w.qd, h)):
                 status = CHART_LOST
         if status != 0:
             status = _change_chart(context, c, r, log, at, h, status, driven)

@@ -12,7 +12,7 @@ from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import call_accelerate, call_place
 from ..methods.interpolants import call_value
 from ..rows.interface import redundancy
-from ..workspaces.workspace import RATE, Context, allocate, allocate_linear, basis_free_parts, load
+from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts, load
 
 NOT_FINITE = int(Status.NOT_FINITE)
 # addresses that the driver and the reader are given
@@ -87,9 +87,9 @@ def _warm(w, store, out):
                     part[a, b] = store[i]
                 i += 1
     if out:
-        store[i] = w.control[RATE]
+        store[i] = w.control.rate
     else:
-        w.control[RATE] = store[i]
+        w.control.rate = store[i]
 
 
 def warm_size(work):

@@ -15,10 +15,10 @@ from ..elements.loops.constraint_rows import BODY, INTS, MASK, ROW
 from ..model.packed_friction import frictions_of
 from .body_splitting import cut
 from .constraint_graph import (
-    H_WIDTH,
     N_COLUMNS,
     N_COUNT,
-    P_WIDTH,
+    PART_PRODUCT,
+    PRODUCT,
     ROWS,
     ROWS_WELD,
     W_MASS,
@@ -154,7 +154,7 @@ class _Builder:
                 for j, other in found:
                     if self.firsts[i] < self.firsts[j]:
                         products.append((*self._product(i, side, j, other), 0))
-        return np.array(products, np.int64).reshape(-1, P_WIDTH)
+        return np.array(products, PRODUCT)
 
     def _products_at_hubs(self):
         """Network.parts and Network.scales: products at the parts of hubs, and with the welds between these."""
@@ -180,7 +180,7 @@ class _Builder:
                     if not after:
                         products.append((0, count, 0, count, target, stride, WELDS, part.body))
                         scales.append(sign * other_sign * part.scale)
-        return np.array(products, np.int64).reshape(-1, H_WIDTH), np.array(scales, float)
+        return np.array(products, PART_PRODUCT), np.array(scales, float)
 
     def _welds(self):
         rows = [
@@ -207,7 +207,7 @@ class _Builder:
         ]
         counts = [joint.constraint.rows for joint in self.joints]
         axes = axes_of(shares, self.lean, counts, self.inside, self.starts, self.where)
-        self.sides[axes.rows[:, 0], 0] = axes.rows[:, 1]
+        self.sides[axes.rows["row"], 0] = axes.rows["body"]
         return axes
 
     def _kinds(self, index):

@@ -27,7 +27,7 @@ from ..runs.run_state import (
 from ..runs.trajectory import B_DATA
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import with_loops
-from ..workspaces.workspace import SIZE, U_TOL, plain_work
+from ..workspaces.workspace import plain_work
 from .layout import allocate_expansion, masks
 from .step_parts import PASS, STEPS, pass_singular
 from .stepper import advance_series
@@ -106,9 +106,9 @@ class SeriesMemory:
         reset_selection(self.series.network, self.context.free)
         numbers.fill(0)
         clock.fill(0.0)
-        work.counters.fill(0)
+        work.counters.clear()
         work.q[:], work.qd[:] = task.q, task.qd
-        work.control[U_TOL], work.control[SIZE] = task.constraint_tol, task.prepared.packed.size
+        work.control.u_tol, work.control.size = task.constraint_tol, task.prepared.packed.size
         clock[T] = clock[T_ORIGIN] = task.span[0]
         method = task.method
         clock[T_END], clock[MAX_STEP] = task.span[1], method.max_step or np.inf

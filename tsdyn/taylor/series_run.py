@@ -66,7 +66,7 @@ def run_series(task, observe=None, relay=None, past=None):
         again, sides = (read_again, packed, order[2]), (task.span[0], last, task.angles, task.stops)
         trajectory = Trajectory(reading, again, recorded.blocks, charts, recorded.points, *sides)
     counted = counts(
-        run, memory.work.counters.tolist(), packed, prepared.spheres, prepared.still, prepared.series.constant_columns
+        run, memory.work.counters, packed, prepared.spheres, prepared.still, prepared.series.constant_columns
     )
     outcome = driven.outcome(task, run, charts, counted, trajectory)
     if observe is None and outcome.status != Status.NOT_FINITE:  # NaN may be left in what a run takes as its own

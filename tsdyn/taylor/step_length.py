@@ -8,7 +8,6 @@ from ..jit.kernels import kernel
 from ..jit.simd import first, four, larger, second, splat, third
 from ..rows.interface import is_near_singular
 from ..runs.run_state import ATOL, RTOL
-from ..workspaces.workspace import FLOOR, SIZE
 from .workspace import HIGHEST, LOWEST, NEXT, ORDERS, TOP
 
 LEAST_ORDER = 5  # of the series of a step past such a place
@@ -60,7 +59,7 @@ def weights(c, r):
         at = b * orders * BODY_ROW
         far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
     far, fast = _most(far), _most(fast)
-    c.work.control[FLOOR] = ROUNDING * (c.work.control[SIZE] + far)
+    c.work.control.floor = ROUNDING * (c.work.control.size + far)
     tol = atol + rtol
     return tol / (atol + rtol * far), tol / (atol + rtol * fast)
 

@@ -48,7 +48,6 @@ from ..runs.run_state import (
 )
 from ..runs.step_control import gets_on, stretch
 from ..runs.trajectory import B_CHART, B_DATA, B_END, B_H, B_START
-from ..workspaces.workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
 from .breakpoints import cross_stop, lower_order
 from .step_length import is_near, longest, loosest, radius, step_length, weights
 from .step_parts import EXPAND, PASS, REACH, call_expand, call_reach, is_next_to_singular, state_within
@@ -114,7 +113,7 @@ def _accept(context, c, r, log, steps, t, ended):
 def _open_chart(w, r, log, t, reason):
     row = log.charts[r.numbers[CHART_ROWS]]
     row[0], row[1], row[2], row[3], row[4] = t, reason, 1.0, 0.0, 0.0
-    w.counters[CHARTS] += 1
+    w.counters.charts += 1
 
 
 @kernel
@@ -135,7 +134,7 @@ def _begin_run(context, c, r, log, steps):
     largest = 0.0
     for i in range(w.q.size):
         largest = max(largest, abs(w.q[i]))
-    w.control[FLOOR] = ROUNDING * (w.control[SIZE] + largest)
+    w.control.floor = ROUNDING * (w.control.size + largest)
     copy(w.q, r.now[0])
     copy(w.qd, r.now[1])
     status = _stand_at(context, c, r.now, r.clock[T], steps)
@@ -179,7 +178,7 @@ def _fastest(c):
 @kernel
 def _watch(c, r, h):
     """Return True if the motion is found stiff: many steps in which nothing rotates or moves far."""
-    far, p = SMALL * c.work.control[FLOOR] / (ROUNDING * h), c.free.poses
+    far, p = SMALL * c.work.control.floor / (ROUNDING * h), c.free.poses
     for b in range(c.network.bodies.shape[0]):
         at = b * POSE
         for i in range(3):
@@ -222,7 +221,7 @@ def advance_series(context, run, log, steps, most):
         x.order[TOP] = x.order[NEXT]
         for k in range(1, x.order[TOP]):
             call_expand(steps[EXPAND], context, k)
-        w.counters[EVALUATIONS] += x.order[TOP]
+        w.counters.evaluations += x.order[TOP]
         h, t1, last, shorter, highest, wanted = step_length(c, r), t0, False, 0, x.order[TOP], tol
         if adaptive and is_near_singular(f, f.indicator.start):
             wanted = max(TIGHTER * tol, min(tol, TIGHTEST))
@@ -262,7 +261,7 @@ def advance_series(context, run, log, steps, most):
                     call_expand(steps[EXPAND], context, 0)
                     return PASSAGE if status == 0 else status
                 status, way = call_reach(steps[PASS], context, t1, t1 - t0), PASS
-            landed = status == 0 and (not adaptive or f.landing.residual <= MISSED * (wanted + w.control[FLOOR]))
+            landed = status == 0 and (not adaptive or f.landing.residual <= MISSED * (wanted + w.control.floor))
             if landed:
                 f.indicator.end = singularity_indicator(c.network, f.rows)
             if landed and (not adaptive or shorter == AVOIDING or last):

@@ -9,7 +9,7 @@ from ..jit.kernels import entry, resident
 from ..maths.dense_linalg import copy
 from ..rows.interface import allocate_free
 from ..runs.trajectory import B_DATA, B_START
-from ..workspaces.workspace import FLOOR, SIZE, plain_work
+from ..workspaces.workspace import plain_work
 from .step_parts import state_within
 from .workspace import NUMBERS, ORDERS, TOP, Expansion, SeriesContext, load_series
 
@@ -30,7 +30,7 @@ def read_series(context, steps, t, rows, blocks, out):
         largest = 0.0
         for j in range(w.q.size):
             largest = max(largest, abs(w.q[j]))
-        w.control[FLOOR] = ROUNDING * (w.control[SIZE] + largest)
+        w.control.floor = ROUNDING * (w.control.size + largest)
         place_bodies(c.network.bodies, w.q, c.free.poses)  # which of p and -p is meant
         status = state_within(context, steps, t[i], t[i] - block[B_START])
         if status != 0:
@@ -64,7 +64,7 @@ class SeriesReader:
         system = system._replace(reals=system.reals.copy())
         n = int(system.bodies[:, 1].sum())
         work = plain_work(n)
-        work.control[SIZE] = size
+        work.control.size = size
         none, whole, table = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0), np.int64)
         bodies = np.zeros((len(network.bodies) + 1) * 24 * orders)
         order = np.zeros(NUMBERS, np.int64)

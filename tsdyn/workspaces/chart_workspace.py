@@ -11,7 +11,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..jit.aligned_arrays import zeros
+from ..jit.kernels import Record
 from ..rows.interface import Rows, allocate_rows
+
+
+class ChartState(Record):
+    """What is known at the present configuration."""
+
+    time: float  # of the last position solve
+    factored: int  # 1 if lower and upper hold factors of N
+    off: float  # error of these factors at the configuration itself, relative
+    placement: int  # number of the position solve at the end of the last step; 0 if the chart is of no use
 
 
 class Local(NamedTuple):
@@ -26,12 +36,7 @@ class Local(NamedTuple):
     lower: np.ndarray  # factors of N = H C Y0; chart_matrix.factorise_chart_matrix
     upper: np.ndarray
     drift: np.ndarray  # (m,)  Phi_t
-    numbers: np.ndarray  # (NUMBERS,)  below
-
-
-# the time last placed at; whether lower and upper hold factors, and by how much of N they are off at the place itself;
-# the count of placements at the last step's end
-TIME, FACTORED, OFF, END, NUMBERS = range(5)
+    state: ChartState
 
 
 def allocate_local(network):
@@ -42,5 +47,5 @@ def allocate_local(network):
     base[4::8] = 1.0
     return Local(
         base, zeros(4 * (nb + 1)), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)),
-        allocate_rows(network), zeros(16 * m), zeros(size), zeros(size), zeros(m), zeros(NUMBERS),
+        allocate_rows(network), zeros(16 * m), zeros(size), zeros(size), zeros(m), ChartState(),
     )  # fmt: skip

@@ -5,11 +5,40 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit.kernels import loader
+from ..jit.kernels import Record, loader
 from ..model.packed import System
 from ..rows.interface import Free, allocate_free
 from ..sparse.constraint_graph import Network, no_network
 from .chart_workspace import Local, allocate_local
+
+
+class Control(Record):
+    """Tolerances, and criteria of the present chart."""
+
+    u_tol: float  # |Phi| of the position solve, Eq. 29
+    b_tol: float  # ||Phi_q U B - I||, Eq. 28
+    size: float  # of the numbers that enter Phi, m
+    floor: float  # |Phi| that rounding leaves
+    rate: float  # of Newton's method for positions: of residuals, in the tangent form over the residual
+    contraction: float  # of the chart, dimensionless; chart_validity.py
+    condition: float  # of N as far as the contraction says
+
+
+class Counters(Record):
+    """How often it was done in a run."""
+
+    evaluations: int  # of accelerations
+    placements: int  # of position solves
+    newton: int  # sweeps of Eq. 29
+    b_iterations: int  # of Eq. 28
+    factorizations: int
+    charts: int
+    jacobians: int  # of implicit methods
+    iteration_matrices: int
+    stage_iterations: int
+    at_rounding: int  # position solves that started at rounding
+    unverified: int  # corrections that were known to suffice
+    kept: int  # factorisations whose older factors served
 
 
 class Work(NamedTuple):
@@ -44,14 +73,9 @@ class Work(NamedTuple):
     Q: np.ndarray  # (n,)    applied forces without gravity; null_space.reduced_acceleration
     h: np.ndarray  # (n,)    -U B gamma; null_space.reduced_acceleration
     householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; dense_linalg.null_space
-    control: np.ndarray  # (CONTROLS,)  tolerances and criteria, below
-    counters: np.ndarray  # int64 (COUNTERS,)  what was done how often, below
+    control: Control
+    counters: Counters
     redundant: np.ndarray  # int64 (d + 1,)  number of redundant rows of Phi, and which; dense_rows.take_selection
-
-
-U_TOL, B_TOL, SIZE, FLOOR, RATE, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(9)
-EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS = range(6)
-JACOBIANS, ITERATION_MATRICES, STAGE_ITERATIONS, AT_ROUNDING, UNVERIFIED, KEPT, COUNTERS = range(6, 13)
 
 
 ROOM = 16  # for implicit.KERNELS addresses and implicit.NUMBERS floats
@@ -142,11 +166,10 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "v": (k,),
         "E": (3 * bodies, k),
         "A": (k, k),
-        "control": (CONTROLS,),
     }
-    work = Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), redundant=np.zeros(redundant + 1, np.int64))
-    work.control[U_TOL] = work.control[B_TOL] = constraint_tol
-    work.control[SIZE] = size
+    work = Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(redundant + 1, np.int64))
+    work.control.u_tol = work.control.b_tol = constraint_tol
+    work.control.size = size
     return work
 
 
@@ -192,10 +215,10 @@ load = loader(plain_context())
 
 def plain_work(n):
     """A `Work` for n coordinates that has no matrices."""
-    whole = ("counters", "redundant")
-    shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name not in whole}
-    shapes |= {"q": (n,), "qd": (n,), "qdd": (n,), "control": (CONTROLS,)}
-    return Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), redundant=np.zeros(1, np.int64))
+    others = ("control", "counters", "redundant")
+    shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name not in others}
+    shapes |= {"q": (n,), "qd": (n,), "qdd": (n,)}
+    return Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(1, np.int64))
 
 
 def parts(system, network, n):

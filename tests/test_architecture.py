@@ -20,6 +20,7 @@ ORDER = [
     "_version",
     "validation",
     "calls",
+    "docstrings",
     "drawing",
     "jit",
     "maths",

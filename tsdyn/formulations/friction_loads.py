@@ -3,7 +3,6 @@
 from ..elements.loops.forces import INTS
 from ..elements.loops.friction import call_normal_load, call_unit_friction
 from ..jit.kernels import caller, kernel
-from ..model.packed_forces import F_FIRST_INT, F_FIRST_REAL, F_REALS
 from ..model.packed_friction import FR_INDEX, FR_KIND, FR_NORMAL, FR_ON, FR_UNIT
 from .tolerances import DAMPED, DAMPED_SHARE
 
@@ -15,8 +14,8 @@ call_rub = caller(RUB)
 def _instance(system, friction):
     """Floats of the instance; where its table and its floats begin."""
     kind = system.forces[friction[FR_KIND]]
-    stride = kind[F_REALS]
-    return stride, kind[F_FIRST_INT] + INTS * friction[FR_INDEX], kind[F_FIRST_REAL] + stride * friction[FR_INDEX]
+    index = friction[FR_INDEX]
+    return kind.stride, kind.table + INTS * index, kind.reals + kind.stride * index
 
 
 @kernel

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from ..elements.loops.body_poses import place_bodies, take_loads
+from ..elements.loops.body_poses import take_loads
 from ..formulations.friction_solve import find_reactions
 from ..jit.kernels import entry, resident
-from ..model.equations import set_time
-from ..rows.interface import METRIC, evaluate_rows, factorise_rows, weigh_bodies
+from ..rows.interface import weigh_bodies
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
+from .factorised_rows import factorise_at
 from .generalised_forces import applied_loads, inertial_forces, velocity_forces
 
 
@@ -21,13 +21,9 @@ def _solve(context, t, q, qd, r, out):
     """
     c = load_parts(context)
     network, s, f = c.network, c.system, c.free
-    bodies = network.bodies
     for k in range(t.size):
-        set_time(s, t[k])
-        place_bodies(bodies, q[k], f.poses)
-        evaluate_rows(network, s, f, f.rows, t[k])
-        found = factorise_rows(network, s, f, f.rows, t[k], METRIC)
-        take_loads(bodies, q[k], r[k], f.Z)
+        found = factorise_at(network, s, f, t[k], q[k])
+        take_loads(network.bodies, q[k], r[k], f.Z)
         weigh_bodies(network, f.Z)
         for e in range(f.gamma.size):
             f.gamma[e] = 0.0

@@ -8,23 +8,13 @@ import math
 
 import numpy as np
 
-from ..elements.loops.body_poses import place_bodies
 from ..jit.kernels import entry, long_kernel, resident
-from ..model.equations import set_time
 from ..model.packed import index_of
-from ..rows.interface import (
-    METRIC,
-    Rows,
-    count_self_stresses,
-    evaluate_every_row,
-    evaluate_rows,
-    factorise_rows,
-    redundancy,
-    self_stress,
-)
+from ..rows.interface import Rows, count_self_stresses, evaluate_every_row, redundancy, self_stress
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
+from .factorised_rows import factorise_at
 
 NEXT_TO_NOTHING = 1e-7  # of the rows' own size
 
@@ -32,10 +22,7 @@ NEXT_TO_NOTHING = 1e-7  # of the rows' own size
 @long_kernel
 def find_rows(network, s, f, q, t, whole):
     """H at q without redundant rows and, in `whole`, with them, and the factors of S; False if S is singular."""
-    set_time(s, t)
-    place_bodies(network.bodies, q, f.poses)
-    evaluate_rows(network, s, f, f.rows, t)
-    regular = factorise_rows(network, s, f, f.rows, t, METRIC)
+    regular = factorise_at(network, s, f, t, q)
     evaluate_every_row(network, s, f, Rows(whole, f.rows.Y, f.rows.S), t)
     return regular
 

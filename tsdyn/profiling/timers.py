@@ -44,6 +44,28 @@ from ..taylor.step_parts import call_expand, call_reach
 # what may run: the driver, and what it and others call; ROWS is any loop over constraints or forces
 DRIVER, PLACE, ACCELERATE, COMPLETE, CHECK, CHART, STEP, NORM = range(8)
 LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, EXPAND, REACH, ROWS, ROLES = range(8, 17)
+# roles of the addresses that drivers are given, in their order; 0 for what has no timer
+OF_STEPS = (
+    PLACE,
+    ACCELERATE,
+    COMPLETE,
+    CHECK,
+    CHART,
+    STEP,
+    0,
+    0,
+    NORM,
+)
+OF_STAGES = (
+    LINEARISE,
+    REDUCE,
+    FACTORISE,
+    SOLVE,
+    SOFTEN,
+    COMPLETE,
+    NORM,
+)
+OF_SERIES = (EXPAND, REACH)
 # the notes: the clock where the processor has none, what it is given first, what it writes, the factor of its first
 # number; the time last read; the slot and role of what runs in what; addresses that timers stand for; then the slots:
 # pairs of calls and time

@@ -9,19 +9,41 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..jit.kernels import Record, records
 from ..model.packed_friction import FR_COLUMNS
 from .massless_axes import Axes, no_axes
 from .panels import Pattern
-from .record_types import record_type
 from .symbolic import analyse
 
 # columns of Network.kinds: addresses of the loops, then where a kind's instances are
 REDUCED, VALUES, BIAS, DRIFT, N_COUNT, N_REALS, N_FIRST_INT, N_FIRST_REAL, N_COLUMNS = range(9)
-# H Y^T of two constraints: where their sides begin in H, how many rows they have; where the product goes, the length of
-# its row there; `same`: 1 for the product of a constraint with itself, on both sides
-PRODUCT = record_type("left", "rows", "right", "columns", "target", "stride", "same")
-# the same at a part of a split body: the kind of product, and which body
-PART_PRODUCT = record_type("left", "rows", "right", "columns", "target", "stride", "kind", "body")
+
+
+class Product(Record):
+    """H Y^T of two constraints at a body; of one with itself, at both."""
+
+    left: int  # where the sides of the two constraints begin in H, and how many rows they have
+    rows: int
+    right: int
+    columns: int
+    target: int  # where the product goes in S
+    stride: int  # length of a row there
+    same: int  # 1 for a constraint with itself
+
+
+class PartProduct(Record):
+    """The same at a part of a split body."""
+
+    left: int
+    rows: int
+    right: int
+    columns: int
+    target: int
+    stride: int
+    kind: int
+    body: int
+
+
 ROWS, ROWS_WELD, WELD_ROWS, WELDS = range(4)  # kinds
 W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
 
@@ -34,13 +56,13 @@ class Network(NamedTuple):
     table: np.ndarray  # int64: constraint_rows.INTS for each instance
     sides: np.ndarray  # int64 (m, 2): the bodies of a row; nb is the ground
     row: np.ndarray  # int64 (m,): its place among the rows of Phi; -1 for a weld's or an axis's
-    products: np.ndarray  # PRODUCT (products,): rows of sides that meet at a body, and where their product goes
+    products: np.ndarray  # Product (products,): rows of sides that meet at a body, and where their product goes
     inverse: np.ndarray  # ((nb + 1) 16,): 1 / m and three zeros, columns of J'^-1; zero for the ground
     mass: np.ndarray  # ((nb + 1) 16,): m and three zeros, columns of J'
     spins: np.ndarray  # int64 (nb,): whether omega' x J' omega' is ever other than zero
     pattern: Pattern  # of S
     normals: np.ndarray  # int64 (nb,): the row of Phi that normalises a body's p, or -1
-    parts: np.ndarray  # PART_PRODUCT (products,): the products at the parts of hubs, see body_splitting.py
+    parts: np.ndarray  # PartProduct (products,): the products at the parts of hubs, see body_splitting.py
     scales: np.ndarray  # (products,): what they are multiplied by
     welds: np.ndarray  # int64 (rows of welds, 2): which row, of which body
     diagonal: np.ndarray  # int64 (m,): where the diagonal entry of a row is in a value array of the pattern
@@ -57,7 +79,7 @@ def no_network():
     """The network of nothing, for its type."""
     none, pattern = np.zeros(0, np.int64), analyse([], [])[1]
     pairs = np.zeros((0, 2), np.int64)
-    kinds, products, parts = np.zeros((0, N_COLUMNS), np.int64), np.zeros(0, PRODUCT), np.zeros(0, PART_PRODUCT)
+    kinds, products, parts = np.zeros((0, N_COLUMNS), np.int64), records(Product), records(PartProduct)
     return Network(
         pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none, parts, np.zeros(0),
         pairs, none, none, np.zeros((0, FR_COLUMNS), np.int64), pairs, np.zeros(1, np.int64),

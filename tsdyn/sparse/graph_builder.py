@@ -12,13 +12,12 @@ import numpy as np
 
 from ..elements.loops.body_poses import STILL
 from ..elements.loops.constraint_rows import BODY, INTS, MASK, ROW
+from ..jit.kernels import records
 from ..model.packed_friction import frictions_of
 from .body_splitting import cut
 from .constraint_graph import (
     N_COLUMNS,
     N_COUNT,
-    PART_PRODUCT,
-    PRODUCT,
     ROWS,
     ROWS_WELD,
     W_MASS,
@@ -27,6 +26,8 @@ from .constraint_graph import (
     WELD_ROWS,
     WELDS,
     Network,
+    PartProduct,
+    Product,
 )
 from .massless_axes import Share, axes_of, inverses, lean_bodies
 from .symbolic import analyse
@@ -154,7 +155,7 @@ class _Builder:
                 for j, other in found:
                     if self.firsts[i] < self.firsts[j]:
                         products.append((*self._product(i, side, j, other), 0))
-        return np.array(products, PRODUCT)
+        return records(Product, products)
 
     def _products_at_hubs(self):
         """Network.parts and Network.scales: products at the parts of hubs, and with the welds between these."""
@@ -180,7 +181,7 @@ class _Builder:
                     if not after:
                         products.append((0, count, 0, count, target, stride, WELDS, part.body))
                         scales.append(sign * other_sign * part.scale)
-        return np.array(products, PART_PRODUCT), np.array(scales, float)
+        return records(PartProduct, products), np.array(scales, float)
 
     def _welds(self):
         rows = [
@@ -217,7 +218,7 @@ class _Builder:
         for kind, packed_kind in zip(classes, self.system.kinds, strict=True):
             if kind.normalises:
                 continue
-            _, _, _, phi_t, _, stride, _, first_real, _ = packed_kind
+            phi_t, stride, first_real = packed_kind.phi_t, packed_kind.stride, packed_kind.reals
             last = None  # the instance before, where it is not left out
             for at, constraint in enumerate(c for c in self.packed.constraints if type(c) is kind):
                 i = index.get(id(constraint))

@@ -16,12 +16,25 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.markers import POINT
-from .record_types import record_type
+from ..jit.kernels import Record, records
 from .tolerances import GIVEN, NONE, THIN
 
-AXIS = record_type("row", "body")  # the row in order of elimination, the body
-# product with a row: which axis, where the row's side begins in H, or -1 - component of a weld; where the product goes
-AXIS_PRODUCT = record_type("axis", "side", "target")
+
+class Axis(Record):
+    """An axis row."""
+
+    row: int  # in order of elimination
+    body: int
+
+
+class AxisProduct(Record):
+    """Product of an axis row with another row at its body."""
+
+    axis: int
+    side: int  # where the row's side begins in H, or -1 - component of a weld
+    target: int  # where the product goes in S
+
+
 # columns of Axes.values: c e; (J' + j e e^T)^-1 c e; the diagonal entry
 AXIS_H, AXIS_Y, AXIS_OWN, AXIS_WIDTH = 0, 4, 8, 12
 
@@ -29,9 +42,9 @@ AXIS_H, AXIS_Y, AXIS_OWN, AXIS_WIDTH = 0, 4, 8, 12
 class Axes(NamedTuple):
     """The axis rows of a network."""
 
-    rows: np.ndarray  # AXIS (axes,)
+    rows: np.ndarray  # Axis (axes,)
     values: np.ndarray  # (axes, AXIS_WIDTH)
-    products: np.ndarray  # AXIS_PRODUCT (products,)
+    products: np.ndarray  # AxisProduct (products,)
     scales: np.ndarray  # (products,): what a product is multiplied by
 
 
@@ -89,7 +102,7 @@ class Share(NamedTuple):
 
 def no_axes():
     """The `Axes` of a network without lean bodies."""
-    return Axes(np.zeros(0, AXIS), np.zeros((0, AXIS_WIDTH)), np.zeros(0, AXIS_PRODUCT), np.zeros(0))
+    return Axes(records(Axis), np.zeros((0, AXIS_WIDTH)), records(AxisProduct), np.zeros(0))
 
 
 def axis_of(axes, row):
@@ -133,8 +146,8 @@ def axes_of(shares, lean, joints, inside, starts, where):
                     products.append((k, -1 - r, target + (3 + r) * stride + a))
                     scales.append(sign * share.scale)
     return Axes(
-        np.array(rows, AXIS),
+        records(Axis, rows),
         np.array(values, float).reshape(-1, AXIS_WIDTH),
-        np.array(products, AXIS_PRODUCT),
+        records(AxisProduct, products),
         np.array(scales, float),
     )

@@ -49,10 +49,27 @@ from .timers import (
     stop,
 )
 
-# roles of the addresses that drivers are given, in their order; 0 for what has no timer
-OF_STEPS = (PLACE, ACCELERATE, COMPLETE, CHECK, CHART, STEP, 0, 0, NORM)
-OF_STAGES = (LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, COMPLETE, NORM)
-OF_SERIES = (EXPAND, REACH)
+# roles of the kernels whose addresses drivers are given, by their names in `Kernels` and `StageKernels`
+OF_DRIVERS = {
+    "place": PLACE,
+    "accelerate": ACCELERATE,
+    "complete": COMPLETE,
+    "check": CHECK,
+    "start_chart": CHART,
+    "step": STEP,
+    "error_norm": NORM,
+    "expand": EXPAND,
+    "reach": REACH,
+}
+OF_STAGES = {
+    "linearise": LINEARISE,
+    "reduce": REDUCE,
+    "factorise": FACTORISE,
+    "solve": SOLVE,
+    "soften": SOFTEN,
+    "complete": COMPLETE,
+    "error_norm": NORM,
+}
 X_ADDRESS, X_COUNT, X_FIRST_INT = 0, 2, 4  # columns of Expansion.forces
 
 
@@ -85,10 +102,10 @@ class Stopwatch:
         """Time the memory's advances."""
         self.memory, advance = memory, memory.advance
 
-        def timed(record, most):
+        def timed(log, most):
             began = time.perf_counter()
             self.begin()
-            status = advance(record, most)
+            status = advance(log, most)
             self.end()
             self.seconds += time.perf_counter() - began
             return status
@@ -158,10 +175,9 @@ class Timekeeper(Stopwatch):
         c = c._replace(network=network, system=system._replace(table=table, kinds=kinds, forces=loads))
         if series:
             c = c._replace(expansion=self._in_series(c.expansion, forces))
-            self._in_driver(memory.steps, OF_SERIES)
-        else:
-            self._in_driver(memory.addresses, OF_STEPS)
-            self._in_driver(c.linear.kernels if memory.implicit else (), OF_STAGES)
+        elif memory.implicit:
+            self._in_driver(c.linear.kernels, OF_STAGES)
+        self._in_driver(memory.run.kernels, OF_DRIVERS)
         memory.settle(c, (self.notes.ctypes.data,))
 
     def _in_series(self, x, forces):
@@ -181,11 +197,13 @@ class Timekeeper(Stopwatch):
         _instead(loads, [X_ADDRESS], [SERIES_TIMER])
         return x._replace(places=places, table=table, forces=loads)
 
-    def _in_driver(self, addresses, roles):
+    def _in_driver(self, kernels, roles):
         """Timers in place of addresses (not all of which need be there)."""
-        for i, (address, role) in enumerate(zip(addresses, roles, strict=False)):
-            if role and address:
-                self.notes[TARGETS + role], addresses[i] = address, TIMERS[role].address
+        for name, role in roles.items():
+            address = getattr(kernels, name)
+            if address:
+                self.notes[TARGETS + role] = address
+                setattr(kernels, name, TIMERS[role].address)
 
     def _headed(self, table, rows):
         """A table with a header before each kind's rows, which are given by place, length and loops; their places."""

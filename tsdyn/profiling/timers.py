@@ -37,8 +37,8 @@ from ..methods.explicit import NORM as NORM_SIGNATURE
 from ..methods.explicit import PLACE as PLACE_SIGNATURE
 from ..methods.explicit import STEP as STEP_SIGNATURE
 from ..methods.explicit import call_accelerate, call_norm, call_place, call_step
+from ..runs.dense_output import call_chart, call_complete
 from ..runs.stepper import call_check
-from ..runs.trajectory import call_chart, call_complete
 from ..taylor.step_parts import call_expand, call_reach
 
 # what may run: the driver, and what it and others call; ROWS is any loop over constraints or forces
@@ -139,12 +139,10 @@ def _chart(context, t, x, y, yd, xd):
     return status
 
 
-def _step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+def _step(context, run, t, h):
     notes = integers(_before(context), ANY)
     _enter(notes, ROLE * ROLES, ROLE)
-    status = call_step(
-        notes[TARGETS + ROLE], context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy
-    )
+    status = call_step(notes[TARGETS + ROLE], context, run, t, h)
     _leave(notes)
     return status
 

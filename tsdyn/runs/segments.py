@@ -2,6 +2,7 @@
 
 from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
 from .event_search import Watch
+from .reader import Reader
 
 
 class Relay:
@@ -26,8 +27,7 @@ class Relay:
         """The `Watch` of the run's events, with a reader for the steps of this part; None where there are none."""
         if task.events is None:
             return None
-        kind, *arguments = reading
-        reader = kind(*arguments)
+        reader = Reader(reading)
         if self.watch is None:
             self.watch = Watch(task.events, task.prepared.packed, reader, task.span[0])
         else:

@@ -22,7 +22,7 @@ from ..sparse.graph_builder import build
 from ..taylor.coefficients import run_forces, run_loops
 from ..taylor.layout import allocate_expansion, masks
 from ..taylor.prescribed_series import expand_motions
-from ..taylor.workspace import ORDERS
+
 
 ORDER = 8
 TOLERANCE = 1e-11  # relative to the largest coefficient up to the one compared
@@ -33,7 +33,7 @@ _AXES = ("x", "y", "z")
 @entry
 def constraint_coefficients(network, reals, x, k, b, Z):
     """b = (k + 1)(k + 2) Phi_{k+2}, x being an Expansion with the bodies' series; k in turn from zero."""
-    orders = x.order[ORDERS]
+    orders = x.order.room
     for i in range(b.size):
         b[i] = 0.0  # the multipliers
     run_loops(network, reals, ADVANCE, k, orders, x.bodies, x.constraints, x.places, b, Z)
@@ -52,7 +52,7 @@ def force_coefficients(reals, x, k, poses, Z):
     """Z ((b + 1) 8,) = order k of the forces and body torques; k in turn from zero."""
     for i in range(Z.size):
         Z[i] = 0.0
-    run_forces(reals, x, k, x.order[ORDERS], poses, Z)
+    run_forces(reals, x, k, x.order.room, poses, Z)
 
 
 def check_constraint_series(scene, constraint, name, rng):
@@ -170,7 +170,7 @@ def along(scene, attachment, coordinates, q):
 
 def write_bodies(scene, q, expansion):
     """Write the bodies' series into an Expansion; return the poses ((b + 1) * POSE,) at order zero."""
-    orders, known = int(expansion.order[ORDERS]), q[0].c.size
+    orders, known = int(expansion.order.room), q[0].c.size
     poses = np.zeros((len(scene.bodies) + 1, POSE))
     poses[:, P] = 1.0
     for b, row in enumerate(expansion.bodies.reshape(-1, BODY_ROW * orders)[:-1]):

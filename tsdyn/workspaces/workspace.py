@@ -10,6 +10,7 @@ from ..model.packed import System
 from ..rows.tangent_workspace import Free
 from ..sparse.constraint_graph import Network, no_network
 from .chart_workspace import Local, allocate_local
+from .stage_records import StageKernels, StageNumbers
 from .tangent_memory import allocate_free
 
 
@@ -55,9 +56,6 @@ EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS = range(6)
 JACOBIANS, ITERATION_MATRICES, STAGE_ITERATIONS, AT_ROUNDING, UNVERIFIED, KEPT, COUNTERS = range(6, 13)
 
 
-ROOM = 16  # for implicit.KERNELS addresses and implicit.NUMBERS floats
-
-
 class Linear(NamedTuple):
     """What implicit methods need besides; empty for explicit ones. l = 6 a rigid body and 3 a point mass.
 
@@ -88,8 +86,8 @@ class Linear(NamedTuple):
     pivots: np.ndarray  # int64 (k,)  row exchanges of P
     now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point; the run's own array
     before: np.ndarray  # (3, n)  at the one before; the run's own array
-    kernels: np.ndarray  # int64 (KERNELS,)  addresses, implicit.LINEARISE ... ERROR_NORM
-    numbers: np.ndarray  # (NUMBERS,)  implicit.RTOL ... EAGER
+    kernels: StageKernels
+    numbers: StageNumbers
 
 
 class Parts(NamedTuple):
@@ -169,8 +167,8 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
         **dict.fromkeys(("K_hat", "C_hat", "P"), (k, k)),
         "b": (k,),
     }
-    shapes |= {"now": (3, n), "before": (3, n), "numbers": (ROOM,)}
-    return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=np.zeros(ROOM, np.int64))
+    shapes |= {"now": (3, n), "before": (3, n)}
+    return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=StageKernels(), numbers=StageNumbers())
 
 
 def basis_free_parts(network, n, basis):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tsdyn.elements.primitive import ANY
+from tsdyn.jit.kernels import ANY
 from tsdyn.maths.dense_linalg import copy
 from tsdyn.methods import integrator
 from tsdyn.methods.explicit import call_accelerate, call_place, callback, vector

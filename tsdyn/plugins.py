@@ -9,7 +9,7 @@ from .elements.applied_load import Given, GivenByState, GivenInBody
 from .elements.bodies import Ground, PointMass, rotation_matrix
 from .elements.element import in_frame
 from .elements.force import Force, finite, load, not_negative, positive_number, vector_load
-from .elements.framed_joint import PARALLEL, FramedJoint, beside, carried, turned_about
+from .elements.framed_joint import FramedJoint, beside, carried, turned_about
 from .elements.friction_laws import act, along_and_across, coefficient, demand_bodies, slip
 from .elements.joint import Joint, across
 from .elements.joint_coordinates import Angle, Displacement, angles, displacements
@@ -17,6 +17,7 @@ from .elements.joint_friction import AXIS, JointFriction, optional_length
 from .elements.joint_load import JointLoad, instants, law_of_joint
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
+from .elements.tolerances import PARALLEL
 from .elements.user_functions import ByState, arguments_of, fill_state, state_load
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack

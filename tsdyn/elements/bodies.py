@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InvalidBody
 from ..validation import demand_known, floats, positive, vector3
+from .tolerances import INERTIA_ROUNDING, TRIANGLE, UNIT_LENGTH
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -79,17 +80,17 @@ def _inertia(value, body):
     scale = np.abs(given).max()
     unit = given / (scale or 1.0)  # no square or sum of its entries overflows
     skew = np.abs(unit - unit.T).max()
-    if skew > 1e-12:
+    if skew > INERTIA_ROUNDING:
         raise InvalidBody(f"{body.name}: the inertia matrix is not symmetric; J - J^T is up to {skew * scale:.3g}.")
     principal = np.linalg.eigvalsh(unit / 2.0 + unit.T / 2.0)
     with np.errstate(over="ignore"):
         moments = principal * scale
-    if principal[0] < -1e-12 or scale == 0.0:
+    if principal[0] < -INERTIA_ROUNDING or scale == 0.0:
         raise InvalidBody(
             f"{body.name}: the principal moments of inertia {moments} kg m^2 must not be negative, nor all "
             "zero; a body without extent is scene.add_point_mass(...)."
         )
-    if principal[2] > (principal[0] + principal[1]) * (1.0 + 1e-9):
+    if principal[2] > (principal[0] + principal[1]) * (1.0 + TRIANGLE):
         raise InvalidBody(
             f"{body.name}: no body has the principal moments {moments} kg m^2: the largest exceeds the sum "
             "of the others (triangle inequality). Are products of inertia or units mixed up?"
@@ -108,7 +109,7 @@ def _orientation(value, body):
             f"scipy Rotation, got {value!r}."
         )
     length = np.sqrt(p @ p)
-    if abs(length - 1.0) > 1e-6:
+    if abs(length - 1.0) > UNIT_LENGTH:
         raise InvalidBody(
             f"{body.name}: orientation {p} has length {length:.9g} and Euler parameters have 1; divide by it"
             + (", or give a rotation: they are zero." if length == 0.0 else ".")

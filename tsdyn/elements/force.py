@@ -33,8 +33,8 @@ from ..validation import number
 from .element import Attachment, check_slots, inlined, layout, static_kernel
 from .loops import constraint_series, force_series, friction
 from .loops import forces as loops
+from .loops.coordinate_rows import SIGNATURE
 from .markers import PARAMETERS, TURN, Marker, Point
-from .primitive import SIGNATURE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -10,8 +10,7 @@ from ..errors import InvalidConstraint
 from .bodies import rotation_matrix
 from .joint import Joint, across
 from .markers import Point, Vector
-
-PARALLEL = 1e-6  # sine of the angle below which a reference has no direction across its axis
+from .tolerances import OPPOSED, PARALLEL
 
 
 class FramedJoint(Joint):
@@ -91,6 +90,6 @@ def carried(a, axis_a, direction, b, axis_b):
     one, other = rotation_matrix(a.orientation), rotation_matrix(b.orientation)
     u, v, d = one @ axis_a, other @ axis_b, one @ direction
     n, cosine = np.cross(u, v), u @ v
-    if cosine > -1.0 + 1e-9:
+    if cosine > -1.0 + OPPOSED:
         d = d * cosine + np.cross(n, d) + n * (n @ d) / (1.0 + cosine)
     return other.T @ d

@@ -16,10 +16,9 @@ from typing import Any, NamedTuple
 from ..jit.kernels import twin
 from ..maths import vectors
 from ..maths.vectors import IDENTITY, unit
+from .tolerances import OPPOSED, PARALLEL_FOUND
 
 cross, dot, to_body, to_ground = map(twin, (vectors.cross, vectors.dot, vectors.to_body, vectors.to_ground))
-
-TINY = 1e-9  # sine of the angle below which a direction counts as parallel to an axis
 
 
 @dataclass(frozen=True)
@@ -137,7 +136,7 @@ def _across(axis, direction=None):
     if direction is not None:
         along = dot(axis, direction)
         f = tuple(d - along * u for d, u in zip(direction, axis, strict=True))
-        if dot(f, f) > TINY**2 * dot(direction, direction):
+        if dot(f, f) > PARALLEL_FOUND**2 * dot(direction, direction):
             return unit(f)
     least = min(range(3), key=lambda i: abs(axis[i]))
     return unit(cross(tuple(float(i == least) for i in range(3)), axis))
@@ -146,7 +145,7 @@ def _across(axis, direction=None):
 def _swung(u, v, d):
     """The direction d turned by the least that takes the unit vector u to v; as it is where they are opposed."""
     n, cosine = cross(u, v), dot(u, v)
-    if cosine <= -1.0 + 1e-9:
+    if cosine <= -1.0 + OPPOSED:
         return d
     side, along = cross(n, d), dot(n, d) / (1.0 + cosine)
     return tuple(cosine * x + y + along * z for x, y, z in zip(d, side, n, strict=True))

@@ -11,7 +11,8 @@ A primitive works on marker coordinates x (3-vectors in the ground frame) and ne
     remember(x, par, t)          optional, with memory = 1: what the last of par is after each accepted step
 
 x is the concatenation of the primitive's markers, par the floats that `parameters()` returns; a motion among them
-occupies three: value, rate and acceleration at t. The loops below apply the chain rule x(q) (Haug 2018, Eqs. 2-3).
+occupies three: value, rate and acceleration at t. The loops over all instances of a kind (loops/) apply the chain
+rule x(q) (Haug 2018, Eqs. 2-3).
 Kernels use arithmetic and NumPy functions, no comparison, abs or norm of x, so that checks can run them on complex
 numbers and truncated Taylor series. `series` receives coefficient k of x and fills column k of the scratch array
 s[slots, k], where earlier coefficients remain.
@@ -23,21 +24,16 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Never, Self
 
 from ..errors import InvalidConstraint
-from ..jit.kernels import ANY, Callback, caller, integers, specialised, stack, stack2, vector
+from ..jit.kernels import Callback, specialised
 from ..motions.prescribed import Motion
 from .element import Attachment, check_slots, inlined, layout, static_kernel
-from .loops import constraint_hessians, constraint_rows, constraint_series
-from .markers import PARAMETERS, TURN, Marker, chain_rule, motion, position
+from .loops import constraint_hessians, constraint_rows, constraint_series, coordinate_rows
+from .markers import PARAMETERS, TURN, Marker
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from ..hints import AnyBody, ArrayLike, BodyLike, Random
-
-# what the table of a kind holds for each instance
-AT, DIMENSION, BLOCK, ROW, STRIDE, INTS = 0, 2, 4, 6, 7, 8
-SIGNATURE = "iippppdp"  # count, reals per instance, table, reals, q, qd, t, out
-call_kind = caller(SIGNATURE)
 
 _registry = {}
 _KERNELS = {"phi": 4, "jacobian": 4, "gamma": 5}  # and their numbers of arguments
@@ -178,119 +174,42 @@ def registered() -> Mapping[str, type[Primitive]]:
     return MappingProxyType(_registry)
 
 
+_LOOPS = {  # name: template, whose kernel it is cached with, signature
+    "phi": (coordinate_rows.values, "phi", coordinate_rows.SIGNATURE),
+    "phi_t": (coordinate_rows.values, "phi_t", coordinate_rows.SIGNATURE),
+    "jacobian": (coordinate_rows.jacobian, "jacobian", coordinate_rows.SIGNATURE),
+    "gamma": (coordinate_rows.bias, "gamma", coordinate_rows.SIGNATURE),
+    "remember": (coordinate_rows.remembers, "remember", coordinate_rows.SIGNATURE),
+    "curvature": (constraint_hessians.loop, "gamma", constraint_hessians.SIGNATURE),
+    "values": (constraint_rows.values, "phi", constraint_rows.SIGNATURE),
+    "drift": (constraint_rows.values, "phi_t", constraint_rows.SIGNATURE),
+    "reduced": (constraint_rows.reduced, "jacobian", constraint_rows.SIGNATURE),
+    "bias": (constraint_rows.bias, "gamma", constraint_rows.SIGNATURE),
+    "series": (constraint_series.series, "series", constraint_series.SIGNATURE),
+    "far_series": (constraint_series.series, "series", constraint_series.SIGNATURE),
+    "driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
+    "far_driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
+}
+
+
 def _compile(cls, functions):
     """Make the callbacks of a kind: each runs over all its instances."""
-    constants = {"ROWS": cls.rows, **layout(cls.markers)}
     try:
         inner = {f"kernel_{name}": inlined(function) for name, function in functions.items()}
     except InvalidConstraint as error:
         raise InvalidConstraint(f"primitive {cls.__name__}: {error}") from error
-    loops = {  # name: template, whose kernel it is cached with, signature
-        "phi": (_values, "phi", SIGNATURE),
-        "phi_t": (_values, "phi_t", SIGNATURE),
-        "jacobian": (_jacobian, "jacobian", SIGNATURE),
-        "gamma": (_gamma, "gamma", SIGNATURE),
-        "remember": (_remembers, "remember", SIGNATURE),
-        "values": (constraint_rows.values, "phi", constraint_rows.SIGNATURE),
-        "drift": (constraint_rows.values, "phi_t", constraint_rows.SIGNATURE),
-        "reduced": (constraint_rows.reduced, "jacobian", constraint_rows.SIGNATURE),
-        "bias": (constraint_rows.bias, "gamma", constraint_rows.SIGNATURE),
-        "series": (constraint_series.series, "series", constraint_series.SIGNATURE),
-        "far_series": (constraint_series.series, "series", constraint_series.SIGNATURE),
-        "driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
-        "far_driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
-    }
+    constants = {"ROWS": cls.rows, **layout(cls.markers), **inner}
     result = {}
-    for name, (template, whose, signature) in loops.items():
+    for name, (template, whose, signature) in _LOOPS.items():
         if whose in functions:
-            owner = getattr(functions[whose], "py_func", functions[whose])
-            names = {**constants, **inner, "SLOTS": cls.slots, "kernel_value": inner[f"kernel_{whose}"]}
-            names["AHEAD"], names["DRIVEN"] = name.startswith("far"), whose == "series_t"
+            owner, driven = getattr(functions[whose], "py_func", functions[whose]), whose == "series_t"
+            names = {
+                **constants,
+                "kernel_value": inner[f"kernel_{whose}"],
+                "SLOTS": cls.slots + (len(cls.quantities()) if driven else 0),
+                "AHEAD": name.startswith("far"),
+                "DRIVEN": driven,
+            }
             names.setdefault("kernel_series_t", names.get("kernel_series"))
-            names["SLOTS"] += len(cls.quantities()) if names["DRIVEN"] else 0
-            copy = specialised(template, f"{cls.__qualname__}.{name}_loop", owner, **names)
-            result[name] = Callback(copy, signature)
-    owner = getattr(functions["gamma"], "py_func", functions["gamma"])
-    places = {"AT": AT, "DIMENSION": DIMENSION, "ROW": ROW, "INTS": INTS}
-    copy = specialised(
-        constraint_hessians.loop, f"{cls.__qualname__}.curvature_loop", owner, **constants, **inner, **places
-    )
-    result["curvature"] = Callback(copy, constraint_hessians.SIGNATURE)
+            result[name] = Callback(specialised(template, f"{cls.__qualname__}.{name}_loop", owner, **names), signature)
     return result
-
-
-# The loops over all instances of a kind. The names in capitals and kernel_* are filled in by `_compile`.
-ROWS = MARKERS = SIZE = 1
-CODES = OWNERS = STARTS = FIRST = (0,)
-kernel_value = kernel_jacobian = kernel_gamma = None
-
-
-def _values(count, stride, table, reals, q, qd, t, out):
-    table, reals, q, out = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(out, ANY)
-    x, f = stack(SIZE), stack(ROWS)
-    for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        for j in range(MARKERS):
-            k = OWNERS[j]
-            position(CODES[j], own[DIMENSION + k], own[AT + k], q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
-        kernel_value(x, real[3 * MARKERS :], t, f)
-        for r in range(ROWS):
-            out[own[ROW] + r] = f[r]
-    return 0
-
-
-def _remembers(count, stride, table, reals, q, qd, t, out):
-    table, reals, q = integers(table, ANY), vector(reals, ANY), vector(q, ANY)
-    x = stack(SIZE)
-    for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        for j in range(MARKERS):
-            k = OWNERS[j]
-            position(CODES[j], own[DIMENSION + k], own[AT + k], q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
-        real[stride - 1] = kernel_value(x, real[3 * MARKERS :], t)
-    return 0
-
-
-def _jacobian(count, stride, table, reals, q, qd, t, out):
-    table, reals, q, out = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(out, ANY)
-    x, f = stack(SIZE), stack2(ROWS, SIZE)
-    for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        for j in range(MARKERS):
-            k = OWNERS[j]
-            position(CODES[j], own[DIMENSION + k], own[AT + k], q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
-        for r in range(ROWS):
-            for c in range(SIZE):
-                f[r, c] = 0.0
-        kernel_jacobian(x, real[3 * MARKERS :], t, f)
-        for r in range(ROWS):
-            for j in range(MARKERS):
-                k = OWNERS[j]
-                block = own[BLOCK + k] + r * own[STRIDE]
-                s, row = real[3 * j : 3 * j + 3], f[r, STARTS[j] :]
-                chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, row, FIRST[j], out[block:])
-    return 0
-
-
-def _gamma(count, stride, table, reals, q, qd, t, out):
-    table, reals, q, out = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(out, ANY)
-    qd = vector(qd, ANY)
-    x, xd, xdd = stack(SIZE), stack(SIZE), stack(SIZE)
-    f, g = stack2(ROWS, SIZE), stack(ROWS)
-    for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        for j in range(MARKERS):
-            k, c = OWNERS[j], STARTS[j]
-            s = real[3 * j : 3 * j + 3]
-            motion(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:], xdd[c:])
-        for r in range(ROWS):
-            for c in range(SIZE):
-                f[r, c] = 0.0
-        kernel_jacobian(x, real[3 * MARKERS :], t, f)
-        kernel_gamma(x, xd, real[3 * MARKERS :], t, g)
-        for r in range(ROWS):
-            total = g[r]
-            for c in range(SIZE):
-                total += f[r, c] * xdd[c]
-            out[own[ROW] + r] = total
-    return 0

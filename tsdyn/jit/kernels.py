@@ -108,13 +108,26 @@ def twin(function):
     )
 
 
-def specialised(template, name, owner, **constants):
+def part(function):
+    """Mark what a template calls and what needs the same constants: `specialised` copies it along."""
+    function.is_part = True
+    return function
+
+
+def specialised(template, name, owner, make=kernel, **constants):
     """Copy a function under another name, with some of its globals replaced by constants or kernels.
 
     The copy claims to stand where `owner` does, so that it is cached, and its cache entry replaced, with the owner.
+    Each `part` that it calls is copied in the same way and made a kernel by `make`.
     """
+    known = template.__globals__
+    parts = {
+        called: make(specialised(known[called], f"{name}.{called}", owner, make, **constants))
+        for called in template.__code__.co_names
+        if getattr(known.get(called), "is_part", False)
+    }
     code = template.__code__.replace(co_filename=owner.__code__.co_filename, co_name=name, co_qualname=name)
-    copy = type(template)(code, {**template.__globals__, **constants}, name)
+    copy = type(template)(code, {**known, **constants, **parts}, name)
     copy.__qualname__, copy.__module__ = name, owner.__module__
     return copy
 

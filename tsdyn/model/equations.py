@@ -3,8 +3,8 @@
 import math
 
 from ..elements.loops.constraint_hessians import SIGNATURE as CURVATURE_SIGNATURE
+from ..elements.loops.coordinate_rows import call_kind
 from ..elements.loops.forces import JACOBIAN as FORCE_JACOBIAN_SIGNATURE
-from ..elements.primitive import call_kind
 from ..jit.kernels import caller, entry, kernel
 from ..motions.prescribed import call_motion
 from ..motions.program import HOLD, call_smooth

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.element import address, checked_parameters
-from ..elements.primitive import AT, BLOCK, DIMENSION, INTS, ROW, STRIDE
+from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE
+from ..elements.loops.template import AT, DIMENSION
 from ..errors import InvalidConstraint
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.element import address, checked_parameters
-from ..elements.loops.forces import AT, DIMENSION, INTS, kept_size
+from ..elements.loops.forces import INTS, kept_size
+from ..elements.loops.template import AT, DIMENSION
 from ..errors import InvalidForce
 from ..motions.signals import Signal
 

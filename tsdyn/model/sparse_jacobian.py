@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..elements.primitive import BLOCK, INTS, ROW, STRIDE
+from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE
 from .packed import COUNT, FIRST_INT
 
 WIDTH = 14  # floats of a row; those of body b begin in the middle

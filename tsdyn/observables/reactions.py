@@ -7,8 +7,8 @@ import numpy as np
 
 from ..elements.bodies import rotation_matrix, transform_g
 from ..elements.loops.body_poses import place_bodies, take_loads
+from ..elements.loops.coordinate_rows import INTS
 from ..elements.markers import POINT
-from ..elements.primitive import INTS
 from ..jit.kernels import entry, resident
 from ..maths.dense_linalg import copy
 from ..model.equations import constraint_jacobian, set_time

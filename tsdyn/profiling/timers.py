@@ -16,8 +16,8 @@ from ..elements.loops.constraint_rows import SIGNATURE as BODY_LOOP
 from ..elements.loops.constraint_rows import call_body_loop
 from ..elements.loops.constraint_series import SIGNATURE as SERIES
 from ..elements.loops.constraint_series import call_series
-from ..elements.primitive import SIGNATURE as LOOP
-from ..elements.primitive import call_kind
+from ..elements.loops.coordinate_rows import SIGNATURE as LOOP
+from ..elements.loops.coordinate_rows import call_kind
 from ..jit.kernels import (
     ANY,
     HAS_CYCLES,

@@ -8,19 +8,28 @@ Complex steps of the primitive's jacobian and gamma in the marker coordinates x 
 rounding. The chain rule x(q) is quadratic in q, so its second derivative is `rotate_gradient` with another p.
 """
 
-from ...jit.kernels import ANY, complex_stack, complex_stack2, integers, kernel, matrix, stack, stack2, vector
+from ...jit.kernels import ANY, complex_stack, complex_stack2, integers, kernel, matrix, part, stack, stack2, vector
 from ...maths.euler_parameters import rotate_gradient
-from ..markers import PARAMETERS, chain_rule, motion, rate
+from ..markers import PARAMETERS, chain_rule, rate
+from ..tolerances import CONSTRAINT_STEP
+from .coordinate_rows import INTS, ROW
+from .template import (
+    AT,
+    CODES,
+    DIMENSION,
+    MARKERS,
+    OWNERS,
+    ROWS,
+    SIZE,
+    STARTS,
+    differentiate,
+    kernel_gamma,
+    kernel_jacobian,
+    move_markers,
+)
 
 SIGNATURE = "iipppppdpippp"  # count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2
-STEP = 1e-100
 SPAN = 14  # coordinates of two bodies
-
-# filled in by primitive._compile
-ROWS = MARKERS = SIZE = 1
-CODES = OWNERS = STARTS = (0,)
-AT = DIMENSION = ROW = INTS = 0
-kernel_jacobian = kernel_gamma = None
 
 
 @kernel
@@ -33,102 +42,138 @@ def _chain_second(code, dimension, at, w, s, f, out):
             out[3 + i] += g[i]
 
 
+@part
+def _accelerate_markers(q, qdd, own, real, xdd):
+    """xdd += x_q qdd."""
+    pushed = stack(4)
+    for j in range(MARKERS):
+        k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
+        rate(CODES[j], own[DIMENSION + k], own[AT + k], q, qdd, s, pushed)
+        for b in range(4 if CODES[j] == PARAMETERS else 3):
+            xdd[c + b] += pushed[b]
+
+
+@part
+def _derive(x, xd, xdd, par, t, lam, J, a1, a2, g_xd, H):
+    """With respect to the markers, by complex steps along x_c and xd_c.
+
+    J = Phi_x, g_xd = gamma_xd, a1 = Phi_xx xd + Phi_xt = gamma_xd / 2, a2 = Phi_xx xdd + gamma_x, H = (Phi_x^T lam)_x.
+    """
+    z, zd = complex_stack(SIZE), complex_stack(SIZE)
+    zJ, zg = complex_stack2(ROWS, SIZE), complex_stack(ROWS)
+    for c in range(SIZE):
+        z[c], zd[c] = x[c], xd[c]
+        for d in range(SIZE):
+            H[c, d] = 0.0
+    differentiate(x, par, t, J)
+    for c in range(SIZE):
+        z[c] = complex(x[c], CONSTRAINT_STEP)
+        for r in range(ROWS):
+            for d in range(SIZE):
+                zJ[r, d] = 0.0
+        kernel_jacobian(z, par, t, zJ)
+        kernel_gamma(z, zd, par, t, zg)
+        z[c] = x[c]
+        for r in range(ROWS):
+            total = zg[r].imag / CONSTRAINT_STEP
+            for d in range(SIZE):
+                slope = zJ[r, d].imag / CONSTRAINT_STEP
+                total += slope * xdd[d]
+                H[d, c] += lam[r] * slope
+            a2[r, c] = total
+        zd[c] = complex(xd[c], CONSTRAINT_STEP)
+        kernel_gamma(z, zd, par, t, zg)
+        zd[c] = xd[c]
+        for r in range(ROWS):
+            g_xd[r, c] = zg[r].imag / CONSTRAINT_STEP
+            a1[r, c] = 0.5 * g_xd[r, c]
+
+
+@part
+def _fill_row(q, qd, own, real, along_x, along_second, out):
+    """out (n,) = along_x x_q + along_second x_qq qd, for one row of G1 or G2, at its two bodies."""
+    row = stack(SPAN)
+    for c in range(SPAN):
+        row[c] = 0.0
+    for j in range(MARKERS):
+        k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
+        code, dimension, at = CODES[j], own[DIMENSION + k], own[AT + k]
+        chain_rule(code, dimension, at, q, s, along_x[c:], 0, row[7 * k :])
+        _chain_second(code, dimension, at, qd, s, along_second[c:], row[7 * k :])
+    for k in range(2):
+        for c in range(own[DIMENSION + k]):
+            out[own[AT + k] + c] = row[7 * k + c]
+
+
+@part
+def _pull_back(q, own, real, H, XHX):
+    """XHX (SPAN, SPAN) = x_q^T H x_q."""
+    HX, where, row = stack2(SIZE, SPAN), stack(4), stack(SPAN)
+    for c in range(SPAN):
+        for d in range(SPAN):
+            XHX[c, d] = 0.0
+    for c in range(SIZE):
+        for d in range(SPAN):
+            HX[c, d] = 0.0
+        for j in range(MARKERS):
+            k, s = OWNERS[j], real[3 * j : 3 * j + 3]
+            chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, H[c, STARTS[j] :], 0, HX[c, 7 * k :])
+    for d in range(SPAN):
+        for j in range(MARKERS):
+            k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
+            for b in range(4):
+                where[b] = HX[c + b, d] if c + b < SIZE else 0.0
+            for b in range(7):
+                row[b] = 0.0
+            chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, where, 0, row)
+            for b in range(own[DIMENSION + k]):
+                XHX[7 * k + b, d] += row[b]
+
+
+@part
+def _add_geometric(own, real, lam, J, XHX):
+    """XHX += (Phi_x^T lam) x_qq: an orientation bends the path of a marker."""
+    where, e = stack(4), stack(4)
+    for j in range(MARKERS):
+        k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
+        if own[DIMENSION + k] == 7 and CODES[j] != PARAMETERS:
+            x, y, z = 0.0, 0.0, 0.0
+            for r in range(ROWS):
+                x += lam[r] * J[r, c]
+                y += lam[r] * J[r, c + 1]
+                z += lam[r] * J[r, c + 2]
+            for d in range(4):
+                for b in range(4):
+                    where[b] = 1.0 if b == d else 0.0
+                rotate_gradient(where, s, x, y, z, e)
+                for b in range(4):
+                    XHX[7 * k + 3 + b, 7 * k + 3 + d] += e[b]
+
+
 def loop(count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2):
-    """Template of the loop over all instances; the names in capitals and kernel_* are filled in by primitive.py."""
+    """All instances: K +=, G1 =, G2 =; 13 arguments, as a callback is given each array by its address."""
     table, reals, lam = integers(table, ANY), vector(reals, ANY), vector(lam, ANY)
     q, qd, qdd = vector(q, n), vector(qd, n), vector(qdd, n)
     K, G1, G2 = matrix(K, n, n), vector(G1, ANY), vector(G2, ANY)
     x, xd, xdd = stack(SIZE), stack(SIZE), stack(SIZE)
-    z, zd = complex_stack(SIZE), complex_stack(SIZE)
-    zJ, zg = complex_stack2(ROWS, SIZE), complex_stack(ROWS)
     J, a1, a2, g_xd = stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE)
-    H, HX, XHX, f = stack2(SIZE, SIZE), stack2(SIZE, SPAN), stack2(SPAN, SPAN), stack(SIZE)
-    row, e, where, pushed = stack(SPAN), stack(4), stack(4), stack(4)
+    H, XHX = stack2(SIZE, SIZE), stack2(SPAN, SPAN)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        par = real[3 * MARKERS :]
-        first = own[ROW]
-        for j in range(MARKERS):
-            k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-            motion(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:], xdd[c:])
-            rate(CODES[j], own[DIMENSION + k], own[AT + k], q, qdd, s, pushed)
-            for b in range(4 if CODES[j] == PARAMETERS else 3):
-                xdd[c + b] += pushed[b]
-        for c in range(SIZE):
-            z[c], zd[c] = x[c], xd[c]
-            f[c] = 0.0
-            for d in range(SIZE):
-                H[c, d] = 0.0
+        own_lam = lam[own[ROW] :]
+        move_markers(q, qd, own, real, x, xd, xdd)
+        _accelerate_markers(q, qdd, own, real, xdd)
+        _derive(x, xd, xdd, real[3 * MARKERS :], t, own_lam, J, a1, a2, g_xd, H)
         for r in range(ROWS):
-            for c in range(SIZE):
-                J[r, c] = 0.0
-        kernel_jacobian(x, par, t, J)
-        for c in range(SIZE):  # along x_c: H = sum lam Phi_xx, a2 = Phi_xx xdd + gamma_x
-            z[c] = complex(x[c], STEP)
-            for r in range(ROWS):
-                for d in range(SIZE):
-                    zJ[r, d] = 0.0
-            kernel_jacobian(z, par, t, zJ)
-            kernel_gamma(z, zd, par, t, zg)
-            z[c] = x[c]
-            for r in range(ROWS):
-                total = zg[r].imag / STEP
-                for d in range(SIZE):
-                    slope = zJ[r, d].imag / STEP
-                    total += slope * xdd[d]
-                    H[d, c] += lam[first + r] * slope
-                a2[r, c] = total
-                f[c] += lam[first + r] * J[r, c]
-            zd[c] = complex(xd[c], STEP)  # along xd_c: a1 = Phi_xx xd + Phi_xt = gamma_xd / 2
-            kernel_gamma(z, zd, par, t, zg)
-            zd[c] = xd[c]
-            for r in range(ROWS):
-                g_xd[r, c] = zg[r].imag / STEP
-                a1[r, c] = 0.5 * g_xd[r, c]
-        for r in range(ROWS):
-            for out, along_x, along_second in ((G1, a1, J), (G2, a2, g_xd)):
-                for c in range(SPAN):
-                    row[c] = 0.0
-                for j in range(MARKERS):
-                    k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-                    code, dimension, at = CODES[j], own[DIMENSION + k], own[AT + k]
-                    chain_rule(code, dimension, at, q, s, along_x[r, c:], 0, row[7 * k :])
-                    _chain_second(code, dimension, at, qd, s, along_second[r, c:], row[7 * k :])
-                for k in range(2):
-                    for c in range(own[DIMENSION + k]):
-                        out[(first + r) * n + own[AT + k] + c] = row[7 * k + c]
+            row = (own[ROW] + r) * n
+            _fill_row(q, qd, own, real, a1[r], J[r], G1[row:])
+            _fill_row(q, qd, own, real, a2[r], g_xd[r], G2[row:])
             for j in range(MARKERS):
                 k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-                at = (first + r) * n + own[AT + k]
-                _chain_second(CODES[j], own[DIMENSION + k], own[AT + k], qdd, s, J[r, c:], G2[at:])
-        for c in range(SPAN):
-            for d in range(SPAN):
-                XHX[c, d] = 0.0
-        for c in range(SIZE):
-            for d in range(SPAN):
-                HX[c, d] = 0.0
-            for j in range(MARKERS):
-                k, s = OWNERS[j], real[3 * j : 3 * j + 3]
-                chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, H[c, STARTS[j] :], 0, HX[c, 7 * k :])
-        for d in range(SPAN):
-            for j in range(MARKERS):
-                k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-                for b in range(4):
-                    where[b] = HX[c + b, d] if c + b < SIZE else 0.0
-                for b in range(7):
-                    row[b] = 0.0
-                chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, where, 0, row)
-                for b in range(own[DIMENSION + k]):
-                    XHX[7 * k + b, d] += row[b]
-        for j in range(MARKERS):
-            k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-            if own[DIMENSION + k] == 7 and CODES[j] != PARAMETERS:
-                for d in range(4):
-                    for b in range(4):
-                        where[b] = 1.0 if b == d else 0.0
-                    rotate_gradient(where, s, f[c], f[c + 1], f[c + 2], e)
-                    for b in range(4):
-                        XHX[7 * k + 3 + b, 7 * k + 3 + d] += e[b]
+                at = own[AT + k]
+                _chain_second(CODES[j], own[DIMENSION + k], at, qdd, s, J[r, c:], G2[row + at :])
+        _pull_back(q, own, real, H, XHX)
+        _add_geometric(own, real, own_lam, J, XHX)
         for k in range(2):
             for l in range(2):
                 for c in range(own[DIMENSION + k]):

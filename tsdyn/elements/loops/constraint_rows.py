@@ -1,21 +1,36 @@
-"""Constraint rows from body poses, one loop a kind: rows of [Phi_r, Phi_pi'], 2 x 8 floats, in place of Phi_q.
+"""Constraint rows from body poses, one loop a kind: rows of H = [Phi_r, Phi_pi'], 2 x 8 floats, in place of Phi_q.
 
 A virtual displacement of a body is (dr, dpi') with dpi' = 2 G dp in the body frame: six numbers and no normalisation
 row. A row of H holds the entries of body a, then of body b, each as (force, 0, body torque, 0).
 """
 
-from ...jit.kernels import ANY, caller, integers, stack, stack2, vector
+from ...jit.kernels import ANY, caller, integers, part, stack, stack2, vector
 from .body_poses import POSE, add_gradient, marker_motion, marker_position
+from .template import (
+    CODES,
+    MARKERS,
+    OWNERS,
+    ROOM,
+    ROWS,
+    SIZE,
+    STARTS,
+    acceleration_bias,
+    differentiate,
+    kernel_phi,
+    kernel_value,
+)
 
 SIGNATURE = "iippppdpp"  # count, reals per instance, table, reals, poses, unused, t, out, H
 call_body_loop = caller(SIGNATURE)
 # what Network.table holds for each instance: places of its two bodies among the poses, its first row, a mask of markers
 BODY, ROW, MASK, INTS = 0, 2, 3, 4
 
-# The names in capitals and kernel_* are filled in by primitive._compile.
-ROWS = MARKERS = SIZE = ROOM = 1
-CODES = OWNERS = STARTS = (0,)
-kernel_phi = kernel_value = kernel_jacobian = kernel_gamma = None
+
+@part
+def _place_markers(poses, own, real, x):
+    """Set x (ROOM,) from the poses."""
+    for j in range(MARKERS):
+        marker_position(CODES[j], poses, own[OWNERS[j]] * POSE, real[3 * j : 3 * j + 3], x, STARTS[j])
 
 
 def values(count, stride, table, reals, poses, unused, t, out, H):
@@ -24,8 +39,7 @@ def values(count, stride, table, reals, poses, unused, t, out, H):
     x, f = stack(ROOM), stack(ROWS)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        for j in range(MARKERS):
-            marker_position(CODES[j], poses, own[OWNERS[j]] * POSE, real[3 * j : 3 * j + 3], x, STARTS[j])
+        _place_markers(poses, own, real, x)
         kernel_value(x, real[3 * MARKERS :], t, f)
         for r in range(ROWS):
             out[own[ROW] + r] = f[r]
@@ -33,19 +47,15 @@ def values(count, stride, table, reals, poses, unused, t, out, H):
 
 
 def reduced(count, stride, table, reals, poses, unused, t, out, H):
-    """out = Phi, and H = [Phi_r, Phi_pi'] of bodies a and b."""
+    """out = Phi, and H = [Phi_r, Phi_pi'] = Phi_x [x_r, x_pi'] of bodies a and b."""
     table, reals, poses, out = integers(table, ANY), vector(reals, ANY), vector(poses, ANY), vector(out, ANY)
     H = vector(H, ANY)
     x, f, g = stack(ROOM), stack(ROWS), stack2(ROWS, SIZE)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        for j in range(MARKERS):
-            marker_position(CODES[j], poses, own[OWNERS[j]] * POSE, real[3 * j : 3 * j + 3], x, STARTS[j])
+        _place_markers(poses, own, real, x)
         kernel_phi(x, real[3 * MARKERS :], t, f)
-        for r in range(ROWS):
-            for c in range(SIZE):
-                g[r, c] = 0.0
-        kernel_jacobian(x, real[3 * MARKERS :], t, g)
+        differentiate(x, real[3 * MARKERS :], t, g)
         for r in range(ROWS):
             out[own[ROW] + r] = f[r]
             h = 16 * (own[ROW] + r)
@@ -58,7 +68,7 @@ def reduced(count, stride, table, reals, poses, unused, t, out, H):
 
 
 def bias(count, stride, table, reals, poses, unused, t, out, H):
-    """out: what (Phi_r, Phi_pi') (r'', omega'') + out = 0 has on its left, Eq. 3 in these terms."""
+    """out: the bias of Phi_r r'' + Phi_pi' omega'' + out = 0, Eq. 3 in these terms."""
     table, reals, poses, out = integers(table, ANY), vector(reals, ANY), vector(poses, ANY), vector(out, ANY)
     x, xd, xdd = stack(ROOM), stack(ROOM), stack(ROOM)
     f, g = stack2(ROWS, SIZE), stack(ROWS)
@@ -66,14 +76,5 @@ def bias(count, stride, table, reals, poses, unused, t, out, H):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         for j in range(MARKERS):
             marker_motion(CODES[j], poses, own[OWNERS[j]] * POSE, real[3 * j : 3 * j + 3], x, xd, xdd, STARTS[j])
-        for r in range(ROWS):
-            for c in range(SIZE):
-                f[r, c] = 0.0
-        kernel_jacobian(x, real[3 * MARKERS :], t, f)
-        kernel_gamma(x, xd, real[3 * MARKERS :], t, g)
-        for r in range(ROWS):
-            total = g[r]
-            for c in range(SIZE):
-                total += f[r, c] * xdd[c]
-            out[own[ROW] + r] = total
+        acceleration_bias(x, xd, xdd, real[3 * MARKERS :], t, f, g, out[own[ROW] :])
     return 0

@@ -18,11 +18,25 @@ A prescribed quantity (a length that is a motion) adds the coefficients of Phi_t
 series of the motions are the last rows of the scratch, written at the start of a step.
 """
 
-from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, stack, stack2, vector
+from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, stack2, vector
 from ...jit.simd import add, cross, fetch, fma, four, lanes, put, splat, times, total
 from ..markers import POINT
 from .body_poses import turned
 from .constraint_rows import INTS, MASK, ROW
+from .template import (
+    AHEAD,
+    CODES,
+    DRIVEN,
+    MARKERS,
+    OWNERS,
+    ROOM,
+    ROWS,
+    SIZE,
+    SLOTS,
+    STARTS,
+    kernel_series,
+    kernel_series_t,
+)
 
 # where the parts of a body's series begin, times the number of orders; floats of an order of all of them
 S_OMEGA, S_R, S_SPIN, BODY_ROW = 12, 16, 20, 24
@@ -70,12 +84,112 @@ def torque(bodies, at, k, forces, first):
     return lanes(total(add(x, u)), total(add(y, v)), total(add(z, w)))
 
 
-# The names in capitals and kernel_series are filled in by primitive._compile.
-ROWS = MARKERS = SIZE = ROOM = SLOTS = 1
-AHEAD = False  # whether each instance has the next one's numbers brought into the cache
-DRIVEN = False  # whether it depends on time
-CODES = OWNERS = STARTS = (0,)
-kernel_series = kernel_series_t = None
+@part
+def _offsets(orders):
+    """Where the series f, lam, x, Phi_x and the scratch of an instance begin."""
+    wide = 4 * orders
+    F = 4 * MARKERS * (1 + ROWS)
+    L = F + MARKERS * wide
+    X = L + 4 * ((ROWS * orders + 3) // 4)
+    return F, L, X, X + MARKERS * wide, X + MARKERS * (1 + ROWS) * wide
+
+
+@part
+def _place(j, k, orders, own, real, bodies):
+    """Coefficient k of x of a marker."""
+    body, s = own[OWNERS[j]] * BODY_ROW * orders, real[3 * j : 3 * j + 3]
+    x = turned(bodies, body + 12 * k, s[0], s[1], s[2])
+    return add(x, four(bodies, body + S_R * orders + 4 * k)) if CODES[j] == POINT else x
+
+
+@part
+def _fetch_next(mode, k, orders, table, bodies, values):
+    """Bring the numbers of the next instance into the cache; its table and its series are given."""
+    wide, (F, _L, _X, _J, _scratch) = 4 * orders, _offsets(orders)
+    fetch(values, 0, F)
+    for j in range(MARKERS):
+        body = table[OWNERS[j]] * BODY_ROW * orders
+        if mode == ADVANCE:
+            fetch(bodies, body, 12 * (k + 1))
+            fetch(values, F + j * wide, 4 * (k + 1))
+        else:
+            fetch(bodies, body + 12 * (k + 2), 12)
+            fetch(bodies, body + S_R * orders + 4 * (k + 2), 4)
+
+
+@part
+def _differentiate(k, orders, own, real, bodies, values, x, f, g):
+    """Store x_k, and (Phi_x)_k where columns of it vary."""
+    wide, (_F, _L, X, J, own_scratch) = 4 * orders, _offsets(orders)
+    places, gradients, step = 0, 4 * MARKERS, 4
+    if k > 0:
+        places, gradients, step = X + 4 * k, J + 4 * k, wide
+    for j in range(MARKERS):
+        place = _place(j, k, orders, own, real, bodies)
+        put(values, places + j * step, place)
+        put(x, STARTS[j], place)
+    for r in range(ROWS):
+        for c in range(SIZE):
+            f[r, c] = 0.0
+    scratch = matrix(data_of(values[own_scratch:]), SLOTS, orders)
+    kernel_series(x, real[3 * MARKERS :], k, scratch, f)
+    if DRIVEN:
+        kernel_series_t(x, real[3 * MARKERS :], k, scratch, g)
+        for r in range(ROWS):
+            values[own_scratch + SLOTS * orders + r] = g[r]
+    for j in range(MARKERS):
+        if k == 0 or own[MASK] >> j & 1:
+            for r in range(ROWS):
+                c, at = STARTS[j], gradients + (r * MARKERS + j) * step
+                put(values, at, lanes(f[r, c], f[r, c + 1], f[r, c + 2]))
+
+
+@part
+def _push(k, orders, own, real, bodies, values, b, Z):
+    """f_{k-1} whole, by lam_{k-1} of b; f_k without lam_k, Eq. (2), and its torque, Eq. (3), onto the bodies' Z."""
+    wide, (F, L, _X, J, _scratch) = 4 * orders, _offsets(orders)
+    for j in range(MARKERS):
+        if own[MASK] >> (GROUND + j) & 1:
+            continue
+        forces, force = F + j * wide, splat(0.0)
+        done = four(values, forces + 4 * k - 4) if k > 1 else splat(0.0)
+        for r in range(ROWS):
+            at = 4 * (MARKERS + r * MARKERS + j)
+            done = fma(four(values, at), splat(-b[own[ROW] + r]), done)
+            if own[MASK] >> j & 1:
+                at, multipliers = J + (r * MARKERS + j) * wide, L + r * orders + k
+                for l in range(1, k + 1):
+                    force = fma(four(values, at + 4 * l), splat(-values[multipliers - l]), force)
+        put(values, forces + 4 * k - 4, done)
+        put(values, forces + 4 * k, force)
+        body, s = own[OWNERS[j]], real[3 * j : 3 * j + 3]
+        if own[MASK] >> (UNTURNED + j) & 1 == 0:
+            y = torque(bodies, body * BODY_ROW * orders, k, values, forces)
+            put(Z, 8 * body + 4, add(four(Z, 8 * body + 4), cross(lanes(s[0], s[1], s[2]), y)))
+        if CODES[j] == POINT:
+            put(Z, 8 * body, add(four(Z, 8 * body), force))
+
+
+@part
+def _residual(k, orders, own, real, bodies, values, b, x):
+    """b = (k + 1)(k + 2) Phi_{k+2}, Eq. (1)."""
+    wide, (_F, _L, X, J, own_scratch) = 4 * orders, _offsets(orders)
+    for j in range(MARKERS):
+        if own[MASK] >> (GROUND + j) & 1 == 0:
+            put(x, STARTS[j], _place(j, k + 2, orders, own, real, bodies))
+    for r in range(ROWS):
+        highest, lower = splat(0.0), splat(0.0)
+        for j in range(MARKERS):
+            if own[MASK] >> (GROUND + j) & 1:
+                continue
+            highest = fma(four(values, 4 * (MARKERS + r * MARKERS + j)), four(x, STARTS[j]), highest)
+            if own[MASK] >> j & 1:
+                places, gradients = X + j * wide, J + (r * MARKERS + j) * wide + 4 * (k + 2)
+                for l in range(1, k + 2):
+                    gradient = times(four(values, gradients - 4 * l), splat(float(l)))
+                    lower = fma(gradient, four(values, places + 4 * l), lower)
+        drift = values[own_scratch + SLOTS * orders + r] if DRIVEN else 0.0
+        b[own[ROW] + r] = (k + 1.0) * ((k + 2.0) * total(highest) + total(lower) + drift)
 
 
 def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b, Z):
@@ -86,94 +200,18 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
     values, b, Z = vector(values, ANY), vector(b, ANY), vector(Z, ANY)
     x, f, g = stack(ROOM), stack2(ROWS, SIZE), stack(ROWS)
-    wide, body_size = 4 * orders, BODY_ROW * orders
-    F = 4 * MARKERS * (1 + ROWS)
-    L = F + MARKERS * wide
-    X = L + 4 * ((ROWS * orders + 3) // 4)
-    J, own_scratch = X + MARKERS * wide, X + MARKERS * (1 + ROWS) * wide
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        first, mask = i * size, own[MASK]
+        series_of, varies = values[i * size :], own[MASK] & ((1 << GROUND) - 1) != 0
         if AHEAD and i + 1 < count:
-            fetch(values, first + size, F)
-            for j in range(MARKERS):
-                body = table[(i + 1) * INTS + OWNERS[j]] * body_size
-                if mode == ADVANCE:
-                    fetch(bodies, body, 12 * (k + 1))
-                    fetch(values, first + size + F + j * wide, 4 * (k + 1))
-                else:
-                    fetch(bodies, body + 12 * (k + 2), 12)
-                    fetch(bodies, body + S_R * orders + 4 * (k + 2), 4)
-        varies = mask & ((1 << GROUND) - 1) != 0
-        if mode == ADVANCE:
-            for r in range(ROWS if k > 0 and varies else 0):
-                values[first + L + r * orders + k - 1] = b[own[ROW] + r]
-            for now in range(0 if k == 0 else k + 1, k + 2 if varies or DRIVEN else 1):
-                places, gradients, step = first, first + 4 * MARKERS, 4
-                if now > 0:
-                    places, gradients, step = first + X + 4 * now, first + J + 4 * now, wide
-                for j in range(MARKERS):
-                    body, s = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3]
-                    place = turned(bodies, body + 12 * now, s[0], s[1], s[2])
-                    if CODES[j] == POINT:
-                        place = add(place, four(bodies, body + S_R * orders + 4 * now))
-                    put(values, places + j * step, place)
-                    put(x, STARTS[j], place)
-                for r in range(ROWS):
-                    for c in range(SIZE):
-                        f[r, c] = 0.0
-                scratch = matrix(data_of(values[first + own_scratch :]), SLOTS, orders)
-                kernel_series(x, real[3 * MARKERS :], now, scratch, f)
-                if DRIVEN:
-                    kernel_series_t(x, real[3 * MARKERS :], now, scratch, g)
-                    for r in range(ROWS):
-                        values[first + own_scratch + SLOTS * orders + r] = g[r]
-                for j in range(MARKERS):
-                    if now == 0 or mask >> j & 1:
-                        for r in range(ROWS):
-                            c, at = STARTS[j], gradients + (r * MARKERS + j) * step
-                            put(values, at, lanes(f[r, c], f[r, c + 1], f[r, c + 2]))
-            for j in range(MARKERS if k > 0 else 0):
-                if mask >> (GROUND + j) & 1:
-                    continue
-                forces, force = first + F + j * wide, splat(0.0)
-                done = four(values, forces + 4 * k - 4) if k > 1 else splat(0.0)
-                for r in range(ROWS):
-                    at = first + 4 * (MARKERS + r * MARKERS + j)
-                    done = fma(four(values, at), splat(-b[own[ROW] + r]), done)
-                    if mask >> j & 1:
-                        at, multipliers = first + J + (r * MARKERS + j) * wide, first + L + r * orders + k
-                        for l in range(1, k + 1):
-                            force = fma(four(values, at + 4 * l), splat(-values[multipliers - l]), force)
-                put(values, forces + 4 * k - 4, done)
-                put(values, forces + 4 * k, force)
-                body, s = own[OWNERS[j]], real[3 * j : 3 * j + 3]
-                if mask >> (UNTURNED + j) & 1 == 0:
-                    y = torque(bodies, body * body_size, k, values, forces)
-                    put(Z, 8 * body + 4, add(four(Z, 8 * body + 4), cross(lanes(s[0], s[1], s[2]), y)))
-                if CODES[j] == POINT:
-                    put(Z, 8 * body, add(four(Z, 8 * body), force))
-        else:
-            for j in range(MARKERS):
-                if mask >> (GROUND + j) & 1:
-                    continue
-                s, body = real[3 * j : 3 * j + 3], own[OWNERS[j]] * body_size
-                place = turned(bodies, body + 12 * (k + 2), s[0], s[1], s[2])
-                if CODES[j] == POINT:
-                    place = add(place, four(bodies, body + S_R * orders + 4 * (k + 2)))
-                put(x, STARTS[j], place)
-            for r in range(ROWS):
-                highest, lower = splat(0.0), splat(0.0)
-                for j in range(MARKERS):
-                    if mask >> (GROUND + j) & 1:
-                        continue
-                    highest = fma(four(values, first + 4 * (MARKERS + r * MARKERS + j)), four(x, STARTS[j]), highest)
-                    if mask >> j & 1:
-                        places = first + X + j * wide
-                        gradients = first + J + (r * MARKERS + j) * wide + 4 * (k + 2)
-                        for l in range(1, k + 2):
-                            gradient = times(four(values, gradients - 4 * l), splat(float(l)))
-                            lower = fma(gradient, four(values, places + 4 * l), lower)
-                drift = values[first + own_scratch + SLOTS * orders + r] if DRIVEN else 0.0
-                b[own[ROW] + r] = (k + 1.0) * ((k + 2.0) * total(highest) + total(lower) + drift)
+            _fetch_next(mode, k, orders, table[(i + 1) * INTS :], bodies, values[(i + 1) * size :])
+        if mode == RESIDUAL:
+            _residual(k, orders, own, real, bodies, series_of, b, x)
+            continue
+        for r in range(ROWS if k > 0 and varies else 0):
+            series_of[_offsets(orders)[1] + r * orders + k - 1] = b[own[ROW] + r]
+        for now in range(0 if k == 0 else k + 1, k + 2 if varies or DRIVEN else 1):
+            _differentiate(now, orders, own, real, bodies, series_of, x, f, g)
+        if k > 0:
+            _push(k, orders, own, real, bodies, series_of, b, Z)
     return 0

@@ -19,6 +19,7 @@ from ...jit.simd import add, cross, fma, four, lanes, put, splat, times
 from ..markers import PARAMETERS, POINT, TURN
 from .body_poses import POSE, P, turned
 from .constraint_series import BODY_ROW, S_OMEGA, S_R, torque
+from .template import CODES, MARKERS, OWNERS, ROOM, SIZE, SLOTS, STARTS, kernel_series
 
 BODY, MASK, INTS = 0, 2, 3  # of the table: the two bodies, and which of them are the ground
 
@@ -74,12 +75,6 @@ def _parameters_torque(values, p, f, k, last):
         y += e0 * f2 - e2 * f0 - e3 * f1 + e1 * f3
         z += e0 * f3 - e3 * f0 + e2 * f1 - e1 * f2
     return lanes(0.5 * x, 0.5 * y, 0.5 * z)
-
-
-# The names in capitals and kernel_series are filled in by force.callbacks.
-MARKERS = SIZE = ROOM = SLOTS = 1
-CODES = OWNERS = STARTS = (0,)
-kernel_series = None
 
 
 def series(mode, k, orders, count, stride, size, table, reals, bodies, values, poses, Z):

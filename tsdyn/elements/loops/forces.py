@@ -8,20 +8,30 @@ with W = xd_qd, X = x_q, Y = xd_q of the markers. f_x and f_xd are complex steps
 central differences where it is not analytic. `force.callbacks` supplies the names in capitals and kernel_*.
 """
 
-from ...jit.kernels import ANY, complex_stack, integers, stack, stack2, vector
+from ...jit.kernels import ANY, complex_stack, integers, part, stack, stack2, vector
+from ..tolerances import FORCE_QUOTIENT, FORCE_STEP
 from .corotated_frames import turn_block, turn_of_bodies, turn_of_directions
 from .marker_jacobians import carry_back, carry_back_derivative, derivatives, state
+from .template import (
+    ALONG,
+    AT,
+    CODES,
+    DIMENSION,
+    KEPT,
+    MARKERS,
+    OWNERS,
+    SIZE,
+    STARTS,
+    force_markers,
+    kernel_derivatives,
+    kernel_law,
+    kernel_remember,
+)
 
-# what the table of a kind holds for each instance
-AT, DIMENSION, INTS = 0, 2, 4
+INTS = 4  # of a kind's table for each instance: template.AT and DIMENSION
 JACOBIAN = "iippppdippip"  # count, reals per instance, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept
+SPAN = 14  # coordinates of two bodies
 FRAME = 7  # floats of an instance's frame: Euler parameters of a body, or a direction
-STEP = 1e-40  # of complex steps: nothing cancels, so as small as can be
-QUOTIENT = 7e-4  # of central differences of fourth order, relative: the fifth root of rounding
-
-MARKERS = SIZE = KEPT = ALONG = 1
-CODES = OWNERS = STARTS = (0,)
-kernel_law = kernel_derivatives = kernel_remember = None
 
 
 def kept_size(markers):
@@ -37,9 +47,7 @@ def forces(count, stride, table, reals, q, qd, t, out):
     x, xd, f = stack(SIZE), stack(SIZE), stack(SIZE)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        for j in range(MARKERS):
-            k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-            state(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:])
+        force_markers(q, qd, own, real, x, xd)
         for c in range(SIZE):
             f[c] = 0.0
         kernel_law(x, xd, real[3 * MARKERS :], t, f)
@@ -55,9 +63,7 @@ def remembers(count, stride, table, reals, q, qd, t, out):
     x, xd = stack(SIZE), stack(SIZE)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        for j in range(MARKERS):
-            k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-            state(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:])
+        force_markers(q, qd, own, real, x, xd)
         real[stride - 1] = kernel_remember(x, xd, real[3 * MARKERS :], t)
     return 0
 
@@ -70,17 +76,17 @@ def complex_steps(x, xd, par, t, fx, fxd):
     for c in range(SIZE):
         for r in range(SIZE):
             g[r] = 0.0
-        z[c] = complex(x[c], STEP)
+        z[c] = complex(x[c], FORCE_STEP)
         kernel_law(z, zd, par, t, g)
         z[c] = x[c]
         for r in range(SIZE):
-            fx[r, c] = g[r].imag / STEP
+            fx[r, c] = g[r].imag / FORCE_STEP
             g[r] = 0.0
-        zd[c] = complex(xd[c], STEP)
+        zd[c] = complex(xd[c], FORCE_STEP)
         kernel_law(z, zd, par, t, g)
         zd[c] = xd[c]
         for r in range(SIZE):
-            fxd[r, c] = g[r].imag / STEP
+            fxd[r, c] = g[r].imag / FORCE_STEP
 
 
 def central_differences(x, xd, par, t, fx, fxd):
@@ -90,7 +96,7 @@ def central_differences(x, xd, par, t, fx, fxd):
         for r in range(SIZE):
             fx[r, c], fxd[r, c] = 0.0, 0.0
         place, rate = x[c], xd[c]
-        h, hd = QUOTIENT * max(1.0, abs(place)), QUOTIENT * max(1.0, abs(rate))
+        h, hd = FORCE_QUOTIENT * max(1.0, abs(place)), FORCE_QUOTIENT * max(1.0, abs(rate))
         for k in range(-2, 3):
             weight = (8.0 * k if k * k == 1 else -0.5 * k) / 12.0
             if k != 0:
@@ -109,80 +115,105 @@ def central_differences(x, xd, par, t, fx, fxd):
                     fxd[r, c] += weight / hd * g[r]
 
 
+@part
+def _differentiate_markers(q, qd, own, real, x, xd, W, X, Y):
+    """Set x, xd, and W = xd_qd, X = x_q, Y = xd_q (SIZE, SPAN)."""
+    for r in range(SIZE):
+        for c in range(SPAN):
+            W[r, c], X[r, c], Y[r, c] = 0.0, 0.0, 0.0
+    for j in range(MARKERS):
+        k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
+        state(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:])
+        derivatives(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, c, 7 * k, W, X, Y)
+
+
+@part
+def _follow_frame(q, own, x, anew, frame, turn):
+    """With anew keep the force's frame, a body's or the direction between two points; else set its turn since then."""
+    if ALONG >= 0:
+        d = stack(3)
+        for c in range(3):
+            d[c] = x[ALONG + c] - x[c]
+        if anew != 0:
+            for c in range(3):
+                frame[4 + c] = d[c]
+        else:
+            turn_of_directions(frame[4:], d, turn)
+        return
+    turn[0], turn[1], turn[2], turn[3] = 1.0, 0.0, 0.0, 0.0
+    k = 0 if own[DIMENSION] != 3 else 1  # a law has the axes of a; those of the ground stay where they are
+    if own[DIMENSION + k] == 7:
+        p = q[own[AT + k] + 3 : own[AT + k] + 7]
+        if anew != 0:
+            for c in range(4):
+                frame[c] = p[c]
+        else:
+            turn_of_bodies(frame, p, turn)
+
+
+@part
+def _law_derivatives(x, xd, q, own, par, t, anew, kept, fx, fxd):
+    """f_x and f_xd: taken and kept with anew, otherwise those kept, turned to where the force's frame is now."""
+    turn, old_x, old_xd = stack(4), kept[:], kept[SIZE * SIZE :]
+    if anew != 0:
+        kernel_derivatives(x, xd, par, t, fx, fxd)
+        for k in range(SIZE):
+            for c in range(SIZE):
+                old_x[k * SIZE + c], old_xd[k * SIZE + c] = fx[k, c], fxd[k, c]
+    _follow_frame(q, own, x, anew, kept[2 * SIZE * SIZE :], turn)
+    if anew == 0:
+        for j in range(MARKERS):
+            for k in range(MARKERS):
+                turn_block(CODES[j], CODES[k], turn, old_x, SIZE, STARTS[j], STARTS[k], fx)
+                turn_block(CODES[j], CODES[k], turn, old_xd, SIZE, STARTS[j], STARTS[k], fxd)
+
+
+@part
+def _add_products(own, fx, fxd, W, X, Y, n, Q_q, Q_qd):
+    """Q_q += W^T (f_x X + f_xd Y), Q_qd += W^T f_xd W, at the coordinates of the two bodies."""
+    h, hd = stack(SIZE), stack(SIZE)
+    for c in range(SPAN):
+        if c % 7 >= own[DIMENSION + c // 7]:
+            continue
+        for r in range(SIZE):
+            y, yd = 0.0, 0.0
+            for k in range(SIZE):
+                y += fx[r, k] * X[k, c] + fxd[r, k] * Y[k, c]
+                yd += fxd[r, k] * W[k, c]
+            h[r], hd[r] = y, yd
+        column = own[AT + c // 7] + c % 7
+        for r in range(SPAN):
+            if r % 7 < own[DIMENSION + r // 7]:
+                y, yd = 0.0, 0.0
+                for k in range(SIZE):
+                    y += W[k, r] * h[k]
+                    yd += W[k, r] * hd[k]
+                place = (own[AT + r // 7] + r % 7) * n + column
+                Q_q[place] += y
+                Q_qd[place] += yd
+
+
 def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept):
     """Q_q, Q_qd (n, n) += the Jacobians of all instances.
 
     With anew the derivatives of the law are taken and kept, (2 SIZE^2 + FRAME) floats an instance; without, those kept
-    are turned to where the force's frame is now. What follows from geometry is always exact.
+    are turned to where the force's frame is now. What follows from geometry is always exact. A callback is given each
+    array by its address, hence twelve arguments.
     """
-    kept, turn = vector(kept, ANY), stack(4)
-    table, reals, q, qd = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(qd, ANY)
-    Q_q, Q_qd = vector(Q_q, ANY), vector(Q_qd, ANY)
-    x, xd, f, h, hd = stack(SIZE), stack(SIZE), stack(SIZE), stack(SIZE), stack(SIZE)
+    kept, table, reals = vector(kept, ANY), integers(table, ANY), vector(reals, ANY)
+    q, qd, Q_q, Q_qd = vector(q, ANY), vector(qd, ANY), vector(Q_q, ANY), vector(Q_qd, ANY)
+    x, xd, f = stack(SIZE), stack(SIZE), stack(SIZE)
     fx, fxd = stack2(SIZE, SIZE), stack2(SIZE, SIZE)
-    d = stack(3)
-    W, X, Y = stack2(SIZE, 14), stack2(SIZE, 14), stack2(SIZE, 14)
+    W, X, Y = stack2(SIZE, SPAN), stack2(SIZE, SPAN), stack2(SIZE, SPAN)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         for r in range(SIZE):
-            for c in range(14):
-                W[r, c], X[r, c], Y[r, c] = 0.0, 0.0, 0.0
             f[r] = 0.0
-        for j in range(MARKERS):
-            k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-            state(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:])
-            derivatives(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, c, 7 * k, W, X, Y)
+        _differentiate_markers(q, qd, own, real, x, xd, W, X, Y)
         kernel_law(x, xd, real[3 * MARKERS :], t, f)
-        old_x, old_xd = kept[i * KEPT :], kept[i * KEPT + SIZE * SIZE :]
-        frame = kept[i * KEPT + 2 * SIZE * SIZE :]
-        if anew != 0:
-            kernel_derivatives(x, xd, real[3 * MARKERS :], t, fx, fxd)
-            for k in range(SIZE):
-                for c in range(SIZE):
-                    old_x[k * SIZE + c], old_xd[k * SIZE + c] = fx[k, c], fxd[k, c]
-        if ALONG >= 0:
-            for c in range(3):
-                d[c] = x[ALONG + c] - x[c]
-            if anew != 0:
-                for c in range(3):
-                    frame[4 + c] = d[c]
-            else:
-                turn_of_directions(frame[4:], d, turn)
-        else:
-            turn[0], turn[1], turn[2], turn[3] = 1.0, 0.0, 0.0, 0.0
-            k = 0 if own[DIMENSION] != 3 else 1  # a law has the axes of a; those of the ground stay where they are
-            if own[DIMENSION + k] == 7:
-                p = q[own[AT + k] + 3 : own[AT + k] + 7]
-                if anew != 0:
-                    for c in range(4):
-                        frame[c] = p[c]
-                else:
-                    turn_of_bodies(frame, p, turn)
-        if anew == 0:
-            for j in range(MARKERS):
-                for k in range(MARKERS):
-                    turn_block(CODES[j], CODES[k], turn, old_x, SIZE, STARTS[j], STARTS[k], fx)
-                    turn_block(CODES[j], CODES[k], turn, old_xd, SIZE, STARTS[j], STARTS[k], fxd)
+        _law_derivatives(x, xd, q, own, real[3 * MARKERS :], t, anew, kept[i * KEPT :], fx, fxd)
         for j in range(MARKERS):
             k, s = OWNERS[j], real[3 * j : 3 * j + 3]
             carry_back_derivative(CODES[j], own[DIMENSION + k], own[AT + k], s, f[STARTS[j] :], n, Q_q)
-        for c in range(14):
-            if c % 7 >= own[DIMENSION + c // 7]:
-                continue
-            for r in range(SIZE):
-                y, yd = 0.0, 0.0
-                for k in range(SIZE):
-                    y += fx[r, k] * X[k, c] + fxd[r, k] * Y[k, c]
-                    yd += fxd[r, k] * W[k, c]
-                h[r], hd[r] = y, yd
-            column = own[AT + c // 7] + c % 7
-            for r in range(14):
-                if r % 7 < own[DIMENSION + r // 7]:
-                    y, yd = 0.0, 0.0
-                    for k in range(SIZE):
-                        y += W[k, r] * h[k]
-                        yd += W[k, r] * hd[k]
-                    place = (own[AT + r // 7] + r % 7) * n + column
-                    Q_q[place] += y
-                    Q_qd[place] += yd
+        _add_products(own, fx, fxd, W, X, Y, n, Q_q, Q_qd)
     return 0

@@ -1,21 +1,25 @@
-"""Kernels of one friction for the solver: its generalised force for unit normal load, and its normal load.
-
-`force.callbacks` supplies the names in capitals and kernel_*.
-"""
+"""Kernels of one friction for the solver: its generalised force for unit normal load, and its normal load."""
 
 from ...jit.kernels import ANY, caller, complex_stack, integers, kernel, stack, stack2, vector
 from ...maths.euler_parameters import matrix_a
-from .forces import AT, DIMENSION
-from .marker_jacobians import carry_back, state
+from ..tolerances import FORCE_STEP
+from .marker_jacobians import carry_back
+from .template import (
+    AT,
+    CODES,
+    DIMENSION,
+    MARKERS,
+    OWNERS,
+    SIZE,
+    STARTS,
+    force_markers,
+    kernel_law,
+    kernel_normal_load,
+)
 
 UNIT_FRICTION = "ippppdp"  # floats of the instance, its table, its floats, q, qd, t, out
 NORMAL_LOAD = "ippppdiipp"  # the same to t, the side that f is on, whether to derive, f, out
 call_unit_friction, call_normal_load = caller(UNIT_FRICTION), caller(NORMAL_LOAD)
-STEP = 1e-40  # of complex steps
-
-MARKERS = SIZE = 1
-CODES = OWNERS = STARTS = (0,)
-kernel_law = kernel_normal_load = None
 
 
 def unit_friction(stride, own, real, q, qd, t, out):
@@ -23,9 +27,7 @@ def unit_friction(stride, own, real, q, qd, t, out):
     own, real, out = integers(own, ANY), vector(real, ANY), vector(out, ANY)
     q, qd = vector(q, ANY), vector(qd, ANY)
     x, xd, f = stack(SIZE), stack(SIZE), stack(SIZE)
-    for j in range(MARKERS):
-        k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-        state(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:])
+    force_markers(q, qd, own, real, x, xd)
     for c in range(SIZE):
         f[c] = 0.0
     for c in range(14):
@@ -59,9 +61,7 @@ def normal_load(stride, own, real, q, qd, t, side, derive, f, out):
     own, real, f, out = integers(own, ANY), vector(real, ANY), vector(f, ANY), vector(out, ANY)
     q, qd = vector(q, ANY), vector(qd, ANY)
     x, xd, s, g, z, A = stack(SIZE), stack(SIZE), stack(3), stack(6), complex_stack(6), stack2(3, 3)
-    for j in range(MARKERS):
-        k, c, place = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-        state(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, place, x[c:], xd[c:])
+    force_markers(q, qd, own, real, x, xd)
     at = own[AT + side]
     for i in range(3):
         s[i] = x[6 * side + i] - q[at + i]
@@ -77,9 +77,9 @@ def normal_load(stride, own, real, q, qd, t, side, derive, f, out):
         out[0] = kernel_normal_load(x, g, par)
         return 0
     for i in range(6):
-        z[i] = complex(g[i], STEP)
+        z[i] = complex(g[i], FORCE_STEP)
         load = kernel_normal_load(x, z, par)
-        out[0], g[i] = load.real, load.imag / STEP
+        out[0], g[i] = load.real, load.imag / FORCE_STEP
         z[i] = z[i].real
     for i in range(3):
         out[4 + i] = A[0, i] * g[3] + A[1, i] * g[4] + A[2, i] * g[5]

@@ -1,0 +1,25 @@
+"""Limits of bodies, markers and compiled loops, each with its unit and where it comes from."""
+
+# Inertia, relative to its largest entry. A tensor turned to other axes is symmetric, and its principal moments are
+# right, to some 10 roundings; sums of hundreds of parts to 1000. The triangle inequality is a limit that a flat body
+# reaches, and tables of masses have nine digits.
+INERTIA_ROUNDING = 1e-12
+TRIANGLE = 1e-9
+
+# | |p| - 1 | of Euler parameters as they are given: those written with seven digits pass, degrees in place of radians
+# do not. They are made of unit length afterwards.
+UNIT_LENGTH = 1e-6
+
+# Sine of an angle. Of a reference the part across an axis gives a direction; at 1e-6 ten digits of it are left.
+PARALLEL = 1e-6
+# The same for a direction that is found, not given: seven digits suffice to count turns by.
+PARALLEL_FOUND = 1e-9
+# 1 + cosine of two axes: below it they are opposed, and the least turn from one to the other is not unique.
+OPPOSED = 1e-9
+
+# Complex steps: f(x + i h) / h cancels nothing and truncates h^2 f'''. So h is as small as it may be without products
+# of h, such as h^2 of a law's squares of small numbers, that reach the least number there is (5e-324) where they count.
+CONSTRAINT_STEP = 1e-100
+FORCE_STEP = 1e-40
+# Of central differences of fourth order, relative to x: the fifth root of the rounding error, their optimum.
+FORCE_QUOTIENT = 7e-4

@@ -52,9 +52,9 @@ def memory_of(stages, n):
 
 
 @kernel
-def _scratch(r):
-    """What follows the stages in the memory of a step."""
-    return r.memory[(int(r.tableau[0]) + 1) * 2 * r.x.size :]
+def _scratch_at(r):
+    """Where the scratch begins in the memory of a step."""
+    return (int(r.tableau[0]) + 1) * 2 * r.x.size
 
 
 @kernel
@@ -107,7 +107,7 @@ def _is_near(context, l, g, k, guess, f, dx):
 @kernel
 def _solve_stage(context, c, r, i, t, g):
     """Solve stage i at time t: k_i, predicted on entry, and v_i, vd_i. Status."""
-    w, l, n, scratch = c.work, c.linear, r.x.size, _scratch(r)
+    w, l, n, scratch = c.work, c.linear, r.x.size, r.memory[_scratch_at(r) :]
     known, ys, k = r.memory[: 2 * n], r.memory[(1 + i) * 2 * n :][:n], r.memory[(1 + i) * 2 * n + n :][:n]
     f, dx, xs = scratch[F * n :][:n], scratch[DX * n :][:n], scratch[XS * n :][:n]
     guess = scratch[H_BEFORE * n + 1 :][:n]
@@ -169,7 +169,7 @@ def _see_step_before(c, t, n, scratch):
 def implicit_step(context, run, t, h):
     """One step of a method whose first stage is explicit; memory as of `memory_of`."""
     c, r = load(context), load_run(run)
-    n, tableau, memory, scratch = r.x.size, r.tableau, r.memory, _scratch(r)
+    n, tableau, memory, scratch = r.x.size, r.tableau, r.memory, r.memory[_scratch_at(r) :]
     stages = int(tableau[0])
     width = 2 + stages
     predictor = tableau[1 + stages * width + stages + stages + 1 :]

@@ -117,8 +117,8 @@ def instants_of(packed, t0, t1):
         count = (t1 - t0) / period
         if not count < MOST_INSTANTS:
             raise InvalidArgument(
-                f"{load.force.name}: a period of {period:g} s makes {count:.3g} instants, and {MOST_INSTANTS} are as many as "
-                "a run may have; take a longer period or a shorter run."
+                f"{load.force.name}: a period of {period:g} s makes {count:.3g} instants, and {MOST_INSTANTS} are as "
+                "many as a run may have; take a longer period or a shorter run."
             )
         times = np.arange(math.floor(t0 / period), math.ceil(t1 / period) + 1) * period
         found.append(times[(times > t0) & (times < t1)])

@@ -50,7 +50,7 @@ def _expand(context, k, ahead):
         begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
     near = f.sizes[SHARE] < NEAR * f.sizes[LARGEST_SHARE]  # there rounding of lam grows from order to order
     refine = orders if near else x.order.refined
-    expand(c.network, c.system, k, k > 0 and k + 1 == x.order.top, ahead, orders, refine, x, f)
+    expand(c.network, c.system, k, k > 0 and k + 1 == x.order.top, ahead, refine, x, f)
     if k == 0:
         for b in range(c.network.bodies.shape[0]):
             at = b * orders * BODY_ROW

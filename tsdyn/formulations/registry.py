@@ -41,26 +41,19 @@ class Formulation:
         return n if self.first_order else k, k
 
     def addresses(self):
-        """Addresses in the order that the driver expects; loads or compiles them."""
+        """Addresses of the kernels that a driver calls, by their names in `Kernels`; loads or compiles them."""
         k = self.kernels
         complete = (k if self.basis_free else null_space).complete  # qdd = D vdd - U B gamma in the others
-        return [f.address for f in (k.place, k.accelerate, complete, k.check, k.start_chart)]
+        kernels = {"place": k.place, "accelerate": k.accelerate, "complete": complete}
+        kernels |= {"check": k.check, "start_chart": k.start_chart}
+        return {name: kernel.address for name, kernel in kernels.items()}
 
     def implicit(self):
-        """Addresses that implicit methods need, in the order of implicit.LINEARISE ... ERROR_NORM."""
-        kernels = (
-            linearisation.linearise,
-            linearisation.reduce,
-            linearisation.factorise,
-            linearisation.solve,
-            linearisation.soften,
-            null_space.complete,
-        )
-        return [f.address for f in (*kernels, self.kernels.error_norm)]
-
-    def norm(self):
-        """Address of the error norm, for adaptive methods."""
-        return self.kernels.error_norm.address
+        """Addresses that implicit methods need, by their names in `StageKernels`."""
+        names = ("linearise", "reduce", "factorise", "solve", "soften")
+        kernels = {name: getattr(linearisation, name) for name in names}
+        kernels |= {"complete": null_space.complete, "error_norm": self.kernels.error_norm}
+        return {name: kernel.address for name, kernel in kernels.items()}
 
 
 FORMULATIONS = {

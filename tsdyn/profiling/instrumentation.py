@@ -46,10 +46,10 @@ class Stopwatch:
         """Time the memory's advances."""
         self.memory, advance = memory, memory.advance
 
-        def timed(record, most):
+        def timed(log, most):
             began = time.perf_counter()
             self.begin()
-            status = advance(record, most)
+            status = advance(log, most)
             self.end()
             self.seconds += time.perf_counter() - began
             return status
@@ -124,10 +124,9 @@ class Timekeeper(Stopwatch):
         c = c._replace(network=network, system=system._replace(table=table, kinds=kinds, forces=loads))
         if series:
             c = c._replace(expansion=self._in_series(c.expansion, forces))
-            self._in_driver(memory.steps, timers.OF_SERIES)
-        else:
-            self._in_driver(memory.addresses, timers.OF_STEPS)
-            self._in_driver(c.linear.kernels if memory.implicit else (), timers.OF_STAGES)
+        elif memory.implicit:
+            self._in_driver(c.linear.kernels, timers.OF_STAGES)
+        self._in_driver(memory.run.kernels, timers.OF_DRIVERS)
         memory.settle(c, (self.notes.ctypes.data,))
 
     def _in_series(self, x, forces):
@@ -147,11 +146,13 @@ class Timekeeper(Stopwatch):
         _instead(loads.T, [X_ADDRESS], [timers.SERIES_TIMER])
         return x._replace(places=places, table=table, forces=loads)
 
-    def _in_driver(self, addresses, roles):
+    def _in_driver(self, kernels, roles):
         """Timers in place of addresses (not all of which need be there)."""
-        for i, (address, role) in enumerate(zip(addresses, roles, strict=False)):
-            if role and address:
-                self.notes[timers.TARGETS + role], addresses[i] = address, timers.TIMERS[role].address
+        for name, role in roles.items():
+            address = getattr(kernels, name)
+            if address:
+                self.notes[timers.TARGETS + role] = address
+                setattr(kernels, name, timers.TIMERS[role].address)
 
     def _headed(self, table, rows):
         """A table with a header before each kind's rows, which are given by place, length and loops; their places."""

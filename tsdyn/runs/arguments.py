@@ -7,6 +7,7 @@ import numpy as np
 from ..errors import InvalidArgument
 from ..methods.integrator import Integrator, registered
 from ..validation import finite_vector, floats, unknown_name
+from .tolerances import SAME_COUNT
 
 TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
 
@@ -48,7 +49,7 @@ def step_count(t0, t1, step):
     count = (t1 - t0) / step
     if not count < 2**53 or t0 + step == t0:
         raise InvalidArgument(f"the step of {step:g} s is too small for the interval ({t0:g}, {t1:g}).")
-    return max(1, math.ceil(count * (1.0 - 1e-12)))
+    return max(1, math.ceil(count * (1.0 - SAME_COUNT)))
 
 
 def state_arrays(state, n):

@@ -14,12 +14,11 @@ import numpy as np
 from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import EPS, LARGEST, Search, TooFast
 from ..model.handles import handles_of
+from ..workspaces.run_state import B_END, STORED
 from .event_states import Inside
 from .events import Failed, Instant
-from .run_state import BEGUN, BLOCKS, CHART_ROWS, DENSE, ROWS, STEPS, STORED, T
-from .trajectory import B_END
+from .tolerances import FAST_TURN, SLOW_TURN
 
-SLOW, FAST = 0.1, 2.0  # rad that a body turns in a step: less needs half of the samples, more needs the most
 AT_START = 64.0 * EPS  # a value, or a time, that is no more than this beside others is that of the start
 
 
@@ -77,12 +76,12 @@ class Watch:
         states = [np.array([each.state for each in found]).reshape(-1, 3, n) for found in self.list]
         return times, *([np.ascontiguousarray(state[:, i]) for state in states] for i in (0, 1))
 
-    def advance(self, memory, record, most):
+    def advance(self, memory, log, most):
         """As `Memory.advance`; the Status, and what there is to say of it."""
         run = memory.run
-        if not run.numbers[BEGUN]:
-            status = memory.advance(record, -1)
-            if not run.numbers[BEGUN]:
+        if not run.numbers.begun:
+            status = memory.advance(log, -1)
+            if not run.numbers.begun:
                 return status, ""
             self.state, self.memory = run.now.copy(), run.remembered.copy()
             self._look_from()
@@ -92,24 +91,24 @@ class Watch:
                 except Failed as failure:
                     raise InvalidArgument(f"events: {failure}") from failure.__cause__
         for _ in range(most):
-            done = run.numbers[STEPS]
-            status = memory.advance(record, 1)
-            if run.numbers[STEPS] > done:
+            done = run.numbers.steps
+            status = memory.advance(log, 1)
+            if run.numbers.steps > done:
                 try:
-                    last = self._look(run, record)
+                    last = self._look(run, log)
                 except Failed as failure:
                     return Status.EVENT_FAILED, str(failure)
                 if last is not None:
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
-            if status != Status.SLICE_DONE or run.numbers[CHART_ROWS] + 2 >= len(record.charts):
+            if status != Status.SLICE_DONE or run.numbers.chart_rows + 2 >= len(log.charts):
                 return status, ""
         return status, ""
 
-    def go_back(self, run, record):
+    def go_back(self, run, log):
         """Let the run end where it has been looked at last."""
-        if self.state is not None and run.clock[T] > self.t:
+        if self.state is not None and run.clock.t > self.t:
             run.remembered[:] = self.memory
-            self._end(run, record, self.t, self.state, self.t)
+            self._end(run, log, self.t, self.state, self.t)
 
     def _look_from(self):
         self.beside = self.t, self.state, self.memory[: self.angles]
@@ -120,17 +119,17 @@ class Watch:
     def _value(self, i, t, state):
         return self.events[i].value(t, self._instant(t, state))
 
-    def _look(self, run, record):
+    def _look(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
         self._look_from()
         before, self.memory = self.memory, run.remembered.copy()
         try:
-            return self._looked(run, record, Inside(self.reader, run, record, self.t, self.state))
+            return self._looked(run, log, Inside(self.reader, run, log, self.t, self.state))
         except KeyboardInterrupt:
             self.memory = before
             raise
 
-    def _looked(self, run, record, step):
+    def _looked(self, run, log, step):
         found, failure, end = [], None, step.t1
         step.degree = self._degree(step)
         for i in range(len(self.events)):
@@ -151,7 +150,7 @@ class Watch:
             self.list[each.index].append(each)
             if len(self.list[each.index]) >= self.events[each.index].limit:
                 run.remembered[: self.angles] = self._instant(each.t, each.state).angles
-                self._end(run, record, each.t, each.state, step.t0)
+                self._end(run, log, each.t, each.state, step.t0)
                 self.t, self.state = each.t, each.state
                 return each
         self.t, self.state = step.t1, step.at(step.t1)
@@ -192,7 +191,7 @@ class Watch:
         """The degree that the interpolant and the fastest turn of a body ask for."""
         squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
         turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
-        return LARGEST if turn > FAST else self.reader.degree if turn > SLOW else self.reader.degree // 2
+        return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
 
     def _walk(self, i, step, points):
         """The occurrences of event i among these points."""
@@ -283,16 +282,16 @@ class Watch:
         return self._value(i, t, step.at(t))
 
     @staticmethod
-    def _end(run, record, t, state, start):
+    def _end(run, log, t, state, start):
         """Let the run end at t, within the step that began at `start`."""
         run.now[:] = state
-        run.clock[T] = t
-        if record.t_eval.size > 0:
-            while run.numbers[ROWS] > 0 and record.out[run.numbers[ROWS] - 1, 0] > t:
-                run.numbers[ROWS] -= 1
+        run.clock.t = t
+        if log.t_eval.size > 0:
+            while run.numbers.rows > 0 and log.out[run.numbers.rows - 1, 0] > t:
+                run.numbers.rows -= 1
         elif t > start:
-            record.out[run.numbers[ROWS] - 1] = [t, *state.ravel(), *run.remembered]
+            log.out[run.numbers.rows - 1] = [t, *state.ravel(), *run.remembered]
         else:
-            run.numbers[ROWS] -= 1
-        if run.numbers[DENSE] == STORED:
-            record.blocks[run.numbers[BLOCKS] - 1, B_END] = t
+            run.numbers.rows -= 1
+        if run.numbers.dense == STORED:
+            log.blocks[run.numbers.blocks - 1, B_END] = t

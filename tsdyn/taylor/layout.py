@@ -18,10 +18,10 @@ from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tables import is_data
 from ..sparse.constraint_graph import DRIFT, N_COUNT, N_FIRST_INT
-from .workspace import Expansion
+from .tolerances import FAR
+from .workspace import Expansion, Orders
 
 SHOWN = 5  # in a message
-FAR = 1 << 15  # orders of all bodies, each some hundred bytes
 
 
 def refusal(packed):
@@ -106,7 +106,7 @@ def allocate_expansion(network, kinds, packed, highest):
     forces, table, loads = _forces(packed, orders)
     constraints = zeros(total + 4)
     return Expansion(
-        order=np.array([highest, orders, highest, highest, highest, 0]),
+        order=Orders(top=highest, room=orders, next=highest, lowest=highest, highest=highest),
         bodies=bodies,
         constraints=constraints,
         places=places,

@@ -3,16 +3,11 @@
 import math
 
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
-from ..formulations.tolerances import ROUNDING
+from ..formulations.chart_validity import ROUNDING
 from ..jit.kernels import kernel
 from ..jit.simd import first, four, larger, second, splat, third
 from ..rows.interface import is_near_singular
-from ..runs.run_state import ATOL, RTOL
-from .workspace import HIGHEST, LOWEST, NEXT, ORDERS, TOP
-
-LEAST_ORDER = 5  # of the series of a step past such a place
-FAR_PASSING, PASSING = 1e-13, 1e-10  # the loosest tolerance of a step past: from elsewhere, and from close by
-STEP_COST = 3  # of a step's landing, in orders
+from .tolerances import FAR_PASSING, LEAST_ORDER, PASSING, STEP_COST
 
 
 @kernel
@@ -52,8 +47,8 @@ def radius(bodies, nb, orders, top, far, fast):
 @kernel
 def weights(c, r):
     """What coefficients of r and omega' are multiplied by to be compared with those of A; sets the floor of Phi."""
-    x, orders = c.expansion, c.expansion.order[ORDERS]
-    rtol, atol = r.clock[RTOL], r.clock[ATOL]
+    x, orders = c.expansion, c.expansion.order.room
+    rtol, atol = r.clock.rtol, r.clock.atol
     far, fast = splat(0.0), splat(0.0)
     for b in range(c.network.bodies.shape[0]):
         at = b * orders * BODY_ROW
@@ -68,14 +63,14 @@ def weights(c, r):
 def step_length(c, r):
     """h = rho tol^(1 / (top + 2)); and the order of the next step, that with the longer step for the work."""
     x, nb = c.expansion, c.network.bodies.shape[0]
-    top, orders = x.order[TOP], x.order[ORDERS]
-    tol = r.clock[ATOL] + r.clock[RTOL]
+    top, orders = x.order.top, x.order.room
+    tol = r.clock.atol + r.clock.rtol
     far, fast = weights(c, r)
     h = radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2))
-    if x.order[HIGHEST] > x.order[LOWEST]:
+    if x.order.highest > x.order.lowest:
         lower = radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top)
         change = 1 if h * (top + STEP_COST - 2) > lower * (top + STEP_COST) else -1
-        x.order[NEXT] = min(max(top + change, x.order[LOWEST]), x.order[HIGHEST])
+        x.order.next = min(max(top + change, x.order.lowest), x.order.highest)
     return h
 
 
@@ -90,9 +85,9 @@ def longest(c, r, tol, most):
     far, fast = weights(c, r)
     h = 0.0
     for k in range(most, LEAST_ORDER, -1):
-        longer = radius(x.bodies, nb, x.order[ORDERS], k, far, fast) * tol ** (1.0 / (k + 2))
+        longer = radius(x.bodies, nb, x.order.room, k, far, fast) * tol ** (1.0 / (k + 2))
         if longer > h:
-            h, x.order[TOP] = longer, k
+            h, x.order.top = longer, k
     return h
 
 

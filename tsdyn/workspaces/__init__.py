@@ -3,5 +3,6 @@
 Imports rows and below.
 
 Begin with workspace.py: that of the forms with a basis, and the tuple of all that a formulation's kernels get.
-chart_workspace.py is that of a chart; the workspace of the constraint rows is of package rows.
+run_state.py is what drivers, step kernels and interpolants share, chart_workspace.py the workspace of a chart; that of
+the constraint rows is of package rows.
 """

@@ -10,6 +10,7 @@ from ..model.packed import System, no_system
 from ..rows.interface import Free, allocate_free
 from ..sparse.constraint_graph import Network, no_network
 from .chart_workspace import Local, allocate_local
+from .stage_records import StageKernels, StageNumbers
 
 
 class Control(Record):
@@ -78,9 +79,6 @@ class Work(NamedTuple):
     redundant: np.ndarray  # int64 (d + 1,)  number of redundant rows of Phi, and which; dense_rows.take_selection
 
 
-ROOM = 16  # for implicit.KERNELS addresses and implicit.NUMBERS floats
-
-
 class Linear(NamedTuple):
     """What implicit methods need besides; empty for explicit ones. l = 6 a rigid body and 3 a point mass.
 
@@ -111,8 +109,8 @@ class Linear(NamedTuple):
     pivots: np.ndarray  # int64 (k,)  row exchanges of P
     now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point; the run's own array
     before: np.ndarray  # (3, n)  at the one before; the run's own array
-    kernels: np.ndarray  # int64 (KERNELS,)  addresses, implicit.LINEARISE ... ERROR_NORM
-    numbers: np.ndarray  # (NUMBERS,)  implicit.RTOL ... EAGER
+    kernels: StageKernels
+    numbers: StageNumbers
 
 
 class Parts(NamedTuple):
@@ -191,8 +189,8 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
         **dict.fromkeys(("K_hat", "C_hat", "P"), (k, k)),
         "b": (k,),
     }
-    shapes |= {"now": (3, n), "before": (3, n), "numbers": (ROOM,)}
-    return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=np.zeros(ROOM, np.int64))
+    shapes |= {"now": (3, n), "before": (3, n)}
+    return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=StageKernels(), numbers=StageNumbers())
 
 
 def basis_free_parts(network, n, basis):

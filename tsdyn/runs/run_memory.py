@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from ..errors import Status
 from ..jit.kernels import resident
 from ..workspaces.run_state import enter_joints
@@ -35,7 +37,8 @@ class Memory:
         self.work = context.work
         self.settle(context)
         self._run, *self._keep_run = resident(run)
-        self._written = [self.work.q.base, self.work.counters]  # what a run leaves, and the next one must not find
+        records = [np.frombuffer(record, np.int64) for record in (run.clock, run.numbers, run.kernels)]
+        self._written = [self.work.q.base, self.work.counters, *records]  # what the next run must not find
 
     def settle(self, context, header=()):
         """Let the kernels find this context, behind the integers of a header."""
@@ -52,8 +55,6 @@ class Memory:
         own, work, run = self.context.system, self.work, self.run
         for array in self._written:
             array.fill(0)
-        for record in (run.clock, run.numbers, run.kernels):
-            record.clear()
         drop_as_at_first(self.network, self.context.free)
         own.reals[:] = system.reals  # motions, signals and what forces remember are written there
         enter_joints(run, task.prepared.handles, task.remembered)

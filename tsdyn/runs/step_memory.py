@@ -1,5 +1,7 @@
 """Run workspace of the step driver."""
 
+import numpy as np
+
 from ..model.packed import System
 from ..workspaces.run_state import lay_out
 from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
@@ -38,6 +40,7 @@ class StepMemory(Memory):
         run = lay_out(n, *sizes, angles, slots, warm=warm_size(work), **lengths)
         linear = allocate_linear(system, n, m, implicit, kept, redundant)
         written = [run.x.base, linear.K.base, linear.pivots]
+        written += [np.frombuffer(record, np.int64) for record in (linear.numbers, linear.kernels)]
         if implicit:
             linear = linear._replace(now=run.now, before=run.before)
         context = Context(system, work, linear, *basis_free_parts(network, n, not basis_free))
@@ -52,6 +55,4 @@ class StepMemory(Memory):
             self.source = system
             for own, new in zip(self.context.system, system, strict=True):
                 own[:] = new
-        self.context.linear.numbers.clear()
-        self.context.linear.kernels.clear()
         super().clear(task, system)

@@ -1,6 +1,7 @@
 """Validation of the arguments of `simulate`: times, method, initial state."""
 
 import math
+from operator import lt
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from ..validation import finite_vector, floats, unknown_name
 from .tolerances import SAME_COUNT
 
 TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
+FEW = 50  # times that a list serves faster than an array: 0.4 us instead of 2
 
 
 def interval(t_span):
@@ -30,7 +32,7 @@ def output_times(t_eval, t0, t1):
     if t_eval is None:
         return np.empty(0)
     times = floats(t_eval)
-    increasing = times.ndim == 1 and np.count_nonzero(times[1:] > times[:-1]) == max(times.size - 1, 0)
+    increasing = times.ndim == 1 and _increase(times)
     if increasing and times.size and t0 <= times[0] and times[-1] <= t1:
         return times
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
@@ -42,6 +44,14 @@ def output_times(t_eval, t0, t1):
             f"t_eval must lie within t_span, ({t0:g}, {t1:g}); it runs from {times[0]:g} to {times[-1]:g}."
         )
     return times
+
+
+def _increase(times):
+    """Whether each of times (k,) is later than the one before."""
+    if times.size < FEW:
+        listed = times.tolist()
+        return all(map(lt, listed, listed[1:]))
+    return (times[1:] > times[:-1]).all()
 
 
 def step_count(t0, t1, step):

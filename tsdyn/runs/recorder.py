@@ -17,8 +17,9 @@ class Recorder:
     Attributes
     ----------
     log : RunLog
-        Of the present slice. After `close`, out, blocks and charts are those of the whole run, but for charts that
-        are in `passed`.
+        Of the present slice.
+    out, blocks : ndarray
+        After `close`: those of the whole run.
     steps : StepLog
         Or None, where no history is kept.
     passed : ChartLog
@@ -28,43 +29,37 @@ class Recorder:
     """
 
     def __init__(self, task, run):
-        self.run, self.per_step, self.dense = run, task.times.size == 0, run.numbers.dense == STORED
+        self.run, self.times, self.stops = run, task.times, task.stops
+        self.per_step, self.dense = task.times.size == 0, run.numbers.dense == STORED
         self.steps, self.passed = (StepLog(), ChartLog()) if task.history else (None, None)
         self.most = max(BLOCK_ROOM // run.block.size, 1) if self.dense else LARGEST_SLICE
-        n = run.now.shape[1]
-        charts, points = np.zeros((2 * CHART_ROOM, 5)), np.zeros((2 * CHART_ROOM if run.numbers.dense else 0, n))
-        none, out = np.empty((0, 3)), np.empty((task.times.size, 1 + 3 * n + run.remembered.size))
-        self.log = RunLog(task.times, task.stops, out, none, charts, points, np.empty((0, run.block.size)))
-        self._out, self._blocks = [], []
+        n, rooms = run.now.shape[1], 2 * CHART_ROOM
+        self.charts, self.points = np.empty((rooms, 5)), np.empty((rooms if run.numbers.dense else 0, n))
+        self.out = np.empty((task.times.size, 1 + 3 * n + run.remembered.size))
+        self.blocks, self.log = np.empty((0, run.block.size)), None
+        self._parts = [], []  # of out and blocks
 
     def begin_slice(self, rows):
         """Make room for a slice of so many steps; what was recorded before is kept."""
-        run, log = self.run.numbers, self.log
-        self._collect()
-        charts, points = log.charts, log.points
-        full = run.chart_rows + CHART_ROOM > len(charts)
-        if not self.dense and run.chart_rows:
-            self._pass_charts()
-        if full and (self.dense or len(charts) < LARGEST_SLICE):
-            charts, points = _doubled(charts), _doubled(points)
-        self.log = log._replace(
-            out=np.empty((rows + 1, log.out.shape[1])) if self.per_step else log.out,
-            history=np.empty((rows, 3)),
-            charts=charts,
-            points=points,
-            blocks=np.empty((rows if self.dense else 0, log.blocks.shape[1])),
-        )
+        if self.log is not None:
+            self._collect()
+            self._make_room_for_charts()
+        if self.per_step:
+            self.out = np.empty((rows + 1, self.out.shape[1]))
+        if self.dense:
+            self.blocks = np.empty((rows, self.blocks.shape[1]))
+        history = np.empty((rows, 3))
+        self.log = RunLog(self.times, self.stops, self.out, history, self.charts, self.points, self.blocks)
 
     def close(self):
         """Put the slices together."""
-        run, log = self.run.numbers, self.log
+        run = self.run.numbers
         self._collect()
         if not self.dense and run.chart_rows > CHART_ROOM:  # fewer are logged with the last one
             self._pass_charts()
-        self.log = log._replace(
-            out=_joined(log.out, self._out) if self.per_step else log.out[: run.rows],
-            blocks=_joined(log.blocks, self._blocks) if self.dense else log.blocks,
-        )
+        self.out = _joined(self.out, self._parts[0]) if self.per_step else self.out[: run.rows]
+        if self.dense:
+            self.blocks = _joined(self.blocks, self._parts[1])
 
     def chart_history(self, charts):
         """The history of charts, with those that are left at the end; or None."""
@@ -74,21 +69,28 @@ class Recorder:
 
     def _collect(self):
         """Take what the slice has written, so that the driver begins at the first rows again."""
-        run, log = self.run.numbers, self.log
+        run, (out, blocks) = self.run.numbers, self._parts
         if self.per_step and run.rows:
-            self._out.append(log.out[: run.rows])
+            out.append(self.out[: run.rows])
             run.rows = 0
         if self.dense and run.blocks:
-            self._blocks.append(log.blocks[: run.blocks])
+            blocks.append(self.blocks[: run.blocks])
             run.blocks = 0
         if run.history:
             if self.steps is not None:
-                self.steps.add(log.history[: run.history])
+                self.steps.add(self.log.history[: run.history])
             run.history = 0
+
+    def _make_room_for_charts(self):
+        full = self.run.numbers.chart_rows + CHART_ROOM > len(self.charts)
+        if not self.dense:
+            self._pass_charts()
+        if full and (self.dense or len(self.charts) < LARGEST_SLICE):
+            self.charts, self.points = _doubled(self.charts), _doubled(self.points)
 
     def _pass_charts(self):
         """Log the charts that have been left, and let the present one be the first."""
-        run, charts, points = self.run.numbers, self.log.charts, self.log.points
+        run, charts, points = self.run.numbers, self.charts, self.points
         left = run.chart_rows
         if self.passed is not None:
             self.passed.add(charts[:left], self.steps)

@@ -57,15 +57,15 @@ def run(task, engine, observe=None, relay=None, past=None):
 def _outcome(engine, memory, driven, readings, watch, began):
     """The `Outcome` of a run that has been driven."""
     status, reason, recorder = driven
-    task, run, log, control = engine.task, memory.run, recorder.log, memory.work.control
-    charts, last = left_open(run, log.charts, (control.condition, control.contraction)), run.now.copy()
+    task, run, control = engine.task, memory.run, memory.work.control
+    charts, last = left_open(run, recorder.charts, control.condition, control.contraction), run.now.copy()
     trajectory = None
     if task.dense_output:
         sides = task.span[0], last, task.angles, task.stops
-        trajectory = Trajectory(*readings, log.blocks, charts, log.points[: len(charts)].copy(), *sides)
+        trajectory = Trajectory(*readings, recorder.blocks, charts, recorder.points[: len(charts)].copy(), *sides)
     found = None if watch is None else watch.found(task.prepared.n)
     return Outcome(
-        status, reason, log.out, recorder.steps, recorder.chart_history(charts), run.clock.t,
+        status, reason, recorder.out, recorder.steps, recorder.chart_history(charts), run.clock.t,
         last, run.remembered.copy(), counts(memory, *engine.skipped), trajectory, found, began,
     )  # fmt: skip
 

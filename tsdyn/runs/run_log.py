@@ -60,8 +60,8 @@ def close_chart(r, log, condition, contraction):
     r.numbers.chart_rows += 1
 
 
-def left_open(run, charts, control):
+def left_open(run, charts, condition, contraction):
     """The charts (k, 5) of a log, the last of which the run has not left."""
     charts = charts[: run.numbers.chart_rows + 1].copy()
-    charts[-1, 2:] = *control, run.numbers.in_chart
+    charts[-1, 2], charts[-1, 3], charts[-1, 4] = condition, contraction, run.numbers.in_chart
     return charts

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from ..errors import Status
 from ..jit.kernels import resident
 from ..rows.interface import reset_selection
@@ -10,6 +12,11 @@ from .arguments import step_count
 from .run_log import no_log
 
 UNLIMITED = 2**62  # steps wanted of an adaptive run
+
+
+def words(record):
+    """The numbers of a record as an array of words, which is cleared in less time."""
+    return np.frombuffer(record, np.int64)
 
 
 class Memory:
@@ -31,11 +38,11 @@ class Memory:
 
     def __init__(self, prepared, network, context, run):
         self.packed, self.weight, self.network, self.run = prepared.packed, prepared.n, network, run
-        self.work = context.work
+        self.work = work = context.work
         self.settle(context)
         self._run, *self._keep_run = resident(run)
-        self._written = [self.work.q.base]  # what a run leaves, and the next one must not find
-        self._records = [self.work.control, self.work.counters, run.clock, run.numbers, run.kernels]
+        records = work.control, work.counters, run.clock, run.numbers, run.kernels
+        self._written = [work.q.base, *map(words, records)]  # what the next run must not find
 
     def settle(self, context, header=()):
         """Let the kernels find this context, behind the integers of a header."""
@@ -52,8 +59,6 @@ class Memory:
         own, work, run = self.context.system, self.work, self.run
         for array in self._written:
             array.fill(0)
-        for record in self._records:
-            record.clear()
         reset_selection(self.network, self.context.free)
         own.reals[:] = system.reals  # motions, signals and what forces remember are written there
         enter_joints(run, task.prepared.handles, task.remembered)

@@ -1,11 +1,13 @@
 """Run workspace of the step driver."""
 
+import numpy as np
+
 from ..model.packed import System
 from ..rows.interface import redundancy
 from ..workspaces.run_state import lay_out
 from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
 from .dense_output import warm_size
-from .run_memory import Memory
+from .run_memory import Memory, words
 from .stepper import advance
 
 MATRICES = 500  # matrices of n coordinates cost as much a step as O(N) kernels do with n^3 / MATRICES more of them
@@ -39,13 +41,13 @@ class StepMemory(Memory):
         run = lay_out(n, *sizes, angles, slots, warm=warm_size(work), **lengths)
         linear = allocate_linear(system, n, m, implicit, kept, redundant)
         written = [run.x.base, linear.K.base, linear.pivots]
+        written += [np.frombuffer(record, np.int64) for record in (linear.numbers, linear.kernels)]
         if implicit:
             linear = linear._replace(now=run.now, before=run.before)
         context = Context(system, work, linear, *basis_free_parts(network, n, not basis_free))
         super().__init__(prepared, network, context, run)
         self.weight = n if basis_free else n + n**3 // MATRICES
-        self._written += written
-        self._records.append(context.local.state)
+        self._written += [*written, words(context.local.state)]
         self.nbytes = sum(array.nbytes for array in (*self._written, context.free.rows.S, context.free.poses))
 
     def clear(self, task, system):
@@ -54,6 +56,4 @@ class StepMemory(Memory):
             self.source = system
             for own, new in zip(self.context.system, system, strict=True):
                 own[:] = new
-        self.context.linear.numbers.clear()
-        self.context.linear.kernels.clear()
         super().clear(task, system)

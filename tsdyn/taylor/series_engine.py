@@ -39,7 +39,8 @@ class SeriesEngine:
         order.top, order.lowest, order.highest = self.orders
         order.next = order.top
         order.refined = max(method.refined, int(len(network.bodies) > MANY))
-        memory.run.clock.rtol, memory.run.clock.atol = method.step_tolerances()
+        if method.step is not None:  # the order follows from tolerances even so
+            memory.run.clock.rtol, memory.run.clock.atol = method.step_tolerances()
         _set_kernels(memory.run, is_far(network, self.highest), task.within)
 
     def reading(self, memory):

@@ -173,6 +173,7 @@ def test_packages_say_what_they_are_for(package):
 
 # arguments of kernels that have one order everywhere, and the packages whose kernels keep to it
 ARGUMENTS = ("context", "network", "system", "w", "f", "l", "linear", "q", "qd", "qdd", "t", "out")
+NAMED_THRESHOLDS = ("rows", "sparse", "formulations", "workspaces")  # no bare numbers in kernels
 ORDERED = ("rows", "sparse", "formulations", "workspaces", "constraints", "forces", "taylor", "configuration", "maths")
 
 
@@ -182,6 +183,15 @@ def test_arguments_of_kernels_have_one_order(module):
         if isinstance(node, ast.FunctionDef) and node.decorator_list:
             places = [ARGUMENTS.index(given.arg) for given in node.args.args if given.arg in ARGUMENTS]
             assert places == sorted(places), f"{node.name}: {', '.join(ARGUMENTS[place] for place in places)}"
+
+
+@pytest.mark.parametrize("module", [name for name in FILES if _district(name) in NAMED_THRESHOLDS], ids=str)
+def test_kernels_have_no_bare_thresholds(module):
+    """Their numbers are multiples of a half, up to eight; all others have names in tolerances.py."""
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if isinstance(node, ast.FunctionDef) and node.decorator_list:
+            numbers = [one.value for one in ast.walk(node) if isinstance(getattr(one, "value", None), float)]
+            assert all(number <= 8.0 and (2.0 * number).is_integer() for number in numbers), f"{node.name}: {numbers}"
 
 
 def test_few_modules_lie_flat():

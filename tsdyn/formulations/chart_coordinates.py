@@ -30,6 +30,7 @@ def displace(network, l, poses):
             )  # d0 - 1, not d0: its rounding would be the same in every step
             put(l.d, 4 * b, lanes(x, y, z))
             l.d[4 * b + 3] = w
+            # p = p0 o (d0, d)
             e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
             p0 = e0 + (w * e0 - e1 * x - e2 * y - e3 * z)
             p1 = e1 + (w * e1 + e0 * x - e3 * y + e2 * z)

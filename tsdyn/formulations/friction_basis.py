@@ -76,6 +76,7 @@ def _find_bases(network, system, w, f, t, vdd):
     """lam_0 and, for each friction, a_i and l_i."""
     r, n, m, k = f.friction, w.q.size, w.Phi.size, vdd.size
     lam, left, x, Q = r.numbers[:m], r.numbers[2 * m : 2 * m + n], r.numbers[2 * m + n : 2 * m + 2 * n], stack(14)
+    # lam_0 = B^T U^T (Q_A + Q_v - M qdd_0),    qdd_0 = D vdd - U B gamma
     copy(w.h, x)
     _expand(w, vdd, x)
     copy(w.Q, left)
@@ -88,6 +89,7 @@ def _find_bases(network, system, w, f, t, vdd):
             _add_momentum(system, b, pd, pd, w.q[at + 3 : at + 7], 8.0, left[at + 3 : at + 7])
     _subtract_inertia(system, w.q, x, left)
     _multipliers(w, left, lam)
+    # a_i = (D^T M D)^-1 D^T g_i,    l_i = B^T U^T (g_i - M D a_i)
     for i in range(network.frictions.shape[0]):
         friction, a = network.frictions[i], r.basis[i, :k]
         unit_friction(system, friction, w.q, w.qd, t, Q)

@@ -172,11 +172,13 @@ def linearise(context, t):
         applied_forces(system, w.q, w.qd, t, linear.r)
         _forces(system, w, linear, t, 1)  # the laws' derivatives are kept; `reduce` takes the rest anew
     _inertia_terms(system, w, linear)
+    # Phi_q^T lam = r;    Y = U B G1,    Z = U B G2
     multiply(w.U, w.B, linear.UB)
-    transposed_times(linear.UB, linear.r, linear.lam)  # Phi_q^T lam = r
+    transposed_times(linear.UB, linear.r, linear.lam)
     constraint_curvature(system, w.q, w.qd, w.qdd, t, linear.lam, linear.K, linear.G1, linear.G2)
     multiply(linear.UB, linear.G1, linear.Y)
     multiply(linear.UB, linear.G2, linear.Z)
+    # C* += 2 M Y,    K* += C* Y - M Z
     _add_mass_times(system, w.q, 2.0, linear.Y, linear.C)
     _add_mass_times(system, w.q, -1.0, linear.Z, linear.K)
     add_product(1.0, linear.C, linear.Y, linear.K)
@@ -220,11 +222,13 @@ def reduce(context, t):
             to += 3
     clear_matrix(linear.K_hat)
     clear_matrix(linear.C_hat)
+    # K_hat = F^T K_body F,    C_hat = F^T C_body F
     multiply(linear.K_body, linear.F, linear.X)
     add_transposed_product(1.0, linear.F, linear.X, linear.K_hat)
     multiply(linear.C_body, linear.F, linear.X)
     add_transposed_product(1.0, linear.F, linear.X, linear.C_hat)
     if system.forces.shape[0] > 0:
+        # K_hat += D^T (Q_qd Y - Q_q) D,    C_hat += D^T Q_qd D
         _forces(system, w, linear, t, 0)
         multiply(linear.Q_q, w.D, linear.X)
         add_transposed_product(-1.0, w.D, linear.X, linear.K_hat)

@@ -14,7 +14,6 @@ from ..elements.markers import PARAMETERS, VECTOR
 from ..model.packed import classes
 from ..motions.prescribed import Motion
 from ..rows.interface import MOST_ROWS
-from ..sparse.constraint_graph import N_COUNT, N_FIRST_REAL, N_REALS
 from ..sparse.constraint_graphs import network_of, redundant_rows, with_loops
 from ..sparse.graph_builder import build
 from .tolerances import HOLDING, UNIT_ROUNDING
@@ -96,9 +95,9 @@ def instances(packed, network):
         groups[type(pair[0])].append(pair)
     kinds, begins, found = list(groups), packed.system.kinds["reals"], []
     for row in network.kinds:
-        i = int(np.searchsorted(begins, row[N_FIRST_REAL], side="right")) - 1
-        first = int((row[N_FIRST_REAL] - begins[i]) // row[N_REALS])
-        found.append((kinds[i], groups[kinds[i]][first : first + int(row[N_COUNT])]))
+        i = int(np.searchsorted(begins, row.reals, side="right")) - 1
+        first = int((row.reals - begins[i]) // row.stride)
+        found.append((kinds[i], groups[kinds[i]][first : first + int(row.count)]))
     return found
 
 

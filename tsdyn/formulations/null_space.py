@@ -38,7 +38,7 @@ def reduced_mass(system, w):
             w.A[i, j] = 0.0
     for b in range(system.mass.size):
         at, mass = system.bodies[b, 0], system.mass[b]
-        for c in range(at, at + 3):
+        for c in range(at, at + 3):  # D^T M D += m D_r^T D_r
             for i in range(k):
                 f = mass * w.D[c, i]
                 if f != 0.0:
@@ -48,12 +48,12 @@ def reduced_mass(system, w):
             e0, e1, e2, e3 = 2.0 * w.q[at + 3], 2.0 * w.q[at + 4], 2.0 * w.q[at + 5], 2.0 * w.q[at + 6]
             x, y, z = w.E[3 * b], w.E[3 * b + 1], w.E[3 * b + 2]
             d0, d1, d2, d3 = w.D[at + 3], w.D[at + 4], w.D[at + 5], w.D[at + 6]
-            for j in range(k):
+            for j in range(k):  # E = 2 G D_p
                 x[j] = -e1 * d0[j] + e0 * d1[j] + e3 * d2[j] - e2 * d3[j]
                 y[j] = -e2 * d0[j] - e3 * d1[j] + e0 * d2[j] + e1 * d3[j]
                 z[j] = -e3 * d0[j] + e2 * d1[j] - e1 * d2[j] + e0 * d3[j]
             J = system.inertia[b]
-            for i in range(k):
+            for i in range(k):  # D^T M D += E^T J' E
                 f = J[0] * x[i] + J[1] * y[i] + J[2] * z[i]
                 g = J[3] * x[i] + J[4] * y[i] + J[5] * z[i]
                 h = J[6] * x[i] + J[7] * y[i] + J[8] * z[i]
@@ -98,7 +98,7 @@ def reduced_acceleration(system, w, t, vdd):
         vdd[j] = 0.0
     for b in range(system.mass.size):
         at, mass = system.bodies[b, 0], system.mass[b]
-        for c in range(3):
+        for c in range(3):  # vdd += D_r^T m (g - h_r)
             f = mass * (system.gravity[c] - w.h[at + c])
             for j in range(k):
                 vdd[j] += f * w.D[at + c, j]
@@ -123,7 +123,7 @@ def reduced_acceleration(system, w, t, vdd):
             s1 = d0 * g0 - d3 * g1 + d2 * g2
             s2 = d3 * g0 + d0 * g1 - d1 * g2
             s3 = -d2 * g0 + d1 * g1 + d0 * g2
-            for j in range(k):
+            for j in range(k):  # vdd += E^T J' 2 G (U B gamma)_p + D_p^T Q_v
                 vdd[j] += (
                     f0 * w.E[3 * b, j]
                     + f1 * w.E[3 * b + 1, j]
@@ -137,12 +137,12 @@ def reduced_acceleration(system, w, t, vdd):
         for c in range(n):
             w.Q[c] = 0.0
         applied_forces(system, w.q, w.qd, t, w.Q)
-        for c in range(n):
+        for c in range(n):  # vdd += D^T Q_A
             f = w.Q[c]
             if f != 0.0:
                 for j in range(k):
                     vdd[j] += f * w.D[c, j]
-    cholesky_solve(w.A, vdd, k)
+    cholesky_solve(w.A, vdd, k)  # vdd <- (D^T M D)^-1 vdd
     w.counters.evaluations += 1
     return OK if is_finite(vdd[:k]) else NOT_FINITE
 

@@ -117,13 +117,14 @@ def tangent_map(system, w, t):
         return status
     w.counters.kept += 1 if w.counters.factorizations == made and m > 0 else 0
     clear_matrix(w.X)
-    for i in range(m):
+    for i in range(m):  # X = Phi_q V, over the nonzero columns of Phi_q
         for part in range(0, 4, 2):
             begin = system.segments[i, part]
             for c in range(begin, begin + system.segments[i, part + 1]):
                 f = w.Phi_q[i, c]
                 for j in range(k):
                     w.X[i, j] += f * w.V[c, j]
+    # T = B Phi_q V,    D = V - U T
     multiply(w.B, w.X, w.T)
     _copy_matrix(w.V, w.D)
     add_product(-1.0, w.U, w.T, w.D)

@@ -105,6 +105,7 @@ def move_by(network, f):
         if network.bodies[b, 1] == 7:
             x, y, z = 0.5 * f.Z[o + 4], 0.5 * f.Z[o + 5], 0.5 * f.Z[o + 6]
             e0, e1, e2, e3 = (f.poses[at + P], f.poses[at + P + 1], f.poses[at + P + 2], f.poses[at + P + 3])
+            # p <- p o (1, dpi' / 2)
             p[0] = e0 - e1 * x - e2 * y - e3 * z
             p[1] = e1 + e0 * x - e3 * y + e2 * z
             p[2] = e2 + e3 * x + e0 * y - e1 * z

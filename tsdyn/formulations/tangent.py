@@ -17,7 +17,7 @@ from ..elements.loops.body_poses import write_accelerations, write_positions, wr
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
 from ..maths.dense_linalg import copy, is_finite, largest
-from ..methods.explicit import ACCELERATE, NORM, PLACE
+from ..methods.explicit import ACCELERATE, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
     DYNAMICS,
@@ -30,7 +30,6 @@ from ..rows.interface import (
     is_axis,
     multiply_rates,
     multiply_rows,
-    project,
     redundant_rows_hold,
     solve_product,
     solve_rows,
@@ -49,6 +48,7 @@ from .chart_coordinates import (
 )
 from .chart_validity import BY_FAILURE, touch, turning
 from .friction_loads import call_rub
+from .tangent_error import error_norm
 from .tolerances import (
     CONTRACTION_LOST,
     CURVATURE,
@@ -61,10 +61,12 @@ from .tolerances import (
     SWEEPS,
 )
 
+__all__ = ["error_norm"]  # which is a part of the form, too
 OK, SINGULAR, MASS_SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR), int(Status.MASS_SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
 CHART_LOST, UNHELD = int(Status.CHART_LOST), int(Status.UNHELD)
 COLUMNS = REDUCED, VALUES, BIAS, DRIFT  # the loops of a network that are called
+SPLIT = 2.0**27 + 1.0  # splits a float in two halves
 
 
 @callback(PLACE)
@@ -285,7 +287,7 @@ def _spin(q, qd, i, out, o):
     excess, low = -1.0, 0.0
     for c in range(4):
         e = q[i + c]
-        wide = 134217729.0 * e  # Dekker: e in two halves, so that their products are exact
+        wide = SPLIT * e  # Dekker: e in two halves, so that their products are exact
         high = wide - (wide - e)
         rest = e - high
         square = e * e
@@ -299,47 +301,3 @@ def _spin(q, qd, i, out, o):
     y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
     z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
     out[o], out[o + 1], out[o + 2] = 2.0 * x - f * x, 2.0 * y - f * y, 2.0 * z - f * z
-
-
-@kernel
-def _weighted_square(network, f, l, e, values, old, at, rtol, atol):
-    """(dq_i / (atol + rtol |value|))^2 summed, dq the change of coordinates (n,) that P0 e makes at q0."""
-    copy(e, f.Z)
-    for i in range(e.size, f.Z.size):
-        f.Z[i] = 0.0
-    if f.b.size > 0:
-        project(network, l.rows0, f.Z, f.b)
-    total = 0.0
-    for b in range(network.bodies.shape[0]):
-        i, o = network.bodies[b, 0], 8 * b
-        for c in range(3):
-            x = f.Z[o + c] / (atol + rtol * max(abs(values[i + c]), abs(old[at + i + c])))
-            total += x * x
-        if network.bodies[b, 1] == 7:
-            i += 3
-            e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
-            x, y, z = 0.5 * f.Z[o + 4], 0.5 * f.Z[o + 5], 0.5 * f.Z[o + 6]
-            for c in range(4):
-                if c == 0:
-                    part = -e1 * x - e2 * y - e3 * z
-                elif c == 1:
-                    part = e0 * x - e3 * y + e2 * z
-                elif c == 2:
-                    part = e3 * x + e0 * y - e1 * z
-                else:
-                    part = -e2 * x + e1 * y + e0 * z
-                part /= atol + rtol * max(abs(values[i + c]), abs(old[at + i + c]))
-                total += part * part
-    return total
-
-
-@callback(NORM, "d")
-def error_norm(context, ex, ey, old, rtol, atol):
-    """Root mean square of the errors P0 ex of q and P0 ey of qd, over atol + rtol times the larger end of the step."""
-    c = load(context)
-    w, f, l, network = c.work, c.free, c.local, c.network
-    n, k = w.q.size, l.x.size - 8
-    old = vector(old, 3 * n)
-    total = _weighted_square(network, f, l, vector(ex, k), w.q, old, 0, rtol, atol)
-    total += _weighted_square(network, f, l, vector(ey, k), w.qd, old, n, rtol, atol)
-    return math.sqrt(total / (2 * n))

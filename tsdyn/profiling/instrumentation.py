@@ -9,7 +9,7 @@ from ..elements.loops import constraint_rows, coordinate_rows, force_series
 from ..elements.loops import forces as force_loops
 from ..formulations.locked_orientations import instances
 from ..model.packed_forces import members_of
-from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT
+from ..sparse.constraint_graph import LOOPS
 from . import timers
 
 X_ADDRESS, X_COUNT, X_FIRST_INT = 0, 2, 4  # columns of Expansion.forces
@@ -95,17 +95,17 @@ class Timekeeper(Stopwatch):
 
         rows = [
             (
-                row[N_FIRST_INT],
-                row[N_COUNT] * constraint_rows.INTS,
-                [*row[: timers.IN_ORDERS], *place],
+                row.table,
+                row.count * constraint_rows.INTS,
+                [*(row[loop] for loop in LOOPS), *place],
                 _of_constraints(kind),
             )
             for kind, row, place in zip(joints, network.kinds, places, strict=True)
         ]
         table, firsts = self._headed(network.table, rows)
         kinds = network.kinds.copy()
-        kinds[:, N_FIRST_INT] = firsts
-        _instead(kinds.T, range(timers.IN_ORDERS), timers.BODY_TIMERS)
+        kinds["table"] = firsts
+        _instead(kinds, LOOPS, timers.BODY_TIMERS)
         network = network._replace(table=table, kinds=kinds)
 
         rows = [

@@ -15,8 +15,20 @@ from .massless_axes import Axes, no_axes
 from .panels import Pattern
 from .symbolic import analyse
 
-# columns of Network.kinds: addresses of the loops, then where a kind's instances are
-REDUCED, VALUES, BIAS, DRIFT, N_COUNT, N_REALS, N_FIRST_INT, N_FIRST_REAL, N_COLUMNS = range(9)
+REDUCED, VALUES, BIAS, DRIFT = LOOPS = "reduced", "values", "bias", "drift"  # those of a `RowKind`
+
+
+class RowKind(Record):
+    """Instances of one class of primitive without a gap."""
+
+    reduced: int  # addresses of the loops of constraint_rows.py; zero where they aren't needed or there is none
+    values: int
+    bias: int
+    drift: int  # 1 for a moving kind until it is loaded
+    count: int  # instances
+    stride: int  # reals of each
+    table: int  # where the entries of the first begin in Network.table
+    reals: int  # and in System.reals
 
 
 class Product(Record):
@@ -52,7 +64,7 @@ class Network(NamedTuple):
     """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H, which are zero where row is -1."""
 
     bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length: 7, 3, or poses.STILL of what never turns
-    kinds: np.ndarray  # int64 (kinds, N_COLUMNS); more than one of a kind where instances between them are left out
+    kinds: np.ndarray  # RowKind (kinds,); more than one of a class where instances between them are left out
     table: np.ndarray  # int64: constraint_rows.INTS for each instance
     sides: np.ndarray  # int64 (m, 2): the bodies of a row; nb is the ground
     row: np.ndarray  # int64 (m,): its place among the rows of Phi; -1 for a weld's or an axis's
@@ -79,7 +91,7 @@ def no_network():
     """The network of nothing, for its type."""
     none, pattern = np.zeros(0, np.int64), analyse([], [])[1]
     pairs = np.zeros((0, 2), np.int64)
-    kinds, products, parts = np.zeros((0, N_COLUMNS), np.int64), records(Product), records(PartProduct)
+    kinds, products, parts = records(RowKind), records(Product), records(PartProduct)
     return Network(
         pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none, parts, np.zeros(0),
         pairs, none, none, np.zeros((0, FR_COLUMNS), np.int64), pairs, np.zeros(1, np.int64),

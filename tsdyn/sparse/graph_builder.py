@@ -12,12 +12,10 @@ import numpy as np
 
 from ..elements.loops.body_poses import STILL
 from ..elements.loops.constraint_rows import BODY, INTS, MASK, ROW
-from ..jit.kernels import records
+from ..jit.kernels import records, row_of
 from ..model.packed_friction import frictions_of
 from .body_splitting import cut
 from .constraint_graph import (
-    N_COLUMNS,
-    N_COUNT,
     ROWS,
     ROWS_WELD,
     W_MASS,
@@ -28,6 +26,7 @@ from .constraint_graph import (
     Network,
     PartProduct,
     Product,
+    RowKind,
 )
 from .massless_axes import Share, axes_of, inverses, lean_bodies
 from .symbolic import analyse
@@ -225,14 +224,22 @@ class _Builder:
                 if i is None:
                     continue
                 if last is None or last != at - 1:
-                    kinds.append([0, 0, 0, int(phi_t != 0), 0, stride, len(table), first_real + at * stride])
+                    kinds.append(
+                        {
+                            "drift": int(phi_t != 0),
+                            "count": 0,
+                            "stride": stride,
+                            "table": len(table),
+                            "reals": first_real + at * stride,
+                        }
+                    )
                     used.append(kind)
                 last = at
-                kinds[-1][N_COUNT] += 1
+                kinds[-1]["count"] += 1
                 entry = [0] * INTS
                 entry[BODY : BODY + 2], entry[ROW], entry[MASK] = self.joints[i].pair, self.firsts[i], 0
                 table += entry
-        return np.array(kinds, np.int64).reshape(-1, N_COLUMNS), np.array(table, np.int64), tuple(used)
+        return records(RowKind, [row_of(RowKind, **kind) for kind in kinds]), np.array(table, np.int64), tuple(used)
 
     def _weights(self):
         """Network.inverse, Network.mass and Network.spins."""

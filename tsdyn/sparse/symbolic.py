@@ -76,17 +76,58 @@ def _with_late(order, cliques, early):
 
 def _order(sizes, cliques):
     """Order of elimination: nodes in one clique only cost no fill and go first; then by minimum degree."""
-    members = dict(enumerate(set(clique) for clique in cliques))
-    owners = [set() for _ in sizes]
-    for name, clique in members.items():
-        for i in clique:
-            owners[i].add(name)
-    order, done = [], [size == 0 for size in sizes]
-    free = deque(i for i, own in enumerate(owners) if len(own) < 2 and not done[i])
+    graph = _QuotientGraph(sizes, cliques)
+    graph.peel()
+    core = [i for i in range(len(sizes)) if not graph.done[i]]
+    if len(core) > OWN:
+        return graph.order + _minimum_degree(core, graph.members.values())
+    ticket = len(core)
+    latest = {i: (graph.degree(i), at) for at, i in enumerate(core)}
+    heap = [(*key, i) for i, key in latest.items()]
+    heapq.heapify(heap)
+    while heap:
+        *key, i = heapq.heappop(heap)
+        if graph.done[i] or latest[i] != tuple(key):
+            continue
+        changed = set(graph.eliminate(i)).union(*graph.peel())
+        for n in changed:
+            if not graph.done[n]:
+                ticket += 1
+                latest[n] = graph.degree(n), ticket  # behind others of its degree: independent nodes first
+                heapq.heappush(heap, (*latest[n], n))
+    return graph.order
 
-    def eliminate(i):
-        done[i] = True
-        order.append(i)
+
+class _QuotientGraph:
+    """Nodes and the cliques that they are in; elimination of a node merges its cliques into one."""
+
+    def __init__(self, sizes, cliques):
+        self.sizes, self.members = sizes, dict(enumerate(set(clique) for clique in cliques))
+        self.owners = [set() for _ in sizes]
+        for name, clique in self.members.items():
+            for i in clique:
+                self.owners[i].add(name)
+        self.order, self.done = [], [size == 0 for size in sizes]
+        self.free = deque(i for i, own in enumerate(self.owners) if len(own) < 2 and not self.done[i])
+
+    def degree(self, i):
+        """Rows that node i is coupled to."""
+        return sum(self.sizes[n] for n in set().union(*(self.members[name] for name in self.owners[i])))
+
+    def peel(self):
+        """Eliminate the nodes that are in one clique only, until there are none; the nodes that each one changes."""
+        changed = []
+        while self.free:
+            i = self.free.popleft()
+            if not self.done[i]:
+                changed.append(self.eliminate(i))
+        return changed
+
+    def eliminate(self, i):
+        """Eliminate node i; the nodes that are coupled to it."""
+        members, owners = self.members, self.owners
+        self.done[i] = True
+        self.order.append(i)
         names = owners[i]
         if not names:
             return ()
@@ -95,54 +136,30 @@ def _order(sizes, cliques):
         union.discard(i)
         alone = len(names) == 1
         if not alone:
-            for name in names:
-                if name != into:
-                    union |= members.pop(name)
-            union.discard(i)
-            for n in union:
-                owners[n] -= names
-                owners[n].add(into)
-                for name in [name for name in owners[n] if name != into and members[name] <= union]:
-                    for other in members.pop(name):
-                        owners[other].discard(name)
+            self._merge(i, names, into)
         if len(union) == 1:
             for n in union:
                 owners[n].discard(into)
             del members[into]
         if alone and len(union) > 1:
             return union  # nobody else has come free
-        free.extend(n for n in union if len(owners[n]) < 2)
+        self.free.extend(n for n in union if len(owners[n]) < 2)
         return union
 
-    def peel():
-        while free:
-            i = free.popleft()
-            if not done[i]:
-                yield eliminate(i)
-
-    deque(peel(), 0)
-    core = [i for i in range(len(sizes)) if not done[i]]
-    if len(core) > OWN:
-        return order + _minimum_degree(core, members.values())
-    ticket = len(core)
-
-    def degree(i):
-        return sum(sizes[n] for n in set().union(*(members[name] for name in owners[i])))
-
-    latest = {i: (degree(i), at) for at, i in enumerate(core)}
-    heap = [(*key, i) for i, key in latest.items()]
-    heapq.heapify(heap)
-    while heap:
-        *key, i = heapq.heappop(heap)
-        if done[i] or latest[i] != tuple(key):
-            continue
-        changed = set(eliminate(i)).union(*peel())
-        for n in changed:
-            if not done[n]:
-                ticket += 1
-                latest[n] = degree(n), ticket  # behind others of its degree: independent nodes first
-                heapq.heappush(heap, (*latest[n], n))
-    return order
+    def _merge(self, i, names, into):
+        """Merge the cliques of these names into one of them, without node i; cliques within it are dropped."""
+        members, owners = self.members, self.owners
+        union = members[into]
+        for name in names:
+            if name != into:
+                union |= members.pop(name)
+        union.discard(i)
+        for n in union:
+            owners[n] -= names
+            owners[n].add(into)
+            for name in [name for name in owners[n] if name != into and members[name] <= union]:
+                for other in members.pop(name):
+                    owners[other].discard(name)
 
 
 def _minimum_degree(core, cliques):

@@ -19,7 +19,6 @@ from ..jit.kernels import kernel
 from ..jit.simd import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times
 from ..maths.dense_linalg import copy
 from ..rows.interface import solve_series, weigh
-from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS
 
 MOST_ORDERS = 64
 
@@ -135,8 +134,8 @@ def run_loops(network, reals, mode, k, x, f):
     for i in range(network.kinds.shape[0]):
         kind = network.kinds[i]
         call_series(
-            x.places[i, 0], mode, k, x.order.room, kind[N_COUNT], kind[N_REALS], x.places[i, 2],
-            network.table[kind[N_FIRST_INT] :], reals[kind[N_FIRST_REAL] :],
+            x.places[i, 0], mode, k, x.order.room, kind.count, kind.stride, x.places[i, 2],
+            network.table[kind.table :], reals[kind.reals :],
             x.bodies, x.constraints[x.places[i, 1] :], f.b, f.Z,
         )  # fmt: skip
 

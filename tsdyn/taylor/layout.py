@@ -17,7 +17,6 @@ from ..model.packed_forces import members_of
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tables import is_data
-from ..sparse.constraint_graph import DRIFT, N_COUNT, N_FIRST_INT
 from .tolerances import FAR
 from .workspace import Expansion, Orders
 
@@ -95,10 +94,10 @@ def allocate_expansion(network, kinds, packed, highest):
     bodies.reshape(nb + 1, -1)[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
     places, total = np.zeros((len(kinds), 3), np.int64), 0
     for i, kind in enumerate(kinds):
-        first, count = network.kinds[i, N_FIRST_INT], int(network.kinds[i, N_COUNT])
+        first, count = network.kinds[i].table, int(network.kinds[i].count)
         masks = network.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
         varies = bool((masks & ((1 << GROUND) - 1)).any())
-        driven = bool(network.kinds[i, DRIFT])
+        driven = bool(network.kinds[i].drift)
         slots = kind.slots + (len(kind.quantities()) if driven else 0)
         width = instance_width(len(kind.markers), kind.rows, slots, orders, varies, driven)
         places[i] = address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint), total, width
@@ -121,7 +120,7 @@ def _motions(network, packed, orders, places, constraints):
     """Expansion.motions; what is prescribed and constant is written now."""
     motions, rows = iter(packed.system.motions), []
     for i, (kind, members) in enumerate(instances(packed, network)):
-        for at, (_, given) in enumerate(members if network.kinds[i, DRIFT] != 0 else ()):
+        for at, (_, given) in enumerate(members if network.kinds[i].drift != 0 else ()):
             first = places[i, 1] + at * places[i, 2] + scratch_at(len(kind.markers), kind.rows, orders, True)
             entry = 0
             for j in range(len(kind.quantities())):
@@ -164,7 +163,7 @@ def masks(network, packed):
     for row, (kind, members) in zip(network.kinds, instances(packed, network), strict=True):
         motions, patterns, series = {}, {}, twin(kind.series)
         for i, (constraint, par) in enumerate(members):
-            entry = network.table[row[N_FIRST_INT] + i * INTS :][:INTS]
+            entry = network.table[row.table + i * INTS :][:INTS]
             length = [lengths[entry[BODY + (marker.body == "b")]] for marker in kind.markers]
             grounded = tuple(
                 isinstance(constraint.body_of(marker), Ground) or (size == STILL and marker.code != POINT)

@@ -29,6 +29,8 @@ class Contender:
         "tolerance" or "step" (s).
     values : tuple of float
         What is worth trying, the cheapest first.
+    largest : int
+        The largest scene with a definition of its own that it runs, in bodies.
     calls : int
         How many short runs a sample is the median of.
     get : str
@@ -38,6 +40,7 @@ class Contender:
     name = ""
     setting = "tolerance"
     values = tuple(10.0**-k for k in range(2, 15))
+    largest = 0
     calls = 9
     get = ""
 
@@ -55,7 +58,7 @@ class Contender:
 
     def serves(self, scene):
         """Whether it can run a scene, a `scenes.Benchmarked`."""
-        raise NotImplementedError
+        return scene.definition is not None and scene.size <= self.largest
 
     def prepare(self, scene):
         """Build the scene; return run(value) -> Outcome, which may be called again and again.

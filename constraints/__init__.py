@@ -1,44 +1,13 @@
 """Constraints, one file each: primitives, and joints composed of them; a new file here is registered automatically."""
 
-from __future__ import annotations
+from .._discovery import export_all, listing
+from ..elements import joint as _joint
+from ..elements import primitive as _primitive
 
-from typing import TYPE_CHECKING
+__all__ = [*export_all(__name__, __path__, globals(), "Primitive", "Joint"), "registered", "registered_joints"]
 
-from .._discovery import export_all
-
-if TYPE_CHECKING:
-    from ..hints import Joint, Primitive
-
-__all__ = export_all(__name__, __path__, globals(), "Primitive", "Joint")
-__all__ += ["registered", "registered_joints"]
-
-
-def registered() -> tuple[type[Primitive], ...]:
-    """Return every primitive class known, built in or plugged in.
-
-    Examples
-    --------
-    >>> import tsdyn as ts
-    >>> ts.constraints.Distance in ts.constraints.registered()
-    True
-    """
-    from ..elements.primitive import registered as known
-
-    return tuple(known().values())
-
-
-def registered_joints() -> tuple[type[Joint], ...]:
-    """Return every joint class known, built in or plugged in.
-
-    Examples
-    --------
-    >>> import tsdyn as ts
-    >>> ts.constraints.Revolute in ts.constraints.registered_joints()
-    True
-    """
-    from ..elements.joint import registered as known
-
-    return tuple(known().values())
+registered = listing(_primitive.registered, "Primitive", "ts.constraints.Distance in ts.constraints.registered()")
+registered_joints = listing(_joint.registered, "Joint", "ts.constraints.Revolute in ts.constraints.registered_joints()")
 
 
 def __dir__() -> list[str]:

@@ -1,732 +1,159 @@
 # Written by tools/stubs.py: do not edit.
 from typing import Any, Self
 
-from ..hints import ArrayLike, Attribute, Body, BodyLike, Floats, Joint, Path, Prescribed, Primitive
+from ..hints import ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Joint, Path, Points, Prescribed, Primitive, References
 
-class AngleDriver(Primitive):
-    reference_a: Attribute[ArrayLike, Floats]
+class AngleDriver(References, Primitive):
     across_a: Attribute[ArrayLike, Floats]
-    reference_b: Attribute[ArrayLike, Floats]
     angle: Attribute[Prescribed, Any]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        reference_a: ArrayLike | None = ...,
-        across_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        angle: Prescribed = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, reference_a: ArrayLike | None = ..., across_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., angle: Prescribed = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        reference: ArrayLike | None = ...,
-        across: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        across_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        angle: Prescribed = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, reference: ArrayLike | None = ..., across: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., across_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., angle: Prescribed = ..., name: str = ...) -> Self: ...
     @property
     def opposed(self) -> tuple[Any, ...]: ...
 
-class ConstantAngle(Joint):
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
+class ConstantAngle(Axes, Joint):
     angle: Attribute[Prescribed, Any]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        angle: Prescribed | None = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., angle: Prescribed | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis: ArrayLike | None = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        angle: Prescribed | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., angle: Prescribed | None = ..., name: str = ...) -> Self: ...
 
-class Cylindrical(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> None: ...
+class Cylindrical(Points, Axes, Joint):
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        axis: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
-class Distance(Primitive):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
+class Distance(Points, Primitive):
     length: Attribute[Prescribed, Any]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        length: Prescribed | None = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., length: Prescribed | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        length: Prescribed | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., length: Prescribed | None = ..., name: str = ...) -> Self: ...
 
-class Dot1(Primitive):
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
+class Dot1(Axes, Primitive):
     value: Attribute[Prescribed, Any]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        value: Prescribed = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., value: Prescribed = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis: ArrayLike | None = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        value: Prescribed = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., value: Prescribed = ..., name: str = ...) -> Self: ...
 
-class Dot2(Primitive):
+class Dot2(Points, Primitive):
     axis_a: Attribute[ArrayLike, Floats]
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
     value: Attribute[Prescribed, Any]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        value: Prescribed = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., value: Prescribed = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis: ArrayLike | None = ...,
-        point: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        value: Prescribed = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., point: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., value: Prescribed = ..., name: str = ...) -> Self: ...
 
 class EulerNormalization(Primitive):
     def __init__(self, a: Body, *, name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: Body, *, name: str = ...) -> Self: ...
 
-class Gear(Primitive):
+class Gear(Points, References, Primitive):
     axis_a: Attribute[ArrayLike, Floats]
-    reference_a: Attribute[ArrayLike, Floats]
-    reference_b: Attribute[ArrayLike, Floats]
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
     ratio: float
     offset: float
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        ratio: float | None = ...,
-        offset: float | None = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., ratio: float | None = ..., offset: float | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis: ArrayLike | None = ...,
-        reference: ArrayLike | None = ...,
-        point: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        ratio: float | None = ...,
-        offset: float | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., point: ArrayLike = ..., axis_a: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., ratio: float | None = ..., offset: float | None = ..., name: str = ...) -> Self: ...
 
-class Parallel(Joint):
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> None: ...
+class Parallel(Axes, Joint):
+    def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis: ArrayLike | None = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
-class Planar(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> None: ...
+class Planar(Points, Axes, Joint):
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        axis: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
-class PlaneContact(Primitive):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
+class PlaneContact(Points, Primitive):
     normal_b: Attribute[ArrayLike, Floats]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        normal_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        normal: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        normal_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., normal: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
-class PointDriver(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
+class PointDriver(Points, Joint):
     path: Attribute[Path, Any]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        path: Path | None = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., path: Path | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        path: Path | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., path: Path | None = ..., name: str = ...) -> Self: ...
 
-class PointOnLine(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
+class PointOnLine(Points, Joint):
     axis_b: Attribute[ArrayLike, Floats]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        axis: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
-class RackAndPinion(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
+class RackAndPinion(Points, Axes, Joint):
     direction_a: Attribute[ArrayLike, Floats]
     reference_b: Attribute[ArrayLike, Floats]
     radius: float
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        direction_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        radius: float | None = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., direction_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., radius: float | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        axis: ArrayLike | None = ...,
-        direction: ArrayLike | None = ...,
-        reference: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        direction_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        radius: float | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., direction: ArrayLike | None = ..., reference: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., direction_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., radius: float | None = ..., name: str = ...) -> Self: ...
 
-class Revolute(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> None: ...
+class Revolute(Points, Axes, Joint):
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        axis: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
-class Spherical(Primitive):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    def __init__(
-        self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., name: str = ...
-    ) -> None: ...
+class Spherical(Points, Primitive):
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., name: str = ...) -> Self: ...
 
-class Thread(Primitive):
-    reference_a: Attribute[ArrayLike, Floats]
+class Thread(Points, References, Primitive):
     across_a: Attribute[ArrayLike, Floats]
     axis_a: Attribute[ArrayLike, Floats]
-    reference_b: Attribute[ArrayLike, Floats]
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
     lead: float
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        reference_a: ArrayLike | None = ...,
-        across_a: ArrayLike | None = ...,
-        axis_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        lead: float | None = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, reference_a: ArrayLike | None = ..., across_a: ArrayLike | None = ..., axis_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., lead: float | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        reference: ArrayLike | None = ...,
-        across: ArrayLike | None = ...,
-        axis: ArrayLike | None = ...,
-        point: ArrayLike = ...,
-        reference_a: ArrayLike | None = ...,
-        across_a: ArrayLike | None = ...,
-        axis_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        lead: float | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, reference: ArrayLike | None = ..., across: ArrayLike | None = ..., axis: ArrayLike | None = ..., point: ArrayLike = ..., reference_a: ArrayLike | None = ..., across_a: ArrayLike | None = ..., axis_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., lead: float | None = ..., name: str = ...) -> Self: ...
 
-class TranslationMotor(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
+class TranslationMotor(Points, Joint):
     axis_a: Attribute[ArrayLike, Floats]
     displacement: Attribute[Prescribed, Any]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        displacement: Prescribed = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., displacement: Prescribed = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        axis: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        displacement: Prescribed = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., displacement: Prescribed = ..., name: str = ...) -> Self: ...
     @classmethod
     def of(cls, joint: Joint, *, displacement: Prescribed, name: str = ...) -> Self: ...
 
-class Universal(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> None: ...
+class Universal(Points, Axes, Joint):
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike | None = ...,
-        axis: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
-class Fixed(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
-    reference_a: Attribute[ArrayLike, Floats]
-    reference_b: Attribute[ArrayLike, Floats]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> None: ...
+class Fixed(Points, Axes, References, Joint):
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike | None = ...,
-        axis: ArrayLike | None = ...,
-        reference: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike | None = ..., axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
     @property
     def frames(self) -> tuple[Any, ...]: ...
 
-class RotationMotor(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
-    reference_a: Attribute[ArrayLike, Floats]
-    reference_b: Attribute[ArrayLike, Floats]
+class RotationMotor(Points, Axes, References, Joint):
     angle: Attribute[Prescribed, Any]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        angle: Prescribed = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., angle: Prescribed = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        axis: ArrayLike | None = ...,
-        reference: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        angle: Prescribed = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., angle: Prescribed = ..., name: str = ...) -> Self: ...
     @property
     def frames(self) -> tuple[Any, ...]: ...
     @classmethod
     def of(cls, joint: Joint, *, angle: Prescribed, name: str = ...) -> Self: ...
 
-class Screw(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
-    reference_a: Attribute[ArrayLike, Floats]
-    reference_b: Attribute[ArrayLike, Floats]
+class Screw(Points, Axes, References, Joint):
     lead: float
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        lead: float | None = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., lead: float | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        axis: ArrayLike | None = ...,
-        reference: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        lead: float | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., lead: float | None = ..., name: str = ...) -> Self: ...
     @property
     def frames(self) -> tuple[Any, ...]: ...
     @property
     def travel_per_radian(self) -> float: ...
 
-class Translational(Joint):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
-    reference_a: Attribute[ArrayLike, Floats]
-    reference_b: Attribute[ArrayLike, Floats]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> None: ...
+class Translational(Points, Axes, References, Joint):
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        axis: ArrayLike | None = ...,
-        reference: ArrayLike | None = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
     @property
     def frames(self) -> tuple[Any, ...]: ...
 

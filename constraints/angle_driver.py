@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import Motion, Primitive, Vector, dot, product, scaled, sine_cosine
+from ..plugins import Motion, Primitive, Vector, dot, kernel, product, scaled, sine_cosine
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Prescribed
+    from ..hints import BodyLike, Prescribed
 
 
 class AngleDriver(Primitive):
@@ -37,12 +37,6 @@ class AngleDriver(Primitive):
         The direction of b that is at the angle.
     angle : one of ts.motions, function(s) of time, or float, rad
         The angle prescribed; it may go on over any number of turns.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If a direction is missing or zero, or the angle is no motion, or a body is wrong.
 
     Examples
     --------
@@ -62,18 +56,8 @@ class AngleDriver(Primitive):
     prescribed = "angle"
     slots = 14
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        reference_a: ArrayLike | None = None,
-        across_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
-        angle: Prescribed = 0.0,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (reference_a, across_a, reference_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, angle: Prescribed = 0.0, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.angle = angle
 
     def __setattr__(self, name, value):
@@ -116,14 +100,7 @@ class AngleDriver(Primitive):
     def gamma(x, xd, par, t, out):
         """Eq. (4)."""
         sine, cosine = np.sin(par[0]), np.cos(par[0])
-        E, F, Ed, Fd, Edd, Fdd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(3):
-            E += x[i] * x[6 + i]
-            F += x[3 + i] * x[6 + i]
-            Ed += xd[i] * x[6 + i] + x[i] * xd[6 + i]
-            Fd += xd[3 + i] * x[6 + i] + x[3 + i] * xd[6 + i]
-            Edd += 2.0 * xd[i] * xd[6 + i]
-            Fdd += 2.0 * xd[3 + i] * xd[6 + i]
+        E, F, Ed, Fd, Edd, Fdd = sine_cosine_rates(x, xd, 6)
         along = sine * F + cosine * E
         beside = cosine * F - sine * E
         drift = 2.0 * par[1] * (sine * Fd + cosine * Ed) + par[2] * along + par[1] * par[1] * beside
@@ -158,6 +135,20 @@ class AngleDriver(Primitive):
         """A random instance; its angle stands still."""
         f, g, h = rng.normal(size=(3, 3))
         return cls(a, b, reference_a=f, across_a=g, reference_b=h, angle=rng.normal())
+
+
+@kernel
+def sine_cosine_rates(x, xd, h):
+    """E = f.h and F = g.h with their first two derivatives at xdd = 0; f, g and h begin at 0, 3 and h of x."""
+    E, F, Ed, Fd, Edd, Fdd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        E += x[i] * x[h + i]
+        F += x[3 + i] * x[h + i]
+        Ed += xd[i] * x[h + i] + x[i] * xd[h + i]
+        Fd += xd[3 + i] * x[h + i] + x[3 + i] * xd[h + i]
+        Edd += 2.0 * xd[i] * xd[h + i]
+        Fdd += 2.0 * xd[3 + i] * xd[h + i]
+    return E, F, Ed, Fd, Edd, Fdd
 
 
 class Turned:

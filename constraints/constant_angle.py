@@ -8,15 +8,15 @@ Singular if a and b are parallel (an angle of 0 or pi): use Parallel.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import InvalidConstraint, Joint, Smooth, Vector, number, rotation_matrix
+from ..plugins import Joint, Smooth, Vector, number, rotation_matrix
 from .dot1 import Dot1
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Prescribed
+    from ..hints import BodyLike, Prescribed
 
 
 class ConstantAngle(Joint):
@@ -24,14 +24,9 @@ class ConstantAngle(Joint):
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    axis_a, axis_b : array_like (3,)
-        The directions in the bodies' own frames; scaled to unit length.
     angle : float or one of ts.motions, rad; optional
         The angle kept, between 0 and pi (exclusive: there the row is singular); None takes that of the bodies as they
         stand now.
-    name : str, optional
 
     Raises
     ------
@@ -54,17 +49,8 @@ class ConstantAngle(Joint):
 
     markers = (Vector("a"), Vector("b"))
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        angle: Prescribed | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (axis_a, axis_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, angle: Prescribed | None = None, **places: Any) -> None:
+        super().__init__(a, b, **places)
         if angle is None:
             u, v = (rotation_matrix(body.orientation) @ s for body, s in zip((a, b), self.coordinates, strict=True))
             angle = float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
@@ -75,7 +61,7 @@ class ConstantAngle(Joint):
         """An angle at which the row is regular."""
         angle = number(self.angle(0.0) if isinstance(self.angle, Smooth) else self.angle)
         if not (0.0 < angle < math.pi and abs(math.cos(angle)) < 1.0):
-            raise InvalidConstraint(
+            raise self.error(
                 f"{self.name}: angle must lie between 0 and pi rad, got {self.angle!r}; to keep two directions "
                 "parallel use Parallel."
             )

@@ -8,38 +8,23 @@ The rows also admit opposed axes; such a start is refused. Never singular.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Angle, Displacement, Joint, Point, Vector
 from .parallel import Parallel
 from .point_on_line import PointOnLine
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class Cylindrical(Joint):
     """Let one body turn about an axis of another and slide along it.
 
-    Parameters
-    ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    point_a, point_b : array_like (3,), m
-        A point of the axis on each body, in its own frame.
-    axis_a, axis_b : array_like (3,)
-        The axis, in the bodies' own frames; scaled to unit length.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If an axis is missing or zero, or a point or body is wrong.
-
     Notes
     -----
-    Rows: axis[0], axis[1], line[0], line[1]. `Cylindrical.at(a, b, point=, axis=)` takes a point and the direction of
-    the axis in the ground frame.
+    The points lie on the axis. Rows: axis[0], axis[1], line[0], line[1]. `Cylindrical.at(a, b, point=, axis=)` takes a
+    point and the direction of the axis in the ground frame.
 
     Examples
     --------
@@ -57,18 +42,8 @@ class Cylindrical(Joint):
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(), Displacement())
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
 
     def compose(self):
         """Eqs. (1), (2)."""

@@ -11,14 +11,14 @@ Singular if x_a = x_b: for zero distance use Spherical.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import InvalidConstraint, Motion, Point, Primitive, rotation_matrix, square
+from ..plugins import Motion, Point, Primitive, ground_point, square
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Prescribed
+    from ..hints import BodyLike, Prescribed
 
 
 class Distance(Primitive):
@@ -26,13 +26,8 @@ class Distance(Primitive):
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    point_a, point_b : array_like (3,), m
-        The points in the bodies' own frames.
     length : float, or three functions of time (L, Ld, Ldd), m; optional
         The distance kept, > 0; None takes the distance of the bodies as they stand now.
-    name : str, optional
 
     Raises
     ------
@@ -41,7 +36,7 @@ class Distance(Primitive):
 
     Examples
     --------
-    A pendulum of 2 m, released from the horizontal:
+    A pendulum, 2 m long, passes its lowest point:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))
@@ -58,19 +53,10 @@ class Distance(Primitive):
     markers = (Point("a"), Point("b"))
     prescribed = "length"
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        length: Prescribed | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, length: Prescribed | None = None, **places: Any) -> None:
+        super().__init__(a, b, **places)
         if length is None:
-            ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
+            ends = [ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
             length = np.linalg.norm(ends[0] - ends[1])
         self.length = length
         self.check()
@@ -79,7 +65,7 @@ class Distance(Primitive):
         """A positive length."""
         initial = Motion.at_start(self.length)
         if not initial > 0.0:
-            raise InvalidConstraint(
+            raise self.error(
                 f"{self.name}: the length is {initial:g} m and must be positive; "
                 "to hold two points together use Spherical."
             )
@@ -127,7 +113,3 @@ class Distance(Primitive):
             d = (x[i] - x[3 + i]) * scale
             out[0, i] = d
             out[0, 3 + i] = -d
-
-
-def _ground_point(body, s):
-    return body.position + (rotation_matrix(body.orientation) @ s if body.dimension != 3 else 0.0)

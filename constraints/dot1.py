@@ -10,12 +10,12 @@ Singular if a and b are parallel (c = 1 or -1): Parallel uses two rows on perpen
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ..plugins import InvalidConstraint, Motion, Primitive, Vector
+from ..plugins import Motion, Primitive, Vector
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Prescribed
+    from ..hints import BodyLike, Prescribed
 
 
 class Dot1(Primitive):
@@ -23,18 +23,8 @@ class Dot1(Primitive):
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    axis_a, axis_b : array_like (3,)
-        The directions in the bodies' own frames; scaled to unit length.
     value : float, or three functions of time (c, cd, cdd); default 0
         The cosine, between -1 and 1 (exclusive: there the row is singular).
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If an axis is missing or zero, or the value is no cosine.
 
     Examples
     --------
@@ -51,17 +41,8 @@ class Dot1(Primitive):
     markers = (Vector("a"), Vector("b"))
     prescribed = "value"
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        value: Prescribed = 0.0,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (axis_a, axis_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, value: Prescribed = 0.0, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.value = value
         self.check()
 
@@ -69,7 +50,7 @@ class Dot1(Primitive):
         """A cosine."""
         initial = Motion.at_start(self.value)
         if not -1.0 < initial < 1.0:
-            raise InvalidConstraint(
+            raise self.error(
                 f"{self.name}: value is the cosine of an angle and must lie between -1 and 1, got {initial:g}; "
                 "to make two axes parallel, keep each of two directions across one of them perpendicular to the other."
             )

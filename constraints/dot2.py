@@ -11,12 +11,12 @@ Never singular by itself.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Motion, Point, Primitive, Vector
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Prescribed
+    from ..hints import BodyLike, Prescribed
 
 
 class Dot2(Primitive):
@@ -24,20 +24,8 @@ class Dot2(Primitive):
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    axis_a : array_like (3,)
-        The direction in a's frame; scaled to unit length.
-    point_a, point_b : array_like (3,), m
-        The points in the bodies' own frames.
     value : float, or three functions of time (c, cd, cdd), m; default 0
         The offset kept.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If the axis is missing or zero, or a point, value or body is wrong.
 
     Examples
     --------
@@ -57,18 +45,8 @@ class Dot2(Primitive):
     markers = (Vector("a"), Point("a"), Point("b"))
     prescribed = "value"
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = None,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        value: Prescribed = 0.0,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (axis_a, point_a, point_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, value: Prescribed = 0.0, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.value = value
 
     def parameters(self):

@@ -28,24 +28,15 @@ class Fixed(FramedJoint):
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    point_a, point_b : array_like (3,), m
-        The points that coincide, in the bodies' own frames.
     axis_a, axis_b, reference_a, reference_b : array_like (3,), optional
         An axis and a direction beside it, in the bodies' own frames, that the joint keeps parallel; what is left out
         follows from the bodies as they stand now. Without any, the bodies keep the orientation that they have.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If an axis is zero, a reference is parallel to its axis, or a point or body is wrong.
 
     Notes
     -----
-    Rows: point[0] to point[2], axis[0], axis[1], turn. `Fixed.at(a, b)` takes the bodies as they stand now; the point,
-    in the ground frame, is the centroid of b, or of a where b is the ground, unless `point=` says another.
+    The points coincide. Rows: point[0] to point[2], axis[0], axis[1], turn. `Fixed.at(a, b)` takes the bodies as they
+    stand now; the point, in the ground frame, is the centroid of b, or of a where b is the ground, unless `point=` says
+    another.
 
     Examples
     --------
@@ -58,20 +49,8 @@ class Fixed(FramedJoint):
     [ 0.  0. 20.] [  0. -20.   0.]
     """
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        reference_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.check()
 
     @Placing

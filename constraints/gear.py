@@ -13,13 +13,12 @@ last accepted step, so a step must rotate by less than half a turn. Singular if 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..plugins import (
     PARALLEL,
-    InvalidConstraint,
     Point,
     Primitive,
     Vector,
@@ -28,6 +27,7 @@ from ..plugins import (
     beside,
     cross,
     dot,
+    ground_point,
     kernel,
     number,
     quotient,
@@ -36,10 +36,9 @@ from ..plugins import (
     square,
     vectors,
 )
-from .thread import place
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 _dot, _cross = vectors.dot, vectors.cross  # by name: `twin` follows the names of kernels
 
@@ -53,8 +52,6 @@ class Gear(Primitive):
         The wheels, on parallel axes that joints to the ground or to a common carrier hold.
     point_a, point_b : array_like (3,), m
         Their centres, in the bodies' own frames.
-    axis_a : array_like (3,)
-        The axis, in the frame of a; scaled to unit length.
     reference_a, reference_b : array_like (3,), optional
         Directions across the axis in the bodies' own frames, whose angles from the line of centres are counted; by
         default both are along it now.
@@ -63,7 +60,6 @@ class Gear(Primitive):
         positive for one inside the other. Not zero.
     offset : float, rad; optional
         theta_b - ratio theta_a; None takes that of the bodies as they stand now.
-    name : str, optional
 
     Raises
     ------
@@ -97,25 +93,14 @@ class Gear(Primitive):
     memory = 1
 
     def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = None,
-        reference_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        ratio: float | None = None,
-        offset: float | None = None,
-        name: str = "",
+        self, a: BodyLike, b: BodyLike, *, ratio: float | None = None, offset: float | None = None, **places: Any
     ) -> None:
-        super().__init__(a, b, (axis_a, reference_a, reference_b, point_a, point_b), name)
+        super().__init__(a, b, **places)
         self.ratio = ratio
         u, f, h, l = self._now()
         for word, v in (("reference_a", f), ("reference_b", h), ("the line of centres", l)):
             if not np.linalg.norm(np.cross(u, v)) > PARALLEL * np.linalg.norm(v):
-                raise InvalidConstraint(f"{self.name}: {word} is along the axis at the start; it must be across it.")
+                raise self.error(f"{self.name}: {word} is along the axis at the start; it must be across it.")
         if offset is None:
             self.check()
             one, other = (np.arctan2(u @ np.cross(l, w), l @ w) for w in (f, h))
@@ -129,7 +114,7 @@ class Gear(Primitive):
         if one is None or other is None:
             u = rotation_matrix(self.a.orientation) @ self._place(self.markers[0], axis)
             ends = [self._place(*pair) for pair in zip(self.markers[3:], points, strict=True)]
-            l = place(self.b, ends[1]) - place(self.a, ends[0])
+            l = ground_point(self.b, ends[1]) - ground_point(self.a, ends[0])
             sound = np.linalg.norm(np.cross(u, l)) > PARALLEL * np.linalg.norm(l)
             f = beside(u, l)[0] if sound else across(u)[0]
             one = rotation_matrix(self.a.orientation).T @ f if one is None else one
@@ -143,18 +128,18 @@ class Gear(Primitive):
         return u, beside(u, f)[0] if np.linalg.norm(np.cross(u, f)) > 0 else f, B @ self.reference_b, self._line()
 
     def _line(self):
-        return place(self.b, self.point_b) - place(self.a, self.point_a)
+        return ground_point(self.b, self.point_b) - ground_point(self.a, self.point_a)
 
     def check(self):
         """A ratio and an offset."""
         ratio = number(self.ratio)
         if not (np.isfinite(ratio) and ratio != 0.0):
-            raise InvalidConstraint(
+            raise self.error(
                 f"{self.name}: ratio is the turn of b over that of a and must be a finite number other than zero, got "
                 f"{self.ratio!r}; it is negative where the wheels turn opposite ways."
             )
         if "offset" in self.__dict__ and not np.isfinite(number(self.offset)):
-            raise InvalidConstraint(f"{self.name}: offset must be a finite angle in rad, got {self.offset!r}.")
+            raise self.error(f"{self.name}: offset must be a finite angle in rad, got {self.offset!r}.")
 
     def parameters(self):
         """(ratio, offset); what is remembered is theta_a."""
@@ -240,7 +225,7 @@ class Gear(Primitive):
         A, B = (rotation_matrix(body.orientation) for body in (a, b))
         u, point = rng.normal(size=(2, 3))
         f, g = across(A @ u)
-        end = place(a, point) + 1.5 * f + 0.3 * rng.normal(size=3) - b.position
+        end = ground_point(a, point) + 1.5 * f + 0.3 * rng.normal(size=3) - b.position
         one, other = (np.cos(c) * f + np.sin(c) * g + 0.2 * rng.normal(size=3) for c in rng.normal(size=2))
         return cls(
             a, b, axis_a=u, reference_a=A.T @ one, reference_b=B.T @ other, point_a=point, point_b=B.T @ end,

@@ -8,30 +8,17 @@ refused. Never singular.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Angle, Joint, Vector, across
 from .dot1 import Dot1
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class Parallel(Joint):
     """Keep a direction of one body parallel to a direction of another, both pointing the same way.
-
-    Parameters
-    ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    axis_a, axis_b : array_like (3,)
-        The directions in the bodies' own frames; scaled to unit length.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If an axis is missing or zero, or a body is wrong.
 
     Notes
     -----
@@ -51,16 +38,8 @@ class Parallel(Joint):
     markers = (Vector("a"), Vector("b"))
     joint_coordinates = (Angle(),)
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (axis_a, axis_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
 
     def compose(self):
         """Eq. (1)."""

@@ -8,38 +8,23 @@ The rows also admit opposed normals; such a start is refused. Never singular.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Angle, Joint, Point, Vector
 from .dot2 import Dot2
 from .parallel import Parallel
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class Planar(Joint):
     """Let one body slide on a plane of another and turn about its normal, flat on it on either side.
 
-    Parameters
-    ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    point_a, point_b : array_like (3,), m
-        A point of the plane on each body, in its own frame.
-    axis_a, axis_b : array_like (3,)
-        The normal of the plane, in the bodies' own frames; scaled to unit length.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If an axis is missing or zero, or a point or body is wrong.
-
     Notes
     -----
-    Rows: axis[0], axis[1], plane. `Planar.at(a, b, point=, axis=)` takes a point and the normal of the plane in the
-    ground frame. A single point on a plane is a PlaneContact.
+    The points lie in the plane, the axes are its normals. Rows: axis[0], axis[1], plane. `Planar.at(a, b, point=,
+    axis=)` takes a point and the normal of the plane in the ground frame. A single point on a plane is a PlaneContact.
 
     Examples
     --------
@@ -57,18 +42,8 @@ class Planar(Joint):
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(),)
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
 
     def compose(self):
         """Eqs. (1), (2)."""

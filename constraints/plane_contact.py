@@ -10,37 +10,21 @@ Never singular by itself.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Point, Primitive, Vector
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class PlaneContact(Primitive):
     """Keep a point of one body in a plane fixed to another, without friction and without lifting off.
 
-    Parameters
-    ----------
-    a, b : Body or ground
-        a carries the point, b the plane.
-    point_a : array_like (3,), m
-        The point, in a's frame.
-    point_b : array_like (3,), m
-        A point of the plane, in b's frame.
-    normal_b : array_like (3,)
-        Normal of the plane, in b's frame; scaled to unit length.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If the normal is missing or zero, or a point or body is wrong.
-
     Notes
     -----
-    The force on a is -lam n: the plane pushes where lam < 0.
+    Body a carries the point point_a, b the plane through point_b with the normal normal_b. The force
+    on a is -lam n: the plane pushes where lam < 0.
 
     Examples
     --------
@@ -58,17 +42,8 @@ class PlaneContact(Primitive):
     rows = 1
     markers = (Point("a"), Point("b"), Vector("b", "normal_b"))
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        normal_b: ArrayLike | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, normal_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
 
     @staticmethod
     def phi(x, par, t, out):

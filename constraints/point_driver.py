@@ -7,15 +7,15 @@ Never singular.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import InvalidConstraint, Joint, Motion, Point, is_data
+from ..plugins import Joint, Motion, Point, is_data
 from .dot2 import Dot2
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Path
+    from ..hints import BodyLike, Path
 
 
 class PointDriver(Joint):
@@ -24,20 +24,10 @@ class PointDriver(Joint):
     Parameters
     ----------
     a, b : Body or ground
-        Two different bodies of one scene; the path is in the frame of a, often the ground.
-    point_a : array_like (3,), m
-        Where the path is measured from, in the frame of a.
-    point_b : array_like (3,), m
-        The point that is led, in the frame of b.
+        Two different bodies of one scene; a is often the ground.
     path : sequence of three, m
-        The coordinates along the axes of a: one of ts.motions, a function f of time or three (f, fd, fdd), data, or a
-        float. Or data of vectors: a ts.Table, a spline of SciPy's, or (t, x) with x (k, 3).
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If the path is not three motions or numbers, or a point or body is wrong.
+        The coordinates of point_b against point_a along the axes of a: one of ts.motions, a function f of time or three
+        (f, fd, fdd), data, or a float. Or data of vectors: a ts.Table, a spline of SciPy's, or (t, x) with x (k, 3).
 
     Notes
     -----
@@ -60,17 +50,8 @@ class PointDriver(Joint):
 
     markers = (Point("a"), Point("b"))
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        path: Path | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, path: Path | None = None, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.path = path
         self.check()
 
@@ -80,7 +61,7 @@ class PointDriver(Joint):
             if is_data(value):
                 value = Motion.components(value, 3, f"{self.name}: path")
             if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 3:
-                raise InvalidConstraint(
+                raise self.error(
                     f"{self.name}: path must be three motions or numbers, the coordinates along the axes of a, got "
                     f"{value!r}."
                 )

@@ -7,38 +7,22 @@ Never singular.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Displacement, Joint, Point, Vector, across
 from .dot2 import Dot2
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class PointOnLine(Joint):
     """Keep a point of one body on a line fixed to another.
 
-    Parameters
-    ----------
-    a, b : Body or ground
-        a carries the point, b the line.
-    point_a : array_like (3,), m
-        The point, in a's frame.
-    point_b : array_like (3,), m
-        A point of the line, in b's frame.
-    axis_b : array_like (3,)
-        The line's direction, in b's frame; scaled to unit length.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If the axis is missing or zero, or a point or body is wrong.
-
     Notes
     -----
-    Rows: line[0], line[1]. `PointOnLine.at(a, b, point=, axis=)` takes the point and the direction in the ground frame.
+    Body a carries the point point_a, b the line through point_b along axis_b. Rows: line[0], line[1].
+    `PointOnLine.at(a, b, point=, axis=)` takes the point and the direction in the ground frame.
 
     Examples
     --------
@@ -56,17 +40,8 @@ class PointOnLine(Joint):
     markers = (Point("a"), Point("b"), Vector("b"))
     joint_coordinates = (Displacement("axis_b"),)
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_b: ArrayLike | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, axis_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
 
     def compose(self):
         """Eq. (1)."""

@@ -8,26 +8,15 @@ counts no turns. Singular if the axis of the pinion is along the rack, which its
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    PARALLEL,
-    Angle,
-    Displacement,
-    InvalidConstraint,
-    Joint,
-    Point,
-    Vector,
-    beside,
-    carried,
-    turned_about,
-)
+from ..plugins import PARALLEL, Angle, Displacement, Joint, Point, Vector, beside, carried, turned_about
 from .thread import Thread, demand_lead, travel
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class RackAndPinion(Joint):
@@ -50,7 +39,6 @@ class RackAndPinion(Joint):
         bodies as they stand now.
     radius : float, m
         Pitch radius: travel over turn, not zero.
-    name : str, optional
 
     Raises
     ------
@@ -90,24 +78,13 @@ class RackAndPinion(Joint):
     )
     joint_coordinates = (Angle(reference="direction_a", direction="reference_b"), Displacement("direction_a"))
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        direction_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
-        radius: float | None = None,
-        name: str = "",
-    ) -> None:
-        given = reference_b if reference_b is not None else direction_a
-        super().__init__(a, b, (point_a, point_b, axis_a, axis_b, direction_a, given), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, radius: float | None = None, **places: Any) -> None:
+        follows = places.get("reference_b") is None
+        if follows:
+            places["reference_b"] = places.get("direction_a")  # for now
+        super().__init__(a, b, **places)
         self.radius = demand_lead(self, "radius", radius)
-        if reference_b is None:
+        if follows:
             turn = travel(a, b, self.direction_a, self.point_a, self.point_b) / self.radius
             now = carried(a, self.axis_a, self.direction_a, b, self.axis_b)
             self.reference_b = turned_about(self.axis_b, now, turn)
@@ -117,12 +94,12 @@ class RackAndPinion(Joint):
         """A radius, a rack across the axis, and a reference beside it."""
         demand_lead(self, "radius", self.radius)
         if abs(self.axis_a @ self.direction_a) > PARALLEL:
-            raise InvalidConstraint(
+            raise self.error(
                 f"{self.name}: direction_a must be across axis_a, the pinion's axis; they are at an angle of "
                 f"{np.degrees(np.arccos(np.clip(self.axis_a @ self.direction_a, -1, 1))):g} degrees."
             )
         if np.linalg.norm(np.cross(self.axis_b, self.reference_b)) < PARALLEL:
-            raise InvalidConstraint(
+            raise self.error(
                 f"{self.name}: reference_b is parallel to axis_b; choose a direction across the pinion's axis."
             )
 

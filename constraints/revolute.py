@@ -8,38 +8,23 @@ The rows also admit opposed axes; such a start is refused. Never singular.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Angle, Joint, Point, Vector
 from .parallel import Parallel
 from .spherical import Spherical
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class Revolute(Joint):
     """Let one body turn about an axis of another, and do nothing else: a hinge.
 
-    Parameters
-    ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    point_a, point_b : array_like (3,), m
-        A point of the axis, in the bodies' own frames.
-    axis_a, axis_b : array_like (3,)
-        The axis, in the bodies' own frames; scaled to unit length.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If an axis is missing or zero, or a point or body is wrong.
-
     Notes
     -----
-    Rows: point[0] to point[2], axis[0], axis[1]. `Revolute.at(a, b, point=, axis=)` takes the point and the axis in the
-    ground frame, the bodies being where they stand now.
+    The points lie on the axis. Rows: point[0] to point[2], axis[0], axis[1]. `Revolute.at(a, b, point=, axis=)` takes
+    the point and the axis in the ground frame, the bodies being where they stand now.
 
     Examples
     --------
@@ -57,18 +42,8 @@ class Revolute(Joint):
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(),)
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
 
     def compose(self):
         """Eqs. (1), (2)."""

@@ -8,7 +8,7 @@ start is refused. Singular if the two axes are perpendicular, which the joint ex
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ..plugins import Angle, FramedJoint, InvalidConstraint, Motion, beside, fit
 from .angle_driver import AngleDriver
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Joint, Prescribed
+    from ..hints import BodyLike, Joint, Prescribed
 
 
 class RotationMotor(FramedJoint):
@@ -26,17 +26,12 @@ class RotationMotor(FramedJoint):
     ----------
     a, b : Body or ground
         Two different bodies of one scene, held on a common axis by a joint (Revolute, Cylindrical, ...).
-    point_a, point_b : array_like (3,), m; optional
-        Where reactions are taken about, in the bodies' own frames; the row itself knows no point.
-    axis_a, axis_b : array_like (3,)
-        The axis, in the bodies' own frames; scaled to unit length.
     reference_a, reference_b : array_like (3,), optional
         Directions beside the axis, in the bodies' own frames; the angle goes from the first to the second about the
         axis (right hand). What is left out follows from the bodies as they stand now: their angle is that at t = 0,
         or at the time nearest to it that data cover.
     angle : one of ts.motions, a function f of time or three (f, fd, fdd), or float, rad
         The angle of b against a.
-    name : str, optional
 
     Raises
     ------
@@ -45,9 +40,9 @@ class RotationMotor(FramedJoint):
 
     Notes
     -----
-    One row: turn. `RotationMotor.of(joint, angle=)` drives a joint that has an axis; `RotationMotor.at(a, b, axis=,
-    angle=)` takes the axis in the ground frame. The torque on b about the axis is that of `solution.reaction(motor,
-    on=b)`, its power part of `solution.power`.
+    One row: turn; the points are those about which reactions are given. `RotationMotor.of(joint, angle=)` drives a
+    joint that has an axis; `RotationMotor.at(a, b, axis=, angle=)` takes the axis in the ground frame. The torque on b
+    about the axis is that of `solution.reaction(motor, on=b)`, its power part of `solution.power`.
 
     Examples
     --------
@@ -66,23 +61,10 @@ class RotationMotor(FramedJoint):
 
     joint_coordinates = (Angle(reference="reference_a", direction="reference_b"),)
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        reference_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
-        angle: Prescribed = 0.0,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, angle: Prescribed = 0.0, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.angle = angle
-        set_apart(self, reference_a is None, reference_b is None, Motion.at_start(self.angle))
+        set_apart(self, places, Motion.at_start(self.angle))
         self.check()
 
     def __setattr__(self, name, value):
@@ -134,9 +116,9 @@ def axes(joint):
     return {name: place for name in names if isinstance(place := getattr(joint, name, None), np.ndarray)}
 
 
-def set_apart(joint, free_a, free_b, angle):
-    """Turn a reference of a framed joint that was left out, so that the bodies now stand at this angle."""
-    if free_b:
+def set_apart(joint, places, angle):
+    """Turn a reference of a framed joint that was left out of its arguments: the bodies now stand at this angle."""
+    if places.get("reference_b") is None:
         joint.reference_b = turned_about(joint.axis_b, beside(joint.axis_b, joint.reference_b)[0], angle)
-    elif free_a:
+    elif places.get("reference_a") is None:
         joint.reference_a = turned_about(joint.axis_a, beside(joint.axis_a, joint.reference_a)[0], -angle)

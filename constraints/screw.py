@@ -10,7 +10,7 @@ f_a and f_b are the references, made perpendicular to the axes. (1) also admits 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Angle, Displacement, FramedJoint
 from .parallel import Parallel
@@ -19,7 +19,7 @@ from .rotation_motor import set_apart
 from .thread import Thread, demand_lead, travel
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class Screw(FramedJoint):
@@ -27,18 +27,11 @@ class Screw(FramedJoint):
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    point_a, point_b : array_like (3,), m
-        A point of the axis on each body, in its own frame.
-    axis_a, axis_b : array_like (3,)
-        The axis, in the bodies' own frames; scaled to unit length.
     reference_a, reference_b : array_like (3,), optional
         Directions beside the axis, in the bodies' own frames, which point the same way where the points coincide; what
         is left out follows from the bodies as they stand now.
     lead : float, m/rad
         Travel of b along the axis over its turn about it (right hand), against a. Negative for a left-handed thread.
-    name : str, optional
 
     Raises
     ------
@@ -48,8 +41,8 @@ class Screw(FramedJoint):
 
     Notes
     -----
-    Rows: axis[0], axis[1], line[0], line[1], thread. `Screw.at(a, b, point=, axis=, lead=)` takes a point and the
-    direction of the axis in the ground frame. A thread of one pitch p in m has lead = p / (2 pi).
+    The points lie on the axis. Rows: axis[0], axis[1], line[0], line[1], thread. `Screw.at(a, b, point=, axis=, lead=)`
+    takes a point and the direction of the axis in the ground frame. A thread of one pitch p in m has lead = p / (2 pi).
 
     Examples
     --------
@@ -66,24 +59,11 @@ class Screw(FramedJoint):
 
     joint_coordinates = (Angle(reference="reference_a", direction="reference_b"), Displacement())
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        reference_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
-        lead: float | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, lead: float | None = None, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.lead = demand_lead(self, "lead", lead)
         turn = travel(a, b, self.axis_a, self.point_a, self.point_b) / self.lead
-        set_apart(self, reference_a is None, reference_b is None, turn)
+        set_apart(self, places, turn)
         self.check()
 
     def check(self):

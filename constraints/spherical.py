@@ -9,29 +9,16 @@ Never singular by itself.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Point, Primitive
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class Spherical(Primitive):
     """Keep a point of one body on a point of another; three rows, three rotations stay free.
-
-    Parameters
-    ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    point_a, point_b : array_like (3,), m
-        The points in the bodies' own frames.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If a point is not three finite numbers, or the bodies are the same or of different scenes.
 
     Notes
     -----
@@ -51,16 +38,8 @@ class Spherical(Primitive):
     rows = 3
     markers = (Point("a"), Point("b"))
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
 
     @staticmethod
     def phi(x, par, t, out):

@@ -15,7 +15,7 @@ if h is along f x g.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,15 +25,18 @@ from ..plugins import (
     Primitive,
     Vector,
     dot,
+    ground_point,
+    kernel,
     number,
     product,
     rotation_matrix,
     scaled,
     sine_cosine,
 )
+from .angle_driver import sine_cosine_rates
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class Thread(Primitive):
@@ -53,12 +56,6 @@ class Thread(Primitive):
         The points whose distance along axis_a is the travel.
     lead : float, m/rad
         Travel over turn, not zero; negative for a left-handed thread.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If the lead is zero or not finite, or a direction, point or body is wrong.
 
     Examples
     --------
@@ -84,21 +81,8 @@ class Thread(Primitive):
     )
     slots = 21
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        reference_a: ArrayLike | None = None,
-        across_a: ArrayLike | None = None,
-        axis_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        lead: float | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (reference_a, across_a, axis_a, reference_b, point_a, point_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, lead: float | None = None, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.lead = lead
         self.check()
 
@@ -113,23 +97,13 @@ class Thread(Primitive):
     @staticmethod
     def phi(x, par, t, out):
         """Eq. (2)."""
-        E, F, s = 0.0, 0.0, 0.0
-        for i in range(3):
-            E += x[i] * x[9 + i]
-            F += x[3 + i] * x[9 + i]
-            s += x[6 + i] * (x[15 + i] - x[12 + i])
-        s /= par[0]
+        E, F, s = turn_and_travel(x, par[0])
         out[0] = par[0] * (np.cos(s) * F - np.sin(s) * E)
 
     @staticmethod
     def jacobian(x, par, t, out):
         """Eq. (4)."""
-        E, F, s = 0.0, 0.0, 0.0
-        for i in range(3):
-            E += x[i] * x[9 + i]
-            F += x[3 + i] * x[9 + i]
-            s += x[6 + i] * (x[15 + i] - x[12 + i])
-        s /= par[0]
+        E, F, s = turn_and_travel(x, par[0])
         sine, cosine = np.sin(s), np.cos(s)
         C = cosine * E + sine * F
         sine, cosine = par[0] * sine, par[0] * cosine
@@ -144,14 +118,9 @@ class Thread(Primitive):
     @staticmethod
     def gamma(x, xd, par, t, out):
         """Eq. (5)."""
-        E, F, Ed, Fd, Edd, Fdd, s, sd, sdd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        E, F, Ed, Fd, Edd, Fdd = sine_cosine_rates(x, xd, 9)
+        s, sd, sdd = 0.0, 0.0, 0.0
         for i in range(3):
-            E += x[i] * x[9 + i]
-            F += x[3 + i] * x[9 + i]
-            Ed += xd[i] * x[9 + i] + x[i] * xd[9 + i]
-            Fd += xd[3 + i] * x[9 + i] + x[3 + i] * xd[9 + i]
-            Edd += 2.0 * xd[i] * xd[9 + i]
-            Fdd += 2.0 * xd[3 + i] * xd[9 + i]
             d, dd = x[15 + i] - x[12 + i], xd[15 + i] - xd[12 + i]
             s += x[6 + i] * d
             sd += xd[6 + i] * d + x[6 + i] * dd
@@ -192,6 +161,17 @@ class Thread(Primitive):
         return cls(a, b, **places, lead=rng.uniform(0.5, 2.0))
 
 
+@kernel
+def turn_and_travel(x, lead):
+    """E, F of Eq. (1) and the travel over the lead, rad."""
+    E, F, s = 0.0, 0.0, 0.0
+    for i in range(3):
+        E += x[i] * x[9 + i]
+        F += x[3 + i] * x[9 + i]
+        s += x[6 + i] * (x[15 + i] - x[12 + i])
+    return E, F, s / lead
+
+
 def demand_lead(constraint, word, value):
     """The lead or radius, refused where there is no travel in a turn."""
     result = number(value)
@@ -205,9 +185,4 @@ def demand_lead(constraint, word, value):
 
 def travel(a, b, direction, point_a, point_b):
     """How far the point of b is from that of a along a direction of a, as the bodies stand now."""
-    return float((rotation_matrix(a.orientation) @ direction) @ (place(b, point_b) - place(a, point_a)))
-
-
-def place(body, s):
-    """Where a point of a body is now, ground frame."""
-    return body.position + (rotation_matrix(body.orientation) @ s if body.dimension != 3 else 0.0)
+    return float((rotation_matrix(a.orientation) @ direction) @ (ground_point(b, point_b) - ground_point(a, point_a)))

@@ -7,35 +7,25 @@ Never singular by itself.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from ..plugins import Displacement, Joint, Motion, Point, Vector, fitting
 from .dot2 import Dot2
 from .rotation_motor import axes, geometry
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Prescribed
+    from ..hints import BodyLike, Prescribed
 
 
 class TranslationMotor(Joint):
     """Move one body along an axis of another as a function of time says: a linear drive on a slider.
 
+    A joint lets them slide (Translational, Cylindrical, ...).
+
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene, held by a joint that lets them slide (Translational, Cylindrical, ...).
-    point_a, point_b : array_like (3,), m
-        The points whose distance along the axis is prescribed, in the bodies' own frames.
-    axis_a : array_like (3,)
-        The axis, in the frame of a; scaled to unit length.
     displacement : one of ts.motions, a function f of time or three (f, fd, fdd), or float, m
-        How far the point of b is from that of a, along the axis.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If the axis is missing or zero, the displacement is no motion, or a point or body is wrong.
+        Of point_b against point_a along axis_a.
 
     Notes
     -----
@@ -60,18 +50,8 @@ class TranslationMotor(Joint):
     markers = (Point("a"), Point("b"), Vector("a"))
     joint_coordinates = (Displacement(),)
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_a: ArrayLike | None = None,
-        displacement: Prescribed = 0.0,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, axis_a), name)
+    def __init__(self, a: BodyLike, b: BodyLike, *, displacement: Prescribed = 0.0, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.displacement = displacement
         self.check()
 

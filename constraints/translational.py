@@ -10,7 +10,7 @@ start is refused. Never singular.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Displacement, FramedJoint
 from .dot1 import Dot1
@@ -18,7 +18,7 @@ from .parallel import Parallel
 from .point_on_line import PointOnLine
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
 class Translational(FramedJoint):
@@ -26,26 +26,14 @@ class Translational(FramedJoint):
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    point_a, point_b : array_like (3,), m
-        A point of the axis on each body, in its own frame.
-    axis_a, axis_b : array_like (3,)
-        The axis, in the bodies' own frames; scaled to unit length.
     reference_a, reference_b : array_like (3,), optional
         Directions beside the axis, in the bodies' own frames, that the joint keeps parallel; what is left out follows
         from the bodies as they stand now.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If an axis is missing or zero, a reference is parallel to its axis, or a point or body is wrong.
 
     Notes
     -----
-    Rows: axis[0], axis[1], turn, line[0], line[1]. `Translational.at(a, b, point=, axis=)` takes a point and the
-    direction of the axis in the ground frame.
+    The points lie on the axis. Rows: axis[0], axis[1], turn, line[0], line[1]. `Translational.at(a, b, point=, axis=)`
+    takes a point and the direction of the axis in the ground frame.
 
     Examples
     --------
@@ -62,20 +50,8 @@ class Translational(FramedJoint):
 
     joint_coordinates = (Displacement(),)
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        reference_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, axis_a, axis_b, reference_a, reference_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
         self.check()
 
     def compose(self):

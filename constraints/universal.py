@@ -18,7 +18,7 @@ from .dot1 import Dot1
 from .spherical import Spherical
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 ALONG = 1e-6  # sine of the angle below which an arm would lie along the shaft
 
@@ -28,23 +28,14 @@ class Universal(Joint):
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    point_a, point_b : array_like (3,), m
-        Where the axes meet, in the bodies' own frames.
     axis_a, axis_b : array_like (3,)
         The axis that each body turns about on the cross between them, in the body's own frame; scaled to unit length.
         Both are across the shafts that the joint connects, and at right angles to each other.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidConstraint
-        If an axis is missing or zero, or a point or body is wrong.
 
     Notes
     -----
-    Rows: point[0] to point[2], cross. `Universal.at(a, b, point=, axis=, axis_b=)` takes them in the ground frame.
+    The points are where the axes meet. Rows: point[0] to point[2], cross. `Universal.at(a, b, point=, axis=, axis_b=)`
+    takes them in the ground frame.
 
     Examples
     --------
@@ -62,30 +53,11 @@ class Universal(Joint):
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(direction="axis_b"), Angle("axis_b", direction="axis_a"))
 
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
-        axis_a: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        name: str = "",
-    ) -> None:
-        super().__init__(a, b, (point_a, point_b, axis_a, axis_b), name)
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
 
     @Placing
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike | None = None,
-        *,
-        point: ArrayLike | None = None,
-        axis: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        **arguments: Any,
-    ) -> Self:
+    def at(cls, a: BodyLike, b: BodyLike | None = None, **arguments: Any) -> Self:
         """Make one from its point and axes in the ground frame, the bodies being where they stand now.
 
         Parameters
@@ -97,11 +69,12 @@ class Universal(Joint):
             The axis fixed in b; None takes the one across `axis` and the line from the point to the centroid of b (of
             a, where b is the ground), which is right where b is a shaft with its centroid on its line.
         """
+        axis, axis_b = arguments.pop("axis", None), arguments.pop("axis_b", None)
         axis = arguments.pop("axis_a", axis)
-        joint = super().at(a, b, point=point, axis_a=axis, axis_b=axis if axis_b is None else axis_b, **arguments)
+        joint = super().at(a, b, axis_a=axis, axis_b=axis if axis_b is None else axis_b, **arguments)
         if axis_b is None:
             body, marker = b if b.dimension else a, joint.markers[3]
-            shaft = body.position - point
+            shaft = body.position - arguments["point"]
             arm = np.cross(axis, shaft)
             if not np.linalg.norm(arm) > ALONG * np.linalg.norm(axis) * np.linalg.norm(shaft):
                 raise InvalidConstraint(

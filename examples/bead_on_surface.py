@@ -83,10 +83,8 @@ def reference(times):
 def check(solution):
     """The bead stays on the surface to rounding, keeps its energy, and is where SciPy says."""
     assert solution.success, solution.message
-    error = solution.constraint_error
-    assert error.position.max() < 1e-14
-    assert error.velocity.max() < 1e-13
-    assert error.acceleration.max() < 1e-12
+    errors = [error.max() for error in solution.constraint_error]
+    assert np.less(errors, (1e-14, 1e-13, 1e-12)).all(), errors
     assert np.ptp(solution.energy) < 1e-8
     position = solution.position(solution.scene.body("bead"))
     assert np.abs(position - reference(solution.t)).max() < 1e-7
@@ -96,9 +94,8 @@ def main():
     """Check the plug-in, then run it for 5 s."""
     ts.testing.check_primitive(OnEllipsoid)
     solution = ts.simulate(build(), (0.0, 5.0), integrator=ts.integrators.Nystrom4(step=1e-3))
+    print(solution, f"  distance from SciPy {np.abs(solution.q - reference(solution.t)).max():.1e} m", sep="\n")
     check(solution)
-    print(solution)
-    print(f"  distance from SciPy {np.abs(solution.q - reference(solution.t)).max():.1e} m")
 
 
 if __name__ == "__main__":

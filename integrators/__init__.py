@@ -1,30 +1,11 @@
 """Integrators, one file each; a new file in this folder is registered automatically."""
 
-from __future__ import annotations
+from .._discovery import export_all, listing
+from ..methods.integrator import registered as _known
 
-from typing import TYPE_CHECKING
+__all__ = [*export_all(__name__, __path__, globals(), "Integrator"), "registered"]
 
-from .._discovery import export_all
-
-if TYPE_CHECKING:
-    from ..hints import Integrator
-
-__all__ = export_all(__name__, __path__, globals(), "Integrator")
-__all__.append("registered")
-
-
-def registered() -> tuple[type[Integrator], ...]:
-    """Return every integrator class known, built in or plugged in.
-
-    Examples
-    --------
-    >>> import tsdyn as ts
-    >>> ts.integrators.Taylor in ts.integrators.registered()
-    True
-    """
-    from ..methods.integrator import registered as known
-
-    return tuple(known().values())
+registered = listing(_known, "Integrator", "ts.integrators.Taylor in ts.integrators.registered()")
 
 
 def __dir__() -> list[str]:

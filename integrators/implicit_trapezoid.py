@@ -8,31 +8,16 @@ from ..plugins import DiagonallyImplicit, ImplicitTableau, linear_second, trapez
 class ImplicitTrapezoid(DiagonallyImplicit):
     """The trapezoidal rule with Jacobian reuse, adaptive or of a fixed step, for stiff scenes at modest accuracy.
 
-    Parameters
-    ----------
-    rtol, atol : float; default 1e-6, 1e-8
-        Each step's error, from differences over two steps, is kept to a fraction of atol + rtol |value|.
-    step : float, s, optional
-        A fixed step instead.
-    max_step, first_step : float, s, optional
-        Bound on the step; the first step to try.
-
-    Raises
-    ------
-    InvalidArgument
-        If a tolerance or a step is not positive and finite.
-
     Examples
     --------
-    A pendulum of 1 m, released from the horizontal; |Phi| stays at rounding:
+    A mass on a spring oscillates at 100 rad/s. Three steps a radian keep its energy: the rule adds no damping.
 
     >>> import tsdyn as ts
-    >>> scene = ts.Scene()
-    >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
-    >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
-    >>> solution = ts.simulate(scene, (0, 1), integrator=ts.integrators.ImplicitTrapezoid(rtol=1e-5, atol=1e-5))
-    >>> print(f"z = {solution.position(ball)[-1, 2]:.4f} m", solution.constraint_error.position.max() < 1e-12)
-    z = -0.1650 m True
+    >>> mass = (scene := ts.Scene(gravity=(0, 0, 0))).add_point_mass(1.0, position=(1, 0, 0), velocity=(1, 0, 0))
+    >>> spring = scene.add(ts.forces.Spring(mass, scene.ground, stiffness=1e4))
+    >>> solution = ts.simulate(scene, (0, 10), integrator=ts.integrators.ImplicitTrapezoid(step=3e-3))
+    >>> bool(abs(solution.energy - 0.5).max() < 1e-6)
+    True
     """
 
     order = 2

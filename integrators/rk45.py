@@ -10,21 +10,6 @@ from ..plugins import ExplicitRungeKutta, RungeKuttaTableau
 class RK45(ExplicitRungeKutta):
     """Explicit Runge-Kutta method of order 5 with an error estimate of order 4.
 
-    Parameters
-    ----------
-    rtol, atol : float; default 1e-6, 1e-8
-        Each step's error is kept to a thirtieth of atol + rtol |value|, in the root mean square over coordinates and
-        velocities, so that what adds up over a run is near to what was asked for.
-    step : float, s, optional
-        A fixed step instead.
-    max_step, first_step : float, s, optional
-        Bound on the step; the first step to try.
-
-    Raises
-    ------
-    InvalidArgument
-        If a tolerance or a step is not positive and finite.
-
     Examples
     --------
     A pendulum of 1 m, released from the horizontal; |Phi| stays at rounding:

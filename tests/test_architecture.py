@@ -19,6 +19,7 @@ ORDER = [
     "_version",
     "validation",
     "calls",
+    "docstrings",
     "drawing",
     "jit",
     "maths",

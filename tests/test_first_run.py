@@ -14,7 +14,7 @@ import tsdyn as ts
 from examples import top
 from tsdyn.ahead import all_kernels, first_run, workers
 from tsdyn.cli import main
-from tsdyn.configuration.initial_conditions import _look
+from tsdyn.configuration.start_kernels import evaluate_start
 from tsdyn.jit import waiting
 from tsdyn.jit.compiled import _types
 from tsdyn.runs.stepper import advance
@@ -200,7 +200,7 @@ def test_every_kernel_of_the_package_is_found_by_its_name():
 
 
 def test_longest_first():
-    names = workers.weight(advance_series.py_func), workers.weight(_look.py_func)
+    names = workers.weight(advance_series.py_func), workers.weight(evaluate_start.py_func)
     small = [workers.weight(kernel.py_func) for kernel in ts.constraints.EulerNormalization.kernels.values()]
     assert min(names) > max(small)
 
@@ -241,7 +241,7 @@ def test_what_a_run_needs_is_asked_for_and_no_more(tmp_path, name, method, form,
 def test_signatures_are_those_of_the_calls():
     ts.simulate(top.build(), (0.0, 0.01))
     ts.simulate(top.build(), (0.0, 0.01), integrator="dop853")
-    for kernel in (_look, advance_series, advance):
+    for kernel in (evaluate_start, advance_series, advance):
         assert list(kernel.overloads) == [_types(kernel)]
 
 
@@ -280,12 +280,15 @@ def test_one_line_counts_on_a_terminal(monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.delenv("TSDYN_QUIET", raising=False)
     with waiting.Waiting(2) as line:
-        for name in ("tsdyn.configuration.initial_conditions _look", "tsdyn.constraints.distance Distance.phi_loop"):
+        for name in (
+            "tsdyn.configuration.start_kernels evaluate_start",
+            "tsdyn.constraints.distance Distance.phi_loop",
+        ):
             line.begin(name)
             line.end(name)
     lines = sys.stderr.text.split("\r")[1:]
     assert {len(line.rstrip("\n")) for line in lines} == {99}
-    assert lines[0].split(":")[-1].strip() == "0 of 2, 0 s (initial_conditions._look)"
+    assert lines[0].split(":")[-1].strip() == "0 of 2, 0 s (start_kernels.evaluate_start)"
     assert lines[-1].strip() == "tsdyn: 2 of 2 kernels compiled in 0 s."
     assert sys.stderr.text.count("\n") == 1
 
@@ -293,8 +296,8 @@ def test_one_line_counts_on_a_terminal(monkeypatch):
 def test_quiet(monkeypatch, capsys):
     monkeypatch.setenv("TSDYN_QUIET", "1")
     with waiting.Waiting(1) as line:
-        line.begin("tsdyn.configuration.initial_conditions _look")
-        line.end("tsdyn.configuration.initial_conditions _look")
+        line.begin("tsdyn.configuration.start_kernels evaluate_start")
+        line.end("tsdyn.configuration.start_kernels evaluate_start")
     assert capsys.readouterr() == ("", "")
 
 

@@ -120,10 +120,10 @@ def test_a_hub_is_cut():
     assert small.welds.shape[0] == 0
 
 
-@pytest.mark.parametrize("large", [start.LARGE, 0], ids=["by name", "without matrices"])
+@pytest.mark.parametrize("large", [start.LISTED_ENTRIES, 0], ids=["by name", "without matrices"])
 def test_rows_that_depend_on_each_other_at_a_hub(large, monkeypatch):
     """Fifty rods hold the hub in its place, of which six would do."""
-    monkeypatch.setattr(start, "LARGE", large)
+    monkeypatch.setattr(start, "LISTED_ENTRIES", large)
     scene = ts.Scene()
     hub = scene.add_body(1.0, (0.1, 0.1, 0.1))
     rng = np.random.default_rng(1)
@@ -267,7 +267,7 @@ def test_assembly_with_sparse_matrices(rng, monkeypatch):
     before, fixed, found = scene.start, scene.bodies[3:4], []
     for large in (kinetic.LARGE, 0):
         scene.place(*before)
-        monkeypatch.setattr(kinetic, "LARGE", large)
+        monkeypatch.setattr(kinetic, "LISTED_ENTRIES", large)
         report = scene.assemble(fixed=fixed)
         found.append((*scene.start, report.moved, report.residual, report.velocity_residual))
     for dense, sparse in zip(*found, strict=True):

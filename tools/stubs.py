@@ -23,8 +23,13 @@ FILES = {
     "forces": ROOT / "tsdyn" / "forces" / "__init__.pyi",
     "integrators": ROOT / "integrators" / "__init__.pyi",
 }
+ATTACHED = (ts.Primitive, ts.Joint, ts.Force)
+PAIRS = {  # arguments: the class of hints.py that has them as attributes
+    ("point_a", "point_b"): "Points",
+    ("axis_a", "axis_b"): "Axes",
+    ("reference_a", "reference_b"): "References",
+}
 READ = {"ArrayLike": "Floats", "Prescribed": "Any", "Path": "Any", "Load": "Any", "VectorLoad": "Any"}  # what is kept
-LINE = 120  # characters
 
 
 def stub(package: str) -> str:
@@ -45,7 +50,9 @@ def _class(cls: type, public: set[str]) -> str:
     """Attributes, `__init__`, `at`, and what no public base has."""
     known = [base for base in cls.__mro__[1:] if base.__name__ in public]
     bases = [base for base in known if not any(base in other.__mro__[1:] for other in known)]
-    lines = [f"class {cls.__name__}({', '.join(base.__name__ for base in bases)}):", *_attributes(cls)]
+    pairs = [pair for pair in PAIRS if issubclass(cls, ATTACHED) and {*pair} <= {*inspect.signature(cls).parameters}]
+    names = [*(PAIRS[pair] for pair in pairs), *(base.__name__ for base in bases)]
+    lines = [f"class {cls.__name__}({', '.join(names)}):", *_attributes(cls, sum(pairs, ()))]
     lines += _function("__init__", inspect.signature(cls.__init__))
     inherited = {name for base in bases for name in dir(base)} - {"at"}
     inherited |= {name for base in cls.__mro__ for name in inspect.get_annotations(base)}
@@ -64,16 +71,16 @@ def _class(cls: type, public: set[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _attributes(cls: type) -> list[str]:
-    """What the arguments of a constraint or force are kept as."""
-    if not issubclass(cls, (ts.Primitive, ts.Joint, ts.Force)):
+def _attributes(cls: type, known: tuple[str, ...]) -> list[str]:
+    """What the arguments of a constraint or force are kept as, but for those that its bases have."""
+    if not issubclass(cls, ATTACHED):
         return []
     scene = ts.Scene()
     instance = cls.example(np.random.default_rng(0), *(scene.add_body(1.0, (1.0, 1.0, 1.0)) for _ in "ab"))
     lines = []
     for name, parameter in inspect.signature(cls).parameters.items():
         method = inspect.isfunction(inspect.getattr_static(cls, name, None))
-        if name in ("a", "b", "name") or method or not hasattr(instance, name):
+        if name in ("a", "b", "name", *known) or method or not hasattr(instance, name):
             continue
         given = str(parameter.annotation)
         if not _may_be_none(cls, name):
@@ -110,21 +117,14 @@ def _may_be_set(instance: object, name: str) -> bool:
 
 
 def _function(name: str, signature: inspect.Signature) -> list[str]:
-    """A method, defaults left out, on one line or with a line for each argument."""
+    """A method on one line, defaults left out."""
     told = []
     for p in signature.parameters.values():
         if p.kind is p.KEYWORD_ONLY and "*" not in told:
             told.append("*")
         typed = f"{p.name}: {p.annotation}" if p.annotation is not p.empty else p.name
         told.append(typed if p.default is p.empty else f"{typed} = ...")
-    end = f") -> {signature.return_annotation}: ..."
-    line = f"    def {name}({', '.join(told)}{end}"
-    if len(line) <= LINE:
-        return [line]
-    inner = ", ".join(told)
-    if len(inner) <= LINE - 8:
-        return [f"    def {name}(", f"        {inner}", f"    {end}"]
-    return [f"    def {name}(", *(f"        {one}," for one in told), f"    {end}"]
+    return [f"    def {name}({', '.join(told)}) -> {signature.return_annotation}: ..."]
 
 
 def _imports(body: str, own: set[str]) -> str:

@@ -15,3 +15,21 @@ def export_all(package, path, namespace, *bases):
                 namespace[name] = value
                 names.append(name)
     return names
+
+
+def listing(known, kind, example):
+    """Make the public function that returns every class of a kind; `known` returns them by name."""
+
+    def registered():
+        return tuple(known().values())
+
+    registered.__annotations__["return"] = f"tuple[type[{kind}], ...]"
+    registered.__doc__ = f"""Return every class of {kind} known, built in or plugged in.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> {example}
+    True
+    """
+    return registered

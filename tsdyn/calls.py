@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from .hints import Class, Function
 
+PLACES = "places"  # the open parameter of an `__init__` that passes marker coordinates on
 KEYWORD, OPEN = inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.VAR_KEYWORD
 BY_POSITION = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 
@@ -85,18 +86,27 @@ def misfit_of(title, signature, arguments, keywords):
 
 
 def complete_signature(cls):
-    """The signature of a class, what its __init__ passes on by **keywords filled in from its bases."""
+    """The signature of a class, what its __init__ passes on by **keywords filled in from its bases.
+
+    `**places` stands for the arguments that place the markers of the class, and for `name`.
+    """
     signature = inspect.signature(cls.__init__)
     parameters = dict(signature.parameters)
     for base in cls.__mro__[1:]:
         opened = [name for name, p in parameters.items() if p.kind == OPEN]
-        if not opened:
+        if not opened or opened[0] == PLACES:
             break
         if "__init__" in vars(base) and base is not object:
             del parameters[opened[0]]
             for name, p in inspect.signature(base.__init__).parameters.items():
-                if p.kind in (KEYWORD, OPEN):
+                if p.kind in (KEYWORD, OPEN) and name != PLACES:
                     parameters.setdefault(name, p)
+    if PLACES in parameters and cls.markers:
+        del parameters[PLACES]
+        placing = {marker.argument: marker.parameter() for marker in cls.markers if marker.placed}
+        name = parameters.pop("name", inspect.Parameter("name", KEYWORD, default="", annotation="str"))
+        own = {n: parameters.pop(n) for n in [*parameters] if parameters[n].kind == KEYWORD}
+        parameters |= {**placing, **own, "name": name}
     order = sorted(parameters.values(), key=lambda p: p.kind)  # stable
     return signature.replace(parameters=order)
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .errors import InvalidArgument, MissingDependency
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 # from the palette of Okabe and Ito, told apart whatever the colour vision
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
@@ -18,6 +22,42 @@ def demand_matplotlib():
         import matplotlib  # noqa: F401
     except ImportError as error:
         raise MissingDependency("the figure needs matplotlib: pip install 'tsdyn[plot]'") from error
+
+
+@contextmanager
+def new_figure(width: float, height: float) -> Iterator[Any]:
+    """Draw in the body of a `with` into a figure of this size, inches, that looks the same whatever style is set.
+
+    Without pyplot, it affects neither the caller's backend nor open figures.
+    """
+    demand_matplotlib()
+    from matplotlib import style
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with style.context("default"):
+        figure = Figure(figsize=(width, height), dpi=200, layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
+
+
+class Drawn:
+    """Base of results that draw themselves by `figure()`."""
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """Draw it; return the matplotlib Figure, written to `path` if given.
+
+        Raises
+        ------
+        MissingDependency
+            If matplotlib is not installed.
+        InvalidArgument
+            If the figure can't be written there.
+        """
+        drawn = self.figure()
+        if path is not None:
+            save(drawn, path)
+        return drawn
 
 
 def save(figure: Any, path: str | Path) -> Path:

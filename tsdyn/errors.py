@@ -185,6 +185,8 @@ class StepFailure(TsdynError, ArithmeticError):
 
     Examples
     --------
+    Two steps of a pendulum, and no more:
+
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))
     >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")

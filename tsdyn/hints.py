@@ -78,6 +78,28 @@ Method: TypeAlias = Integrator | type[Integrator] | str
 Methods: TypeAlias = Sequence[str | Callable[..., Integrator]] | Mapping[str, str | Callable[..., Integrator]]
 StepKernel: TypeAlias = tuple[Any, Floats, Callable[[int, int], int]]  # with its numbers, and floats of memory
 
+
+class Points:
+    """Attributes of a constraint or force with a point on each body, for stubs."""
+
+    point_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+
+
+class Axes:
+    """Attributes of one with an axis on each body."""
+
+    axis_a: Attribute[ArrayLike, Floats]
+    axis_b: Attribute[ArrayLike, Floats]
+
+
+class References:
+    """Attributes of one that measures an angle between two directions."""
+
+    reference_a: Attribute[ArrayLike, Floats]
+    reference_b: Attribute[ArrayLike, Floats]
+
+
 Item = TypeVar("Item", bound=Attachment)
 Class = TypeVar("Class", bound=type)
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -88,6 +110,7 @@ __all__ = [
     "AssemblyReport",
     "Attachment",
     "Attribute",
+    "Axes",
     "Axis",
     "Benchmark",
     "Body",
@@ -125,6 +148,7 @@ __all__ = [
     "Path",
     "Phase",
     "PointMass",
+    "Points",
     "Prescribed",
     "Primitive",
     "Profile",
@@ -133,6 +157,7 @@ __all__ = [
     "Redundancy",
     "RedundantRow",
     "Reference",
+    "References",
     "RememberingState",
     "Rotation",
     "Scene",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .benchmarking.haug_tables import DURATION, LEVELS
-from .drawing import BLUE, GREEN, GREY, VERMILION, demand_matplotlib, save
+from .drawing import BLUE, GREEN, GREY, VERMILION, demand_matplotlib, new_figure, save
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,6 +46,8 @@ def constraint_error(solution: Solution, ax: Any = None) -> Any:
 
     Examples
     --------
+    The errors of a pendulum, in the axes of a figure made for them:
+
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))
     >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
@@ -89,23 +91,18 @@ def tables_figure(tables: Sequence[Any]) -> Any:
     MissingDependency
         If matplotlib is not installed.
 
+    Notes
+    -----
+    The tables take minutes.
+
     Examples
     --------
-    The tables take minutes:
-
     >>> import tsdyn as ts
     >>> from tsdyn.benchmarking.haug_tables import reproduce
     >>> figure = ts.plots.tables_figure(reproduce())  # doctest: +SKIP
     >>> ts.plots.save(figure, "tables.png")  # doctest: +SKIP
     """
-    demand_matplotlib()
-    from matplotlib import style
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with style.context("default"):  # looks the same whatever style the caller has set
-        figure = Figure(figsize=(9.0, 6.8), dpi=200, layout="constrained")
-        FigureCanvasAgg(figure)
+    with new_figure(9.0, 6.8) as figure:
         figure.suptitle(
             "Constraint error: Maggi/Kane drifts, the tangent-space ODE stays at rounding",
             x=0.01,

@@ -6,15 +6,15 @@ integrators/ import from here, too. docs/plug-ins.md shows how.
 
 from .calls import Placing, fitting
 from .elements.applied_load import Given, GivenByState, GivenInBody
-from .elements.bodies import Ground, PointMass, rotation_matrix
+from .elements.bodies import Ground, PointMass, ground_point, rotation_matrix
 from .elements.element import in_frame
-from .elements.force import Force, finite, load, not_negative, positive_number, vector_load
+from .elements.force import Force, load, vector_load
 from .elements.framed_joint import FramedJoint, beside, carried, turned_about
-from .elements.friction_laws import act, along_and_across, coefficient, demand_bodies, slip
+from .elements.friction_laws import BodyFriction, act, along_and_across, coefficient, slip
 from .elements.joint import Joint, across
 from .elements.joint_coordinates import Angle, Displacement, angles, displacements
-from .elements.joint_friction import AXIS, JointFriction, optional_length
-from .elements.joint_load import JointLoad, instants, law_of_joint
+from .elements.joint_friction import AXIS, JointFriction, optional
+from .elements.joint_load import JointLoad
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
 from .elements.tolerances import PARALLEL
@@ -57,7 +57,7 @@ from .motions.expressions import Smooth
 from .motions.prescribed import Motion
 from .motions.signals import Signal
 from .motions.tables import is_data
-from .validation import floats, number, positive, vector3, whole
+from .validation import finite, floats, not_negative, number, positive, vector3, whole
 
 __all__ = [
     "AXIS",
@@ -65,6 +65,7 @@ __all__ = [
     "PARALLEL",
     "Adaptive",
     "Angle",
+    "BodyFriction",
     "ByState",
     "DiagonallyImplicit",
     "Displacement",
@@ -110,7 +111,6 @@ __all__ = [
     "carried",
     "coefficient",
     "cross",
-    "demand_bodies",
     "displacements",
     "dot",
     "embedded_error",
@@ -120,19 +120,17 @@ __all__ = [
     "finite",
     "fitting",
     "floats",
+    "ground_point",
     "in_frame",
-    "instants",
     "inverse_root",
     "is_data",
     "kernel",
-    "law_of_joint",
     "linear_second",
     "load",
     "not_negative",
     "number",
-    "optional_length",
+    "optional",
     "positive",
-    "positive_number",
     "product",
     "quotient",
     "root",

@@ -27,9 +27,23 @@ def number(value):
 
 def positive(value, what, error=InvalidArgument):
     """Return a positive finite float, or raise `error`."""
+    return _fitting(value, lambda x: x > 0.0, f"{what} must be a positive finite number", error)
+
+
+def not_negative(value, what, error=InvalidArgument):
+    """Return a finite float >= 0, or raise `error`."""
+    return _fitting(value, lambda x: x >= 0.0, f"{what} must be a finite number that is not negative", error)
+
+
+def finite(value, what, error=InvalidArgument):
+    """Return a finite float, or raise `error`."""
+    return _fitting(value, math.isfinite, f"{what} must be a finite number", error)
+
+
+def _fitting(value, fits, rule, error):
     result = number(value)
-    if not (math.isfinite(result) and result > 0.0):
-        raise error(f"{what} must be a positive finite number, got {value!r}.")
+    if not (math.isfinite(result) and fits(result)):
+        raise error(f"{rule}, got {value!r}.")
     return result
 
 

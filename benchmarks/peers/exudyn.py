@@ -120,12 +120,8 @@ class ExudynTree(Exudyn):
 class ExudynConstraints(Exudyn):
     """Bodies with Euler parameters, joints by multipliers."""
 
-    name, setting = "Exudyn, constraints", "step"
+    name, setting, largest = "Exudyn, constraints", "step", 64
     values = tuple(10.0 ** (-k / 2) for k in range(4, 11))
-
-    def serves(self, scene):
-        """What its own joints describe."""
-        return scene.definition is not None and scene.size <= 64
 
     def fill(self, exu, mbs, definition):
         """Bodies and joints; returns a pair of sensors a body."""

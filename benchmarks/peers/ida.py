@@ -11,6 +11,7 @@ class IDA(Contender):
     """Through scikit-sundae; sparse factors where they pay; multipliers are left out of the error test."""
 
     name = "SUNDIALS IDA"
+    largest = 64
     values = tuple(10.0**-k for k in range(3, 13))
     get = "pip install scikit-sundae"
 
@@ -19,10 +20,6 @@ class IDA(Contender):
         import sksundae
 
         return f"scikit-sundae {sksundae.__version__}, SUNDIALS {getattr(sksundae, 'SUNDIALS_VERSION', '')}".strip(", ")
-
-    def serves(self, scene):
-        """Any definition of moderate size."""
-        return scene.definition is not None and scene.size <= 64
 
     def prepare(self, scene):
         """Compile, and find the pattern."""

@@ -9,14 +9,11 @@ class Index1(Contender):
     """Compiled right-hand side, SciPy's loop."""
 
     name = "SciPy DOP853, index 1"
+    largest = 64
 
     def version(self):
         """SciPy's."""
         return f"SciPy {scipy.__version__}"
-
-    def serves(self, scene):
-        """Any definition of moderate size: its elimination is dense."""
-        return scene.definition is not None and scene.size <= 64
 
     def prepare(self, scene):
         """Compile, and pack the definition."""

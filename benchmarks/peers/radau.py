@@ -9,6 +9,7 @@ class Radau(Contender):
     """Residual and Jacobian compiled; dense factors, sparse for many unknowns."""
 
     name = "Radau (scipy_dae)"
+    largest = 64
     values = tuple(10.0**-k for k in range(3, 13))
     get = "pip install scipy-dae"
 
@@ -19,10 +20,6 @@ class Radau(Contender):
         import scipy_dae  # noqa: F401
 
         return f"scipy_dae {version('scipy_dae')}"
-
-    def serves(self, scene):
-        """Any definition of moderate size."""
-        return scene.definition is not None and scene.size <= 64
 
     def prepare(self, scene):
         """Compile, and find the pattern."""

@@ -1,6 +1,6 @@
 """Which kernels a run needs, so that a first one can have them compiled at the same time."""
 
-from ..configuration import initial_conditions
+from ..configuration import start_kernels
 from ..formulations import friction_basis, friction_solve, linearisation, null_space
 from ..formulations.registry import FORMULATIONS
 from ..integrators import DOP853, Taylor
@@ -65,7 +65,7 @@ def of_force(kernels, series=True, implicit=False, form=FORMULATIONS["tangent"])
 
 def of_method(method, form, within, far=False):
     """The kernels of a start, of the method and of the form; far: of series that are too long for caches near by."""
-    yield initial_conditions._look
+    yield start_kernels.evaluate_start
     if isinstance(method, Taylor):
         yield from (step_parts.expand_far_series if far else step_parts.expand_series, step_parts.reach)
         yield advance_series

@@ -82,6 +82,8 @@ def benchmark(
 
     Examples
     --------
+    Two methods on a pendulum at one tolerance:
+
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))
     >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")

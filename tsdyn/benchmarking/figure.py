@@ -1,35 +1,14 @@
 """The work-precision figure of `benchmark`: one panel a scene, one line a method."""
 
-from ..drawing import BLUE, GREEN, GREY, VERMILION, demand_matplotlib
+from ..drawing import BLUE, GREEN, GREY, VERMILION, new_figure
 
 COLOURS = (BLUE, VERMILION, GREEN, "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = "osD^vPX"
 
 
 def figure(benchmarks):
-    """Draw benchmarks side by side.
-
-    Parameters
-    ----------
-    benchmarks : dict of title to Benchmark
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    MissingDependency
-        If matplotlib is not installed.
-    """
-    demand_matplotlib()
-    from matplotlib import style
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with style.context("default"):
-        drawn = Figure(figsize=(1.0 + 4.0 * len(benchmarks), 4.4), dpi=200, layout="constrained")
-        FigureCanvasAgg(drawn)
+    """Draw benchmarks side by side."""
+    with new_figure(1.0 + 4.0 * len(benchmarks), 4.4) as drawn:
         panels = drawn.subplots(1, len(benchmarks), sharey=True, squeeze=False)[0]
         names = list(dict.fromkeys(row.method for benchmark in benchmarks.values() for row in benchmark.rows))
         for ax, (title, benchmark) in zip(panels, benchmarks.items(), strict=True):

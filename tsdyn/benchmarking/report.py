@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..drawing import Drawn
+
 if TYPE_CHECKING:
     from ..hints import Reference, Solution
 
@@ -73,7 +75,7 @@ class Row(NamedTuple):
         )
 
 
-class Benchmark:
+class Benchmark(Drawn):
     """Run time against error of methods on one scene.
 
     Attributes
@@ -155,23 +157,11 @@ class Benchmark:
             f"</caption>{body}</table><p>{notes}</p>"
         )
 
-    def plot(self, path: str | Path | None = None) -> Any:
-        """Draw run time against error, one line a method; return the matplotlib Figure, written to `path` if given.
-
-        Raises
-        ------
-        MissingDependency
-            If matplotlib is not installed.
-        InvalidArgument
-            If the figure can't be written there.
-        """
-        from ..drawing import save
+    def figure(self) -> Any:
+        """Draw it; return the matplotlib Figure."""
         from .figure import figure
 
-        drawn = figure({"": self})
-        if path is not None:
-            save(drawn, path)
-        return drawn
+        return figure({"": self})
 
 
 _HEAD = ("method", "tol or step", "error r (m)", "error A", "", "time (ms)", *HEADS, "status")

@@ -1,6 +1,7 @@
 """The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), the profile of a scene, compiling ahead."""
 
 import argparse
+import inspect
 import sys
 import time
 
@@ -27,24 +28,13 @@ def _parser():
     )
     parser.add_argument("--version", action="version", version=f"tsdyn {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    tables = commands.add_parser(
-        "tables",
-        help="measure the constraint errors of Haug (2018), Tables 1 and 2, and draw them over time",
-        description="Run the sliding top and the two-body pendulum of Haug (2018), print the largest constraint errors "
-        "beside the published ones, and draw them over time. The exit code is 1 where a bound is broken.",
-    )
+    tables = _command(commands, _tables)
     figure = tables.add_mutually_exclusive_group()
     figure.add_argument(
         "--figure", metavar="PATH", help=f"where to write the figure (default {DEFAULT_FIGURE}); the suffix says how"
     )
     figure.add_argument("--no-figure", action="store_true", help="print the tables only")
-    tables.set_defaults(run=_tables)
-    profile = commands.add_parser(
-        "profile",
-        help="measure where the time of a run of a scene goes, and what to change",
-        description="Run a scene several times, print the time of each phase of a run, what was skipped, and what to "
-        "change. Options that are not given are those of ts.simulate.",
-    )
+    profile = _command(commands, _profile)
     profile.add_argument(
         "scene",
         metavar="SCENE",
@@ -59,20 +49,25 @@ def _parser():
     profile.add_argument("--outputs", type=int, metavar="N", help="so many output times instead of every step")
     profile.add_argument("--no-advice", action="store_true", help="don't try other methods and tolerances")
     profile.add_argument("--figure", metavar="PATH", help="where to draw it; the suffix says how")
-    profile.set_defaults(run=_profile)
-    kernels = commands.add_parser(
-        "compile",
-        help="compile kernels ahead of the first run, on all processors",
-        description="Fill the cache on disk with the kernels of the default method and of every built-in constraint "
-        "and force, or with all of them. What is there already is left alone. The exit code is 1 where a kernel can't "
-        "be compiled or stored.",
-    )
+    kernels = _command(commands, _compile)
     kernels.add_argument("--all", action="store_true", help="of every method, formulation and result, too")
-    kernels.set_defaults(run=_compile)
+    return parser
+
+
+def _command(commands, run):
+    """The parser of a command: the first line of the docstring of `run` is its help, the rest its description."""
+    help_, _, description = (run.__doc__ or "").partition("\n\n")
+    parser = commands.add_parser(run.__name__[1:], help=help_, description=inspect.cleandoc(description))
+    parser.set_defaults(run=run)
     return parser
 
 
 def _tables(parsed):
+    """Measure the constraint errors of Haug (2018), Tables 1 and 2, and draw them over time.
+
+    Run the sliding top and the two-body pendulum of Haug (2018), print the largest constraint errors beside the
+    published ones, and draw them over time. The exit code is 1 where a bound is broken.
+    """
     # imported here: the command line answers without what a run needs
     from ..benchmarking.haug_tables import as_text, reproduce
 
@@ -84,6 +79,11 @@ def _tables(parsed):
 
 
 def _profile(parsed):
+    """Measure where the time of a run of a scene goes, and what to change.
+
+    Run a scene several times, print the time of each phase of a run, what was skipped, and what to change. Options that
+    are not given are those of ts.simulate.
+    """
     import numpy as np
 
     from ..profiling.profile import profile
@@ -106,6 +106,11 @@ def _profile(parsed):
 
 
 def _compile(parsed):
+    """Compile kernels ahead of the first run, on all processors.
+
+    Fill the cache on disk with the kernels of the default method and of every built-in constraint and force, or with
+    all of them. What is there already is left alone. The exit code is 1 where a kernel can't be compiled or stored.
+    """
     from ..ahead.all_kernels import compile_kernels
 
     count, folder, failed = compile_kernels(parsed.all)

@@ -9,22 +9,21 @@ import numpy as np
 
 from ..calls import fitting
 from ..elements.names import named
-from ..errors import InconsistentState, InvalidArgument, InvalidBody, SingularConfiguration
+from ..errors import InconsistentState, InvalidArgument, InvalidBody
 from ..maths.row_rank import row_lengths
 from ..validation import number, one_of, positive
-from .continuation import STAGES, Found, Kept, close, nearest, relax, settle, stuck
+from .continuation import Found, Kept, close, nearest, relax, settle, stuck
 from .infeasible_subset import refuse
 from .kinetic_metric import Metric, least_step
 from .loop_folds import Folds
 from .mirrored_branches import demand_aligned
-from .start_violations import ROUNDING, demand_finite
+from .start_violations import demand_finite, refuse_vanished
+from .tolerances import LEAST_VELOCITY_TOL, ROUNDING, STAGES, STIFFER
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..hints import PointMass, Scene
-
-STIFFER = (0.1, 0.01, 0.001)  # softness of what keeps a fold, from try to try
 
 
 @dataclass(frozen=True)
@@ -132,7 +131,7 @@ def assemble(
     demand_aligned(packed, q, float(t))
     given, qd = _velocities(scene, metric, q, qd, A, Phi_t[metric.own])
     residual = Phi_q @ qd + Phi_t
-    _demand_compatible(scene, residual, max(tol, 1e-9) * (1.0 + np.abs(qd).max()))
+    _demand_compatible(scene, residual, max(tol, LEAST_VELOCITY_TOL) * (1.0 + np.abs(qd).max()))
     over = links.turned(metric, q, links.shown(metric, sketch))
     scene.place(q, qd)
     return AssemblyReport(
@@ -228,10 +227,7 @@ def _demand_regular(scene, metric, A):
     """Refuse rows that vanish."""
     zero = np.flatnonzero(row_lengths(A) == 0.0)
     if zero.size:
-        raise SingularConfiguration(
-            f"the row of {scene.row_names()[metric.own[zero[0]]]} in Phi_q is zero in this configuration: the "
-            "constraint is singular here. Start from another configuration, or use a constraint that is regular here."
-        )
+        refuse_vanished(scene.row_names()[metric.own[zero[0]]])
 
 
 def _demand_compatible(scene, residual, tol):

@@ -13,16 +13,25 @@ import numpy as np
 
 from ..maths.row_rank import row_lengths
 from .kinetic_metric import least_step, soft_step
-
-STAGES = ((1.0, 4), (0.3, 4), (0.1, 4), (0.03, 4), (0.01, 4), (1e-3, 5), (1e-4, 5), (1e-6, 5), (1e-8, 40))
-NEAR = 0.02  # of a link, or so: a sketch that is off by less takes the last stage only
-MOST_TURN = 0.5  # rad a step
-MOST_CLOSING, MOST_SETTLING = 60, 60
-SETTLED = 1e-11  # what is left of the slope, of the distance
-ROUNDING = 1e-15
-DEPENDENT = 1e-6  # singular values of unit rows that small are left alone while the constraints aren't met
-MANY = 200  # coordinates from which on fewer starts are tried
-SHAKES = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.0)
+from .tolerances import (
+    CLOSED,
+    CONVERGED,
+    DECREASE,
+    LEAST_DIVISOR,
+    MANY,
+    MOST_CLOSING,
+    MOST_SETTLING,
+    MOST_SLIDE,
+    MOST_TURN,
+    NEAR,
+    NO_AXIS,
+    PASSED,
+    SETTLED,
+    SHAKES,
+    STAGES,
+    STEEP,
+    STUCK,
+)
 
 
 class Found(NamedTuple):
@@ -49,7 +58,7 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
     rng, best, total = np.random.default_rng(0), None, 0
     shakes = shakes[:2] if metric.n > MANY else shakes
     Phi = metric.linear(sketch, rows)[0]
-    if np.abs(Phi).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(sketch).max()):
+    if np.abs(Phi).max(initial=0.0) <= CLOSED * (1.0 + np.abs(sketch).max()):
         return Found(sketch, Phi, 0, True)
     for attempt in range(2 + len(also) + len(shakes)):
         if attempt == 0:
@@ -81,14 +90,16 @@ def settle(metric, sketch, q, rows=None):
     Phi, A = metric.linear(q, rows)
     while steps < MOST_SETTLING and metric.columns.size:
         wish = metric.towards(q, sketch)[1]
-        step = wish + least_step(A, A @ wish, DEPENDENT)
+        step = wish + least_step(A, A @ wish, STEEP)
         size = np.linalg.norm(step)
-        if size <= SETTLED * np.linalg.norm(wish) or size >= 0.9 * last:
+        if size <= SETTLED * np.linalg.norm(wish) or size >= DECREASE * last:
             break
         turn = metric.largest_turn(step)
-        trial, residual, more = close(metric, metric.moved(q, min(1.0, 0.2 / max(turn, 1e-300)) * step), rows)
+        trial, residual, more = close(
+            metric, metric.moved(q, min(1.0, MOST_SLIDE / max(turn, LEAST_DIVISOR)) * step), rows
+        )
         steps += 1 + more
-        allowed = 10.0 * np.abs(Phi).max(initial=0.0) + ROUNDING * (1.0 + np.abs(q).max())
+        allowed = 10.0 * np.abs(Phi).max(initial=0.0) + CLOSED * (1.0 + np.abs(q).max())
         if np.abs(residual).max(initial=0.0) > allowed:
             break
         last, q = size, trial
@@ -99,7 +110,7 @@ def settle(metric, sketch, q, rows=None):
 def stuck(metric, q, Phi, rows=None):
     """Rows that are not met and whose derivative vanishes."""
     size = np.abs(Phi)
-    return np.flatnonzero((row_lengths(metric.linear(q, rows)[1]) == 0.0) & (size > 1e-6 * size.max(initial=0.0)))
+    return np.flatnonzero((row_lengths(metric.linear(q, rows)[1]) == 0.0) & (size > STUCK * size.max(initial=0.0)))
 
 
 def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
@@ -147,7 +158,7 @@ def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
                 break
             q, now = trial, after
             size = np.linalg.norm(step)
-            if size <= (1e-9 if softness == stages[-1][0] else 0.03) * (np.linalg.norm(now[2]) + 1e-300):
+            if size <= (CONVERGED if softness == stages[-1][0] else PASSED) * (np.linalg.norm(now[2]) + LEAST_DIVISOR):
                 break
     return q, steps
 
@@ -157,10 +168,10 @@ def close(metric, q, rows=None):
     Phi, A = metric.linear(q, rows)
     steps = 0
     while steps < MOST_CLOSING and Phi.size and metric.columns.size:
-        if np.abs(Phi).max() <= ROUNDING * (1.0 + np.abs(q).max()):
+        if np.abs(Phi).max() <= CLOSED * (1.0 + np.abs(q).max()):
             break
         steps += 1
-        step = least_step(A, Phi, DEPENDENT)
+        step = least_step(A, Phi, STEEP)
         turn = metric.largest_turn(step)
         factor = min(1.0, MOST_TURN / turn) if turn > 0.0 else 1.0
         size = np.linalg.norm(Phi)
@@ -197,7 +208,7 @@ class _Relative:
                 if self.places[body][0] >= 0:
                     B[3 * k : 3 * k + 3, self.places[body]] = block
         B = B[:, self.metric.columns]
-        lengths = np.maximum(row_lengths(B), 1e-300)
+        lengths = np.maximum(row_lengths(B), LEAST_DIVISOR)
         some = row_lengths(B) > 0.0
         return np.where(some, residual.ravel() / lengths, 0.0), B / lengths[:, None]
 
@@ -206,7 +217,7 @@ def _logarithm(E):
     """The rotation vector of a rotation matrix, (3,), of less than half a turn."""
     v = np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]]) / 2.0
     sine = np.linalg.norm(v)
-    return v * (np.arctan2(sine, (np.trace(E) - 1.0) / 2.0) / sine) if sine > 1e-12 else v
+    return v * (np.arctan2(sine, (np.trace(E) - 1.0) / 2.0) / sine) if sine > NO_AXIS else v
 
 
 def _strain(Phi, lengths):

@@ -12,9 +12,8 @@ from ..jit.compiler import is_ours
 from ..jit.kernels import twin
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import starts_of
+from .tolerances import LEAST_X, QUOTIENT_ERROR, QUOTIENT_STEPS
 
-STEPS = (1e-2, 1e-4, 1e-6)  # of difference quotients, relative to x
-CLOSE = 1e-3  # relative; a wrong entry is further off
 TRIED = 3  # instances of each kind
 
 
@@ -67,11 +66,11 @@ def _wrong_row(constraint, par, x, t):
         jacobian(x, par, t, Phi_x)
         rate, size = Phi_x @ direction, np.abs(Phi_x) @ np.abs(direction)
         off = np.full(kind.rows, np.inf)
-        for step in STEPS:
-            h = step * max(np.abs(x).max(), 1e-6) * direction
+        for step in QUOTIENT_STEPS:
+            h = step * max(np.abs(x).max(), LEAST_X) * direction
             quotient = (value(x + h) - value(x - h)) * np.abs(direction).max() / (2.0 * np.abs(h).max())
             off = np.fmin(off, np.abs(quotient - rate))
     except Exception:  # the compiled kernels will say
         return None
-    wrong = np.flatnonzero(off > CLOSE * size)
+    wrong = np.flatnonzero(off > QUOTIENT_ERROR * size)
     return int(wrong[0]) if wrong.size else None

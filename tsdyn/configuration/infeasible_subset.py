@@ -11,8 +11,8 @@ import numpy as np
 
 from ..errors import InconsistentState
 from .continuation import nearest
+from .tolerances import LEFT_OVER
 
-LEFT_OVER = 1e-4  # of the largest |Phi|
 FEW = 6  # constraints of which all sets are tried
 MOST = 60  # constraints among which a conflict is looked for
 TRIAL_SHAKES = (0.1, 0.3, 0.6, 1.0)

@@ -2,33 +2,31 @@
 
 import numpy as np
 
-from ..elements.loops.body_poses import move_bodies, place_bodies, write_positions, write_velocities
 from ..errors import RedundantConstraints, SingularConfiguration, Status
 from ..formulations.locked_orientations import keep_turning, settle, still
-from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
-from ..jit.kernels import entry, kernel, resident
+from ..jit.kernels import resident
 from ..maths.row_rank import dependent
-from ..model.equations import set_time
 from ..observables.evaluate import constraint_arrays
-from ..rows.axis_rows import is_axis
-from ..rows.evaluation import factor_rows, run_loops
-from ..rows.independent_rows import drop_rows, select
-from ..rows.schur_complement import gather, scatter
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import drop, network_of
-from ..sparse.factorisation import solve
 from ..sparse.massless_axes import axis_of
 from ..workspaces.tangent_memory import allocate_free
-from ..workspaces.workspace import FLOOR, SIZE, U_TOL, load_parts, parts
+from ..workspaces.workspace import FLOOR, SIZE, U_TOL, parts
 from .rank import check_rank
-from .start_violations import ROUNDING, demand_finite, demand_small
+from .start_kernels import choose_rows, evaluate_start, free_axis, go_near_by, land_start
+from .start_violations import demand_finite, demand_small, refuse_vanished
+from .tolerances import (
+    DENSE_ENTRIES,
+    LEAST_NEIGHBOURHOOD,
+    LEAST_SIZE,
+    LISTED_ENTRIES,
+    NEIGHBOURHOOD,
+    REDUNDANT_SHARES,
+    ROUNDING,
+    SHORTENING,
+    SHORTEST_LEG,
+)
 
-LARGE = 1 << 20  # entries of Phi_q from which on no dense one is made
-DENSE = 1 << 23  # where nothing else serves
-SHARES = 1e-3, 1e-6, 1e-9, 1e-12  # below which rows are taken for redundant, if they then hold near by, too
-WANDER, NEAR_BY = 1e-2, 1e-3  # how far to look whether they do, and at least: turns, and shares of the scene's size
-SHORTER, SHORTEST = 0.25, 1e-3  # a leg of the way from whose end Newton's method finds no place is cut; no shorter
-NO_WAY = 1e-9  # of a direction is left: nothing can move
 NO_CHOICE = (
     "Phi_q has dependent rows, and no independent selection of its rows was found: a row may be zero here. Start from "
     "another configuration."
@@ -37,99 +35,6 @@ DEPENDENT = (
     "Phi_q has dependent rows.\nRemove the redundant rows, or use a joint with fewer rows. If the rows are independent "
     "elsewhere, this is a singular configuration: start from another one."
 )
-
-
-@entry("pvvdv")
-def _look(context, q, qd, t, velocity):
-    """f.b = Phi and velocity = Phi_q qd + Phi_t of the network's rows, and H; the row that depends on others, or -1."""
-    c = load_parts(context)
-    network, system, f = c.network, c.system, c.free
-    set_time(system, t)
-    place_bodies(network.bodies, q, f.poses)
-    move_bodies(network.bodies, q, qd, f.poses)
-    run_loops(network, system.reals, REDUCED, f, t, f.b, f.H)
-    gather_speeds(network, f)
-    find_drift(network, system, f, t)
-    gather(network, f.H, f.Z, velocity)
-    for e in range(velocity.size):
-        velocity[e] += f.gamma[e]
-    return factor_rows(network, f, f.H, f.Y, f.S, 0)
-
-
-@entry("pd")
-def _land(context, t):
-    """Put w.q and w.qd onto the manifold. Status."""
-    c = load_parts(context)
-    network, system, w, f = c.network, c.system, c.work, c.free
-    set_time(system, t)
-    place_bodies(network.bodies, w.q, f.poses)
-    move_bodies(network.bodies, w.q, w.qd, f.poses)
-    status = land(network, system, w, f, t)
-    if status != 0:
-        return status
-    write_positions(network.bodies, f.poses, w.q)
-    find_drift(network, system, f, t)
-    land_velocities(network, f, True)
-    write_velocities(network.bodies, f.poses, w.qd)
-    return 0
-
-
-@entry("pd")
-def _choose(context, share):
-    """Choose the rows to drop of those that `_look` has evaluated, those left less than a share; how many they are."""
-    c = load_parts(context)
-    f = c.free
-    select(c.network, f, f.H, f.Y, f.S, -1, share)
-    drop_rows(f.dropped, f.H)
-    return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, 0) < 0 else -1
-
-
-@entry("pvd")
-def _hold_axes(context, q, t):
-    """The row of an axis without inertia that the rows which are kept leave free at q, or -1."""
-    c = load_parts(context)
-    network, f = c.network, c.free
-    set_time(c.system, t)
-    place_bodies(network.bodies, q, f.poses)
-    run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)
-    failed = factor_rows(network, f, f.H, f.Y, f.S, 1)
-    return failed if is_axis(network, f.S, failed) else -1
-
-
-@entry("pdvd")
-def _wander(context, t, way, far):
-    """Go a little along the manifold: the body that moves most turns by far, or is shifted by that share of the size.
-
-    way (bodies, 8) is any direction, made tangent. Status of landing there.
-    """
-    c = load_parts(context)
-    network, f = c.network, c.free
-    status = factorise(network, c.system, c.work, f, t)
-    if status != 0:
-        return status
-    for i in range(f.Z.size):
-        f.Z[i] = way[i]
-    wanted = _farthest(c)
-    for _ in range(2):
-        gather(network, f.H, f.Z, f.b)
-        solve(network.pattern, f.S, f.b)
-        scatter(network, f.Y, f.b, f.Z)
-    found = _farthest(c)
-    scale = far / found if found > NO_WAY * wanted else 0.0
-    for i in range(f.Z.size):
-        f.Z[i] *= scale
-    move_by(network, f)
-    return land(network, c.system, c.work, f, t)
-
-
-@kernel
-def _farthest(c):
-    """The largest entry of Z: of turns, and of shifts as shares of the size."""
-    Z, part, found = c.free.Z, 1.0 / max(c.work.control[SIZE], 1e-3), 0.0
-    for b in range(c.network.bodies.shape[0]):
-        for i in range(3):
-            found = max(found, max(abs(Z[8 * b + i]) * part, abs(Z[8 * b + 4 + i])))
-    return found
 
 
 def consistent(scene, system, q, qd, t, tol, allowed=False):
@@ -194,7 +99,7 @@ class _Start:
 
     def loose_axis(self):
         """The row of an axis without inertia that the rows which are kept leave free; -1 where there is none."""
-        return _hold_axes(self.context, self.q, self.t) if len(self.network.axes.rows) else -1
+        return free_axis(self.context, self.q, self.t) if len(self.network.axes.rows) else -1
 
     def demand_inertia(self):
         """Refuse an axis that nothing holds and that carries no inertia."""
@@ -221,7 +126,7 @@ class _Start:
         """Refuse what is off; the row of H that depends on those before it, or -1."""
         scene, network, free, q, qd = self.scene, self.network, self.free, self.q, self.qd
         dropped, free.dropped[0] = free.dropped[0], 0
-        dependent = _look(self.context, q, qd, self.t, self.rates)
+        dependent = evaluate_start(self.context, q, qd, self.t, self.rates)
         free.dropped[0] = dropped
         rows, real = network.normals[network.normals >= 0], network.row >= 0
         Phi, velocity = np.zeros(self.m), np.zeros(self.m)
@@ -242,15 +147,15 @@ class _Start:
         names, row, H = self.scene.row_names(), self.network.row, self.free.H.reshape(-1, 16)
         gone = np.flatnonzero(~H.any(axis=1) & (row >= 0))
         if gone.size:
-            _refuse_vanished(names[row[gone[0]]])
+            refuse_vanished(names[row[gone[0]]])
         way = np.random.default_rng(0).normal(size=(len(self.network.bodies) + 1, 8))
-        way[:, :3] *= max(self.packed.size, 1e-3)
+        way[:, :3] *= max(self.packed.size, LEAST_SIZE)
         way[-1] = way[:, 3] = way[:, 7] = 0.0
         loose = -1
-        for share in SHARES:
+        for share in REDUNDANT_SHARES:
             self.free.dropped[0] = 0
-            _look(self.context, self.q, self.qd, self.t, self.rates)
-            if _choose(self.context, share) < 0:
+            evaluate_start(self.context, self.q, self.qd, self.t, self.rates)
+            if choose_rows(self.context, share) < 0:
                 raise SingularConfiguration(NO_CHOICE)
             loose = self.loose_axis()
             if loose >= 0:
@@ -276,7 +181,7 @@ class _Start:
         """The rows that follow from others by pivoted QR of all at once: for scenes that blocks part badly."""
         network, q = self.network, self.q
         joints = np.flatnonzero(network.row >= 0)
-        if q.size * joints.size > DENSE or network.welds.size:
+        if q.size * joints.size > DENSE_ENTRIES or network.welds.size:
             return np.empty(0, int)
         A = constraint_arrays(self.scene.system, q, self.qd, self.t)[1][network.row[joints]]
         for at in self.at:  # without the changes of length of p, which the normalisations hold
@@ -287,23 +192,23 @@ class _Start:
         """Drop these rows; whether S of the others is regular."""
         self.free.dropped[0] = rows.size
         self.free.dropped[1 : 1 + rows.size] = rows
-        return _look(self.context, self.q, self.qd, self.t, self.rates) < 0 and self.loose_axis() < 0
+        return evaluate_start(self.context, self.q, self.qd, self.t, self.rates) < 0 and self.loose_axis() < 0
 
     def hold_near_by(self, way):
         """Whether the rows that are dropped hold on the way to a place near by: in one go, or in shorter legs."""
-        gone, leg = 0.0, WANDER
-        while gone < WANDER:
+        gone, leg = 0.0, NEIGHBOURHOOD
+        while gone < NEIGHBOURHOOD:
             here = self.free.poses.copy()
-            status = _wander(self.context, self.t, way, leg)
+            status = go_near_by(self.context, self.t, way, leg)
             if status == Status.UNHELD:
                 return False
             if status == Status.SUCCESS:
                 gone += leg
                 continue
             self.free.poses[:] = here
-            leg *= SHORTER
-            if leg < SHORTEST * WANDER:
-                return gone >= NEAR_BY
+            leg *= SHORTENING
+            if leg < SHORTEST_LEG * NEIGHBOURHOOD:
+                return gone >= LEAST_NEIGHBOURHOOD
         return True
 
     def landed(self):
@@ -314,7 +219,7 @@ class _Start:
             q[at] /= np.linalg.norm(q[at], axis=1)[:, None]
         if self.far or self.fast:
             self.work.q[:], self.work.qd[:] = q, qd
-            if _land(self.context, self.t) == 0:
+            if land_start(self.context, self.t) == 0:
                 q, qd = self.work.q.copy(), self.work.qd.copy()
             else:  # what holds an orientation has not put it right
                 keep_turning(self.packed, still(self.packed).bodies.tolist())
@@ -324,7 +229,7 @@ class _Start:
 def _refuse(scene, start, dependent):
     """Say which rows are dependent; return where a closer look finds none."""
     network, free, q = start.network, start.free, start.q
-    if q.size * len(scene.system.segments) < LARGE:
+    if q.size * len(scene.system.segments) < LISTED_ENTRIES:
         check_rank(scene, constraint_arrays(scene.system, q, start.qd, start.t)[1])
         return
     if network.row[dependent] < 0:
@@ -332,12 +237,5 @@ def _refuse(scene, start, dependent):
         raise RedundantConstraints(f"the constraints at {hub} depend on one another: {DEPENDENT}")
     name = scene.row_names()[network.row[dependent]]
     if not free.H[16 * dependent : 16 * dependent + 16].any():
-        _refuse_vanished(name)
+        refuse_vanished(name)
     raise RedundantConstraints(f"{name} depends on other constraint rows: {DEPENDENT}")
-
-
-def _refuse_vanished(name):
-    raise SingularConfiguration(
-        f"the row of {name} in Phi_q is zero in this configuration: the constraint is singular here. "
-        "Start from another configuration, or use a constraint that is regular here."
-    )

@@ -12,9 +12,7 @@ from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
 from ..maths.row_rank import row_lengths
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import LARGE, constraint_arrays
-
-NEXT_TO_NOTHING = 1e-13  # of rows of length one
-THIN = 1e-6  # of the mean moment of inertia: what an axis without inertia is given
+from .tolerances import IMMOBILE, LEAST_DIVISOR, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
 
 
 class Metric:
@@ -85,7 +83,7 @@ class Metric:
         x, v = np.zeros(self.size), rotation_vectors(q[self.p], target[self.p])
         shift, turn = self.root * (target[self.r] - q[self.r]), np.einsum("bij,bj->bi", self.fall, v)
         Jv, a = np.einsum("bji,bj->bi", self.fall, turn), np.linalg.norm(v, axis=1)[:, None]
-        small = a < 1e-3
+        small = a < SMALL_ANGLE
         a = np.where(small, 1.0, a)
         c = np.where(small, 1.0 / 12.0, (1.0 - a / 2.0 / np.tan(a / 2.0)) / a**2)
         across = np.cross(v, Jv)
@@ -161,7 +159,7 @@ def rotation_vectors(p, target):
     e = np.einsum("bij,bj->bi", transform_g(p), target)
     e0, size = np.einsum("bi,bi->b", p, target), np.linalg.norm(e, axis=1)
     angle = 2.0 * np.arctan2(size, np.abs(e0))
-    factor = np.where(size > 0.0, angle / np.maximum(size, 1e-300), 0.0)
+    factor = np.where(size > 0.0, angle / np.maximum(size, LEAST_DIVISOR), 0.0)
     return (np.where(e0 < 0.0, -1.0, 1.0) * factor)[:, None] * e
 
 
@@ -180,7 +178,7 @@ def soft_step(A, residual, wish, softness):
     return splu(matrix).solve(np.concatenate((wish, -residual)))[: wish.size]
 
 
-def least_step(A, residual, rcond=1e-10):
+def least_step(A, residual, rcond=SOLVED):
     """The smallest x with residual + A x = 0, by least squares; rcond: singular values of unit rows that are none."""
     lengths = row_lengths(A)
     some = lengths > 0.0
@@ -192,7 +190,7 @@ def least_step(A, residual, rcond=1e-10):
     from scipy.sparse import diags_array
 
     unit = diags_array(1.0 / lengths[some]) @ A[some]
-    return soft_step(unit, residual[some] / lengths[some], np.zeros(A.shape[1]), np.full(some.sum(), NEXT_TO_NOTHING))
+    return soft_step(unit, residual[some] / lengths[some], np.zeros(A.shape[1]), np.full(some.sum(), SOFT))
 
 
 def unit_tangent(metric, q, rng):
@@ -200,7 +198,7 @@ def unit_tangent(metric, q, rng):
     _, A = metric.linear(q)
     reach = metric.reach(q)
     wish = metric.speeds(reach * rng.normal(size=metric.r.shape), rng.normal(size=(len(metric.p), 3)))
-    wish = wish + least_step(A, A @ wish, 1e-7)
+    wish = wish + least_step(A, A @ wish, TANGENT)
     shift, turn = metric.extent(wish)
     size = max(shift / reach, turn)
-    return wish / size if size > 1e-9 else None
+    return wish / size if size > IMMOBILE else None

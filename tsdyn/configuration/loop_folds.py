@@ -13,9 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-CLEAR = 0.2  # rad, in a sketch; below that what is nearest tells more
-SHOWN = 0.1  # rad, by the links' directions: what is reported where it comes out on the other side
-FLAT = 0.1  # a slide this little across the axis, as a share, makes no fold
+from .tolerances import CLEAR, FLAT, POINT_LIKE, SHOWN
 
 
 class Fold(NamedTuple):
@@ -194,7 +192,7 @@ def _link(edge, near, body, axis):
         across = None if n is None else np.cross(n, near.slide[body])
         return across if across is not None and np.linalg.norm(across) > FLAT else None
     link = near.points[body] - edge.points[body]
-    return link if np.linalg.norm(link) > 1e-9 else None
+    return link if np.linalg.norm(link) > POINT_LIKE else None
 
 
 def _sides(edge, body):

@@ -17,12 +17,11 @@ from .continuation import close
 from .kinetic_metric import Metric, unit_tangent
 from .row_dependence import divide, partners, put_aside
 from .start_violations import demand_finite, demand_small
+from .tolerances import ASIDE, CONSISTENT, NEIGHBOUR_MET
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Attachment, Scene
 
-CONSISTENT = 1e-9  # of 1 + max |q|
-ASIDE = 0.02  # of the scene's size, and rad: how far the neighbours are at which the rank is compared
 TRIES = 3
 MOST_ROWS = 3000  # of closed loops, which take a dense factorisation
 
@@ -146,14 +145,18 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
 
     Examples
     --------
+    A door needs one hinge; a second one on the same axis adds five redundant rows:
+
     >>> import tsdyn as ts
-    >>> scene = ts.Scene()
-    >>> bar = scene.add_body(**ts.shapes.cylinder(0.02, 1.0, axis="x", mass=1.0), position=(0.5, 0, 0))
-    >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
-    >>> again = scene.add(ts.constraints.Dot1(scene.ground, bar, axis_a=(0, 1, 0), axis_b=(1, 0, 0), name="again"))
+    >>> door = (scene := ts.Scene()).add_body(mass=20.0, inertia=(4, 5, 1))
+    >>> for height in (-1, 1):
+    ...     hinge = ts.constraints.Revolute.at(scene.ground, door, point=(0.5, 0, height), axis=(0, 0, 1))
+    ...     print(scene.add(hinge))
+    <Revolute(ground, body1): 5 rows>
+    <Revolute(ground, body1) #2: 5 rows>
     >>> report = scene.mobility()
     >>> report.degrees_of_freedom, len(report.redundant)
-    (1, 1)
+    (1, 5)
     """
     packed, start = scene.packed, scene.start[0]
     q = finite_vector(start if q is None else q, start.size, "q").copy()
@@ -227,7 +230,7 @@ def _neighbours(metric, q, A):
         if step is None:
             return
         other, Phi, _ = close(metric, metric.moved(q, ASIDE * step))
-        if np.abs(Phi).max(initial=0.0) <= 1e-10 * (1.0 + np.abs(q).max()):
+        if np.abs(Phi).max(initial=0.0) <= NEIGHBOUR_MET * (1.0 + np.abs(q).max()):
             yield other
 
 

@@ -3,8 +3,10 @@
 import numpy as np
 
 from ..constraints.euler_normalization import EulerNormalization
-from ..errors import RedundantConstraints, SingularConfiguration
-from ..maths.row_rank import RANK_TOL, farthest_first, singular_values, unit_rows
+from ..errors import RedundantConstraints
+from ..maths.row_rank import farthest_first, rank_of, singular_values, unit_rows
+from .row_dependence import partners
+from .start_violations import refuse_vanished
 
 
 def check_rank(scene, Phi_q):
@@ -14,23 +16,16 @@ def check_rank(scene, Phi_q):
         return
     lengths = np.linalg.norm(Phi_q, axis=1)
     if not lengths.all():
-        row = scene.row_names()[int(np.argmin(lengths))]
-        raise SingularConfiguration(
-            f"the row of {row} in Phi_q is zero in this configuration: the constraint is singular here. "
-            "Start from another configuration, or use a constraint that is regular here."
-        )
-    scaled = Phi_q / lengths[:, None]
-    size = singular_values(scaled)
-    rank = int((size > RANK_TOL * size[0]).sum())
+        refuse_vanished(scene.row_names()[int(np.argmin(lengths))])
+    rank = rank_of(Phi_q)
     if rank == m:
         return
-    names, order = scene.row_names(), _pivots(scene, scaled)
-    kept, dropped = order[:rank], order[rank:]
-    stories, dropped = [], np.sort(dropped)
-    every, *_ = np.linalg.lstsq(scaled[kept].T, scaled[dropped].T, rcond=None)
-    for row, weights in zip(dropped, every.T, strict=True):
-        partners = sorted(kept[np.abs(weights) > 1e-6])
-        stories.append(f"  {names[row]} depends on " + (", ".join(names[i] for i in partners[:8]) or "nothing else"))
+    names, order = scene.row_names(), _pivots(scene, unit_rows(Phi_q))
+    kept, dropped = order[:rank].tolist(), sorted(order[rank:].tolist())
+    stories = [
+        f"  {names[row]} depends on " + (", ".join(names[i] for i in sorted(others)[:8]) or "nothing else")
+        for row, others in zip(dropped, partners(Phi_q, kept, dropped), strict=True)
+    ]
     raise RedundantConstraints(
         f"{m - rank} of the {m} constraint rows are redundant, Phi_q has rank {rank}:\n"
         + "\n".join(stories)

@@ -3,9 +3,7 @@
 import numpy as np
 
 from ..maths.row_rank import RANK_TOL, farthest_first, rank_of, singular_values, unit_rows
-
-TAKES_PART = 1e-6  # weight from which on a row counts among those that another depends on
-FIRM = 1e-3  # singular values, of the largest, from which on rows of a body are put aside without more ado
+from .tolerances import FIRM, TAKES_PART
 
 
 def divide(A, groups):

@@ -24,14 +24,12 @@ from ..motions.elementary import Polynomial
 from ..validation import floats, number
 from .assemble import assemble
 from .rigid_shift import RigidShift
+from .tolerances import DRIVE_LEAST, DRIVE_SHARE, DRIVE_TURN, LEAST_DIVISOR
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..hints import ArrayLike, AssemblyReport, ItemLike, Scene
-
-STEP, SHARE = 0.25, 0.05  # of a joint in a loop: rad; of the scene's size
-LEAST = 2.0**-8  # of the way, of a step that is halved where it can't be assembled
 
 
 class Goal:
@@ -210,7 +208,7 @@ def _drive(scene, joint, goals, held, t):
     for goal in goals:
         if goal.turns and not threaded:  # whole turns move nothing
             goal.value = float(joint_motion.counted(goal.value, goal.new_value))
-        way = abs(goal.new_value - goal.value) / (STEP if goal.turns else SHARE * size)
+        way = abs(goal.new_value - goal.value) / (DRIVE_TURN if goal.turns else DRIVE_SHARE * size)
         steps = max(steps, math.ceil(way)) if shift is None else 1
     share, step, before = 0.0, 1.0 / steps, scene.start
     if shift is not None:
@@ -226,7 +224,7 @@ def _drive(scene, joint, goals, held, t):
         except (InconsistentState, SingularConfiguration) as error:
             scene.place(*before)
             step *= 0.5
-            if shift is not None or step * steps < LEAST:
+            if shift is not None or step * steps < DRIVE_LEAST:
                 raise InconsistentState(
                     f"{joint.title} can't be set so: the scene can be assembled {share:.0%} of the way. {error}"
                 ) from error
@@ -252,4 +250,4 @@ def _assembled(scene, drivers, t):
 def _size(scene):
     """How far the scene reaches, m."""
     places = np.array([body.position for body in scene.bodies])
-    return max(float(np.ptp(places, axis=0).max()), scene.packed.size, 1e-300)
+    return max(float(np.ptp(places, axis=0).max()), scene.packed.size, LEAST_DIVISOR)

@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from ..errors import InconsistentState
-
-ROUNDING = 2e-16
+from ..errors import InconsistentState, SingularConfiguration
 
 
 def demand_finite(scene, *arrays):
@@ -33,4 +31,12 @@ def demand_small(scene, residual, tol, level, formula):
         + "\n".join(lines)
         + f"\nCorrect the bodies' {'poses' if level == 'position' else 'velocities'}, or call scene.assemble() to move "
         "them to the nearest consistent ones."
+    )
+
+
+def refuse_vanished(row):
+    """Refuse a row of Phi_q, by its name, that is zero."""
+    raise SingularConfiguration(
+        f"the row of {row} in Phi_q is zero in this configuration: the constraint is singular here. Start from another "
+        "configuration, or use a constraint that is regular here."
     )

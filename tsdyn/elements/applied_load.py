@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Self
 
 from ..errors import InvalidForce
 from ..jit.kernels import specialised, stack
@@ -11,16 +11,37 @@ from ..maths.euler_parameters import rotate
 from ..maths.recurrences import rotation
 from ..motions.signals import Signal
 from ..validation import one_of
-from .user_functions import ByState, fill_state
+from .user_functions import ByState, arguments_of, fill_state, variant
 
-function = None  # filled in by `GivenByState.wrap`
+function = None  # filled in by `GivenByState`
 FIRST = 0
 
 
 class Given:
-    """Mixed into forces of one vector, the attribute `given`, conjugate to their first marker."""
+    """Mixed into forces of one vector, the attribute `given`, conjugate to their first marker.
+
+    Parameters
+    ----------
+    frame : {"ground", "body"}
+        The axes in which the vector is given.
+
+    Raises
+    ------
+    InvalidForce
+        If the vector is not three finite numbers or a function of t or of (t, state), is zero, or the frame is unknown.
+    InvalidBody
+        If a torque is on a point mass.
+    """
 
     given = ""
+
+    def __new__(cls, *others: Any, frame: str = "ground", **more: Any) -> Self:
+        """Choose the kernel by frame and by the sort of the vector."""
+        if arguments_of(more.get(cls.given)) == 2:
+            cls = variant(cls, GivenByState)
+        elif isinstance(frame, str) and frame == "body":
+            cls = variant(cls, GivenInBody)
+        return super().__new__(cls)
 
     def take(self, value: Any, frame: str, hint: str) -> None:
         """Take the vector over, and the frame that it is in; hint is how to write it, with its unit."""
@@ -32,7 +53,8 @@ class Given:
 
     def check(self) -> None:
         """It must do something."""
-        self.demand_any(self.given)
+        if Signal.is_zero(getattr(self, self.given)):
+            raise self.error(f"{self.name}: it is zero at all times; set {self.given}.")
 
     def parameters(self) -> tuple[Any, ...]:
         """The vector."""
@@ -87,14 +109,8 @@ class GivenByState(ByState):
         """One flag: the vector is given in the body frame."""
         return (float(self.frame == "body"),)
 
-    @staticmethod
-    def law(x, xd, par, t, out):
-        """Of no function: what instances replace."""
-        for i in range(10):
-            out[i] = math.nan
-
     @classmethod
-    def wrap(cls, inner, owner):
+    def _wrap(cls, inner, owner):
         """The kernel of a user's function."""
         return specialised(_law, f"{owner.__qualname__}.{cls.given}", owner, function=inner, FIRST=cls.first)
 

@@ -234,3 +234,8 @@ def rotation_matrix(p: ArrayLike) -> Floats:
         [2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), e0 * e0 - e1 * e1 - e2 * e2 + e3 * e3],
     ]
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def ground_point(body: Any, s: ArrayLike) -> Floats:
+    """Return where a point s of a body is now, ground frame."""
+    return body.position + (rotation_matrix(body.orientation) @ s if body.dimension != 3 else 0.0)

@@ -11,11 +11,12 @@ import numpy as np
 from numba.core.errors import NumbaError
 
 from ..calls import Placing, complete_signature, fitting
+from ..docstrings import complete_docstring
 from ..errors import InvalidConstraint
 from ..jit.kernels import kernel
 from ..validation import demand_known, floats, label, number
 from .bodies import Ground, PointMass, rotation_matrix
-from .markers import PARAMETERS, POINT, TURN
+from .markers import PARAMETERS, POINT, TURN, Marker, entries
 from .membership import note
 from .names import named
 
@@ -24,7 +25,12 @@ if TYPE_CHECKING:
 
     from ..hints import AnyBody, ArrayLike, BodyLike, Floats, Function, Scene, TsdynError
     from .joint_coordinates import Angle, Displacement
-    from .markers import Marker
+
+ENTRIES = (  # of docstrings
+    "a, b : Body or ground\n    Two different bodies of one scene.",
+    "a : Body\n    A body of the scene.",
+    "name : str, optional",
+)
 
 
 def by_name(function: Function) -> Function:
@@ -70,6 +76,7 @@ class Attachment:
     coordinates: tuple[Floats, ...]
     markers: tuple[Marker, ...] = ()
     error: type[TsdynError] = InvalidConstraint
+    lacks = ""  # what a base class is the base of, and has none of itself
     particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
     joint_coordinates: tuple[Angle | Displacement, ...] = ()  # Angle and Displacement, see tsdyn/joint_coordinates.py
     angle_near = 0.0  # on which turn its angles begin: set by `Scene.set`
@@ -79,18 +86,32 @@ class Attachment:
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
+        if not isinstance(cls.markers, (tuple, list)) or not all(isinstance(m, Marker) for m in cls.markers):
+            return  # to be refused by name
         cls.__init__ = fitting(by_name(cls.__init__), then=note)
         if unwrap(cls.__init__).__code__.co_flags & CO_VARKEYWORDS:
             cls.__init__.__signature__ = complete_signature(cls)
-        if "__new__" in vars(cls):  # else the signature would be that of __new__
+        if cls.__new__ is not object.__new__:  # else the signature would be that of __new__
             cls.__signature__ = signature(MethodType(cls.__init__, cls))
+        raises = f"{cls.error.__name__}\n    If an argument is inadmissible or missing, or the bodies don't fit."
+        complete_docstring(cls, (*ENTRIES, *entries(cls.markers)), raises)
 
     def __init__(
-        self, a: BodyLike, b: BodyLike | None = None, coordinates: Sequence[ArrayLike | None] = (), name: str = ""
+        self,
+        a: BodyLike,
+        b: BodyLike | None = None,
+        coordinates: Sequence[ArrayLike | None] = (),
+        name: str = "",
+        **places: ArrayLike | None,
     ) -> None:
-        """Attach it to its bodies; coordinates has an entry for each marker, in the body frame."""
-        self.a, self.b = a, b
+        """Attach it to its bodies; coordinates has an entry for each marker, in the body frame.
+
+        A subclass whose `__init__` passes `**places` on has the arguments of its markers, and `name`.
+        """
         kind = self._kind()
+        if self.lacks and not self.markers:
+            raise self.error(f"{kind} is the base of {self.lacks}; use one of them, or a subclass.")
+        self.a, self.b = a, b
         name = label(name, kind, self.error)
         needed = {marker.body for marker in self.markers} | {"a"}
         bodies = [body for body, letter in ((a, "a"), (b, "b")) if body is not None or letter in needed]
@@ -108,11 +129,18 @@ class Attachment:
             raise self.error(f"{self.name}: it joins {a.name!r} to itself; pass two different bodies.")
         if len({id(body.scene) for body in bodies}) != 1:
             raise self.error(f"{self.name}: {a.name!r} and {b.name!r} belong to different scenes.")
-        given = list(coordinates) or [None] * len(self.markers)
+        given = list(coordinates) or self._placed(places)
         if len(given) != len(self.markers):
             raise self.error(f"{self.name}: {len(self.markers)} markers, but {len(given)} coordinates.")
         self.coordinates = tuple(self._places(given))
         self.built = tuple(getattr(body, "values", {}).get("orientation") for body in (a, b))
+
+    def _placed(self, places):
+        """The coordinates of all markers by the arguments that were given."""
+        known = {marker.argument: marker.default for marker in self.markers}
+        for unknown in places.keys() - known:
+            raise TypeError(f"unknown argument {unknown}")  # answered with the arguments that there are, see calls.py
+        return list({**known, **places}.values())
 
     def _untitled(self, bodies):
         """The name of one that its user has given none."""

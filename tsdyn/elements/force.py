@@ -24,12 +24,9 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Never, Self
 
-import numpy as np
-
 from ..errors import InvalidForce
 from ..jit.kernels import Callback, kernel, specialised
 from ..motions.signals import Signal
-from ..validation import number
 from .element import Attachment, check_slots, inlined, layout, static_kernel
 from .loops import constraint_series, force_series, friction
 from .loops import forces as loops
@@ -37,9 +34,9 @@ from .loops.coordinate_rows import SIGNATURE
 from .markers import PARAMETERS, TURN, Marker, Point
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Mapping
 
-    from ..hints import AnyBody, ArrayLike, BodyLike, Random
+    from ..hints import AnyBody, Random
 
 _registry = {}
 _KERNELS = {"law": 5}  # and their numbers of arguments
@@ -70,6 +67,8 @@ class Force(Attachment):
         Attribute -> function (value, what, error) that checks a value that is set and returns it.
     loads : tuple of str
         The attributes whose work is applied power.
+    sources : tuple of str
+        The attributes of which one at least must differ from zero.
     conservative : bool
         Whether all but the loads' work is in potential and dissipation, however the bodies move.
     a, b : Body or ground
@@ -82,8 +81,8 @@ class Force(Attachment):
     >>> import tsdyn as ts
     >>> class Pole(ts.Force):
     ...     markers = (ts.Point("a"),)
-    ...     def __init__(self, a, *, point_a=(0, 0, 0), stiffness=1.0, name=""):
-    ...         super().__init__(a, None, (point_a,), name)
+    ...     def __init__(self, a, *, stiffness=1.0, **places):
+    ...         super().__init__(a, None, **places)
     ...         self.stiffness = float(stiffness)
     ...     def parameters(self):
     ...         return (self.stiffness,)
@@ -100,12 +99,14 @@ class Force(Attachment):
     """
 
     error = InvalidForce
+    lacks = "forces and has no law"
     memory = 0
     slots = 0
     no_series = ""
     analytic = True
     quantities: Mapping[str, Callable[..., Any]] = MappingProxyType({})
     loads: tuple[str, ...] = ()
+    sources: tuple[str, ...] = ()
     conservative = True
     own_kernels = MappingProxyType(
         {}
@@ -134,14 +135,6 @@ class Force(Attachment):
         if not cls.__name__.startswith("_"):
             _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
-    def __init__(
-        self, a: BodyLike, b: BodyLike | None = None, coordinates: Sequence[ArrayLike | None] = (), name: str = ""
-    ) -> None:
-        """Attach the force to its bodies; coordinates has an entry for each marker, in the body frame."""
-        if not self.markers:
-            raise InvalidForce("Force is the base of forces and has no law; use one of them, or a subclass.")
-        super().__init__(a, b, coordinates, name)
-
     def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked by `quantities`."""
         if name in self.quantities:
@@ -153,40 +146,16 @@ class Force(Attachment):
         """The callbacks that run it; forces with the same ones are run together."""
         return self.own_kernels
 
-    def demand_any(self, *names: str) -> None:
-        """Refuse a force all of whose attributes of these names are zero."""
-        if all(Signal.is_zero(getattr(self, name)) for name in names):
-            raise InvalidForce(f"{self.name}: it is zero at all times; set {' or '.join(names)}.")
+    def check(self) -> None:
+        """Refuse a force all of whose sources are zero."""
+        if self.sources and all(Signal.is_zero(getattr(self, name)) for name in self.sources):
+            raise self.error(f"{self.name}: it is zero at all times; set {' or '.join(self.sources)}.")
 
     @classmethod
     def example(cls, rng: Random, a: AnyBody, b: AnyBody) -> Self:
         """Return a random valid instance between two bodies, for tests."""
         places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code not in (PARAMETERS, TURN)}
         return cls(a, b, **places) if any(m.body == "b" for m in cls.markers) else cls(a, **places)
-
-
-def not_negative(value, what, error):
-    """A finite float >= 0."""
-    result = number(value)
-    if not (np.isfinite(result) and result >= 0.0):
-        raise error(f"{what} must be a finite number that is not negative, got {value!r}.")
-    return result
-
-
-def positive_number(value, what, error):
-    """A finite float > 0."""
-    result = number(value)
-    if not (np.isfinite(result) and result > 0.0):
-        raise error(f"{what} must be a positive finite number, got {value!r}.")
-    return result
-
-
-def finite(value, what, error):
-    """A finite float."""
-    result = number(value)
-    if not np.isfinite(result):
-        raise error(f"{what} must be a finite number, got {value!r}.")
-    return result
 
 
 def load(value, what, error):

@@ -3,9 +3,17 @@
 Markers: Point a, Turn a, Point b, Turn b.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..jit.kernels import kernel
+from .markers import Point, Turn
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
 
 
 @kernel
@@ -49,9 +57,54 @@ def along_and_across(x, f):
     return along, turn, np.sqrt(f0 * f0 + f1 * f1 + f2 * f2), np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
 
 
-def demand_bodies(force, torque, name):
-    """Refuse what would put a torque on a point mass."""
-    if force.b.dimension == 3 or (force.a.dimension == 3 and torque != 0.0):
-        body = force.b if force.b.dimension == 3 else force.a
-        hint = "make it a, and the other body b" if body is force.b else f"set {name}=0"
-        raise force.error(f"{force.name}: the point mass {body.name!r} can't take the torque of it; {hint}.")
+class BodyFriction:
+    """Mixed in before `Force`: friction between two bodies, by a force at a point of a and by a torque.
+
+    The first of `sources` scales the force, the second the torque.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene. b is the ground or a rigid body, a may be a point mass.
+    point_a : array_like (3,), m
+        Where the force acts, body frame of a.
+
+    Raises
+    ------
+    InvalidForce
+        If a number is negative or not finite, a velocity of regularisation is zero, both force and torque are zero, or
+        a torque would act on a point mass.
+    """
+
+    markers = (Point("a"), Turn("a"), Point("b"), Turn("b"))
+    particles = True
+    sources: tuple[str, ...] = ()
+
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        name: str = "",
+        **quantities: Any,
+    ) -> None:
+        for unknown in quantities.keys() - self.quantities.keys():
+            raise TypeError(f"unknown argument {unknown}")  # answered with the arguments that there are, see calls.py
+        super().__init__(a, b, point_a=point_a, name=name)
+        for key, value in quantities.items():
+            setattr(self, key, value)
+        self.check()
+
+    def parameters(self) -> tuple[Any, ...]:
+        """The quantities, in their order."""
+        return tuple(getattr(self, key) for key in self.quantities)
+
+    def check(self) -> None:
+        """Refuse a friction without effect, and a torque on a point mass."""
+        super().check()
+        torque = self.sources[1]
+        if self.b.dimension == 3 or (self.a.dimension == 3 and getattr(self, torque) != 0.0):
+            body = self.b if self.b.dimension == 3 else self.a
+            hint = "make it a, and the other body b" if body is self.b else f"set {torque}=0"
+            raise self.error(f"{self.name}: the point mass {body.name!r} can't take the torque of it; {hint}.")

@@ -15,8 +15,7 @@ import numpy as np
 
 from ..calls import fitting, unknown_argument
 from ..errors import InvalidForce
-from ..validation import label, number
-from .force import not_negative, positive_number
+from ..validation import label, not_negative, positive
 from .markers import TURN, Marker, Point, Turn, Vector
 
 if TYPE_CHECKING:
@@ -25,6 +24,11 @@ if TYPE_CHECKING:
     from ..hints import AnyBody, Attachment, Floats, Random
 
 AXIS = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("a"))
+
+
+def optional(check):
+    """The check of a value that may be None."""
+    return lambda value, what, error: None if value is None else check(value, what, error)
 
 
 class JointFriction:
@@ -50,6 +54,13 @@ class JointFriction:
         Normal load besides that of the reaction.
     name : str, optional
 
+    Raises
+    ------
+    InvalidForce
+        If the joint is of another class or isn't in its scene, or a number is negative, not finite or impossible.
+    RedundantConstraints
+        When a run begins, if the reaction that it needs isn't unique.
+
     Attributes
     ----------
     joints : tuple of classes
@@ -73,9 +84,9 @@ class JointFriction:
     quantities: Mapping[str, Callable[..., Any]] = MappingProxyType(
         {
             "kinetic": not_negative,
-            "static": lambda value, *where: None if value is None else not_negative(value, *where),
-            "slip_velocity": positive_number,
-            "stribeck_velocity": lambda value, *where: None if value is None else positive_number(value, *where),
+            "static": optional(not_negative),
+            "slip_velocity": positive,
+            "stribeck_velocity": optional(positive),
             "preload": not_negative,
         }
     )
@@ -168,11 +179,3 @@ class JointFriction:
     def sizes(cls, rng: Random) -> dict[str, float]:
         """Random arguments of the geometry, for tests."""
         return {}
-
-
-def optional_length(value, what, error):
-    """A positive finite float, m, or None."""
-    result = None if value is None else number(value)
-    if result is not None and not (np.isfinite(result) and result > 0.0):
-        raise error(f"{what} must be a positive finite number, or None, got {value!r}.")
-    return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
@@ -9,13 +10,10 @@ import numpy as np
 from ..errors import InvalidForce
 from ..validation import label, positive
 from .markers import TURN
-from .user_functions import arguments_of
+from .user_functions import ByState, arguments_of, variant
 
 if TYPE_CHECKING:
-    from ..hints import AnyBody, Floats, Random
-
-if TYPE_CHECKING:
-    from ..hints import Attachment, JointLaw
+    from ..hints import AnyBody, Attachment, Floats, JointLaw, Random
 
 
 def instants(value, what, error):
@@ -38,8 +36,15 @@ class JointLoad:
 
     loads = ("function",)
     memory = 1
+    quantities = MappingProxyType({"function": law_of_joint, "period": instants})
     coordinate = ""  # "angle" or "displacement"
+    kind_of_example: Any = None  # a class of joints with such a coordinate and an axis
     remembers_angle = False  # of its joint, from the start of a run on
+
+    def __new__(cls, *given: Any, period: float | None = None, **others: Any) -> Self:
+        """Choose the kernel: held, or by the function; a copy has its class already."""
+        continuous = (given or others) and period is None
+        return super().__new__(variant(cls, ByState) if continuous else cls)
 
     def __init__(
         self, joint: Attachment, *, function: JointLaw, period: float | None = None, which: int = 0, name: str = ""
@@ -101,4 +106,5 @@ class JointLoad:
     @classmethod
     def example(cls, rng: Random, a: AnyBody, b: AnyBody) -> Self:
         """A damper that is sampled, on a joint that is added to the scene."""
-        return cls(a.scene.add(cls.joint_of_example(rng, a, b)), function=lambda t, x, rate: -rate, period=0.1)
+        joint = cls.kind_of_example(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3))
+        return cls(a.scene.add(joint), function=lambda t, x, rate: -rate, period=0.1)

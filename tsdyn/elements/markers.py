@@ -12,6 +12,7 @@ has r only.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from inspect import Parameter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,8 @@ from ..maths.euler_parameters import rotate, rotate_gradient, rotate_rate
 from ..validation import vector3
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from ..hints import AnyBody, ArrayLike, Floats, TsdynError
 
 POINT, VECTOR, PARAMETERS, TURN = 0, 1, 2, 3  # codes in kernels
@@ -36,6 +39,9 @@ class Marker:
     code = POINT
     size = 3
     prefix = "point_"
+    placed = True  # by an argument, three body-frame coordinates
+    default = (0.0, 0.0, 0.0)
+    meaning = "array_like (3,), m\n    A point in the {}; by default the centroid."
 
     def __post_init__(self) -> None:
         if self.body not in ("a", "b"):
@@ -43,12 +49,25 @@ class Marker:
         if not self.argument:
             object.__setattr__(self, "argument", self.prefix + self.body)
 
+    def parameter(self) -> Parameter:
+        """Return the argument that places it, as one of a signature."""
+        annotation = "ArrayLike | None" if self.default is None else "ArrayLike"
+        return Parameter(self.argument, Parameter.KEYWORD_ONLY, default=self.default, annotation=annotation)
+
     def coordinates(
         self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
     ) -> Floats:
         """Check the body-frame coordinates that a user gave, return them as an array (3,)."""
-        place = vector3(value, f"{where}: {self.argument}", error)
+        if not self.placed:
+            _needs_rotation(body, where)
+            return np.zeros(3)
+        what = f"{where}: {self.argument}"
+        place = self.fitted(vector3(value, what, error), body, what, error)
         place.setflags(write=False)
+        return place
+
+    def fitted(self, place: Floats, body: AnyBody, what: str, error: type[TsdynError]) -> Floats:
+        """Return the coordinates of a marker of this kind, or raise an error where the body has none such."""
         return place
 
 
@@ -62,14 +81,11 @@ class Point(Marker):
     ('point_a', 'tip_b')
     """
 
-    def coordinates(
-        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
-    ) -> Floats:
-        """Check the coordinates; a point mass has no other point than itself."""
-        value = super().coordinates(body, value, where, error)
-        if body.dimension == 3 and value.any():
-            raise error(f"{where}: {self.argument} must be (0, 0, 0) on the point mass {body.name!r}.")
-        return value
+    def fitted(self, place: Floats, body: AnyBody, what: str, error: type[TsdynError]) -> Floats:
+        """Return the coordinates; a point mass has no other point than itself."""
+        if body.dimension == 3 and place.any():
+            raise error(f"{what} must be (0, 0, 0) on the point mass {body.name!r}.")
+        return place
 
 
 class Vector(Marker):
@@ -84,20 +100,17 @@ class Vector(Marker):
 
     code = VECTOR
     prefix = "axis_"
+    default = None
+    meaning = "array_like (3,)\n    A direction in the {}; scaled to unit length."
 
-    def coordinates(
-        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
-    ) -> Floats:
-        """Check and normalise the direction."""
-        value = super().coordinates(body, value, where, error)
-        _needs_rotation(body, f"{where}: {self.argument}")
-        size = np.abs(value).max()
+    def fitted(self, place: Floats, body: AnyBody, what: str, error: type[TsdynError]) -> Floats:
+        """Return the direction at unit length."""
+        _needs_rotation(body, what)
+        size = np.abs(place).max()
         if not size > 0.0:
-            raise error(f"{where}: {self.argument} has length zero; give a direction, such as (0, 0, 1).")
-        value = np.ldexp(value, -np.frexp(size)[1])  # by a power of two: no square overflows, no bit changes
-        value = value / np.linalg.norm(value)
-        value.setflags(write=False)
-        return value
+            raise error(f"{what} has length zero; give a direction, such as (0, 0, 1).")
+        place = np.ldexp(place, -np.frexp(size)[1])  # by a power of two: no square overflows, no bit changes
+        return place / np.linalg.norm(place)
 
 
 class Parameters(Marker):
@@ -113,13 +126,8 @@ class Parameters(Marker):
     code = PARAMETERS
     size = 4
     prefix = "parameters_"
-
-    def coordinates(
-        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
-    ) -> Floats:
-        """Nothing to place: the marker is p."""
-        _needs_rotation(body, where)
-        return np.zeros(3)
+    placed = False
+    default = None
 
 
 class Turn(Marker):
@@ -134,13 +142,19 @@ class Turn(Marker):
 
     code = TURN
     prefix = "turn_"
+    placed = False
+    default = None
 
-    def coordinates(
-        self, body: AnyBody, value: ArrayLike | None, where: str, error: type[TsdynError] = InvalidConstraint
-    ) -> Floats:
-        """Nothing to place: all points of a body turn alike."""
-        _needs_rotation(body, where)
-        return np.zeros(3)
+
+def entries(markers: Sequence[Marker]) -> Iterator[str]:
+    """Entries of a docstring for the arguments that place markers; one for a pair on both bodies."""
+    pairs = {}
+    for marker in markers:
+        if marker.placed:
+            pairs.setdefault((marker.code, marker.argument.removesuffix(f"_{marker.body}")), []).append(marker)
+    for one, *others in pairs.values():
+        arguments = ", ".join(marker.argument for marker in (one, *others))
+        yield f"{arguments} : {one.meaning.format('frame of each body' if others else f'frame of {one.body}')}"
 
 
 def _needs_rotation(body, where):

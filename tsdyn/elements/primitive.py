@@ -31,9 +31,9 @@ from .loops import constraint_hessians, constraint_rows, constraint_series, coor
 from .markers import PARAMETERS, TURN, Marker
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
-    from ..hints import AnyBody, ArrayLike, BodyLike, Random
+    from ..hints import AnyBody, Random
 
 _registry = {}
 _KERNELS = {"phi": 4, "jacobian": 4, "gamma": 5}  # and their numbers of arguments
@@ -92,6 +92,7 @@ class Primitive(Attachment):
     >>> ts.testing.check_primitive(OnCylinder)  # doctest: +SKIP
     """
 
+    lacks = "constraints and has no rows"
     rows = 0
     slots = 0
     memory = 0
@@ -123,16 +124,6 @@ class Primitive(Attachment):
             functions[name] = static_kernel(cls, name, arguments, where, InvalidConstraint)
         cls.kernels = MappingProxyType(_compile(cls, functions))
         _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
-
-    def __init__(
-        self, a: BodyLike, b: BodyLike | None = None, coordinates: Sequence[ArrayLike | None] = (), name: str = ""
-    ) -> None:
-        """Attach the primitive to its bodies; coordinates has an entry for each marker, in the body frame."""
-        if not self.rows:
-            raise InvalidConstraint(
-                "Primitive is the base of constraints and has no rows; use one of them, or a subclass."
-            )
-        super().__init__(a, b, coordinates, name)
 
     def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; a prescribed one may be a number or three functions of time."""

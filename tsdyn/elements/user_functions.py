@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from types import FunctionType
 from typing import Any
 
 from ..jit.compiled_once import compiled_once
-from ..jit.kernels import kernel
+from ..jit.kernels import kernel, specialised
 from .force import callbacks
 
 STATE = 13  # position, Euler parameters, velocity, angular velocity
@@ -17,7 +18,7 @@ class Kernels(dict):
     """The callbacks of one kind with one function; pickled as the two."""
 
     def __init__(self, kind, function):
-        functions = {"law": kind.wrap(kernel(function, allocates=True), function)}
+        functions = {"law": kind._wrap(kernel(function, allocates=True), function)}
         if kind.memory:
             functions["remember"] = kind.remember
         super().__init__(callbacks(kind, functions, function))
@@ -58,11 +59,29 @@ def state_load(value, what, error):
     return value
 
 
+def variant(cls, mixin):
+    """The private subclass of a public class that has a mixin, or the class itself where there is none."""
+    private = (kind for kind in cls.__subclasses__() if kind.__name__.startswith("_"))
+    return next((kind for kind in private if issubclass(kind, mixin)), cls)
+
+
 class ByState:
     """Mixed into forces that are given by a user's function, which the attribute named by `given` holds."""
 
     analytic = False
     no_series = "it is a function of the state, of which only values are known"
+    template: Any = None  # the law, with the name `function` to be filled in
+
+    @classmethod
+    def _wrap(cls, inner, owner):
+        """Return the law with a user's function, compiled with the file of the function."""
+        return specialised(cls.template, f"{owner.__qualname__}.{cls.__name__}", owner, function=inner)
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        """Of no function: what instances replace."""
+        for i in range(x.size):
+            out[i] = math.nan
 
     @property
     def kernels(self):

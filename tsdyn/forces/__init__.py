@@ -1,30 +1,11 @@
 """Forces, one file each; a new file in this folder is registered automatically."""
 
-from __future__ import annotations
+from .._discovery import export_all, listing
+from ..elements.force import registered as _known
 
-from typing import TYPE_CHECKING
+__all__ = [*export_all(__name__, __path__, globals(), "Force"), "registered"]
 
-from .._discovery import export_all
-
-if TYPE_CHECKING:
-    from ..hints import Force
-
-__all__ = export_all(__name__, __path__, globals(), "Force")
-__all__.append("registered")
-
-
-def registered() -> tuple[type[Force], ...]:
-    """Return every force class known, built in or plugged in.
-
-    Examples
-    --------
-    >>> import tsdyn as ts
-    >>> ts.forces.Spring in ts.forces.registered()
-    True
-    """
-    from ..elements.force import registered as known
-
-    return tuple(known().values())
+registered = listing(_known, "Force", "ts.forces.Spring in ts.forces.registered()")
 
 
 def __dir__() -> list[str]:

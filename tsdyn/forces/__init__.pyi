@@ -4,182 +4,34 @@ from typing import Any, Self
 
 from .. import JointFriction
 from ..constraints import Revolute, Translational
-from ..hints import ArrayLike, Attachment, Attribute, Body, BodyLike, Floats, Force, Frame, JointLaw, Load, PointMass, VectorLoad
+from ..hints import ArrayLike, Attachment, Attribute, Axes, Body, BodyLike, Floats, Force, Frame, JointLaw, Load, PointMass, Points, References, VectorLoad
 
-class Bushing(Force):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
+class Bushing(Points, Force):
     stiffness: Attribute[ArrayLike, Floats]
     damping: Attribute[ArrayLike, Floats]
     torsional_stiffness: Attribute[ArrayLike, Floats]
     torsional_damping: Attribute[ArrayLike, Floats]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        stiffness: ArrayLike = ...,
-        damping: ArrayLike = ...,
-        torsional_stiffness: ArrayLike = ...,
-        torsional_damping: ArrayLike = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., stiffness: ArrayLike = ..., damping: ArrayLike = ..., torsional_stiffness: ArrayLike = ..., torsional_damping: ArrayLike = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        stiffness: ArrayLike = ...,
-        damping: ArrayLike = ...,
-        torsional_stiffness: ArrayLike = ...,
-        torsional_damping: ArrayLike = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., stiffness: ArrayLike = ..., damping: ArrayLike = ..., torsional_stiffness: ArrayLike = ..., torsional_damping: ArrayLike = ..., name: str = ...) -> Self: ...
 
-class CoulombFriction(Force):
-    point_a: Attribute[ArrayLike, Floats]
-    force: float
-    torque: float
-    slip_velocity: float
-    slip_rate: float
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        force: float = ...,
-        torque: float = ...,
-        slip_velocity: float = ...,
-        slip_rate: float = ...,
-        name: str = ...,
-    ) -> None: ...
-    @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        point_a: ArrayLike = ...,
-        force: float = ...,
-        torque: float = ...,
-        slip_velocity: float = ...,
-        slip_rate: float = ...,
-        name: str = ...,
-    ) -> Self: ...
-
-class Spring(Force):
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
+class Spring(Points, Force):
     stiffness: float
     damping: float
     free_length: float
     actuator: Attribute[Load, Any]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        stiffness: float = ...,
-        damping: float = ...,
-        free_length: float | None = ...,
-        actuator: Load = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., stiffness: float = ..., damping: float = ..., free_length: float | None = ..., actuator: Load = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        stiffness: float = ...,
-        damping: float = ...,
-        free_length: float | None = ...,
-        actuator: Load = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., stiffness: float = ..., damping: float = ..., free_length: float | None = ..., actuator: Load = ..., name: str = ...) -> Self: ...
 
-class TorsionalSpring(Force):
-    axis_a: Attribute[ArrayLike, Floats]
-    axis_b: Attribute[ArrayLike, Floats]
-    reference_a: Attribute[ArrayLike, Floats]
-    reference_b: Attribute[ArrayLike, Floats]
+class TorsionalSpring(Axes, References, Force):
     stiffness: float
     damping: float
     free_angle: float
     actuator: Attribute[Load, Any]
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis_a: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        stiffness: float = ...,
-        damping: float = ...,
-        free_angle: float = ...,
-        actuator: Load = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., stiffness: float = ..., damping: float = ..., free_angle: float = ..., actuator: Load = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        axis: ArrayLike | None = ...,
-        reference: ArrayLike | None = ...,
-        axis_b: ArrayLike | None = ...,
-        axis_a: ArrayLike | None = ...,
-        reference_a: ArrayLike | None = ...,
-        reference_b: ArrayLike | None = ...,
-        stiffness: float = ...,
-        damping: float = ...,
-        free_angle: float = ...,
-        actuator: Load = ...,
-        name: str = ...,
-    ) -> Self: ...
-
-class ViscousFriction(Force):
-    point_a: Attribute[ArrayLike, Floats]
-    damping: float
-    torsional_damping: float
-    def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = ...,
-        damping: float = ...,
-        torsional_damping: float = ...,
-        name: str = ...,
-    ) -> None: ...
-    @classmethod
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point: ArrayLike = ...,
-        point_a: ArrayLike = ...,
-        damping: float = ...,
-        torsional_damping: float = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., axis_a: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., stiffness: float = ..., damping: float = ..., free_angle: float = ..., actuator: Load = ..., name: str = ...) -> Self: ...
 
 class ContactFriction(JointFriction, Force):
     @property
@@ -189,29 +41,19 @@ class ContactFriction(JointFriction, Force):
     slip_velocity: float
     stribeck_velocity: float | None
     preload: float
-    def __init__(
-        self,
-        joint: Attachment,
-        *,
-        kinetic: float,
-        static: float | None = ...,
-        slip_velocity: float = ...,
-        stribeck_velocity: float | None = ...,
-        preload: float = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, joint: Attachment, *, kinetic: float, static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        joint: Attachment,
-        *,
-        kinetic: float,
-        static: float | None = ...,
-        slip_velocity: float = ...,
-        stribeck_velocity: float | None = ...,
-        preload: float = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, joint: Attachment, *, kinetic: float, static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> Self: ...
+
+class CoulombFriction(Force):
+    force: float
+    torque: float
+    slip_velocity: float
+    slip_rate: float
+    point_a: Attribute[ArrayLike, Floats]
+    def __init__(self, a: BodyLike, b: BodyLike, *, force: float = ..., torque: float = ..., slip_velocity: float = ..., slip_rate: float = ..., point_a: ArrayLike = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., force: float = ..., torque: float = ..., slip_velocity: float = ..., slip_rate: float = ..., point_a: ArrayLike = ..., name: str = ...) -> Self: ...
 
 class JointForce(Force):
     @property
@@ -220,13 +62,9 @@ class JointForce(Force):
     period: float | None
     @property
     def which(self) -> int: ...
-    def __init__(
-        self, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...
-    ) -> None: ...
+    def __init__(self, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...
-    ) -> Self: ...
+    def at(cls, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...) -> Self: ...
     @property
     def geometry(self) -> Any: ...
 
@@ -237,40 +75,19 @@ class JointTorque(Force):
     period: float | None
     @property
     def which(self) -> int: ...
-    def __init__(
-        self, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...
-    ) -> None: ...
+    def __init__(self, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...
-    ) -> Self: ...
+    def at(cls, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...) -> Self: ...
     @property
     def geometry(self) -> Any: ...
 
 class PointForce(Force):
-    force: Attribute[VectorLoad, Any]
     point_a: Attribute[ArrayLike, Floats]
+    force: Attribute[VectorLoad, Any]
     frame: Frame
-    def __init__(
-        self,
-        a: PointMass | str,
-        *,
-        force: VectorLoad | None = ...,
-        point_a: ArrayLike = ...,
-        frame: Frame = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: PointMass | str, *, point_a: ArrayLike = ..., force: VectorLoad | None = ..., frame: Frame = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: PointMass | str,
-        *,
-        point: ArrayLike = ...,
-        force: VectorLoad | None = ...,
-        point_a: ArrayLike = ...,
-        frame: Frame = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: PointMass | str, *, point: ArrayLike = ..., point_a: ArrayLike = ..., force: VectorLoad | None = ..., frame: Frame = ..., name: str = ...) -> Self: ...
     def take(self, value: Any, frame: str, hint: str) -> None: ...
 
 class RevoluteFriction(JointFriction, Force):
@@ -284,42 +101,14 @@ class RevoluteFriction(JointFriction, Force):
     slip_velocity: float
     stribeck_velocity: float | None
     preload: float
-    def __init__(
-        self,
-        joint: Revolute,
-        *,
-        radius: float,
-        kinetic: float,
-        collar_radius: float = ...,
-        length: float | None = ...,
-        static: float | None = ...,
-        slip_velocity: float = ...,
-        stribeck_velocity: float | None = ...,
-        preload: float = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, joint: Revolute, *, radius: float, kinetic: float, collar_radius: float = ..., length: float | None = ..., static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        joint: Revolute,
-        *,
-        radius: float,
-        kinetic: float,
-        collar_radius: float = ...,
-        length: float | None = ...,
-        static: float | None = ...,
-        slip_velocity: float = ...,
-        stribeck_velocity: float | None = ...,
-        preload: float = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, joint: Revolute, *, radius: float, kinetic: float, collar_radius: float = ..., length: float | None = ..., static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> Self: ...
 
 class Torque(Force):
     torque: Attribute[VectorLoad, Any]
     frame: Frame
-    def __init__(
-        self, a: Body | str, *, torque: VectorLoad | None = ..., frame: Frame = ..., name: str = ...
-    ) -> None: ...
+    def __init__(self, a: Body | str, *, torque: VectorLoad | None = ..., frame: Frame = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: Body | str, *, torque: VectorLoad | None = ..., frame: Frame = ..., name: str = ...) -> Self: ...
     def take(self, value: Any, frame: str, hint: str) -> None: ...
@@ -334,64 +123,25 @@ class TranslationalFriction(JointFriction, Force):
     slip_velocity: float
     stribeck_velocity: float | None
     preload: float
-    def __init__(
-        self,
-        joint: Translational,
-        *,
-        kinetic: float,
-        length: float | None = ...,
-        width: float | None = ...,
-        static: float | None = ...,
-        slip_velocity: float = ...,
-        stribeck_velocity: float | None = ...,
-        preload: float = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, joint: Translational, *, kinetic: float, length: float | None = ..., width: float | None = ..., static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        joint: Translational,
-        *,
-        kinetic: float,
-        length: float | None = ...,
-        width: float | None = ...,
-        static: float | None = ...,
-        slip_velocity: float = ...,
-        stribeck_velocity: float | None = ...,
-        preload: float = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, joint: Translational, *, kinetic: float, length: float | None = ..., width: float | None = ..., static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> Self: ...
 
-class UserForce(Force):
+class UserForce(Points, Force):
     function: Callable[..., object]
-    point_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    def __init__(
-        self,
-        a: PointMass | str,
-        b: BodyLike | None = ...,
-        *,
-        function: Callable[..., object],
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        parameters: ArrayLike = ...,
-        name: str = ...,
-    ) -> None: ...
+    def __init__(self, a: PointMass | str, b: BodyLike | None = ..., *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., function: Callable[..., object], parameters: ArrayLike = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(
-        cls,
-        a: PointMass | str,
-        b: BodyLike | None = ...,
-        *,
-        point: ArrayLike = ...,
-        function: Callable[..., object],
-        point_a: ArrayLike = ...,
-        point_b: ArrayLike = ...,
-        parameters: ArrayLike = ...,
-        name: str = ...,
-    ) -> Self: ...
+    def at(cls, a: PointMass | str, b: BodyLike | None = ..., *, point: ArrayLike = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., function: Callable[..., object], parameters: ArrayLike = ..., name: str = ...) -> Self: ...
     def forget(self) -> None: ...
     @property
     def function_of_state(self) -> Any: ...
+
+class ViscousFriction(Force):
+    damping: float
+    torsional_damping: float
+    point_a: Attribute[ArrayLike, Floats]
+    def __init__(self, a: BodyLike, b: BodyLike, *, damping: float = ..., torsional_damping: float = ..., point_a: ArrayLike = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., damping: float = ..., torsional_damping: float = ..., point_a: ArrayLike = ..., name: str = ...) -> Self: ...
 
 def registered() -> tuple[type[Force], ...]: ...

@@ -14,7 +14,7 @@ restoring torque acts towards the full turn.
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -48,7 +48,6 @@ class Bushing(Force):
         Along the axes of a.
     torsional_stiffness, torsional_damping : float or array_like (3,), N m/rad and N m s/rad
         About the axes of a; the angles are twice the vector part of the relative Euler parameters.
-    name : str, optional
 
     Raises
     ------
@@ -70,31 +69,24 @@ class Bushing(Force):
 
     markers = (Point("a"), Point("b"), Parameters("a"), Parameters("b"), Turn("a"), Turn("b"))
     slots = 45
-    quantities = MappingProxyType(
-        dict.fromkeys(("stiffness", "damping", "torsional_stiffness", "torsional_damping"), _three)
-    )
+    sources = ("stiffness", "damping", "torsional_stiffness", "torsional_damping")
+    quantities = MappingProxyType(dict.fromkeys(sources, _three))
 
     def __init__(
         self,
         a: BodyLike,
         b: BodyLike,
         *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
         stiffness: ArrayLike = 0.0,
         damping: ArrayLike = 0.0,
         torsional_stiffness: ArrayLike = 0.0,
         torsional_damping: ArrayLike = 0.0,
-        name: str = "",
+        **places: Any,
     ) -> None:
-        super().__init__(a, b, (point_a, point_b, None, None, None, None), name)
+        super().__init__(a, b, **places)
         self.stiffness, self.damping = stiffness, damping
         self.torsional_stiffness, self.torsional_damping = torsional_stiffness, torsional_damping
         self.check()
-
-    def check(self):
-        """It must do something."""
-        self.demand_any(*self.quantities)
 
     def parameters(self):
         """K, C, K_t, C_t."""

@@ -23,17 +23,6 @@ class ContactFriction(JointFriction, Force):
     ----------
     joint : PlaneContact
         Added to its scene.
-    kinetic : float
-        Coefficient of friction while sliding.
-    static, slip_velocity, stribeck_velocity, preload, name
-        Optional, see `ts.JointFriction`: a coefficient, m/s, m/s, N.
-
-    Raises
-    ------
-    InvalidForce
-        If joint is no PlaneContact of the scene, or a number is negative, not finite or impossible.
-    RedundantConstraints
-        When a run begins, if the reaction that it needs isn't unique.
 
     Examples
     --------

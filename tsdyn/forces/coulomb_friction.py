@@ -11,25 +11,21 @@ Below the slip velocity v0 the law is viscous: a body that should stick creeps.
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import Force, Point, Turn, act, demand_bodies, not_negative, positive_number, slip
+from ..plugins import BodyFriction, Force, act, not_negative, positive, slip
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
-class CoulombFriction(Force):
+class CoulombFriction(BodyFriction, Force):
     """Resist the motion of a relative to b by a force and a torque of constant size.
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene. b is the ground or a rigid body, a may be a point mass.
-    point_a : array_like (3,), m
-        Where the force acts, body frame of a.
     force : float, N
         Size of the friction force: the friction coefficient times the normal force.
     torque : float, N m
@@ -38,13 +34,6 @@ class CoulombFriction(Force):
         Regularisation: at this velocity the force is 71% of its size.
     slip_rate : float, rad/s
         The same for the torque.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidForce
-        If a size is negative, a regularisation not positive, or both sizes are zero, or a torque would act on a point
-        mass.
 
     Examples
     --------
@@ -59,11 +48,10 @@ class CoulombFriction(Force):
     0.250 m, 0.000 m/s
     """
 
-    markers = (Point("a"), Turn("a"), Point("b"), Turn("b"))
-    particles = True
+    sources = ("force", "torque")
     no_series = "its force reverses within slip_velocity, too sharply for a series"
     quantities = MappingProxyType(
-        {"force": not_negative, "torque": not_negative, "slip_velocity": positive_number, "slip_rate": positive_number}
+        {"force": not_negative, "torque": not_negative, "slip_velocity": positive, "slip_rate": positive}
     )
 
     def __init__(
@@ -71,25 +59,13 @@ class CoulombFriction(Force):
         a: BodyLike,
         b: BodyLike,
         *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
         force: float = 0.0,
         torque: float = 0.0,
         slip_velocity: float = 1e-3,
         slip_rate: float = 1e-3,
-        name: str = "",
+        **given: Any,
     ) -> None:
-        super().__init__(a, b, (point_a, None, (0.0, 0.0, 0.0), None), name)
-        self.force, self.torque, self.slip_velocity, self.slip_rate = force, torque, slip_velocity, slip_rate
-        self.check()
-
-    def check(self):
-        """It must do something, and to bodies that can take it."""
-        self.demand_any("force", "torque")
-        demand_bodies(self, self.torque, "torque")
-
-    def parameters(self):
-        """(R, N0, v0, w0)."""
-        return self.force, self.torque, self.slip_velocity, self.slip_rate
+        super().__init__(a, b, force=force, torque=torque, slip_velocity=slip_velocity, slip_rate=slip_rate, **given)
 
     @staticmethod
     def law(x, xd, par, t, out):

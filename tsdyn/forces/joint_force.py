@@ -9,9 +9,9 @@ The power of (1) is F sd for any motion of the bodies.
 """
 
 import math
-from types import MappingProxyType
 
-from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements, instants, law_of_joint, specialised
+from ..constraints.translational import Translational
+from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements
 
 
 class JointForce(JointLoad, Force):
@@ -27,7 +27,6 @@ class JointForce(JointLoad, Force):
         As for JointTorque.
     which : int
         Which displacement, of a joint that has several.
-    name : str, optional
 
     Raises
     ------
@@ -51,13 +50,8 @@ class JointForce(JointLoad, Force):
 
     markers = (Vector("a", "axis"), Point("a", "own_point"), Point("b", "other_point"))
     coordinate = "displacement"
-    quantities = MappingProxyType({"function": law_of_joint, "period": instants})
+    kind_of_example = Translational
     geometries = staticmethod(displacements)
-
-    def __new__(cls, *given, period=None, **others):
-        """Choose the kernel: held, or by the function; a copy has its class already."""
-        continuous = (given or others) and period is None
-        return super().__new__(_ContinuousForce if cls is JointForce and continuous else cls)
 
     @staticmethod
     def directions(geometry):
@@ -81,35 +75,8 @@ class JointForce(JointLoad, Force):
         """The force, as it is held."""
         return par[0]
 
-    @staticmethod
-    def joint_of_example(rng, a, b):
-        """A guide."""
-        from ..constraints.translational import Translational
 
-        return Translational(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3))
-
-
-class _ContinuousForce(ByState, JointForce):
-    """By the function at every evaluation, Eq. (3)."""
-
-    given = "function"
-    memory, remember, series = 0, None, None
-    no_series = "it is a function of the joint's displacement, of which only values are known; with period= it has one"
-    check = JointLoad.check
-
-    @staticmethod
-    def wrap(inner, owner):
-        """The kernel of a user's function."""
-        return specialised(_law, f"{owner.__qualname__}.joint_force", owner, function=inner)
-
-    @staticmethod
-    def law(x, xd, par, t, out):
-        """Of no function: what instances replace."""
-        for i in range(9):
-            out[i] = math.nan
-
-
-function = None  # filled in by `wrap`
+function = None  # filled in by `ByState`
 
 
 def _law(x, xd, par, t, out):
@@ -124,3 +91,13 @@ def _law(x, xd, par, t, out):
         force = math.nan
     for i in range(3):
         out[i], out[3 + i], out[6 + i] = force * (x[6 + i] - x[3 + i]), -force * x[i], force * x[i]
+
+
+class _ContinuousForce(ByState, JointForce):
+    """By the function at every evaluation, Eq. (3)."""
+
+    given = "function"
+    template = staticmethod(_law)
+    memory, remember, series = 0, None, None
+    no_series = "it is a function of the joint's displacement, of which only values are known; with period= it has one"
+    check = JointLoad.check

@@ -8,11 +8,11 @@ The power of (1) is T times the rate of the angle if the joint holds the axis.
 """
 
 import math
-from types import MappingProxyType
 
 import numpy as np
 
-from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles, instants, law_of_joint, specialised
+from ..constraints.revolute import Revolute
+from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles
 
 
 class JointTorque(JointLoad, Force):
@@ -32,7 +32,6 @@ class JointTorque(JointLoad, Force):
         end there, and every method keeps its order.
     which : int
         Which angle, of a joint that has several (Universal).
-    name : str, optional
 
     Raises
     ------
@@ -62,13 +61,8 @@ class JointTorque(JointLoad, Force):
 
     markers = (Vector("a", "axis"), Turn("a"), Turn("b"))
     coordinate = "angle"
-    quantities = MappingProxyType({"function": law_of_joint, "period": instants})
+    kind_of_example = Revolute
     geometries = staticmethod(angles)
-
-    def __new__(cls, *given, period=None, **others):
-        """Choose the kernel: held, or by the function; a copy has its class already."""
-        continuous = (given or others) and period is None
-        return super().__new__(_ContinuousTorque if cls is JointTorque and continuous else cls)
 
     @staticmethod
     def directions(geometry):
@@ -93,47 +87,8 @@ class JointTorque(JointLoad, Force):
         """The torque, as it is held."""
         return par[0]
 
-    @staticmethod
-    def joint_of_example(rng, a, b):
-        """A hinge."""
-        from ..constraints.revolute import Revolute
 
-        return Revolute(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3))
-
-
-class _ContinuousTorque(ByState, JointTorque):
-    """By the function at every evaluation, Eq. (2); what it remembers is the angle."""
-
-    remembers_angle = True
-    markers = (Vector("a", "axis"), Vector("a", "reference"), Vector("b", "direction"), Turn("a"), Turn("b"))
-    given = "function"
-    series = None
-    no_series = "it is a function of the joint's angle, of which only values are known; with period= it has a series"
-    check = JointLoad.check
-
-    @staticmethod
-    def directions(geometry):
-        """The axis, and the directions whose angle it is."""
-        return np.cross(geometry.f, geometry.g), geometry.f, geometry.h
-
-    @staticmethod
-    def wrap(inner, owner):
-        """The kernel of a user's function."""
-        return specialised(_law, f"{owner.__qualname__}.joint_torque", owner, function=inner)
-
-    @staticmethod
-    def law(x, xd, par, t, out):
-        """Of no function: what instances replace."""
-        for i in range(15):
-            out[i] = math.nan
-
-    @staticmethod
-    def remember(x, xd, par, t):
-        """The angle."""
-        return angle_about(x, par[0])
-
-
-function = None  # filled in by `wrap`
+function = None  # filled in by `ByState`
 
 
 def _law(x, xd, par, t, out):
@@ -148,3 +103,25 @@ def _law(x, xd, par, t, out):
         out[i] = 0.0
     for i in range(3):
         out[9 + i], out[12 + i] = -torque * x[i], torque * x[i]
+
+
+class _ContinuousTorque(ByState, JointTorque):
+    """By the function at every evaluation, Eq. (2); what it remembers is the angle."""
+
+    remembers_angle = True
+    markers = (Vector("a", "axis"), Vector("a", "reference"), Vector("b", "direction"), Turn("a"), Turn("b"))
+    given = "function"
+    template = staticmethod(_law)
+    series = None
+    no_series = "it is a function of the joint's angle, of which only values are known; with period= it has a series"
+    check = JointLoad.check
+
+    @staticmethod
+    def directions(geometry):
+        """The axis, and the directions whose angle it is."""
+        return np.cross(geometry.f, geometry.g), geometry.f, geometry.h
+
+    @staticmethod
+    def remember(x, xd, par, t):
+        """The angle."""
+        return angle_about(x, par[0])

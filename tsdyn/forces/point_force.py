@@ -7,23 +7,12 @@ f = A(p_a) F      frame="body"       (2)
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ..plugins import (
-    Force,
-    Given,
-    GivenByState,
-    GivenInBody,
-    Parameters,
-    Point,
-    Turn,
-    arguments_of,
-    state_load,
-    vector_load,
-)
+from ..plugins import Force, Given, GivenByState, GivenInBody, Parameters, Point, Turn, state_load, vector_load
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, Frame, PointMass, VectorLoad
+    from ..hints import Frame, PointMass, VectorLoad
 
 
 class PointForce(Given, Force):
@@ -33,19 +22,9 @@ class PointForce(Given, Force):
     ----------
     a : Body
         A rigid body or a point mass.
-    point_a : array_like (3,), m
-        The point, body frame.
     force : array_like (3,), ts.Table, or function of t or of (t, state); N
         A function returns a tuple of three; state (13,) is the position of the point (m), Euler parameters, velocity of
         the point (m/s) and angular velocity (rad/s), ground frame.
-    frame : {"ground", "body"}
-        The axes in which the force is given.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidForce
-        If the force is not three finite numbers or such a function, is zero, or the frame is unknown.
 
     Notes
     -----
@@ -68,24 +47,10 @@ class PointForce(Given, Force):
     loads = ("force",)
     given = "force"
 
-    def __new__(cls, *others, force=None, frame="ground", **more):
-        """Choose the kernel by frame and by the sort of the force."""
-        if cls is PointForce and arguments_of(force) == 2:
-            cls = _StatePointForce
-        elif cls is PointForce and isinstance(frame, str) and frame == "body":
-            cls = _BodyPointForce
-        return super().__new__(cls)
-
     def __init__(
-        self,
-        a: PointMass | str,
-        *,
-        force: VectorLoad | None = None,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        frame: Frame = "ground",
-        name: str = "",
+        self, a: PointMass | str, *, force: VectorLoad | None = None, frame: Frame = "ground", **places: Any
     ) -> None:
-        super().__init__(a, None, (point_a, *[None] * (len(self.markers) - 1)), name)
+        super().__init__(a, None, **places)
         self.take(force, frame, "(Fx, Fy, Fz) in N")
 
     @classmethod

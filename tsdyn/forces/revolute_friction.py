@@ -17,16 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.revolute import Revolute
-from ..plugins import (
-    AXIS,
-    Force,
-    JointFriction,
-    along_and_across,
-    coefficient,
-    not_negative,
-    optional_length,
-    positive_number,
-)
+from ..plugins import AXIS, Force, JointFriction, along_and_across, coefficient, not_negative, optional, positive
 
 
 class RevoluteFriction(JointFriction, Force):
@@ -38,21 +29,10 @@ class RevoluteFriction(JointFriction, Force):
         Added to its scene.
     radius : float, m
         Of the pin.
-    kinetic : float
-        Coefficient of friction while sliding.
-    **given
-        static, slip_velocity, stribeck_velocity (of the pin's surface, m/s), preload (N), name: see `ts.JointFriction`.
     collar_radius : float, m
         Where the force along the axis rubs; 0: it causes no friction.
     length : float, m, optional
         Of the bearing, which carries torques that tilt the pin as a pair of forces; None: they cause no friction.
-
-    Raises
-    ------
-    InvalidForce
-        If joint is no Revolute of the scene, or a number is negative, not finite or impossible.
-    RedundantConstraints
-        When a run begins, if the reaction that it needs isn't unique.
 
     Examples
     --------
@@ -72,9 +52,9 @@ class RevoluteFriction(JointFriction, Force):
     quantities = MappingProxyType(
         {
             **JointFriction.quantities,
-            "radius": positive_number,
+            "radius": positive,
             "collar_radius": not_negative,
-            "length": optional_length,
+            "length": optional(positive),
         }
     )
 

@@ -12,27 +12,14 @@ Singular at l = 0: a run ends there.
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    Force,
-    InvalidForce,
-    Point,
-    Signal,
-    dot,
-    inverse_root,
-    load,
-    not_negative,
-    product,
-    rotation_matrix,
-    scaled,
-    square,
-)
+from ..plugins import Force, Point, Signal, dot, ground_point, inverse_root, load, not_negative, product, scaled, square
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Load
+    from ..hints import BodyLike, Load
 
 
 class Spring(Force):
@@ -40,17 +27,12 @@ class Spring(Force):
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene.
-    point_a, point_b : array_like (3,), m
-        The points in the bodies' own frames.
     stiffness : float, N/m
     damping : float, N s/m
     free_length : float, m; optional
         None takes the distance of the bodies as they stand now.
     actuator : float, function of time, or ts.Table, N
         A tension of its own; its power is applied power.
-    name : str, optional
 
     Raises
     ------
@@ -76,6 +58,7 @@ class Spring(Force):
         {"stiffness": not_negative, "damping": not_negative, "free_length": not_negative, "actuator": load}
     )
     loads = ("actuator",)
+    sources = ("stiffness", "damping", "actuator")
     slots = 11
 
     def __init__(
@@ -83,28 +66,22 @@ class Spring(Force):
         a: BodyLike,
         b: BodyLike,
         *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
         stiffness: float = 0.0,
         damping: float = 0.0,
         free_length: float | None = None,
         actuator: Load = 0.0,
-        name: str = "",
+        **places: Any,
     ) -> None:
-        super().__init__(a, b, (point_a, point_b), name)
-        ends = [_ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
+        super().__init__(a, b, **places)
+        ends = [ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
         length = np.linalg.norm(ends[0] - ends[1])
         if not length > 0.0:
-            raise InvalidForce(
+            raise self.error(
                 f"{self.name}: its two points coincide at the start, so it has no direction; move point_a or point_b."
             )
         self.stiffness, self.damping, self.actuator = stiffness, damping, actuator
         self.free_length = length if free_length is None else free_length
         self.check()
-
-    def check(self):
-        """It must do something."""
-        self.demand_any("stiffness", "damping", "actuator")
 
     def parameters(self):
         """(k, c, l0, actuator)."""
@@ -156,7 +133,3 @@ class Spring(Force):
         """A random spring and damper."""
         numbers = dict(zip(("stiffness", "damping", "free_length"), rng.uniform(0.5, 2.0, 3), strict=True))
         return cls(a, b, point_a=rng.normal(size=3), point_b=rng.normal(size=3), **numbers)
-
-
-def _ground_point(body, s):
-    return body.position + (rotation_matrix(body.orientation) @ s if body.dimension != 3 else 0.0)

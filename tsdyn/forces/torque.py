@@ -9,48 +9,24 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from ..plugins import (
-    Force,
-    Given,
-    GivenByState,
-    GivenInBody,
-    Parameters,
-    Point,
-    Turn,
-    arguments_of,
-    state_load,
-    vector_load,
-)
+from ..plugins import Force, Given, GivenByState, GivenInBody, Parameters, Point, Turn, state_load, vector_load
 
 if TYPE_CHECKING:
     from ..hints import Body, Frame, VectorLoad
 
 
 class Torque(Given, Force):
-    """Turn a body.
+    """Turn a rigid body.
 
     Parameters
     ----------
-    a : Body
-        A rigid body.
     torque : array_like (3,), ts.Table, or function of t or of (t, state); N m
         A function returns a tuple of three; state (13,) is the position of the centroid (m), Euler parameters, velocity
         (m/s) and angular velocity (rad/s), ground frame.
-    frame : {"ground", "body"}
-        The axes in which the torque is given.
-    name : str, optional
-
-    Raises
-    ------
-    InvalidForce
-        If the torque is not three finite numbers or such a function, is zero, or the frame is unknown.
-    InvalidBody
-        If a is a point mass.
 
     Notes
     -----
-    Its power is applied power. Whether it is a function of state is settled when it is made; a new function of the same
-    sort may be set.
+    Its power is applied power. A new function of the same sort may be set, as of PointForce.
 
     Examples
     --------
@@ -68,19 +44,10 @@ class Torque(Given, Force):
     loads = ("torque",)
     given = "torque"
 
-    def __new__(cls, *others, torque=None, frame="ground", **more):
-        """Choose the kernel by frame and by the sort of the torque."""
-        if cls is Torque and arguments_of(torque) == 2:
-            cls = _StateTorque
-        elif cls is Torque and isinstance(frame, str) and frame == "body":
-            cls = _BodyTorque
-        return super().__new__(cls)
-
     def __init__(
         self, a: Body | str, *, torque: VectorLoad | None = None, frame: Frame = "ground", name: str = ""
     ) -> None:
-        places = [(0.0, 0.0, 0.0) if marker.code == Point.code else None for marker in self.markers]
-        super().__init__(a, None, places, name)
+        super().__init__(a, None, name=name)
         self.take(torque, frame, "(Nx, Ny, Nz) in N m")
 
     @classmethod

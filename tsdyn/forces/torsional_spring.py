@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..plugins import (
+    PARALLEL,
     Angle,
     Force,
     InvalidForce,
@@ -44,8 +45,6 @@ from ..plugins import (
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Floats, Load
 
-PARALLEL = 1e-6  # sine of the angle below which a reference has no direction about the axis
-
 
 class TorsionalSpring(Force):
     """Turn b about an axis of a by actuator - stiffness (angle - free_angle) - damping times its rate, and a back.
@@ -67,7 +66,6 @@ class TorsionalSpring(Force):
         The angle at the start lies in (-pi, pi].
     actuator : float, function of time, or ts.Table, N m
         Torque about the axis on b, the opposite on a; its power is applied power.
-    name : str, optional
 
     Raises
     ------
@@ -98,45 +96,34 @@ class TorsionalSpring(Force):
         {"stiffness": not_negative, "damping": not_negative, "free_angle": finite, "actuator": load}
     )
     loads = ("actuator",)
+    sources = ("stiffness", "damping", "actuator")
 
     def __init__(
         self,
         a: BodyLike,
         b: BodyLike,
         *,
-        axis_a: ArrayLike | None = None,
         axis_b: ArrayLike | None = None,
-        reference_a: ArrayLike | None = None,
-        reference_b: ArrayLike | None = None,
         stiffness: float = 0.0,
         damping: float = 0.0,
         free_angle: float = 0.0,
         actuator: Load = 0.0,
-        name: str = "",
+        **places: Any,
     ) -> None:
         self.__dict__["_given"] = axis_b
-        super().__init__(a, b, (axis_a, reference_a, reference_b, None, None), name)
+        super().__init__(a, b, **places)
         self.reference_a = self.coordinates[1]
         self.stiffness, self.damping, self.free_angle, self.actuator = stiffness, damping, free_angle, actuator
         axis, _, reference = (self._turned(i) for i in range(3))
         if np.linalg.norm(np.cross(axis, reference)) < PARALLEL:
-            raise InvalidForce(
+            raise self.error(
                 f"{self.name}: reference_b is parallel to the axis at the start; choose one across it, such as the one "
                 "that coincides with reference_a at the angle zero."
             )
         self.check()
 
     @Placing
-    def at(
-        cls,
-        a: BodyLike,
-        b: BodyLike | None = None,
-        *,
-        axis: ArrayLike | None = None,
-        reference: ArrayLike | None = None,
-        axis_b: ArrayLike | None = None,
-        **arguments: Any,
-    ) -> Self:
+    def at(cls, a: BodyLike, b: BodyLike | None = None, **arguments: Any) -> Self:
         """Make one from directions in the ground frame, the bodies being where they stand now.
 
         Parameters
@@ -145,11 +132,8 @@ class TorsionalSpring(Force):
         reference : array_like (3,), optional
             Of both bodies: the angle is zero now.
         """
-        arguments.setdefault("axis_a", axis)
-        for name in ("reference_a", "reference_b"):
-            arguments.setdefault(name, reference)
-        if axis_b is not None:
-            arguments["axis_b"] = in_frame(b, Vector("b"), axis_b)
+        if arguments.get("axis_b") is not None:
+            arguments["axis_b"] = in_frame(b, Vector("b"), arguments["axis_b"])
         return super().at(a, b, **arguments)
 
     def _places(self, given):
@@ -161,7 +145,7 @@ class TorsionalSpring(Force):
             if axis_a is None:
                 axis_a = along
             elif not np.linalg.norm(np.cross(self._place(self.markers[0], axis_a), along)) < PARALLEL:
-                raise InvalidForce(f"{self.name}: axis_b is not along axis_a as the bodies stand; give one of them.")
+                raise self.error(f"{self.name}: axis_b is not along axis_a as the bodies stand; give one of them.")
         axis_a = self._place(self.markers[0], axis_a)
         if reference_a is None:
             free = reference_b is None
@@ -198,12 +182,8 @@ class TorsionalSpring(Force):
         value = vector3(value, f"{self.name}: reference_a", InvalidForce)
         across = value - axis * (axis @ value)
         if not np.linalg.norm(across) > PARALLEL * np.linalg.norm(value):
-            raise InvalidForce(f"{self.name}: reference_a is parallel to axis_a; choose a direction across the axis.")
+            raise self.error(f"{self.name}: reference_a is parallel to axis_a; choose a direction across the axis.")
         return across
-
-    def check(self):
-        """It must do something."""
-        self.demand_any("stiffness", "damping", "actuator")
 
     def parameters(self):
         """(k, c, free angle, actuator), and the angle remembered."""

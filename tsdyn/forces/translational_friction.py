@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.translational import Translational
-from ..plugins import AXIS, Force, JointFriction, act, along_and_across, coefficient, optional_length, slip
+from ..plugins import AXIS, Force, JointFriction, act, along_and_across, coefficient, optional, positive, slip
 
 
 class TranslationalFriction(JointFriction, Force):
@@ -28,22 +28,11 @@ class TranslationalFriction(JointFriction, Force):
     ----------
     joint : Translational
         Added to its scene.
-    kinetic : float
-        Coefficient of friction while sliding.
-    **given
-        static, slip_velocity, stribeck_velocity (m/s), preload (N), name: see `ts.JointFriction`.
     length : float, m, optional
         Of the part that is guided, the body that `joint.on` is, about the joint's point on it: it carries torques that
         tilt the slide as a pair of forces. None: they cause no friction.
     width : float, m, optional
         Arm at which the guide carries a torque about the axis; None: that causes no friction.
-
-    Raises
-    ------
-    InvalidForce
-        If joint is no Translational of the scene, or a number is negative, not finite or impossible.
-    RedundantConstraints
-        When a run begins, if the reaction that it needs isn't unique.
 
     Examples
     --------
@@ -58,7 +47,9 @@ class TranslationalFriction(JointFriction, Force):
 
     joints = (Translational,)
     markers = AXIS
-    quantities = MappingProxyType({**JointFriction.quantities, "length": optional_length, "width": optional_length})
+    quantities = MappingProxyType(
+        {**JointFriction.quantities, "length": optional(positive), "width": optional(positive)}
+    )
 
     def __init__(
         self,

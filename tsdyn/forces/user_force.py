@@ -11,23 +11,11 @@ from __future__ import annotations
 
 import math
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    ByState,
-    Force,
-    InvalidForce,
-    Parameters,
-    Point,
-    Turn,
-    arguments_of,
-    fill_state,
-    floats,
-    specialised,
-    stack,
-)
+from ..plugins import ByState, Force, Parameters, Point, Turn, arguments_of, fill_state, floats, stack
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,6 +31,27 @@ def _numbers(value, what, error):
     return result
 
 
+function = None  # filled in by `ByState`
+
+
+def _law(x, xd, par, t, out):
+    a, b, load = stack(13), stack(13), stack(6)
+    fill_state(x, xd, 0, a)
+    fill_state(x, xd, 10, b)
+    for i in range(6):
+        load[i] = 0.0
+    try:
+        function(t, a, b, par, load)
+    except Exception:
+        load[0] = math.nan
+    d0, d1, d2 = x[0] - x[10], x[1] - x[11], x[2] - x[12]
+    for i in range(3):
+        out[i], out[7 + i], out[10 + i] = load[i], load[3 + i], -load[i]
+    out[17] = -load[3] - (d1 * load[2] - d2 * load[1])
+    out[18] = -load[4] - (d2 * load[0] - d0 * load[2])
+    out[19] = -load[5] - (d0 * load[1] - d1 * load[0])
+
+
 class UserForce(ByState, Force):
     """A force and torque on a, and the opposite on b, by a function of time and of both states.
 
@@ -56,11 +65,8 @@ class UserForce(ByState, Force):
         parameters, velocity of the point (m/s), angular velocity (rad/s), all in the ground frame; those of the ground
         are point_b, (1, 0, 0, 0) and zeros. It writes out (6,): force on a at point_a (N), torque on a (N m), ground
         frame. It may compare and allocate; what it raises ends the run. A NaN does, too.
-    point_a, point_b : array_like (3,), m
-        Body frame.
     parameters : array_like, optional
         Numbers that the function gets as par; to be changed as `force.values`.
-    name : str, optional
 
     Raises
     ------
@@ -94,6 +100,7 @@ class UserForce(ByState, Force):
     particles = True
     loads = ("function",)
     given = "function"
+    template = staticmethod(_law)
     quantities = MappingProxyType({"values": _numbers})
 
     def __init__(
@@ -102,14 +109,12 @@ class UserForce(ByState, Force):
         b: BodyLike | None = None,
         *,
         function: Callable[..., object],
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        point_b: ArrayLike = (0.0, 0.0, 0.0),
         parameters: ArrayLike = (),
-        name: str = "",
+        **places: Any,
     ) -> None:
         if b is None:
             b = getattr(getattr(a, "scene", None), "ground", None)
-        super().__init__(a, b, (point_a, None, None, point_b, None, None), name)
+        super().__init__(a, b, **places)
         self.values = parameters
         self.function = function
         self.check()
@@ -117,7 +122,7 @@ class UserForce(ByState, Force):
     def check(self):
         """A plain function of five arguments."""
         if arguments_of(self.function) != 5:
-            raise InvalidForce(
+            raise self.error(
                 f"{self.name}: function must be a plain Python function of five arguments (t, a, b, par, out), got "
                 f"{self.function!r}."
             )
@@ -126,42 +131,10 @@ class UserForce(ByState, Force):
         """The numbers given."""
         return tuple(self.values)
 
-    @staticmethod
-    def wrap(inner, owner):
-        """The kernel of a user's function."""
-        return specialised(_law, f"{owner.__qualname__}.law", owner, function=inner)
-
-    @staticmethod
-    def law(x, xd, par, t, out):
-        """Eq. (1), of no function: the base that instances replace."""
-        for i in range(20):
-            out[i] = math.nan
-
     @classmethod
     def example(cls, rng, a, b):
         """A drag that depends on everything."""
         return cls(a, b, function=_example, point_a=rng.normal(size=3), point_b=rng.normal(size=3), parameters=(0.7,))
-
-
-function = None  # filled in by `wrap`
-
-
-def _law(x, xd, par, t, out):
-    a, b, load = stack(13), stack(13), stack(6)
-    fill_state(x, xd, 0, a)
-    fill_state(x, xd, 10, b)
-    for i in range(6):
-        load[i] = 0.0
-    try:
-        function(t, a, b, par, load)
-    except Exception:
-        load[0] = math.nan
-    d0, d1, d2 = x[0] - x[10], x[1] - x[11], x[2] - x[12]
-    for i in range(3):
-        out[i], out[7 + i], out[10 + i] = load[i], load[3 + i], -load[i]
-    out[17] = -load[3] - (d1 * load[2] - d2 * load[1])
-    out[18] = -load[4] - (d2 * load[0] - d0 * load[2])
-    out[19] = -load[5] - (d0 * load[1] - d1 * load[0])
 
 
 def _example(t, a, b, par, out):

@@ -10,31 +10,21 @@ dissipation = c v.v + c_t w.w                                     (3)
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ..plugins import Force, Point, Turn, act, cross, demand_bodies, not_negative, slip
+from ..plugins import BodyFriction, Force, act, cross, not_negative, slip
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike
+    from ..hints import BodyLike
 
 
-class ViscousFriction(Force):
+class ViscousFriction(BodyFriction, Force):
     """Resist the motion of a relative to b in proportion to its velocity.
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene. b is the ground or a rigid body, a may be a point mass.
-    point_a : array_like (3,), m
-        Where the force acts, body frame of a.
     damping : float, N s/m
     torsional_damping : float, N m s/rad
-    name : str, optional
-
-    Raises
-    ------
-    InvalidForce
-        If a number is negative or not finite, or both are zero, or a torque would act on a point mass.
 
     Examples
     --------
@@ -47,33 +37,14 @@ class ViscousFriction(Force):
     0.135335 m/s, 4.0000 W at the start
     """
 
-    markers = (Point("a"), Turn("a"), Point("b"), Turn("b"))
-    particles = True
+    sources = ("damping", "torsional_damping")
     slots = 9
-    quantities = MappingProxyType({"damping": not_negative, "torsional_damping": not_negative})
+    quantities = MappingProxyType(dict.fromkeys(sources, not_negative))
 
     def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        point_a: ArrayLike = (0.0, 0.0, 0.0),
-        damping: float = 0.0,
-        torsional_damping: float = 0.0,
-        name: str = "",
+        self, a: BodyLike, b: BodyLike, *, damping: float = 0.0, torsional_damping: float = 0.0, **given: Any
     ) -> None:
-        super().__init__(a, b, (point_a, None, (0.0, 0.0, 0.0), None), name)
-        self.damping, self.torsional_damping = damping, torsional_damping
-        self.check()
-
-    def check(self):
-        """It must do something, and to bodies that can take it."""
-        self.demand_any("damping", "torsional_damping")
-        demand_bodies(self, self.torsional_damping, "torsional_damping")
-
-    def parameters(self):
-        """(c, c_t)."""
-        return self.damping, self.torsional_damping
+        super().__init__(a, b, damping=damping, torsional_damping=torsional_damping, **given)
 
     @staticmethod
     def law(x, xd, par, t, out):

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 from ..calls import fitting
+from ..docstrings import complete_docstring
 from ..validation import positive
 from .diagonally_implicit import implicit_step, memory_of
 from .explicit import embedded_error, nystrom_step, runge_kutta_step, second_embedded_error, second_order_step
@@ -26,6 +27,18 @@ class Integrator:
 
     A method gives, for a second-order system vdd = f(t, v, vd) and for a first-order one (the Maggi/Kane form), a step
     kernel (see explicit.py) and the numbers that the kernel reads.
+
+    Parameters
+    ----------
+    step : float, s, optional
+        A fixed step, instead of tolerances.
+    max_step, first_step : float, s, optional
+        Upper bound on the steps, and the first step to try.
+
+    Raises
+    ------
+    InvalidArgument
+        If a tolerance or a step is not positive and finite.
 
     Attributes
     ----------
@@ -62,6 +75,7 @@ class Integrator:
         super().__init_subclass__(**keywords)
         if "__init__" in vars(cls):
             cls.__init__ = fitting(cls.__init__)
+        complete_docstring(cls)
         if cls.order:
             _registry[cls.__name__.lower().replace("_", "")] = cls
 
@@ -118,6 +132,12 @@ class ExplicitNystrom(Integrator):
 
 class Adaptive(Integrator):
     """A method that chooses its steps by an error estimate, unless it is given a fixed one.
+
+    Parameters
+    ----------
+    rtol, atol : float; default 1e-6, 1e-8
+        The error of each step is kept below (atol + rtol |value|) / `margin`, in the root mean square over coordinates
+        and velocities, so that the error accumulated over a run is of the size of the tolerances.
 
     Examples
     --------

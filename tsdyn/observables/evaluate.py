@@ -74,12 +74,11 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
     Examples
     --------
     >>> import tsdyn as ts
-    >>> scene = ts.Scene()
-    >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
-    >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
+    >>> ball = (scene := ts.Scene()).add_point_mass(mass=2.0, position=(1, 0, 0))
+    >>> table = scene.add(ts.constraints.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1)))
     >>> at_start = scene.evaluate()
-    >>> print(at_start.Phi_q, at_start.qdd + 0.0)
-    [[1. 0. 0.]] [ 0.    0.   -9.81]
+    >>> print(at_start.Phi_q, at_start.M.diagonal(), at_start.multipliers)
+    [[0. 0. 1.]] [2. 2. 2.] [-19.62]
     """
     system = scene.system
     start = scene.start

@@ -2,15 +2,14 @@
 
 import numpy as np
 
-from ..elements.loops.body_poses import place_bodies, take_loads
+from ..elements.loops.body_poses import take_loads
 from ..formulations.friction_solve import find_reactions
 from ..jit.kernels import entry, resident
-from ..model.equations import set_time
-from ..rows.evaluation import factorise_rows, run_loops
 from ..rows.schur_complement import weigh
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
+from .factorised_rows import factorise_at
 from .generalised_forces import applied_loads, inertial_forces, velocity_forces
 
 
@@ -22,14 +21,10 @@ def _solve(context, t, q, qd, r, out):
     """
     c = load_parts(context)
     network, s, f = c.network, c.system, c.free
-    bodies = network.bodies
     for k in range(t.size):
-        set_time(s, t[k])
-        place_bodies(bodies, q[k], f.poses)
-        run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
-        found = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, 0)
-        take_loads(bodies, q[k], r[k], f.Z)
-        for b in range(bodies.shape[0]):
+        found = factorise_at(network, s, f, t[k], q[k])
+        take_loads(network.bodies, q[k], r[k], f.Z)
+        for b in range(network.bodies.shape[0]):
             weigh(network.inverse, b, f.Z, 8 * b, f.Z, 8 * b)
         for e in range(f.gamma.size):
             f.gamma[e] = 0.0

@@ -6,20 +6,20 @@ from collections import Counter
 import numpy as np
 
 from ..elements.bodies import rotation_matrix, transform_g
-from ..elements.loops.body_poses import place_bodies, take_loads
+from ..elements.loops.body_poses import take_loads
 from ..elements.loops.coordinate_rows import INTS
 from ..elements.markers import POINT
 from ..jit.kernels import entry, resident
 from ..maths.dense_linalg import copy
 from ..model.equations import constraint_jacobian, set_time
-from ..model.packed import COUNT, FIRST_INT, FIRST_REAL, REALS, classes, index_of
+from ..model.packed import classes, index_of
 from ..model.sparse_jacobian import WIDTH, with_short_rows
-from ..rows.evaluation import factorise_rows, run_loops
 from ..rows.schur_complement import gather, scatter
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..sparse.factorisation import solve
 from ..workspaces.workspace import load_parts, parts
+from .factorised_rows import factorise_at
 from .friction_reactions import with_normal_loads
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
 
@@ -35,10 +35,7 @@ def solve_multipliers(context, t, q, r, rows, out):
     network, s, f = whole.network, whole.system, whole.free
     bodies = network.bodies
     for k in range(t.size):
-        set_time(s, t[k])
-        place_bodies(bodies, q[k], f.poses)
-        run_loops(network, s.reals, REDUCED, f, t[k], f.b, f.H)
-        regular = factorise_rows(network, s.reals, f, t[k], f.b, f.H, f.Y, f.S, 0)
+        regular = factorise_at(network, s, f, t[k], q[k])
         constraint_jacobian(s, q[k], t[k], rows)
         copy(r[k], f.Q)
         take_loads(bodies, q[k], r[k], f.Z)
@@ -123,11 +120,11 @@ def only(packed, parts):
             seen[type(constraint)] += 1
         packed.derived.places_within = within
     rows = dict(zip(classes(packed), with_short_rows(packed).kinds, strict=True))
-    kinds = np.array([rows[type(part)] for part in packed.constraints[parts]])
+    kinds = np.array([rows[type(part)] for part in packed.constraints[parts]], packed.system.kinds.dtype)
     within = np.array(packed.derived.places_within[parts])
-    kinds[:, FIRST_INT] += INTS * within
-    kinds[:, FIRST_REAL] += kinds[:, REALS] * within
-    kinds[:, COUNT] = 1
+    kinds["table"] += INTS * within
+    kinds["reals"] += kinds["stride"] * within
+    kinds["count"] = 1
     return kinds
 
 
@@ -140,7 +137,7 @@ def loads_of(packed):
 
 def force_reaction(solution, load, body):
     """Force and torque (k, 3) that a force exerts on a body, torque about its first point on it, ground frame."""
-    force, system = load.force, solution.system._replace(forces=load.row[None])
+    force, system = load.force, solution.system._replace(forces=load.alone)
     Q = force_loads(system, solution.t, solution.q, solution.qd, solution._memory)
     at, length = solution.system.bodies[index_of(solution.packed, body)]
     return _at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)

@@ -37,6 +37,8 @@ class State(Kinematics["float | Any"], _Arrays):
 
     Examples
     --------
+    A run that stops half-way, and another one that goes on:
+
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))
     >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")

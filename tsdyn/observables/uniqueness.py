@@ -9,16 +9,15 @@ import math
 
 import numpy as np
 
-from ..elements.loops.body_poses import place_bodies
 from ..jit.kernels import entry, kernel, long_kernel, resident
-from ..model.equations import set_time
 from ..model.packed import index_of
-from ..rows.evaluation import factorise_rows, run_loops
+from ..rows.evaluation import run_loops
 from ..rows.schur_complement import gather, weigh
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..sparse.factorisation import solve
 from ..workspaces.workspace import load_parts, parts
+from .factorised_rows import factorise_at
 
 NEXT_TO_NOTHING = 1e-7  # of the rows' own size
 
@@ -45,10 +44,7 @@ def find_stress(network, f, whole, dropped):
 @long_kernel
 def find_rows(network, s, f, q, t, whole):
     """H at q without dropped rows and, in `whole`, with them, and the factors of S; False if S is singular."""
-    set_time(s, t)
-    place_bodies(network.bodies, q, f.poses)
-    run_loops(network, s.reals, REDUCED, f, t, f.b, f.H)
-    regular = factorise_rows(network, s.reals, f, t, f.b, f.H, f.Y, f.S, 0)
+    regular = factorise_at(network, s, f, t, q)
     count = f.dropped[0]
     f.dropped[0] = 0
     run_loops(network, s.reals, REDUCED, f, t, f.b, whole)

@@ -1,37 +1,16 @@
 """The figure of `profile`: one bar a phase, one colour a group."""
 
 from ..benchmarking.figure import COLOURS
-from ..drawing import GREY, demand_matplotlib
+from ..drawing import GREY, new_figure
 from .units import duration
 
 
 def figure(profile):
-    """Draw a profile.
-
-    Parameters
-    ----------
-    profile : Profile
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    MissingDependency
-        If matplotlib is not installed.
-    """
-    demand_matplotlib()
-    from matplotlib import style
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+    """Draw a profile."""
     groups = list(profile.groups())
     colours = {group: COLOURS[i % len(COLOURS)] for i, group in enumerate(groups)}
     phases = profile.phases
-    with style.context("default"):
-        drawn = Figure(figsize=(8.0, 1.4 + 0.28 * len(phases)), dpi=200, layout="constrained")
-        FigureCanvasAgg(drawn)
+    with new_figure(8.0, 1.4 + 0.28 * len(phases)) as drawn:
         ax = drawn.subplots()
         shares = [100.0 * phase.seconds / profile.seconds for phase in phases]
         ax.barh(range(len(phases)), shares, color=[colours[phase.group] for phase in phases], height=0.7)

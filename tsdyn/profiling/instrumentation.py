@@ -5,72 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements import primitive
-from ..elements.loops import constraint_rows, force_series
+from ..elements.loops import constraint_rows, coordinate_rows, force_series
 from ..elements.loops import forces as force_loops
 from ..formulations.locked_orientations import instances
-from ..model.packed import COUNT, FIRST_INT
-from ..model.packed_forces import F_COUNT, F_FIRST_INT, F_REMEMBER, FORCE, members_of
+from ..model.packed_forces import members_of
 from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT
-from .timers import (
-    ACCELERATE,
-    BODY_TIMERS,
-    CHART,
-    CHECK,
-    COMPLETE,
-    DRIVER,
-    EXPAND,
-    FACTORISE,
-    FIRST_KIND,
-    FIRST_ORDER,
-    HEADER,
-    IN_ORDERS,
-    LINEARISE,
-    LOOP_TIMERS,
-    LOOPS,
-    NORM,
-    PLACE,
-    REACH,
-    REDUCE,
-    ROLES,
-    ROWS,
-    SERIES_TIMER,
-    SLOTS,
-    SOFTEN,
-    SOLVE,
-    STEP,
-    T_LOOPS,
-    T_NOTES,
-    T_SLOT,
-    TARGETS,
-    TIMERS,
-    new_notes,
-    start,
-    stop,
-)
+from . import timers
 
-# roles of the kernels whose addresses drivers are given, by their names in `Kernels` and `StageKernels`
-OF_DRIVERS = {
-    "place": PLACE,
-    "accelerate": ACCELERATE,
-    "complete": COMPLETE,
-    "check": CHECK,
-    "start_chart": CHART,
-    "step": STEP,
-    "error_norm": NORM,
-    "expand": EXPAND,
-    "reach": REACH,
-}
-OF_STAGES = {
-    "linearise": LINEARISE,
-    "reduce": REDUCE,
-    "factorise": FACTORISE,
-    "solve": SOLVE,
-    "soften": SOFTEN,
-    "complete": COMPLETE,
-    "error_norm": NORM,
-}
 X_ADDRESS, X_COUNT, X_FIRST_INT = 0, 2, 4  # columns of Expansion.forces
+OF_KIND = "phi", "jacobian", "gamma", "phi_t"  # the loops of System.kinds and of System.forces that are timed
+OF_FORCE = "force", "remember"
 
 
 class Entry(NamedTuple):
@@ -132,11 +76,11 @@ class Timekeeper(Stopwatch):
 
     def begin(self):
         """Before an advance."""
-        start(self.notes)
+        timers.start(self.notes)
 
     def end(self):
         """After it."""
-        stop(self.notes)
+        timers.stop(self.notes)
 
     def observe(self, memory):
         """Put timers in."""
@@ -146,38 +90,43 @@ class Timekeeper(Stopwatch):
         forces = [members_of(row, memory.packed.loads) for row in system.forces]
         classes = list(dict.fromkeys(map(type, memory.packed.constraints)))
         joints = [kind for kind, _ in instances(memory.packed, network)]
-        self.notes = new_notes(len(joints) + len(classes) + 2 * len(forces))
+        self.notes = timers.new_notes(len(joints) + len(classes) + 2 * len(forces))
         places = c.expansion.places[:, :1] if series else np.zeros((len(joints), 1), np.int64)
 
         rows = [
-            (row[N_FIRST_INT], row[N_COUNT] * constraint_rows.INTS, [*row[:IN_ORDERS], *place], _of_constraints(kind))
+            (
+                row[N_FIRST_INT],
+                row[N_COUNT] * constraint_rows.INTS,
+                [*row[: timers.IN_ORDERS], *place],
+                _of_constraints(kind),
+            )
             for kind, row, place in zip(joints, network.kinds, places, strict=True)
         ]
         table, firsts = self._headed(network.table, rows)
         kinds = network.kinds.copy()
         kinds[:, N_FIRST_INT] = firsts
-        _instead(kinds, range(IN_ORDERS), BODY_TIMERS)
+        _instead(kinds.T, range(timers.IN_ORDERS), timers.BODY_TIMERS)
         network = network._replace(table=table, kinds=kinds)
 
         rows = [
-            (row[FIRST_INT], row[COUNT] * primitive.INTS, row[:IN_ORDERS], _of_constraints(kind))
+            (row.table, row.count * coordinate_rows.INTS, [row[name] for name in OF_KIND], _of_constraints(kind))
             for kind, row in zip(classes, system.kinds, strict=True)
         ]
         rows += [
-            (row[F_FIRST_INT], row[F_COUNT] * force_loops.INTS, row[[FORCE, F_REMEMBER]], _of_forces(members))
+            (row.table, row.count * force_loops.INTS, [row[name] for name in OF_FORCE], _of_forces(members))
             for members, row in zip(forces, system.forces, strict=True)
         ]
         table, firsts = self._headed(system.table, rows)
         kinds, loads = system.kinds.copy(), system.forces.copy()
-        kinds[:, FIRST_INT], loads[:, F_FIRST_INT] = firsts[: len(kinds)], firsts[len(kinds) :]
-        _instead(kinds, range(IN_ORDERS), LOOP_TIMERS)
-        _instead(loads, (FORCE, F_REMEMBER), LOOP_TIMERS)
+        kinds["table"], loads["table"] = firsts[: len(kinds)], firsts[len(kinds) :]
+        _instead(kinds, OF_KIND, timers.LOOP_TIMERS)
+        _instead(loads, OF_FORCE, timers.LOOP_TIMERS)
         c = c._replace(network=network, system=system._replace(table=table, kinds=kinds, forces=loads))
         if series:
             c = c._replace(expansion=self._in_series(c.expansion, forces))
         elif memory.implicit:
-            self._in_driver(c.linear.kernels, OF_STAGES)
-        self._in_driver(memory.run.kernels, OF_DRIVERS)
+            self._in_driver(c.linear.kernels, timers.OF_STAGES)
+        self._in_driver(memory.run.kernels, timers.OF_DRIVERS)
         memory.settle(c, (self.notes.ctypes.data,))
 
     def _in_series(self, x, forces):
@@ -185,7 +134,7 @@ class Timekeeper(Stopwatch):
             (
                 row[X_FIRST_INT],
                 row[X_COUNT] * force_series.INTS,
-                [0] * IN_ORDERS + [row[X_ADDRESS]],
+                [0] * timers.IN_ORDERS + [row[X_ADDRESS]],
                 _of_forces(members),
             )
             for members, row in zip(forces, x.forces, strict=True)
@@ -193,8 +142,8 @@ class Timekeeper(Stopwatch):
         table, firsts = self._headed(x.table, rows)
         places, loads = x.places.copy(), x.forces.copy()
         loads[:, X_FIRST_INT] = firsts
-        _instead(places, [0], [SERIES_TIMER])
-        _instead(loads, [X_ADDRESS], [SERIES_TIMER])
+        _instead(places.T, [0], [timers.SERIES_TIMER])
+        _instead(loads.T, [X_ADDRESS], [timers.SERIES_TIMER])
         return x._replace(places=places, table=table, forces=loads)
 
     def _in_driver(self, kernels, roles):
@@ -202,33 +151,36 @@ class Timekeeper(Stopwatch):
         for name, role in roles.items():
             address = getattr(kernels, name)
             if address:
-                self.notes[TARGETS + role] = address
-                setattr(kernels, name, TIMERS[role].address)
+                self.notes[timers.TARGETS + role] = address
+                setattr(kernels, name, timers.TIMERS[role].address)
 
     def _headed(self, table, rows):
         """A table with a header before each kind's rows, which are given by place, length and loops; their places."""
         parts, firsts, at = [np.zeros(0, np.int64)], [], 0
         for first, length, loops, kind in rows:
-            header = np.zeros(HEADER, np.int64)
-            header[T_NOTES], header[T_SLOT] = self.notes.ctypes.data, FIRST_KIND + len(self.kinds) * LOOPS * ROLES
-            header[T_LOOPS : T_LOOPS + len(loops)] = loops
+            header = np.zeros(timers.HEADER, np.int64)
+            header[timers.T_NOTES], header[timers.T_SLOT] = (
+                self.notes.ctypes.data,
+                timers.FIRST_KIND + len(self.kinds) * timers.LOOPS * timers.ROLES,
+            )
+            header[timers.T_LOOPS : timers.T_LOOPS + len(loops)] = loops
             self.kinds.append(kind)
             parts += [header, table[first : first + length]]
-            firsts.append(at + HEADER)
-            at += HEADER + int(length)
+            firsts.append(at + timers.HEADER)
+            at += timers.HEADER + int(length)
         return np.concatenate(parts), np.array(firsts, np.int64)
 
     def entries(self, cost):
         """What has run, a list of `Entry`, the driver first, freed of what a timer costs (`timers.own_cost`)."""
         half = 0.5 * cost
-        slots = self.notes[SLOTS:].reshape(-1, 2)
+        slots = self.notes[timers.SLOTS :].reshape(-1, 2)
         unit, found = self.seconds / slots[:, 1].sum(), []
         for i in np.flatnonzero(slots[:, 0]).tolist():
             calls = int(slots[i, 0])
             found.append(Entry(*_what(i), calls, slots[i, 1] * unit - calls * half))
-        within = np.bincount([e.within for e in found], [e.calls for e in found], ROLES)
-        calls = np.bincount([e.role for e in found], [e.calls for e in found], ROLES)
-        driver = Entry(DRIVER, DRIVER, -1, -1, -1, 1, slots[0, 1] * unit - within[DRIVER] * half)
+        within = np.bincount([e.within for e in found], [e.calls for e in found], timers.ROLES)
+        calls = np.bincount([e.role for e in found], [e.calls for e in found], timers.ROLES)
+        driver = Entry(timers.DRIVER, timers.DRIVER, -1, -1, -1, 1, slots[0, 1] * unit - within[timers.DRIVER] * half)
         return [driver] + [
             e._replace(seconds=e.seconds - within[e.role] * half * e.calls / calls[e.role]) for e in found
         ]
@@ -236,21 +188,21 @@ class Timekeeper(Stopwatch):
 
 def _what(slot):
     """Role, role it runs in, order, kind and loop of a slot."""
-    if slot < FIRST_ORDER:
-        return *divmod(slot, ROLES), -1, -1, -1
-    if slot < FIRST_KIND:
-        return EXPAND, DRIVER, slot - FIRST_ORDER, -1, -1
-    kind, rest = divmod(slot - FIRST_KIND, LOOPS * ROLES)
-    loop, within = divmod(rest, ROLES)
-    return ROWS, within, -1, kind, loop
+    if slot < timers.FIRST_ORDER:
+        return *divmod(slot, timers.ROLES), -1, -1, -1
+    if slot < timers.FIRST_KIND:
+        return timers.EXPAND, timers.DRIVER, slot - timers.FIRST_ORDER, -1, -1
+    kind, rest = divmod(slot - timers.FIRST_KIND, timers.LOOPS * timers.ROLES)
+    loop, within = divmod(rest, timers.ROLES)
+    return timers.ROWS, within, -1, kind, loop
 
 
-def _instead(rows, columns, timers):
-    """Timers in place of those loops that there are in columns."""
-    for column, timer in zip(columns, timers, strict=False):
-        there = rows[:, column] != 0
+def _instead(columns, names, timers):
+    """Timers in place of those loops that there are in the columns of these names."""
+    for name, timer in zip(names, timers, strict=False):
+        there = columns[name] != 0
         if there.any():
-            rows[there, column] = timer.address
+            columns[name][there] = timer.address
 
 
 def _of_constraints(kind):

@@ -4,24 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .timers import (
-    ACCELERATE,
-    CHART,
-    CHECK,
-    COMPLETE,
-    DRIVER,
-    EXPAND,
-    FACTORISE,
-    LINEARISE,
-    NORM,
-    PLACE,
-    REACH,
-    REDUCE,
-    ROWS,
-    SOFTEN,
-    SOLVE,
-    STEP,
-)
+from . import timers as role
 
 
 class Phase(NamedTuple):
@@ -53,7 +36,7 @@ class _Times:
         """The phases of constraints and of forces that have run within roles."""
         constraints, forces = [], {}
         for e in self.entries:
-            if e.role == ROWS and e.within in within:
+            if e.role == role.ROWS and e.within in within:
                 kind = self.kinds[e.kind]
                 (forces.setdefault(kind.label, []) if kind.force else constraints).append(e)
         found = [("constraint rows", constraints), *((f"force: {label}", some) for label, some in forces.items())]
@@ -63,15 +46,15 @@ class _Times:
 
     def orders(self):
         """Seconds of each order of series, its loops over constraints and forces with the share that all have."""
-        own = {e.order: (e.calls, e.seconds) for e in self.entries if e.role == EXPAND}
+        own = {e.order: (e.calls, e.seconds) for e in self.entries if e.role == role.EXPAND}
         return [own[order] for order in sorted(own)]
 
 
 def of_steps(entries, kinds, prices, stats):
     """The phases of a method that goes step by step."""
     t = _Times(entries, kinds)
-    (placed, place), (evaluated, accelerate) = t.of(PLACE), t.of(ACCELERATE)
-    _, complete = t.of(COMPLETE)
+    (placed, place), (evaluated, accelerate) = t.of(role.PLACE), t.of(role.ACCELERATE)
+    _, complete = t.of(role.COMPLETE)
     of_place, of_evaluation = _Purse(place), _Purse(accelerate + complete)
     free = "system" in prices
     n_velocity, velocity = evaluated, of_evaluation.take(evaluated, prices["velocities"])
@@ -85,24 +68,29 @@ def of_steps(entries, kinds, prices, stats):
     elif not free:
         factored = [Phase("accelerations", "D^T M D and its factors", placed, of_place.take(placed, prices["mass"]))]
     found = [
-        *t.rows("positions", PLACE),
+        *t.rows("positions", role.PLACE),
         *factored,
         Phase("positions", "corrections" if free else "corrections, B and D", placed, of_place.left),
         Phase("velocities", "freed of what leaves the constraints" if free else "qd = D vd", n_velocity, velocity),
-        *t.rows("accelerations", ACCELERATE),
+        *t.rows("accelerations", role.ACCELERATE),
         Phase("accelerations", "bodies and solves", evaluated, of_evaluation.left),
-        *t.rows("charts", CHART, CHECK),
-        Phase("charts", "made", *t.of(CHART)),
-        Phase("charts", "looked at", *t.of(CHECK)),
-        *t.rows("stage equations", LINEARISE, REDUCE),
-        Phase("stage equations", "Jacobians", *t.of(LINEARISE)),
-        Phase("stage equations", "iteration matrices", t.of(FACTORISE)[0], t.of(REDUCE, FACTORISE)[1]),
-        Phase("stage equations", "solves", *t.of(SOLVE)),
-        Phase("stage equations", "norms of corrections", *t.of(NORM, within=STEP)),
-        Phase("steps", "sums over stages", *t.of(STEP)),
-        *t.rows("steps", DRIVER),
-        Phase("steps", "error norms", t.of(NORM, within=DRIVER)[0], t.of(NORM, SOFTEN, within=DRIVER)[1]),
-        Phase("steps", "control and records", stats.steps + stats.rejected, t.of(DRIVER)[1]),
+        *t.rows("charts", role.CHART, role.CHECK),
+        Phase("charts", "made", *t.of(role.CHART)),
+        Phase("charts", "looked at", *t.of(role.CHECK)),
+        *t.rows("stage equations", role.LINEARISE, role.REDUCE),
+        Phase("stage equations", "Jacobians", *t.of(role.LINEARISE)),
+        Phase("stage equations", "iteration matrices", t.of(role.FACTORISE)[0], t.of(role.REDUCE, role.FACTORISE)[1]),
+        Phase("stage equations", "solves", *t.of(role.SOLVE)),
+        Phase("stage equations", "norms of corrections", *t.of(role.NORM, within=role.STEP)),
+        Phase("steps", "sums over stages", *t.of(role.STEP)),
+        *t.rows("steps", role.DRIVER),
+        Phase(
+            "steps",
+            "error norms",
+            t.of(role.NORM, within=role.DRIVER)[0],
+            t.of(role.NORM, role.SOFTEN, within=role.DRIVER)[1],
+        ),
+        Phase("steps", "control and records", stats.steps + stats.rejected, t.of(role.DRIVER)[1]),
     ]
     return _sorted(found)
 
@@ -110,16 +98,16 @@ def of_steps(entries, kinds, prices, stats):
 def of_series(entries, kinds, prices, stats):
     """The phases of a Taylor run."""
     t = _Times(entries, kinds)
-    landings, landing = t.of(REACH)
+    landings, landing = t.of(role.REACH)
     purse = _Purse(landing)
     found = [
-        *t.rows("coefficients", EXPAND),
-        Phase("coefficients", "bodies and solves", *t.of(EXPAND)),
-        *t.rows("landing", REACH),
+        *t.rows("coefficients", role.EXPAND),
+        Phase("coefficients", "bodies and solves", *t.of(role.EXPAND)),
+        *t.rows("landing", role.REACH),
         Phase("landing", "factors", stats.factorizations, purse.take(stats.factorizations, prices["system"])),
         Phase("landing", "series summed, corrections", landings, purse.left),
-        *t.rows("steps", DRIVER),
-        Phase("steps", "lengths and records", stats.steps + stats.rejected, t.of(DRIVER)[1]),
+        *t.rows("steps", role.DRIVER),
+        Phase("steps", "lengths and records", stats.steps + stats.rejected, t.of(role.DRIVER)[1]),
     ]
     return _sorted(found)
 

@@ -65,9 +65,7 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     Examples
     --------
     >>> import tsdyn as ts
-    >>> scene = ts.Scene(gravity=(0, 0, -10))
-    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
-    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> stone = (scene := ts.Scene()).add_point_mass(mass=1.0, velocity=(1, 0, 0))
     >>> report = ts.profile(scene, (0, 0.1), advice=False)
     >>> report.solution.success, report.seconds > 0.0
     (True, True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ..hints import Integrator, Phase, Scene, Solution
 
+from ..drawing import Drawn
 from .units import duration
 
 SKIPPED = {
@@ -22,7 +23,7 @@ SKIPPED = {
 HEAD = ("", "share", "time", "calls", "a call")
 
 
-class Profile:
+class Profile(Drawn):
     """Where the time of a call of `simulate` goes; made by `tsdyn.profile`.
 
     Attributes
@@ -149,23 +150,11 @@ class Profile:
         body = "".join(f"<tr>{row}</tr>" for row in rows)
         return f"<table><caption>Profile: {caption}</caption>{body}</table><dl>{notes}</dl>"
 
-    def plot(self, path=None):
-        """Draw the phases as bars; return the matplotlib Figure, written to `path` if given.
-
-        Raises
-        ------
-        MissingDependency
-            If matplotlib is not installed.
-        InvalidArgument
-            If the figure can't be written there.
-        """
-        from ..drawing import save
+    def figure(self) -> Any:
+        """Draw it; return the matplotlib Figure."""
         from .figure import figure
 
-        drawn = figure(self)
-        if path is not None:
-            save(drawn, path)
-        return drawn
+        return figure(self)
 
 
 _OUTSIDE = ("Python", "outputs", "choice of the method")

@@ -44,6 +44,27 @@ from ..taylor.step_parts import call_expand, call_reach
 # what may run: the driver, and what it and others call; ROWS is any loop over constraints or forces
 DRIVER, PLACE, ACCELERATE, COMPLETE, CHECK, CHART, STEP, NORM = range(8)
 LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, EXPAND, REACH, ROWS, ROLES = range(8, 17)
+# roles of the kernels whose addresses drivers are given, by their names in `Kernels` and `StageKernels`
+OF_DRIVERS = {
+    "place": PLACE,
+    "accelerate": ACCELERATE,
+    "complete": COMPLETE,
+    "check": CHECK,
+    "start_chart": CHART,
+    "step": STEP,
+    "error_norm": NORM,
+    "expand": EXPAND,
+    "reach": REACH,
+}
+OF_STAGES = {
+    "linearise": LINEARISE,
+    "reduce": REDUCE,
+    "factorise": FACTORISE,
+    "solve": SOLVE,
+    "soften": SOFTEN,
+    "complete": COMPLETE,
+    "error_norm": NORM,
+}
 # the notes: the clock where the processor has none, what it is given first, what it writes, the factor of its first
 # number; the time last read; the slot and role of what runs in what; addresses that timers stand for; then the slots:
 # pairs of calls and time

@@ -61,6 +61,8 @@ class Scene:
 
     Examples
     --------
+    A pendulum has two degrees of freedom, since its rod may point anywhere:
+
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))
     >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
@@ -218,6 +220,8 @@ class Scene:
 
         Examples
         --------
+        Names stand for handles:
+
         >>> import tsdyn as ts
         >>> scene = ts.Scene(gravity=(0, 0, -10))
         >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")

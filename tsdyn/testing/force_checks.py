@@ -14,7 +14,7 @@ from ..model.packed_forces import with_force_jacobians
 from ..motions.signals import Signal
 from ..observables.generalised_forces import force_loads
 from ..observables.power import load_powers, marker_states
-from ..simulation.scene import Scene
+from .instances import instances
 from .series_checks import check_force_series
 
 if TYPE_CHECKING:
@@ -52,10 +52,8 @@ def check_force(kind: type[Force] | Callable[[AnyBody, AnyBody], Force], *, seed
     ----------
     kind : Force subclass, or callable (a, b) -> Force
         A class is tried with its own `example(rng, a, b)`.
-    seed : int
-        Of the random states.
-    states : int
-        Number of random, fast-turning states for each arrangement: body to body, body to ground, ground to body.
+    seed, states : int
+        As for `check_primitive`.
 
     Raises
     ------
@@ -69,41 +67,27 @@ def check_force(kind: type[Force] | Callable[[AnyBody, AnyBody], Force], *, seed
     >>> ts.testing.check_force(ts.forces.Spring, states=1)
     """
     rng = np.random.default_rng(seed)
-    for arrangement in ("body to body", "body to ground", "ground to body"):
-        for _ in range(states):
-            scene, force = _instance(kind, arrangement, rng)
-            if force is not None:
-                name = f"{force._kind()} ({arrangement})"
-                _check(scene, force, name, rng)
-                check_force_series(scene, force, name, rng)
+    for scene, force, arrangement in instances(lambda *bodies: _make(kind, rng, *bodies), rng, states):
+        for body in scene.bodies:
+            body.velocity, body.angular_velocity = rng.normal(size=3), 3.0 * rng.normal(size=3)
+        name = f"{force._kind()} ({arrangement})"
+        _check(scene, force, name, rng)
+        check_force_series(scene, force, name, rng)
 
 
-def _instance(kind, arrangement, rng):
-    """A scene with one instance, moving; None where the arrangement means nothing to the force."""
-    scene = Scene()
-    bodies = [scene.add_body(1.0, (1.0, 1.1, 1.2), rng.normal(size=3), _unit(rng), name=n) for n in ("one", "two")]
-    for body in bodies:
-        body.velocity, body.angular_velocity = rng.normal(size=3), 3.0 * rng.normal(size=3)
-    a = scene.ground if arrangement == "ground to body" else bodies[0]
-    b = scene.ground if arrangement == "body to ground" else bodies[1]
+def _make(kind, rng, a, b, alone):
+    """An instance, or None where it means nothing between a body and the ground."""
     if isinstance(kind, type) and issubclass(kind, Force):
-        kind, one = (lambda a, b, kind=kind: kind.example(rng, a, b)), not any(m.body == "b" for m in kind.markers)
-        if one and arrangement != "body to body":
-            return scene, None
-    elif not callable(kind):
+        single = not any(marker.body == "b" for marker in kind.markers)
+        return None if single and alone else kind.example(rng, a, b)
+    if not callable(kind):
         raise InvalidArgument(f"check_force needs a Force class or a callable (a, b), got {kind!r}.")
     try:
-        force = kind(a, b)
+        return kind(a, b)
     except InvalidForce:
-        if arrangement == "body to body":
-            raise
-        return scene, None
-    return scene, scene.add(force)
-
-
-def _unit(rng):
-    p = rng.normal(size=4)
-    return p / np.linalg.norm(p)
+        if alone:
+            return None
+        raise
 
 
 def _check(scene, force, name, rng):

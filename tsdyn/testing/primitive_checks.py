@@ -17,7 +17,7 @@ from ..maths.two_jets import Jet
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
-from ..simulation.scene import Scene
+from .instances import instances
 from .series_checks import check_constraint_series
 
 if TYPE_CHECKING:
@@ -69,46 +69,31 @@ def check_primitive(
     >>> ts.testing.check_primitive(ts.constraints.Distance, states=1)
     """
     rng = np.random.default_rng(seed)
-    for arrangement in ("body to body", "body to ground", "ground to body"):
-        for _ in range(states):
-            scene, constraint = _instance(kind, arrangement, rng)
-            if constraint is None:
-                continue
-            name = f"{type(constraint).__name__} ({arrangement})"
-            for part in constraint.parts:
-                own = name if part is constraint else f"{type(part).__name__} in {name}"
-                _check_kernels(part, own, rng, part.parameters())
-                if type(part).example.__func__ is Primitive.example.__func__:
-                    _check_perturbed(part, own, rng)
-            _check_assembled(scene, constraint, name, rng)
-            check_constraint_series(scene, constraint, name, rng)
+    for scene, constraint, arrangement in instances(lambda *bodies: _make(kind, rng, *bodies), rng, states):
+        name = f"{type(constraint).__name__} ({arrangement})"
+        for part in constraint.parts:
+            own = name if part is constraint else f"{type(part).__name__} in {name}"
+            _check_kernels(part, own, rng, part.parameters())
+            if type(part).example.__func__ is Primitive.example.__func__:
+                _check_perturbed(part, own, rng)
+        _check_assembled(scene, constraint, name, rng)
+        check_constraint_series(scene, constraint, name, rng)
 
 
-def _instance(kind, arrangement, rng):
-    """A scene with one instance; None where the arrangement means nothing to the primitive."""
-    scene = Scene()
-    bodies = [
-        scene.add_body(1.0, (1.0, 1.1, 1.2), position=rng.normal(size=3), orientation=_unit(rng), name=name)
-        for name in ("one", "two")
-    ]
-    a = scene.ground if arrangement == "ground to body" else bodies[0]
-    b = scene.ground if arrangement == "body to ground" else bodies[1]
+def _make(kind, rng, a, b, alone):
+    """An instance, or None where it means nothing between a body and the ground."""
     if isinstance(kind, type) and issubclass(kind, (Primitive, Joint)):
-        if arrangement != "body to body" and not any(m.body == "b" for m in kind.markers):
-            return scene, None
-        constraint = _example(kind, rng, a, b)
-    elif callable(kind):
-        try:
-            constraint = kind(a, b)
-        except TsdynError:
-            if arrangement == "body to body":
-                raise
-            return scene, None
-        if arrangement != "body to body" and constraint.b is None:
-            return scene, None
-    else:
+        single = not any(marker.body == "b" for marker in kind.markers)
+        return None if single and alone else _example(kind, rng, a, b)
+    if not callable(kind):
         raise InvalidArgument(f"check_primitive needs a Primitive class or a callable (a, b), got {kind!r}.")
-    return scene, scene.add(constraint)
+    try:
+        constraint = kind(a, b)
+    except TsdynError:
+        if alone:
+            return None
+        raise
+    return None if alone and constraint.b is None else constraint
 
 
 def _example(kind, rng, a, b):
@@ -138,11 +123,6 @@ def _check_perturbed(constraint, name, rng):
             f"{error} This is with par = ({numbers}), changed at random; where such parameters can't be, write a "
             "classmethod example(cls, rng, a, b) that returns a random valid instance."
         ) from error
-
-
-def _unit(rng):
-    p = rng.normal(size=4)
-    return p / np.linalg.norm(p)
 
 
 def _check_kernels(constraint, name, rng, par):

@@ -1,0 +1,93 @@
+"""Limits of assembly and of the checks of a start, each with its unit and where it comes from.
+
+Shares are without unit; q has m and Euler parameters side by side, so residuals are compared with 1 + max |q|.
+"""
+
+# --- residuals ---
+# A start whose residuals are below this share of 1 + max |q| is taken as it is: one rounding of q, so projection would
+# only exchange one rounding for another.
+ROUNDING = 2e-16
+# The same of a residual that Gauss-Newton steps have left: their sums round several times.
+CLOSED = 1e-15
+# Residuals of configurations that are asked for their mobility: looser than a start's, since positions may be typed.
+CONSISTENT = 1e-9
+# ... and of neighbours that were found by Gauss-Newton steps, which end at CLOSED where they converge at all.
+NEIGHBOUR_MET = 1e-10
+# Residuals Phi_q qd + Phi_t of the velocities that fit best, at least: no smaller than `initial_tol` of `simulate`.
+LEAST_VELOCITY_TOL = 1e-9
+
+# --- redundant rows of a start ---
+# Shares of a pivot of S in its diagonal entry below which the row is dropped, tried in turn. Pivots are squares of
+# distances between rows, which joints of crooked data bring to 1e-3; rounding leaves 1e-15 of them.
+REDUNDANT_SHARES = 1e-3, 1e-6, 1e-9, 1e-12
+# How far a dropped row must hold on the way from the start, and at least: rad, or share of the scene's size. A row that
+# is tangent by chance opens as the square of the way: 1e-4 at 1e-2, far above rounding.
+NEIGHBOURHOOD, LEAST_NEIGHBOURHOOD = 1e-2, 1e-3
+# A leg of that way whose end can't be projected is shortened to a quarter, down to this share of the whole.
+SHORTENING, SHORTEST_LEG = 0.25, 1e-3
+# Share of a direction that is left when it has been made tangent: less is rounding, and nothing can move.
+IMMOBILE = 1e-9
+# m; a scene of points in one place has no size, and lengths are compared with this.
+LEAST_SIZE = 1e-3
+# Entries of Phi_q (8 bytes each): up to the first, dependent rows are listed with their partners; up to the second,
+# rows are selected by dense QR where blocks fail.
+LISTED_ENTRIES, DENSE_ENTRIES = 1 << 20, 1 << 23
+
+# --- dependence of rows at unit length ---
+# Weight from which on a row is named among those that another depends on; rounding of weights is RANK_TOL at most.
+TAKES_PART = 1e-6
+# Singular value, as a share of the largest, from which on the rows of a body are independent for sure.
+FIRM = 1e-3
+# The same below which a direction isn't corrected: by steps towards a sketch while the constraints aren't met yet, by
+# Gauss-Newton steps, by tangents. The last two are below RANK_TOL and at it.
+STEEP, SOLVED, TANGENT = 1e-6, 1e-10, 1e-7
+# Softness of rows in sparse least squares, which no rank is known of: above the rounding of their squares.
+SOFT = 1e-13
+# Inertia of an axis that has none, as a share of the body's mean moment: the metric of kinetic energy stays a metric.
+THIN = 1e-6
+
+# --- the way from a sketch ---
+# (softness of the constraints' springs, steps at most) from stage to stage; the last is stiff enough for Gauss-Newton.
+STAGES = ((1.0, 4), (0.3, 4), (0.1, 4), (0.03, 4), (0.01, 4), (1e-3, 5), (1e-4, 5), (1e-6, 5), (1e-8, 40))
+# A sketch that is off by less (share of the scene's reach) takes the last stage only.
+NEAR = 0.02
+# rad; the largest rotation of a step, and of one along the constraints.
+MOST_TURN, MOST_SLIDE = 0.5, 0.2
+# Steps at most: of Gauss-Newton, and of the descent along the constraints.
+MOST_CLOSING, MOST_SETTLING = 60, 60
+# Length of a step, as a share of the wish, at which a stage has converged: the last one, and those before it.
+CONVERGED, PASSED = 1e-9, 0.03
+# What is left of the slope, as a share of the distance, when the descent ends; and the least decrease of a step.
+SETTLED, DECREASE = 1e-11, 0.9
+# Residual, as a share of the largest, above which a row whose derivative vanishes is named.
+STUCK = 1e-6
+# Shares of the scene's size, and rad, by which a sketch is shaken where the way from it ends elsewhere; two for scenes
+# of more coordinates than MANY.
+SHAKES, MANY = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.0), 200
+# Softness of the springs that keep a fold, from try to try.
+STIFFER = (0.1, 0.01, 0.001)
+
+# --- loops, conflicts, mobility, plug-ins ---
+# rad; an angle of a fold that is drawn deliberately, and one that is reported when it comes out on the other side.
+CLEAR, SHOWN = 0.2, 0.1
+# Share of a slide's direction across the axis beside it below which the two make no fold; m, of a link without length.
+FLAT, POINT_LIKE = 0.1, 1e-9
+# Share of the largest |Phi| below which a row takes no part in a conflict.
+LEFT_OVER = 1e-4
+# Share of the scene's size, and rad: how far away the rank is compared. Singular positions are isolated, and no closer.
+ASIDE = 0.02
+# Relative steps of difference quotients of phi, and their error: a wrong entry is further off by orders of magnitude.
+QUOTIENT_STEPS, QUOTIENT_ERROR = (1e-2, 1e-4, 1e-6), 1e-3
+# The least x that such a step is relative to, m.
+LEAST_X = 1e-6
+# A joint in a loop is driven by steps of this, rad, or share of the scene's size; the least share of a step.
+DRIVE_TURN, DRIVE_SHARE, DRIVE_LEAST = 0.25, 0.05, 2.0**-8
+
+# --- arithmetic ---
+# The least divisor: no length that matters is so small, and zero isn't divided by.
+LEAST_DIVISOR = 1e-300
+# a = |v|, rad, below which (1 - a/2 cot(a/2)) / a^2 is its limit 1/12: the next term is a^2 / 720; the formula loses
+# eps / a^2 by cancellation.
+SMALL_ANGLE = 1e-3
+# Sine below which a rotation has no axis.
+NO_AXIS = 1e-12

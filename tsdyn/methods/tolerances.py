@@ -1,7 +1,11 @@
-"""Thresholds of the step kernels: Newton's iteration of an implicit stage (diagonally_implicit.py).
+"""Thresholds of methods: order conditions, and Newton's iteration of an implicit stage (diagonally_implicit.py).
 
 Sizes of corrections are error norms: 1 is the step's tolerance. Contraction is the ratio of two such sizes in a row.
 """
+
+# Residual of an order condition of a tableau, relative to the size of its terms: rounding of coefficients that are
+# written as quotients of integers.
+ORDER_CONDITION = 1e-14
 
 # Corrections of a stage at most: as many as KAPPA takes at a contraction of 0.7, and some after a new matrix.
 ITERATIONS = 20

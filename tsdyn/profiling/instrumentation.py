@@ -12,7 +12,6 @@ from ..model.packed_forces import members_of
 from ..sparse.constraint_graph import LOOPS
 from . import timers
 
-X_ADDRESS, X_COUNT, X_FIRST_INT = 0, 2, 4  # columns of Expansion.forces
 OF_KIND = "phi", "jacobian", "gamma", "phi_t"  # the loops of System.kinds and of System.forces that are timed
 OF_FORCE = "force", "remember"
 
@@ -91,13 +90,13 @@ class Timekeeper(Stopwatch):
         classes = list(dict.fromkeys(map(type, memory.packed.constraints)))
         joints = [kind for kind, _ in instances(memory.packed, network)]
         self.notes = timers.new_notes(len(joints) + len(classes) + 2 * len(forces))
-        places = c.expansion.places[:, :1] if series else np.zeros((len(joints), 1), np.int64)
+        places = c.expansion.places["loop"] if series else [0] * len(joints)
 
         rows = [
             (
                 row.table,
                 row.count * constraint_rows.INTS,
-                [*(row[loop] for loop in LOOPS), *place],
+                [*(row[loop] for loop in LOOPS), place],
                 _of_constraints(kind),
             )
             for kind, row, place in zip(joints, network.kinds, places, strict=True)
@@ -131,19 +130,14 @@ class Timekeeper(Stopwatch):
 
     def _in_series(self, x, forces):
         rows = [
-            (
-                row[X_FIRST_INT],
-                row[X_COUNT] * force_series.INTS,
-                [0] * timers.IN_ORDERS + [row[X_ADDRESS]],
-                _of_forces(members),
-            )
+            (row.table, row.count * force_series.INTS, [0] * timers.IN_ORDERS + [row.loop], _of_forces(members))
             for members, row in zip(forces, x.forces, strict=True)
         ]
         table, firsts = self._headed(x.table, rows)
         places, loads = x.places.copy(), x.forces.copy()
-        loads[:, X_FIRST_INT] = firsts
-        _instead(places.T, [0], [timers.SERIES_TIMER])
-        _instead(loads.T, [X_ADDRESS], [timers.SERIES_TIMER])
+        loads["table"] = firsts
+        for rows in (places, loads):
+            _instead(rows, ["loop"], [timers.SERIES_TIMER])
         return x._replace(places=places, table=table, forces=loads)
 
     def _in_driver(self, kernels, roles):

@@ -12,14 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InvalidArgument, Status
-from ..maths.root_isolation import EPS, LARGEST, Search, TooFast
+from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..model.handles import handles_of
 from ..workspaces.run_state import B_END, STORED
 from .event_states import Inside
 from .events import Failed, Instant
-from .tolerances import FAST_TURN, SLOW_TURN
-
-AT_START = 64.0 * EPS  # a value, or a time, that is no more than this beside others is that of the start
+from .tolerances import FAST_TURN, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
 
 
 class Occurrence(NamedTuple):
@@ -198,7 +196,7 @@ class Watch:
         track, direction, found = self.tracks[i], self.events[i].direction, []
         (before, value), *rest = points
         if track.sign == 0.0 and track.zero is None:  # the run's first step
-            if 0.0 < abs(track.value) <= AT_START * max(abs(value) for _, value in points):
+            if 0.0 < abs(track.value) <= START_ZERO * max(abs(value) for _, value in points):
                 track.zero, track.passed, track.pending = before, value != 0.0, value == 0.0
             else:
                 rest = points
@@ -227,11 +225,11 @@ class Watch:
         """By how much the value of event i at t changes with rounding errors of the state."""
         try:
             state, value = step.at(t), self._at(i, step, t)
-            size = 4.0 * EPS * np.abs(state).max(axis=1, keepdims=True)
+            size = SHAKEN * np.abs(state).max(axis=1, keepdims=True)
             shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
         except Failed:
             return 0.0
-        return 4.0 * max(abs(each - value) for each in shaken)
+        return NOISE * max(abs(each - value) for each in shaken)
 
     def _zero(self, i, step, t, other):
         """The `Occurrence` at a zero, or at the end next to another time of the zeros around it."""
@@ -258,7 +256,7 @@ class Watch:
         if a * b >= 0.0:
             return [Occurrence(t0, i, step.at(t0))]
         root = self._between(i, step, (t0, a), (t1, b))
-        if root - self.start <= AT_START * max(1.0, abs(self.start)):
+        if root - self.start <= START_ZERO * max(1.0, abs(self.start)):
             return []
         return [Occurrence(root, i, step.at(root))]
 
@@ -271,8 +269,8 @@ class Watch:
         def value(t):
             return known[t] if t in known else self._at(i, step, t)
 
-        root = brentq(value, first[0], t1, xtol=4.0 * EPS, rtol=4.0 * EPS, maxiter=1000)
-        shift = 4.0 * EPS * max(abs(root), 1.0)
+        root = brentq(value, first[0], t1, xtol=ROOT, rtol=ROOT, maxiter=1000)
+        shift = ROOT * max(abs(root), 1.0)
         # a run that goes on from a terminal event had better find it behind itself
         while self.events[i].limit < math.inf and root + shift < t1 and value(root) * b <= 0.0:
             root, shift = root + shift, 2.0 * shift

@@ -61,8 +61,8 @@ def _outcome(engine, memory, driven, readings, watch, began):
     charts, last = left_open(run, recorder.charts, control.condition, control.contraction), run.now.copy()
     trajectory = None
     if task.dense_output:
-        sides = task.span[0], last, task.angles, task.stops
-        trajectory = Trajectory(*readings, recorder.blocks, charts, recorder.points[: len(charts)].copy(), *sides)
+        records = recorder.blocks, charts, recorder.points[: len(charts)].copy()
+        trajectory = Trajectory(readings, records, task.span[0], last, task.angles, task.stops)
     found = None if watch is None else watch.found(task.prepared.n)
     return Outcome(
         status, reason, recorder.out, recorder.steps, recorder.chart_history(charts), run.clock.t,

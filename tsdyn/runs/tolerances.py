@@ -1,4 +1,6 @@
-"""Thresholds of the drivers: step control, stops, charts, events, slices. Those of events' root search are in maths."""
+"""Thresholds of the drivers: step control, stops, charts, events, slices. Those of root isolation are in maths."""
+
+from ..maths.root_isolation import EPS
 
 # --- times -----------------------------------------------------------------------------------------------------------
 # Shortest step, relative to |t|: two units in the last place. Near t = 0 relative to FROM_ZERO of the interval.
@@ -63,6 +65,17 @@ TURN_GAIN = 1.05
 # --- events ----------------------------------------------------------------------------------------------------------
 # rad that a body turns in a step: less needs half of the samples, more needs the most.
 SLOW_TURN, FAST_TURN = 0.1, 2.0
+
+# A value, or a time, that is no more than this beside others is that of the run's start: rounding of some dozen
+# operations of an event function.
+START_ZERO = 64.0 * EPS
+
+# Relative change of a state by which the rounding error of an event function is measured, and how much larger than the
+# largest change it is taken for: three changes of random signs are tried.
+SHAKEN, NOISE = 4.0 * EPS, 4.0
+
+# s, and relative: how near to a zero Brent's method comes.
+ROOT = 4.0 * EPS
 
 # --- slices ----------------------------------------------------------------------------------------------------------
 # s between returns to Python: progress bars and Ctrl-C answer at once, at a cost of 0.1 ms a slice.

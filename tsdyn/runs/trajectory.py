@@ -46,14 +46,10 @@ class Trajectory:
 
     Parameters
     ----------
-    reading : Reading
-        Of this process.
-    again : tuple
-        A function and its arguments, which make `reading` in another process.
-    blocks : ndarray (steps, ...)
-    charts : ndarray (charts, 5)
-    points : ndarray (charts, n)
-        q0 of each chart.
+    readings : tuple
+        The `Reading` of this process; a function and its arguments, which make it in another one.
+    records : tuple of ndarray
+        Blocks (steps, ...), charts (charts, 5), and q0 of each chart (charts, n).
     start : float, s
     first : ndarray (3, n)
         q, qd, qdd there, for a run that has made no step.
@@ -63,9 +59,9 @@ class Trajectory:
         Of the `Task`: at one where a function is asked the step counts that begins there, as for outputs.
     """
 
-    def __init__(self, reading, again, blocks, charts, points, start, first, angles, stops):
-        self._reading, self.again = reading, again
-        self.blocks, self.charts, self.points = blocks, charts, points
+    def __init__(self, readings, records, start, first, angles, stops):
+        self._reading, self.again = readings
+        self.blocks, self.charts, self.points = records
         self.start, self.first, self.angles = start, first, angles
         self.asked = stops[stops[:, 1] != 0.0, 0]
 

@@ -132,11 +132,11 @@ def _put_product(array, o, x, f, low, exact):
 def run_loops(network, reals, mode, k, x, f):
     """One mode of the series loops of every kind; x is an `Expansion`, f a `Free`."""
     for i in range(network.kinds.shape[0]):
-        kind = network.kinds[i]
+        kind, series = network.kinds[i], x.places[i]
         call_series(
-            x.places[i, 0], mode, k, x.order.room, kind.count, kind.stride, x.places[i, 2],
+            series.loop, mode, k, x.order.room, kind.count, kind.stride, series.width,
             network.table[kind.table :], reals[kind.reals :],
-            x.bodies, x.constraints[x.places[i, 1] :], f.b, f.Z,
+            x.bodies, x.constraints[series.values :], f.b, f.Z,
         )  # fmt: skip
 
 
@@ -146,8 +146,8 @@ def run_forces(reals, x, k, f):
     for i in range(x.forces.shape[0]):
         kind = x.forces[i]
         call_series(
-            kind[0], 0, k, x.order.room, kind[2], kind[3], kind[6], x.table[kind[4] :], reals[kind[5] :],
-            x.bodies, x.loads[kind[1] :], f.poses, f.Z,
+            kind.loop, 0, k, x.order.room, kind.count, kind.stride, kind.width,
+            x.table[kind.table :], reals[kind.reals :], x.bodies, x.loads[kind.values :], f.poses, f.Z,
         )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from ..runs.dense_output import put_state, recall
 from ..workspaces.run_state import B_DATA, B_START, lay_out, load_run
 from ..workspaces.workspace import plain_work
 from .step_parts import set_floor, state_within
-from .workspace import Expansion, Orders, SeriesContext, Trial, load_series
+from .workspace import SeriesContext, Trial, load_series, no_series
 
 
 @entry
@@ -41,7 +41,5 @@ def reading_workspace(system, network, orders, size):
     n = int(own.bodies[:, 1].sum())
     work = plain_work(n)
     work.control.size = size
-    none, whole, table = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0), np.int64)
-    bodies = np.zeros((len(network.bodies) + 1) * BODY_ROW * orders)
-    expansion = Expansion(Orders(room=orders), bodies, none, table, table, whole, none, table)
+    expansion = no_series(orders, np.zeros((len(network.bodies) + 1) * BODY_ROW * orders))
     return SeriesContext(own, work, network, allocate_free(network, n), expansion, Trial()), lay_out(n, 0, 0, 0, 0)

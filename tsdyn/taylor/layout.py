@@ -12,11 +12,12 @@ from ..elements.markers import POINT
 from ..errors import InvalidConstraint, InvalidForce
 from ..formulations.locked_orientations import instances
 from ..jit.aligned_arrays import zeros
-from ..jit.kernels import twin
+from ..jit.kernels import records, twin
 from ..model.packed_forces import members_of
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tables import is_data
+from .tables import ConstraintSeries, ForceSeries, MotionSeries
 from .tolerances import FAR
 from .workspace import Expansion, Orders
 
@@ -92,7 +93,7 @@ def allocate_expansion(network, kinds, packed, highest):
     loops = ("far_series", "far_driven_series") if is_far(network, highest) else ("series", "driven_series")
     bodies = zeros((nb + 1) * orders * BODY_ROW)
     bodies.reshape(nb + 1, -1)[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
-    places, total = np.zeros((len(kinds), 3), np.int64), 0
+    rows, total = [], 0
     for i, kind in enumerate(kinds):
         first, count = network.kinds[i].table, int(network.kinds[i].count)
         masks = network.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
@@ -100,8 +101,9 @@ def allocate_expansion(network, kinds, packed, highest):
         driven = bool(network.kinds[i].drift)
         slots = kind.slots + (len(kind.quantities()) if driven else 0)
         width = instance_width(len(kind.markers), kind.rows, slots, orders, varies, driven)
-        places[i] = address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint), total, width
+        rows.append([address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint), total, width])
         total += count * width
+    places = records(ConstraintSeries, rows)
     forces, table, loads = _forces(packed, orders)
     constraints = zeros(total + 4)
     return Expansion(
@@ -121,7 +123,7 @@ def _motions(network, packed, orders, places, constraints):
     motions, rows = iter(packed.system.motions), []
     for i, (kind, members) in enumerate(instances(packed, network)):
         for at, (_, given) in enumerate(members if network.kinds[i].drift != 0 else ()):
-            first = places[i, 1] + at * places[i, 2] + scratch_at(len(kind.markers), kind.rows, orders, True)
+            first = places[i].values + at * places[i].width + scratch_at(len(kind.markers), kind.rows, orders, True)
             entry = 0
             for j in range(len(kind.quantities())):
                 row = first + (kind.slots + j) * orders
@@ -132,7 +134,7 @@ def _motions(network, packed, orders, places, constraints):
                 else:
                     constraints[row] = given[entry]
                 entry += 1 if moves else 3
-    return np.array(rows, np.int64).reshape(-1, 3)
+    return records(MotionSeries, rows)
 
 
 def _forces(packed, orders):
@@ -145,12 +147,12 @@ def _forces(packed, orders):
         kind = members[0].force
         series = address(kind.kernels, "series", kind.name, InvalidForce)
         width = force_series.instance_width(len(kind.markers), kind.slots, orders)
-        rows.append([series, total, len(members), row.stride, len(table), row.reals, width])
+        rows.append([series, total, width, len(members), row.stride, len(table), row.reals])
         total += len(members) * width
         for load in members:
             pair = [index.get(id(body), nb) for body in (load.force.a, load.force.b)]
             table += [*pair, (pair[0] == nb) | (pair[1] == nb) << 1]
-    return np.array(rows, np.int64).reshape(-1, 7), np.array(table, np.int64), zeros(total + 4)
+    return records(ForceSeries, rows), np.array(table, np.int64), zeros(total + 4)
 
 
 def masks(network, packed):

@@ -4,11 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit.kernels import Record, loader
+from ..jit.kernels import Record, loader, records
 from ..model.packed import System
 from ..rows.interface import Free
 from ..sparse.constraint_graph import Network
 from ..workspaces.workspace import Work, plain_context
+from .tables import ConstraintSeries, ForceSeries, MotionSeries
 
 
 class Orders(Record):
@@ -28,12 +29,11 @@ class Expansion(NamedTuple):
     order: Orders
     bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
     constraints: np.ndarray  # each kind's instances; constraint_series.series
-    places: np.ndarray  # int64 (kinds, 3): addresses of the loops; where a kind's series begin, floats of an instance
-    forces: np.ndarray  # int64 (kinds, 7): address, first of loads, instances, reals each, first in table, in reals;
-    # and floats of an instance
+    places: np.ndarray  # (kinds,) of tables.ConstraintSeries
+    forces: np.ndarray  # (kinds,) of tables.ForceSeries
     table: np.ndarray  # int64: the bodies of each force
     loads: np.ndarray  # each kind of force's instances
-    motions: np.ndarray  # int64 (motions, 3): what runs a motion's program; its place in reals; and in constraints
+    motions: np.ndarray  # (motions,) of tables.MotionSeries
 
 
 class Trial(Record):
@@ -67,10 +67,15 @@ class SeriesContext(NamedTuple):
     trial: Trial
 
 
+def no_series(orders, bodies):
+    """An `Expansion` with the series of bodies alone, and room for so many orders."""
+    none, kinds = np.zeros(0), (records(kind, []) for kind in (ConstraintSeries, ForceSeries))
+    return Expansion(Orders(room=orders), bodies, none, *kinds, np.zeros(0, np.int64), none, records(MotionSeries, []))
+
+
 def _example():
     """One of the right types."""
-    line, whole, table = np.zeros(1), np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    expansion = Expansion(Orders(), line, line, table, table, whole, line, table)
+    expansion = no_series(1, np.zeros(1))
     plain = plain_context()
     return SeriesContext(plain.system, plain.work, plain.network, plain.free, expansion, Trial())
 

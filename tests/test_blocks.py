@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tsdyn.sparse.factorisation import factor, factor_lu, solve, solve_lu, solve_lu_transposed
-from tsdyn.sparse.symbolic import Pattern, analyse
+from tsdyn.sparse.panels import Pattern
+from tsdyn.sparse.symbolic import analyse
 
 ROOT = Path(__file__).parents[1]
 EPS = np.finfo(float).eps

@@ -11,7 +11,7 @@ from tsdyn.configuration import start_kernels
 from tsdyn.formulations.registry import FORMULATIONS
 from tsdyn.jit.compiled import is_declared
 from tsdyn.motions.program import run_program
-from tsdyn.rows.evaluation import choose_anew
+from tsdyn.rows.reselection import choose_anew
 
 
 def shared_kernels():

@@ -8,8 +8,9 @@ from tests.helpers.built_in import INTEGRATORS
 from tsdyn.jit.kernels import ANY
 from tsdyn.maths.dense_linalg import copy
 from tsdyn.methods import integrator
-from tsdyn.methods.explicit import call_accelerate, call_place, callback, step_kernel, vector
+from tsdyn.methods.explicit import call_accelerate, call_place, callback, vector
 from tsdyn.methods.interpolants import HERMITE, VALUE, Interpolant
+from tsdyn.methods.plug_in import step_kernel
 from tsdyn.testing import integrator_checks, integrator_scenes
 
 I = ts.integrators

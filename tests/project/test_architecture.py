@@ -1,6 +1,7 @@
 """The shape of the house: imports run one way, kernels are compiled in one place, files stay short."""
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -110,6 +111,57 @@ def test_no_modules_import_each_other_in_a_circle():
             del left[module]
 
 
+def test_constraint_rows_have_one_interface():
+    for module, targets in EDGES.items():
+        if _district(module) in ("rows", "sparse"):
+            continue
+        below = {target for target in targets if _district(target) == "rows"} - {"tsdyn.rows.interface"}
+        assert not below | set(targets) & {"tsdyn.sparse.factorisation", "tsdyn.sparse.block_operations"}, module
+
+
+def test_redundant_rows_are_dropped_behind_the_interface():
+    for module, file in FILES.items():
+        if _district(module) not in ("rows", "sparse"):
+            names = {getattr(node, "attr", "") for node in ast.walk(ast.parse(file.read_text()))}
+            assert not names & {"dropped", "anew"}, module
+
+
+WAY = """
+import sys
+import tsdyn as ts
+from examples.pendulum_chain import build
+
+calls, landing = [], False
+
+def follow(frame, event, argument):
+    global landing
+    name, function = frame.f_globals["__name__"], frame.f_code.co_name
+    if event == "call" and function == "land":
+        calls.clear()
+        landing = True
+    if landing and event == "call" and name.startswith("tsdyn") and ".jit" not in name and ".maths" not in name:
+        calls.append((frame.f_back.f_globals["__name__"], name, function))
+    if event == "return" and function == "land":
+        landing = False
+    if landing and event == "return" and function == "find_correction":
+        sys.setprofile(None)
+
+scene = build()
+sys.setprofile(follow)
+ts.simulate(scene, (0.0, 0.1), integrator=ts.integrators.Taylor(tol=1e-3))
+print(*dict.fromkeys(call for call in calls if call[0] != call[1]), sep="\\n")
+"""
+
+
+def test_a_row_gets_from_the_projection_to_its_factor_and_back_in_few_calls():
+    """Calls between modules, in a chain of spherical joints."""
+    options = {"cwd": ROOT, "capture_output": True, "text": True, "check": True}
+    result = subprocess.run([sys.executable, "-c", WAY], env={**os.environ, "TSDYN_DEBUG": "1"}, **options)
+    calls = result.stdout.splitlines()
+    assert "factorisation" in calls[-1]
+    assert 5 < len(calls) - 1 < 15, result.stdout  # the first one is that of `land`
+
+
 @pytest.mark.parametrize("package", sorted(PACKAGES - {"tsdyn"}), ids=str)
 def test_packages_say_what_they_are_for(package):
     text = ast.get_docstring(ast.parse(FILES[package].read_text()))
@@ -118,6 +170,29 @@ def test_packages_say_what_they_are_for(package):
     assert 3 <= len(text.splitlines()) <= 10
     assert "Imports " in text
     assert "Begin with " in text
+
+
+# arguments of kernels that have one order everywhere, and the packages whose kernels keep to it
+ARGUMENTS = ("context", "network", "system", "w", "f", "l", "linear", "q", "qd", "qdd", "t", "out")
+NAMED_THRESHOLDS = ("rows", "sparse", "formulations", "workspaces")  # no bare numbers in kernels
+ORDERED = ("rows", "sparse", "formulations", "workspaces", "constraints", "forces", "taylor", "configuration", "maths")
+
+
+@pytest.mark.parametrize("module", [name for name in FILES if _district(name) in ORDERED], ids=str)
+def test_arguments_of_kernels_have_one_order(module):
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if isinstance(node, ast.FunctionDef) and node.decorator_list:
+            places = [ARGUMENTS.index(given.arg) for given in node.args.args if given.arg in ARGUMENTS]
+            assert places == sorted(places), f"{node.name}: {', '.join(ARGUMENTS[place] for place in places)}"
+
+
+@pytest.mark.parametrize("module", [name for name in FILES if _district(name) in NAMED_THRESHOLDS], ids=str)
+def test_kernels_have_no_bare_thresholds(module):
+    """Their numbers are multiples of a half, up to eight; all others have names in tolerances.py."""
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if isinstance(node, ast.FunctionDef) and node.decorator_list:
+            numbers = [one.value for one in ast.walk(node) if isinstance(getattr(one, "value", None), float)]
+            assert all(number <= 8.0 and (2.0 * number).is_integer() for number in numbers), f"{node.name}: {numbers}"
 
 
 def test_few_modules_lie_flat():

@@ -11,7 +11,7 @@ import tsdyn as ts
 from examples import driven_pivot, top
 from tests.helpers.scenes import build as build_scene
 from tests.helpers.scenes import random_chain
-from tsdyn.runs import slices as drive
+from tsdyn.runs import recorder
 from tsdyn.simulation import scene_cache as prepare
 
 I = ts.integrators
@@ -180,6 +180,6 @@ def test_a_large_memory_is_not_kept(monkeypatch):
 
 def test_room_for_charts_is_made_as_they_come(monkeypatch):
     expected = {way: run(top.build(), way) for way in ("charts", "dense", "default")}
-    monkeypatch.setattr(drive, "CHART_ROOM", 4)
+    monkeypatch.setattr(recorder, "CHART_ROOM", 4)
     for way, each in expected.items():
         same(run(top.build(), way), each)

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from tests.helpers.tolerances import CLOSE, EPS
 from tsdyn.sparse.factorisation import factor, factor_lu, solve, solve_lu, solve_lu_transposed
-from tsdyn.sparse.symbolic import Pattern, analyse
+from tsdyn.sparse.panels import Pattern
+from tsdyn.sparse.symbolic import analyse
 
 ROOT = Path(__file__).parents[2]
 

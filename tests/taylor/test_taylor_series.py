@@ -20,7 +20,8 @@ from tests.helpers.scenes import (
 from tests.helpers.tolerances import ALGEBRA, FINE, HELD, ROUNDING, TIGHT
 from tsdyn.elements.bodies import transform_g
 from tsdyn.elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
-from tsdyn.runs.trajectory import B_DATA, B_H
+from tsdyn.taylor.layout import room
+from tsdyn.workspaces.run_state import B_DATA, B_H
 
 C, F = ts.constraints, ts.forces
 ORDER = 16
@@ -66,7 +67,7 @@ def first_step(scene):
     """The series of a run's first step: h, and for each body r (k, 3), A (k, 3, 3) and omega' (k - 1, 3)."""
     method = ts.integrators.Taylor(order=ORDER)
     solution = ts.simulate(scene, (0.0, 1.0), integrator=method, dense_output=True, max_steps=1)
-    block, orders = solution._trajectory.blocks[0], solution._trajectory.reading[3]
+    block, orders = solution._trajectory.blocks[0], room(ORDER)
     data = block[B_DATA + 1 + solution.q.shape[1] :]
     bodies = []
     for b in range(len(scene.bodies)):

@@ -7,9 +7,9 @@ from ..formulations.null_space import reduced_mass, velocities
 from ..formulations.tangent import solve_velocities
 from ..jit.kernels import entry, kernel
 from ..maths.dense_linalg import copy
-from ..rows.evaluation import factor_rows
-from ..runs.run_state import T, load_run
+from ..rows.interface import DYNAMICS, factorise_selected_rows
 from ..taylor.workspace import load_series
+from ..workspaces.run_state import load_run
 from ..workspaces.workspace import load
 
 SYSTEM, NORMAL, VELOCITIES, MASS = range(4)
@@ -20,7 +20,7 @@ ROUNDS = 5
 @kernel
 def _system(network, f):
     """W H^T, H W H^T and its factors."""
-    factor_rows(network, f, f.H, f.Y, f.S, 1)
+    factorise_selected_rows(network, f, f.rows, DYNAMICS)
 
 
 @entry
@@ -35,7 +35,7 @@ def again(context, run, what, count):
             factorise_normal(c.network, w, f, l)
         else:
             copy(r.y, l.y)
-            solve_velocities(c.network, c.system, w, f, l, r.clock[T])
+            solve_velocities(c.network, c.system, w, f, l, r.clock.t)
 
 
 @entry
@@ -46,7 +46,7 @@ def again_with_basis(context, run, what, count):
         if what == MASS:
             reduced_mass(c.system, c.work)
         else:
-            velocities(c.system, c.work, r.clock[T], r.y)
+            velocities(c.system, c.work, r.clock.t, r.y)
 
 
 @entry

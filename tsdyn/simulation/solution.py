@@ -270,7 +270,7 @@ class Solution(Balances, Kinematics["Floats"]):
         """Whether what `reaction` gives is the only answer, at each output: bool (k,).
 
         Redundant constraints can share their loads in many ways with the same motion; `reaction` is then one of them,
-        with the multipliers of dropped rows (NaN in `multipliers`) taken as zero.
+        with the multipliers of redundant rows (NaN in `multipliers`) taken as zero.
         """
         item = self.handles.item(item)
         if id(item) in reactions.loads_of(self.packed):

@@ -6,7 +6,7 @@ from ..configuration.rank import weakest_row
 from ..errors import Status
 from ..formulations.dependent_rows import dependent_rows
 from ..observables.evaluate import constraint_arrays
-from ..sparse.constraint_graphs import dropped_rows
+from ..sparse.constraint_graphs import redundant_rows
 from ..taylor.layout import without_series
 from ..validation import counted
 
@@ -48,7 +48,7 @@ def _kept(stats):
 
 def _locked(solution):
     """Say so where redundant rows leave nothing free."""
-    redundant = len(dropped_rows(solution.packed))
+    redundant = len(redundant_rows(solution.packed))
     still = redundant and not solution.system.rheonomic[0]
     if not (still and solution.q.shape[1] == len(solution.system.segments) - redundant):
         return ""
@@ -71,7 +71,7 @@ def _suspect(solution, scene):
     if solution.q.shape[1] > MOST:
         return _suspect_of_many(solution, scene)
     _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)
-    rows, share = weakest_row(scene, Phi_q, len(dropped_rows(solution.packed)))
+    rows, share = weakest_row(scene, Phi_q, len(redundant_rows(solution.packed)))
     if not share < NEARLY_SINGULAR:
         return ""
     return (
@@ -84,7 +84,7 @@ def _suspect_of_many(solution, scene):
     """The same by elimination, at a cost of O(N)."""
     packed = solution.packed
     rows = dependent_rows(packed, solution._last[0], solution._reached, NEARLY_SINGULAR**2)
-    redundant = len(dropped_rows(packed))
+    redundant = len(redundant_rows(packed))
     if rows is None or len(rows) <= redundant:
         return ""
     names = scene.row_names()

@@ -1,6 +1,7 @@
 """Redundant constraints: the same motion as without them, all rows held, and nothing said to be unique that is not."""
 
 import pickle
+from types import SimpleNamespace
 
 import closed_loops
 import numpy as np
@@ -10,6 +11,8 @@ from minimal import balance
 
 import tsdyn as ts
 from examples import door, four_bar, sarrus
+from tsdyn.jit.kernels import twin
+from tsdyn.rows.interface import return_to_selection, save_selection
 
 C = ts.constraints
 I = ts.integrators
@@ -230,3 +233,12 @@ def test_a_hub_with_redundant_joints():
     heights = np.array([solution.position(body)[:, 2] for body in scene.bodies[1:]])
     np.testing.assert_allclose(heights, np.broadcast_to(heights[0], heights.shape), atol=1e-11)
     assert solution.constraint_error.position.max() < 1e-13
+
+
+def test_a_selection_of_redundant_rows_is_restored_whole():
+    """After a passing one, of other rows and of another number."""
+    f = SimpleNamespace(dropped=np.array([2, 4, 1, 0, 0, 0]), saved=np.zeros(6, int))
+    twin(save_selection)(f)
+    f.dropped[:] = 3, 0, 2, 3, 0, 0
+    twin(return_to_selection)(f)
+    assert f.dropped[:3].tolist() == [2, 4, 1]

@@ -267,7 +267,7 @@ def test_assembly_with_sparse_matrices(rng, monkeypatch):
     before, fixed, found = scene.start, scene.bodies[3:4], []
     for large in (kinetic.LARGE, 0):
         scene.place(*before)
-        monkeypatch.setattr(kinetic, "LISTED_ENTRIES", large)
+        monkeypatch.setattr(kinetic, "LARGE", large)
         report = scene.assemble(fixed=fixed)
         found.append((*scene.start, report.moved, report.residual, report.velocity_residual))
     for dense, sparse in zip(*found, strict=True):

@@ -292,8 +292,9 @@ def residual(integers, reals, y, yd, out):
 
 
 @numba.njit(**OPTIONS)
-def differences(integers, reals, y, yd, shift, group, first, rows, values):
+def differences(packed, y, yd, shift, group, first, rows, values):
     """Entries of dF/dy + shift dF/dyd by columns, rows[first[j]:first[j + 1]] of column j, a group at once."""
+    integers, reals = packed
     n = y.size
     y, yd, f, g = y.copy(), yd.copy(), np.empty(n), np.empty(n)
     residual(integers, reals, y, yd, f)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @fitting
-def benchmark(
+def benchmark(  # many arguments, by name: those of runs, and of how they are measured
     scene: Scene,
     methods: Methods | None = None,
     tolerances: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10),

@@ -52,7 +52,7 @@ class Goal:
         return Dot2(g.own, g.other, axis_a=g.e, **points, value=motion, name=name)
 
 
-def set_joint(
+def set_joint(  # by name: a value and a rate of each coordinate
     scene: Scene,
     joint: ItemLike,
     *,

@@ -45,7 +45,7 @@ class Profile(Drawn):
     solution : Solution
     """
 
-    def __init__(
+    def __init__(  # made in one place, by name
         self,
         scene: Scene,
         solution: Solution,

@@ -11,7 +11,8 @@ import numpy as np
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
 from ..maths.row_rank import row_lengths
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
-from ..observables.evaluate import LARGE, constraint_arrays
+from ..observables.evaluate import constraint_arrays
+from ..observables.tolerances import LARGE
 from .tolerances import IMMOBILE, LEAST_DIVISOR, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
 
 

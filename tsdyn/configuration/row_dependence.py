@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..maths.row_rank import RANK_TOL, farthest_first, rank_of, singular_values, unit_rows
+from ..maths.row_rank import farthest_first, rank_of, singular_values, unit_rows
+from ..maths.tolerances import RANK_TOL
 from .tolerances import FIRM, TAKES_PART
 
 

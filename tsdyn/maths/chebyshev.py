@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from .tolerances import REAL
+
 FINE = 4  # cells of the fine grid between two nodes
 CHECK = -float(np.cos(0.3 * np.pi))  # well off the nodes of every degree that is a power of two
 
@@ -59,4 +61,4 @@ def extremes(coefficients):
     if slope.size < 2:
         return np.empty(0)
     roots = chebyshev.chebroots(slope)
-    return np.sort(roots.real[np.abs(roots.imag) < 1e-6])
+    return np.sort(roots.real[np.abs(roots.imag) < REAL])

@@ -3,6 +3,7 @@
 import math
 
 from ..jit.kernels import kernel
+from .tolerances import CONVERGED, ORTHOGONAL
 
 
 @kernel
@@ -162,7 +163,7 @@ def _jacobi(R, m):
                     continue
                 size = abs(c) / math.sqrt(a * b)
                 worst = max(worst, size)
-                if size < 1e-15:
+                if size < ORTHOGONAL:
                     continue
                 zeta = (b - a) / (2.0 * c)
                 t = 1.0 / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
@@ -174,7 +175,7 @@ def _jacobi(R, m):
                     x, y = R[i, k], R[j, k]
                     R[i, k] = cosine * x - sine * y
                     R[j, k] = sine * x + cosine * y
-        if not worst > 1e-10:
+        if not worst > CONVERGED:
             break
     smallest, largest = math.inf, 0.0
     for i in range(m):

@@ -4,8 +4,7 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..validation import floats
-
-FLAT = 1e-12  # of the cube of the mesh's size: less volume is none
+from .tolerances import FLAT
 
 
 def moments(vertices, faces):

@@ -11,20 +11,26 @@ from typing import NamedTuple
 import numpy as np
 
 from .chebyshev import FINE, extremes, table
+from .tolerances import (
+    AT_ZERO,
+    CLEAR,
+    DEEPEST,
+    EPS,
+    EXTREME,
+    HOPELESS,
+    NEAR,
+    NO_NOISE,
+    NOISE_RATIO,
+    SHORTEST,
+    TIGHT,
+    TINY,
+    WIDEST_NOISE,
+)
 
-EPS = float(np.finfo(float).eps)
 LARGEST = 32  # degree
 # shares of the largest sample
-TIGHT = 1e-10  # error of an interpolant that has resolved the function
-HOPELESS = 0.05  # error of an interpolant of degree 16 that is not worth one of degree 32
-NEAR = 0.01  # an extreme that is nearer to zero is sampled
-AT_ZERO = 1e-6  # next to an end that is nearer to zero an extreme is looked for
 
-CLEAR = 10.0  # times what the higher half of the coefficients adds: further away from zero there is no zero
 CALM = 12  # halvings in a row that leave one half resolved: the rest is a kink or a jump
-TINY = 1e-7  # of the interval: what is rough on so little is rounding
-SHORTEST = 1e4 * EPS  # of the time: an interval that is not halved
-DEEPEST = 2.0**-24  # of the whole interval: likewise
 POLISH = 16  # degree of the interpolant by which an extreme is found
 MOST = 1 << 20  # samples of one search
 
@@ -125,12 +131,12 @@ class Search:
         """The rounding error of the values: what high degrees add where a smooth function is of a low one."""
         t, least = fit.a + 0.382 * (fit.b - fit.a), SHORTEST * max(abs(fit.a), abs(fit.b))
         half, found = max(TINY * (fit.b - fit.a), least), np.inf
-        while half < 1e-3 * (fit.b - fit.a):
+        while half < WIDEST_NOISE * (fit.b - fit.a):
             rough = table(8).coefficients[5:] @ self._values(t + half * table(8).nodes)
             found = min(found, 10.0 * float(np.abs(rough).max()))
-            if found <= 1e-12 * fit.scale or half == least:
+            if found <= NO_NOISE * fit.scale or half == least:
                 break
-            half = max(1e-3 * half, least)
+            half = max(NOISE_RATIO * half, least)
         return found if found < np.inf else 0.0
 
     def _follow(self, fit, calm):
@@ -206,7 +212,7 @@ class Search:
         from scipy.optimize import minimize_scalar  # takes a while to import
 
         value = lambda s: sign * self._values(np.array([a + s]))[0]  # noqa: E731
-        found = minimize_scalar(value, bounds=(0.0, b - a), method="bounded", options={"xatol": 1e-9 * (b - a)})
+        found = minimize_scalar(value, bounds=(0.0, b - a), method="bounded", options={"xatol": EXTREME * (b - a)})
         if not abs(found.fun) < np.inf:
             return {}
         return {a + float(found.x): 0.0 if abs(found.fun) <= AT_ZERO * scale else sign * float(found.fun)}

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-RANK_TOL = 1e-7  # of the largest singular value of rows of unit length: less is zero; charts work with the squares
+from .tolerances import NO_LENGTH, RANK_TOL
 
 
 def row_lengths(A):
     """Lengths of the rows of A, dense or sparse; next to nothing counts as nothing."""
     squares = (A * A).sum(axis=1) if isinstance(A, np.ndarray) else A.multiply(A).sum(axis=1)
     lengths = np.sqrt(np.asarray(squares).ravel())
-    return np.where(lengths > 1e-12 * lengths.max(initial=0.0), lengths, 0.0)
+    return np.where(lengths > NO_LENGTH * lengths.max(initial=0.0), lengths, 0.0)
 
 
 def unit_rows(A):

@@ -3,10 +3,7 @@
 import numpy as np
 
 from ..errors import InvalidConstraint
-
-TOGETHER = 1e-14  # of the time, or a thousandth of the run: knots that are nearer to each other are one
-JUMP = 1e-9  # of the largest value or rate; less is rounding of the data
-ROUNDING = 1e-12  # of the largest value, over the shortest piece beside a knot: as much of a rate is rounding
+from .tolerances import JUMP, LEAST_SPAN, ROUNDING, TOGETHER
 
 
 def demand_covered(motion, t0, t1, what, error):
@@ -60,7 +57,7 @@ def stops_of(parameters, instants, t0, t1):
     times = np.concatenate([instants, *found])
     order = np.argsort(times, kind="stable")
     times, asked = times[order], np.where(order < instants.size, 1.0, 0.0)
-    near = TOGETHER * max(abs(t0), abs(t1), 1e-3 * (t1 - t0))
+    near = TOGETHER * max(abs(t0), abs(t1), LEAST_SPAN * (t1 - t0))
     late = t1 - times <= near
     times, asked = np.where(late, t1, times), np.where(late, 0.0, asked)
     kept = times - t0 > near

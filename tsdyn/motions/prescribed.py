@@ -20,6 +20,7 @@ from .expressions import FUNCTIONS, Smooth
 from .knots import demand_covered, demand_followed
 from .program import run_program
 from .tables import is_data
+from .tolerances import QUOTIENT_ERROR, QUOTIENT_NOISE, QUOTIENT_STEPS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -173,14 +174,14 @@ class Motion:
         for i, names in ((0, ("f", "fd")), (1, ("fd", "fdd"))):
             given, values = self._at(i + 1, times), self._at(i, times)
             off = np.full(times.size, np.inf)
-            for h in min(1.0, t1 - t0) * np.array([1e-2, 1e-3, 1e-4, 1e-5]):
+            for h in min(1.0, t1 - t0) * np.array(QUOTIENT_STEPS):
                 near = [self._at(i, times + k * h) for k in (-2, -1, 1, 2)]
                 with np.errstate(invalid="ignore"):
                     quotient = (near[0] - 8.0 * near[1] + 8.0 * near[2] - near[3]) / (12.0 * h)
-                    off = np.fmin(off, np.abs(quotient - given) - 1e-9 * np.abs(values) / h)
+                    off = np.fmin(off, np.abs(quotient - given) - QUOTIENT_NOISE * np.abs(values) / h)
             if not (np.isfinite(given).all() and np.isfinite(values).all()):
                 continue  # the run ends there, and says so
-            if (off > 1e-3 * (np.abs(given).max() + np.abs(values).max())).sum() > times.size // 2:
+            if (off > QUOTIENT_ERROR * (np.abs(given).max() + np.abs(values).max())).sum() > times.size // 2:
                 raise InvalidConstraint(
                     f"{self.what}: {names[1]} is not the derivative of {names[0]}: at t = {times[0]:g} it gives "
                     f"{given[0]:g}, and a difference quotient of {names[0]} does not. Correct the derivatives."

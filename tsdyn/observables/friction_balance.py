@@ -8,10 +8,9 @@ from ..jit.kernels import twin
 from .diagnostics import starts_of
 from .generalised_forces import force_loads
 from .power import marker_states
+from .tolerances import BALANCED, COMPLEX_STEP
 
 SWEEPS = 50
-ROUNDING = 1e-15
-STEP = 1e-40  # of complex steps
 JAMMED = (
     "no reactions are consistent with the friction of the joints: with large coefficients of friction the mechanism "
     "may jam here."
@@ -39,7 +38,7 @@ def balance(packed, t, q, qd, Phi_q, solve):
         except np.linalg.LinAlgError as error:
             raise SingularConfiguration(JAMMED) from error
         N = N + step
-        if not np.abs(step).max() > ROUNDING * np.abs(N).max():
+        if not np.abs(step).max() > BALANCED * np.abs(N).max():
             return N @ np.array(units), first + N @ parts
     raise SingularConfiguration(JAMMED)
 
@@ -69,9 +68,9 @@ def _reaction(packed, load, q, qd, Phi_q):
 
     def find(lam):
         f = wrench @ lam[member.rows]
-        values = [normal(x, f + STEP * 1j * e, par) for e in np.eye(6)]
+        values = [normal(x, f + COMPLEX_STEP * 1j * e, par) for e in np.eye(6)]
         change = np.zeros(lam.size)
-        change[member.rows] = np.imag(values) / STEP @ wrench
+        change[member.rows] = np.imag(values) / COMPLEX_STEP @ wrench
         return np.real(values[0]), change
 
     return find

@@ -18,8 +18,7 @@ from ..model.packed import FIRST_REAL, REALS, classes
 from ..model.packed_forces import F_FIRST_REAL
 from ..runs.events import Instant
 from .scene_cache import Prepared
-
-FAR = 100.0  # sizes of a scene: its distance from the origin above which it has one of its own
+from .tolerances import FAR_ORIGIN
 
 
 def origin_of(packed, q):
@@ -35,12 +34,12 @@ def _origin(packed, q):
     if packed.derived.grounded is None:
         packed.derived.grounded = _points(packed)
     grounded, longest = packed.derived.grounded
-    if np.maximum.reduce(np.abs(q)) <= FAR * longest:
+    if np.maximum.reduce(np.abs(q)) <= FAR_ORIGIN * longest:
         return None
     places = np.concatenate((q[packed.system.bodies[:, :1] + np.arange(3)], grounded))
     low, high = places.min(axis=0), places.max(axis=0)
     size, centre = max(float((high - low).max()), longest), 0.5 * (low + high)
-    if not (size > 0.0 and np.abs(centre).max() > FAR * size and _sees_differences(packed)):
+    if not (size > 0.0 and np.abs(centre).max() > FAR_ORIGIN * size and _sees_differences(packed)):
         return None
     step = 2.0 ** np.floor(np.log2(size))
     return np.round(centre / step) * step

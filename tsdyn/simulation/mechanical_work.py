@@ -7,10 +7,10 @@ import numpy as np
 from ..observables.friction_reactions import with_normal_loads
 from ..observables.power import driving_power, force_powers, power_of
 from ..observables.reactions import multipliers
+from .tolerances import AGREE, DEEPEST
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 AT_ONCE = 2000  # pieces of the interval
-AGREE, DEEPEST = 1e-11, 8  # of a piece's two halves with the whole; how often it is cut
 
 
 def work(solution, trajectory, item=None):

@@ -13,12 +13,7 @@ from ..errors import Status, TsdynError
 from ..integrators import DOP853, SDIRK54, Taylor
 from ..runs.arguments import tolerances
 from ..runs.run_state import H, T
-
-PILOT = 60  # steps
-COST = 1.5  # of an evaluation in an implicit stage, its share of matrices included, against an explicit one
-
-
-LARGEST_PILOT = 700  # coordinates: above that implicit methods, whose matrices are dense, cost more than they save
+from .tolerances import COST, LARGEST_PILOT, PILOT
 
 
 def explicit(prepared, rtol, atol, series):

@@ -6,9 +6,9 @@ import numpy as np
 
 from ..formulations.chart_validity import ROUNDING
 from ..sparse.massless_axes import levers
+from .tolerances import FAR_LEVER
 
 NOISE = 4.0 * ROUNDING  # of a position, over the lever: what a placement leaves of a direction
-FAR = 1e4  # levers: below that no tolerance is touched
 
 
 def within_rounding(method, packed, q):
@@ -21,13 +21,13 @@ def within_rounding(method, packed, q):
     if packed.derived.levers is None:
         packed.derived.levers = levers(packed)
     arms = packed.derived.levers
-    if np.abs(q).max() < FAR * arms.min(where=arms > 0.0, initial=np.inf):
+    if np.abs(q).max() < FAR_LEVER * arms.min(where=arms > 0.0, initial=np.inf):
         return method, ""
     far = np.abs(q[packed.system.bodies[:, :1] + np.arange(3)]).max(axis=1)
     ratios = np.where(arms > 0.0, far / np.where(arms > 0.0, arms, 1.0), 0.0)
     worst = int(np.argmax(ratios))
     noise = NOISE * ratios[worst]
-    if ratios[worst] < FAR or min(method.step_tolerances()) >= noise:
+    if ratios[worst] < FAR_LEVER or min(method.step_tolerances()) >= noise:
         return method, ""
     other = copy.copy(method)
     for i, name in enumerate(("rtol", "atol")):

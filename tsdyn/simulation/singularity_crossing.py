@@ -20,10 +20,7 @@ from ..runs.segments import Relay
 from ..runs.step_run import run_steps
 from ..runs.trajectory import Pieces
 from ..taylor.series_run import run_series
-
-REGULAR = 0.02  # of the largest share of the weakest row: as much is regular again, as it is for Taylor
-FINEST = 1e-10  # tolerance of the series, if the method has none that is less
-NO_STEP = 1e-6  # of a fixed step: a time of the grid that is nearer has been reached
+from .tolerances import FINEST, NO_STEP, REGULAR
 
 
 def run_past(task, observe=None):

@@ -9,11 +9,9 @@ from ..observables.evaluate import constraint_arrays
 from ..sparse.constraint_graphs import dropped_rows
 from ..taylor.layout import without_series
 from ..validation import counted
+from .tolerances import BLOW_UP, MOST_SINGULAR, NEARLY_SINGULAR
 
-NEARLY_SINGULAR = 0.05
-MOST = 600  # coordinates for which singular values are worked out
 FEW = 3  # parts of a scene that are named
-BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
 
 
 def account(solution, scene, reason):
@@ -68,7 +66,7 @@ def _suspect(solution, scene):
     """Name what is nearly singular at the last point."""
     if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
         return ""
-    if solution.q.shape[1] > MOST:
+    if solution.q.shape[1] > MOST_SINGULAR:
         return _suspect_of_many(solution, scene)
     _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)
     rows, share = weakest_row(scene, Phi_q, len(dropped_rows(solution.packed)))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tsdyn.jit.code_hash import deep_hash
-from tsdyn.jit.kernels import Record, entry, kernel, loader, resident
+from tsdyn.jit.kernels import Record, entry, kernel, loader, records, resident, row_of
 
 
 class Counts(Record):
@@ -96,3 +96,18 @@ def test_the_layout_is_part_of_the_hash():
 
     if not isinstance(load, type(lambda: 0)):  # there is a layout only where kernels are compiled
         assert hash_with(Counts) == hash_with(Counts) != hash_with(Wider)
+
+
+def test_an_array_of_records():
+    table = records(Counts, [(0.5, 3), row_of(Counts, steps=4)])
+    assert table[0].steps == 3
+    assert table["size"].tolist() == [0.5, 0.0]
+
+    @kernel
+    def total(rows):
+        result = 0
+        for i in range(rows.shape[0]):
+            result += rows[i].steps
+        return result
+
+    assert total(table) == 7

@@ -21,7 +21,6 @@ from ..errors import Status
 from ..jit.kernels import callback, caller, kernel, long_kernel, stack
 from ..jit.simd import add, four, put, splat, sub, times
 from ..maths.dense_linalg import copy, largest
-from ..model.packed_forces import F_FIRST_INT, F_FIRST_REAL, F_REALS
 from ..model.packed_friction import FR_BODY, FR_COUNT, FR_FIRST, FR_INDEX, FR_KIND, FR_NORMAL, FR_ON, FR_UNIT
 from ..rows.axis_rows import gather_axes, multiply_axes_both
 from ..rows.evaluation import run_loops
@@ -46,8 +45,8 @@ NEAR = 1e-10  # of it: a correction by new factors that leaves no more than roun
 def _instance(system, friction):
     """Floats of the instance; where its table and its floats begin."""
     kind = system.forces[friction[FR_KIND]]
-    stride = kind[F_REALS]
-    return stride, kind[F_FIRST_INT] + INTS * friction[FR_INDEX], kind[F_FIRST_REAL] + stride * friction[FR_INDEX]
+    index = friction[FR_INDEX]
+    return kind.stride, kind.table + INTS * index, kind.reals + kind.stride * index
 
 
 @kernel

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.markers import PARAMETERS, VECTOR
-from ..model.packed import FIRST_REAL, classes
+from ..model.packed import classes
 from ..motions.prescribed import Motion
 from ..sparse.constraint_graph import N_COUNT, N_FIRST_REAL, N_REALS
 from ..sparse.constraint_graphs import dropped_rows, network_of, with_loops
@@ -95,7 +95,7 @@ def instances(packed, network):
     groups = {kind: [] for kind in classes(packed)}
     for pair in zip(packed.constraints, packed.parameters, strict=True):
         groups[type(pair[0])].append(pair)
-    kinds, begins, found = list(groups), packed.system.kinds[:, FIRST_REAL], []
+    kinds, begins, found = list(groups), packed.system.kinds["reals"], []
     for row in network.kinds:
         i = int(np.searchsorted(begins, row[N_FIRST_REAL], side="right")) - 1
         first = int((row[N_FIRST_REAL] - begins[i]) // row[N_REALS])

@@ -32,7 +32,7 @@ from .arrays import (
 )
 from .compiled import DEBUG, Callback, callback, entry, letters, table
 from .compiler import OPTIONS, Callee, is_ours
-from .resident import Record, image_of, loader, resident
+from .resident import Record, image_of, loader, records, resident, row_of
 
 __all__ = [  # what is to be found here, too
     "ANY",
@@ -49,7 +49,9 @@ __all__ = [  # what is to be found here, too
     "integers",
     "loader",
     "matrix",
+    "records",
     "resident",
+    "row_of",
     "stack",
     "stack2",
     "vector",

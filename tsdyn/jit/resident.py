@@ -10,7 +10,8 @@ A `Record` holds single numbers under names, in place of an array with an index 
         q: np.ndarray
         control: Control
 
-Kernels read and write `work.control.floor` and `work.control.steps += 1`, and so does Python.
+Kernels read and write `work.control.floor` and `work.control.steps += 1`, and so does Python. `records(Control, rows)`
+is an array of them.
 """
 
 import ctypes
@@ -52,6 +53,19 @@ class Record(ctypes.Structure, metaclass=_Layout):
         def __setattr__(self, name, value):
             """Set a number."""
             super().__setattr__(name, type(self).__annotations__[name](value))
+
+
+def records(layout, rows=()):
+    """An array of records of a layout, from rows of numbers: `array[i].name`; in Python `array["name"]`, too."""
+    kinds = {float: np.float64, int: np.int64}
+    dtype = np.dtype((np.record, [(name, kinds[kind]) for name, kind in layout.__annotations__.items()]))
+    return np.array([tuple(row) for row in rows], dtype)
+
+
+def row_of(layout, **values):
+    """A row for `records`, by names; zero where nothing is given."""
+    assert values.keys() <= layout.__annotations__.keys()
+    return [values.get(name, 0) for name in layout.__annotations__]
 
 
 @typeof_impl.register(Record)

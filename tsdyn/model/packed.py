@@ -9,13 +9,12 @@ from ..elements.element import address, checked_parameters
 from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE
 from ..elements.loops.template import AT, DIMENSION
 from ..errors import InvalidConstraint
+from ..jit.kernels import records, row_of
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from .derived import Derived
-from .packed_forces import FORCE_COLUMNS, SIGNAL_COLUMNS, find_forces, pack_forces
-
-# columns of System.kinds: four addresses, where a kind's instances are, the address that implicit methods need
-PHI, JACOBIAN, GAMMA, PHI_T, COUNT, REALS, FIRST_INT, FIRST_REAL, CURVATURE, COLUMNS = range(10)
+from .packed_forces import find_forces, pack_forces
+from .tables import ConstraintKind, ForceKind, MotionPlace, SignalPlace
 
 
 class System(NamedTuple):
@@ -25,18 +24,37 @@ class System(NamedTuple):
     mass: np.ndarray  # float64 (nb,)
     inertia: np.ndarray  # float64 (nb, 9): J' row by row; zero for a point mass
     gravity: np.ndarray  # float64 (3,)
-    kinds: np.ndarray  # int64 (kinds, 9): addresses and extents, columns above
+    kinds: np.ndarray  # (kinds,) of tables.ConstraintKind
     table: np.ndarray  # int64: for each instance the places in q and Phi_q, primitive.INTS numbers
     reals: np.ndarray  # float64: for each instance marker coordinates, then parameters
-    motions: np.ndarray  # int64 (motions, 5): addresses of f, fd, fdd, or of what runs a program, 0, 0; the place of
-    # the first in reals; where the program begins there
+    motions: np.ndarray  # (motions,) of tables.MotionPlace
     rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
     segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
-    forces: np.ndarray  # int64 (kinds, 9): addresses and extents, columns in force_pack
-    signals: np.ndarray  # int64 (signals, 4): functions of time and motions that loads are given, force_pack
+    forces: np.ndarray  # (kinds,) of tables.ForceKind
+    signals: np.ndarray  # (signals,) of tables.SignalPlace
     memory: np.ndarray  # int64 (slots,): places in reals of what forces, then constraints remember from step to step
     normals: np.ndarray  # int64 (frictions,): places in reals of the normal loads of joints' frictions
-    counters: np.ndarray  # int64 (kinds, 5): loops of constraints that remember: address, count, reals, places of both
+
+
+def no_system():
+    """An example of its type."""
+    whole, wholes = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
+    return System(
+        bodies=wholes,
+        mass=np.zeros(1),
+        inertia=np.zeros((1, 1)),
+        gravity=np.zeros(1),
+        kinds=records(ConstraintKind),
+        table=whole,
+        reals=np.zeros(1),
+        motions=records(MotionPlace),
+        rheonomic=whole,
+        segments=wholes,
+        forces=records(ForceKind),
+        signals=records(SignalPlace),
+        memory=whole,
+        normals=whole,
+    )
 
 
 class Member(NamedTuple):
@@ -57,7 +75,7 @@ class Packed(NamedTuple):
     parameters: tuple  # of each constraint: floats and Motions
     coordinates: tuple  # of each constraint: where its markers are, (3,) each
     size: float  # largest number among the coordinates
-    loads: tuple  # a force_pack.Load for each force, in the order added
+    loads: tuple  # a packed_forces.Load for each force, in the order added
     members: tuple  # a Member for each constraint of the scene, in the order of their rows
     slots: tuple  # of System.memory, for each constraint; -1 for none
     derived: Derived  # what has been worked out from it
@@ -75,12 +93,9 @@ def _found_again(process, *parts):
     system = packed.system
     kinds = classes(packed)
     for row, kind in zip(system.kinds, kinds, strict=True):
-        for column, name in ((PHI, "phi"), (JACOBIAN, "jacobian"), (GAMMA, "gamma"), (PHI_T, "phi_t")):
-            row[column] = _address(kind, name) if row[column] else 0
-        row[CURVATURE] = 0
-    remembering = [kind for kind in kinds if kind.memory]
-    for row, kind in zip(system.counters, remembering, strict=True):
-        row[0] = _address(kind, "remember")
+        for name in ("phi", "jacobian", "gamma", "phi_t", "remember"):
+            row[name] = _address(kind, name) if row[name] else 0
+        row["curvature"] = 0
     values = [
         value
         for kind in kinds
@@ -90,7 +105,7 @@ def _found_again(process, *parts):
         if isinstance(value, Motion)
     ]
     for row, motion in zip(system.motions, values, strict=True):
-        row[:3] = motion.addresses
+        row.value, row.rate, row.acceleration = motion.addresses
     return packed._replace(loads=find_forces(system, packed.loads))
 
 
@@ -103,85 +118,108 @@ def pack(scene):
         If a plug-in's parameters are no finite numbers or Motions, or Numba can't compile its kernels.
     """
     starts = np.cumsum([0, *(body.dimension for body in scene.bodies)])
-    n = int(starts[-1])
     where = {id(body): (int(at), body.dimension) for at, body in zip(starts, scene.bodies, strict=False)}
-    groups, row = {}, 0
-    segments = []
     primitives = scene.primitives
     parameters = {constraint: _parameters(constraint) for constraint in primitives}
-    for constraint in primitives:
-        groups.setdefault(type(constraint), []).append((constraint, row))
-        row += constraint.rows
-        spans = [where.get(id(body), (0, 0)) for body in (constraint.a, constraint.b)]
-        segments += [[*spans[0], *spans[1]]] * constraint.rows
-
-    kinds, table, reals, motions, programs = [], [], [], [], []
-    counters, kept = [], {}
-    for kind, members in groups.items():
-        first = len(table), len(reals)
-        strides = set()
-        for constraint, at_row in members:
-            begin = len(reals)
-            table += _places(constraint, at_row, n, where)
-            reals += np.concatenate(constraint.coordinates).tolist()
-            for value in parameters[constraint]:
-                if isinstance(value, Motion):
-                    motions.append([*value.addresses, len(reals), 0])
-                    programs.append(value)
-                    reals += value.value(value.origin)
-                else:
-                    reals.append(float(value))
-            if kind.memory:
-                kept[constraint] = len(reals)
-                reals.append(0.0)
-            stride = len(reals) - begin
-            if strides - {stride}:
-                raise InvalidConstraint(
-                    f"{constraint.name}: parameters() must return as many values as for every other {kind.__name__}."
-                )
-            strides.add(stride)
-        addresses = [_address(kind, name) for name in ("phi", "jacobian", "gamma")]
-        moving = any(constraint.rheonomic for constraint, _ in members)
-        addresses.append(_address(kind, "phi_t") if moving else 0)
-        kinds.append([*addresses, len(members), stride, *first, 0])
-        if kind.memory:
-            counters.append([_address(kind, "remember"), len(members), stride, *first])
-
+    table, reals = [], []
+    kinds, motions, kept = _pack_constraints(parameters, int(starts[-1]), where, table, reals)
     forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals)
-    begins = {}  # of programs: one for all that move alike
-    for row, motion in zip(motions, programs, strict=True):
-        if motion.smooth is not None:
-            if id(motion.smooth) not in begins:
-                begins[id(motion.smooth)] = len(reals)
-                reals += motion.smooth.program()
-            row[4] = begins[id(motion.smooth)]
+    _append_programs(motions, reals)
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
         mass=np.array([body.values["mass"] for body in scene.bodies]),
         inertia=np.array(inertias).reshape(-1, 9),
         gravity=np.array(scene.gravity),  # writable, as all arrays here: what is read-only is another type to a kernel
-        kinds=np.array(kinds, np.int64).reshape(-1, COLUMNS),
+        kinds=records(ConstraintKind, kinds),
         table=np.array(table, np.int64),
         reals=np.array(reals),
-        motions=np.array(motions, np.int64).reshape(-1, 5),
-        rheonomic=np.array([any(kind[PHI_T] for kind in kinds)], np.int64),
-        segments=np.array(segments, np.int64).reshape(-1, 4),
-        forces=np.array(forces, np.int64).reshape(-1, FORCE_COLUMNS),
-        signals=np.array(signals, np.int64).reshape(-1, SIGNAL_COLUMNS),
+        motions=records(MotionPlace, [row for row, _ in motions]),
+        rheonomic=np.array([any(constraint.rheonomic for constraint in primitives)], np.int64),
+        segments=np.array(_segments(primitives, where), np.int64).reshape(-1, 4),
+        forces=forces,
+        signals=signals,
         memory=np.array([*memory, *kept.values()], np.int64),
         normals=np.array(normals, np.int64),
-        counters=np.array(counters, np.int64).reshape(-1, 5),
     )
     coordinates = tuple(constraint.coordinates for constraint in primitives)
     size = max((np.abs(s).max() for each in coordinates for s in each), default=0.0)
-    parameters = tuple(parameters.values())
     members = tuple(_members(scene.constraints))
     order = {constraint: len(memory) + i for i, constraint in enumerate(kept)}
     slots = tuple(order.get(constraint, -1) for constraint in primitives)
-    return Packed(
-        system, scene.bodies, primitives, parameters, coordinates, float(size), loads, members, slots, Derived()
-    )
+    given = tuple(parameters.values())
+    return Packed(system, scene.bodies, primitives, given, coordinates, float(size), loads, members, slots, Derived())
+
+
+def _segments(primitives, where):
+    """The two spans of columns of each row of Phi_q that are not zero."""
+    found = []
+    for constraint in primitives:
+        spans = [where.get(id(body), (0, 0)) for body in (constraint.a, constraint.b)]
+        found += [[*spans[0], *spans[1]]] * constraint.rows
+    return found
+
+
+def _pack_constraints(parameters, n, where, table, reals):
+    """Append the instances, kind by kind, to `table` and `reals`.
+
+    Returns rows of System.kinds, of System.motions each with its Motion, and {constraint: place of what it remembers}.
+    """
+    groups, row = {}, 0
+    for constraint in parameters:
+        groups.setdefault(type(constraint), []).append((constraint, row))
+        row += constraint.rows
+    kinds, motions, kept = [], [], {}
+    for kind, members in groups.items():
+        first = len(table), len(reals)
+        for constraint, at_row in members:
+            begin = len(reals)
+            table += _places(constraint, at_row, n, where)
+            _append_reals(constraint, parameters[constraint], reals, motions)
+            if kind.memory:
+                kept[constraint] = len(reals)
+                reals.append(0.0)
+            if begin == first[1]:
+                stride = len(reals) - begin
+            if len(reals) - begin != stride:
+                raise InvalidConstraint(
+                    f"{constraint.name}: parameters() must return as many values as for every other {kind.__name__}."
+                )
+        moving = any(constraint.rheonomic for constraint, _ in members)
+        loops = ["phi", "jacobian", "gamma", *["phi_t"] * moving, *["remember"] * bool(kind.memory)]
+        kinds.append(
+            row_of(
+                ConstraintKind,
+                **{name: _address(kind, name) for name in loops},
+                count=len(members),
+                stride=stride,
+                table=first[0],
+                reals=first[1],
+            )
+        )
+    return kinds, motions, kept
+
+
+def _append_reals(constraint, parameters, reals, motions):
+    """Append where the markers are, then the parameters; three places for a Motion, whose row joins `motions`."""
+    reals += np.concatenate(constraint.coordinates).tolist()
+    for value in parameters:
+        if isinstance(value, Motion):
+            motions.append(([*value.addresses, len(reals), 0], value))
+            reals += value.value(value.origin)
+        else:
+            reals.append(float(value))
+
+
+def _append_programs(motions, reals):
+    """Append the programs of `ts.motions`, one for all that move alike, and say in the rows where they begin."""
+    begins = {}
+    for row, motion in motions:
+        if motion.smooth is not None:
+            if id(motion.smooth) not in begins:
+                begins[id(motion.smooth)] = len(reals)
+                reals += motion.smooth.program()
+            row[-1] = begins[id(motion.smooth)]
 
 
 def _members(constraints):
@@ -234,7 +272,7 @@ def user_functions(packed):
 def with_curvatures(packed):
     """The system with the kernels of second derivatives, which only implicit methods load."""
     kinds = packed.system.kinds.copy()
-    kinds[:, CURVATURE] = [_address(kind, "curvature") for kind in classes(packed)]
+    kinds["curvature"] = [_address(kind, "curvature") for kind in classes(packed)]
     return packed.system._replace(kinds=kinds)
 
 

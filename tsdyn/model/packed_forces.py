@@ -8,12 +8,9 @@ from ..elements.element import address, checked_parameters
 from ..elements.loops.forces import INTS, kept_size
 from ..elements.loops.template import AT, DIMENSION
 from ..errors import InvalidForce
+from ..jit.kernels import records
 from ..motions.signals import Signal
-
-# columns of System.forces: three addresses, then where a kind's instances are
-FORCE, FORCE_JACOBIAN, F_COUNT, F_REALS, F_FIRST_INT, F_FIRST_REAL, F_REMEMBER, F_KEPT, FORCE_COLUMNS = range(9)
-# columns of System.signals: the address of what runs; its places in reals; where a motion's program begins there, or -1
-S_ADDRESS, S_PLACE, S_WIDTH, S_FIRST, SIGNAL_COLUMNS = range(5)
+from .tables import ForceKind, SignalPlace
 
 
 class Load(NamedTuple):
@@ -22,7 +19,7 @@ class Load(NamedTuple):
     force: object
     parameters: tuple  # floats and Signals
     coordinates: tuple  # where its markers are, (3,) each
-    row: np.ndarray  # (FORCE_COLUMNS,) a row of System.forces that has this instance alone
+    alone: np.ndarray  # (1,) of tables.ForceKind: a System.forces that has this instance alone
     slot: int  # of System.memory; -1 for none
     normal: int  # of System.normals; -1 for none
 
@@ -72,17 +69,18 @@ def pack_forces(forces, where, table, reals):
                     f"{force.name}: parameters() must return as many values as for every other {type(force).__name__}."
                 )
             stride = size
-            row = np.array([force_address, 0, 1, stride, *begin, remember, 0], np.int64)
+            alone = records(ForceKind, [[force_address, 0, remember, 1, stride, *begin, 0]])
             slot = len(memory) - 1 if force.memory else -1
             normal = len(normals) - 1 if "normal_load" in kernels else -1
-            loads[id(force)] = Load(force, parameters, force.coordinates, row, slot, normal)
-        rows.append([force_address, 0, len(members), stride, *first, remember, 0])
+            loads[id(force)] = Load(force, parameters, force.coordinates, alone, slot, normal)
+        rows.append([force_address, 0, remember, len(members), stride, *first, 0])
     begins = {}
     for signal, motion in programs:
         if id(motion) not in begins:  # one program for all that are given the same
             begins[id(motion)] = len(reals)
             reals += motion.program()
-        signal[S_FIRST] = begins[id(motion)]
+        signal[-1] = begins[id(motion)]
+    rows, signals = records(ForceKind, rows), records(SignalPlace, signals)
     return rows, signals, memory, normals, tuple(loads[id(force)] for force in forces)
 
 
@@ -91,8 +89,8 @@ def with_force_jacobians(packed):
     rows, total = packed.system.forces.copy(), 0
     for row in rows:
         force = members_of(row, packed.loads)[0].force
-        row[FORCE_JACOBIAN], row[F_KEPT] = _address(force, "jacobian"), total
-        total += row[F_COUNT] * kept_size(force.markers)
+        row.jacobian, row.kept = _address(force, "jacobian"), total
+        total += row.count * kept_size(force.markers)
     return packed.system._replace(forces=rows), int(total)
 
 
@@ -101,21 +99,22 @@ def find_forces(system, loads):
     signals, rows = iter(system.signals), {}
     for row in system.forces:
         members = members_of(row, loads)
-        row[FORCE], row[FORCE_JACOBIAN] = _address(members[0].force, "force"), 0
-        row[F_REMEMBER] = _address(members[0].force, "remember") if row[F_REMEMBER] else 0
+        row.force, row.jacobian = _address(members[0].force, "force"), 0
+        row.remember = _address(members[0].force, "remember") if row.remember else 0
         for load in members:
-            one = load.row.copy()
-            one[[FORCE, FORCE_JACOBIAN, F_REMEMBER]] = row[[FORCE, FORCE_JACOBIAN, F_REMEMBER]]
-            rows[id(load)] = load._replace(row=one)
+            alone = load.alone.copy()
+            for name in ("force", "jacobian", "remember"):
+                alone[name] = row[name]
+            rows[id(load)] = load._replace(alone=alone)
             for value in load.parameters:
                 for _ in range(max(len(value.motions), 1) if isinstance(value, Signal) else 0):
-                    next(signals)[S_ADDRESS] = value.address
+                    next(signals).address = value.address
     return tuple(rows[id(load)] for load in loads)
 
 
 def members_of(row, loads):
     """The loads that a row of System.forces runs."""
-    return [load for load in loads if (load.row[[FORCE, F_REALS]] == row[[FORCE, F_REALS]]).all()]
+    return [load for load in loads if (load.alone[0].force, load.alone[0].stride) == (row.force, row.stride)]
 
 
 def _address(force, name):

@@ -5,7 +5,6 @@ import numpy as np
 from ..elements.element import address
 from ..elements.loops.forces import INTS
 from ..errors import InvalidForce
-from .packed_forces import F_COUNT, F_FIRST_INT, F_REALS
 
 # columns of Network.frictions: bodies a and b; the side that the reaction is taken on; where its rows are in
 # Network.friction_rows; row of System.forces and place in it; addresses of the loops of friction_loops
@@ -25,7 +24,7 @@ def frictions_of(packed, bodies, rows_of, sides):
         on = 0 if force.on is force.a else 1
         for part in packed.constraints[members[id(force.joint)].parts]:
             rows += [(e, int(sides[e, 1] == bodies[id(force.on)])) for e in rows_of(part)]
-        kind, index = _place(packed.system.forces, load.row)
+        kind, index = _place(packed.system.forces, load.alone[0])
         loops = (address(force.kernels, name, force.name, InvalidForce) for name in ("unit_friction", "normal_load"))
         pair = (bodies.get(id(body), len(bodies)) for body in (force.a, force.b))
         frictions.append([*pair, on, first, len(rows) - first, kind, index, *loops])
@@ -35,7 +34,7 @@ def frictions_of(packed, bodies, rows_of, sides):
 def _place(kinds, row):
     """Return the row of System.forces that runs a load, and the index of the load in it."""
     for i, kind in enumerate(kinds):
-        index = (row[F_FIRST_INT] - kind[F_FIRST_INT]) // INTS
-        if kind[F_REALS] == row[F_REALS] and 0 <= index < kind[F_COUNT]:
+        index = (row.table - kind.table) // INTS
+        if kind.stride == row.stride and 0 <= index < kind.count:
             return i, int(index)
     raise AssertionError("a load has a row")

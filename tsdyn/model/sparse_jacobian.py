@@ -3,7 +3,6 @@
 import numpy as np
 
 from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE
-from .packed import COUNT, FIRST_INT
 
 WIDTH = 14  # floats of a row; those of body b begin in the middle
 
@@ -15,7 +14,7 @@ def with_short_rows(packed):
         system = packed.system
         table = system.table.copy()
         for kind in system.kinds:
-            first, count = kind[FIRST_INT], kind[COUNT]
+            first, count = kind.table, kind.count
             own = table[first : first + INTS * count].reshape(count, INTS)
             own[:, BLOCK] = WIDTH * own[:, ROW]
             own[:, BLOCK + 1] = WIDTH * own[:, ROW] + WIDTH // 2

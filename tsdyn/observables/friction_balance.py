@@ -47,7 +47,7 @@ def _unit(system, load, t, q, qd):
     """Generalised forces (n,) of one friction for a normal load of one."""
     memory = np.zeros((1, system.memory.size + system.normals.size))
     memory[0, system.memory.size + load.normal] = 1.0
-    return force_loads(system._replace(forces=load.row[None]), np.array([t]), q[None], qd[None], memory)[0]
+    return force_loads(system._replace(forces=load.alone), np.array([t]), q[None], qd[None], memory)[0]
 
 
 def _reaction(packed, load, q, qd, Phi_q):

@@ -55,7 +55,7 @@ def load_powers(packed, load, t, q, qd, memory):
             twin(kind.law)(values, xd, par, t, f)
             work = sum(a * b for a, b in zip(f, xd, strict=True))
         else:  # a function of a user's has no twin on arrays
-            system = packed.system._replace(forces=load.row[None])
+            system = packed.system._replace(forces=load.alone)
             work = np.einsum("kn,kn->k", force_loads(system, t, q, qd, memory), qd)
     return U.x, lost, work + U.xd + lost
 
@@ -85,7 +85,7 @@ def _turning(p, pd):
 def power_of(solution, item):
     """Power (k,) that a constraint puts in, lam . Phi_t of its rows, or a force: applied, less what it dissipates.
 
-    item is a system.Member or a force_pack.Load.
+    item is a packed.Member or a packed_forces.Load.
     """
     if not hasattr(item, "rows"):
         _, lost, applied = load_powers(solution.packed, item, solution.t, solution.q, solution.qd, solution._memory)

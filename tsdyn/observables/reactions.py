@@ -12,7 +12,7 @@ from ..elements.markers import POINT
 from ..jit.kernels import entry, resident
 from ..maths.dense_linalg import copy
 from ..model.equations import constraint_jacobian, set_time
-from ..model.packed import COUNT, FIRST_INT, FIRST_REAL, REALS, classes, index_of
+from ..model.packed import classes, index_of
 from ..model.sparse_jacobian import WIDTH, with_short_rows
 from ..rows.schur_complement import gather, scatter
 from ..sparse.constraint_graph import REDUCED
@@ -120,11 +120,11 @@ def only(packed, parts):
             seen[type(constraint)] += 1
         packed.derived.places_within = within
     rows = dict(zip(classes(packed), with_short_rows(packed).kinds, strict=True))
-    kinds = np.array([rows[type(part)] for part in packed.constraints[parts]])
+    kinds = np.array([rows[type(part)] for part in packed.constraints[parts]], packed.system.kinds.dtype)
     within = np.array(packed.derived.places_within[parts])
-    kinds[:, FIRST_INT] += INTS * within
-    kinds[:, FIRST_REAL] += kinds[:, REALS] * within
-    kinds[:, COUNT] = 1
+    kinds["table"] += INTS * within
+    kinds["reals"] += kinds["stride"] * within
+    kinds["count"] = 1
     return kinds
 
 
@@ -137,7 +137,7 @@ def loads_of(packed):
 
 def force_reaction(solution, load, body):
     """Force and torque (k, 3) that a force exerts on a body, torque about its first point on it, ground frame."""
-    force, system = load.force, solution.system._replace(forces=load.row[None])
+    force, system = load.force, solution.system._replace(forces=load.alone)
     Q = force_loads(system, solution.t, solution.q, solution.qd, solution._memory)
     at, length = solution.system.bodies[index_of(solution.packed, body)]
     return _at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)

@@ -5,16 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements import primitive
-from ..elements.loops import constraint_rows, force_series
+from ..elements.loops import constraint_rows, coordinate_rows, force_series
 from ..elements.loops import forces as force_loops
 from ..formulations.locked_orientations import instances
-from ..model.packed import COUNT, FIRST_INT
-from ..model.packed_forces import F_COUNT, F_FIRST_INT, F_REMEMBER, FORCE, members_of
+from ..model.packed_forces import members_of
 from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT
 from . import timers
 
 X_ADDRESS, X_COUNT, X_FIRST_INT = 0, 2, 4  # columns of Expansion.forces
+OF_KIND = "phi", "jacobian", "gamma", "phi_t"  # the loops of System.kinds and of System.forces that are timed
+OF_FORCE = "force", "remember"
 
 
 class Entry(NamedTuple):
@@ -105,22 +105,22 @@ class Timekeeper(Stopwatch):
         table, firsts = self._headed(network.table, rows)
         kinds = network.kinds.copy()
         kinds[:, N_FIRST_INT] = firsts
-        _instead(kinds, range(timers.IN_ORDERS), timers.BODY_TIMERS)
+        _instead(kinds.T, range(timers.IN_ORDERS), timers.BODY_TIMERS)
         network = network._replace(table=table, kinds=kinds)
 
         rows = [
-            (row[FIRST_INT], row[COUNT] * primitive.INTS, row[: timers.IN_ORDERS], _of_constraints(kind))
+            (row.table, row.count * coordinate_rows.INTS, [row[name] for name in OF_KIND], _of_constraints(kind))
             for kind, row in zip(classes, system.kinds, strict=True)
         ]
         rows += [
-            (row[F_FIRST_INT], row[F_COUNT] * force_loops.INTS, row[[FORCE, F_REMEMBER]], _of_forces(members))
+            (row.table, row.count * force_loops.INTS, [row[name] for name in OF_FORCE], _of_forces(members))
             for members, row in zip(forces, system.forces, strict=True)
         ]
         table, firsts = self._headed(system.table, rows)
         kinds, loads = system.kinds.copy(), system.forces.copy()
-        kinds[:, FIRST_INT], loads[:, F_FIRST_INT] = firsts[: len(kinds)], firsts[len(kinds) :]
-        _instead(kinds, range(timers.IN_ORDERS), timers.LOOP_TIMERS)
-        _instead(loads, (FORCE, F_REMEMBER), timers.LOOP_TIMERS)
+        kinds["table"], loads["table"] = firsts[: len(kinds)], firsts[len(kinds) :]
+        _instead(kinds, OF_KIND, timers.LOOP_TIMERS)
+        _instead(loads, OF_FORCE, timers.LOOP_TIMERS)
         c = c._replace(network=network, system=system._replace(table=table, kinds=kinds, forces=loads))
         if series:
             c = c._replace(expansion=self._in_series(c.expansion, forces))
@@ -143,8 +143,8 @@ class Timekeeper(Stopwatch):
         table, firsts = self._headed(x.table, rows)
         places, loads = x.places.copy(), x.forces.copy()
         loads[:, X_FIRST_INT] = firsts
-        _instead(places, [0], [timers.SERIES_TIMER])
-        _instead(loads, [X_ADDRESS], [timers.SERIES_TIMER])
+        _instead(places.T, [0], [timers.SERIES_TIMER])
+        _instead(loads.T, [X_ADDRESS], [timers.SERIES_TIMER])
         return x._replace(places=places, table=table, forces=loads)
 
     def _in_driver(self, addresses, roles):
@@ -196,12 +196,12 @@ def _what(slot):
     return timers.ROWS, within, -1, kind, loop
 
 
-def _instead(rows, columns, timers):
-    """Timers in place of those loops that there are in columns."""
-    for column, timer in zip(columns, timers, strict=False):
-        there = rows[:, column] != 0
+def _instead(columns, names, timers):
+    """Timers in place of those loops that there are in the columns of these names."""
+    for name, timer in zip(names, timers, strict=False):
+        there = columns[name] != 0
         if there.any():
-            rows[there, column] = timer.address
+            columns[name][there] = timer.address
 
 
 def _of_constraints(kind):

@@ -14,8 +14,7 @@ from ..elements.markers import POINT
 from ..elements.user_functions import Kernels
 from ..jit.compiler import is_ours
 from ..model.derived import Derived
-from ..model.packed import FIRST_REAL, REALS, classes
-from ..model.packed_forces import F_FIRST_REAL
+from ..model.packed import classes
 from ..runs.events import Instant
 from .scene_cache import Prepared
 from .tolerances import FAR_ORIGIN
@@ -126,11 +125,11 @@ def _moved(packed, origin):
     for kind, row in kinds:
         members = [i for i, constraint in enumerate(packed.constraints) if type(constraint) is kind]
         for at, i in enumerate(members):
-            begin = row[FIRST_REAL] + at * row[REALS]
+            begin = row.reals + at * row.stride
             coordinates[i] = move(packed.constraints[i], packed.coordinates[i], begin)
     coordinates = tuple(coordinates[i] for i in range(len(packed.constraints)))
     loads = tuple(
-        load._replace(coordinates=move(load.force, load.coordinates, load.row[F_FIRST_REAL])) for load in packed.loads
+        load._replace(coordinates=move(load.force, load.coordinates, load.alone[0].reals)) for load in packed.loads
     )
     return packed._replace(
         system=packed.system._replace(reals=reals),

@@ -217,7 +217,7 @@ class _Builder:
         for kind, packed_kind in zip(classes, self.system.kinds, strict=True):
             if kind.normalises:
                 continue
-            _, _, _, phi_t, _, stride, _, first_real, _ = packed_kind
+            phi_t, stride, first_real = packed_kind.phi_t, packed_kind.stride, packed_kind.reals
             last = None  # the instance before, where it is not left out
             for at, constraint in enumerate(c for c in self.packed.constraints if type(c) is kind):
                 i = index.get(id(constraint))

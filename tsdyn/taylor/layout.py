@@ -13,7 +13,7 @@ from ..errors import InvalidConstraint, InvalidForce
 from ..formulations.locked_orientations import instances
 from ..jit.aligned_arrays import zeros
 from ..jit.kernels import twin
-from ..model.packed_forces import F_FIRST_REAL, F_REALS, members_of
+from ..model.packed_forces import members_of
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tables import is_data
@@ -128,8 +128,8 @@ def _motions(network, packed, orders, places, constraints):
                 row = first + (kind.slots + j) * orders
                 moves = isinstance(given[entry], Motion)
                 if moves:
-                    address_, _, _, _, program = next(motions)
-                    rows.append([address_, program, row])
+                    motion = next(motions)
+                    rows.append([motion.value, motion.program, row])
                 else:
                     constraints[row] = given[entry]
                 entry += 1 if moves else 3
@@ -146,7 +146,7 @@ def _forces(packed, orders):
         kind = members[0].force
         series = address(kind.kernels, "series", kind.name, InvalidForce)
         width = force_series.instance_width(len(kind.markers), kind.slots, orders)
-        rows.append([series, total, len(members), row[F_REALS], len(table), row[F_FIRST_REAL], width])
+        rows.append([series, total, len(members), row.stride, len(table), row.reals, width])
         total += len(members) * width
         for load in members:
             pair = [index.get(id(body), nb) for body in (load.force.a, load.force.b)]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..jit.kernels import loader
-from ..model.packed import System
+from ..model.packed import System, no_system
 from ..rows.tangent_workspace import Free
 from ..sparse.constraint_graph import Network, no_network
 from .chart_workspace import Local, allocate_local
@@ -180,9 +180,7 @@ def basis_free_parts(network, n, basis):
 
 def plain_context():
     """A context of the right types."""
-    one, two = np.zeros(1), np.zeros((1, 1))
-    ones, twos = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    system = System(twos, one, two, one, twos, ones, one, twos, ones, twos, twos, twos, ones, ones, twos)
+    system = no_system()
     return Context(
         system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False), *basis_free_parts(no_network(), 2, False)
     )

@@ -16,7 +16,7 @@ from ..model.equations import evaluate_constraints
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..validation import finite_vector, number
 from .generalised_forces import applied_loads, velocity_forces
-from .tolerances import INDEPENDENT, LARGE, LEAST_DIVISOR, LOST, REDUNDANT_SHARES
+from .tolerances import INDEPENDENT, LARGE, LEAST_DIVISOR, LOST, LOST_DENSE, REDUNDANT_SHARES
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Floats, Matrix, Scene
@@ -218,7 +218,7 @@ def equilibrated_solve(A, b):
     """Solve a symmetric system scaled to unit rows; LinAlgError where it is singular to working precision."""
     scale = 1.0 / np.sqrt(np.maximum(np.abs(A).max(axis=1), LEAST_DIVISOR))
     scaled = A * scale[:, None] * scale
-    if A.size and np.linalg.cond(scaled) > 1e14:
+    if A.size and np.linalg.cond(scaled) > 1.0 / LOST_DENSE:
         raise np.linalg.LinAlgError
     return np.linalg.solve(scaled, b * scale) * scale
 

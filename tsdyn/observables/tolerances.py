@@ -2,6 +2,8 @@
 
 # Of the largest pivot of a sparse factorisation: a pivot below it is rounding.
 LOST = 1e-13
+# The reciprocal of the condition number below which a dense system, scaled to unit rows, is singular.
+LOST_DENSE = 1e-14
 # Of a row's diagonal entry, tried in turn: rows with smaller pivots are left out, as redundant.
 REDUNDANT_SHARES = 3e-2, 1e-3, 1e-6, 1e-9
 # Of the largest motion that the rows left out allow: a row that moves more is independent of the others left out.

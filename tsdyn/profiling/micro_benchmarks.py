@@ -11,10 +11,9 @@ from ..rows.evaluation import factor_rows
 from ..runs.run_state import T, load_run
 from ..taylor.workspace import load_series
 from ..workspaces.workspace import load
+from .tolerances import BRIEF, ROUNDS
 
 SYSTEM, NORMAL, VELOCITIES, MASS = range(4)
-BRIEF = 2e-3  # s, of a sample
-ROUNDS = 5
 
 
 @kernel

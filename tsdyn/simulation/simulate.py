@@ -166,26 +166,11 @@ def _request(scene, kept, method, options, state):
     q, qd = kept.start(scene, q, qd, span[0], options.initial_tol, memory, options.drop)
     if not form.serving(method).basis_free:
         demand_holonomic(kept.packed, q, span[0], form.name)
-    return Task(
-        prepared=kept,
-        method=method,
-        form=form,
-        span=span,
-        q=q,
-        qd=qd,
-        remembered=memory,
-        times=options.times,
-        dense_output=options.dense_output,
-        events=options.events,
-        constraint_tol=options.constraint_tol,
-        max_steps=options.max_steps,
-        interval=options.chart_interval or 0,
-        report=options.report,
-        history=options.history,
-        choose=None,
-        stops=stops_of(kept.motions, instants_of(kept.packed, *span), *span),
-        sampling=Sampling(kept, state is not None) if sampled(kept.packed) else None,
-    )
+    asked = {name: value for name, value in options._asdict().items() if name in Task._fields}
+    stops = stops_of(kept.motions, instants_of(kept.packed, *span), *span)
+    sampling = Sampling(kept, state is not None) if sampled(kept.packed) else None
+    made = {"prepared": kept, "method": method, "q": q, "qd": qd, "remembered": memory, "choose": None}
+    return Task(**{**asked, **made}, interval=options.chart_interval or 0, stops=stops, sampling=sampling)
 
 
 def _run(task, scene, initial_tol):

@@ -12,20 +12,33 @@ from ..methods.integrator import Integrator
 from ..observables.diagnostics import ConstraintError, constraint_error
 from ..simulation.simulate import simulate
 from .integrator_scenes import GRID, cases, distance, mean_distance
+from .tolerances import (
+    BOUNDED,
+    BY_ORDER,
+    COARSEST,
+    DENSE_TOLERANCE,
+    EPS,
+    FACTOR,
+    FEWEST,
+    HIGH_ORDER,
+    HIGH_TOLERANCE,
+    ITERATION_TRACE,
+    LEVELS,
+    MOST,
+    NO_TRACE,
+    ORDER_TOLERANCE,
+    POINTS,
+    RATIO,
+    REJECTED,
+    REPEATED,
+    ROUNDING,
+    STRETCHED,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-EPS = np.finfo(float).eps
-LEVELS = (50.0, 500.0, 5000.0)  # of eps: position, velocity, acceleration
 FORMS = ("tangent", "maggi-kane")
-ORDER_TOLERANCE, DENSE_TOLERANCE = 0.2, 0.5
-HIGH_ORDER, HIGH_TOLERANCE = 6, 0.75
-FEWEST, MOST, RATIO = 2, 6000, 2.0 ** (1.0 / 3.0)  # steps: in each part of the grid, in a run, from run to run
-POINTS = (4, 7)  # sizes of step that an order is fitted to
-COARSEST, ROUNDING = 0.05, 2e-11
-FACTOR = 100.0  # of the tolerance, that an error may come to
-BY_ORDER = {True: (1e-4, 1e-6, 1e-8), False: (1e-3, 1e-4, 1e-5)}  # tolerances from order four on, and below
 
 
 class Finding(NamedTuple):
@@ -111,7 +124,7 @@ def check_integrator(
             errors = ()
             if adaptive:
                 errors = _tolerances(method, case, form, where, order)
-                _repeats(lambda: _make(method, rtol=1e-4, atol=1e-4), case, form, where)
+                _repeats(lambda: _make(method, rtol=REPEATED, atol=REPEATED), case, form, where)
                 if kind.driver == "steps":  # series know a step's error before it is made
                     _rejections(method, case, form, where)
                 _bounds(method, case, form, where)
@@ -320,32 +333,30 @@ def _history(solution, where):
 
 def _rejections(method, case, form, where):
     """The first accepted step after a rejection ends where it ends when it is tried at once."""
-    bold = _make(method, rtol=1e-6, atol=1e-6)
+    bold = _make(method, rtol=REJECTED, atol=REJECTED)
     bold.first_step = case.end / 10.0
     after = _run(case, bold, form, max_steps=1)
     if not after.stats.steps:
         raise CheckFailed(f"{where}: after a first step of {bold.first_step:g} s: {after.message}")
     if not after.stats.rejected:
-        raise CheckFailed(f"{where}: a first step of {bold.first_step:g} s is accepted at a tolerance of 1e-6.")
-    plain = _make(method, rtol=1e-6, atol=1e-6)
+        raise CheckFailed(f"{where}: a first step of {bold.first_step:g} s is accepted at a tolerance of {REJECTED:g}.")
+    plain = _make(method, rtol=REJECTED, atol=REJECTED)
     plain.first_step = float(after.steps.h[after.steps.accepted][0])
     before = _run(case, plain, form, max_steps=1)
     if before.stats.rejected:
         raise CheckFailed(f"{where}: a step of {plain.first_step:g} s is accepted after a rejection, and not at once.")
     gap = max(distance(after.state.q, before.state.q), distance(after.state.qd, before.state.qd))
-    left = (
-        0.1 * max(bold.step_tolerances()) if bold.implicit else 1e-12
-    )  # an iteration ends elsewhere within its tolerance
+    left = ITERATION_TRACE * max(bold.step_tolerances()) if bold.implicit else NO_TRACE
     if not gap < left:
         raise CheckFailed(f"{where}: rejected steps leave a trace of {gap:.1e} in the step that is accepted.")
 
 
 def _bounds(method, case, form, where):
     """first_step and max_step are kept."""
-    made = _make(method, rtol=1e-3, atol=1e-3)
+    made = _make(method, rtol=BOUNDED, atol=BOUNDED)
     made.first_step, made.max_step = case.end / 1000.0, case.end / 400.0
     steps = _finished(_run(case, made, form), where).steps
     if steps.h[0] != made.first_step:
         raise CheckFailed(f"{where}: the first step is {steps.h[0]:g} s, not the first_step of {made.first_step:g} s.")
-    if steps.h.max() > made.max_step * 1.002:  # the last one may be stretched by a thousandth, to end on time
+    if steps.h.max() > made.max_step * STRETCHED:  # the last one may be stretched by a thousandth, to end on time
         raise CheckFailed(f"{where}: a step of {steps.h.max():g} s is longer than the max_step of {made.max_step:g} s.")

@@ -9,10 +9,10 @@ from ..constraints import Distance, PlaneContact, Spherical
 from ..integrators import DOP853, RK45
 from ..simulation.scene import Scene
 from ..simulation.simulate import simulate
+from .tolerances import TIGHT
 
 GRID = 16  # equal parts of the span, at whose ends fixed steps are compared
 INNER = np.sort(np.random.default_rng(1).uniform(0.01, 0.99, 40))  # fractions of the span, within the steps
-TIGHT = 1e-13
 
 
 class Case(NamedTuple):

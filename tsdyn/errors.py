@@ -117,7 +117,7 @@ class InconsistentState(TsdynError, ValueError):
     Correct the bodies' poses, or call scene.assemble() to move them to the nearest consistent ones.
     """
 
-    constraints: tuple[Any, ...] = ()  # in conflict, where no state meets all of them
+    constraints: tuple[Any, ...] = ()  # in conflict, if no state satisfies all of them
 
 
 class RedundantConstraints(TsdynError, ValueError):
@@ -149,7 +149,7 @@ class SingularConfiguration(TsdynError, ArithmeticError):
     ...     ts.simulate(scene, (0, 1))
     ... except ts.SingularConfiguration as error:
     ...     print(str(error).partition(", so")[0])
-    needle: turning about the axis [0. 0. 1.] of its frame is free and carries no inertia
+    needle: rotation about the axis [0. 0. 1.] of its frame is free and has no inertia
     """
 
 
@@ -185,7 +185,7 @@ class StepFailure(TsdynError, ArithmeticError):
 
     Examples
     --------
-    Two steps of a pendulum, and no more:
+    A pendulum, stopped after two steps:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))

@@ -7,13 +7,13 @@ import numpy as np
 from ..observables import diagnostics, power
 from .tolerances import NO_POWER
 
-MOST_OUTPUTS = 200  # that are looked at
+MOST_OUTPUTS = 200  # examined
 
 
 def energy_error(solution, task):
-    """Largest change of the energy since the start, of the largest kinetic energy; None where it isn't constant.
+    """Return the largest change of energy since the start over the largest kinetic energy; None if it isn't conserved.
 
-    Outputs and the point reached are looked at.
+    Outputs and the last state are compared.
     """
     system, packed = solution.system, solution.packed
     if system.rheonomic[0] or system.normals.size:

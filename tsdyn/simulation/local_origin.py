@@ -21,7 +21,7 @@ from .tolerances import FAR_ORIGIN
 
 
 def origin_of(packed, q):
-    """The origin (3,) for a run from positions q (n,), or None for that of the scene."""
+    """Return the local origin (3,) for a run from positions q (n,); None for the origin of the scene."""
     of, origin = packed.derived.origin
     if of is not q:
         origin = _origin(packed, q)
@@ -45,7 +45,7 @@ def _origin(packed, q):
 
 
 def _points(packed):
-    """The corners (2, 3) of a box with the points of the ground that items are on, and the longest lever on a body."""
+    """Return the corners (2, 3) of a box around all ground points of items, and the longest lever on a body."""
     grounded, longest = [], 0.0
     pairs = [*zip(packed.constraints, packed.coordinates, strict=True)]
     pairs += [(load.force, load.coordinates) for load in packed.loads]
@@ -60,7 +60,7 @@ def _points(packed):
 
 
 def _sees_differences(packed):
-    """Return True if there are constraints or forces, and none that may depend on positions as they are."""
+    """Return True if there are constraints or forces, and none that may depend on absolute positions."""
     items = [*packed.constraints, *(load.force for load in packed.loads)]
     joined = packed.loads or not all(constraint.normalises for constraint in packed.constraints)
     own = joined and all(is_ours(type(item).__module__) for item in items)
@@ -68,7 +68,7 @@ def _sees_differences(packed):
 
 
 def run_near(driver, task, scene, origin, tol):
-    """The `Outcome` of a task whose positions are taken from an origin; tol as of `Prepared.start`."""
+    """Return the `Outcome` of a task run relative to a local origin; tol as for `Prepared.start`."""
     packed = task.prepared.packed
     local, shift = _local(task.prepared, scene, origin), np.zeros(task.q.size)
     shift[packed.system.bodies[:, :1] + np.arange(3)] = origin
@@ -101,7 +101,7 @@ def run_near(driver, task, scene, origin, tol):
 
 
 def _local(prepared, scene, origin):
-    """The `Prepared` of the scene with that origin; kept for the next run."""
+    """Return the `Prepared` of the scene relative to that origin; kept for the next run."""
     kept = prepared.packed.derived.local
     if kept is None or (kept[0] != origin).any():
         kept = prepared.packed.derived.local = origin, Prepared(scene, _moved(prepared.packed, origin))
@@ -141,7 +141,7 @@ def _moved(packed, origin):
 
 
 def _away(function, packed, shift):
-    """A user's event function that is given positions as they are in the scene."""
+    """Return an event function that receives positions in the scene's coordinates."""
 
     def moved(t, instant):
         begin, state, angles = instant._beside
@@ -163,7 +163,7 @@ class _Moved:
         return getattr(self.trajectory, name)
 
     def __call__(self, t):
-        """As of a `Trajectory`."""
+        """Evaluate as a `Trajectory` does."""
         states, memory, status = self.trajectory(t)
         states[:, 0] += self.shift
         return states, memory, status

@@ -18,7 +18,7 @@ from .progress import reporter
 
 
 class Options(NamedTuple):
-    """What a run was asked for; None where something follows from the scene."""
+    """Options of a run; None where the scene decides."""
 
     span: tuple  # start and end, s
     method: Any  # Integrator, or None
@@ -69,7 +69,7 @@ def checked(given):
 
 
 def _method(integrator, rtol, atol, form):
-    """The method that was asked for, None for the default."""
+    """Return the requested method, None for the default."""
     if integrator is None:
         return None
     method = method_of(integrator, rtol, atol)

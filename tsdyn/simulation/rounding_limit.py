@@ -8,13 +8,13 @@ from ..formulations.chart_validity import ROUNDING
 from ..sparse.massless_axes import levers
 from .tolerances import FAR_LEVER
 
-NOISE = 4.0 * ROUNDING  # of a position, over the lever: what a placement leaves of a direction
+NOISE = 4.0 * ROUNDING  # direction error of a placement: rounding of a position over the lever
 
 
 def within_rounding(method, packed, q):
-    """A method whose steps look for no smaller errors than there are digits for, and a sentence if it is another.
+    """Return the method with attainable tolerances, and a sentence if they were raised.
 
-    Series know by themselves what a landing leaves.
+    The Taylor method accounts for the rounding of its projection itself.
     """
     if method.step is not None or method.driver != "steps":
         return method, ""

@@ -61,11 +61,11 @@ def simulate(  # many arguments, by name: each is an option of a run
     ----------
     scene : Scene
     t_span : (float, float), s
-        Start and end, the end later.
+        Start and end, start < end.
     integrator : Integrator or str, optional
-        A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor;
-        DOP853 where a part of the scene has no series; SDIRK54, from the start, where the motion is found stiff and
-        SDIRK54 needs fewer evaluations.
+        A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor; DOP853 if a part of the
+        scene has no series; SDIRK54, restarted from t_span[0], if the motion is found stiff and SDIRK54 needs fewer
+        evaluations.
     rtol, atol : float, optional
         Tolerances of the default method, or of an adaptive method given by name; default 1e-8. An instance has its own
         tolerances; rtol or atol beside an instance is refused.
@@ -98,8 +98,7 @@ def simulate(  # many arguments, by name: each is an option of a run
     max_step : float, s, optional
         Longest step, for every method; a longer fixed step is reduced to it.
     history : bool
-        Keep `solution.steps` and `solution.charts`: 8 bytes a step, 16 to 40 more for each step rejected and each
-        chart.
+        Keep `solution.steps` and `solution.charts`: 8 bytes per step, 16 to 40 more per rejected step and chart.
     progress : bool or callable, optional
         True shows a bar (needs tqdm); a callable receives the fraction done, 0 to 1.
     chart_interval : int, optional
@@ -146,7 +145,7 @@ def simulate(  # many arguments, by name: each is an option of a run
 
     started = time.perf_counter()
     task = _request(scene, kept, method, options, state)
-    if integrator is None and task.sampling is None:  # what is asked in Python is asked once
+    if integrator is None and task.sampling is None:  # a sampled controller can't be rerun
         same = {name: given[name] for name in ("constraint_tol", "initial_tol", "max_step")}
         task = task._replace(choose=method_choice.chooser(simulate, scene, method, task.span[1], same))
     outcome = _run(task, scene, options.initial_tol)
@@ -157,7 +156,7 @@ def simulate(  # many arguments, by name: each is an option of a run
 
 
 def _request(scene, kept, method, options, state):
-    """The run request: the start is made consistent with the constraints."""
+    """Return the run request, with a start that is consistent with the constraints."""
     span, form = options.span, options.form
     for motion in kept.motions:
         motion.check(*span)
@@ -174,7 +173,7 @@ def _request(scene, kept, method, options, state):
 
 
 def _run(task, scene, initial_tol):
-    """The outcome of the method's driver, in coordinates near the scene where the scene is far from the origin."""
+    """Run the method's driver, relative to a local origin if the scene is far from its own."""
     driver, packed = DRIVERS.get(task.method.driver, task.method.driver), task.prepared.packed
     origin = origin_of(packed, task.q)
     if origin is not None:

@@ -11,11 +11,11 @@ from ..taylor.layout import without_series
 from ..validation import counted
 from .tolerances import BLOW_UP, MOST_SINGULAR, NEARLY_SINGULAR
 
-FEW = 3  # parts of a scene that are named
+FEW = 3  # items named in a message
 
 
 def account(solution, scene, reason):
-    """How the run of a solution ended, in words."""
+    """Return the termination message of a run."""
     reason = " ".join(part for part in (reason, _kept(solution.stats)) if part)
     if solution.success:
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
@@ -33,7 +33,7 @@ def account(solution, scene, reason):
 
 
 def _kept(stats):
-    """The accuracy near singular configurations, from energy and projections."""
+    """Report the accuracy near singular configurations, from energy and projections."""
     if not stats.steps_near_singular:
         return ""
     error = stats.energy_error
@@ -45,7 +45,7 @@ def _kept(stats):
 
 
 def _locked(solution):
-    """Say so where redundant rows leave nothing free."""
+    """Report that redundant rows leave no degree of freedom."""
     redundant = len(dropped_rows(solution.packed))
     still = redundant and not solution.system.rheonomic[0]
     if not (still and solution.q.shape[1] == len(solution.system.segments) - redundant):
@@ -63,7 +63,7 @@ def _growth(solution):
 
 
 def _suspect(solution, scene):
-    """Name what is nearly singular at the last point."""
+    """Name the nearly singular item at the last state."""
     if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
         return ""
     if solution.q.shape[1] > MOST_SINGULAR:
@@ -79,7 +79,7 @@ def _suspect(solution, scene):
 
 
 def _suspect_of_many(solution, scene):
-    """The same by elimination, at a cost of O(N)."""
+    """Do the same by elimination, in O(N)."""
     packed = solution.packed
     rows = dependent_rows(packed, solution._last[0], solution._reached, NEARLY_SINGULAR**2)
     redundant = len(dropped_rows(packed))

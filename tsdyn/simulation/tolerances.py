@@ -1,4 +1,4 @@
-"""Limits by which runs are prepared and judged, as shares of what is named unless a unit is."""
+"""Limits of the preparation and assessment of runs; dimensionless unless a unit is named."""
 
 # --- choice of the method ---
 # Steps of the pilot run of an implicit method, and the cost of an evaluation within an implicit stage, its share of the

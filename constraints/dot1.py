@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 class Dot1(Primitive):
-    """Keep the cosine of the angle between two body-fixed directions; by default keep them perpendicular.
+    """Cosine of the angle between two body-fixed directions; by default zero: they are perpendicular.
 
     Parameters
     ----------
     value : float, or three functions of time (c, cd, cdd); default 0
-        The cosine, between -1 and 1 (exclusive: there the row is singular).
+        The cosine, between -1 and 1 (exclusive: the row is singular there).
 
     Examples
     --------
@@ -47,12 +47,12 @@ class Dot1(Primitive):
         self.check()
 
     def check(self):
-        """A cosine."""
+        """Refuse a value that is no cosine."""
         initial = Motion.at_start(self.value)
         if not -1.0 < initial < 1.0:
             raise self.error(
                 f"{self.name}: value is the cosine of an angle and must lie between -1 and 1, got {initial:g}; "
-                "to make two axes parallel, keep each of two directions across one of them perpendicular to the other."
+                "for parallel axes use Parallel."
             )
 
     def parameters(self):

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 
 class Dot2(Primitive):
-    """Keep the offset of a point of b from a point of a, measured along an axis of a.
+    """Offset of a point of b from a point of a, along an axis of a.
 
     Parameters
     ----------
     value : float, or three functions of time (c, cd, cdd), m; default 0
-        The offset kept.
+        The offset.
 
     Examples
     --------

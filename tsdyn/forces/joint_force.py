@@ -15,7 +15,7 @@ from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements
 
 
 class JointForce(JointLoad, Force):
-    """Push b of a joint along its axis by a function of time, displacement and rate; with a period, sampled and held.
+    """Force along the axis of a joint, a function of time, displacement and rate; sampled and held if it has a period.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class JointForce(JointLoad, Force):
     period : float, s, optional
         As for JointTorque.
     which : int
-        Which displacement, of a joint that has several.
+        Index of the displacement, of a joint with several.
 
     Raises
     ------
@@ -72,7 +72,7 @@ class JointForce(JointLoad, Force):
 
     @staticmethod
     def remember(x, xd, par, t):
-        """The force, as it is held."""
+        """The held force."""
         return par[0]
 
 

@@ -315,7 +315,7 @@ class Scene:
         return found(self, item) if twin is None else twin
 
     def row_names(self) -> list[str]:
-        """Return the names of the rows of Phi, in order: the constraint's title, and the row's label if it has several."""
+        """Return the names of the rows of Phi, in order: title of the constraint, and label of the row."""
         names, seen = [], Counter()
         for constraint in self.constraints:
             title = constraint.title

@@ -20,7 +20,7 @@ TIGHT, HOPELESS = 1e-10, 0.05
 # An extreme whose value is nearer to zero (share of the scale) is sampled; one beside an end that is nearer than the
 # second is looked for.
 NEAR, AT_ZERO = 0.01, 1e-6
-# No zero is where values exceed the higher half of the coefficients this many times.
+# Values that exceed the higher half of the coefficients by this factor exclude a zero.
 CLEAR = 10.0
 # Share of the interval on which roughness is rounding; the least interval, in roundings of the time; the least share of
 # the whole.

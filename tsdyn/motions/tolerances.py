@@ -3,9 +3,9 @@
 # Of the time: knots that are nearer to each other are one (some 50 roundings); of the run's length, the time that this
 # is at least a share of.
 TOGETHER, LEAST_SPAN = 1e-14, 1e-3
-# Of the largest value or rate at a knot: a smaller difference between its sides is rounding of the data, no jump.
+# Of the largest value or rate at a knot: smaller differences between its sides are rounding of data.
 JUMP = 1e-9
-# Of the largest value, over the shortest piece beside a knot, s: as much of a rate is rounding.
+# Of the largest value, over the shortest piece at a knot, s: the rounding error of a rate.
 ROUNDING = 1e-12
 
 # Derivatives given as functions are compared with quotients over these shares of the run's length (at most 1 s each),

@@ -18,7 +18,7 @@ JAMMED = (
 
 
 def balance(packed, t, q, qd, Phi_q, solve):
-    """Frictions (n,) and the solution of the equations of motion with them; solve(load) is linear but for solve(0).
+    """Return friction forces (n,) and the solution of the equations of motion; solve(load) is affine in the load.
 
     Newton's method for the normal loads N = N(lam_0 + sum_i lam_i N_i).
     """
@@ -44,21 +44,21 @@ def balance(packed, t, q, qd, Phi_q, solve):
 
 
 def _unit(system, load, t, q, qd):
-    """Generalised forces (n,) of one friction for a normal load of one."""
+    """Return the generalised forces g (n,) of one friction for unit normal load."""
     memory = np.zeros((1, system.memory.size + system.normals.size))
     memory[0, system.memory.size + load.normal] = 1.0
     return force_loads(system._replace(forces=load.alone), np.array([t]), q[None], qd[None], memory)[0]
 
 
 def _reaction(packed, load, q, qd, Phi_q):
-    """Make the function of multipliers (m,) that gives a normal load and its derivative (m,)."""
+    """Return a normal load as a function of multipliers (m,), with its derivative (m,)."""
     force, member = load.force, next(m for m in packed.members if m.constraint is load.force.joint)
     rows = Phi_q[member.rows]
     rows = rows if isinstance(rows, np.ndarray) else rows.toarray()
     at, (jets, _) = starts_of(packed)[force.on], marker_states(packed, load, q[None], qd[None])
     x = [float(np.squeeze(jet.x)) for jet in jets]
     s = np.array(x[:3] if force.on is force.a else x[6:9]) - q[at : at + 3]
-    wrench = np.zeros((6, rows.shape[0]))  # of multipliers of one: force, and torque about the point
+    wrench = np.zeros((6, rows.shape[0]))  # for unit multipliers: force, and torque about the point
     wrench[:3] = -rows[:, at : at + 3].T
     if force.on.dimension == 7:
         p = q[at + 3 : at + 7]

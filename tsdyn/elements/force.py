@@ -46,8 +46,8 @@ _OPTIONAL = {"potential": 3, "dissipation": 4, "remember": 4, "series": 6, "norm
 class Force(Attachment):
     """Base class of all forces.
 
-    Subclass it in one file of your own: set `markers`, write `law` as a static method, and pass the bodies and the
-    marker coordinates on in `__init__`. `tsdyn.testing.check_force` checks the result.
+    Subclass it in one file of your own: set `markers`, write `law` as a static method; an `__init__` with
+    further arguments passes the bodies and `**places` on. `tsdyn.testing.check_force` checks the result.
 
     Attributes
     ----------

@@ -42,10 +42,10 @@ if TYPE_CHECKING:
 class Thread(Primitive):
     """Rotation of b relative to a in proportion to its travel: the row of `Screw` and `RackAndPinion`.
 
+    Other joints must leave rotation of b about f x g alone.
+
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene, held by other joints so that b rotates about f x g alone.
     reference_a, across_a : array_like (3,)
         Directions of a at the angles 0 and pi/2, perpendicular to the axis of rotation; scaled to unit length.
     axis_a : array_like (3,)

@@ -28,6 +28,7 @@ PAIRS = {  # arguments: the class of hints.py that has them as attributes
     ("point_a", "point_b"): "Points",
     ("axis_a", "axis_b"): "Axes",
     ("reference_a", "reference_b"): "References",
+    ("joint", "function", "period", "which"): "JointLoads",
 }
 READ = {"ArrayLike": "Floats", "Prescribed": "Any", "Path": "Any", "Load": "Any", "VectorLoad": "Any"}  # what is kept
 

@@ -16,11 +16,9 @@ class TsdynError(Exception):
     --------
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
-    >>> try:
-    ...     ts.simulate(scene, (0, 1))
-    ... except ts.TsdynError as error:
-    ...     print(error)
-    the scene has no bodies; add one with scene.add_body(...).
+    >>> ts.simulate(scene, (0, 1))
+    Traceback (most recent call last):
+    tsdyn.errors.InvalidBody: the scene has no bodies; add one with scene.add_body(...).
     """
 
 
@@ -30,11 +28,9 @@ class InvalidArgument(TsdynError, ValueError):
     Examples
     --------
     >>> import tsdyn as ts
-    >>> try:
-    ...     ts.shapes.sphere(0.5)
-    ... except ts.InvalidArgument as error:
-    ...     print(error)
-    sphere: give either mass= in kg or density= in kg/m^3.
+    >>> ts.shapes.sphere(0.5)
+    Traceback (most recent call last):
+    tsdyn.errors.InvalidArgument: sphere: give either mass= in kg or density= in kg/m^3.
     """
 
 
@@ -44,11 +40,9 @@ class InvalidCall(InvalidArgument, TypeError):
     Examples
     --------
     >>> import tsdyn as ts
-    >>> try:
-    ...     ts.Table(time=(0, 1), values=(0, 1))
-    ... except ts.InvalidCall as error:
-    ...     print(error)
-    Table() has no argument time; did you mean times? It has times, values.
+    >>> ts.Table(time=(0, 1), values=(0, 1))
+    Traceback (most recent call last):
+    tsdyn.errors.InvalidCall: Table() has no argument time; did you mean times? It has times, values.
     """
 
 
@@ -59,11 +53,9 @@ class InvalidBody(TsdynError, ValueError):
     --------
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
-    >>> try:
-    ...     scene.add_body(mass=-1.0, inertia=(1, 1, 1))
-    ... except ts.InvalidBody as error:
-    ...     print(error)
-    body1: mass (kg) must be a positive finite number, got -1.0.
+    >>> scene.add_body(mass=-1.0, inertia=(1, 1, 1))
+    Traceback (most recent call last):
+    tsdyn.errors.InvalidBody: body1: mass (kg) must be a positive finite number, got -1.0.
     """
 
 
@@ -75,11 +67,9 @@ class InvalidConstraint(TsdynError, ValueError):
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
     >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
-    >>> try:
-    ...     ts.constraints.Dot1(body, scene.ground, axis_a=(0, 0, 1), axis_b=(0, 0, 0))
-    ... except ts.InvalidConstraint as error:
-    ...     print(error)
-    Dot1(body1, ground): axis_b has length zero; give a direction, such as (0, 0, 1).
+    >>> ts.constraints.Dot1(body, scene.ground, axis_a=(0, 0, 1), axis_b=(0, 0, 0))
+    Traceback (most recent call last):
+    tsdyn.errors.InvalidConstraint: Dot1(body1, ground): axis_b has length zero; give a direction, such as (0, 0, 1).
     """
 
 
@@ -91,11 +81,9 @@ class InvalidForce(TsdynError, ValueError):
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
     >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
-    >>> try:
-    ...     ts.forces.Spring(body, scene.ground, point_b=(1, 0, 0), stiffness=-5.0)
-    ... except ts.InvalidForce as error:
-    ...     print(error)
-    Spring(body1, ground): stiffness must be a finite number that is not negative, got -5.0.
+    >>> ts.forces.Spring(body, scene.ground, point_b=(1, 0, 0), stiffness=-5.0)
+    Traceback (most recent call last):
+    tsdyn.errors.InvalidForce: Spring(body1, ground): stiffness must be a finite number that is not negative, got -5.0.
     """
 
 
@@ -108,11 +96,9 @@ class InconsistentState(TsdynError, ValueError):
     >>> scene = ts.Scene()
     >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
     >>> rod = scene.add(ts.constraints.Distance(body, scene.ground, point_b=(1, 0, 0), length=1.5))
-    >>> try:
-    ...     ts.simulate(scene, (0, 1))
-    ... except ts.InconsistentState as error:
-    ...     print(error)
-    the initial position breaks 1 constraint row (allowed: 2e-09):
+    >>> ts.simulate(scene, (0, 1))
+    Traceback (most recent call last):
+    tsdyn.errors.InconsistentState: the initial position breaks 1 constraint row (allowed: 2e-09):
       Distance(body1, ground): Phi = -0.416667
     Correct the bodies' poses, or call scene.assemble() to move them to the nearest consistent ones.
     """
@@ -161,11 +147,9 @@ class UnknownAttribute(TsdynError, AttributeError):
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
     >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
-    >>> try:
-    ...     body.masss = 2.0
-    ... except ts.UnknownAttribute as error:
-    ...     print(error)
-    <Body 'body1'> has no attribute 'masss' to set; did you mean mass?
+    >>> body.masss = 2.0
+    Traceback (most recent call last):
+    tsdyn.errors.UnknownAttribute: <Body 'body1'> has no attribute 'masss' to set; did you mean mass?
     """
 
 

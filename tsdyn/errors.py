@@ -52,8 +52,7 @@ class InvalidBody(TsdynError, ValueError):
     Examples
     --------
     >>> import tsdyn as ts
-    >>> scene = ts.Scene()
-    >>> scene.add_body(mass=-1.0, inertia=(1, 1, 1))
+    >>> ts.Scene().add_body(mass=-1.0, inertia=(1, 1, 1))
     Traceback (most recent call last):
     tsdyn.errors.InvalidBody: body1: mass (kg) must be a positive finite number, got -1.0.
     """
@@ -65,9 +64,8 @@ class InvalidConstraint(TsdynError, ValueError):
     Examples
     --------
     >>> import tsdyn as ts
-    >>> scene = ts.Scene()
-    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
-    >>> ts.constraints.Dot1(body, scene.ground, axis_a=(0, 0, 1), axis_b=(0, 0, 0))
+    >>> body = ts.Scene().add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> ts.constraints.Dot1(body, "ground", axis_a=(0, 0, 1), axis_b=(0, 0, 0))
     Traceback (most recent call last):
     tsdyn.errors.InvalidConstraint: Dot1(body1, ground): axis_b has length zero; give a direction, such as (0, 0, 1).
     """
@@ -79,9 +77,8 @@ class InvalidForce(TsdynError, ValueError):
     Examples
     --------
     >>> import tsdyn as ts
-    >>> scene = ts.Scene()
-    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
-    >>> ts.forces.Spring(body, scene.ground, point_b=(1, 0, 0), stiffness=-5.0)
+    >>> ball = ts.Scene().add_point_mass(mass=1.0)
+    >>> ts.forces.Spring(ball, "ground", point_b=(1, 0, 0), stiffness=-5.0)
     Traceback (most recent call last):
     tsdyn.errors.InvalidForce: Spring(body1, ground): stiffness must be a finite number that is not negative, got -5.0.
     """
@@ -93,12 +90,11 @@ class InconsistentState(TsdynError, ValueError):
     Examples
     --------
     >>> import tsdyn as ts
-    >>> scene = ts.Scene()
-    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
-    >>> rod = scene.add(ts.constraints.Distance(body, scene.ground, point_b=(1, 0, 0), length=1.5))
-    >>> ts.simulate(scene, (0, 1))
+    >>> ball = ts.Scene().add_point_mass(mass=1.0)
+    >>> rod = ball.scene.add(ts.constraints.Distance(ball, "ground", point_b=(1, 0, 0), length=1.5))
+    >>> ts.simulate(ball.scene, (0, 1))
     Traceback (most recent call last):
-    tsdyn.errors.InconsistentState: the initial position breaks 1 constraint row (allowed: 2e-09):
+    tsdyn.errors.InconsistentState: the initial position breaks 1 constraint row (allowed: 1e-09):
       Distance(body1, ground): Phi = -0.416667
     Correct the bodies' poses, or call scene.assemble() to move them to the nearest consistent ones.
     """
@@ -111,6 +107,8 @@ class RedundantConstraints(TsdynError, ValueError):
 
     Examples
     --------
+    Two equal joints have three rows too many:
+
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
     >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
@@ -128,9 +126,11 @@ class SingularConfiguration(TsdynError, ArithmeticError):
 
     Examples
     --------
+    A thin rod has no inertia about its axis:
+
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
-    >>> needle = scene.add_body(**ts.shapes.rod(1.0, mass=1.0), name="needle")  # no inertia about its axis
+    >>> needle = scene.add_body(**ts.shapes.rod(1.0, mass=1.0), name="needle")
     >>> try:
     ...     ts.simulate(scene, (0, 1))
     ... except ts.SingularConfiguration as error:
@@ -145,8 +145,7 @@ class UnknownAttribute(TsdynError, AttributeError):
     Examples
     --------
     >>> import tsdyn as ts
-    >>> scene = ts.Scene()
-    >>> body = scene.add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> body = ts.Scene().add_body(mass=1.0, inertia=(1, 1, 1))
     >>> body.masss = 2.0
     Traceback (most recent call last):
     tsdyn.errors.UnknownAttribute: <Body 'body1'> has no attribute 'masss' to set; did you mean mass?

@@ -82,7 +82,7 @@ def benchmark(  # many arguments, by name: those of runs, and of how they are me
 
     Examples
     --------
-    Two methods on a pendulum at one tolerance:
+    A pendulum by two methods, at one tolerance only:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))

@@ -24,7 +24,12 @@ from ..validation import number
 from . import program as code
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import TypeAlias
+
     from ..hints import ArrayLike, Floats, Value
+
+    Operator: TypeAlias = Callable[["Smooth", "Smooth | float"], "Smooth"]
 
 
 class Operation(NamedTuple):
@@ -58,6 +63,11 @@ _OPERATIONS = {
     "tanh": Operation(code.TANH, 2, 0, np.tanh),
     "arctan": Operation(code.ARCTAN, 2, 0, np.arctan),
 }
+
+
+def _operators(operation: str) -> tuple[Operator, Operator]:
+    """Return a binary operator of motions, and the same with a number on the left."""
+    return lambda self, other: _binary(operation, self, other), lambda self, other: _binary(operation, other, self)
 
 
 class Smooth:
@@ -159,29 +169,10 @@ class Smooth:
         head = [0.0, len(instructions) // code.STEP, *places, rows, row[id(self)]]
         return [float(x) for x in (*head, *instructions, *constants)] + [0.0] * (rows * code.WIDTH)
 
-    def __add__(self, other: Smooth | float) -> Smooth:
-        return _binary("add", self, other)
-
-    def __radd__(self, other: Smooth | float) -> Smooth:
-        return _binary("add", other, self)
-
-    def __sub__(self, other: Smooth | float) -> Smooth:
-        return _binary("subtract", self, other)
-
-    def __rsub__(self, other: Smooth | float) -> Smooth:
-        return _binary("subtract", other, self)
-
-    def __mul__(self, other: Smooth | float) -> Smooth:
-        return _binary("multiply", self, other)
-
-    def __rmul__(self, other: Smooth | float) -> Smooth:
-        return _binary("multiply", other, self)
-
-    def __truediv__(self, other: Smooth | float) -> Smooth:
-        return _binary("divide", self, other)
-
-    def __rtruediv__(self, other: Smooth | float) -> Smooth:
-        return _binary("divide", other, self)
+    __add__, __radd__ = _operators("add")
+    __sub__, __rsub__ = _operators("subtract")
+    __mul__, __rmul__ = _operators("multiply")
+    __truediv__, __rtruediv__ = _operators("divide")
 
     def __neg__(self) -> Smooth:
         return _binary("multiply", -1.0, self)

@@ -9,19 +9,16 @@ Run it: python -m benchmarks.assembly [--count 200] [--seed 1] [mechanism ...]
 """
 
 import argparse
-import sys
 import time
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 import tsdyn as ts
+from tests.helpers.sketched_mechanisms import MECHANISMS
+from tests.helpers.sketches import CLEAR
 from tsdyn.configuration.continuation import close
 from tsdyn.configuration.kinetic_metric import Metric
-
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
-from sketches import CLEAR, MECHANISMS
 
 
 class Tally(NamedTuple):

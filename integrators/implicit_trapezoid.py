@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from ..plugins import DiagonallyImplicit, ImplicitTableau, linear_second, trapezoid_error
 
+LOOSE = 1e-3  # tolerance below which a step is held to less than its part
+
 
 class ImplicitTrapezoid(DiagonallyImplicit):
     """The trapezoidal rule with Jacobian reuse, adaptive or of a fixed step, for stiff scenes at modest accuracy.
@@ -21,9 +23,10 @@ class ImplicitTrapezoid(DiagonallyImplicit):
     """
 
     order = 2
+    margin = 100.0
     tableau = ImplicitTableau(a=((0,), (1 / 2, 1 / 2)), c=(0, 1), order=2, embedded_order=2)
     errors, second = (trapezoid_error,), linear_second
 
     def step_tolerances(self) -> tuple[float, float]:
         """A step's error has order 3 and a run's order 2: the power makes the latter follow the tolerance."""
-        return tuple(min(tol / 100.0, (tol / 100.0) * (tol / 1e-3) ** 0.5) for tol in (self.rtol, self.atol))
+        return tuple(tol / self.margin * min(1.0, (tol / LOOSE) ** 0.5) for tol in (self.rtol, self.atol))

@@ -6,6 +6,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
+from tests.helpers.tolerances import CLOSE, FAIR, HELD, NEAR, ROUNDING, TIGHT
 
 S = ts.shapes
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
@@ -25,7 +26,7 @@ def test_a_shape_makes_a_body():
     scene = ts.Scene()
     body = scene.add_body(**S.box((1.0, 2.0, 3.0), density=2.0), position=(1, 0, 0), name="block")
     assert body.mass == pytest.approx(12.0)
-    np.testing.assert_allclose(body.inertia, np.diag([13.0, 10.0, 5.0]), rtol=1e-14)
+    np.testing.assert_allclose(body.inertia, np.diag([13.0, 10.0, 5.0]), rtol=ROUNDING)
     assert ts.simulate(scene, (0.0, 0.1)).success
 
 
@@ -43,8 +44,8 @@ def test_a_shape_makes_a_body():
     ids=["ball", "dense ball", "shell", "cylinder", "dense cylinder", "tube", "rod"],
 )
 def test_closed_forms(shape, mass, inertia):
-    assert shape.mass == pytest.approx(mass, rel=1e-14)
-    np.testing.assert_allclose(shape.inertia, np.diag(inertia), rtol=1e-8, atol=1e-14)
+    assert shape.mass == pytest.approx(mass, rel=ROUNDING)
+    np.testing.assert_allclose(shape.inertia, np.diag(inertia), rtol=NEAR, atol=ROUNDING)
 
 
 def test_a_box_of_triangles_is_a_box(rng):
@@ -53,11 +54,11 @@ def test_a_box_of_triangles_is_a_box(rng):
     vertices, faces = hull(turn.apply((CUBE - 0.5) * size) + place)
     mesh = S.from_mesh(vertices, faces, density=3.0)
     box = S.box(size, density=3.0).rotated(turn).moved(place)
-    assert mesh.mass == pytest.approx(box.mass, rel=1e-9)
-    np.testing.assert_allclose(mesh.inertia, box.inertia, rtol=1e-8, atol=1e-8)
-    np.testing.assert_allclose(mesh.centroid, box.centroid, rtol=1e-12)
+    assert mesh.mass == pytest.approx(box.mass, rel=CLOSE)
+    np.testing.assert_allclose(mesh.inertia, box.inertia, rtol=NEAR, atol=NEAR)
+    np.testing.assert_allclose(mesh.centroid, box.centroid, rtol=HELD)
     tiny = S.from_mesh(vertices * 1e-6, faces, mass=1.0)
-    np.testing.assert_allclose(tiny.inertia, S.from_mesh(vertices, faces, mass=1.0).inertia * 1e-12, rtol=1e-7)
+    np.testing.assert_allclose(tiny.inertia, S.from_mesh(vertices, faces, mass=1.0).inertia * 1e-12, rtol=FAIR)
 
 
 def test_a_mesh_with_a_cavity():
@@ -66,7 +67,7 @@ def test_a_mesh_with_a_cavity():
     hollow = S.from_mesh(np.concatenate((vertices, inside)), np.concatenate((faces, turned)), density=8.0)
     assert hollow.mass == pytest.approx(7.0)
     expected = S.box((1, 1, 1), density=8.0).inertia - S.box((0.5, 0.5, 0.5), density=8.0).inertia
-    np.testing.assert_allclose(hollow.inertia, expected, atol=1e-14)
+    np.testing.assert_allclose(hollow.inertia, expected, atol=ROUNDING)
 
 
 def test_random_polyhedra_are_sums_of_their_halves(rng):
@@ -79,15 +80,15 @@ def test_random_polyhedra_are_sums_of_their_halves(rng):
         corners = np.vstack((points[triangle], [points.mean(axis=0)]))
         parts.append(S.from_mesh(*hull(corners), density=2.0))
     total = sum(parts[1:], parts[0])
-    assert total.mass == pytest.approx(whole.mass, rel=1e-12)
-    np.testing.assert_allclose(total.centroid, whole.centroid, atol=1e-12)
-    np.testing.assert_allclose(total.inertia, whole.inertia, atol=1e-11)
+    assert total.mass == pytest.approx(whole.mass, rel=HELD)
+    np.testing.assert_allclose(total.centroid, whole.centroid, atol=HELD)
+    np.testing.assert_allclose(total.inertia, whole.inertia, atol=TIGHT)
 
 
 def test_a_dumbbell():
     ball = S.sphere(0.1, mass=1.0)
     body = ball.moved((0, 0, 1)) + ball.moved((0, 0, -1)) + S.rod(2.0, mass=0.3)
-    np.testing.assert_allclose(np.diag(body.inertia), [2.108, 2.108, 0.008], rtol=1e-14)
+    np.testing.assert_allclose(np.diag(body.inertia), [2.108, 2.108, 0.008], rtol=ROUNDING)
     np.testing.assert_allclose(body.centroid, 0.0, atol=1e-16)
 
 

@@ -3,7 +3,7 @@
     python -m tools.stubs
 
 Type checkers do not run the code that finds these classes and that gives each its signature of `.at`: the stubs name
-them. tests/test_types.py fails where a stub is out of date.
+them. tests/project/test_types.py fails where a stub is out of date.
 """
 
 from __future__ import annotations

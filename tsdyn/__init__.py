@@ -9,9 +9,8 @@ _here = _Path(__file__).parent
 if not (_here / "constraints").is_dir():  # a checkout: they stand beside this folder
     __path__.append(str(_here.parent))
 
-from . import _moved, constraints, forces, integrators, motions, shapes, testing  # noqa: E402
+from . import _moved, constraints, forces, integrators, motions, shapes  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402
-from .benchmarking.benchmark import benchmark  # noqa: E402
 from .elements.bodies import Body, PointMass  # noqa: E402
 from .elements.force import Force  # noqa: E402
 from .elements.joint import Joint  # noqa: E402
@@ -106,21 +105,25 @@ __all__ = [
 
 
 if TYPE_CHECKING:
-    from . import plots
+    from . import plots, testing
+    from .benchmarking.benchmark import benchmark
     from .profiling.profile import profile
 else:
+    _LATER = {
+        "benchmark": ".benchmarking.benchmark",
+        "plots": ".plots",
+        "profile": ".profiling.profile",
+        "testing": ".testing",
+    }
 
     def __getattr__(name):
         """What is loaded when it is asked for: no run needs it."""
-        if name == "plots":
-            from importlib import import_module
+        if name not in _LATER:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from importlib import import_module
 
-            return import_module(".plots", __name__)
-        if name == "profile":
-            from .profiling.profile import profile
-
-            return profile
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        found = import_module(_LATER[name], __name__)
+        return found if _LATER[name] == f".{name}" else getattr(found, name)
 
 
 def __dir__() -> list[str]:

@@ -46,12 +46,12 @@ from .methods.explicit import (
     embedded_error,
     error_kernel,
     second_embedded_error,
-    step_kernel,
     vector,
 )
 from .methods.integrator import Adaptive, DiagonallyImplicit, ExplicitNystrom, ExplicitRungeKutta, Integrator
 from .methods.interpolants import DOP853 as DOP853_INTERPOLANT
 from .methods.interpolants import linear_second
+from .methods.plug_in import step_kernel
 from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
 from .motions.expressions import Smooth
 from .motions.prescribed import Motion

@@ -12,7 +12,7 @@ digits on which the two agree are vouched for. Written beside this script, as 64
     t, r, A, v, w_body, energy
                  output times, centroids, rotation matrices (rows first), velocities, body angular velocities, J
 
-tests/test_references.py recomputes these numbers from equations of its own.
+tests/simulation/test_references.py recomputes these numbers from equations of its own.
 """
 
 import json

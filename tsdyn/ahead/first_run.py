@@ -5,6 +5,7 @@ from ..formulations import friction_basis, friction_solve, linearisation, null_s
 from ..formulations.registry import FORMULATIONS
 from ..integrators import DOP853, Taylor
 from ..jit.compiled import DEBUG
+from ..methods.plug_in import called_for
 from ..motions import program
 from ..motions.signals import Signal
 from ..runs.arguments import tolerances
@@ -75,7 +76,7 @@ def of_method(method, form, within, far=False):
     yield from (kernels.place, kernels.accelerate, (kernels if form.basis_free else null_space).complete)
     yield from (kernels.check, kernels.start_chart, kernels.error_norm, advance)
     if method.driver == "steps":
-        yield method.kernel(form.first_order)[0]
+        yield from filter(None, called_for(method.kernel(form.first_order)[0]))
     if method.step is None:
         yield from method.errors
     if method.implicit:

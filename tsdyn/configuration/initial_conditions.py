@@ -7,13 +7,13 @@ from ..formulations.locked_orientations import keep_turning, settle, still
 from ..jit.kernels import resident
 from ..maths.row_rank import dependent
 from ..observables.evaluate import constraint_arrays
+from ..rows.interface import allocate_free, redundant_of, set_selection
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
-from ..sparse.constraint_graphs import drop, network_of
+from ..sparse.constraint_graphs import network_of, set_redundant
 from ..sparse.massless_axes import axis_of
-from ..workspaces.tangent_memory import allocate_free
-from ..workspaces.workspace import FLOOR, SIZE, U_TOL, parts
+from ..workspaces.workspace import parts
 from .rank import check_rank
-from .start_kernels import choose_rows, evaluate_start, free_axis, go_near_by, land_start
+from .start_kernels import evaluate_start, free_axis, go_near_by, land_start, select_redundant
 from .start_violations import demand_finite, demand_small, refuse_vanished
 from .tolerances import (
     DENSE_ENTRIES,
@@ -50,24 +50,24 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         _refuse(scene, start, dependent)
         dependent = -1
     start.demand_velocities()
-    known = packed.derived.dropped
+    known = packed.derived.redundant
     if dependent < 0:
         if known is not None:  # an earlier start had redundant rows
-            drop(packed, None)
+            set_redundant(packed, None)
             start = start.again()
         start.demand_inertia()
-        settle(packed, start.network, start.free.H)
+        settle(packed, start.network, start.free.rows.H)
         return start.landed()
     if known is None:
-        drop(packed, np.zeros(0, np.int64))
+        set_redundant(packed, np.zeros(0, np.int64))
         start = start.again()
     rows = start.redundant_rows()
     if known is None or len(known) != len(rows):
-        drop(packed, rows if len(rows) else None)
+        set_redundant(packed, rows if len(rows) else None)
         start = start.again()
     elif still(packed).bodies.size:
         start.check()  # for H where it starts
-    settle(packed, start.network, start.free.H)
+    settle(packed, start.network, start.free.rows.H)
     return start.landed()
 
 
@@ -81,7 +81,7 @@ class _Start:
         system = system._replace(reals=system.reals.copy())
         self.m = len(system.segments)
         whole = parts(system, self.network, q.size)
-        if self.packed.derived.dropped is not None:
+        if self.packed.derived.redundant is not None:
             whole = whole._replace(free=allocate_free(self.network, q.size, redundant=True))
         self.free, self.work, self.rates = whole.free, whole.work, np.zeros(len(self.network.row))
         self.context, *self._keep = resident(whole)
@@ -89,8 +89,8 @@ class _Start:
         self.at = rigid[:, None] + np.arange(3, 7)
         self.far = self.fast = False
         work = self.work
-        work.control[U_TOL], work.control[SIZE] = tol, self.packed.size
-        work.control[FLOOR] = ROUNDING * (self.packed.size + np.abs(q).max())
+        work.control.u_tol, work.control.size = tol, self.packed.size
+        work.control.floor = ROUNDING * (self.packed.size + np.abs(q).max())
 
     def demand_velocities(self):
         """Refuse velocities that violate the constraints."""
@@ -125,16 +125,14 @@ class _Start:
     def check(self):
         """Refuse violated rows; return the first row of H that depends on those before it, or -1."""
         scene, network, free, q, qd = self.scene, self.network, self.free, self.q, self.qd
-        dropped, free.dropped[0] = free.dropped[0], 0
-        dependent = evaluate_start(self.context, q, qd, self.t, self.rates)
-        free.dropped[0] = dropped
+        dependent = evaluate_start(self.context, q, qd, self.t, self.rates, 1)
         rows, real = network.normals[network.normals >= 0], network.row >= 0
         Phi, velocity = np.zeros(self.m), np.zeros(self.m)
         Phi[network.row[real]], velocity[network.row[real]] = free.b[real], self.rates[real]
         p, pd = q[self.at], qd[self.at]
         Phi[rows], velocity[rows] = 0.5 * ((p * p).sum(axis=1) - 1.0), (p * pd).sum(axis=1)
         H = np.ones((self.m, 1))
-        H[network.row[real], 0] = free.H.reshape(-1, 16)[real].sum(axis=1)
+        H[network.row[real], 0] = free.rows.H.reshape(-1, 16)[real].sum(axis=1)
         demand_finite(scene, Phi, H, velocity)
         demand_small(scene, Phi, self.tol * (1.0 + np.abs(q).max()), "position", "Phi")
         self.velocity = velocity
@@ -144,7 +142,7 @@ class _Start:
 
     def redundant_rows(self):
         """Return the rows that are redundant here and nearby; refuse a singular configuration."""
-        names, row, H = self.scene.row_names(), self.network.row, self.free.H.reshape(-1, 16)
+        names, row, H = self.scene.row_names(), self.network.row, self.free.rows.H.reshape(-1, 16)
         gone = np.flatnonzero(~H.any(axis=1) & (row >= 0))
         if gone.size:
             refuse_vanished(names[row[gone[0]]])
@@ -153,14 +151,13 @@ class _Start:
         way[-1] = way[:, 3] = way[:, 7] = 0.0
         loose = -1
         for share in REDUNDANT_SHARES:
-            self.free.dropped[0] = 0
-            evaluate_start(self.context, self.q, self.qd, self.t, self.rates)
-            if choose_rows(self.context, share) < 0:
+            evaluate_start(self.context, self.q, self.qd, self.t, self.rates, 1)
+            if select_redundant(self.context, self.t, share) < 0:
                 raise SingularConfiguration(NO_CHOICE)
             loose = self.loose_axis()
             if loose >= 0:
                 continue
-            rows = self.free.dropped[1 : 1 + self.free.dropped[0]].copy()
+            rows = redundant_of(self.free)
             if self.hold_near_by(way.ravel()):
                 return rows
         self.refuse_axis(loose)
@@ -189,13 +186,12 @@ class _Start:
         return joints[np.sort(dependent(A))]
 
     def serve(self, rows):
-        """Drop these rows; return True if S of the others is nonsingular."""
-        self.free.dropped[0] = rows.size
-        self.free.dropped[1 : 1 + rows.size] = rows
-        return evaluate_start(self.context, self.q, self.qd, self.t, self.rates) < 0 and self.loose_axis() < 0
+        """Take these rows for redundant; return True if S of the others is nonsingular."""
+        set_selection(self.free, rows)
+        return evaluate_start(self.context, self.q, self.qd, self.t, self.rates, 0) < 0 and self.loose_axis() < 0
 
     def hold_near_by(self, way):
-        """Return True if the dropped rows hold along the way to a nearby configuration."""
+        """Return True if the redundant rows hold along the way to a nearby configuration."""
         gone, leg = 0.0, NEIGHBOURHOOD
         while gone < NEIGHBOURHOOD:
             here = self.free.poses.copy()
@@ -236,6 +232,6 @@ def _refuse(scene, start, dependent):
         hub = scene.bodies[dict(network.welds.tolist())[dependent]].name
         raise RedundantConstraints(f"the constraints at {hub} depend on one another: {DEPENDENT}")
     name = scene.row_names()[network.row[dependent]]
-    if not free.H[16 * dependent : 16 * dependent + 16].any():
+    if not free.rows.H[16 * dependent : 16 * dependent + 16].any():
         refuse_vanished(name)
     raise RedundantConstraints(f"{name} depends on other constraint rows: {DEPENDENT}")

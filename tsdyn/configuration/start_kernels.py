@@ -4,31 +4,44 @@ from ..elements.loops.body_poses import move_bodies, place_bodies, write_positio
 from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
 from ..jit.kernels import entry, kernel
 from ..model.equations import set_time
-from ..rows.axis_rows import is_axis
-from ..rows.evaluation import factor_rows, run_loops
-from ..rows.independent_rows import drop_rows, select
-from ..rows.schur_complement import gather, scatter
-from ..sparse.constraint_graph import REDUCED
-from ..sparse.factorisation import solve
-from ..workspaces.workspace import SIZE, load_parts
+from ..rows.interface import (
+    DYNAMICS,
+    METRIC,
+    evaluate_rows,
+    factorise_selected_rows,
+    is_axis,
+    keep_every_row,
+    multiply_rows,
+    project,
+    restore_selection,
+    select_rows,
+)
+from ..workspaces.workspace import load_parts
 from .tolerances import IMMOBILE, LEAST_SIZE
 
 
-@entry("pvvdv")
-def evaluate_start(context, q, qd, t, velocity):
-    """f.b = Phi, velocity = Phi_q qd + Phi_t, H of the network's rows; the first row that depends on others, or -1."""
+@entry("pvvdvi")
+def evaluate_start(context, q, qd, t, velocity, every):
+    """f.b = Phi, velocity = Phi_q qd + Phi_t, H of the network's rows; the first row that depends on others, or -1.
+
+    With every = 1 of every row, with 0 without the redundant ones.
+    """
     c = load_parts(context)
     network, system, f = c.network, c.system, c.free
     set_time(system, t)
     place_bodies(network.bodies, q, f.poses)
     move_bodies(network.bodies, q, qd, f.poses)
-    run_loops(network, system.reals, REDUCED, f, t, f.b, f.H)
+    count = keep_every_row(f) if every == 1 else -1
+    evaluate_rows(network, system, f, f.rows, t)
     gather_speeds(network, f)
     find_drift(network, system, f, t)
-    gather(network, f.H, f.Z, velocity)
+    multiply_rows(network, f.rows, f.Z, velocity)
     for e in range(velocity.size):
         velocity[e] += f.gamma[e]
-    return factor_rows(network, f, f.H, f.Y, f.S, 0)
+    failed = factorise_selected_rows(network, f, f.rows, METRIC)
+    if every == 1:
+        restore_selection(f, count)
+    return failed
 
 
 @entry("pd")
@@ -49,14 +62,13 @@ def land_start(context, t):
     return 0
 
 
-@entry("pd")
-def choose_rows(context, share):
-    """Select the rows to drop, those whose pivots are below a share of their diagonal entries; return their number."""
+@entry("pdd")
+def select_redundant(context, t, share):
+    """Select redundant rows at the poses, those with pivots below a share; return their number, or -1."""
     c = load_parts(context)
-    f = c.free
-    select(c.network, f, f.H, f.Y, f.S, -1, share)
-    drop_rows(f.dropped, f.H)
-    return f.dropped[0] if factor_rows(c.network, f, f.H, f.Y, f.S, 0) < 0 else -1
+    network, f = c.network, c.free
+    count = select_rows(network, c.system, f, t, share)
+    return count if factorise_selected_rows(network, f, f.rows, METRIC) < 0 else -1
 
 
 @entry("pvd")
@@ -66,9 +78,9 @@ def free_axis(context, q, t):
     network, f = c.network, c.free
     set_time(c.system, t)
     place_bodies(network.bodies, q, f.poses)
-    run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)
-    failed = factor_rows(network, f, f.H, f.Y, f.S, 1)
-    return failed if is_axis(network, f.S, failed) else -1
+    evaluate_rows(network, c.system, f, f.rows, t)
+    failed = factorise_selected_rows(network, f, f.rows, DYNAMICS)
+    return failed if is_axis(network, f.rows, failed) else -1
 
 
 @entry("pdvd")
@@ -86,9 +98,7 @@ def go_near_by(context, t, way, far):
         f.Z[i] = way[i]
     wanted = _farthest(c)
     for _ in range(2):
-        gather(network, f.H, f.Z, f.b)
-        solve(network.pattern, f.S, f.b)
-        scatter(network, f.Y, f.b, f.Z)
+        project(network, f.rows, f.Z, f.b)
     found = _farthest(c)
     scale = far / found if found > IMMOBILE * wanted else 0.0
     for i in range(f.Z.size):
@@ -100,7 +110,7 @@ def go_near_by(context, t, way, far):
 @kernel
 def _farthest(c):
     """Return the largest entry of Z: rotations, and displacements as shares of the scene's size."""
-    Z, part, found = c.free.Z, 1.0 / max(c.work.control[SIZE], LEAST_SIZE), 0.0
+    Z, part, found = c.free.Z, 1.0 / max(c.work.control.size, LEAST_SIZE), 0.0
     for b in range(c.network.bodies.shape[0]):
         for i in range(3):
             found = max(found, max(abs(Z[8 * b + i]) * part, abs(Z[8 * b + 4 + i])))

@@ -9,11 +9,7 @@ from ..elements.loops.body_poses import OMEGA, POSE, P, add_torque, write_accele
 from ..jit.kernels import kernel
 from ..jit.simd import cross, fma, four, put, splat, sub, times
 from ..model.equations import applied_forces
-from ..rows.axis_rows import gather_axes
-from ..rows.evaluation import run_loops
-from ..rows.schur_complement import gather, scatter, weigh
-from ..sparse.constraint_graph import BIAS
-from ..sparse.factorisation import solve
+from ..rows.interface import constrain_accelerations, evaluate_bias, weigh_bodies
 
 
 @kernel
@@ -55,14 +51,8 @@ def accelerate_bodies(network, system, w, f, t):
 def solve_accelerations(network, system, w, f, t):
     """Solve for accelerations and multipliers, without qdd; w.q and w.qd are read if there are forces."""
     body_forces(network, system, w, f, t)
-    for b in range(network.bodies.shape[0]):
-        weigh(network.inverse, b, f.Z, 8 * b, f.Z, 8 * b)
+    weigh_bodies(network, f.Z)
     if f.b.size == 0:
         return
-    gather(network, f.H, f.Z, f.b)
-    gather_axes(network, f.Z, f.b)
-    run_loops(network, system.reals, BIAS, f, t, f.gamma, f.H)
-    for e in range(f.b.size):
-        f.b[e] += f.gamma[e]
-    solve(network.pattern, f.S, f.b)
-    scatter(network, f.Y, f.b, f.Z)
+    evaluate_bias(network, system, f, t)
+    constrain_accelerations(network, f.rows, f.gamma, f.Z, f.b)

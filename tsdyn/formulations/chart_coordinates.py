@@ -8,32 +8,10 @@ N       = H(q) C Y0                         derivative of Phi with respect to -u
 import math
 
 from ..elements.loops.body_poses import OMEGA, POSE, RD, R, orient
-from ..jit.kernels import kernel, long_kernel, stack
-from ..jit.simd import add, cross, first, fma, four, lanes, put, second, splat, sub, third, times, total
-from ..rows.axis_rows import leave_axes_out
-from ..rows.independent_rows import drop_diagonal
-from ..rows.schur_complement import inner, more, multiply_both
-from ..sparse.constraint_graph import (
-    H_BODY,
-    H_COLUMNS,
-    H_KIND,
-    H_LEFT,
-    H_RIGHT,
-    H_ROWS,
-    H_STRIDE,
-    H_TARGET,
-    ROWS,
-    ROWS_WELD,
-    W_MASS,
-    W_ROTATION,
-    WEIGHTS,
-    WELDS,
-)
-from ..sparse.factorisation import factor_lu
-from ..workspaces.workspace import FACTORIZATIONS
-
-FARTHEST = 0.9  # |d|^2: a body that has turned further is out of the chart's reach
-PIVOT_LIMIT = 1e-13  # of N: less of a diagonal entry than this is rounding
+from ..jit.kernels import kernel
+from ..jit.simd import add, cross, first, fma, four, lanes, put, second, splat, third, times, total
+from ..rows.interface import factorise_chart_matrix, rotate_rate
+from .tolerances import FARTHEST
 
 
 @kernel
@@ -52,6 +30,7 @@ def displace(network, l, poses):
             )  # d0 - 1, not d0: its rounding would be the same in every step
             put(l.d, 4 * b, lanes(x, y, z))
             l.d[4 * b + 3] = w
+            # p = p0 o (d0, d)
             e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
             p0 = e0 + (w * e0 - e1 * x - e2 * y - e3 * z)
             p1 = e1 + (w * e1 + e0 * x - e3 * y + e2 * z)
@@ -63,91 +42,19 @@ def displace(network, l, poses):
 
 
 @kernel
-def _turn_by(l, b, y):
-    """Return C y of body b, y in four lanes."""
-    x, e, z, w = l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2], l.d[4 * b + 3]
-    d = lanes(x, e, z)
-    along = total(times(d, y)) / (1.0 + w)
-    return add(y, sub(fma(d, splat(along), times(y, splat(w))), cross(d, y)))
-
-
-@kernel
 def turn_rates(network, l, rates, poses):
     """Set rd and omega' of the poses from rates of chart coordinates."""
     for b in range(network.bodies.shape[0]):
         put(poses, b * POSE + RD, four(rates, 8 * b))
         if network.bodies[b, 1] == 7:
-            put(poses, b * POSE + OMEGA, _turn_by(l, b, four(rates, 8 * b + 4)))
+            put(poses, b * POSE + OMEGA, rotate_rate(l, b, four(rates, 8 * b + 4)))
 
 
 @kernel
-def _multiply_parts_both(network, l, H, lower, upper):
-    """The products at the parts of hubs: X as in `factorise_normal`, and of the welds W0 before and C W0 after."""
-    t = stack(12)
-    for i in range(network.parts.shape[0]):
-        part, scale = network.parts[i], network.scales[i]
-        left, rows, right, columns = part[H_LEFT], part[H_ROWS], part[H_RIGHT], part[H_COLUMNS]
-        target, stride, kind, b = part[H_TARGET], part[H_STRIDE], part[H_KIND], part[H_BODY]
-        light, w = network.inverse[WEIGHTS * b + W_MASS], WEIGHTS * b + W_ROTATION
-        if kind != ROWS and network.bodies[b, 1] == 7:
-            for c in range(3):
-                put(t, 4 * c, _turn_by(l, b, four(network.inverse, w + 4 * c)))
-        for r in range(rows):
-            for c in range(columns):
-                at, h = target + r * stride + c, left + 16 * r
-                if kind == ROWS:
-                    other = right + 16 * c
-                    if left != right or c >= r:
-                        more(upper, at, scale * inner(H, h, l.X, other))
-                    if left != right or c > r:
-                        more(lower, at, scale * inner(H, other, l.X, h))
-                elif kind == WELDS:
-                    if r < 3 and r == c:
-                        more(upper, at, scale * light)
-                        more(lower, at, scale * light)
-                    elif r >= 3 and c >= 3:
-                        more(upper, at, scale * t[4 * (c - 3) + r - 3])
-                        more(lower, at, scale * t[4 * (r - 3) + c - 3])
-                else:
-                    turned = light * H[h + c]
-                    if c >= 3:
-                        o = 4 * (c - 3)
-                        turned = H[h + 4] * t[o] + H[h + 5] * t[o + 1] + H[h + 6] * t[o + 2]
-                    placed = l.X[h + c + c // 3]
-                    if kind == ROWS_WELD:
-                        more(upper, at, scale * turned)
-                        more(lower, at, scale * placed)
-                    else:
-                        more(upper, target + c * stride + r, scale * placed)
-                        more(lower, target + c * stride + r, scale * turned)
-
-
-@long_kernel
 def factorise_normal(network, w, f, l):
     """Factorise N = H C Y0 at the present H; False if N is singular."""
-    for e in range(network.sides.shape[0]):
-        for k in range(2):
-            at = 16 * e + 8 * k
-            put(l.X, at, four(l.Y0, at))
-            put(l.X, at + 4, _turn_by(l, network.sides[e, k], four(l.Y0, at + 4)))
-    multiply_both(network, f.H, l.X, l.lower, l.upper)
-    if network.parts.shape[0] > 0:
-        _multiply_parts_both(network, l, f.H, l.lower, l.upper)
-    for values in (l.lower, l.upper):
-        drop_diagonal(network, f.dropped, values)
-        leave_axes_out(network, values)
-    w.counters[FACTORIZATIONS] += 1
-    return factor_lu(network.pattern, l.lower, l.upper, PIVOT_LIMIT) < 0
-
-
-@kernel
-def gather_rates(network, H, poses, out):
-    """out = H (rd, omega') of the poses."""
-    for e in range(network.sides.shape[0]):
-        at, a, b = 16 * e, network.sides[e, 0] * POSE + RD, network.sides[e, 1] * POSE + RD
-        g = fma(four(H, at), four(poses, a), times(four(H, at + 4), four(poses, a + 4)))
-        g = fma(four(H, at + 8), four(poses, b), fma(four(H, at + 12), four(poses, b + 4), g))
-        out[e] = total(g)
+    w.counters.factorizations += 1
+    return factorise_chart_matrix(network, f, l)
 
 
 @kernel

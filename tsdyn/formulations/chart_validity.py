@@ -12,13 +12,10 @@ import math
 
 from ..elements.loops.body_poses import POSE, P, R, place_bodies
 from ..jit.kernels import kernel
-from ..jit.simd import get
 from ..maths.dense_linalg import copy
-from ..rows.evaluation import factorise_rows, run_loops, serve_still
-from ..sparse.constraint_graph import REDUCED
-from ..workspaces.chart_workspace import END, FACTORED, OFF, TIME
-from ..workspaces.workspace import CHARTS, CONDITION, CONTRACTION, FACTORIZATIONS, FLOOR, KEPT, PLACEMENTS, SIZE
+from ..rows.interface import METRIC, evaluate_rows, factorise_rows, pivot_loss, selection_serves
 from .chart_coordinates import factorise_normal, turned_most
+from .tolerances import CONTRACTION_LIMIT, ROUNDING, SAME, TINY, TURN_LIMIT, TURN_SHARE
 
 # reasons to leave a chart, as stored; REASONS names them
 STAY, BY_CONTRACTION, BY_TURN, BY_INTERVAL, BY_FAILURE, AT_START, BY_SERIES = range(7)
@@ -32,30 +29,23 @@ REASONS = (
     "step of a series",
 )
 
-CONTRACTION_LIMIT = 0.15
-TURN_LIMIT = 0.25
-TURN_SHARE = 0.55  # a turn alone, which no constraint minds, may go on to |d| = 0.9 in one step
-CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a turn of 60 degrees
-ROUNDING = 1e-15  # relative to the numbers that enter Phi: below this a residual says nothing
-SAME = 1e-6  # of N: factors that are off by less tell the contraction as well as new ones
-
 
 @kernel
 def touch(network, system, w, f, l, t):
     """Make the chart at w.q: base, H0, Y0, factors of S0. True if the rows of H0 are independent."""
     regular = True
-    last = l.numbers[END] > 0.0 and l.numbers[END] == w.counters[PLACEMENTS] and network.axes.rows.shape[0] == 0
-    if last and serve_still(network, f, f.S):  # the place that was left last
-        copy(f.H, l.H0)
-        copy(f.Y, l.Y0)
-        copy(f.S, l.S0)
-        w.counters[KEPT] += 1 if f.b.size > 0 else 0
+    same = l.state.placement > 0 and l.state.placement == w.counters.placements  # as the chart that was left last
+    if same and network.axes.rows.shape[0] == 0 and selection_serves(network, f, f.rows):
+        copy(f.rows.H, l.rows0.H)
+        copy(f.rows.Y, l.rows0.Y)
+        copy(f.rows.S, l.rows0.S)
+        w.counters.kept += 1 if f.b.size > 0 else 0
     else:
         place_bodies(network.bodies, w.q, f.poses)
-        run_loops(network, system.reals, REDUCED, f, t, f.b, l.H0)
+        evaluate_rows(network, system, f, l.rows0, t)
         if f.b.size > 0:
-            w.counters[FACTORIZATIONS] += 1
-            regular = factorise_rows(network, system.reals, f, t, f.b, l.H0, l.Y0, l.S0, 0)
+            w.counters.factorizations += 1
+            regular = factorise_rows(network, system, f, l.rows0, t, METRIC)
     for b in range(network.bodies.shape[0]):
         at, o = b * POSE, 8 * b
         for c in range(3):
@@ -67,15 +57,15 @@ def touch(network, system, w, f, l, t):
     size = 0.0
     for i in range(w.q.size):
         size = max(size, abs(w.q[i]))
-    w.counters[CHARTS] += 1
-    w.control[FLOOR] = ROUNDING * (w.control[SIZE] + size)
-    w.control[CONTRACTION], w.control[CONDITION] = 0.0, 1.0
-    l.numbers[TIME], l.numbers[FACTORED], l.numbers[END] = t, 0.0, 0.0
+    w.counters.charts += 1
+    w.control.floor = ROUNDING * (w.control.size + size)
+    w.control.contraction, w.control.condition = 0.0, 1.0
+    l.state.time, l.state.factored, l.state.placement = t, 0, 0
     return regular
 
 
 @kernel
-def measure_turns(network, q, l):
+def measure_turns(network, l, q):
     """l.d of positions q; (d0, d) = p0* o p."""
     for b in range(network.bodies.shape[0]):
         if network.bodies[b, 1] == 7:
@@ -90,27 +80,15 @@ def measure_turns(network, q, l):
 
 @kernel
 def turning(network, w, f, l):
-    """Return the reason to abandon the chart at l.d and f.H, or STAY; records contraction and condition."""
+    """Return the reason to abandon the chart at l.d and f.rows, or STAY; records contraction and condition."""
     turn, contraction = turned_most(l), 0.0
     if f.b.size > 0:
-        known = l.numbers[FACTORED] > 0.0 and l.numbers[OFF] < SAME
-        w.counters[KEPT] += 1 if known else 0
-        contraction = _contraction(network, l) if known or factorise_normal(network, w, f, l) else math.inf
-    l.numbers[FACTORED] = 0.0  # dense output, if there is any, would come between
-    w.control[CONTRACTION] = max(contraction, TURN_SHARE * turn)
-    w.control[CONDITION] = (1.0 + w.control[CONTRACTION]) / max(1.0 - w.control[CONTRACTION], 1e-300)
+        known = l.state.factored == 1 and l.state.off < SAME
+        w.counters.kept += 1 if known else 0
+        contraction = pivot_loss(network, l) if known or factorise_normal(network, w, f, l) else math.inf
+    l.state.factored = 0  # dense output, if there is any, would come between
+    w.control.contraction = max(contraction, TURN_SHARE * turn)
+    w.control.condition = (1.0 + w.control.contraction) / max(1.0 - w.control.contraction, TINY)
     if not contraction < CONTRACTION_LIMIT:
         return BY_CONTRACTION
     return STAY if turn < TURN_LIMIT else BY_TURN
-
-
-@kernel
-def _contraction(network, l):
-    """Return the contraction from the reciprocal pivots of N and S0."""
-    pattern, worst = network.pattern, 0.0
-    for j in range(pattern.heads.size):
-        at, step = pattern.heads[j], pattern.widths[j] + 1
-        for _ in range(pattern.starts[j + 1] - pattern.starts[j]):
-            worst = max(worst, abs(1.0 - get(l.S0, at) / get(l.upper, at)))
-            at += step
-    return worst

@@ -12,31 +12,23 @@ import math
 from ..errors import Status
 from ..jit.kernels import callback, kernel, stack, vector
 from ..maths.dense_linalg import cholesky_solve, copy, largest, lu, lu_solve
+from ..maths.euler_parameters import multiply_g
 from ..model.packed_friction import FR_BODY, FR_COUNT, FR_FIRST, FR_ON
 from ..workspaces.workspace import load
-from .friction_solve import RUB, normal_load, unit_friction
+from .friction_loads import RUB, is_settled, normal_load, step_share, unit_friction
+from .tolerances import BASIS_LOAD_ROUNDING, LOAD_SWEEPS
 
 OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
-SWEEPS, DAMPED = 40, 12
-ROUNDING = 4e-16  # of the largest normal load
 
 
 @kernel
-def _turn(p, x, out):
-    """out = G(p) x; p, x (4,), out (3,)."""
-    out[0] = -p[1] * x[0] + p[0] * x[1] + p[3] * x[2] - p[2] * x[3]
-    out[1] = -p[2] * x[0] - p[3] * x[1] + p[0] * x[2] + p[1] * x[3]
-    out[2] = -p[3] * x[0] + p[2] * x[1] - p[1] * x[2] + p[0] * x[3]
-
-
-@kernel
-def _add_momentum(s, b, p, x, y, f, out):
-    """out += f G(p)^T J' G(x) y of body b; out (4,)."""
-    w, J = stack(3), s.inertia[b]
-    _turn(x, y, w)
-    h0 = f * (J[0] * w[0] + J[1] * w[1] + J[2] * w[2])
-    h1 = f * (J[3] * w[0] + J[4] * w[1] + J[5] * w[2])
-    h2 = f * (J[6] * w[0] + J[7] * w[1] + J[8] * w[2])
+def _add_momentum(system, b, p, x, y, scale, out):
+    """out += scale G(p)^T J' G(x) y of body b; out (4,)."""
+    w, J = stack(3), system.inertia[b]
+    multiply_g(x, y, w)
+    h0 = scale * (J[0] * w[0] + J[1] * w[1] + J[2] * w[2])
+    h1 = scale * (J[3] * w[0] + J[4] * w[1] + J[5] * w[2])
+    h2 = scale * (J[6] * w[0] + J[7] * w[1] + J[8] * w[2])
     out[0] += -p[1] * h0 - p[2] * h1 - p[3] * h2
     out[1] += p[0] * h0 - p[3] * h1 + p[2] * h2
     out[2] += p[3] * h0 + p[0] * h1 - p[1] * h2
@@ -44,15 +36,15 @@ def _add_momentum(s, b, p, x, y, f, out):
 
 
 @kernel
-def _subtract_inertia(s, q, x, out):
+def _subtract_inertia(system, q, x, out):
     """out -= M x."""
-    for b in range(s.mass.size):
-        at = s.bodies[b, 0]
+    for b in range(system.mass.size):
+        at = system.bodies[b, 0]
         for c in range(at, at + 3):
-            out[c] -= s.mass[b] * x[c]
-        if s.bodies[b, 1] == 7:
+            out[c] -= system.mass[b] * x[c]
+        if system.bodies[b, 1] == 7:
             p = q[at + 3 : at + 7]
-            _add_momentum(s, b, p, p, x[at + 3 : at + 7], -4.0, out[at + 3 : at + 7])
+            _add_momentum(system, b, p, p, x[at + 3 : at + 7], -4.0, out[at + 3 : at + 7])
 
 
 @kernel
@@ -80,49 +72,51 @@ def _expand(w, vdd, out):
 
 
 @kernel
-def _find_bases(s, w, network, f, t, vdd):
+def _find_bases(network, system, w, f, t, vdd):
     """lam_0 and, for each friction, a_i and l_i."""
     r, n, m, k = f.friction, w.q.size, w.Phi.size, vdd.size
     lam, left, x, Q = r.numbers[:m], r.numbers[2 * m : 2 * m + n], r.numbers[2 * m + n : 2 * m + 2 * n], stack(14)
+    # lam_0 = B^T U^T (Q_A + Q_v - M qdd_0),    qdd_0 = D vdd - U B gamma
     copy(w.h, x)
     _expand(w, vdd, x)
     copy(w.Q, left)
-    for b in range(s.mass.size):
-        at = s.bodies[b, 0]
+    for b in range(system.mass.size):
+        at = system.bodies[b, 0]
         for c in range(3):
-            left[at + c] += s.mass[b] * s.gravity[c]
-        if s.bodies[b, 1] == 7:
+            left[at + c] += system.mass[b] * system.gravity[c]
+        if system.bodies[b, 1] == 7:
             pd = w.qd[at + 3 : at + 7]
-            _add_momentum(s, b, pd, pd, w.q[at + 3 : at + 7], 8.0, left[at + 3 : at + 7])
-    _subtract_inertia(s, w.q, x, left)
+            _add_momentum(system, b, pd, pd, w.q[at + 3 : at + 7], 8.0, left[at + 3 : at + 7])
+    _subtract_inertia(system, w.q, x, left)
     _multipliers(w, left, lam)
+    # a_i = (D^T M D)^-1 D^T g_i,    l_i = B^T U^T (g_i - M D a_i)
     for i in range(network.frictions.shape[0]):
         friction, a = network.frictions[i], r.basis[i, :k]
-        unit_friction(s, friction, w.q, w.qd, t, Q)
+        unit_friction(system, friction, w.q, w.qd, t, Q)
         for c in range(n):
             left[c] = x[c] = 0.0
         for j in range(k):
             a[j] = 0.0
         for side in range(2):
             body = friction[FR_BODY + side]
-            if body < s.mass.size:
-                at = s.bodies[body, 0]
-                for c in range(s.bodies[body, 1]):
+            if body < system.mass.size:
+                at = system.bodies[body, 0]
+                for c in range(system.bodies[body, 1]):
                     g = Q[7 * side + c]
                     left[at + c] = g
                     for j in range(k):
                         a[j] += w.D[at + c, j] * g
         cholesky_solve(w.A, a, k)
         _expand(w, a, x)
-        _subtract_inertia(s, w.q, x, left)
+        _subtract_inertia(system, w.q, x, left)
         _multipliers(w, left, r.basis[i, n : n + m])
 
 
 @kernel
-def _find_load(s, w, network, friction, lam, t, out, by_row):
+def _find_load(network, system, w, friction, lam, t, out, by_row):
     """out (7,) as of friction_solve.normal_load, and by_row (m,) its derivative by the multipliers, of its own rows."""
     body = friction[FR_BODY + friction[FR_ON]]
-    at, turns = s.bodies[body, 0], s.bodies[body, 1] == 7
+    at, turns = system.bodies[body, 0], system.bodies[body, 1] == 7
     reaction, half, torque = stack(6), stack(4), stack(3)
     for c in range(6):
         reaction[c] = 0.0
@@ -135,7 +129,7 @@ def _find_load(s, w, network, friction, lam, t, out, by_row):
             if turns:
                 for c in range(4):
                     half[c] = 0.5 * row[at + 3 + c]
-                _turn(w.q[at + 3 : at + 7], half, torque)
+                multiply_g(w.q[at + 3 : at + 7], half, torque)
             if only_sum == 0:
                 for c in range(3):
                     reaction[c] -= row[at + c] * lam[e]
@@ -146,24 +140,24 @@ def _find_load(s, w, network, friction, lam, t, out, by_row):
                     x -= row[at + c] * out[1 + c] + torque[c] * out[4 + c]
                 by_row[e] = x
         if only_sum == 0:
-            normal_load(s, friction, w.q, w.qd, t, 1, reaction, out)
+            normal_load(system, friction, w.q, w.qd, t, 1, reaction, out)
 
 
 @callback(RUB)
 def rub(context, t, vdd):
     """Add joint friction to vdd. Status."""
     c = load(context)
-    s, w, f, network = c.system, c.work, c.free, c.network
+    system, w, f, network = c.system, c.work, c.free, c.network
     r, n, m, frictions = f.friction, w.q.size, w.Phi.size, c.network.frictions.shape[0]
     k = w.v.size
     vdd = vector(vdd, k)
-    _find_bases(s, w, network, f, t, vdd)
+    _find_bases(network, system, w, f, t, vdd)
     lam_0, lam, by_row = r.numbers[:m], r.numbers[m : 2 * m], w.z
     b, loads = r.numbers[2 * (m + n) :], r.numbers[2 * (m + n) + frictions :]
     for i in range(frictions):
         loads[i] = r.load[7 * i] if abs(r.load[7 * i]) < math.inf else 0.0
     done, before = False, math.inf
-    for sweep in range(SWEEPS):
+    for sweep in range(LOAD_SWEEPS):
         copy(lam_0, lam)
         for j in range(frictions):
             for e in range(m):
@@ -172,7 +166,7 @@ def rub(context, t, vdd):
             break
         for i in range(frictions):
             friction = network.frictions[i]
-            _find_load(s, w, network, friction, lam, t, r.load[7 * i :], by_row)
+            _find_load(network, system, w, friction, lam, t, r.load[7 * i :], by_row)
             b[i] = r.load[7 * i] - loads[i]
             for j in range(frictions):
                 x = 1.0 if i == j else 0.0
@@ -183,17 +177,17 @@ def rub(context, t, vdd):
         if not lu(r.J, r.pivots, frictions):
             return JAMMED
         lu_solve(r.J, r.pivots, b, frictions)
-        change, share, size = largest(b[:frictions]), 1.0 if sweep < DAMPED else 0.5, 0.0
+        change, share, size = largest(b[:frictions]), step_share(sweep), 0.0
         if not change < math.inf:
             return JAMMED
         for i in range(frictions):
             loads[i] += share * b[i]
             size = max(size, abs(loads[i]))
-        done = change <= ROUNDING * size or (sweep > 0 and change * change <= ROUNDING * size * before)
+        done = is_settled(change, before, share, sweep, BASIS_LOAD_ROUNDING * size)
         before = change
     for i in range(frictions):
         N = loads[i]
-        r.load[7 * i] = s.reals[s.normals[i]] = N
+        r.load[7 * i] = system.reals[system.normals[i]] = N
         for j in range(k):
             vdd[j] += r.basis[i, j] * N
     return OK if done else JAMMED

@@ -15,62 +15,29 @@ pattern of S and a factorisation of comparable cost.
 import math
 
 from ..elements.loops.body_poses import POSE, P, add_torque
-from ..elements.loops.forces import INTS
-from ..elements.loops.friction import call_normal_load, call_unit_friction
 from ..errors import Status
-from ..jit.kernels import callback, caller, kernel, long_kernel, stack
+from ..jit.kernels import callback, kernel, long_kernel, stack
 from ..jit.simd import add, four, put, splat, sub, times
 from ..maths.dense_linalg import copy, largest
-from ..model.packed_friction import FR_BODY, FR_COUNT, FR_FIRST, FR_INDEX, FR_KIND, FR_NORMAL, FR_ON, FR_UNIT
-from ..rows.axis_rows import gather_axes, multiply_axes_both
-from ..rows.evaluation import run_loops
-from ..rows.independent_rows import drop, drop_diagonal
-from ..rows.schur_complement import gather, inner, multiply_both, scatter, weigh
-from ..sparse.constraint_graph import BIAS
-from ..sparse.factorisation import factor_lu, solve_lu
-from ..sparse.massless_axes import AXIS_ROW
+from ..model.packed_friction import FR_BODY, FR_COUNT, FR_FIRST
+from ..rows.interface import (
+    acceleration_residuals,
+    add_axis_multipliers,
+    apply_multipliers,
+    clear_redundant,
+    evaluate_bias,
+    factorise_product,
+    inner,
+    solve_product,
+    weigh,
+    weigh_bodies,
+)
 from ..workspaces.workspace import load
 from .accelerations import body_forces
+from .friction_loads import RUB, forget_loads, is_settled, normal_load, step_share, unit_friction
+from .tolerances import DAMPED, LOAD_ROUNDING, LOAD_SWEEPS, NEWTON_DONE, SLOW_LOADS
 
 OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
-RUB = "pdp"
-call_rub = caller(RUB)
-SWEEPS, DAMPED = 40, 12
-PIVOT_LIMIT = 1e-13  # of N~: less of a diagonal entry than this is rounding
-ROUNDING = 2e-16  # of the largest multiplier
-NEAR = 1e-10  # of it: a correction by new factors that leaves no more than rounding
-
-
-@kernel
-def _instance(system, friction):
-    """Floats of the instance; where its table and its floats begin."""
-    kind = system.forces[friction[FR_KIND]]
-    index = friction[FR_INDEX]
-    return kind.stride, kind.table + INTS * index, kind.reals + kind.stride * index
-
-
-@kernel
-def unit_friction(system, friction, q, qd, t, out):
-    """out (14,) = generalised forces on the bodies a and b, for a normal load of one."""
-    stride, own, real = _instance(system, friction)
-    call_unit_friction(friction[FR_UNIT], stride, system.table[own:], system.reals[real:], q, qd, t, out)
-
-
-@kernel
-def normal_load(system, friction, q, qd, t, derive, reaction, out):
-    """out (7,) = the normal load of a reaction (6,) and, with derive = 1, its derivative by that."""
-    stride, own, real = _instance(system, friction)
-    call_normal_load(
-        friction[FR_NORMAL], stride, system.table[own:], system.reals[real:], q, qd, t, friction[FR_ON], derive,
-        reaction, out,
-    )  # fmt: skip
-
-
-@kernel
-def forget_loads(system):
-    """Set joint friction to zero in the sum of forces."""
-    for i in range(system.normals.size):
-        system.reals[system.normals[i]] = 0.0
 
 
 @kernel
@@ -103,8 +70,8 @@ def _find_loads(network, system, f, q, qd, t, derive):
             e, side = network.friction_rows[j]
             at = 16 * e + 8 * side
             for c in range(3):
-                reaction[c] -= f.H[at + c] * r.lam[e]
-                reaction[3 + c] -= f.H[at + 4 + c] * r.lam[e]
+                reaction[c] -= f.rows.H[at + c] * r.lam[e]
+                reaction[3 + c] -= f.rows.H[at + 4 + c] * r.lam[e]
         normal_load(system, friction, q, qd, t, derive, reaction, r.load[7 * i :])
 
 
@@ -119,14 +86,14 @@ def _rub_bodies(network, f):
             z, at = 8 * network.frictions[i, FR_BODY + k], 16 * i + 8 * k
             put(f.Z, z, add(four(f.Z, z), times(four(r.g, at), N)))
             put(f.Z, z + 4, add(four(f.Z, z + 4), times(four(r.g, at + 4), N)))
-    scatter(network, f.Y, r.lam, f.Z)
+    apply_multipliers(network, f.rows, r.lam, f.Z)
 
 
 @kernel
 def _factorise(network, f, cold):
     """Factorise N~, or S if `cold`; False if the matrix is singular."""
     r, change = f.friction, stack(8)
-    copy(f.Y, r.X)
+    copy(f.rows.Y, r.X)
     if not cold:
         for i in range(network.frictions.shape[0]):
             friction = network.frictions[i]
@@ -136,18 +103,14 @@ def _factorise(network, f, cold):
                 change[c], change[4 + c] = r.load[7 * i + 1 + c], r.load[7 * i + 4 + c]
             for j in range(friction[FR_FIRST], friction[FR_FIRST] + friction[FR_COUNT]):
                 e, side = network.friction_rows[j]
-                n = splat(-inner(f.H, 16 * e + 8 * side, change, 0))
+                n = splat(-inner(f.rows.H, 16 * e + 8 * side, change, 0))
                 for k in range(2):
                     body, x = network.sides[e, k], 16 * e + 8 * k
                     g = 16 * i if body == a else 16 * i + 8
                     if body in (a, b):
                         put(r.X, x, sub(four(r.X, x), times(four(r.g, g), n)))
                         put(r.X, x + 4, sub(four(r.X, x + 4), times(four(r.g, g + 4), n)))
-    multiply_both(network, f.H, r.X, r.lower, r.upper)
-    multiply_axes_both(network, f.H, r.X, r.lower, r.upper)
-    drop_diagonal(network, f.dropped, r.lower)
-    drop_diagonal(network, f.dropped, r.upper)
-    return factor_lu(network.pattern, r.lower, r.upper, PIVOT_LIMIT) < 0
+    return factorise_product(network, f, r.X, r.lower, r.upper)
 
 
 @long_kernel
@@ -159,37 +122,32 @@ def find_reactions(network, system, f, q, qd, t):
     r = f.friction
     _weigh_units(network, system, f, q, qd, t)
     copy(f.Z, r.Z)
-    drop(f.dropped, r.lam)
+    clear_redundant(f, r.lam)
     size = largest(r.lam)
     if not size < math.inf:
         for e in range(r.lam.size):
             r.lam[e] = 0.0
         size = 0.0
     before, anew, done = math.inf, True, False
-    for sweep in range(SWEEPS):
+    for sweep in range(LOAD_SWEEPS):
         _find_loads(network, system, f, q, qd, t, int(anew and size > 0.0 and not done))
         _rub_bodies(network, f)
         if done:
             return True
-        gather(network, f.H, f.Z, f.b)
-        for e in range(f.b.size):
-            f.b[e] += f.gamma[e]
-        gather_axes(network, f.Z, f.b)
-        for i in range(network.axes.rows.shape[0]):
-            e = network.axes.rows[i, AXIS_ROW]
-            f.b[e] += r.lam[e]
+        acceleration_residuals(network, f.rows, f.gamma, f.Z, f.b)
+        add_axis_multipliers(network, r.lam, f.b)
         if anew and not _factorise(network, f, size == 0.0):
             return False
-        solve_lu(network.pattern, r.lower, r.upper, f.b)
-        change, share = largest(f.b), 1.0 if sweep < DAMPED else 0.5
+        solve_product(network, r.lower, r.upper, f.b)
+        change, share = largest(f.b), step_share(sweep)
         if not change < math.inf:
             return False
         for e in range(f.b.size):
             r.lam[e] += share * f.b[e]
         cold, size = size == 0.0, largest(r.lam)
-        done = change <= ROUNDING * size or (share == 1.0 and sweep > 0 and change * change <= ROUNDING * size * before)
-        done = done or (anew and not cold and change <= NEAR * size)
-        anew, before = cold or sweep >= DAMPED or change > 0.1 * before, change
+        done = is_settled(change, before, share, sweep, LOAD_ROUNDING * size)
+        done = done or (anew and not cold and change <= NEWTON_DONE * size)
+        anew, before = cold or sweep >= DAMPED or change > SLOW_LOADS * before, change
     return False
 
 
@@ -197,14 +155,13 @@ def find_reactions(network, system, f, q, qd, t):
 def rub(context, t, unused):
     """Solve for accelerations as accelerations.solve_accelerations, with joint friction. Status."""
     c = load(context)
-    s, w, f, network = c.system, c.work, c.free, c.network
-    forget_loads(s)
-    body_forces(network, s, w, f, t)
-    for b in range(network.bodies.shape[0]):
-        weigh(network.inverse, b, f.Z, 8 * b, f.Z, 8 * b)
-    run_loops(network, s.reals, BIAS, f, t, f.gamma, f.H)
-    found = find_reactions(network, s, f, w.q, w.qd, t)
-    for i in range(s.normals.size):
-        s.reals[s.normals[i]] = f.friction.load[7 * i]
+    system, w, f, network = c.system, c.work, c.free, c.network
+    forget_loads(system)
+    body_forces(network, system, w, f, t)
+    weigh_bodies(network, f.Z)
+    evaluate_bias(network, system, f, t)
+    found = find_reactions(network, system, f, w.q, w.qd, t)
+    for i in range(system.normals.size):
+        system.reals[system.normals[i]] = f.friction.load[7 * i]
     copy(f.friction.lam, f.b)
     return OK if found else JAMMED

@@ -13,12 +13,10 @@ import numpy as np
 from ..elements.markers import PARAMETERS, VECTOR
 from ..model.packed import classes
 from ..motions.prescribed import Motion
-from ..sparse.constraint_graph import N_COUNT, N_FIRST_REAL, N_REALS
-from ..sparse.constraint_graphs import dropped_rows, network_of, with_loops
+from ..rows.interface import MOST_ROWS
+from ..sparse.constraint_graphs import network_of, redundant_rows, with_loops
 from ..sparse.graph_builder import build
-from ..workspaces.tangent_memory import MOST_ROWS
-
-LEAST = 1e-12  # of the largest square of a singular value of its rows: with less they don't hold a body
+from .tolerances import HOLDING, UNIT_ROUNDING
 
 
 class Still(NamedTuple):
@@ -27,11 +25,11 @@ class Still(NamedTuple):
     bodies: np.ndarray  # int64 (h,)
     holding: np.ndarray  # int64 (k, 2): which of these bodies a row of Phi holds
     omitted: frozenset  # places in Packed.constraints: what joins these bodies to each other and the ground so
-    dropped: np.ndarray  # int64: rows of Phi, redundant ones of those that are left
+    redundant: np.ndarray  # int64: rows of Phi, redundant ones of those that are left
 
 
 def still(packed):
-    """The `Still` of a packed scene with the rows that it drops now; where they hold is for `settle` to say."""
+    """The `Still` of a packed scene with its redundant rows as of now; where they hold is for `settle` to say."""
     if packed.derived.locked is None:
         packed.derived.locked = _find(packed)
     return packed.derived.locked
@@ -71,7 +69,7 @@ def settle(packed, network, H):
         torques, squares = H.reshape(-1, 2, 8)[rows, side, 4:7], np.zeros((len(found.bodies), 3, 3))
         np.add.at(squares, which, torques[:, :, None] * torques[:, None, :])
         sizes = np.linalg.eigvalsh(squares)
-        loose = ~(sizes[:, 0] > LEAST * sizes[:, 2])
+        loose = ~(sizes[:, 0] > HOLDING * sizes[:, 2])
         if not loose.any():
             return
         keep_turning(packed, found.bodies[loose].tolist())
@@ -85,7 +83,7 @@ def hold(packed, q, qd):
     at = first[:, None] + np.arange(3, 7)
     p, q, qd = q[at], q.copy(), qd.copy()
     square = (p * p).sum(axis=1)
-    q[at] = np.where((np.abs(square - 1.0) > 1e-15)[:, None], p / np.sqrt(square)[:, None], p)
+    q[at] = np.where((np.abs(square - 1.0) > UNIT_ROUNDING)[:, None], p / np.sqrt(square)[:, None], p)
     qd[at] = 0.0
     return q, qd
 
@@ -97,9 +95,9 @@ def instances(packed, network):
         groups[type(pair[0])].append(pair)
     kinds, begins, found = list(groups), packed.system.kinds["reals"], []
     for row in network.kinds:
-        i = int(np.searchsorted(begins, row[N_FIRST_REAL], side="right")) - 1
-        first = int((row[N_FIRST_REAL] - begins[i]) // row[N_REALS])
-        found.append((kinds[i], groups[kinds[i]][first : first + int(row[N_COUNT])]))
+        i = int(np.searchsorted(begins, row.reals, side="right")) - 1
+        first = int((row.reals - begins[i]) // row.stride)
+        found.append((kinds[i], groups[kinds[i]][first : first + int(row.count)]))
     return found
 
 
@@ -118,15 +116,15 @@ def _find(packed):
                     ways.append(other)
     omitted = {i: rows for body in held for i, pair, rows in joints[body] if held.issuperset(pair)}
     bodies = sorted(held - {len(packed.bodies)})
-    dropped = _dropped(packed, omitted, sum(map(len, omitted.values())) - 3 * len(bodies))
-    if dropped is None:
-        bodies = omitted = dropped = ()
+    redundant = _redundant(packed, omitted, sum(map(len, omitted.values())) - 3 * len(bodies))
+    if redundant is None:
+        bodies = omitted = redundant = ()
     holding = [(i, row) for i, body in enumerate(bodies) for row in holding[body]]
     return Still(
         np.array(bodies, np.int64),
         np.array(holding, np.int64).reshape(-1, 2),
         frozenset(omitted),
-        np.array(dropped, np.int64),
+        np.array(redundant, np.int64),
     )
 
 
@@ -150,13 +148,13 @@ def _joints(packed):
     return found
 
 
-def _dropped(packed, omitted, spare):
-    """Of the rows that are left those to drop: as many as the whole drops but for the `spare` ones that are omitted.
+def _redundant(packed, omitted, spare):
+    """Redundant rows among those that are left: as many as in the whole scene less the `spare` ones that are omitted.
 
-    Where too few of those that the whole drops are left, some others: a run chooses anew. None where that can't be
+    Where too few redundant rows of the whole scene are left, some others: a run selects anew. None where that can't be
     done.
     """
-    whole = dropped_rows(packed)
+    whole = redundant_rows(packed)
     if not len(whole):
         return () if spare == 0 else None
     gone, row, left, others = set(network_of(packed).row[whole].tolist()), 0, [], []

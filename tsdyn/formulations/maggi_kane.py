@@ -11,35 +11,34 @@ from ..jit.kernels import callback, vector
 from ..maths.dense_linalg import copy
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import set_time
-from ..workspaces.chart_workspace import TIME
-from ..workspaces.workspace import PLACEMENTS, load
+from ..workspaces.workspace import load
 from .newton_iterations import NOT_FINITE, OK
 from .null_space import frictional_acceleration, look, project, reduced_mass, velocities, weighted_square
 from .null_space_chart import new_chart, tangent_map
 
 
 @callback(PLACE)
-def place(context, t, q):
-    """Set positions q without projection: Phi_q, B, D and the factor of D^T M D. Status."""
+def place(context, t, x):
+    """Set positions x = q without projection: Phi_q, B, D and the factor of D^T M D. Status."""
     c = load(context)
-    s, w = c.system, c.work
-    w.counters[PLACEMENTS] += 1
-    c.local.numbers[TIME] = t
-    if not set_time(s, t):
+    system, w = c.system, c.work
+    w.counters.placements += 1
+    c.local.state.time = t
+    if not set_time(system, t):
         return NOT_FINITE
-    copy(vector(q, w.q.size), w.q)
-    status = tangent_map(s, w, t)
-    return reduced_mass(s, w) if status == OK else status
+    copy(vector(x, w.q.size), w.q)
+    status = tangent_map(system, w, t)
+    return reduced_mass(system, w) if status == OK else status
 
 
 @callback(ACCELERATE)
-def accelerate(context, t, velocity, wd, qd):
-    """Set kinematic velocities w at the current position: qd and wd. Status."""
+def accelerate(context, t, velocity, wd, xd):
+    """Set kinematic velocities w at the current position: wd, and xd = qd. Status."""
     c = load(context)
-    s, w = c.system, c.work
-    velocities(s, w, t, vector(velocity, w.v.size))
+    system, w = c.system, c.work
+    velocities(system, w, t, vector(velocity, w.v.size))
     status = frictional_acceleration(context, c, t, vector(wd, w.v.size))
-    copy(w.qd, vector(qd, w.q.size))
+    copy(w.qd, vector(xd, w.q.size))
     return status
 
 
@@ -63,13 +62,13 @@ def error_norm(context, eq, ew, old, rtol, atol):
 
 
 @callback("pdpppp")
-def start_chart(context, t, q, velocity, wd, qd):
-    """Make new bases U and V at the present q; w = V^T P0 qd, wd = V^T P0 qdd. Status."""
+def start_chart(context, t, x, velocity, wd, xd):
+    """Make new bases U and V at the present x = q, xd = qd; w = V^T P0 qd, wd = V^T P0 qdd. Status."""
     c = load(context)
-    s, w = c.system, c.work
-    set_time(s, t)
-    status = new_chart(s, w, c.free, c.local, c.network, t)
-    copy(w.q, vector(q, w.q.size))
-    copy(w.qd, vector(qd, w.q.size))
+    system, w = c.system, c.work
+    set_time(system, t)
+    status = new_chart(c.network, system, w, c.free, c.local, t)
+    copy(w.q, vector(x, w.q.size))
+    copy(w.qd, vector(xd, w.q.size))
     project(w, vector(velocity, w.v.size), vector(wd, w.v.size))
     return status

@@ -4,19 +4,17 @@ import math
 
 from ..errors import Status
 from ..jit.kernels import kernel
-from ..maths.dense_linalg import invert
-from ..model.equations import constraint_jacobian, constraints
-from ..workspaces.workspace import B_ITERATIONS, B_TOL, FACTORIZATIONS, FLOOR, NEWTON, RATE, U_TOL
+from .dense_rows import evaluate_dense_residuals, factorise_dense_rows, invert_normal_matrix, subtract_normal
+from .tolerances import B_OUTDATED, B_SWEEPS, HUGE, ROUNDING_AT_MOST, SLOW, STALLED
 
 OK = int(Status.SUCCESS)
 NEWTON_FAILED = int(Status.NEWTON_FAILED)
 NOT_FINITE = int(Status.NOT_FINITE)
 SINGULAR = int(Status.SINGULAR)
-SWEEPS = 30
 
 
 @kernel
-def solve_positions(s, w, t, v):
+def solve_positions(system, w, t, v):
     """Find u and q = q0 + V v - U u with Phi(q, t) = 0, Eqs. 19, 20 and 29. Status.
 
     The start is u + T dv, T = du/dv being left over from the place before. Sweeps go on until |Phi| <= u_tol and what
@@ -35,25 +33,24 @@ def solve_positions(s, w, t, v):
         w.base[i] = w.q0[i] + x
     for j in range(k):
         w.v[j] = v[j]
-    floor = w.control[FLOOR]
-    tol = max(w.control[U_TOL], floor)
+    floor = w.control.floor
+    tol = max(w.control.u_tol, floor)
     left = max(tol * math.sqrt(tol), floor)
     before, stuck = math.inf, False
-    for _ in range(SWEEPS):
+    for _ in range(B_SWEEPS):
         _step_off(w, n, m)
-        constraints(s, w.q, t, w.Phi)
-        leave_out(w, w.Phi)
-        w.counters[NEWTON] += 1
+        evaluate_dense_residuals(system, w, t)
+        w.counters.newton += 1
         worst = 0.0
         for i in range(m):
             size = abs(w.Phi[i])
             if not size < math.inf:
                 return NOT_FINITE
             worst = max(worst, size)
-        if worst > tol and worst > 0.25 * before:
-            if stuck and worst <= 100.0 * floor:
+        if worst > tol and worst > SLOW * before:
+            if stuck and worst <= ROUNDING_AT_MOST * floor:
                 tol, floor = worst, worst  # a fresh B did not help: this is rounding
-            elif not factorise_b(s, w, t):  # B was out of date
+            elif not factorise_dense_rows(system, w, t):  # B was out of date
                 return SINGULAR
             stuck = True
         for i in range(m):
@@ -63,27 +60,12 @@ def solve_positions(s, w, t, v):
             w.u[i] += d
             w.z[i] = d
         if before < math.inf:
-            w.control[RATE] = worst / before
-        if worst <= floor or (worst <= tol and worst * w.control[RATE] <= left):
-            subtract_normal(w, w.q)  # q itself, not all of the sum again: a digit less is lost
+            w.control.rate = worst / before
+        if worst <= floor or (worst <= tol and worst * w.control.rate <= left):
+            subtract_normal(w, w.z, w.q)  # q itself, not all of the sum again: a digit less is lost
             return OK
         before = worst
     return NEWTON_FAILED
-
-
-@kernel
-def leave_out(w, f):
-    """Zero the entries of redundant rows of Phi."""
-    for i in range(w.left_out[0]):
-        f[w.left_out[1 + i]] = 0.0
-
-
-@kernel
-def leave_rows_out(w):
-    """Zero the redundant rows of Phi_q."""
-    for i in range(w.left_out[0]):
-        for j in range(w.q.size):
-            w.Phi_q[w.left_out[1 + i], j] = 0.0
 
 
 @kernel
@@ -97,55 +79,6 @@ def _step_off(w, n, m):
 
 
 @kernel
-def subtract_normal(w, out):
-    """out -= U z."""
-    for i in range(out.size):
-        x = 0.0
-        for j in range(w.z.size):
-            x += w.U[i, j] * w.z[j]
-        out[i] -= x
-
-
-@kernel
-def factorise_b(s, w, t):
-    """Factorise B = (Phi_q U)^-1 at the present q; False if Phi_q U is singular."""
-    constraint_jacobian(s, w.q, t, w.Phi_q)
-    leave_rows_out(w)
-    normal_matrix(s, w)
-    return invert_normal_matrix(w)
-
-
-@kernel
-def invert_normal_matrix(w):
-    """B = N^-1, N = Phi_q U being known; False where it is singular."""
-    m = w.u.size
-    for i in range(m):
-        for j in range(m):
-            w.R[i, j] = w.N[i, j]
-    w.counters[FACTORIZATIONS] += 1
-    return invert(w.R, w.B, m)
-
-
-@kernel
-def normal_matrix(s, w):
-    """N = Phi_q U, over the nonzero columns of Phi_q."""
-    m = w.u.size
-    for i in range(m):
-        begin, middle = s.segments[i, 0], s.segments[i, 2]
-        end, last = begin + s.segments[i, 1], middle + s.segments[i, 3]
-        for j in range(m):
-            x = 0.0
-            for c in range(begin, end):
-                x += w.Phi_q[i, c] * w.U[c, j]
-            for c in range(middle, last):
-                x += w.Phi_q[i, c] * w.U[c, j]
-            w.N[i, j] = x
-    for i in range(w.left_out[0]):
-        row = w.left_out[1 + i]
-        w.N[row, row] = 1.0
-
-
-@kernel
 def update_b(w):
     """Bring B to (Phi_q U)^-1 by Eq. 28, B <- 2 B - B (Phi_q U) B, N = Phi_q U being known. Status.
 
@@ -154,9 +87,9 @@ def update_b(w):
     A start with |R| near one or above is replaced by a factorisation.
     """
     m = w.u.size
-    tol = w.control[B_TOL] * math.sqrt(w.control[B_TOL])
+    tol = w.control.b_tol * math.sqrt(w.control.b_tol)
     before = math.inf
-    for _ in range(SWEEPS):
+    for _ in range(B_SWEEPS):
         worst = 0.0
         for i in range(m):
             total = 0.0
@@ -171,12 +104,12 @@ def update_b(w):
             if not total < math.inf:
                 return NOT_FINITE
             worst = max(worst, total)
-        if worst > 0.5 and before == math.inf:
-            before = 1e300  # a factorisation is tried once
+        if worst > B_OUTDATED and before == math.inf:
+            before = HUGE  # a factorisation is tried once
             if not invert_normal_matrix(w):
                 return SINGULAR
             continue
-        w.counters[B_ITERATIONS] += 1
+        w.counters.b_iterations += 1
         for i in range(m):  # row i of B R; R is needed whole, B only row by row
             for j in range(m):
                 x = 0.0
@@ -185,7 +118,7 @@ def update_b(w):
                 w.z[j] = x
             for j in range(m):
                 w.B[i, j] -= w.z[j]
-        if worst * worst <= tol or worst > 0.5 * before:  # squared next time; or rounding is all that is left
-            return OK if worst < 0.5 else SINGULAR
+        if worst * worst <= tol or worst > STALLED * before:  # squared next time; or rounding is all that is left
+            return OK if worst < B_OUTDATED else SINGULAR
         before = worst
     return SINGULAR

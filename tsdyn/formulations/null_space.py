@@ -16,56 +16,55 @@ from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
 from ..maths.dense_linalg import cholesky, cholesky_solve, is_finite, transposed_times
 from ..methods.explicit import ACCELERATE, NORM, PLACE
-from ..model.equations import acceleration_bias, applied_forces, is_rheonomic, set_time, time_derivative
-from ..rows.evaluation import held, run_loops
-from ..sparse.constraint_graph import REDUCED
-from ..workspaces.chart_workspace import TIME
-from ..workspaces.workspace import EVALUATIONS, FACTORIZATIONS, FLOOR, PLACEMENTS, load
+from ..model.equations import applied_forces, is_rheonomic, set_time
+from ..rows.interface import evaluate_rows, redundant_rows_hold
+from ..workspaces.workspace import load
 from .chart_validity import measure_turns, turning
-from .friction_solve import call_rub, forget_loads
-from .newton_iterations import NOT_FINITE, OK, leave_out, solve_positions, subtract_normal
+from .dense_rows import correct, evaluate_dense_bias, evaluate_dense_drift, multiply_dense_row
+from .friction_loads import call_rub, forget_loads
+from .newton_iterations import NOT_FINITE, OK, solve_positions
 from .null_space_chart import new_chart, tangent_map
+from .tolerances import MASS_PIVOT
 
-PIVOT_LIMIT = 1e-14  # of D^T M D: less than this is rounding
 MASS_SINGULAR, UNHELD = int(Status.MASS_SINGULAR), int(Status.UNHELD)
 
 
 @kernel
-def reduced_mass(s, w):
+def reduced_mass(system, w):
     """E and the Cholesky factor of D^T M D at the present q. Status."""
     k = w.v.size
     for i in range(k):
         for j in range(i + 1):
             w.A[i, j] = 0.0
-    for b in range(s.mass.size):
-        at, mass = s.bodies[b, 0], s.mass[b]
-        for c in range(at, at + 3):
+    for b in range(system.mass.size):
+        at, mass = system.bodies[b, 0], system.mass[b]
+        for c in range(at, at + 3):  # D^T M D += m D_r^T D_r
             for i in range(k):
                 f = mass * w.D[c, i]
                 if f != 0.0:
                     for j in range(i + 1):
                         w.A[i, j] += f * w.D[c, j]
-        if s.bodies[b, 1] == 7:
+        if system.bodies[b, 1] == 7:
             e0, e1, e2, e3 = 2.0 * w.q[at + 3], 2.0 * w.q[at + 4], 2.0 * w.q[at + 5], 2.0 * w.q[at + 6]
             x, y, z = w.E[3 * b], w.E[3 * b + 1], w.E[3 * b + 2]
             d0, d1, d2, d3 = w.D[at + 3], w.D[at + 4], w.D[at + 5], w.D[at + 6]
-            for j in range(k):
+            for j in range(k):  # E = 2 G D_p
                 x[j] = -e1 * d0[j] + e0 * d1[j] + e3 * d2[j] - e2 * d3[j]
                 y[j] = -e2 * d0[j] - e3 * d1[j] + e0 * d2[j] + e1 * d3[j]
                 z[j] = -e3 * d0[j] + e2 * d1[j] - e1 * d2[j] + e0 * d3[j]
-            J = s.inertia[b]
-            for i in range(k):
+            J = system.inertia[b]
+            for i in range(k):  # D^T M D += E^T J' E
                 f = J[0] * x[i] + J[1] * y[i] + J[2] * z[i]
                 g = J[3] * x[i] + J[4] * y[i] + J[5] * z[i]
                 h = J[6] * x[i] + J[7] * y[i] + J[8] * z[i]
                 for j in range(i + 1):
                     w.A[i, j] += f * x[j] + g * y[j] + h * z[j]
-    w.counters[FACTORIZATIONS] += 1
-    return OK if cholesky(w.A, k, PIVOT_LIMIT) else MASS_SINGULAR
+    w.counters.factorizations += 1
+    return OK if cholesky(w.A, k, MASS_PIVOT) else MASS_SINGULAR
 
 
 @kernel
-def velocities(s, w, t, vd):
+def velocities(system, w, t, vd):
     """qd = D vd - U B Phi_t, Eq. 23."""
     n, k = w.q.size, vd.size
     for i in range(n):
@@ -73,66 +72,41 @@ def velocities(s, w, t, vd):
         for j in range(k):
             x += w.D[i, j] * vd[j]
         w.qd[i] = x
-    if is_rheonomic(s):
-        time_derivative(s, w.q, t, w.Phi_t)
-        leave_out(w, w.Phi_t)
-        _correct(w, w.Phi_t, w.qd)
+    if is_rheonomic(system):
+        evaluate_dense_drift(system, w, t)
+        correct(w, w.Phi_t, w.qd)
 
 
 @kernel
-def _refine_velocities(s, w):
+def _refine_velocities(system, w):
     """qd -= U B (Phi_q qd + Phi_t)."""
-    driven = is_rheonomic(s)
+    driven = is_rheonomic(system)
     for i in range(w.Phi.size):
-        w.Phi[i] = (w.Phi_t[i] if driven else 0.0) + _row_times(s, w, i, w.qd)
-    _correct(w, w.Phi, w.qd)
+        w.Phi[i] = (w.Phi_t[i] if driven else 0.0) + multiply_dense_row(system, w, i, w.qd)
+    correct(w, w.Phi, w.qd)
 
 
 @kernel
-def _row_times(s, w, i, x):
-    """Row i of Phi_q x."""
-    total = 0.0
-    for part in range(0, 4, 2):
-        begin = s.segments[i, part]
-        for j in range(begin, begin + s.segments[i, part + 1]):
-            total += w.Phi_q[i, j] * x[j]
-    return total
-
-
-@kernel
-def _correct(w, f, out):
-    """out -= U B f, by z = B f."""
-    m = f.size
-    for i in range(m):
-        x = 0.0
-        for j in range(m):
-            x += w.B[i, j] * f[j]
-        w.z[i] = x
-    subtract_normal(w, out)
-
-
-@kernel
-def reduced_acceleration(s, w, t, vdd):
+def reduced_acceleration(system, w, t, vdd):
     """vdd of Eq. 26 at the present q and qd. Status."""
     n, k = w.q.size, vdd.size
-    acceleration_bias(s, w.q, w.qd, t, w.gamma)
-    leave_out(w, w.gamma)
+    evaluate_dense_bias(system, w, t)
     for i in range(n):
         w.h[i] = 0.0
-    _correct(w, w.gamma, w.h)  # h = -U B gamma, what qdd is at vdd = 0
+    correct(w, w.gamma, w.h)  # h = -U B gamma, what qdd is at vdd = 0
     for j in range(k):
         vdd[j] = 0.0
-    for b in range(s.mass.size):
-        at, mass = s.bodies[b, 0], s.mass[b]
-        for c in range(3):
-            f = mass * (s.gravity[c] - w.h[at + c])
+    for b in range(system.mass.size):
+        at, mass = system.bodies[b, 0], system.mass[b]
+        for c in range(3):  # vdd += D_r^T m (g - h_r)
+            f = mass * (system.gravity[c] - w.h[at + c])
             for j in range(k):
                 vdd[j] += f * w.D[at + c, j]
-        if s.bodies[b, 1] == 7:
+        if system.bodies[b, 1] == 7:
             e0, e1, e2, e3 = w.q[at + 3], w.q[at + 4], w.q[at + 5], w.q[at + 6]
             d0, d1, d2, d3 = w.qd[at + 3], w.qd[at + 4], w.qd[at + 5], w.qd[at + 6]
             a0, a1, a2, a3 = -2.0 * w.h[at + 3], -2.0 * w.h[at + 4], -2.0 * w.h[at + 5], -2.0 * w.h[at + 6]
-            J = s.inertia[b]
+            J = system.inertia[b]
             x = -e1 * a0 + e0 * a1 + e3 * a2 - e2 * a3  # 2 G (U B gamma)_p
             y = -e2 * a0 - e3 * a1 + e0 * a2 + e1 * a3
             z = -e3 * a0 + e2 * a1 - e1 * a2 + e0 * a3
@@ -149,7 +123,7 @@ def reduced_acceleration(s, w, t, vdd):
             s1 = d0 * g0 - d3 * g1 + d2 * g2
             s2 = d3 * g0 + d0 * g1 - d1 * g2
             s3 = -d2 * g0 + d1 * g1 + d0 * g2
-            for j in range(k):
+            for j in range(k):  # vdd += E^T J' 2 G (U B gamma)_p + D_p^T Q_v
                 vdd[j] += (
                     f0 * w.E[3 * b, j]
                     + f1 * w.E[3 * b + 1, j]
@@ -159,28 +133,28 @@ def reduced_acceleration(s, w, t, vdd):
                     + s2 * w.D[at + 5, j]
                     + s3 * w.D[at + 6, j]
                 )
-    if s.forces.shape[0] > 0:
+    if system.forces.shape[0] > 0:
         for c in range(n):
             w.Q[c] = 0.0
-        applied_forces(s, w.q, w.qd, t, w.Q)
-        for c in range(n):
+        applied_forces(system, w.q, w.qd, t, w.Q)
+        for c in range(n):  # vdd += D^T Q_A
             f = w.Q[c]
             if f != 0.0:
                 for j in range(k):
                     vdd[j] += f * w.D[c, j]
-    cholesky_solve(w.A, vdd, k)
-    w.counters[EVALUATIONS] += 1
+    cholesky_solve(w.A, vdd, k)  # vdd <- (D^T M D)^-1 vdd
+    w.counters.evaluations += 1
     return OK if is_finite(vdd[:k]) else NOT_FINITE
 
 
 @kernel
 def frictional_acceleration(context, c, t, vdd):
     """`reduced_acceleration`, then what the frictions of joints change. Status."""
-    s, network = c.system, c.network
+    system, network = c.system, c.network
     frictions = network.frictions.shape[0] > 0
     if frictions:
-        forget_loads(s)
-    status = reduced_acceleration(s, c.work, t, vdd)
+        forget_loads(system)
+    status = reduced_acceleration(system, c.work, t, vdd)
     return call_rub(network.rub[0], context, t, vdd) if frictions and status == OK else status
 
 
@@ -188,25 +162,25 @@ def frictional_acceleration(context, c, t, vdd):
 def place(context, t, v):
     """Set positions from v: q, Phi_q, B, D and the factor of D^T M D. Status."""
     c = load(context)
-    s, w = c.system, c.work
-    w.counters[PLACEMENTS] += 1
-    c.local.numbers[TIME] = t
-    if not set_time(s, t):
+    system, w = c.system, c.work
+    w.counters.placements += 1
+    c.local.state.time = t
+    if not set_time(system, t):
         return NOT_FINITE
-    status = solve_positions(s, w, t, vector(v, w.v.size))
+    status = solve_positions(system, w, t, vector(v, w.v.size))
     if status == OK:
-        status = tangent_map(s, w, t)
-    return reduced_mass(s, w) if status == OK else status
+        status = tangent_map(system, w, t)
+    return reduced_mass(system, w) if status == OK else status
 
 
 @callback(ACCELERATE)
 def accelerate(context, t, vd, vdd, unused):
     """Set velocities from vd at the current position: qd and vdd. Status."""
     c = load(context)
-    s, w = c.system, c.work
-    velocities(s, w, t, vector(vd, w.v.size))
+    system, w = c.system, c.work
+    velocities(system, w, t, vector(vd, w.v.size))
     if c.linear.K.size > 0:  # of implicit methods, whose long steps leave B less exact
-        _refine_velocities(s, w)
+        _refine_velocities(system, w)
     return frictional_acceleration(context, c, t, vector(vdd, w.v.size))
 
 
@@ -214,7 +188,7 @@ def accelerate(context, t, vd, vdd, unused):
 def complete(context, vdd):
     """Accelerations qdd = D vdd - U B gamma, Eq. 24, after `accelerate`, refined once by Phi_q qdd + gamma."""
     c = load(context)
-    s, w = c.system, c.work
+    system, w = c.system, c.work
     vdd = vector(vdd, w.v.size)
     for i in range(w.q.size):
         x = w.h[i]
@@ -224,11 +198,11 @@ def complete(context, vdd):
     for i in range(w.gamma.size):
         x = w.gamma[i]
         for part in range(0, 4, 2):
-            begin = s.segments[i, part]
-            for j in range(begin, begin + s.segments[i, part + 1]):
+            begin = system.segments[i, part]
+            for j in range(begin, begin + system.segments[i, part + 1]):
                 x += w.Phi_q[i, j] * w.qdd[j]
         w.Phi[i] = x
-    _correct(w, w.Phi, w.qdd)
+    correct(w, w.Phi, w.qdd)
     return OK
 
 
@@ -243,8 +217,8 @@ def look(c):
     """Return the reason to abandon the chart at the present q, or zero."""
     w, f, l, network = c.work, c.free, c.local, c.network
     place_bodies(network.bodies, w.q, f.poses)
-    measure_turns(network, w.q, l)
-    run_loops(network, c.system.reals, REDUCED, f, l.numbers[TIME], f.b, f.H)
+    measure_turns(network, l, w.q)
+    evaluate_rows(network, c.system, f, f.rows, l.state.time)
     return turning(network, w, f, l)
 
 
@@ -276,15 +250,15 @@ def error_norm(context, ev, evd, old, rtol, atol):
 def start_chart(context, t, v, vd, vdd, unused):
     """Make a chart at the present q; v = 0, vd = V^T P0 qd, vdd = V^T P0 qdd, Eq. 27. Status."""
     c = load(context)
-    s, w = c.system, c.work
-    set_time(s, t)
-    status = new_chart(s, w, c.free, c.local, c.network, t)
+    system, w = c.system, c.work
+    set_time(system, t)
+    status = new_chart(c.network, system, w, c.free, c.local, t)
     k = w.v.size
     v = vector(v, k)
     for j in range(k):
         v[j] = 0.0
     project(w, vector(vd, k), vector(vdd, k))
-    return UNHELD if status == OK and not held(c.free, w.control[FLOOR]) else status
+    return UNHELD if status == OK and not redundant_rows_hold(c.free, w.control.floor) else status
 
 
 @kernel

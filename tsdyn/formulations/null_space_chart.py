@@ -10,25 +10,20 @@ import math
 
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import null_space
-from ..model.equations import constraint_jacobian
-from ..workspaces.workspace import FACTORIZATIONS, KEPT, RATE
 from .chart_validity import touch
-from .newton_iterations import OK, SINGULAR, invert_normal_matrix, leave_rows_out, normal_matrix, update_b
-
-RANK_LIMIT = 1e-14  # smallest singular value of Phi_q, rows scaled to length one: less is rounding; S, in the metric
-# of the masses, says what is independent: rows of points that are a nanometre apart differ by 1e-9
+from .dense_products import add_product, add_transposed_product, clear_matrix, multiply
+from .dense_rows import evaluate_dense_rows, form_normal_matrix, invert_normal_matrix, take_selection
+from .newton_iterations import OK, SINGULAR, update_b
+from .tolerances import FIRST_RATE, RANK_LIMIT
 
 
 @kernel
-def new_chart(s, w, f, l, network, t):
+def new_chart(network, system, w, f, l, t):
     """Make a chart at the present q: q0, U, V by SVD, B, L; u = 0, v = 0. Status."""
     n, m, k = w.q.size, w.u.size, w.v.size
-    regular = touch(network, s, w, f, l, t)
-    w.left_out[0] = f.dropped[0]
-    for i in range(f.dropped[0]):
-        w.left_out[1 + i] = network.row[f.dropped[1 + i]]
-    constraint_jacobian(s, w.q, t, w.Phi_q)
-    leave_rows_out(w)
+    regular = touch(network, system, w, f, l, t)
+    take_selection(network, w, f)
+    evaluate_dense_rows(system, w, t)
     kept = 0
     for i in range(n):
         w.q0[i] = w.q[i]
@@ -50,11 +45,11 @@ def new_chart(s, w, f, l, network, t):
     if m > 0 and not (regular and low > RANK_LIMIT * high):
         return SINGULAR
     _normal_space(network, w, l)
-    normal_matrix(s, w)
+    form_normal_matrix(system, w)
     if not invert_normal_matrix(w) or update_b(w) != OK:
         return SINGULAR
     _left_inverse(w)
-    w.control[RATE] = 0.1
+    w.control.rate = FIRST_RATE
     return OK
 
 
@@ -64,7 +59,7 @@ def _normal_space(network, w, l):
     for i in range(w.U.shape[0]):
         for j in range(w.U.shape[1]):
             w.U[i, j] = 0.0
-    diagonal = l.S0[network.pattern.shape[1] :]
+    diagonal = l.rows0.S[network.pattern.shape[1] :]
     for b in range(network.bodies.shape[0]):
         if network.normals[b] >= 0:
             for c in range(4):
@@ -79,11 +74,11 @@ def _normal_space(network, w, l):
                 continue
             i, o = network.bodies[b, 0], 8 * b + 4
             for c in range(3):
-                w.U[i + c, j] = scale * l.Y0[y + c]
+                w.U[i + c, j] = scale * l.rows0.Y[y + c]
             if network.bodies[b, 1] == 7:
                 e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
                 f = 0.5 * scale
-                a0, a1, a2 = f * l.Y0[y + 4], f * l.Y0[y + 5], f * l.Y0[y + 6]
+                a0, a1, a2 = f * l.rows0.Y[y + 4], f * l.rows0.Y[y + 5], f * l.rows0.Y[y + 6]
                 w.U[i + 3, j] = -e1 * a0 - e2 * a1 - e3 * a2
                 w.U[i + 4, j] = e0 * a0 - e3 * a1 + e2 * a2
                 w.U[i + 5, j] = e3 * a0 + e0 * a1 - e1 * a2
@@ -93,68 +88,44 @@ def _normal_space(network, w, l):
 @kernel
 def _left_inverse(w):
     """L = V - Phi_q^T B^T U^T V at q0; T and X are scratch, T zero at the end, as it is at q0."""
-    n, m, k = w.q.size, w.u.size, w.v.size
-    for i in range(m):
-        for j in range(k):
-            w.T[i, j] = 0.0
-            w.X[i, j] = 0.0
-        for c in range(n):
-            f = w.U[c, i]
-            if f != 0.0:
-                for j in range(k):
-                    w.T[i, j] += f * w.V[c, j]
-    for i in range(m):
-        for c in range(m):
-            f = w.B[c, i]
-            for j in range(k):
-                w.X[i, j] += f * w.T[c, j]
-    for i in range(n):
-        for j in range(k):
-            w.L[i, j] = w.V[i, j]
-        for c in range(m):
-            f = w.Phi_q[c, i]
-            if f != 0.0:
-                for j in range(k):
-                    w.L[i, j] -= f * w.X[c, j]
-    for i in range(m):
-        for j in range(k):
-            w.T[i, j] = 0.0
+    clear_matrix(w.T)
+    add_transposed_product(1.0, w.U, w.V, w.T)
+    clear_matrix(w.X)
+    add_transposed_product(1.0, w.B, w.T, w.X)
+    _copy_matrix(w.V, w.L)
+    add_transposed_product(-1.0, w.Phi_q, w.X, w.L)
+    clear_matrix(w.T)
 
 
 @kernel
-def tangent_map(s, w, t):
+def _copy_matrix(A, out):
+    """out = A."""
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            out[i, j] = A[i, j]
+
+
+@kernel
+def tangent_map(system, w, t):
     """Phi_q, N, B, T = B Phi_q V and D = V - U T at the present q, Eqs. 7, 9, 28. Status."""
-    n, m, k = w.q.size, w.u.size, w.v.size
-    constraint_jacobian(s, w.q, t, w.Phi_q)
-    leave_rows_out(w)
-    normal_matrix(s, w)
-    made = w.counters[FACTORIZATIONS]
+    m, k = w.u.size, w.v.size
+    evaluate_dense_rows(system, w, t)
+    form_normal_matrix(system, w)
+    made = w.counters.factorizations
     status = update_b(w)
     if status != OK:
         return status
-    w.counters[KEPT] += 1 if w.counters[FACTORIZATIONS] == made and m > 0 else 0
-    for i in range(m):
-        for j in range(k):
-            w.X[i, j] = 0.0
+    w.counters.kept += 1 if w.counters.factorizations == made and m > 0 else 0
+    clear_matrix(w.X)
+    for i in range(m):  # X = Phi_q V, over the nonzero columns of Phi_q
         for part in range(0, 4, 2):
-            begin = s.segments[i, part]
-            for c in range(begin, begin + s.segments[i, part + 1]):
+            begin = system.segments[i, part]
+            for c in range(begin, begin + system.segments[i, part + 1]):
                 f = w.Phi_q[i, c]
                 for j in range(k):
                     w.X[i, j] += f * w.V[c, j]
-    for i in range(m):
-        for j in range(k):
-            w.T[i, j] = 0.0
-        for c in range(m):
-            f = w.B[i, c]
-            for j in range(k):
-                w.T[i, j] += f * w.X[c, j]
-    for i in range(n):
-        for j in range(k):
-            w.D[i, j] = w.V[i, j]
-        for c in range(m):
-            f = w.U[i, c]
-            if f != 0.0:
-                for j in range(k):
-                    w.D[i, j] -= f * w.T[c, j]
+    # T = B Phi_q V,    D = V - U T
+    multiply(w.B, w.X, w.T)
+    _copy_matrix(w.V, w.D)
+    add_product(-1.0, w.U, w.T, w.D)
     return OK

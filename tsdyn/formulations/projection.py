@@ -12,63 +12,65 @@ from ..errors import Status
 from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import add, fma, four, put, splat
 from ..maths.dense_linalg import largest
-from ..rows.evaluation import factorise_rows, held, run_loops
-from ..rows.independent_rows import weakest
-from ..rows.schur_complement import gather, scatter
-from ..rows.singularity import NEAR
-from ..rows.tangent_workspace import LARGEST_SHARE, MOVED, RESIDUAL
-from ..sparse.constraint_graph import DRIFT, REDUCED, VALUES
-from ..sparse.factorisation import solve
-from ..workspaces.workspace import AT_ROUNDING, FACTORIZATIONS, FLOOR, NEWTON
+from ..rows.interface import (
+    DYNAMICS,
+    constrain,
+    evaluate_drift,
+    evaluate_residuals,
+    evaluate_rows,
+    factorise_rows,
+    find_correction,
+    is_near_singular,
+    project,
+    redundant_rows_hold,
+    singularity_indicator,
+)
+from .tolerances import LAND_SWEEPS, LEAST_MOVE, MOST_PARTS, ROUNDING_AT_MOST, STALLED
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
 UNHELD = int(Status.UNHELD)
-SWEEPS = 12
-MOST_PARTS = 100.0  # of a step on which p is followed
-LEAST_MOVE = 1e-15  # corrections above this are more than rounding: S is made anew
 
 
 @long_kernel
 def factorise(network, system, w, f, t):
     """b = Phi, and H, W H^T and the factors of S, at the present poses. Status."""
-    run_loops(network, system.reals, REDUCED, f, t, f.b, f.H)
-    w.counters[FACTORIZATIONS] += 1
-    return OK if factorise_rows(network, system.reals, f, t, f.b, f.H, f.Y, f.S, 1) else SINGULAR
+    evaluate_rows(network, system, f, f.rows, t)
+    w.counters.factorizations += 1
+    return OK if factorise_rows(network, system, f, f.rows, t, DYNAMICS) else SINGULAR
 
 
 @long_kernel
 def land(network, system, w, f, t):
     """Project positions onto the manifold along W H^T; H, Y and the factors of S are those of the result. Status."""
-    floor, before, moved, renew = w.control[FLOOR], math.inf, 0.0, True
-    f.sizes[RESIDUAL], f.sizes[MOVED] = -1.0, 0.0
-    for _ in range(SWEEPS):
+    floor, before, moved, renew = w.control.floor, math.inf, 0.0, True
+    f.landing.residual, f.landing.moved = -1.0, 0.0
+    for _ in range(LAND_SWEEPS):
         if renew:
             status = factorise(network, system, w, f, t)
             if status != OK:
                 return status
-            if f.sizes[RESIDUAL] >= 0.0:
+            if f.landing.residual >= 0.0:
                 return _settle(network, f, floor)
             renew = False
         else:
-            run_loops(network, system.reals, VALUES, f, t, f.b, f.H)
+            evaluate_residuals(network, system, f, t)
         worst = largest(f.b)
-        f.sizes[RESIDUAL] = max(f.sizes[RESIDUAL], worst)
+        f.landing.residual = max(f.landing.residual, worst)
         if not worst < math.inf:
             return NOT_FINITE
-        if worst <= floor or worst > 0.5 * before:
-            if worst > 100.0 * floor:
+        if worst <= floor or worst > STALLED * before:
+            if worst > ROUNDING_AT_MOST * floor:
                 return NEWTON_FAILED
             if moved <= LEAST_MOVE:
-                w.counters[AT_ROUNDING] += 1 if moved == 0.0 else 0
+                w.counters.at_rounding += 1 if moved == 0.0 else 0
                 return _settle(network, f, floor)
             renew = True
             continue
         before = worst
-        w.counters[NEWTON] += 1
-        solve(network.pattern, f.S, f.b)
+        w.counters.newton += 1
         moved = max(moved, _displace(network, f))
-        f.sizes[MOVED] = moved
+        f.landing.moved = moved
     return NEWTON_FAILED
 
 
@@ -78,20 +80,17 @@ def _settle(network, f, floor):
 
     A residual of Phi there displaces bodies by the residual over the distance.
     """
-    if not held(f, floor):
+    if not redundant_rows_hold(f, floor):
         return UNHELD
-    if weakest(network, f.S) < NEAR * f.sizes[LARGEST_SHARE]:
-        solve(network.pattern, f.S, f.b)
+    if is_near_singular(f, singularity_indicator(network, f.rows)):
         _displace(network, f)
     return OK
 
 
 @kernel
 def _displace(network, f):
-    """Displace the bodies by -Y b; return the largest displacement."""
-    for i in range(f.Z.size):
-        f.Z[i] = 0.0
-    scatter(network, f.Y, f.b, f.Z)
+    """Displace the bodies by the smallest correction of the residuals b; return the largest displacement."""
+    find_correction(network, f.rows, f.b, f.Z)
     move_by(network, f)
     return largest(f.Z)
 
@@ -106,6 +105,7 @@ def move_by(network, f):
         if network.bodies[b, 1] == 7:
             x, y, z = 0.5 * f.Z[o + 4], 0.5 * f.Z[o + 5], 0.5 * f.Z[o + 6]
             e0, e1, e2, e3 = (f.poses[at + P], f.poses[at + P + 1], f.poses[at + P + 2], f.poses[at + P + 3])
+            # p <- p o (1, dpi' / 2)
             p[0] = e0 - e1 * x - e2 * y - e3 * z
             p[1] = e1 + e0 * x - e3 * y + e2 * z
             p[2] = e2 + e3 * x + e0 * y - e1 * z
@@ -133,9 +133,7 @@ def gather_speeds(network, f):
 @kernel
 def find_drift(network, system, f, t):
     """gamma = Phi_t, time being set."""
-    for e in range(f.gamma.size):
-        f.gamma[e] = 0.0
-    run_loops(network, system.reals, DRIFT, f, t, f.gamma, f.H)
+    evaluate_drift(network, system, f, t, f.gamma)
 
 
 @kernel
@@ -146,12 +144,10 @@ def land_velocities(network, f, drifting):
     """
     gather_speeds(network, f)
     for _ in range(2):
-        gather(network, f.H, f.Z, f.b)
         if drifting:
-            for e in range(f.b.size):
-                f.b[e] += f.gamma[e]
-        solve(network.pattern, f.S, f.b)
-        scatter(network, f.Y, f.b, f.Z)
+            constrain(network, f.rows, f.gamma, f.Z, f.b)
+        else:
+            project(network, f.rows, f.Z, f.b)
     for b in range(network.bodies.shape[0]):
         put(f.poses, b * POSE + RD, four(f.Z, 8 * b))
         put(f.poses, b * POSE + OMEGA, four(f.Z, 8 * b + 4))

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from types import ModuleType
 
+from ..rows.interface import redundancy
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..validation import unknown_name
@@ -32,33 +33,27 @@ class Formulation:
             network.rub[0] = (friction_solve if self.basis_free else friction_basis).rub.address
         return network
 
-    def sizes(self, n, rank, bodies):
-        """Lengths of x and y; rank is that of Phi_q."""
+    def sizes(self, n, m, network):
+        """Lengths of x and y of a network, with n coordinates and m constraint rows."""
         if self.basis_free:
-            return 8 * bodies, 8 * bodies
-        return n if self.first_order else n - rank, n - rank
+            return 8 * len(network.bodies), 8 * len(network.bodies)
+        k = n - m + redundancy(network)
+        return n if self.first_order else k, k
 
     def addresses(self):
-        """Addresses in the order that the driver expects; loads or compiles them."""
+        """Addresses of the kernels that a driver calls, by their names in `Kernels`; loads or compiles them."""
         k = self.kernels
         complete = (k if self.basis_free else null_space).complete  # qdd = D vdd - U B gamma in the others
-        return [f.address for f in (k.place, k.accelerate, complete, k.check, k.start_chart)]
+        kernels = {"place": k.place, "accelerate": k.accelerate, "complete": complete}
+        kernels |= {"check": k.check, "start_chart": k.start_chart}
+        return {name: kernel.address for name, kernel in kernels.items()}
 
     def implicit(self):
-        """Addresses that implicit methods need, in the order of implicit.LINEARISE ... ERROR_NORM."""
-        kernels = (
-            linearisation.linearise,
-            linearisation.reduce,
-            linearisation.factorise,
-            linearisation.solve,
-            linearisation.soften,
-            null_space.complete,
-        )
-        return [f.address for f in (*kernels, self.kernels.error_norm)]
-
-    def norm(self):
-        """Address of the error norm, for adaptive methods."""
-        return self.kernels.error_norm.address
+        """Addresses that implicit methods need, by their names in `StageKernels`."""
+        names = ("linearise", "reduce", "factorise", "solve", "soften")
+        kernels = {name: getattr(linearisation, name) for name in names}
+        kernels |= {"complete": null_space.complete, "error_norm": self.kernels.error_norm}
+        return {name: kernel.address for name, kernel in kernels.items()}
 
 
 FORMULATIONS = {

@@ -17,151 +17,165 @@ from ..elements.loops.body_poses import write_accelerations, write_positions, wr
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
 from ..maths.dense_linalg import copy, is_finite, largest
-from ..methods.explicit import ACCELERATE, NORM, PLACE
+from ..methods.explicit import ACCELERATE, PLACE
 from ..model.equations import is_rheonomic, set_time
-from ..rows.axis_rows import is_axis
-from ..rows.evaluation import factor_rows, held, run_loops
-from ..rows.schur_complement import gather, scatter
+from ..rows.interface import (
+    DYNAMICS,
+    apply_multipliers,
+    constrain,
+    evaluate_drift,
+    evaluate_residuals,
+    evaluate_rows,
+    factorise_selected_rows,
+    is_axis,
+    multiply_rates,
+    multiply_rows,
+    redundant_rows_hold,
+    solve_product,
+    solve_rows,
+)
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
-from ..sparse.factorisation import solve, solve_lu
-from ..workspaces.chart_workspace import END, FACTORED, OFF, TIME
 from ..workspaces.workspace import (
-    AT_ROUNDING,
-    CONTRACTION,
-    EVALUATIONS,
-    FACTORIZATIONS,
-    FLOOR,
-    KEPT,
-    NEWTON,
-    PLACEMENTS,
-    RATE,
-    SIZE,
-    U_TOL,
-    UNVERIFIED,
     load,
 )
 from .accelerations import solve_accelerations
 from .chart_coordinates import (
     displace,
     factorise_normal,
-    gather_rates,
     largest_rates,
     turn_rates,
     write_back,
 )
-from .chart_validity import BY_FAILURE, CONTRACTION_LOST, touch, turning
-from .friction_solve import call_rub
+from .chart_validity import BY_FAILURE, touch, turning
+from .friction_loads import call_rub
+from .tangent_error import error_norm
+from .tolerances import (
+    CONTRACTION_LOST,
+    CURVATURE,
+    RENEWALS,
+    ROUNDING_AT_MOST,
+    SLOW,
+    SLOW_VELOCITIES,
+    SPEED_ROUNDING,
+    STALLED,
+    SWEEPS,
+)
 
+__all__ = ["error_norm"]  # which is a part of the form, too
 OK, SINGULAR, MASS_SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR), int(Status.MASS_SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
 CHART_LOST, UNHELD = int(Status.CHART_LOST), int(Status.UNHELD)
 COLUMNS = REDUCED, VALUES, BIAS, DRIFT  # the loops of a network that are called
-SWEEPS, RENEWALS = 24, 4
-CURVATURE = 1.0  # 1 / m: what Newton's method leaves of an error, over its square, where none has been measured
-SPEED_ROUNDING = 2e-16
+SPLIT = 2.0**27 + 1.0  # splits a float in two halves
 
 
 @callback(PLACE)
 def place(context, t, x):
     """Set positions from x (8 b,): poses on the manifold, H, W H^T and the factors of S. Status."""
     c = load(context)
-    s, w, f, l, network = c.system, c.work, c.free, c.local, c.network
-    w.counters[PLACEMENTS] += 1
-    l.numbers[TIME] = t
-    if not set_time(s, t):
+    system, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    w.counters.placements += 1
+    l.state.time = t
+    if not set_time(system, t):
         return NOT_FINITE
     x, status = vector(x, l.x.size - 8), NEWTON_FAILED
     for attempt in range(2):
         copy(x, l.x)
         if attempt == 1:  # a long step: from the tangent plane, P0 x
-            gather(network, l.H0, l.x, w.u)
-            solve(network.pattern, l.S0, w.u)
-        scatter(network, l.Y0, w.u, l.x)
-        status = _solve_positions(network, s, w, f, l, t, RENEWALS * attempt)
+            multiply_rows(network, l.rows0, l.x, w.u)
+            solve_rows(network, l.rows0, w.u)
+        apply_multipliers(network, l.rows0, w.u, l.x)
+        status = _solve_positions(network, system, w, f, l, t, RENEWALS * attempt)
         if status == OK or f.b.size == 0:
             break
     if status != OK:
         return status
     if f.b.size > 0:
-        w.counters[FACTORIZATIONS] += 1
-        failed = factor_rows(network, f, f.H, f.Y, f.S, 1)
+        w.counters.factorizations += 1
+        failed = factorise_selected_rows(network, f, f.rows, DYNAMICS)
         if failed >= 0:
-            return MASS_SINGULAR if is_axis(network, f.S, failed) else SINGULAR
-    if s.forces.shape[0] > 0:
+            return MASS_SINGULAR if is_axis(network, f.rows, failed) else SINGULAR
+    if system.forces.shape[0] > 0:
         write_positions(network.bodies, f.poses, w.q)
     return OK
 
 
 @kernel
-def _solve_positions(network, s, w, f, l, t, renewals):
+def _solve_positions(network, system, w, f, l, t, renewals):
     """Newton's method for u, N being that of its start or made anew so often; poses and H at the solution. Status.
 
     It ends where what is left, |Phi| or what the convergence so far lets expect of it, is below u_tol^(3/2) or
     rounding; H is taken there, with the last |Phi|.
     """
-    floor = w.control[FLOOR]
-    tol = max(w.control[U_TOL], floor)
+    floor = w.control.floor
+    tol = max(w.control.u_tol, floor)
     left = max(tol * math.sqrt(tol), floor)
-    column, before, rate, ending, anew = REDUCED, math.inf, 0.0, False, 0
-    l.numbers[FACTORED] = 0.0
+    with_H, before, rate, ending, anew = True, math.inf, 0.0, False, 0
+    l.state.factored = 0
     for sweep in range(SWEEPS):
         if not displace(network, l, f.poses):
             return CHART_LOST
         if f.b.size == 0:
             return OK
-        run_loops(network, s.reals, column, f, t, f.b, f.H)
+        if with_H:
+            evaluate_rows(network, system, f, f.rows, t)
+        else:
+            evaluate_residuals(network, system, f, t)
         worst = largest(f.b)
         if not worst < math.inf:
             return NOT_FINITE
-        slow = worst > 0.25 * before
-        if worst <= left or ending or (slow and worst <= 100.0 * floor):
-            if column == REDUCED:
-                w.counters[AT_ROUNDING if sweep == 0 else UNVERIFIED] += 0 if ending else 1
+        slow = worst > SLOW * before
+        if worst <= left or ending or (slow and worst <= ROUNDING_AT_MOST * floor):
+            if with_H:
+                if sweep == 0:
+                    w.counters.at_rounding += 1
+                elif not ending:
+                    w.counters.unverified += 1
                 return OK
-            column, ending = REDUCED, True  # once more, for H
+            with_H = ending = True  # once more, for H
             continue
         if slow:  # N was that of another place
             anew += 1
             if anew > renewals:
                 return NEWTON_FAILED
-            l.numbers[FACTORED] = 0.0
-            if column != REDUCED:
-                column, before = REDUCED, math.inf
+            l.state.factored = 0
+            if not with_H:
+                with_H, before = True, math.inf
                 continue
         elif before < math.inf:
-            if worst > 100.0 * floor and rate == 0.0:
-                w.control[RATE] = worst / (before * before)
+            if worst > ROUNDING_AT_MOST * floor and rate == 0.0:
+                w.control.rate = worst / (before * before)
             rate = worst / before
-        if l.numbers[FACTORED] == 0.0:
+        if l.state.factored == 0:
             if not factorise_normal(network, w, f, l):
                 return SINGULAR
-            l.numbers[FACTORED], l.numbers[OFF], rate = 1.0, w.control[RATE] * worst, 0.0
-        solve_lu(network.pattern, l.lower, l.upper, f.b)
-        w.counters[NEWTON] += 1
-        scatter(network, l.Y0, f.b, l.x)
+            l.state.factored, l.state.off, rate = 1, w.control.rate * worst, 0.0
+        solve_product(network, l.lower, l.upper, f.b)
+        w.counters.newton += 1
+        apply_multipliers(network, l.rows0, f.b, l.x)
         for e in range(f.b.size):
             w.u[e] += f.b[e]
-        expected = worst * (rate if rate > 0.0 else w.control[RATE] * worst)
-        column, before = REDUCED if expected <= left else VALUES, worst
+        expected = worst * (rate if rate > 0.0 else w.control.rate * worst)
+        with_H, before = expected <= left, worst
     return NEWTON_FAILED
 
 
 @kernel
-def solve_velocities(network, s, w, f, l, t):
+def solve_velocities(network, system, w, f, l, t):
     """rd and omega' of the poses from the rates l.y, projected onto the tangent space. False if N is singular.
 
     The factors are those of N at the start of the position solve, or, where it needed none, those of S as long as they
     do.
     """
-    rheonomic = is_rheonomic(s)
+    rheonomic = is_rheonomic(system)
     if rheonomic:
-        run_loops(network, s.reals, DRIFT, f, t, l.drift, f.H)
-    factored = l.numbers[FACTORED] > 0.0
+        evaluate_drift(network, system, f, t, l.drift)
+    factored = l.state.factored == 1
     if not factored and network.axes.rows.shape[0] > 0:  # S is of another metric than the chart
         if not factorise_normal(network, w, f, l):
             return False
-        factored, l.numbers[FACTORED], l.numbers[OFF] = True, 1.0, 0.0
-    lower, upper = l.lower if factored else f.S, l.upper if factored else f.S
+        factored, l.state.factored, l.state.off = True, 1, 0.0
+    lower, upper = l.lower if factored else f.rows.S, l.upper if factored else f.rows.S
     floor, before = 0.0, math.inf
     for sweep in range(SWEEPS):
         turn_rates(network, l, l.y, f.poses)
@@ -169,24 +183,24 @@ def solve_velocities(network, s, w, f, l, t):
             return True
         if sweep == 0:
             speed, spin = largest_rates(network, f.poses)
-            floor = SPEED_ROUNDING * (speed + w.control[SIZE] * spin)
-        gather_rates(network, f.H, f.poses, f.b)
+            floor = SPEED_ROUNDING * (speed + w.control.size * spin)
+        multiply_rates(network, f.rows, f.poses, f.b)
         if rheonomic:
             for e in range(f.b.size):
                 f.b[e] += l.drift[e]
         worst = largest(f.b)
         if not worst < math.inf:
             return False
-        if worst <= floor or (factored and worst > 0.5 * before and worst <= 100.0 * floor):
-            w.counters[KEPT] += 0 if factored else 1
+        if worst <= floor or (factored and worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):
+            w.counters.kept += 0 if factored else 1
             return True
-        if not factored and worst > 0.1 * before:
+        if not factored and worst > SLOW_VELOCITIES * before:
             if not factorise_normal(network, w, f, l):
                 return False
             lower, upper, factored = l.lower, l.upper, True
-            l.numbers[FACTORED], l.numbers[OFF] = 1.0, 0.0
-        solve_lu(network.pattern, lower, upper, f.b)
-        scatter(network, l.Y0, f.b, l.y)
+            l.state.factored, l.state.off = 1, 0.0
+        solve_product(network, lower, upper, f.b)
+        apply_multipliers(network, l.rows0, f.b, l.y)
         before = worst
     return True
 
@@ -195,22 +209,22 @@ def solve_velocities(network, s, w, f, l, t):
 def accelerate(context, t, y, yd, unused):
     """Set velocities from y (8 b,) at the current position: velocities, accelerations and y'. Status."""
     c = load(context)
-    s, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    system, w, f, l, network = c.system, c.work, c.free, c.local, c.network
     n = l.x.size - 8
     yd = vector(yd, n)
     copy(vector(y, n), l.y)
-    if not solve_velocities(network, s, w, f, l, t):
+    if not solve_velocities(network, system, w, f, l, t):
         return NOT_FINITE
-    if s.forces.shape[0] > 0:
+    if system.forces.shape[0] > 0:
         write_velocities(network.bodies, f.poses, w.qd)
     if network.frictions.shape[0] > 0:
         status = call_rub(network.rub[0], context, t, yd)
         if status != OK:
             return status
     else:
-        solve_accelerations(network, s, w, f, t)
+        solve_accelerations(network, system, w, f, t)
     write_back(network, l, f.poses, f.Z, yd)
-    w.counters[EVALUATIONS] += 1
+    w.counters.evaluations += 1
     return OK if is_finite(yd) else NOT_FINITE
 
 
@@ -220,11 +234,7 @@ def complete(context, yd):
     c = load(context)
     w, f, network = c.work, c.free, c.network
     if f.b.size > 0:
-        gather(network, f.H, f.Z, f.b)
-        for e in range(f.b.size):
-            f.b[e] += f.gamma[e]
-        solve(network.pattern, f.S, f.b)
-        scatter(network, f.Y, f.b, f.Z)
+        constrain(network, f.rows, f.gamma, f.Z, f.b)
     write_positions(network.bodies, f.poses, w.q)
     write_velocities(network.bodies, f.poses, w.qd)
     write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
@@ -237,8 +247,8 @@ def check(context):
     c = load(context)
     w, f, l = c.work, c.free, c.local
     reason = turning(c.network, w, f, l)
-    l.numbers[END] = w.counters[PLACEMENTS] if w.control[CONTRACTION] < CONTRACTION_LOST else 0.0
-    if not held(f, w.control[FLOOR]):
+    l.state.placement = w.counters.placements if w.control.contraction < CONTRACTION_LOST else 0
+    if not redundant_rows_hold(f, w.control.floor):
         return BY_FAILURE  # the next chart can't be made, and says why
     return reason
 
@@ -247,16 +257,16 @@ def check(context):
 def start_chart(context, t, x, y, yd, unused):
     """Make a chart at the present q: x = 0, y = (rd, omega'), y' = (rdd, omega'd). Status."""
     c = load(context)
-    s, w, f, l, network = c.system, c.work, c.free, c.local, c.network
-    if not set_time(s, t):
+    system, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    if not set_time(system, t):
         return NOT_FINITE
-    regular = touch(network, s, w, f, l, t)
+    regular = touch(network, system, w, f, l, t)
     x, y, yd = vector(x, l.x.size - 8), vector(y, l.x.size - 8), vector(yd, l.x.size - 8)
     for i in range(x.size):
         x[i] = 0.0
     for e in range(w.u.size):
         w.u[e] = 0.0
-    w.control[RATE] = CURVATURE
+    w.control.rate = CURVATURE
     for b in range(network.bodies.shape[0]):
         i, o = network.bodies[b, 0], 8 * b
         for c in range(3):
@@ -266,7 +276,7 @@ def start_chart(context, t, x, y, yd, unused):
             _spin(w.q, w.qdd, i + 3, yd, o + 4)
     if not regular:
         return SINGULAR
-    return OK if held(f, w.control[FLOOR]) else UNHELD
+    return OK if redundant_rows_hold(f, w.control.floor) else UNHELD
 
 
 @kernel
@@ -277,7 +287,7 @@ def _spin(q, qd, i, out, o):
     excess, low = -1.0, 0.0
     for c in range(4):
         e = q[i + c]
-        wide = 134217729.0 * e  # Dekker: e in two halves, so that their products are exact
+        wide = SPLIT * e  # Dekker: e in two halves, so that their products are exact
         high = wide - (wide - e)
         rest = e - high
         square = e * e
@@ -291,49 +301,3 @@ def _spin(q, qd, i, out, o):
     y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
     z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
     out[o], out[o + 1], out[o + 2] = 2.0 * x - f * x, 2.0 * y - f * y, 2.0 * z - f * z
-
-
-@kernel
-def _weighted_square(network, f, l, e, values, old, at, rtol, atol):
-    """(dq_i / (atol + rtol |value|))^2 summed, dq the change of coordinates (n,) that P0 e makes at q0."""
-    copy(e, f.Z)
-    for i in range(e.size, f.Z.size):
-        f.Z[i] = 0.0
-    if f.b.size > 0:
-        gather(network, l.H0, f.Z, f.b)
-        solve(network.pattern, l.S0, f.b)
-        scatter(network, l.Y0, f.b, f.Z)
-    total = 0.0
-    for b in range(network.bodies.shape[0]):
-        i, o = network.bodies[b, 0], 8 * b
-        for c in range(3):
-            x = f.Z[o + c] / (atol + rtol * max(abs(values[i + c]), abs(old[at + i + c])))
-            total += x * x
-        if network.bodies[b, 1] == 7:
-            i += 3
-            e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
-            x, y, z = 0.5 * f.Z[o + 4], 0.5 * f.Z[o + 5], 0.5 * f.Z[o + 6]
-            for c in range(4):
-                if c == 0:
-                    part = -e1 * x - e2 * y - e3 * z
-                elif c == 1:
-                    part = e0 * x - e3 * y + e2 * z
-                elif c == 2:
-                    part = e3 * x + e0 * y - e1 * z
-                else:
-                    part = -e2 * x + e1 * y + e0 * z
-                part /= atol + rtol * max(abs(values[i + c]), abs(old[at + i + c]))
-                total += part * part
-    return total
-
-
-@callback(NORM, "d")
-def error_norm(context, ex, ey, old, rtol, atol):
-    """Root mean square of the errors P0 ex of q and P0 ey of qd, over atol + rtol times the larger end of the step."""
-    c = load(context)
-    w, f, l, network = c.work, c.free, c.local, c.network
-    n, k = w.q.size, l.x.size - 8
-    old = vector(old, 3 * n)
-    total = _weighted_square(network, f, l, vector(ex, k), w.q, old, 0, rtol, atol)
-    total += _weighted_square(network, f, l, vector(ey, k), w.qd, old, n, rtol, atol)
-    return math.sqrt(total / (2 * n))

@@ -7,6 +7,8 @@ Stage i of (v, vd)' = (vd, f) has the unknown k_i = vdd there:
 
 P is kept over iterations, stages and steps. On poor measured contraction it is rebuilt, first from the same stiffness
 and damping at the current configuration, then from new ones.
+
+The memory of a step, n = k floats each:  known part of v_i, of vd_i;  (vd, k) of each stage;  then scratch, below.
 """
 
 import math
@@ -14,157 +16,192 @@ import math
 from ..errors import Status
 from ..jit.kernels import ANY, callback, caller, kernel, vector
 from ..maths.dense_linalg import copy, transposed_times
-from ..workspaces.workspace import CHARTS, ROOM, STAGE_ITERATIONS, load
+from ..workspaces.run_state import load_run
+from ..workspaces.workspace import load
 from .explicit import ERROR, STEP, call_accelerate, call_norm, call_place, combine
+from .tolerances import (
+    APART,
+    AT_FLOOR,
+    DIVERGING,
+    EAGER_STAGES,
+    FIXED_TOL,
+    GUESS,
+    ITERATIONS,
+    KAPPA,
+    LEAST,
+    MATRICES,
+    RESIDUAL_FLOOR,
+    SAME_G,
+    SLOW,
+    TOO_FAR,
+)
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
-ITERATIONS = 20
-FAR = 0.1  # of the state's size: a solution further from its prediction may be another one
-STAGES_EAGER = 30.0  # stages with a matrix of their own from the start, after an older one has failed
-KAPPA = 0.001  # of what a step may be off by: what a stage's iteration may leave
-SLOW = 0.1  # contraction above which the iteration matrix is made anew
-GUESS, LEAST = 0.3, 0.02  # contraction taken for granted where none has been measured
-DIVERGING = 0.9
-TRIES = 3  # new matrices for one stage until stiffness and damping are made anew; diverging iterations until it fails
-ROUNDING = 4e-15
-# Linear.kernels
-LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, COMPLETE, ERROR_NORM, KERNELS = range(8)
-# Linear.numbers; CHART is the chart that P belongs to
-RTOL, ATOL, G, CHART, KNOWN, THETA, T_BEFORE, EAGER, NUMBERS = range(9)
-
-FIXED_TOL = 1e-12  # of the iteration, where no tolerance sets the step
-
-assert max(KERNELS, NUMBERS) <= ROOM
+SCRATCH = 6  # vectors of it, and a number
+# f(v_i, vd_i), the correction of v_i, v_i; v and vd of the step before in this chart, h before, then the predicted k_i
+F, DX, XS, Y_BEFORE, K_BEFORE, H_BEFORE = range(6)
 
 call_linearise = caller("pd")
 call_solve = caller("pp")
 call_soften = caller("ppdp")
 
 
+def memory_of(stages, n):
+    """Floats of memory that `implicit_step` needs."""
+    return (stages + 1) * 2 * n + SCRATCH * n + 1
+
+
 @kernel
-def _matrix(context, w, l, t, g, f, anew):
+def _scratch_at(r):
+    """Where the scratch begins in the memory of a step."""
+    return (int(r.tableau[0]) + 1) * 2 * r.x.size
+
+
+@kernel
+def _renew_matrix(context, c, t, g, f, anew):
     """P at the place last taken, f being the accelerations there; with anew, from new stiffness and damping. Status."""
-    status = 0
-    if anew or l.numbers[KNOWN] == 0.0:
-        call_solve(l.kernels[COMPLETE], context, f)
-        status = call_linearise(l.kernels[LINEARISE], context, t)
-        l.numbers[KNOWN] = 1.0 if status == 0 else 0.0
+    l, status = c.linear, 0
+    if anew or l.numbers.known == 0:
+        call_solve(l.kernels.complete, context, f)
+        status = call_linearise(l.kernels.linearise, context, t)
+        l.numbers.known = 1 if status == 0 else 0
     if status == 0:
-        call_linearise(l.kernels[REDUCE], context, t)
-        status = call_linearise(l.kernels[FACTORISE], context, g)
-    l.numbers[G] = g if status == 0 else 0.0
-    l.numbers[CHART] = w.counters[CHARTS]
+        call_linearise(l.kernels.reduce, context, t)
+        status = call_linearise(l.kernels.factorise, context, g)
+    l.numbers.g = g if status == 0 else 0.0
+    l.numbers.chart = c.work.counters.charts
     return status
 
 
 @kernel
-def _stage(context, place, accelerate, w, l, t, g, x, y, k, xs, ys, f, dx, guess):
-    """Solve one stage: x, y are its known parts, k the unknown, predicted on entry. xs, ys at the solution. Status."""
+def _set_stage(g, k, known, xs, ys):
+    """vd_i = y + g k, v_i = x + g vd_i; known is (x, y), the parts from earlier stages."""
     n = k.size
+    for c in range(n):
+        ys[c] = known[n + c] + g * k[c]
+        xs[c] = known[c] + g * ys[c]
+
+
+@kernel
+def _correct(context, l, g, k, f, dx):
+    """k += P^-1 A (f - k); the size of g times it, and of g^2 times it, in the error norm."""
+    for c in range(k.size):
+        f[c] -= k[c]
+    call_solve(l.kernels.solve, context, f)
+    for c in range(k.size):
+        k[c] += f[c]
+        f[c] *= g
+        dx[c] = g * f[c]
+    return call_norm(l.kernels.error_norm, context, dx, f, l.now, l.numbers.rtol, l.numbers.atol)
+
+
+@kernel
+def _is_near(context, l, g, k, guess, f, dx):
+    """Return True if the positions of a solution are near to those of its prediction: another one may be far."""
+    for c in range(k.size):
+        f[c] = 0.0  # of velocities a stiff transient may change any amount
+        dx[c] = g * g * (k[c] - guess[c])
+    return call_norm(l.kernels.error_norm, context, dx, f, l.now, 1.0, 1.0) < TOO_FAR
+
+
+@kernel
+def _solve_stage(context, c, r, i, t, g):
+    """Solve stage i at time t: k_i, predicted on entry, and v_i, vd_i. Status."""
+    w, l, n, scratch = c.work, c.linear, r.x.size, r.memory[_scratch_at(r) :]
+    known, ys, k = r.memory[: 2 * n], r.memory[(1 + i) * 2 * n :][:n], r.memory[(1 + i) * 2 * n + n :][:n]
+    f, dx, xs = scratch[F * n :][:n], scratch[DX * n :][:n], scratch[XS * n :][:n]
+    guess = scratch[H_BEFORE * n + 1 :][:n]
     copy(k, guess)
-    floor = ROUNDING / (l.numbers[RTOL] + l.numbers[ATOL])
-    before, theta, measured = math.inf, l.numbers[THETA], False
+    floor = RESIDUAL_FLOOR / (l.numbers.rtol + l.numbers.atol)
+    before, theta, measured = math.inf, l.numbers.theta, False
     slow, apart, stuck, renewed = 0, 0, False, False
-    eager = l.numbers[EAGER] > 0.0
-    l.numbers[EAGER] -= 1.0
+    eager = l.numbers.eager > 0
+    l.numbers.eager -= 1
     for _ in range(ITERATIONS):
-        for c in range(n):
-            ys[c] = y[c] + g * k[c]
-            xs[c] = x[c] + g * ys[c]
-        status = call_place(place, context, t, xs)
+        _set_stage(g, k, known, xs, ys)
+        status = call_place(r.kernels.place, context, t, xs)
         if status == 0:
-            status = call_accelerate(accelerate, context, t, ys, f, f)
+            status = call_accelerate(r.kernels.accelerate, context, t, ys, f, f)
         if status != 0:
             return status
-        w.counters[STAGE_ITERATIONS] += 1
-        stale = eager or l.numbers[CHART] != w.counters[CHARTS] or abs(g - l.numbers[G]) > 0.3 * g
+        w.counters.stage_iterations += 1
+        stale = eager or l.numbers.chart != w.counters.charts or abs(g - l.numbers.g) > SAME_G * g
         eager = False
         if stale or (measured and theta > SLOW):
             if not stale:
                 if slow == 0 and not renewed:
-                    l.numbers[EAGER] = STAGES_EAGER
+                    l.numbers.eager = EAGER_STAGES
                 slow += 1
             renewed = True
-            if _matrix(context, w, l, t, g, f, slow == TRIES) != 0:
+            if _renew_matrix(context, c, t, g, f, slow == MATRICES) != 0:
                 return STAGE_FAILED
             before, theta, measured = math.inf, GUESS, False
-        for c in range(n):
-            f[c] -= k[c]
-        call_solve(l.kernels[SOLVE], context, f)
-        for c in range(n):
-            k[c] += f[c]
-            f[c] *= g
-            dx[c] = g * f[c]
-        size = call_norm(l.kernels[ERROR_NORM], context, dx, f, l.now, l.numbers[RTOL], l.numbers[ATOL])
+        size = _correct(context, l, g, k, f, dx)
         if not size < math.inf:
             return STAGE_FAILED
         if before < math.inf:
             theta, measured = size / before, True
-            stuck = theta > DIVERGING and size <= 100.0 * floor  # this is rounding
+            stuck = theta > DIVERGING and size <= AT_FLOOR * floor
             apart += 1 if renewed and theta > DIVERGING else 0
-            if apart == TRIES:
+            if apart == APART:
                 return STAGE_FAILED
         if size <= floor or stuck or (theta < 1.0 and size * theta <= KAPPA * (1.0 - theta)):
-            l.numbers[THETA] = min(max(theta, LEAST), GUESS)
-            for c in range(n):
-                ys[c] = y[c] + g * k[c]
-                xs[c] = x[c] + g * ys[c]
-                f[c] = 0.0  # of velocities a stiff transient may change any amount
-                dx[c] = g * g * (k[c] - guess[c])
-            moved = call_norm(l.kernels[ERROR_NORM], context, dx, f, l.now, 1.0, 1.0)
-            return 0 if moved < FAR else STAGE_FAILED
+            l.numbers.theta = min(max(theta, LEAST), GUESS)
+            _set_stage(g, k, known, xs, ys)
+            return 0 if _is_near(context, l, g, k, guess, f, dx) else STAGE_FAILED
         before = size
     return STAGE_FAILED
 
 
+@kernel
+def _see_step_before(c, t, n, scratch):
+    """h of the step before, 0 where there is none, and its start in this chart: v = L^T (q - q0) wherever q is."""
+    l = c.linear
+    h_before = t - l.numbers.t_before if l.numbers.t_before > -math.inf else 0.0
+    scratch[H_BEFORE * n] = h_before
+    if h_before > 0.0:
+        transposed_times(c.work.L, l.before[1], scratch[Y_BEFORE * n :][:n])
+        transposed_times(c.work.L, l.before[2], scratch[K_BEFORE * n :][:n])
+    return h_before
+
+
 @callback(STEP)
-def implicit_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
-    """One step of a method whose first stage is explicit; memory (stages + 1) 2n + 6n + 1."""
-    data = load(context)
-    w, l = data.work, data.linear
-    n = nx
-    x, y, yd, dx, dy = vector(x, n), vector(y, n), vector(yd, n), vector(dx, n), vector(dy, n)
-    tableau, memory = vector(tableau, ANY), vector(memory, ANY)
+def implicit_step(context, run, t, h):
+    """One step of a method whose first stage is explicit; memory as of `memory_of`."""
+    c, r = load(context), load_run(run)
+    n, tableau, memory, scratch = r.x.size, r.tableau, r.memory, r.memory[_scratch_at(r) :]
     stages = int(tableau[0])
     width = 2 + stages
     predictor = tableau[1 + stages * width + stages + stages + 1 :]
-    scratch = memory[(stages + 1) * 2 * n :]
-    bx, by, f, low = memory[:n], memory[n : 2 * n], scratch[:n], scratch[n : 2 * n]
-    first = scratch[5 * n + 1 : 6 * n + 1]
-    xs, y_before, k_before = scratch[2 * n : 3 * n], scratch[3 * n : 4 * n], scratch[4 * n : 5 * n]
-    h_before = t - l.numbers[T_BEFORE] if l.numbers[T_BEFORE] > -math.inf else 0.0
-    scratch[5 * n] = h_before
-    if h_before > 0.0:
-        transposed_times(w.L, l.before[1], y_before)  # v = L^T (q - q0) wherever q is: the point before in this chart
-        transposed_times(w.L, l.before[2], k_before)
-    copy(y, memory[2 * n : 3 * n])
-    copy(yd, memory[3 * n : 4 * n])
+    x, y, k_before = memory[:n], memory[n : 2 * n], scratch[K_BEFORE * n :]
+    h_before = _see_step_before(c, t, n, scratch)
+    copy(r.y, memory[2 * n : 3 * n])
+    copy(r.yd, memory[3 * n : 4 * n])
     for i in range(1, stages):
         row = tableau[1 + i * width :]
-        ys, k = memory[(1 + i) * 2 * n :][:n], memory[(1 + i) * 2 * n + n :][:n]
+        k = memory[(1 + i) * 2 * n + n :][:n]
+        # the prediction of k_i from earlier stages, then the known parts of v_i and vd_i
         combine(predictor[i * stages :], i, 1.0, 2 * n, memory, memory)
-        copy(by, k)
+        copy(y, k)
         combine(row[2:], i, h, 2 * n, memory, memory)
-        for c in range(n):
-            bx[c] += x[c]
-            by[c] += y[c]
+        for j in range(n):
+            x[j] += r.x[j]
+            y[j] += r.y[j]
         if i == 1 and h_before > 0.0:  # along the line through the step before
             ratio = row[1] * h / h_before
-            for c in range(n):
-                k[c] += ratio * (yd[c] - k_before[c])
-        status = _stage(
-            context, place, accelerate, w, l, t + h * row[1], h * row[2 + i], bx, by, k, xs, ys, f, low, first
-        )  # fmt: skip
+            for j in range(n):
+                k[j] += ratio * (r.yd[j] - k_before[j])
+        status = _solve_stage(context, c, r, i, t + h * row[1], h * row[2 + i])
         if status != 0:
             return status
     combine(tableau[1 + stages * width :], stages, h, 2 * n, memory, memory)
-    copy(bx, dx)
-    copy(by, dy)
+    copy(x, r.dx)
+    copy(y, r.dy)
     return 0
 
 
 @callback(ERROR)
-def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
+def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):  # nine: as plug-ins have it
     """The trapezoidal rule's -h^3 / 12 times the third derivatives of v and vd, by differences over two steps.
 
     Where there is no step before, as if one as long had been without slope: more than the error of a short step.
@@ -172,18 +209,20 @@ def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
     n = nx
     memory, ex, ey = vector(memory, ANY), vector(ex, n), vector(ey, n)
     before = memory[6 * n :]
-    h_before = before[5 * n]
+    h_before = before[H_BEFORE * n]
     for c in range(n):
         for part, out in ((0, ex), (n, ey)):
             now, end, slope = memory[2 * n + part + c], memory[4 * n + part + c], 0.0
             if h_before > 0.0:
-                slope = (now - before[3 * n + part + c]) / h_before
+                slope = (now - before[Y_BEFORE * n + part + c]) / h_before
             out[c] = -h * h * ((end - now) - h * slope) / (6.0 * (h + (h_before if h_before > 0.0 else h)))
     return 0
 
 
 def prepare_implicit(linear, method, addresses):
-    """Give the step kernel its tolerances and the addresses it calls."""
-    tolerances = (FIXED_TOL, FIXED_TOL) if method.step else method.step_tolerances()
-    linear.numbers[[RTOL, ATOL, THETA, T_BEFORE]] = *tolerances, GUESS, -math.inf
-    linear.kernels[:KERNELS] = addresses
+    """Give the step kernel its tolerances and the addresses that it calls, by name."""
+    numbers = linear.numbers
+    numbers.rtol, numbers.atol = (FIXED_TOL, FIXED_TOL) if method.step else method.step_tolerances()
+    numbers.theta, numbers.t_before = GUESS, -math.inf
+    for name, address in addresses.items():
+        setattr(linear.kernels, name, address)

@@ -1,34 +1,26 @@
-"""The step kernels of tableau methods.
+"""The step kernels of explicit tableau methods, and how step kernels and error estimates are called.
 
 A formulation supplies two kernels, called by address:
 
     place(context, t, x)                set positions: evaluate all that depends on t and x alone
     accelerate(context, t, y, yd, xd)   set velocities; return yd and, for a first-order system, xd
 
-A step kernel returns the increments dx, dy, which the driver adds by compensated summation. Signature of a step kernel:
-context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy; yd and xd are the derivatives at the
-start of the step. The memory of a Runge-Kutta method holds n = nx + ny floats of scratch, then (x', y') of each stage.
+A step kernel, step(context, run, t, h), makes a step h from t. It reads x, y and their derivatives xd, yd at the start
+of the step from the `Run`, and writes the increments dx, dy there, which the driver adds by compensated summation. The
+memory of a Runge-Kutta method holds n = nx + ny floats of scratch, then (x', y') of each stage.
 """
 
 from ..jit.kernels import ANY, callback, caller, kernel, vector
 from ..maths.dense_linalg import copy
+from ..workspaces.run_state import load_run
 
-PLACE, ACCELERATE, STEP = "pdp", "pdppp", "piiddiipppppppp"
+PLACE, ACCELERATE, STEP = "pdp", "pdppp", "ppdd"
 ERROR, NORM = "diipppppp", "ppppdd"
 call_norm = caller(NORM, "d")
 call_error = caller(ERROR)
 call_place = caller(PLACE)
 call_accelerate = caller(ACCELERATE)
 call_step = caller(STEP)
-
-
-def step_kernel(function):
-    """Decorate a step kernel: f(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy).
-
-    It writes the increments dx, dy and returns 0, or the status that `call_place` or `call_accelerate` gave. Arrays
-    come as addresses: `vector(x, nx)` is the array.
-    """
-    return callback(STEP)(function)
 
 
 def error_kernel(function):
@@ -48,41 +40,43 @@ def _add(out, f, k):
 
 
 @callback(STEP)
-def nystrom_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+def nystrom_step(context, run, t, h):
     """One step of an explicit Nystrom method, xd = y; memory (stages + 2) n."""
-    n = nx
-    x, y, yd, dx, dy = vector(x, n), vector(y, n), vector(yd, n), vector(dx, n), vector(dy, n)
-    tableau, memory = vector(tableau, ANY), vector(memory, ANY)
+    r = load_run(run)
+    n, x, y, tableau, memory = r.x.size, r.x, r.y, r.tableau, r.memory
     stages = int(tableau[0])
     xs, ys = memory[:n], memory[n : 2 * n]
     width = 2 + 2 * stages
-    copy(yd, memory[2 * n : 3 * n])
+    copy(r.yd, memory[2 * n : 3 * n])
     for i in range(1, stages):
         row = tableau[1 + i * width :]
         ti = t + h * row[1]
+        # y_i = y + h sum_j a_ij k_j
         copy(y, ys)
         for j in range(i):
             _add(ys, h * row[2 + stages + j], memory[(2 + j) * n :])
-        if row[0] == 0.0:  # not where the stage before was
+        # x_i = x + h c_i y + h^2 sum_j abar_ij k_j, placed unless the stage before was there
+        if row[0] == 0.0:
             for c in range(n):
                 xs[c] = h * row[1] * y[c]
             for j in range(i):
                 _add(xs, h * h * row[2 + j], memory[(2 + j) * n :])
             for c in range(n):
                 xs[c] += x[c]
-            status = call_place(place, context, ti, xs)
+            status = call_place(r.kernels.place, context, ti, xs)
             if status != 0:
                 return status
-        status = call_accelerate(accelerate, context, ti, ys, memory[(2 + i) * n :], xd)
+        status = call_accelerate(r.kernels.accelerate, context, ti, ys, memory[(2 + i) * n :], r.xd)
         if status != 0:
             return status
+    # dx = h y + h^2 sum_j bbar_j k_j,  dy = h sum_j b_j k_j
     weights = tableau[1 + stages * width :]
     for c in range(n):
-        dx[c] = h * y[c]
-        dy[c] = 0.0
+        r.dx[c] = h * y[c]
+        r.dy[c] = 0.0
     for j in range(stages):
-        _add(dx, h * h * weights[j], memory[(2 + j) * n :])
-        _add(dy, h * weights[stages + j], memory[(2 + j) * n :])
+        _add(r.dx, h * h * weights[j], memory[(2 + j) * n :])
+        _add(r.dy, h * weights[stages + j], memory[(2 + j) * n :])
     return 0
 
 
@@ -97,81 +91,87 @@ def combine(weights, count, h, n, memory, out):
 
 
 @kernel
-def stage(context, place, accelerate, second, t, h, i, nx, ny, x, y, weights, memory):
-    """Derivatives at t and (x, y) + h sum_j weights_j k_j, as stage i; second: where x' = y. Status."""
-    n = nx + ny
+def stage(context, r, second, t, h, i, row):
+    """Stage i: the derivatives at t + h c_i, (x, y) + h sum_j a_ij k_j. Status.
+
+    row is c_i, then a_i; (x, y) is the start of the step, as the driver keeps it. second: where x' = y.
+    """
+    nx, ny, memory = r.x_old.size, r.y_old.size, r.memory
+    n, ti = nx + ny, t + h * row[0]
     xs, ys, k = memory[:nx], memory[nx:n], memory[(1 + i) * n :][:n]
-    combine(weights, i, h, n, memory, memory)
+    combine(row[1:], i, h, n, memory, memory)
     for c in range(nx):
-        xs[c] += x[c]
+        xs[c] += r.x_old[c]
     for c in range(ny):
-        ys[c] += y[c]
-    status = call_place(place, context, t, xs)
+        ys[c] += r.y_old[c]
+    status = call_place(r.kernels.place, context, ti, xs)
     if status == 0:
         if second:
             copy(ys, k[:nx])
-        status = call_accelerate(accelerate, context, t, ys, k[nx:], k[:nx])  # of a second order it leaves x' alone
+        # accelerate leaves x' of a second-order system alone
+        status = call_accelerate(r.kernels.accelerate, context, ti, ys, k[nx:], k[:nx])
     return status
 
 
 @kernel
-def _step(context, place, accelerate, second, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
-    n = nx + ny
-    stages = int(tableau[0])
+def _step(context, r, second, t, h):
+    """One step of an explicit Runge-Kutta method on (x, y); second: where x' = y. Status."""
+    nx, ny, tableau, memory = r.x.size, r.y.size, r.tableau, r.memory
+    n, stages = nx + ny, int(tableau[0])
     width = 2 + stages
-    copy(xd, memory[n:])
-    copy(yd, memory[n + nx :])
+    copy(r.y if second else r.xd, memory[n:])
+    copy(r.yd, memory[n + nx :])
     for i in range(1, stages):
-        row = tableau[1 + i * width :]
-        status = stage(context, place, accelerate, second, t + h * row[1], h, i, nx, ny, x, y, row[2:], memory)
+        status = stage(context, r, second, t, h, i, tableau[1 + i * width + 1 :])
         if status != 0:
             return status
     combine(tableau[1 + stages * width :], stages, h, n, memory, memory)
-    copy(memory[:nx], dx)
-    copy(memory[nx:n], dy)
+    copy(memory[:nx], r.dx)
+    copy(memory[nx:n], r.dy)
     return 0
 
 
 @callback(STEP)
-def second_order_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+def second_order_step(context, run, t, h):
     """One step of an explicit Runge-Kutta method on (x, y) with xd = y; memory (stages + 1) 2 n."""
-    x, y, yd, dx, dy = vector(x, nx), vector(y, nx), vector(yd, nx), vector(dx, nx), vector(dy, nx)
-    tableau, memory = vector(tableau, ANY), vector(memory, ANY)
-    return _step(context, place, accelerate, True, t, h, nx, nx, x, y, yd, y, tableau, memory, dx, dy)
+    return _step(context, load_run(run), True, t, h)
 
 
 @callback(STEP)
-def runge_kutta_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+def runge_kutta_step(context, run, t, h):
     """One step of an explicit Runge-Kutta method on the first-order system (x, y); memory (stages + 1)(nx + ny)."""
-    x, y, yd, xd = vector(x, nx), vector(y, ny), vector(yd, ny), vector(xd, nx)
-    dx, dy, tableau, memory = vector(dx, nx), vector(dy, ny), vector(tableau, ANY), vector(memory, ANY)
-    return _step(context, place, accelerate, False, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy)
+    return _step(context, load_run(run), False, t, h)
 
 
 @kernel
-def _error(row, h, nx, ny, y, yd, tableau, memory, ex, ey):
-    n = nx + ny
-    y, yd, ex, ey = vector(y, nx), vector(yd, ny), vector(ex, nx), vector(ey, ny)
-    tableau, memory = vector(tableau, ANY), vector(memory, ANY)
-    stages = int(tableau[0])
-    weights = tableau[1 + stages * (2 + stages) + stages + row * (stages + 1) :]
-    for c in range(nx):
-        ex[c] = h * weights[stages] * y[c]
-    for c in range(ny):
-        ey[c] = h * weights[stages] * yd[c]
+def _weigh(weights, stages, h, n, memory, end, out):
+    """out = h (sum_j w_j k_j + w_end k_end), one k every n floats of the memory."""
+    for c in range(out.size):
+        out[c] = h * weights[stages] * end[c]
     for j in range(stages):
-        _add(ex, h * weights[j], memory[(1 + j) * n :])
-        _add(ey, h * weights[j], memory[(1 + j) * n + nx :])
+        _add(out, h * weights[j], memory[(1 + j) * n :])
+
+
+@kernel
+def _error(which, h, y, yd, tableau, memory, ex, ey):
+    """Errors by a row of error weights; of the derivatives at the step's end, x' is y."""
+    nx, n, stages = ex.size, ex.size + ey.size, int(tableau[0])
+    weights = tableau[1 + stages * (2 + stages) + stages + which * (stages + 1) :]
+    _weigh(weights, stages, h, n, memory, y, ex)
+    _weigh(weights, stages, h, n, memory[nx:], yd, ey)
+
+
+@callback(ERROR)
+def embedded_error(h, nx, ny, y, yd, tableau, memory, ex, ey):  # nine: as plug-ins have it
+    """Errors ex, ey of the step that `memory` holds, y and yd being the derivatives at its end."""
+    y, yd, ex, ey = vector(y, nx), vector(yd, ny), vector(ex, nx), vector(ey, ny)
+    _error(0, h, y, yd, vector(tableau, ANY), vector(memory, ANY), ex, ey)
     return 0
 
 
 @callback(ERROR)
-def embedded_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
-    """Errors ex, ey of the step that `memory` holds, y and yd being the derivatives at its end."""
-    return _error(0, h, nx, ny, y, yd, tableau, memory, ex, ey)
-
-
-@callback(ERROR)
-def second_embedded_error(h, nx, ny, y, yd, tableau, memory, ex, ey):
+def second_embedded_error(h, nx, ny, y, yd, tableau, memory, ex, ey):  # nine: as plug-ins have it
     """The same by the tableau's second row of error weights."""
-    return _error(1, h, nx, ny, y, yd, tableau, memory, ex, ey)
+    y, yd, ex, ey = vector(y, nx), vector(yd, ny), vector(ex, nx), vector(ey, ny)
+    _error(1, h, y, yd, vector(tableau, ANY), vector(memory, ANY), ex, ey)
+    return 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 from ..calls import fitting
 from ..docstrings import complete_docstring
 from ..validation import positive
-from .diagonally_implicit import implicit_step
+from .diagonally_implicit import implicit_step, memory_of
 from .explicit import embedded_error, nystrom_step, runge_kutta_step, second_embedded_error, second_order_step
 from .interpolants import HERMITE, HERMITE_FIRST_ORDER, hermite_second
 from .tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
@@ -233,7 +233,7 @@ class DiagonallyImplicit(Adaptive):
     def kernel(self, first_order: bool) -> StepKernel:
         """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
-        return implicit_step, self.tableau.numbers, lambda nx, ny: (stages + 1) * (nx + ny) + 6 * nx + 1
+        return implicit_step, self.tableau.numbers, lambda nx, ny: memory_of(stages, nx)
 
 
 def registered() -> Mapping[str, type[Integrator]]:

@@ -1,21 +1,21 @@
 """Interpolants: one block of numbers a step, and the motion inside the step from that block.
 
-    fill(context, place, accelerate, first_order, t, h, n, nx, ny,
-         x0, y0, yd0, x1, y1, yd1, xd1, before, now, tableau, memory, data)     the block of a step; Status
-    value(s, h, n, nx, ny, data, x, y)                                          x and y at t + s h
+    fill(context, run)                    the data of the step that the `Run` has just made, in its block; Status
+    value(s, h, n, nx, ny, data, x, y)    x and y at t + s h
 
-0 marks the start of the step and 1 its end; before and now hold q, qd, qdd there. A fill may evaluate the equations by
-place and accelerate; the caller restores the workspace.
+In the `Run`, x, y, yd, xd and now (q, qd, qdd) are those of the step's end, x_old, y_old, yd_old and before those of
+its start; start and length are in the block. A fill may evaluate the equations; the caller restores the workspace.
 """
 
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ..jit.kernels import ANY, Callback, callback, caller, kernel, vector
+from ..jit.kernels import Callback, callback, caller, kernel, vector
 from ..maths.dense_linalg import copy
+from ..workspaces.run_state import B_DATA, B_H, B_START, load_run
 from .explicit import combine, stage
 
-FILL, VALUE = "piiiddiii" + 12 * "p", "ddiiippp"
+FILL, VALUE = "pp", "ddiiippp"
 call_fill = caller(FILL)
 call_value = caller(VALUE)
 
@@ -30,8 +30,11 @@ class Interpolant(NamedTuple):
 
 
 @kernel
-def _quintic(s, h, a, ad, add, b, bd, bdd, out, outd):
-    """Quintic Hermite interpolation at s in (0, 1) of a step h, and its derivative."""
+def _quintic(s, h, n, d, out, outd):
+    """Quintic Hermite interpolation at s in (0, 1) of a step h, and its derivative.
+
+    d holds n values, n first and n second derivatives of the start, then those of the end.
+    """
     s2 = s * s
     s3 = s2 * s
     f = s3 * (10.0 + s * (6.0 * s - 15.0))
@@ -41,59 +44,59 @@ def _quintic(s, h, a, ad, add, b, bd, bdd, out, outd):
     k0, k0d = 0.5 * (s2 - s3 * (3.0 + s * (s - 3.0))), s + 0.5 * s2 * (s * (12.0 - 5.0 * s) - 9.0)
     k1, k1d = 0.5 * s3 * (1.0 + s * (s - 2.0)), 0.5 * s2 * (3.0 + s * (5.0 * s - 8.0))
     for i in range(out.size):
-        step = b[i] - a[i]
-        out[i] = a[i] + f * step + h * (g0 * ad[i] + g1 * bd[i]) + h * h * (k0 * add[i] + k1 * bdd[i])
+        a, ad, add = d[i], d[n + i], d[2 * n + i]
+        b, bd, bdd = d[3 * n + i], d[4 * n + i], d[5 * n + i]
+        step = b - a
+        out[i] = a + f * step + h * (g0 * ad + g1 * bd) + h * h * (k0 * add + k1 * bdd)
         if outd.size > 0:
-            outd[i] = fd * step + g0d * ad[i] + g1d * bd[i] + h * (k0d * add[i] + k1d * bdd[i])
+            outd[i] = fd * step + g0d * ad + g1d * bd + h * (k0d * add + k1d * bdd)
 
 
 @kernel
-def _cubic(s, h, a, ad, b, bd, out):
-    """Cubic Hermite interpolation."""
+def _cubic(s, h, d, out):
+    """Cubic Hermite interpolation; d holds values and derivatives of the start, then those of the end."""
+    n = out.size
     f = s * s * (3.0 - 2.0 * s)
     g0, g1 = s * (s - 1.0) * (s - 1.0), s * s * (s - 1.0)
-    for i in range(out.size):
-        out[i] = a[i] + f * (b[i] - a[i]) + h * (g0 * ad[i] + g1 * bd[i])
+    for i in range(n):
+        a, b = d[i], d[2 * n + i]
+        out[i] = a + f * (b - a) + h * (g0 * d[n + i] + g1 * d[3 * n + i])
 
 
 @callback(FILL)
-def fill_hermite(
-    context, place, accelerate, first_order, t, h, n, nx, ny,
-    x0, y0, yd0, x1, y1, yd1, xd1, before, now, tableau, memory, data,
-):  # fmt: skip
+def fill_hermite(context, run):
     """x, x', x'' at both ends, x' being y."""
-    data = vector(data, 6 * nx)
-    copy(vector(x0, nx), data)
-    copy(vector(y0, nx), data[nx:])
-    copy(vector(yd0, nx), data[2 * nx :])
-    copy(vector(x1, nx), data[3 * nx :])
-    copy(vector(y1, nx), data[4 * nx :])
-    copy(vector(yd1, nx), data[5 * nx :])
+    r = load_run(run)
+    data, nx = r.block[B_DATA:], r.x.size
+    copy(r.x_old, data)
+    copy(r.y_old, data[nx:])
+    copy(r.yd_old, data[2 * nx :])
+    copy(r.x, data[3 * nx :])
+    copy(r.y, data[4 * nx :])
+    copy(r.yd, data[5 * nx :])
     return 0
 
 
 @callback(VALUE)
 def hermite(s, h, n, nx, ny, data, x, y):
     """Quintic Hermite interpolation of x, and of y by its derivative."""
-    d, k = vector(data, 6 * nx), nx
-    _quintic(s, h, d, d[k:], d[2 * k :], d[3 * k :], d[4 * k :], d[5 * k :], vector(x, k), vector(y, k))
+    _quintic(s, h, nx, vector(data, 6 * nx), vector(x, nx), vector(y, nx))
     return 0
 
 
 @callback(FILL)
-def fill_hermite_first_order(
-    context, place, accelerate, first_order, t, h, n, nx, ny,
-    x0, y0, yd0, x1, y1, yd1, xd1, before, now, tableau, memory, data,
-):  # fmt: skip
+def fill_hermite_first_order(context, run):
     """q, qd, qdd at both ends, then y and y' at both."""
-    data = vector(data, 6 * n + 4 * ny)
-    copy(vector(before, 3 * n), data)
-    copy(vector(now, 3 * n), data[3 * n :])
+    r = load_run(run)
+    data, n, ny = r.block[B_DATA:], r.now.shape[1], r.y.size
+    for i in range(3):
+        copy(r.before[i], data[i * n :])
+        copy(r.now[i], data[(3 + i) * n :])
     data = data[6 * n :]
-    copy(vector(y0, ny), data)
-    copy(vector(yd0, ny), data[ny:])
-    copy(vector(y1, ny), data[2 * ny :])
-    copy(vector(yd1, ny), data[3 * ny :])
+    copy(r.y_old, data)
+    copy(r.yd_old, data[ny:])
+    copy(r.y, data[2 * ny :])
+    copy(r.yd, data[3 * ny :])
     return 0
 
 
@@ -101,9 +104,8 @@ def fill_hermite_first_order(
 def hermite_first_order(s, h, n, nx, ny, data, x, y):
     """Quintic for x = q, cubic for y, whose second derivative nothing gives."""
     d = vector(data, 6 * n + 4 * ny)
-    _quintic(s, h, d, d[n:], d[2 * n :], d[3 * n :], d[4 * n :], d[5 * n :], vector(x, n), vector(y, 0))
-    d = d[6 * n :]
-    _cubic(s, h, d, d[ny:], d[2 * ny :], d[3 * ny :], vector(y, ny))
+    _quintic(s, h, n, d, vector(x, n), vector(y, 0))
+    _cubic(s, h, d[6 * n :], vector(y, ny))
     return 0
 
 
@@ -135,33 +137,27 @@ POWER = 7  # rows of the polynomial of DOP853
 
 
 @callback(FILL)
-def fill_dop853(
-    context, place, accelerate, first_order, t, h, n, nx, ny,
-    x0, y0, yd0, x1, y1, yd1, xd1, before, now, tableau, memory, data,
-):  # fmt: skip
+def fill_dop853(context, run):
     """(x, y) at the start and seven rows F, by three more stages; Hairer, Norsett, Wanner, II.6, Eq. (6.13)."""
-    x0, y0, x1, y1, yd1 = vector(x0, nx), vector(y0, ny), vector(x1, nx), vector(y1, ny), vector(yd1, ny)
-    tableau, memory = vector(tableau, ANY), vector(memory, ANY)
-    size = nx + ny
-    data = vector(data, (1 + POWER) * size)
-    stages = int(tableau[0])
-    numbers = tableau[1 + stages * (2 + stages) + stages + 2 * (stages + 1) :]
+    r = load_run(run)
+    nx, ny, memory, second = r.x.size, r.y.size, r.memory, r.numbers.first_order == 0
+    t, h, size, data = r.block[B_START], r.block[B_H], nx + ny, r.block[B_DATA:]
+    stages = int(r.tableau[0])
+    numbers = r.tableau[1 + stages * (2 + stages) + stages + 2 * (stages + 1) :]
     first, last = memory[size:], memory[(1 + stages) * size :]
-    copy(vector(xd1, nx) if first_order == 1 else y1, last)
-    copy(yd1, last[nx:])
-    copy(x0, data)
-    copy(y0, data[nx:])
+    copy(r.y if second else r.xd, last)
+    copy(r.yd, last[nx:])
+    copy(r.x_old, data)
+    copy(r.y_old, data[nx:])
     for c in range(size):
-        step = x1[c] - x0[c] if c < nx else y1[c - nx] - y0[c - nx]
+        step = r.x[c] - r.x_old[c] if c < nx else r.y[c - nx] - r.y_old[c - nx]
         data[size + c] = step
         data[2 * size + c] = h * first[c] - step
         data[3 * size + c] = 2.0 * step - h * (last[c] + first[c])
     total = stages + 4
     for i in range(stages + 1, total):
-        status = stage(
-            context, place, accelerate, first_order == 0, t + h * numbers[0], h, i, nx, ny, x0, y0, numbers[1:], memory
-        )
-        if status != 0:  # too long a step, with tolerances as loose: the cubic of its two ends is what it gets
+        if stage(context, r, second, t, h, i, numbers) != 0:
+            # too long a step, with tolerances as loose: the cubic of its two ends is what it gets
             for c in range(4 * size, (1 + POWER) * size):
                 data[c] = 0.0
             return 0

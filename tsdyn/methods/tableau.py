@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InvalidArgument
+from .tolerances import ORDER_CONDITION
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +40,7 @@ def _lower(values, stages, what):
 def _demand(what, size=1.0, **conditions):
     """Refuse what fails by more than rounding of coefficients of that size."""
     for name, value in conditions.items():
-        if np.abs(value).max() > 1e-14 * size:
+        if np.abs(value).max() > ORDER_CONDITION * size:
             raise InvalidArgument(f"{what}: the condition {name} fails by {np.abs(value).max():.3g}.")
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 class Derived:
     """Of one `Packed`: each entry is None, or empty, until the function named beside it has been called."""
 
-    dropped: object = None  # int64 (k,): redundant rows of the constraint graph; set by constraint_graphs.drop
+    redundant: object = None  # int64 (k,): redundant rows of the constraint graph; constraint_graphs.set_redundant
     turning: set = field(default_factory=set)  # bodies that count as turning; locked_orientations.keep_turning
     handles: object = None  # handles.handles_of
     body_indices: dict = None  # packed.index_of
@@ -18,7 +18,7 @@ class Derived:
     locked: object = None  # a `Still`: locked_orientations.still
     moving_graph: tuple = None  # locked_orientations.moving_network, and by the loops asked for:
     moving_networks: dict = field(default_factory=dict)
-    undropped: object = None  # a `Packed` none of whose rows is dropped: dependent_rows.dependent_rows
+    examined: object = None  # a `Packed` without redundant rows so far: dependent_rows.dependent_rows
     aligned: tuple = None  # mirrored_branches.demand_aligned
     holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
     loads: dict = None  # reactions.loads_of
@@ -42,8 +42,8 @@ class Derived:
 
     def __reduce__(self):
         """In another process: what doesn't depend on where things are in memory."""
-        return _of, (self.dropped, self.turning, self.handles)
+        return _of, (self.redundant, self.turning, self.handles)
 
 
-def _of(dropped, turning, handles):
-    return Derived(dropped, turning, handles)
+def _of(redundant, turning, handles):
+    return Derived(redundant, turning, handles)

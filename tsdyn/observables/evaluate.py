@@ -113,10 +113,10 @@ def _with_friction(packed, t, q, qd, Phi_q, solve):
 
 def _of_independent_rows(M, Phi_q, load, gamma):
     """(qdd, lam) with NaN for rows of Phi_q that follow from others, and hold with them."""
-    dropped = dependent(Phi_q)
-    if not dropped.size:
+    redundant = dependent(Phi_q)
+    if not redundant.size:
         raise SingularConfiguration(NOT_UNIQUE)
-    kept = np.setdiff1d(np.arange(len(Phi_q)), dropped)
+    kept = np.setdiff1d(np.arange(len(Phi_q)), redundant)
     kkt = np.block([[M, Phi_q[kept].T], [Phi_q[kept], np.zeros((kept.size, kept.size))]])
     try:
         found = equilibrated_solve(kkt, np.concatenate((load, -gamma[kept])))
@@ -159,19 +159,19 @@ def _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t):
     """As `_of_independent_rows`, of sparse arrays."""
     m, found = len(gamma), False
     for share in REDUNDANT_SHARES:
-        dropped = dependent_rows(packed, q, t, share)
-        if dropped is None or not dropped.size:
+        redundant = dependent_rows(packed, q, t, share)
+        if redundant is None or not redundant.size:
             continue
         found = True
         for _ in range(ROUNDS):
-            kept = np.setdiff1d(np.arange(m), dropped)
+            kept = np.setdiff1d(np.arange(m), redundant)
             solve = _sparse_solver(M, Phi_q[kept])
             if solve is None:
                 break
-            wrong = _independent(Phi_q[dropped], solve, np.zeros(kept.size))
+            wrong = _independent(Phi_q[redundant], solve, np.zeros(kept.size))
             if not wrong.size:
                 return _with_gaps(solve(load, gamma[kept]), kept, Phi_q, gamma)
-            dropped = np.delete(dropped, wrong)
+            redundant = np.delete(redundant, wrong)
     solve = None if found else _sparse_solver(M, Phi_q, 0.0)  # regular, if not by much
     if solve is None:
         raise SingularConfiguration(NOT_UNIQUE)

@@ -5,7 +5,7 @@ import numpy as np
 from ..elements.loops.body_poses import take_loads
 from ..formulations.friction_solve import find_reactions
 from ..jit.kernels import entry, resident
-from ..rows.schur_complement import weigh
+from ..rows.interface import weigh_bodies
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
@@ -24,8 +24,7 @@ def _solve(context, t, q, qd, r, out):
     for k in range(t.size):
         found = factorise_at(network, s, f, t[k], q[k])
         take_loads(network.bodies, q[k], r[k], f.Z)
-        for b in range(network.bodies.shape[0]):
-            weigh(network.inverse, b, f.Z, 8 * b, f.Z, 8 * b)
+        weigh_bodies(network, f.Z)
         for e in range(f.gamma.size):
             f.gamma[e] = 0.0
         found = found and find_reactions(network, s, f, q[k], qd[k], t[k])

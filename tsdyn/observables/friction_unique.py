@@ -3,14 +3,15 @@
 import numpy as np
 
 from ..errors import RedundantConstraints
-from ..formulations.friction_solve import normal_load
+from ..formulations.friction_loads import normal_load
 from ..jit.kernels import entry, resident, stack
 from ..model.packed_friction import FR_COUNT, FR_FIRST
+from ..rows.interface import count_self_stresses, redundancy, self_stress
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
 from .tolerances import NO_STRESS
-from .uniqueness import find_rows, find_stress
+from .uniqueness import find_rows
 
 
 @entry
@@ -20,8 +21,8 @@ def _free_loads(context, t, q, whole, out):
     network, s, f = c.network, c.system, c.free
     reaction, none, found = stack(6), stack(7), stack(7)
     find_rows(network, s, f, q, t, whole)
-    for d in range(f.dropped[0]):
-        largest = find_stress(network, f, whole, f.dropped[1 + d])
+    for d in range(count_self_stresses(f)):
+        largest = self_stress(network, f, whole, d)
         for i in range(out.size):
             friction = network.frictions[i]
             for c in range(6):
@@ -40,7 +41,7 @@ def _free_loads(context, t, q, whole, out):
 def demand_unique(packed, q, t):
     """Raise RedundantConstraints where a friction needs a reaction that isn't unique at q."""
     network = network_of(packed, REDUCED)
-    if not (network.dropped.size and len(network.frictions)):
+    if not (redundancy(network) and len(network.frictions)):
         return
     system = packed.system._replace(reals=packed.system.reals.copy())
     context, *_keep = resident(parts(system, network, q.size))

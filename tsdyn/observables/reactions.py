@@ -14,10 +14,9 @@ from ..maths.dense_linalg import copy
 from ..model.equations import constraint_jacobian, set_time
 from ..model.packed import classes, index_of
 from ..model.sparse_jacobian import WIDTH, with_short_rows
-from ..rows.schur_complement import gather, scatter
+from ..rows.interface import balance_loads, mark_redundant
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
-from ..sparse.factorisation import solve
 from ..workspaces.workspace import load_parts, parts
 from .factorised_rows import factorise_at
 from .friction_reactions import with_normal_loads
@@ -42,9 +41,7 @@ def solve_multipliers(context, t, q, r, rows, out):
         for i in range(out.shape[1]):
             out[k, i] = 0.0
         for _ in range(2):
-            gather(network, f.Y, f.Z, f.b)
-            solve(network.pattern, f.S, f.b)
-            scatter(network, f.H, f.b, f.Z)
+            balance_loads(network, f.rows, f.Z, f.b)
             for e in range(f.b.size):
                 if network.row[e] >= 0:
                     out[k, network.row[e]] += f.b[e]
@@ -60,8 +57,7 @@ def solve_multipliers(context, t, q, r, rows, out):
                 for c in range(3, 7):
                     x += f.Q[bodies[b, 0] + c] * q[k, bodies[b, 0] + c]
                 out[k, i] = x
-        for i in range(f.dropped[0]):
-            out[k, network.row[f.dropped[1 + i]]] = math.nan
+        mark_redundant(network, f, math.nan, out[k])
         if not regular:
             for i in range(out.shape[1]):
                 out[k, i] = math.nan
@@ -85,11 +81,11 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
 
 
 def particular(multipliers):
-    """Multipliers (k, m) with zeros where rows are dropped: they solve the same equations."""
-    dropped = np.isnan(multipliers)
-    if not dropped.any():
+    """Multipliers (k, m) with zeros at redundant rows: they solve the same equations."""
+    redundant = np.isnan(multipliers)
+    if not redundant.any():
         return multipliers
-    return np.where(dropped & ~dropped.all(axis=1, keepdims=True), 0.0, multipliers)
+    return np.where(redundant & ~redundant.all(axis=1, keepdims=True), 0.0, multipliers)
 
 
 def reaction(solution, member, body):

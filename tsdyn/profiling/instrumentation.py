@@ -9,10 +9,9 @@ from ..elements.loops import constraint_rows, coordinate_rows, force_series
 from ..elements.loops import forces as force_loops
 from ..formulations.locked_orientations import instances
 from ..model.packed_forces import members_of
-from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT
+from ..sparse.constraint_graph import LOOPS
 from . import timers
 
-X_ADDRESS, X_COUNT, X_FIRST_INT = 0, 2, 4  # columns of Expansion.forces
 OF_KIND = "phi", "jacobian", "gamma", "phi_t"  # the loops of System.kinds and of System.forces that are timed
 OF_FORCE = "force", "remember"
 
@@ -46,10 +45,10 @@ class Stopwatch:
         """Time the memory's advances."""
         self.memory, advance = memory, memory.advance
 
-        def timed(record, most):
+        def timed(log, most):
             began = time.perf_counter()
             self.begin()
-            status = advance(record, most)
+            status = advance(log, most)
             self.end()
             self.seconds += time.perf_counter() - began
             return status
@@ -91,21 +90,21 @@ class Timekeeper(Stopwatch):
         classes = list(dict.fromkeys(map(type, memory.packed.constraints)))
         joints = [kind for kind, _ in instances(memory.packed, network)]
         self.notes = timers.new_notes(len(joints) + len(classes) + 2 * len(forces))
-        places = c.expansion.places[:, :1] if series else np.zeros((len(joints), 1), np.int64)
+        places = c.expansion.places["loop"] if series else [0] * len(joints)
 
         rows = [
             (
-                row[N_FIRST_INT],
-                row[N_COUNT] * constraint_rows.INTS,
-                [*row[: timers.IN_ORDERS], *place],
+                row.table,
+                row.count * constraint_rows.INTS,
+                [*(row[loop] for loop in LOOPS), place],
                 _of_constraints(kind),
             )
             for kind, row, place in zip(joints, network.kinds, places, strict=True)
         ]
         table, firsts = self._headed(network.table, rows)
         kinds = network.kinds.copy()
-        kinds[:, N_FIRST_INT] = firsts
-        _instead(kinds.T, range(timers.IN_ORDERS), timers.BODY_TIMERS)
+        kinds["table"] = firsts
+        _instead(kinds, LOOPS, timers.BODY_TIMERS)
         network = network._replace(table=table, kinds=kinds)
 
         rows = [
@@ -124,34 +123,30 @@ class Timekeeper(Stopwatch):
         c = c._replace(network=network, system=system._replace(table=table, kinds=kinds, forces=loads))
         if series:
             c = c._replace(expansion=self._in_series(c.expansion, forces))
-            self._in_driver(memory.steps, timers.OF_SERIES)
-        else:
-            self._in_driver(memory.addresses, timers.OF_STEPS)
-            self._in_driver(c.linear.kernels if memory.implicit else (), timers.OF_STAGES)
+        elif memory.implicit:
+            self._in_driver(c.linear.kernels, timers.OF_STAGES)
+        self._in_driver(memory.run.kernels, timers.OF_DRIVERS)
         memory.settle(c, (self.notes.ctypes.data,))
 
     def _in_series(self, x, forces):
         rows = [
-            (
-                row[X_FIRST_INT],
-                row[X_COUNT] * force_series.INTS,
-                [0] * timers.IN_ORDERS + [row[X_ADDRESS]],
-                _of_forces(members),
-            )
+            (row.table, row.count * force_series.INTS, [0] * timers.IN_ORDERS + [row.loop], _of_forces(members))
             for members, row in zip(forces, x.forces, strict=True)
         ]
         table, firsts = self._headed(x.table, rows)
         places, loads = x.places.copy(), x.forces.copy()
-        loads[:, X_FIRST_INT] = firsts
-        _instead(places.T, [0], [timers.SERIES_TIMER])
-        _instead(loads.T, [X_ADDRESS], [timers.SERIES_TIMER])
+        loads["table"] = firsts
+        for rows in (places, loads):
+            _instead(rows, ["loop"], [timers.SERIES_TIMER])
         return x._replace(places=places, table=table, forces=loads)
 
-    def _in_driver(self, addresses, roles):
+    def _in_driver(self, kernels, roles):
         """Timers in place of addresses (not all of which need be there)."""
-        for i, (address, role) in enumerate(zip(addresses, roles, strict=False)):
-            if role and address:
-                self.notes[timers.TARGETS + role], addresses[i] = address, timers.TIMERS[role].address
+        for name, role in roles.items():
+            address = getattr(kernels, name)
+            if address:
+                self.notes[timers.TARGETS + role] = address
+                setattr(kernels, name, timers.TIMERS[role].address)
 
     def _headed(self, table, rows):
         """A table with a header before each kind's rows, which are given by place, length and loops; their places."""

@@ -7,9 +7,9 @@ from ..formulations.null_space import reduced_mass, velocities
 from ..formulations.tangent import solve_velocities
 from ..jit.kernels import entry, kernel
 from ..maths.dense_linalg import copy
-from ..rows.evaluation import factor_rows
-from ..runs.run_state import T, load_run
+from ..rows.interface import DYNAMICS, factorise_selected_rows
 from ..taylor.workspace import load_series
+from ..workspaces.run_state import load_run
 from ..workspaces.workspace import load
 from .tolerances import BRIEF, ROUNDS
 
@@ -19,7 +19,7 @@ SYSTEM, NORMAL, VELOCITIES, MASS = range(4)
 @kernel
 def _system(network, f):
     """W H^T, H W H^T and its factors."""
-    factor_rows(network, f, f.H, f.Y, f.S, 1)
+    factorise_selected_rows(network, f, f.rows, DYNAMICS)
 
 
 @entry
@@ -34,7 +34,7 @@ def again(context, run, what, count):
             factorise_normal(c.network, w, f, l)
         else:
             copy(r.y, l.y)
-            solve_velocities(c.network, c.system, w, f, l, r.clock[T])
+            solve_velocities(c.network, c.system, w, f, l, r.clock.t)
 
 
 @entry
@@ -45,7 +45,7 @@ def again_with_basis(context, run, what, count):
         if what == MASS:
             reduced_mass(c.system, c.work)
         else:
-            velocities(c.system, c.work, r.clock[T], r.y)
+            velocities(c.system, c.work, r.clock.t, r.y)
 
 
 @entry

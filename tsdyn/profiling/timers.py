@@ -37,35 +37,34 @@ from ..methods.explicit import NORM as NORM_SIGNATURE
 from ..methods.explicit import PLACE as PLACE_SIGNATURE
 from ..methods.explicit import STEP as STEP_SIGNATURE
 from ..methods.explicit import call_accelerate, call_norm, call_place, call_step
+from ..runs.dense_output import call_chart, call_complete
 from ..runs.stepper import call_check
-from ..runs.trajectory import call_chart, call_complete
 from ..taylor.step_parts import call_expand, call_reach
 
 # what may run: the driver, and what it and others call; ROWS is any loop over constraints or forces
 DRIVER, PLACE, ACCELERATE, COMPLETE, CHECK, CHART, STEP, NORM = range(8)
 LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, EXPAND, REACH, ROWS, ROLES = range(8, 17)
-# roles of the addresses that drivers are given, in their order; 0 for what has no timer
-OF_STEPS = (
-    PLACE,
-    ACCELERATE,
-    COMPLETE,
-    CHECK,
-    CHART,
-    STEP,
-    0,
-    0,
-    NORM,
-)
-OF_STAGES = (
-    LINEARISE,
-    REDUCE,
-    FACTORISE,
-    SOLVE,
-    SOFTEN,
-    COMPLETE,
-    NORM,
-)
-OF_SERIES = (EXPAND, REACH)
+# roles of the kernels whose addresses drivers are given, by their names in `Kernels` and `StageKernels`
+OF_DRIVERS = {
+    "place": PLACE,
+    "accelerate": ACCELERATE,
+    "complete": COMPLETE,
+    "check": CHECK,
+    "start_chart": CHART,
+    "step": STEP,
+    "error_norm": NORM,
+    "expand": EXPAND,
+    "reach": REACH,
+}
+OF_STAGES = {
+    "linearise": LINEARISE,
+    "reduce": REDUCE,
+    "factorise": FACTORISE,
+    "solve": SOLVE,
+    "soften": SOFTEN,
+    "complete": COMPLETE,
+    "error_norm": NORM,
+}
 # the notes: the clock where the processor has none, what it is given first, what it writes, the factor of its first
 # number; the time last read; the slot and role of what runs in what; addresses that timers stand for; then the slots:
 # pairs of calls and time
@@ -161,12 +160,10 @@ def _chart(context, t, x, y, yd, xd):
     return status
 
 
-def _step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy):
+def _step(context, run, t, h):
     notes = integers(_before(context), ANY)
     _enter(notes, ROLE * ROLES, ROLE)
-    status = call_step(
-        notes[TARGETS + ROLE], context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy
-    )
+    status = call_step(notes[TARGETS + ROLE], context, run, t, h)
     _leave(notes)
     return status
 

@@ -3,7 +3,7 @@
 Imports sparse and below. The rows themselves come from elements/loops/constraint_rows.py, Phi of each kind from
 constraints/.
 
-Begin with evaluation.py: H at the present poses, S = H W H^T and its factors. schur_complement.py forms the products
-with H, independent_rows.py chooses which of redundant rows to keep, singularity.py says how near Phi_q is to losing
-rank; tolerances.py has the share below which a pivot counts as zero (sparse/block_operations.py compares).
+Begin with interface.py, the one module that other packages import. Below it evaluation.py calls the loops,
+schur_complement.py forms S = H W H^T and products with H, chart_matrix.py N; independent_rows.py selects the redundant
+rows, reselection.py renews the selection, redundant_rows.py zeroes them; tolerances.py has the thresholds.
 """

@@ -5,7 +5,7 @@ An axis row is zero in H, since a projection onto the constraint manifold ignore
 
 from ..jit.kernels import kernel
 from ..jit.simd import four, get, let, put, times, total
-from ..sparse.massless_axes import A_AXIS, A_SIDE, A_TARGET, AXIS_BODY, AXIS_H, AXIS_OWN, AXIS_ROW, AXIS_Y
+from ..sparse.massless_axes import AXIS_H, AXIS_OWN, AXIS_Y
 
 
 @kernel
@@ -13,7 +13,7 @@ def weigh_axes(network, Y):
     """Set the axis rows of Y = W H^T."""
     axes = network.axes
     for i in range(axes.rows.shape[0]):
-        put(Y, 16 * axes.rows[i, AXIS_ROW] + 4, four(axes.values[i], AXIS_Y))
+        put(Y, 16 * axes.rows[i].row + 4, four(axes.values[i], AXIS_Y))
 
 
 @kernel
@@ -22,11 +22,11 @@ def multiply_axes(network, H, Y, values):
     axes = network.axes
     for i in range(axes.products.shape[0]):
         product, scale = axes.products[i], axes.scales[i]
-        side, y = product[A_SIDE], 16 * axes.rows[product[A_AXIS], AXIS_ROW] + 4
+        side, y = product.side, 16 * axes.rows[product.axis].row + 4
         x = get(Y, y - 1 - side) if side < 0 else total(times(four(H, side + 4), four(Y, y)))
-        let(values, product[A_TARGET], scale * x)
+        let(values, product.target, scale * x)
     for i in range(axes.rows.shape[0]):
-        let(values, network.diagonal[axes.rows[i, AXIS_ROW]], axes.values[i, AXIS_OWN])
+        let(values, network.diagonal[axes.rows[i].row], axes.values[i, AXIS_OWN])
 
 
 @kernel
@@ -36,10 +36,10 @@ def multiply_axes_both(network, H, X, lower, upper):
     axes = network.axes
     for i in range(axes.products.shape[0]):
         product = axes.products[i]
-        h = four(axes.values[product[A_AXIS]], AXIS_H)
-        let(lower, product[A_TARGET], total(times(h, four(X, product[A_SIDE] + 4))))
+        h = four(axes.values[product.axis], AXIS_H)
+        let(lower, product.target, total(times(h, four(X, product.side + 4))))
     for i in range(axes.rows.shape[0]):
-        let(lower, network.diagonal[axes.rows[i, AXIS_ROW]], axes.values[i, AXIS_OWN])
+        let(lower, network.diagonal[axes.rows[i].row], axes.values[i, AXIS_OWN])
 
 
 @kernel
@@ -47,16 +47,25 @@ def leave_axes_out(network, values):
     """Replace axis rows by minus one on the diagonal: S for the given inertias, with zero multipliers of axis rows."""
     axes = network.axes
     for i in range(axes.rows.shape[0]):
-        let(values, network.diagonal[axes.rows[i, AXIS_ROW]], -1.0)
+        let(values, network.diagonal[axes.rows[i].row], -1.0)
 
 
 @kernel
-def gather_axes(network, Z, out):
-    """out = c e . Z of the axis rows, Z being accelerations of bodies."""
+def gather_axes(network, values, at, stride, scale, out):
+    """out = scale c e . z of the axis rows, z at values[at + stride * b] being of body b."""
     axes = network.axes
     for i in range(axes.rows.shape[0]):
-        e, b = axes.rows[i, AXIS_ROW], axes.rows[i, AXIS_BODY]
-        out[e] = total(times(four(axes.values[i], AXIS_H), four(Z, 8 * b + 4)))
+        e, b = axes.rows[i].row, axes.rows[i].body
+        out[e] = scale * total(times(four(axes.values[i], AXIS_H), four(values, at + stride * b)))
+
+
+@kernel
+def add_axis_multipliers(network, lam, out):
+    """out += lam of the axis rows: the second term of c e . omega'd + lam_e."""
+    axes = network.axes
+    for i in range(axes.rows.shape[0]):
+        e = axes.rows[i].row
+        out[e] += lam[e]
 
 
 @kernel
@@ -64,10 +73,10 @@ def clear_axes(network, out):
     """out = 0 of the axis rows."""
     axes = network.axes
     for i in range(axes.rows.shape[0]):
-        out[axes.rows[i, AXIS_ROW]] = 0.0
+        out[axes.rows[i].row] = 0.0
 
 
 @kernel
-def is_axis(network, values, e):
-    """Return True if the failed row of an elimination, or -1, is an axis row; values are the partial factors of S."""
-    return e >= 0 and values[network.pattern.shape[1] + e] < 0.0
+def is_axis(network, rows, e):
+    """Return True if the row that failed in the factorisation of S, or -1, is an axis row."""
+    return e >= 0 and rows.S[network.pattern.shape[1] + e] < 0.0

@@ -1,9 +1,5 @@
 """Selection of independent rows of H among redundant ones, by rank-revealing elimination of S.
 
-A redundant row holds wherever the rows that it depends on hold. It is dropped: its row of H and its right-hand sides
-are zero and its diagonal entry of S and N is one, so its multiplier is zero and every sparsity pattern is unchanged.
-The selection is renewed when the kept rows come close to dependence.
-
 Rows are ordered by diagonally pivoted Cholesky, pivots relative to the diagonal entry; rows with negligible pivots are
 dropped. In large scenes pivoting is confined to the blocks of the fill-reducing order: the selection is independent,
 but not the best conditioned.
@@ -12,38 +8,11 @@ but not the best conditioned.
 import math
 
 from ..jit.kernels import kernel, long_kernel
-from ..jit.simd import put, splat
 from ..sparse.block_operations import eliminate, subtract_products
-from ..sparse.factorisation import keep_diagonal, record
+from ..sparse.factorisation import keep_diagonal, update_later_blocks
 from .axis_rows import leave_axes_out
-from .schur_complement import inner, multiply_rows, weigh_rows
-from .tolerances import ZERO_PIVOT
-
-FIRST, FINER = 1e-3, 1e-2  # the share below which rows are dropped, at first; how it falls while those are too many
-WORSE = 0.1  # of what the weakest row has had since it was chosen: below it the choice is made anew
-
-
-@kernel
-def drop(dropped, b):
-    """Zero the right-hand sides of dropped rows."""
-    for i in range(dropped[0]):
-        b[dropped[1 + i]] = 0.0
-
-
-@kernel
-def drop_rows(dropped, H):
-    """Zero the rows of H that are dropped."""
-    for i in range(dropped[0]):
-        at = 16 * dropped[1 + i]
-        for c in range(0, 16, 4):
-            put(H, at + c, splat(0.0))
-
-
-@kernel
-def drop_diagonal(network, dropped, values):
-    """Ones on the diagonal of S, or of one of the parts of N, where rows are dropped."""
-    for i in range(dropped[0]):
-        values[network.diagonal[dropped[1 + i]]] = 1.0
+from .schur_complement import form_schur_complement, inner, weigh_rows
+from .tolerances import FEWER, FIRST_SHARE, ZERO_PIVOT
 
 
 @kernel
@@ -143,7 +112,7 @@ def _eliminate_choosing(network, values, share, dropped, A, order):
     As factorisation.factor; what is left in `values` serves nothing. Negative where a row that must be kept can't be.
     """
     pattern = network.pattern
-    starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
+    starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     keep_diagonal(pattern, values)
     kept, count = values[pattern.shape[1] :], 0
     for j in range(heads.size):
@@ -166,11 +135,7 @@ def _eliminate_choosing(network, values, share, dropped, A, order):
             if size - k > 3:
                 out, right = u[3 * (width + 1) :], u[3:]
                 subtract_products(u, 3, width, right, right, out, width, size - k - 3, width - k - 3, True)
-        for e in range(updates[j], updates[j + 1]):
-            at, rows, run, n, target, stride = record(pattern, e)
-            for k in range(0, size, 3):
-                u, r = panel[k * (width + 1) :], panel[k * width :]
-                subtract_products(u, size - k, width, r[at:], r[run:], values[target:], stride, rows, n, at == run)
+        update_later_blocks(pattern, values, panel, j, size, width)
     return count
 
 
@@ -186,24 +151,25 @@ def _settle(f, count, wanted):
 
 
 @long_kernel
-def select(network, f, H, Y, S, wanted, least):
+def select(network, f, rows, wanted, least):
     """Select `wanted` rows of H to drop; if wanted < 0, all rows with relative pivots below `least`.
 
     Return True if that many exist; f.dropped then lists them in elimination order. Y and S are scratch.
     """
     m, count = network.row.size, -1
     if f.block.size >= m * m and network.welds.shape[0] == 0:
-        weigh_rows(network, H, Y)
-        count = _choose_of_all(network, H, Y, wanted, ZERO_PIVOT if wanted >= 0 else least, f.chosen, f.block, f.order)
+        weigh_rows(network, rows.H, rows.Y)
+        share = ZERO_PIVOT if wanted >= 0 else least
+        count = _choose_of_all(network, rows.H, rows.Y, wanted, share, f.chosen, f.block, f.order)
         return _settle(f, count, wanted)
-    share = FIRST if wanted >= 0 else least
+    share = FIRST_SHARE if wanted >= 0 else least
     while True:
-        weigh_rows(network, H, Y)
-        multiply_rows(network, H, Y, S)
-        leave_axes_out(network, S)
-        count = _eliminate_choosing(network, S, share, f.chosen, f.block, f.order)
+        weigh_rows(network, rows.H, rows.Y)
+        form_schur_complement(network, rows.H, rows.Y, rows.S)
+        leave_axes_out(network, rows.S)
+        count = _eliminate_choosing(network, rows.S, share, f.chosen, f.block, f.order)
         if _settle(f, count, wanted):
             return True
-        share *= FINER
+        share *= FEWER
         if count < wanted or share < least:
             return False

@@ -1,26 +1,12 @@
-"""The Schur complement S = H W H^T (Delassus operator) of the constraint rows H = [Phi_r, Phi_pi'], and products by H.
+"""The Schur complement S = H W H^T (Delassus operator) of the constraint rows H = [Phi_r, Phi_pi']: factors, solves.
 
 Body quantities are rows of eight floats, (linear, 0, angular in the body frame, 0); the last row is the ground's.
 """
 
+from ..elements.loops.body_poses import POSE, RD
 from ..jit.kernels import kernel
 from ..jit.simd import add, fma, four, get, let, put, splat, times, total
 from ..sparse.constraint_graph import (
-    H_BODY,
-    H_COLUMNS,
-    H_KIND,
-    H_LEFT,
-    H_RIGHT,
-    H_ROWS,
-    H_STRIDE,
-    H_TARGET,
-    P_COLUMNS,
-    P_LEFT,
-    P_RIGHT,
-    P_ROWS,
-    P_SAME,
-    P_STRIDE,
-    P_TARGET,
     ROWS,
     ROWS_WELD,
     W_MASS,
@@ -28,6 +14,14 @@ from ..sparse.constraint_graph import (
     WEIGHTS,
     WELD_ROWS,
 )
+from ..sparse.factorisation import factor, solve
+from .axis_rows import gather_axes, leave_axes_out, multiply_axes, weigh_axes
+from .redundant_rows import set_redundant_diagonal
+from .tolerances import ZERO_PIVOT
+
+# What S is made for. DYNAMICS: W is the inverse of the mass matrix, by way of axis rows where a body has next to no
+# inertia about an axis. METRIC: W is that of the raised inertias, without axis rows: a metric for projections.
+DYNAMICS, METRIC = 0, 1
 
 
 @kernel
@@ -39,6 +33,13 @@ def weigh(weights, at, values, i, out, o):
     f = fma(four(weights, w + W_ROTATION + 8), splat(values[i + 6]), f)
     put(out, o, times(four(values, i), splat(weights[w + W_MASS])))
     put(out, o + 4, f)
+
+
+@kernel
+def weigh_bodies(network, Z):
+    """Z <- W Z."""
+    for b in range(network.bodies.shape[0]):
+        weigh(network.inverse, b, Z, 8 * b, Z, 8 * b)
 
 
 @kernel
@@ -57,7 +58,7 @@ def inner(H, h, Y, y):
 
 
 @kernel
-def _inner_both(H, h, Y, y):
+def inner_both(H, h, Y, y):
     """Return the product of two rows at both bodies."""
     f = fma(four(H, h), four(Y, y), times(four(H, h + 4), four(Y, y + 4)))
     g = fma(four(H, h + 8), four(Y, y + 8), times(four(H, h + 12), four(Y, y + 12)))
@@ -71,20 +72,19 @@ def more(values, at, x):
 
 
 @kernel
-def multiply_rows(network, H, Y, values):
+def form_schur_complement(network, H, Y, values):
     """Set the upper triangle of S = H Y^T in the blocks of the pattern, with zeros for fill."""
     products = network.products
     for i in range(network.pattern.shape[1]):
         let(values, i, 0.0)
     for i in range(products.shape[0]):
         product = products[i]
-        left, right = get(product, P_LEFT), get(product, P_RIGHT)
-        target, stride = get(product, P_TARGET), get(product, P_STRIDE)
-        rows, columns = get(product, P_ROWS), get(product, P_COLUMNS)
-        if get(product, P_SAME) != 0:
+        left, right, rows, columns = product.left, product.right, product.rows, product.columns
+        target, stride = product.target, product.stride
+        if product.same != 0:
             for r in range(rows):
                 for c in range(r, columns):
-                    more(values, target + c, _inner_both(H, left + 16 * r, Y, right + 16 * c))
+                    more(values, target + c, inner_both(H, left + 16 * r, Y, right + 16 * c))
                 target += stride
         else:
             for r in range(rows):
@@ -100,8 +100,8 @@ def _multiply_parts(network, H, Y, values):
     """Add the products at the parts of split bodies."""
     for i in range(network.parts.shape[0]):
         part, scale = network.parts[i], network.scales[i]
-        left, rows, right, columns = part[H_LEFT], part[H_ROWS], part[H_RIGHT], part[H_COLUMNS]
-        target, stride, kind, weights = part[H_TARGET], part[H_STRIDE], part[H_KIND], WEIGHTS * part[H_BODY]
+        left, rows, right, columns = part.left, part.rows, part.right, part.columns
+        target, stride, kind, weights = part.target, part.stride, part.kind, WEIGHTS * part.body
         for r in range(rows):
             for c in range(columns):
                 if kind == ROWS:
@@ -119,34 +119,32 @@ def _multiply_parts(network, H, Y, values):
 
 
 @kernel
-def multiply_both(network, H, X, lower, upper):
-    """Set H X^T in the blocks of the pattern as `factor_lu` expects: upper triangle, lower triangle transposed."""
-    products = network.products
-    for i in range(network.pattern.shape[1]):
-        let(upper, i, 0.0)
-        let(lower, i, 0.0)
-    for i in range(products.shape[0]):
-        product = products[i]
-        left, right = get(product, P_LEFT), get(product, P_RIGHT)
-        target, stride = get(product, P_TARGET), get(product, P_STRIDE)
-        rows, columns = get(product, P_ROWS), get(product, P_COLUMNS)
-        if get(product, P_SAME) != 0:
-            for r in range(rows):
-                more(upper, target + r, _inner_both(H, left + 16 * r, X, right + 16 * r))
-                for c in range(r + 1, columns):
-                    more(upper, target + c, _inner_both(H, left + 16 * r, X, right + 16 * c))
-                    more(lower, target + c, _inner_both(H, right + 16 * c, X, left + 16 * r))
-                target += stride
+def factorise_selected_rows(network, f, rows, metric):
+    """Set Y = W H^T and the factors of S = H W H^T, the selection being given; return the row that fails, or -1.
+
+    metric as in `factorise_rows`.
+    """
+    weigh_rows(network, rows.H, rows.Y)
+    form_schur_complement(network, rows.H, rows.Y, rows.S)
+    if f.dropped[0] > 0:
+        set_redundant_diagonal(network, f, rows.S)
+    if network.axes.rows.shape[0] > 0:
+        weigh_axes(network, rows.Y)
+        if metric == METRIC:
+            leave_axes_out(network, rows.S)
         else:
-            for r in range(rows):
-                for c in range(columns):
-                    more(upper, target + c, inner(H, left + 16 * r, X, right + 16 * c))
-                    more(lower, target + c, inner(H, right + 16 * c, X, left + 16 * r))
-                target += stride
+            multiply_axes(network, rows.H, rows.Y, rows.S)
+    return factor(network.pattern, rows.S, ZERO_PIVOT)
 
 
 @kernel
-def gather(network, H, Z, out):
+def solve_rows(network, rows, b):
+    """b <- S^-1 b."""
+    solve(network.pattern, rows.S, b)
+
+
+@kernel
+def _gather(network, H, Z, out):
     """out = H Z."""
     for e in range(network.sides.shape[0]):
         at, a, b = 16 * e, 8 * network.sides[e, 0], 8 * network.sides[e, 1]
@@ -156,11 +154,101 @@ def gather(network, H, Z, out):
 
 
 @kernel
-def scatter(network, Y, lam, Z):
-    """Z -= Y^T lam."""
+def _scatter(network, Y, lam, Z):
+    """Z <- Z - Y^T lam."""
     for e in range(network.sides.shape[0]):
         f = splat(-lam[e])
         for k in range(2):
             at, z = 16 * e + 8 * k, 8 * network.sides[e, k]
             put(Z, z, fma(four(Y, at), f, four(Z, z)))
             put(Z, z + 4, fma(four(Y, at + 4), f, four(Z, z + 4)))
+
+
+@kernel
+def multiply_rows(network, rows, Z, out):
+    """out = H Z."""
+    _gather(network, rows.H, Z, out)
+
+
+@kernel
+def multiply_rates(network, rows, poses, out):
+    """out = H (rd, omega') of the poses."""
+    H = rows.H
+    for e in range(network.sides.shape[0]):
+        at, a, b = 16 * e, network.sides[e, 0] * POSE + RD, network.sides[e, 1] * POSE + RD
+        g = fma(four(H, at), four(poses, a), times(four(H, at + 4), four(poses, a + 4)))
+        g = fma(four(H, at + 8), four(poses, b), fma(four(H, at + 12), four(poses, b + 4), g))
+        out[e] = total(g)
+
+
+@kernel
+def apply_multipliers(network, rows, lam, Z):
+    """Z <- Z - Y^T lam."""
+    _scatter(network, rows.Y, lam, Z)
+
+
+@kernel
+def find_correction(network, rows, b, Z):
+    """Smallest Z in the metric with H Z = -b; b becomes its multipliers.
+
+    b <- S^-1 b,    Z = -Y^T b
+    """
+    solve(network.pattern, rows.S, b)
+    for i in range(Z.size):
+        Z[i] = 0.0
+    _scatter(network, rows.Y, b, Z)
+
+
+@kernel
+def project(network, rows, Z, lam):
+    """Project Z onto H Z = 0.
+
+    lam = S^-1 H Z,    Z <- Z - Y^T lam
+    """
+    _gather(network, rows.H, Z, lam)
+    solve(network.pattern, rows.S, lam)
+    _scatter(network, rows.Y, lam, Z)
+
+
+@kernel
+def constrain(network, rows, c, Z, lam):
+    """Project Z onto H Z + c = 0.
+
+    lam = S^-1 (H Z + c),    Z <- Z - Y^T lam
+    """
+    _gather(network, rows.H, Z, lam)
+    for e in range(lam.size):
+        lam[e] += c[e]
+    solve(network.pattern, rows.S, lam)
+    _scatter(network, rows.Y, lam, Z)
+
+
+@kernel
+def acceleration_residuals(network, rows, gamma, Z, out):
+    """out = H Z + gamma, and of axis rows c e . Z; Z is (rdd, omega'd)."""
+    _gather(network, rows.H, Z, out)
+    gather_axes(network, Z, 4, 8, 1.0, out)
+    for e in range(out.size):
+        out[e] += gamma[e]
+
+
+@kernel
+def constrain_accelerations(network, rows, gamma, Z, lam):
+    """Accelerations Z and multipliers from Z = W F, with S of DYNAMICS.
+
+    lam = S^-1 (H Z + gamma),    Z <- Z - Y^T lam
+    """
+    acceleration_residuals(network, rows, gamma, Z, lam)
+    solve(network.pattern, rows.S, lam)
+    _scatter(network, rows.Y, lam, Z)
+
+
+@kernel
+def balance_loads(network, rows, F, lam):
+    """Multipliers for H^T lam = F by least squares, and what they leave of F, a load of each body.
+
+    lam = S^-1 H W F,    F <- F - H^T lam
+    """
+    _gather(network, rows.Y, F, lam)
+    solve(network.pattern, rows.S, lam)
+    _scatter(network, rows.H, lam, F)

@@ -6,21 +6,36 @@ in the run.
 
 from ..jit.kernels import kernel
 from .independent_rows import weakest
-from .tangent_workspace import LARGEST_SHARE, SHARE
-
-NEAR = 0.02  # of the largest share: a place with less is near a singular configuration
-NEXT_TO, WITHIN_A_STEP = 1e-3, 0.2  # of it: less is next to one; where fixed steps can't be made, less than
+from .tolerances import NEAR, NEXT_TO, WITHIN_A_STEP
 
 
 @kernel
-def note_share(network, f, values):
-    """Record the singularity indicator from the factors of S, `values`, at a chart or the end of a step."""
-    sizes = f.sizes
-    sizes[SHARE] = weakest(network, values)
-    sizes[LARGEST_SHARE] = max(sizes[SHARE], sizes[LARGEST_SHARE])
+def singularity_indicator(network, rows):
+    """Return the singularity indicator of rows that are factorised."""
+    return weakest(network, rows.S)
 
 
 @kernel
-def is_below(f, part):
-    """Return True if the indicator is below `part` of its largest value."""
-    return f.sizes[SHARE] < part * f.sizes[LARGEST_SHARE]
+def note_indicator(network, f, rows):
+    """Record the singularity indicator at a chart or the end of a step."""
+    note = f.indicator
+    note.start = singularity_indicator(network, rows)
+    note.largest = max(note.start, note.largest)
+
+
+@kernel
+def is_near_singular(f, share):
+    """Return True if a configuration with this indicator is near a singular one."""
+    return share < NEAR * f.indicator.largest
+
+
+@kernel
+def is_next_to_singular(f):
+    """Return True if the recorded indicator says that a step method can't go on."""
+    return f.indicator.start < NEXT_TO * f.indicator.largest
+
+
+@kernel
+def is_singular_within_a_step(f):
+    """Return True if a singular configuration may be within a fixed step."""
+    return f.indicator.start < WITHIN_A_STEP * f.indicator.largest

@@ -1,5 +1,31 @@
-"""Thresholds of the constraint rows."""
+"""Thresholds of the constraint rows.
 
-# Share of its diagonal entry that elimination leaves of a pivot of S = H W H^T; below it the pivot counts as zero.
-# S is quadratic in H: rows that are this close to dependent make an angle of 3e-7 rad in the metric W.
+"Share" is the share of its diagonal entry that elimination leaves of a pivot of S = H W H^T, dimensionless: 1 for a
+row that is orthogonal to the rows before it in the metric W, in general the square of the sine of the angle that it
+makes with them.
+"""
+
+# Share: below it the pivot counts as zero. The angle is 3e-7 rad.
 ZERO_PIVOT = 1e-13
+
+# Share: below it rows are dropped where a given number must be dropped; while too many fall below it, it is multiplied
+# by FEWER. The first share, an angle of 0.03 rad, parts redundant rows from others unless the configuration is nearly
+# singular.
+FIRST_SHARE, FEWER = 1e-3, 1e-2
+
+# Share of the weakest row over its largest value since the selection: below it the selection is renewed, so that S
+# loses no more than one digit to an old selection.
+WORSE = 0.1
+
+# |Phi| of redundant rows over the rounding of Phi: above it they don't hold. Relative to the size of the scene 1e-9, as
+# at the start (docs/theory.md).
+HELD = 1e6
+
+# Rows: scenes with more are searched for redundant rows within the blocks of the elimination order, not all at once
+# (docs/design-decisions.md, "Global pivoting up to 700 rows"); the dense matrix takes 4 MB at this size.
+MOST_ROWS = 700
+
+# Singularity indicator over its largest value in the run, dimensionless; it falls as the square of the distance.
+NEAR = 0.02  # below, at 0.14 of the distance: multipliers are refined at each order, Taylor steps tightened
+NEXT_TO = 1e-3  # below, at 0.03: a step method hands over to series
+WITHIN_A_STEP = 0.2  # below, at 0.45: so does a fixed step that fails

@@ -1,14 +1,17 @@
 """Validation of the arguments of `simulate`: times, method, initial state."""
 
 import math
+from operator import lt
 
 import numpy as np
 
 from ..errors import InvalidArgument
 from ..methods.integrator import Integrator, registered
 from ..validation import finite_vector, floats, unknown_name
+from .tolerances import SAME_COUNT
 
 TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
+FEW = 50  # times that a list serves faster than an array: 0.4 us instead of 2
 
 
 def interval(t_span):
@@ -29,7 +32,7 @@ def output_times(t_eval, t0, t1):
     if t_eval is None:
         return np.empty(0)
     times = floats(t_eval)
-    increasing = times.ndim == 1 and np.count_nonzero(times[1:] > times[:-1]) == max(times.size - 1, 0)
+    increasing = times.ndim == 1 and _increase(times)
     if increasing and times.size and t0 <= times[0] and times[-1] <= t1:
         return times
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
@@ -43,12 +46,20 @@ def output_times(t_eval, t0, t1):
     return times
 
 
+def _increase(times):
+    """Whether each of times (k,) is later than the one before."""
+    if times.size < FEW:
+        listed = times.tolist()
+        return all(map(lt, listed, listed[1:]))
+    return (times[1:] > times[:-1]).all()
+
+
 def step_count(t0, t1, step):
     """How many fixed steps there are, the last of which may be shorter."""
     count = (t1 - t0) / step
     if not count < 2**53 or t0 + step == t0:
         raise InvalidArgument(f"the step of {step:g} s is too small for the interval ({t0:g}, {t1:g}).")
-    return max(1, math.ceil(count * (1.0 - 1e-12)))
+    return max(1, math.ceil(count * (1.0 - SAME_COUNT)))
 
 
 def state_arrays(state, n):

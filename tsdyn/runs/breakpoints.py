@@ -10,43 +10,46 @@ import math
 from ..jit.kernels import kernel
 from ..model.equations import hold_pieces
 from .outputs import record
-from .run_state import NEXT_STOP, ROWS, T_END, WAITING, T
-
-SLIVER = 1e-6  # of a fixed step: a stop that is nearer to a time of the grid stands for it
-SHORT = 0.5  # of the step wanted: a step cut to less says nothing of the next one
+from .tolerances import SLIVER
 
 
 @kernel
 def next_stop(r, log):
     """The next time at which a step has to end, but for the end of the run; inf where there is none."""
-    i = r.numbers[NEXT_STOP]
-    while i < log.stops.shape[0] and log.stops[i, 0] <= r.clock[T]:
+    i = r.numbers.next_stop
+    while i < log.stops.shape[0] and log.stops[i, 0] <= r.clock.t:
         i += 1
-    r.numbers[NEXT_STOP] = i
+    r.numbers.next_stop = i
     return log.stops[i, 0] if i < log.stops.shape[0] else math.inf
 
 
 @kernel
-def cut_fixed(stop, t1, h, last):
-    """The end of a fixed step of h that would end at t1, the last of its grid or not, and whether it is cut."""
+def fixed_end(r, stop):
+    """The end of the next step of fixed length, whether it is the run's last, and whether a stop cuts it.
+
+    t_k = t_origin + k h, but for steps that end at stops; a stop within SLIVER h of t_k stands for it.
+    """
+    done, h = r.numbers.steps + 1 - r.numbers.cuts, r.clock.h
+    last = done == r.numbers.steps_wanted
+    t1 = r.clock.t_end if last else r.clock.t_origin + done * h
     if stop < t1 - SLIVER * h or (last and stop < t1):
-        return stop, True
-    return stop if stop < t1 + SLIVER * h and not last else t1, False
+        return stop, False, True
+    return stop if stop < t1 + SLIVER * h and not last else t1, last, False
 
 
 @kernel
 def take_pieces(system, r, log):
     """Let piecewise motions and loads stay with their pieces up to the next stop."""
-    end = min(next_stop(r, log), r.clock[T_END])
-    hold_pieces(system, 0.5 * (r.clock[T] + end))
+    end = min(next_stop(r, log), r.clock.t_end)
+    hold_pieces(system, 0.5 * (r.clock.t + end))
 
 
 @kernel
 def is_sampled(r, log, t1):
     """Whether Python is asked at this stop, before the run goes on."""
-    i = r.numbers[NEXT_STOP]
+    i = r.numbers.next_stop
     if i < log.stops.shape[0] and log.stops[i, 0] == t1 and log.stops[i, 1] != 0.0:
-        r.numbers[WAITING] = 1
+        r.numbers.waiting = 1
         return True
     return False
 
@@ -54,7 +57,7 @@ def is_sampled(r, log, t1):
 @kernel
 def amend(r, log, q, qd, qdd):
     """The output at a stop, if there is one, with the accelerations after it."""
-    i = r.numbers[ROWS] - 1
-    if i >= 0 and log.out[i, 0] == r.clock[T]:
-        r.numbers[ROWS] = i
-        record(r, log, r.clock[T], q, qd, qdd)
+    i = r.numbers.rows - 1
+    if i >= 0 and log.out[i, 0] == r.clock.t:
+        r.numbers.rows = i
+        record(r, log, r.clock.t, q, qd, qdd)

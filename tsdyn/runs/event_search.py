@@ -12,15 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InvalidArgument, Status
-from ..maths.root_isolation import EPS, LARGEST, Search, TooFast
+from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..model.handles import handles_of
+from ..workspaces.run_state import B_END, STORED
 from .event_states import Inside
 from .events import Failed, Instant
-from .run_state import BEGUN, BLOCKS, CHART_ROWS, DENSE, ROWS, STEPS, STORED, T
-from .trajectory import B_END
-
-SLOW, FAST = 0.1, 2.0  # rad that a body turns in a step: less needs half of the samples, more needs the most
-AT_START = 64.0 * EPS  # a value, or a time, that is no more than this beside others is that of the start
+from .tolerances import FAST_TURN, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
 
 
 class Occurrence(NamedTuple):
@@ -77,12 +74,12 @@ class Watch:
         states = [np.array([each.state for each in found]).reshape(-1, 3, n) for found in self.list]
         return times, *([np.ascontiguousarray(state[:, i]) for state in states] for i in (0, 1))
 
-    def advance(self, memory, record, most):
+    def advance(self, memory, log, most):
         """As `Memory.advance`; the Status, and what there is to say of it."""
         run = memory.run
-        if not run.numbers[BEGUN]:
-            status = memory.advance(record, -1)
-            if not run.numbers[BEGUN]:
+        if not run.numbers.begun:
+            status = memory.advance(log, -1)
+            if not run.numbers.begun:
                 return status, ""
             self.state, self.memory = run.now.copy(), run.remembered.copy()
             self._look_from()
@@ -92,24 +89,24 @@ class Watch:
                 except Failed as failure:
                     raise InvalidArgument(f"events: {failure}") from failure.__cause__
         for _ in range(most):
-            done = run.numbers[STEPS]
-            status = memory.advance(record, 1)
-            if run.numbers[STEPS] > done:
+            done = run.numbers.steps
+            status = memory.advance(log, 1)
+            if run.numbers.steps > done:
                 try:
-                    last = self._look(run, record)
+                    last = self._look(run, log)
                 except Failed as failure:
                     return Status.EVENT_FAILED, str(failure)
                 if last is not None:
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
-            if status != Status.SLICE_DONE or run.numbers[CHART_ROWS] + 2 >= len(record.charts):
+            if status != Status.SLICE_DONE or run.numbers.chart_rows + 2 >= len(log.charts):
                 return status, ""
         return status, ""
 
-    def go_back(self, run, record):
+    def go_back(self, run, log):
         """Let the run end where it has been looked at last."""
-        if self.state is not None and run.clock[T] > self.t:
+        if self.state is not None and run.clock.t > self.t:
             run.remembered[:] = self.memory
-            self._end(run, record, self.t, self.state, self.t)
+            self._end(run, log, self.t, self.state, self.t)
 
     def _look_from(self):
         self.beside = self.t, self.state, self.memory[: self.angles]
@@ -120,17 +117,17 @@ class Watch:
     def _value(self, i, t, state):
         return self.events[i].value(t, self._instant(t, state))
 
-    def _look(self, run, record):
+    def _look(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
         self._look_from()
         before, self.memory = self.memory, run.remembered.copy()
         try:
-            return self._looked(run, record, Inside(self.reader, run, record, self.t, self.state))
+            return self._looked(run, log, Inside(self.reader, run, log, self.t, self.state))
         except KeyboardInterrupt:
             self.memory = before
             raise
 
-    def _looked(self, run, record, step):
+    def _looked(self, run, log, step):
         found, failure, end = [], None, step.t1
         step.degree = self._degree(step)
         for i in range(len(self.events)):
@@ -151,7 +148,7 @@ class Watch:
             self.list[each.index].append(each)
             if len(self.list[each.index]) >= self.events[each.index].limit:
                 run.remembered[: self.angles] = self._instant(each.t, each.state).angles
-                self._end(run, record, each.t, each.state, step.t0)
+                self._end(run, log, each.t, each.state, step.t0)
                 self.t, self.state = each.t, each.state
                 return each
         self.t, self.state = step.t1, step.at(step.t1)
@@ -192,14 +189,14 @@ class Watch:
         """The degree that the interpolant and the fastest turn of a body ask for."""
         squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
         turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
-        return LARGEST if turn > FAST else self.reader.degree if turn > SLOW else self.reader.degree // 2
+        return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
 
     def _walk(self, i, step, points):
         """The occurrences of event i among these points."""
         track, direction, found = self.tracks[i], self.events[i].direction, []
         (before, value), *rest = points
         if track.sign == 0.0 and track.zero is None:  # the run's first step
-            if 0.0 < abs(track.value) <= AT_START * max(abs(value) for _, value in points):
+            if 0.0 < abs(track.value) <= START_ZERO * max(abs(value) for _, value in points):
                 track.zero, track.passed, track.pending = before, value != 0.0, value == 0.0
             else:
                 rest = points
@@ -228,11 +225,11 @@ class Watch:
         """By how much the value of event i at t changes with rounding errors of the state."""
         try:
             state, value = step.at(t), self._at(i, step, t)
-            size = 4.0 * EPS * np.abs(state).max(axis=1, keepdims=True)
+            size = SHAKEN * np.abs(state).max(axis=1, keepdims=True)
             shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
         except Failed:
             return 0.0
-        return 4.0 * max(abs(each - value) for each in shaken)
+        return NOISE * max(abs(each - value) for each in shaken)
 
     def _zero(self, i, step, t, other):
         """The `Occurrence` at a zero, or at the end next to another time of the zeros around it."""
@@ -259,7 +256,7 @@ class Watch:
         if a * b >= 0.0:
             return [Occurrence(t0, i, step.at(t0))]
         root = self._between(i, step, (t0, a), (t1, b))
-        if root - self.start <= AT_START * max(1.0, abs(self.start)):
+        if root - self.start <= START_ZERO * max(1.0, abs(self.start)):
             return []
         return [Occurrence(root, i, step.at(root))]
 
@@ -272,8 +269,8 @@ class Watch:
         def value(t):
             return known[t] if t in known else self._at(i, step, t)
 
-        root = brentq(value, first[0], t1, xtol=4.0 * EPS, rtol=4.0 * EPS, maxiter=1000)
-        shift = 4.0 * EPS * max(abs(root), 1.0)
+        root = brentq(value, first[0], t1, xtol=ROOT, rtol=ROOT, maxiter=1000)
+        shift = ROOT * max(abs(root), 1.0)
         # a run that goes on from a terminal event had better find it behind itself
         while self.events[i].limit < math.inf and root + shift < t1 and value(root) * b <= 0.0:
             root, shift = root + shift, 2.0 * shift
@@ -283,16 +280,16 @@ class Watch:
         return self._value(i, t, step.at(t))
 
     @staticmethod
-    def _end(run, record, t, state, start):
+    def _end(run, log, t, state, start):
         """Let the run end at t, within the step that began at `start`."""
         run.now[:] = state
-        run.clock[T] = t
-        if record.t_eval.size > 0:
-            while run.numbers[ROWS] > 0 and record.out[run.numbers[ROWS] - 1, 0] > t:
-                run.numbers[ROWS] -= 1
+        run.clock.t = t
+        if log.t_eval.size > 0:
+            while run.numbers.rows > 0 and log.out[run.numbers.rows - 1, 0] > t:
+                run.numbers.rows -= 1
         elif t > start:
-            record.out[run.numbers[ROWS] - 1] = [t, *state.ravel(), *run.remembered]
+            log.out[run.numbers.rows - 1] = [t, *state.ravel(), *run.remembered]
         else:
-            run.numbers[ROWS] -= 1
-        if run.numbers[DENSE] == STORED:
-            record.blocks[run.numbers[BLOCKS] - 1, B_END] = t
+            run.numbers.rows -= 1
+        if run.numbers.dense == STORED:
+            log.blocks[run.numbers.blocks - 1, B_END] = t

@@ -4,7 +4,6 @@ import numpy as np
 
 from ..errors import Status
 from .events import Failed
-from .run_state import T
 
 ROOM = 64  # states that are kept
 
@@ -12,9 +11,9 @@ ROOM = 64  # states that are kept
 class Inside:
     """States within the step that a run has just made."""
 
-    def __init__(self, reader, run, record, t0, before):
-        self.t0, self.t1, self.degree = t0, float(run.clock[T]), 0
-        self._reader, self._record, self._block = reader, record, run.block[None]
+    def __init__(self, reader, run, log, t0, before):
+        self.t0, self.t1, self.degree = t0, float(run.clock.t), 0
+        self._reader, self._log, self._block = reader, log, run.block[None]
         self._known = {t0: before, self.t1: run.now.copy()}
 
     def states(self, times):
@@ -30,7 +29,7 @@ class Inside:
 
     def _read(self, times):
         rows = np.zeros(times.size, int)
-        states, status = self._reader(times, rows, self._block, self._record.charts, self._record.points)
+        states, status = self._reader(times, rows, self._block, self._log.charts, self._log.points)
         if status == Status.SUCCESS:
             return states
         return [self._read(times[i : i + 1])[0] for i in range(times.size)] if times.size > 1 else [None]

@@ -59,7 +59,7 @@ class ChartLog:
         self.chunks = [chunk for part in parts for chunk in part.chunks]
 
     def add(self, rows, steps):
-        """Add rows (k, 5) as of `Record.charts`; instants that are the starts of the latest `steps` are not copied."""
+        """Add rows (k, 5) as of `RunLog.charts`; instants that are the starts of the latest `steps` are not copied."""
         if _few(rows, self.chunks):
             self.chunks.append(rows.copy())
             return

@@ -3,23 +3,22 @@
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import copy
 from ..model.joint_turns import angle_after
-from .run_state import ROWS, T
 
 
 @kernel
 def record(r, log, t, q, qd, qdd):
     """Record one output, at the last accepted state or inside the step."""
-    n, i = q.size, r.numbers[ROWS]
+    n, i = q.size, r.numbers.rows
     row = log.out[i]
     row[0] = t
     for j in range(n):
         row[1 + j], row[1 + n + j], row[1 + 2 * n + j] = q[j], qd[j], qdd[j]
     for j in range(r.remembered.size):
         row[1 + 3 * n + j] = r.remembered[j]
-    if t != r.clock[T]:
+    if t != r.clock.t:
         for j in range(r.joints.shape[0]):
-            row[1 + 3 * n + j] = angle_after(r, j, q, qd, t - r.clock[T])
-    r.numbers[ROWS] = i + 1
+            row[1 + 3 * n + j] = angle_after(r, j, q, qd, t - r.clock.t)
+    r.numbers.rows = i + 1
 
 
 @kernel

@@ -7,15 +7,12 @@ a body is back in its orientation, so a chart doesn't either.
 import math
 
 from ..jit.kernels import kernel
-
-MOST = 1.0  # rad in a step, as its start has it
-TOO_FAR = 2.5  # rad, as both ends have it
-GAIN = 1.05  # of the share of MOST that is tried, from step to step, where a chart has failed at all of it
+from .tolerances import MOST_TURN, TOO_FAR
 
 
 @kernel
 def longest_step(bodies, now):
-    """The step in which nothing turns by more than MOST; now (3, n) is q, qd, qdd."""
+    """The step in which nothing turns by more than MOST_TURN; now (3, n) is q, qd, qdd."""
     longest = math.inf
     for b in range(bodies.shape[0]):
         if bodies[b, 1] == 7:
@@ -25,9 +22,9 @@ def longest_step(bodies, now):
                 gain += now[2, c] * now[2, c]
             gain = 2.0 * math.sqrt(max(gain - speed * speed, 0.0))  # pdd is pd.pd along p, alpha / 2 across
             speed = 2.0 * math.sqrt(speed)
-            fast = speed + math.sqrt(speed * speed + 2.0 * gain * MOST)
+            fast = speed + math.sqrt(speed * speed + 2.0 * gain * MOST_TURN)
             if fast > 0.0:
-                longest = min(longest, 2.0 * MOST / fast)
+                longest = min(longest, 2.0 * MOST_TURN / fast)
     return longest
 
 

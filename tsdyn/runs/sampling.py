@@ -11,10 +11,7 @@ import numpy as np
 from ..errors import InvalidArgument, InvalidForce, Status
 from ..model import joint_motion
 from ..validation import number
-from .run_state import BEGUN, HISTORY, WAITING, T
-
-MOST = 1 << 25  # instants of a run
-SAME = 1e-9  # of a period: instants that are nearer are the same
+from .tolerances import MOST_INSTANTS, SAME_INSTANT
 
 
 class Failed(Exception):
@@ -71,32 +68,32 @@ class Sampling:
 
 
 class Sampled:
-    """The memory of a run, advanced from instant to instant; see `Memory` and `SeriesMemory`."""
+    """The memory of a run, advanced from instant to instant; see `Memory`."""
 
     def __init__(self, memory, sampling):
         self.memory, self.sampling = memory, sampling
         self.run, self.weight, self.context = memory.run, memory.weight, memory.context
         self.reason = ""
 
-    def advance(self, record, most):
+    def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""
         run, work = self.run, self.memory.context.work
         numbers = run.numbers
         try:
-            if not numbers[BEGUN] and most != 0:
-                self.sampling.ask(self.memory, float(run.clock[T]), work.q.copy(), work.qd.copy())
-            first = numbers[HISTORY]
+            if not numbers.begun and most != 0:
+                self.sampling.ask(self.memory, float(run.clock.t), work.q.copy(), work.qd.copy())
+            first = numbers.history
             while True:
-                done = int(numbers[HISTORY] - first)
-                status = self.memory.advance(record, most - done if most > 0 else most)
-                if status != Status.SLICE_DONE or not numbers[WAITING]:
+                done = int(numbers.history - first)
+                status = self.memory.advance(log, most - done if most > 0 else most)
+                if status != Status.SLICE_DONE or not numbers.waiting:
                     return status
-                self.sampling.ask(self.memory, float(run.clock[T]), run.now[0].copy(), run.now[1].copy())
-                status = self.memory.advance(record, 0)
-                if status != Status.SLICE_DONE or numbers[HISTORY] - first >= most:
+                self.sampling.ask(self.memory, float(run.clock.t), run.now[0].copy(), run.now[1].copy())
+                status = self.memory.advance(log, 0)
+                if status != Status.SLICE_DONE or numbers.history - first >= most:
                     return status
         except Failed as failure:
-            if not numbers[BEGUN]:
+            if not numbers.begun:
                 raise InvalidForce(str(failure)) from failure.__cause__
             self.reason = str(failure)
             return Status.SAMPLING_FAILED
@@ -109,7 +106,7 @@ def sampled(packed):
 
 def is_due(t, period):
     """Return True if t is an instant of a period."""
-    return abs(t - round(t / period) * period) <= SAME * period
+    return abs(t - round(t / period) * period) <= SAME_INSTANT * period
 
 
 def instants_of(packed, t0, t1):
@@ -118,10 +115,10 @@ def instants_of(packed, t0, t1):
     for load in sampled(packed):
         period = load.force.period
         count = (t1 - t0) / period
-        if not count < MOST:
+        if not count < MOST_INSTANTS:
             raise InvalidArgument(
-                f"{load.force.name}: a period of {period:g} s makes {count:.3g} instants, and {MOST} are as many as a "
-                "run may have; take a longer period or a shorter run."
+                f"{load.force.name}: a period of {period:g} s makes {count:.3g} instants, and {MOST_INSTANTS} are as "
+                "many as a run may have; take a longer period or a shorter run."
             )
         times = np.arange(math.floor(t0 / period), math.ceil(t1 / period) + 1) * period
         found.append(times[(times > t0) & (times < t1)])

@@ -1,7 +1,7 @@
 """Run segments: state and records passed between the parts of one run that different methods integrate."""
 
-from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
 from .event_search import Watch
+from .reader import Reader
 
 
 class Relay:
@@ -15,19 +15,18 @@ class Relay:
 
     def enter(self, memory):
         """Let a part begin where the last one ended."""
-        memory.context.free.sizes[LARGEST_SHARE] = self.largest
+        memory.context.free.indicator.largest = self.largest
 
     def leave(self, memory):
         """Take over how a part ended."""
-        sizes = memory.context.free.sizes
-        self.share, self.largest = float(sizes[SHARE]), float(sizes[LARGEST_SHARE])
+        indicator = memory.context.free.indicator
+        self.share, self.largest = indicator.start, indicator.largest
 
     def watching(self, task, reading):
         """The `Watch` of the run's events, with a reader for the steps of this part; None where there are none."""
         if task.events is None:
             return None
-        kind, *arguments = reading
-        reader = kind(*arguments)
+        reader = Reader(reading)
         if self.watch is None:
             self.watch = Watch(task.events, task.prepared.packed, reader, task.span[0])
         else:

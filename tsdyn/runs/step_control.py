@@ -3,102 +3,118 @@
 import math
 
 from ..jit.kernels import kernel
-from ..methods.diagonally_implicit import SOFTEN, G, call_soften
+from ..methods.diagonally_implicit import call_soften
 from ..methods.explicit import call_error, call_norm
-from .run_state import (
-    AT_LIMIT,
-    ATOL,
-    BELOW_LIMIT,
-    ERROR_BEFORE,
-    EXPONENT,
-    FIRST_ORDER,
-    LAST_STAGE,
-    MAX_STEP,
-    REJECTED_LAST,
-    RTOL,
-    STABLE,
-    STIFF,
-    T_END,
-    T_ORIGIN,
-    H,
-    T,
+from .dense_output import evaluate
+from .tolerances import (
+    AT_LONGEST,
+    FIRST_ERROR,
+    FIRST_GROWTH,
+    FIRST_PART,
+    FROM_ZERO,
+    GROW,
+    LEAST_BEFORE,
+    LEAST_ERROR,
+    MILD_STEPS,
+    NO_SLOPE,
+    PI_BEFORE,
+    PI_ERROR,
+    ROUNDING_STRETCH,
+    SAFETY,
+    SECOND_ESTIMATE,
+    SHORTEST,
+    SHRINK,
+    STIFF_STEPS,
+    STRETCH,
+    TOO_SMALL,
+    TRIAL,
 )
-from .trajectory import A_ERROR, A_ERROR_2, A_NORM, evaluate
-
-SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
-SHORTEST = 4e-16  # of t, two units in the last place; of t = 0, of a thousandth of the interval
-STIFF_STEPS, MILD_STEPS = 15, 6  # at the limit of stability until a motion is called stiff; below it until forgotten
 
 
 @kernel
 def gets_on(r, t0, t1):
     """Whether a step from t0 to t1 is more than the rounding of t."""
-    return t1 > t0 + SHORTEST * max(abs(t0), 1e-3 * (r.clock[T_END] - r.clock[T_ORIGIN]))
+    return t1 > t0 + SHORTEST * max(abs(t0), FROM_ZERO * (r.clock.t_end - r.clock.t_origin))
 
 
 @kernel
 def stretch(h, longest):
     """How much longer than h the last step of a run may be, so that no tiny one is left."""
-    if h < 0.999 * longest or longest == math.inf:
-        return 1e-3 * h
-    return max(longest - h, 1e-9 * h)
+    if h < AT_LONGEST * longest or longest == math.inf:
+        return STRETCH * h
+    return max(longest - h, ROUNDING_STRETCH * h)
 
 
 @kernel
-def first_step(context, w, r, at):
+def first_step(context, w, r):
     """A first step from the sizes of y, y' and y'' (Hairer, Norsett, Wanner, Solving ODEs I, II.4)."""
-    first = r.xd if r.numbers[FIRST_ORDER] == 1 else r.y
-    rtol, atol = r.clock[RTOL], r.clock[ATOL]
+    first = r.xd if r.numbers.first_order == 1 else r.y
+    rtol, atol = r.clock.rtol, r.clock.atol
     n = w.q.size
+    # d0 = |(q, qd)|, d1 = |(x', y')|
     d0 = 0.0
     for i in range(n):
         a, b = w.q[i] / (atol + rtol * abs(w.q[i])), w.qd[i] / (atol + rtol * abs(w.qd[i]))
         d0 += a * a + b * b
     d0 = math.sqrt(d0 / (2 * n))
-    d1 = call_norm(at[A_NORM], context, first, r.yd, r.now, rtol, atol)
-    span = r.clock[T_END] - r.clock[T]
-    h = min(0.01 * d0 / d1 if d1 > 1e-5 and d0 > 1e-5 else 1e-6, 0.1 * span)
+    d1 = call_norm(r.kernels.error_norm, context, first, r.yd, r.now, rtol, atol)
+    span = r.clock.t_end - r.clock.t
+    h = min(FIRST_ERROR * d0 / d1 if d1 > TOO_SMALL and d0 > TOO_SMALL else TRIAL, FIRST_PART * span)
+    # d2 = |(x'', y'')|, by an Euler step of h
     for i in range(r.x.size):
         r.xs[i] = r.x[i] + h * first[i]
     for i in range(r.y.size):
         r.ys[i] = r.y[i] + h * r.yd[i]
-    if evaluate(context, w, at, r.clock[T] + h, r.xs, r.ys, r.yds, r.dx) != 0:
+    if evaluate(context, w, r, r.clock.t + h, r.xs, r.ys, r.yds, r.dx) != 0:
         return h
-    second = r.dx if r.numbers[FIRST_ORDER] == 1 else r.ys
+    second = r.dx if r.numbers.first_order == 1 else r.ys
     for i in range(r.x.size):
         r.dx[i] = second[i] - first[i]
     for i in range(r.y.size):
         r.dy[i] = r.yds[i] - r.yd[i]
-    d2 = call_norm(at[A_NORM], context, r.dx, r.dy, r.now, rtol, atol) / h
-    size = max(d1, d2)
-    return min(100.0 * h, (0.01 / size) ** r.clock[EXPONENT] if size > 1e-15 else 100.0 * h, span)
+    d2 = call_norm(r.kernels.error_norm, context, r.dx, r.dy, r.now, rtol, atol) / h
+    # h^(order + 1) max(d1, d2) = FIRST_ERROR
+    size, most = max(d1, d2), FIRST_GROWTH * h
+    return min(most, (FIRST_ERROR / size) ** r.clock.exponent if size > NO_SLOPE else most, span)
 
 
 @kernel
-def accept(context, l, r, at, h):
+def _estimate(r, error, h, end):
+    """One estimate of the error of the step h, in r.dx and r.dy."""
+    call_error(error, h, r.x.size, r.y.size, end, r.yd, r.tableau, r.memory, r.dx, r.dy)
+
+
+@kernel
+def _size(context, r):
+    """The estimate in r.dx and r.dy, over the tolerance."""
+    return call_norm(r.kernels.error_norm, context, r.dx, r.dy, r.now, r.clock.rtol, r.clock.atol)
+
+
+@kernel
+def accept(context, l, r, h):
     """Accept or reject the step h and choose the next one (Gustafsson's PI control). True if accepted."""
-    end = r.xd if r.numbers[FIRST_ORDER] == 1 else r.y
-    call_error(at[A_ERROR], h, r.x.size, r.y.size, end, r.yd, r.tableau, r.memory, r.dx, r.dy)
-    if l.numbers[G] > 0.0:
-        call_soften(l.kernels[SOFTEN], context, r.dx, l.numbers[G], r.dy)
-    error = call_norm(at[A_NORM], context, r.dx, r.dy, r.now, r.clock[RTOL], r.clock[ATOL])
-    if at[A_ERROR_2] != 0:  # Hairer's combination of two orders; nan stays nan
-        call_error(at[A_ERROR_2], h, r.x.size, r.y.size, end, r.yd, r.tableau, r.memory, r.dx, r.dy)
-        second = call_norm(at[A_NORM], context, r.dx, r.dy, r.now, r.clock[RTOL], r.clock[ATOL])
+    end = r.xd if r.numbers.first_order == 1 else r.y
+    _estimate(r, r.kernels.error, h, end)
+    if l.numbers.g > 0.0:
+        call_soften(l.kernels.soften, context, r.dx, l.numbers.g, r.dy)
+    error = _size(context, r)
+    if r.kernels.second_error != 0:  # Hairer's combination of two orders; nan stays nan
+        _estimate(r, r.kernels.second_error, h, end)
+        second = _size(context, r)
         if error != 0.0:
-            error *= error / math.hypot(error, 0.1 * second)
-    power = r.clock[EXPONENT]
+            error *= error / math.hypot(error, SECOND_ESTIMATE * second)
+    power = r.clock.exponent
     if not error <= 1.0:
         factor = SAFETY * error**-power if error < math.inf else SHRINK
-        r.clock[H] = h * max(factor, SHRINK)
-        r.numbers[REJECTED_LAST] = 1
+        r.clock.h = h * max(factor, SHRINK)
+        r.numbers.rejected_last = 1
         return False
-    error = max(error, 1e-10)
-    factor = SAFETY * error ** (-0.7 * power) * r.clock[ERROR_BEFORE] ** (0.4 * power)
-    factor = min(max(factor, SHRINK), 1.0 if r.numbers[REJECTED_LAST] != 0 else GROW)
-    r.clock[ERROR_BEFORE] = max(error, 1e-4)
-    r.clock[H] = min(h * factor, r.clock[MAX_STEP])
-    r.numbers[REJECTED_LAST] = 0
+    error = max(error, LEAST_ERROR)
+    factor = SAFETY * error ** (-PI_ERROR * power) * r.clock.error_before ** (PI_BEFORE * power)
+    factor = min(max(factor, SHRINK), 1.0 if r.numbers.rejected_last != 0 else GROW)
+    r.clock.error_before = max(error, LEAST_BEFORE)
+    r.clock.h = min(h * factor, r.clock.max_step)
+    r.numbers.rejected_last = 0
     return True
 
 
@@ -108,20 +124,20 @@ def watch_stiffness(r, h):
 
     h |lambda| from the last stage and the step's end, both at the same time (Hairer, Wanner, Solving ODEs II, IV.2).
     """
-    n, at = r.x.size, r.numbers[LAST_STAGE]
+    n, at, limit = r.x.size, r.numbers.last_stage, r.clock.stability_limit
     rates, speeds = 0.0, 0.0
     for c in range(n):
         speed, rate = r.memory[at + c] - r.y[c], r.memory[at + n + c] - r.yd[c]
         speeds += speed * speed
         rates += rate * rate
-    if h * h * rates > r.clock[STABLE] * r.clock[STABLE] * speeds:
-        r.numbers[AT_LIMIT] += 1
-        r.numbers[BELOW_LIMIT] = 0
-        if r.numbers[AT_LIMIT] == STIFF_STEPS:
-            r.numbers[STIFF] = 1
+    if h * h * rates > limit * limit * speeds:
+        r.numbers.at_limit += 1
+        r.numbers.below_limit = 0
+        if r.numbers.at_limit == STIFF_STEPS:
+            r.numbers.stiff = 1
             return True
-    elif r.numbers[AT_LIMIT] > 0:
-        r.numbers[BELOW_LIMIT] += 1
-        if r.numbers[BELOW_LIMIT] == MILD_STEPS:
-            r.numbers[AT_LIMIT] = 0
+    elif r.numbers.at_limit > 0:
+        r.numbers.below_limit += 1
+        if r.numbers.below_limit == MILD_STEPS:
+            r.numbers.at_limit = 0
     return False

@@ -12,7 +12,6 @@ import numpy as np
 from ..errors import Status, TsdynError
 from ..integrators import DOP853, SDIRK54, Taylor
 from ..runs.arguments import tolerances
-from ..runs.run_state import H, T
 from .tolerances import COST, LARGEST_PILOT, PILOT
 
 
@@ -37,7 +36,7 @@ def chooser(simulate, scene, method, end, options):
     def choose(run):
         if run.now.shape[1] > LARGEST_PILOT:
             return False
-        start = float(run.clock[T])
+        start = float(run.clock.t)
         state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered[len(run.joints) :].copy())
         try:
             pilot = simulate(scene, (start, end), integrator=implicit(method), max_steps=PILOT, state=state, **options)
@@ -49,6 +48,6 @@ def chooser(simulate, scene, method, end, options):
             return False
         h = pilot.steps.h[pilot.steps.accepted]
         stages = COST * pilot.stats.evaluations / pilot.stats.steps
-        return stages / np.mean(h[h.size // 2 :]) < method.stages / run.clock[H]
+        return stages / np.mean(h[h.size // 2 :]) < method.stages / run.clock.h
 
     return choose

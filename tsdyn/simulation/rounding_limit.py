@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 
-from ..formulations.chart_validity import ROUNDING
+from ..formulations.tolerances import ROUNDING
 from ..sparse.massless_axes import levers
 from .tolerances import FAR_LEVER
 

@@ -80,13 +80,13 @@ class Prepared:
         known, start = self._start
         if known != given:
             system, before = self.packed.system, still(self.packed)
-            dropped = self.packed.derived.dropped
+            redundant = self.packed.derived.redundant
             if system.memory.size:
                 system = system._replace(reals=system.reals.copy())
                 system.reals[system.memory] = remembered[self.handles.count :]
             start = consistent(scene, system, q, qd, t, tol, redundant_allowed)
-            if self.packed.derived.dropped is not dropped or still(self.packed) is not before:
-                self.__dict__.pop("series", None)  # its graph has other dropped rows
+            if self.packed.derived.redundant is not redundant or still(self.packed) is not before:
+                self.__dict__.pop("series", None)  # its graph has other redundant rows
                 self._spare.clear()
             demand_aligned(self.packed, start[0], t)
             demand_unique(self.packed, start[0], t)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..ahead.first_run import prepare_first_run
@@ -13,9 +14,10 @@ from ..errors import InvalidArgument, Status
 from ..motions.knots import stops_of
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
+from ..runs.run import run
 from ..runs.sampling import Sampling, instants_of, sampled
 from ..runs.task import Task
-from ..taylor.series_run import run_series
+from ..taylor.series_engine import SeriesEngine
 from . import method_choice
 from .local_origin import origin_of, run_near
 from .options import checked
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 
     from ..hints import ArrayLike, Event, Formulation, Method, Progress, Redundancy, Span, State
 
-DRIVERS = {"steps": run_past, "series": run_series}  # by Integrator.driver, if it isn't one itself; see task.py
+DRIVERS = {"steps": run_past, "series": partial(run, engine=SeriesEngine)}  # by Integrator.driver; see task.py
 
 
 @fitting

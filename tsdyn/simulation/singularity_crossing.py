@@ -13,23 +13,22 @@ import numpy as np
 from ..errors import Status, TsdynError
 from ..formulations.registry import formulation
 from ..integrators import Taylor
-from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
 from ..runs.history import ChartLog, StepLog
-from ..runs.run_state import STEPS, T_END, T
+from ..runs.run import run
 from ..runs.segments import Relay
-from ..runs.step_run import run_steps
+from ..runs.step_engine import StepEngine
 from ..runs.trajectory import Pieces
-from ..taylor.series_run import run_series
+from ..taylor.series_engine import SeriesEngine
 from .tolerances import FINEST, NO_STEP, REGULAR
 
 
 def run_past(task, observe=None):
     """Run a `Task` of a step method; return the `Outcome`. An observed run has one segment, without crossings."""
     if observe is not None or task.form.first_order or task.prepared.refusal:
-        return run_steps(task, observe)
+        return run(task, StepEngine, observe)
     relay = Relay()
     try:
-        outcome = run_steps(task._replace(report=_until_its_end(task.report)), relay=relay)
+        outcome = run(task._replace(report=_until_its_end(task.report)), StepEngine, relay=relay)
         return _go_on(task, relay, outcome) if outcome.status == Status.PASSAGE else outcome
     finally:
         task.report(None)
@@ -52,9 +51,9 @@ def _go_on(task, relay, first):
                 break
             try:
                 if series:
-                    part = run_series(rest, relay=relay, past=lambda memory: Carrier(memory, task, relay.share))
+                    part = run(rest, SeriesEngine, relay=relay, past=lambda memory: Carrier(memory, task, relay.share))
                 else:
-                    part = run_steps(rest, relay=relay)
+                    part = run(rest, StepEngine, relay=relay)
             except TsdynError as error:  # the partial result is returned
                 parts[-1] = parts[-1]._replace(status=Status.SINGULAR, reason=str(error))
                 break
@@ -124,7 +123,7 @@ class Carrier:
 
     Parameters
     ----------
-    memory : SeriesMemory
+    memory : Memory
     task : Task
         The whole run's.
     share : float
@@ -138,24 +137,24 @@ class Carrier:
         self.step = task.method.step
         self.grid = math.nan  # the grid time that is aimed at
 
-    def advance(self, record, most):
-        """Advance as `SeriesMemory` does; Status.PASSAGE when the configuration is regular again."""
+    def advance(self, log, most):
+        """Advance as `Memory` does; Status.PASSAGE when the configuration is regular again."""
         if most <= 0:
-            return self.memory.advance(record, most)
+            return self.memory.advance(log, most)
         numbers, clock = self.run.numbers, self.run.clock
         for _ in range(most):
-            done = numbers[STEPS]
-            status = self.memory.advance(record, 1)
-            if status == Status.SUCCESS and clock[T] < self.end:
+            done = numbers.steps
+            status = self.memory.advance(log, 1)
+            if status == Status.SUCCESS and clock.t < self.end:
                 status = Status.SLICE_DONE
-            if status != Status.SLICE_DONE or numbers[STEPS] == done:
+            if status != Status.SLICE_DONE or numbers.steps == done:
                 return status
             if not self._is_regular():
-                clock[T_END] = self.end
-            elif self.step is None or clock[T] == self.grid:
+                clock.t_end = self.end
+            elif self.step is None or clock.t == self.grid:
                 return Status.PASSAGE
             else:
-                clock[T_END] = self.grid = self._next()
+                clock.t_end = self.grid = self._next()
         return Status.SLICE_DONE
 
     @property
@@ -164,10 +163,10 @@ class Carrier:
         return self.memory.reason
 
     def _is_regular(self):
-        sizes = self.context.free.sizes
-        return sizes[SHARE] >= max(REGULAR * sizes[LARGEST_SHARE], self.share)
+        indicator = self.context.free.indicator
+        return indicator.start >= max(REGULAR * indicator.largest, self.share)
 
     def _next(self):
         """Return the next time of the grid."""
-        done = (self.run.clock[T] - self.origin) / self.step
+        done = (self.run.clock.t - self.origin) / self.step
         return min(self.origin + math.ceil(done + NO_STEP) * self.step, self.end)

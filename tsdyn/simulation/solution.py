@@ -270,7 +270,7 @@ class Solution(Balances, Kinematics["Floats"]):
         """Return True where `reaction` is unique, at each output: bool (k,).
 
         Redundant constraints can share their load in many ways without a change of motion; `reaction` is then the
-        solution whose multipliers of dropped rows (NaN in `multipliers`) are zero.
+        solution whose multipliers of redundant rows (NaN in `multipliers`) are zero.
         """
         item = self.handles.item(item)
         if id(item) in reactions.loads_of(self.packed):

@@ -6,7 +6,7 @@ from ..configuration.rank import weakest_row
 from ..errors import Status
 from ..formulations.dependent_rows import dependent_rows
 from ..observables.evaluate import constraint_arrays
-from ..sparse.constraint_graphs import dropped_rows
+from ..sparse.constraint_graphs import redundant_rows
 from ..taylor.layout import without_series
 from ..validation import counted
 from .tolerances import BLOW_UP, MOST_SINGULAR, NEARLY_SINGULAR
@@ -46,7 +46,7 @@ def _kept(stats):
 
 def _locked(solution):
     """Report that redundant rows leave no degree of freedom."""
-    redundant = len(dropped_rows(solution.packed))
+    redundant = len(redundant_rows(solution.packed))
     still = redundant and not solution.system.rheonomic[0]
     if not (still and solution.q.shape[1] == len(solution.system.segments) - redundant):
         return ""
@@ -69,7 +69,7 @@ def _suspect(solution, scene):
     if solution.q.shape[1] > MOST_SINGULAR:
         return _suspect_of_many(solution, scene)
     _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)
-    rows, share = weakest_row(scene, Phi_q, len(dropped_rows(solution.packed)))
+    rows, share = weakest_row(scene, Phi_q, len(redundant_rows(solution.packed)))
     if not share < NEARLY_SINGULAR:
         return ""
     return (
@@ -82,7 +82,7 @@ def _suspect_of_many(solution, scene):
     """Do the same by elimination, in O(N)."""
     packed = solution.packed
     rows = dependent_rows(packed, solution._last[0], solution._reached, NEARLY_SINGULAR**2)
-    redundant = len(dropped_rows(packed))
+    redundant = len(redundant_rows(packed))
     if rows is None or len(rows) <= redundant:
         return ""
     names = scene.row_names()

@@ -1,6 +1,6 @@
 """Elementary operations of block elimination in local scalars: up to three pivots at a time, and whole links of chains.
 
-An operation works on rows of a panel (see symbolic.py), `width` floats apart, from the first pivot on: in u, and for an
+An operation works on rows of a panel (see panels.py), `width` floats apart, from the first pivot on: in u, and for an
 unsymmetric matrix also in l, transposed. It stores the reciprocals of the pivots and returns the index of the pivot
 that failed, or -1. `kept` holds the diagonal before elimination; its sign is the sign that the pivot must have.
 """
@@ -53,7 +53,10 @@ def eliminate(u, size, width, n, kept, limit):
 
 @kernel
 def subtract_products(pivots, size, width, left, right, out, stride, rows, n, diagonal):
-    """Subtract from out, up to three pivots: left's columns times right's rows; of a diagonal block the upper part."""
+    """Subtract from out, up to three pivots: left's columns times right's rows; of a diagonal block the upper part.
+
+    Ten arguments: where the pivots, both factors and the result are, and how many rows and columns they have.
+    """
     if size >= 3:
         d0, d1, d2 = pivots[0], pivots[width + 1], pivots[2 * width + 2]
         a, b, c = left, left[width:], left[2 * width :]

@@ -12,8 +12,7 @@ in the graph meet at neighbouring parts.
 
 from typing import NamedTuple
 
-LARGEST = 42  # rows at a body that isn't cut
-LEAF, FAN = 18, 4  # rows at a part without parts below it; parts below one
+from .tolerances import FAN, LARGEST, LEAF
 
 
 class Part(NamedTuple):

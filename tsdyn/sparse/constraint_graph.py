@@ -9,17 +9,54 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..jit.kernels import Record, records
 from ..model.packed_friction import FR_COLUMNS
 from .massless_axes import Axes, no_axes
-from .symbolic import Pattern, analyse
+from .panels import Pattern
+from .symbolic import analyse
 
-# columns of Network.kinds: addresses of the loops, then where a kind's instances are
-REDUCED, VALUES, BIAS, DRIFT, N_COUNT, N_REALS, N_FIRST_INT, N_FIRST_REAL, N_COLUMNS = range(9)
-# columns of Network.products
-P_LEFT, P_ROWS, P_RIGHT, P_COLUMNS, P_TARGET, P_STRIDE, P_SAME, P_WIDTH = range(8)  # SAME: with itself, both sides
-# columns of Network.parts; kinds of products
-H_LEFT, H_ROWS, H_RIGHT, H_COLUMNS, H_TARGET, H_STRIDE, H_KIND, H_BODY, H_WIDTH = range(9)
-ROWS, ROWS_WELD, WELD_ROWS, WELDS = range(4)
+REDUCED, VALUES, BIAS, DRIFT = LOOPS = "reduced", "values", "bias", "drift"  # those of a `RowKind`
+
+
+class RowKind(Record):
+    """Instances of one class of primitive without a gap."""
+
+    reduced: int  # addresses of the loops of constraint_rows.py; zero where they aren't needed or there is none
+    values: int
+    bias: int
+    drift: int  # 1 for a moving kind until it is loaded
+    count: int  # instances
+    stride: int  # reals of each
+    table: int  # where the entries of the first begin in Network.table
+    reals: int  # and in System.reals
+
+
+class Product(Record):
+    """H Y^T of two constraints at a body; of one with itself, at both."""
+
+    left: int  # where the sides of the two constraints begin in H, and how many rows they have
+    rows: int
+    right: int
+    columns: int
+    target: int  # where the product goes in S
+    stride: int  # length of a row there
+    same: int  # 1 for a constraint with itself
+
+
+class PartProduct(Record):
+    """The same at a part of a split body."""
+
+    left: int
+    rows: int
+    right: int
+    columns: int
+    target: int
+    stride: int
+    kind: int
+    body: int
+
+
+ROWS, ROWS_WELD, WELD_ROWS, WELDS = range(4)  # kinds
 W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
 
 
@@ -27,17 +64,17 @@ class Network(NamedTuple):
     """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H, which are zero where row is -1."""
 
     bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length: 7, 3, or poses.STILL of what never turns
-    kinds: np.ndarray  # int64 (kinds, N_COLUMNS); more than one of a kind where instances between them are left out
+    kinds: np.ndarray  # RowKind (kinds,); more than one of a class where instances between them are left out
     table: np.ndarray  # int64: constraint_rows.INTS for each instance
     sides: np.ndarray  # int64 (m, 2): the bodies of a row; nb is the ground
     row: np.ndarray  # int64 (m,): its place among the rows of Phi; -1 for a weld's or an axis's
-    products: np.ndarray  # int64 (products, P_WIDTH): rows of sides that meet at a body, and where their product goes
+    products: np.ndarray  # Product (products,): rows of sides that meet at a body, and where their product goes
     inverse: np.ndarray  # ((nb + 1) 16,): 1 / m and three zeros, columns of J'^-1; zero for the ground
     mass: np.ndarray  # ((nb + 1) 16,): m and three zeros, columns of J'
     spins: np.ndarray  # int64 (nb,): whether omega' x J' omega' is ever other than zero
     pattern: Pattern  # of S
     normals: np.ndarray  # int64 (nb,): the row of Phi that normalises a body's p, or -1
-    parts: np.ndarray  # int64 (products, H_WIDTH): the products at the parts of hubs, see body_splitting.py
+    parts: np.ndarray  # PartProduct (products,): the products at the parts of hubs, see body_splitting.py
     scales: np.ndarray  # (products,): what they are multiplied by
     welds: np.ndarray  # int64 (rows of welds, 2): which row, of which body
     diagonal: np.ndarray  # int64 (m,): where the diagonal entry of a row is in a value array of the pattern
@@ -54,8 +91,7 @@ def no_network():
     """The network of nothing, for its type."""
     none, pattern = np.zeros(0, np.int64), analyse([], [])[1]
     pairs = np.zeros((0, 2), np.int64)
-    kinds, products = np.zeros((0, N_COLUMNS), np.int64), np.zeros((0, P_WIDTH), np.int64)
-    parts = np.zeros((0, H_WIDTH), np.int64)
+    kinds, products, parts = records(RowKind), records(Product), records(PartProduct)
     return Network(
         pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none, parts, np.zeros(0),
         pairs, none, none, np.zeros((0, FR_COLUMNS), np.int64), pairs, np.zeros(1, np.int64),

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..elements.element import address
 from ..errors import InvalidConstraint
-from .constraint_graph import BIAS, DRIFT, REDUCED, VALUES
+from .constraint_graph import DRIFT
 from .graph_builder import build
 
 
@@ -18,27 +18,26 @@ def network_of(packed, *columns):
     return known.networks[columns]
 
 
-def drop(packed, rows):
+def set_redundant(packed, rows):
     """Have the networks of a scene made anew, with these rows of them redundant, int64 (k,); None where none are.
 
     Hubs are left whole then: elimination may end with the row of a weld, which can't be left out.
     """
     packed.derived.forget_graphs()
-    packed.derived.dropped = rows
+    packed.derived.redundant = rows
 
 
-def dropped_rows(packed):
+def redundant_rows(packed):
     """Redundant rows of a scene's networks, int64 (k,)."""
-    rows = packed.derived.dropped
+    rows = packed.derived.redundant
     return np.zeros(0, np.int64) if rows is None else rows
 
 
 def with_loops(network, kinds, *columns):
     """The network with the addresses of these loops, which are loaded now."""
-    names = {REDUCED: "reduced", VALUES: "values", BIAS: "bias", DRIFT: "drift"}
     table = network.kinds.copy()
-    for row, kind in zip(table, kinds, strict=True):
-        for column in columns:
-            if column != DRIFT or row[DRIFT] != 0:
-                row[column] = address(kind.kernels, names[column], kind.__name__, InvalidConstraint)
+    for i, kind in enumerate(kinds):
+        for loop in columns:
+            if loop != DRIFT or table[DRIFT][i] != 0:
+                table[loop][i] = address(kind.kernels, loop, kind.__name__, InvalidConstraint)
     return network._replace(kinds=table, rub=np.zeros(1, np.int64))

@@ -1,4 +1,4 @@
-"""Numeric part of the sparse factorisation: block elimination in the panels laid out by symbolic.analyse.
+"""Numeric part of the sparse factorisation: block elimination in the panels laid out by panels.py.
 
     S = U^T D^-1 U    symmetric and, but for late nodes (see symbolic.py), positive definite; values hold U
     N = L D^-1 U      any other, without pivoting: `upper` holds U, `lower` holds L^T
@@ -54,12 +54,18 @@ def factor(pattern, values, limit):
             if size - k > 3:
                 out, right = u[3 * (width + 1) :], u[3:]
                 subtract_products(u, 3, width, right, right, out, width, size - k - 3, width - k - 3, True)
-        for e in range(updates[j], updates[j + 1]):
-            at, rows, run, n, target, stride = record(pattern, e)
-            for k in range(0, size, 3):
-                u, r = panel[k * (width + 1) :], panel[k * width :]
-                subtract_products(u, size - k, width, r[at:], r[run:], values[target:], stride, rows, n, at == run)
+        update_later_blocks(pattern, values, panel, j, size, width)
     return -1
+
+
+@kernel
+def update_later_blocks(pattern, values, panel, j, size, width):
+    """Subtract the products of the eliminated block j, `size` rows of a panel, from later panels."""
+    for e in range(pattern.updates[j], pattern.updates[j + 1]):
+        at, rows, run, n, target, stride = record(pattern, e)
+        for k in range(0, size, 3):
+            u, r = panel[k * (width + 1) :], panel[k * width :]
+            subtract_products(u, size - k, width, r[at:], r[run:], values[target:], stride, rows, n, at == run)
 
 
 @kernel

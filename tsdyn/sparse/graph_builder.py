@@ -12,13 +12,10 @@ import numpy as np
 
 from ..elements.loops.body_poses import STILL
 from ..elements.loops.constraint_rows import BODY, INTS, MASK, ROW
+from ..jit.kernels import records, row_of
 from ..model.packed_friction import frictions_of
 from .body_splitting import cut
 from .constraint_graph import (
-    H_WIDTH,
-    N_COLUMNS,
-    N_COUNT,
-    P_WIDTH,
     ROWS,
     ROWS_WELD,
     W_MASS,
@@ -27,6 +24,9 @@ from .constraint_graph import (
     WELD_ROWS,
     WELDS,
     Network,
+    PartProduct,
+    Product,
+    RowKind,
 )
 from .massless_axes import Share, axes_of, inverses, lean_bodies
 from .symbolic import analyse
@@ -97,7 +97,7 @@ class _Builder:
     def _cut_hubs(self):
         """Parts of hubs, and the cliques: nodes that meet at a body or a part. Frictions couple a hub's rows whole."""
         degrees = np.where(self.rows[:, 1] == 7, 6, 3).tolist()
-        whole = self.packed.derived.dropped is not None or self.system.normals.size
+        whole = self.packed.derived.redundant is not None or self.system.normals.size
         pairs = [tuple(body if body < self.nb else -1 for body in pair) for pair in self.nodes]
         self.parts = [] if whole else cut(pairs, self.sizes, degrees)
         self.hubs, self.cliques = {part.body for part in self.parts}, [[] for _ in range(self.nb)]
@@ -154,7 +154,7 @@ class _Builder:
                 for j, other in found:
                     if self.firsts[i] < self.firsts[j]:
                         products.append((*self._product(i, side, j, other), 0))
-        return np.array(products, np.int64).reshape(-1, P_WIDTH)
+        return records(Product, products)
 
     def _products_at_hubs(self):
         """Network.parts and Network.scales: products at the parts of hubs, and with the welds between these."""
@@ -180,7 +180,7 @@ class _Builder:
                     if not after:
                         products.append((0, count, 0, count, target, stride, WELDS, part.body))
                         scales.append(sign * other_sign * part.scale)
-        return np.array(products, np.int64).reshape(-1, H_WIDTH), np.array(scales, float)
+        return records(PartProduct, products), np.array(scales, float)
 
     def _welds(self):
         rows = [
@@ -207,7 +207,7 @@ class _Builder:
         ]
         counts = [joint.constraint.rows for joint in self.joints]
         axes = axes_of(shares, self.lean, counts, self.inside, self.starts, self.where)
-        self.sides[axes.rows[:, 0], 0] = axes.rows[:, 1]
+        self.sides[axes.rows["row"], 0] = axes.rows["body"]
         return axes
 
     def _kinds(self, index):
@@ -224,14 +224,22 @@ class _Builder:
                 if i is None:
                     continue
                 if last is None or last != at - 1:
-                    kinds.append([0, 0, 0, int(phi_t != 0), 0, stride, len(table), first_real + at * stride])
+                    kinds.append(
+                        {
+                            "drift": int(phi_t != 0),
+                            "count": 0,
+                            "stride": stride,
+                            "table": len(table),
+                            "reals": first_real + at * stride,
+                        }
+                    )
                     used.append(kind)
                 last = at
-                kinds[-1][N_COUNT] += 1
+                kinds[-1]["count"] += 1
                 entry = [0] * INTS
                 entry[BODY : BODY + 2], entry[ROW], entry[MASK] = self.joints[i].pair, self.firsts[i], 0
                 table += entry
-        return np.array(kinds, np.int64).reshape(-1, N_COLUMNS), np.array(table, np.int64), tuple(used)
+        return records(RowKind, [row_of(RowKind, **kind) for kind in kinds]), np.array(table, np.int64), tuple(used)
 
     def _weights(self):
         """Network.inverse, Network.mass and Network.spins."""
@@ -248,9 +256,9 @@ class _Builder:
 
     def _dropped(self):
         if self.still is not None:
-            return np.flatnonzero(np.isin(self.places, self.still.dropped))
-        dropped = self.packed.derived.dropped
-        return np.zeros(0, np.int64) if dropped is None else dropped.copy()
+            return np.flatnonzero(np.isin(self.places, self.still.redundant))
+        redundant = self.packed.derived.redundant
+        return np.zeros(0, np.int64) if redundant is None else redundant.copy()
 
     def network(self):
         """The `Network`, and the classes of its kinds."""

@@ -16,24 +16,35 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.markers import POINT
+from ..jit.kernels import Record, records
+from .tolerances import GIVEN, NONE, THIN
 
-THIN = (
-    1e-6  # of a body's largest moment of inertia, about its centroid or by its levers: what is less takes an axis row
-)
-GIVEN = 0.1  # of it: J
-NONE = 1e-14  # of its largest moment of inertia: what is less is none
-# columns of Axes.rows, of Axes.values, and of Axes.products
-AXIS_ROW, AXIS_BODY = range(2)
-AXIS_H, AXIS_Y, AXIS_OWN, AXIS_WIDTH = 0, 4, 8, 12  # c e; (J' + j e e^T)^-1 c e; the diagonal entry
-A_AXIS, A_SIDE, A_TARGET, A_WIDTH = range(4)  # A_SIDE: where a row's side begins in H, or -1 - component of a weld
+
+class Axis(Record):
+    """An axis row."""
+
+    row: int  # in order of elimination
+    body: int
+
+
+class AxisProduct(Record):
+    """Product of an axis row with another row at its body."""
+
+    axis: int
+    side: int  # where the row's side begins in H, or -1 - component of a weld
+    target: int  # where the product goes in S
+
+
+# columns of Axes.values: c e; (J' + j e e^T)^-1 c e; the diagonal entry
+AXIS_H, AXIS_Y, AXIS_OWN, AXIS_WIDTH = 0, 4, 8, 12
 
 
 class Axes(NamedTuple):
     """The axis rows of a network."""
 
-    rows: np.ndarray  # int64 (axes, 2): the row in order of elimination, the body
+    rows: np.ndarray  # Axis (axes,)
     values: np.ndarray  # (axes, AXIS_WIDTH)
-    products: np.ndarray  # int64 (products, A_WIDTH): with which row, and where the product goes
+    products: np.ndarray  # AxisProduct (products,)
     scales: np.ndarray  # (products,): what a product is multiplied by
 
 
@@ -91,14 +102,14 @@ class Share(NamedTuple):
 
 def no_axes():
     """The `Axes` of a network without lean bodies."""
-    return Axes(np.zeros((0, 2), np.int64), np.zeros((0, AXIS_WIDTH)), np.zeros((0, A_WIDTH), np.int64), np.zeros(0))
+    return Axes(records(Axis), np.zeros((0, AXIS_WIDTH)), records(AxisProduct), np.zeros(0))
 
 
 def axis_of(axes, row):
     """The body and the axis, body frame, that a row in order of elimination belongs to."""
-    i = int(np.flatnonzero(axes.rows[:, AXIS_ROW] == row)[0])
+    i = int(np.flatnonzero(axes.rows["row"] == row)[0])
     h = axes.values[i, AXIS_H : AXIS_H + 3]
-    return int(axes.rows[i, AXIS_BODY]), h / np.linalg.norm(h)
+    return int(axes.rows[i].body), h / np.linalg.norm(h)
 
 
 def axes_of(shares, lean, joints, inside, starts, where):
@@ -135,8 +146,8 @@ def axes_of(shares, lean, joints, inside, starts, where):
                     products.append((k, -1 - r, target + (3 + r) * stride + a))
                     scales.append(sign * share.scale)
     return Axes(
-        np.array(rows, np.int64).reshape(-1, 2),
+        records(Axis, rows),
         np.array(values, float).reshape(-1, AXIS_WIDTH),
-        np.array(products, np.int64).reshape(-1, A_WIDTH),
+        records(AxisProduct, products),
         np.array(scales, float),
     )

@@ -1,39 +1,26 @@
-"""Symbolic part of the sparse factorisation: fill-reducing ordering, supernodes, and the address of every entry.
+"""Symbolic part of the sparse factorisation: fill-reducing ordering and supernodes; panels.py has the addresses.
 
 The pattern is symmetric. Rows are grouped into nodes (all constraint rows between two bodies); the nodes at one body
 form a clique. Nodes are eliminated in a fill-reducing order; consecutive nodes with nearly equal remaining patterns are
-merged into one dense block (a supernode). Block j stores its rows of the upper triangle as one dense row-major panel:
-its own columns first, then the columns of later rows that elimination reaches,
-
-    values[heads[j] + r * widths[j] + c],   r < size of j,   c < widths[j] = size of j + rows reached.
-
-Elimination of block j updates the panels of later blocks by products of its columns. The targets are listed here once,
-so the kernels in factorisation.py neither search nor allocate.
+merged into one dense block (a supernode).
 """
 
 import heapq
-from bisect import bisect_right
 from collections import deque
-from typing import NamedTuple
 
 import numpy as np
 
-WIDEST = 24  # rows of a block
-OWN = 100  # nodes in loops that are ordered here, without importing scipy.sparse
-
-
-class Pattern(NamedTuple):
-    """What the kernels of factorisation.py read: int64 vectors only."""
-
-    shape: np.ndarray  # rows, length of the panels, length of a value array (panels, then room for a diagonal)
-    starts: np.ndarray  # first row of each block in the eliminated vector, and the end
-    heads: np.ndarray  # where each block's panel begins in the value array
-    widths: np.ndarray  # length of a row of each block's panel
-    columns: np.ndarray  # of each block, the first of its segments, and the end
-    segments: np.ndarray  # pairs: first row in the eliminated vector, count; the rows that each panel reaches
-    updates: np.ndarray  # of each block, the first of its records, and the end
-    records: np.ndarray  # sixes: row column, rows, first column, columns in its own panel; target, target's row length
-    negative: np.ndarray  # rows of late nodes, whose pivots are below zero
+from .panels import lay_out
+from .tolerances import (
+    LINK_COST,
+    LOOKUP,
+    NUMBER_COST,
+    OWN,
+    PIVOTS_COST,
+    PRODUCT_COST,
+    UPDATE_COST,
+    WIDEST,
+)
 
 
 def analyse(sizes, cliques, late=0):
@@ -70,7 +57,7 @@ def analyse(sizes, cliques, late=0):
     order = _order(sizes[:early], [clique for clique in others if len(clique) > 1])
     order = _with_late(order, cliques, early) if late else order
     groups = _amalgamate(sizes, order, *_tree(sizes, order, cliques))
-    rows, pattern, where = _lay_out(sizes, cliques, groups)
+    rows, pattern, where = lay_out(sizes, cliques, groups)
     negative = [row for i in range(early, len(sizes)) for row in range(rows[i], rows[i] + sizes[i])]
     return rows, pattern._replace(negative=np.array(negative, np.int64)), where
 
@@ -89,17 +76,58 @@ def _with_late(order, cliques, early):
 
 def _order(sizes, cliques):
     """Order of elimination: nodes in one clique only cost no fill and go first; then by minimum degree."""
-    members = dict(enumerate(set(clique) for clique in cliques))
-    owners = [set() for _ in sizes]
-    for name, clique in members.items():
-        for i in clique:
-            owners[i].add(name)
-    order, done = [], [size == 0 for size in sizes]
-    free = deque(i for i, own in enumerate(owners) if len(own) < 2 and not done[i])
+    graph = _QuotientGraph(sizes, cliques)
+    graph.peel()
+    core = [i for i in range(len(sizes)) if not graph.done[i]]
+    if len(core) > OWN:
+        return graph.order + _minimum_degree(core, graph.members.values())
+    ticket = len(core)
+    latest = {i: (graph.degree(i), at) for at, i in enumerate(core)}
+    heap = [(*key, i) for i, key in latest.items()]
+    heapq.heapify(heap)
+    while heap:
+        *key, i = heapq.heappop(heap)
+        if graph.done[i] or latest[i] != tuple(key):
+            continue
+        changed = set(graph.eliminate(i)).union(*graph.peel())
+        for n in changed:
+            if not graph.done[n]:
+                ticket += 1
+                latest[n] = graph.degree(n), ticket  # behind others of its degree: independent nodes first
+                heapq.heappush(heap, (*latest[n], n))
+    return graph.order
 
-    def eliminate(i):
-        done[i] = True
-        order.append(i)
+
+class _QuotientGraph:
+    """Nodes and the cliques that they are in; elimination of a node merges its cliques into one."""
+
+    def __init__(self, sizes, cliques):
+        self.sizes, self.members = sizes, dict(enumerate(set(clique) for clique in cliques))
+        self.owners = [set() for _ in sizes]
+        for name, clique in self.members.items():
+            for i in clique:
+                self.owners[i].add(name)
+        self.order, self.done = [], [size == 0 for size in sizes]
+        self.free = deque(i for i, own in enumerate(self.owners) if len(own) < 2 and not self.done[i])
+
+    def degree(self, i):
+        """Rows that node i is coupled to."""
+        return sum(self.sizes[n] for n in set().union(*(self.members[name] for name in self.owners[i])))
+
+    def peel(self):
+        """Eliminate the nodes that are in one clique only, until there are none; the nodes that each one changes."""
+        changed = []
+        while self.free:
+            i = self.free.popleft()
+            if not self.done[i]:
+                changed.append(self.eliminate(i))
+        return changed
+
+    def eliminate(self, i):
+        """Eliminate node i; the nodes that are coupled to it."""
+        members, owners = self.members, self.owners
+        self.done[i] = True
+        self.order.append(i)
         names = owners[i]
         if not names:
             return ()
@@ -108,54 +136,30 @@ def _order(sizes, cliques):
         union.discard(i)
         alone = len(names) == 1
         if not alone:
-            for name in names:
-                if name != into:
-                    union |= members.pop(name)
-            union.discard(i)
-            for n in union:
-                owners[n] -= names
-                owners[n].add(into)
-                for name in [name for name in owners[n] if name != into and members[name] <= union]:
-                    for other in members.pop(name):
-                        owners[other].discard(name)
+            self._merge(i, names, into)
         if len(union) == 1:
             for n in union:
                 owners[n].discard(into)
             del members[into]
         if alone and len(union) > 1:
             return union  # nobody else has come free
-        free.extend(n for n in union if len(owners[n]) < 2)
+        self.free.extend(n for n in union if len(owners[n]) < 2)
         return union
 
-    def peel():
-        while free:
-            i = free.popleft()
-            if not done[i]:
-                yield eliminate(i)
-
-    deque(peel(), 0)
-    core = [i for i in range(len(sizes)) if not done[i]]
-    if len(core) > OWN:
-        return order + _minimum_degree(core, members.values())
-    ticket = len(core)
-
-    def degree(i):
-        return sum(sizes[n] for n in set().union(*(members[name] for name in owners[i])))
-
-    latest = {i: (degree(i), at) for at, i in enumerate(core)}
-    heap = [(*key, i) for i, key in latest.items()]
-    heapq.heapify(heap)
-    while heap:
-        *key, i = heapq.heappop(heap)
-        if done[i] or latest[i] != tuple(key):
-            continue
-        changed = set(eliminate(i)).union(*peel())
-        for n in changed:
-            if not done[n]:
-                ticket += 1
-                latest[n] = degree(n), ticket  # behind others of its degree: independent nodes first
-                heapq.heappush(heap, (*latest[n], n))
-    return order
+    def _merge(self, i, names, into):
+        """Merge the cliques of these names into one of them, without node i; cliques within it are dropped."""
+        members, owners = self.members, self.owners
+        union = members[into]
+        for name in names:
+            if name != into:
+                union |= members.pop(name)
+        union.discard(i)
+        for n in union:
+            owners[n] -= names
+            owners[n].add(into)
+            for name in [name for name in owners[n] if name != into and members[name] <= union]:
+                for other in members.pop(name):
+                    owners[other].discard(name)
 
 
 def _minimum_degree(core, cliques):
@@ -202,11 +206,11 @@ def _tree(sizes, order, cliques):
 def _cost(size, reach):
     """Nanoseconds, roughly, of factoring a block once and solving with it three times: measured and fitted."""
     if size == reach == 3:
-        return 66.0  # mostly a link of a chain, which has kernels of its own
+        return LINK_COST
     steps = -(-size // 3)
     numbers = size * reach + size * (size + 1) / 2
     products = sum((size + reach - k) ** 2 for k in range(size)) / 2
-    return 49.0 * steps + 2.4 * numbers + 0.24 * products + (20.0 if reach else 0.0)
+    return PIVOTS_COST * steps + NUMBER_COST * numbers + PRODUCT_COST * products + (UPDATE_COST if reach else 0.0)
 
 
 def _amalgamate(sizes, order, parent, reach):
@@ -232,112 +236,6 @@ def _amalgamate(sizes, order, parent, reach):
         whole[root[i]].append(i)
     for i, parts in whole.items():
         total = sum(rows[part] for part in parts)
-        # a tenth more: what the parts have to look up isn't in their cost
-        if len(parts) > 1 and total <= WIDEST and _cost(total, 0) <= 1.1 * sum(cost[part] for part in parts):
+        if len(parts) > 1 and total <= WIDEST and _cost(total, 0) <= LOOKUP * sum(cost[part] for part in parts):
             groups[i] = [node for part in parts for node in groups.pop(part)]
     return list(groups.values())
-
-
-def _lay_out(sizes, cliques, groups):
-    home = {i: g for g, group in enumerate(groups) for i in group}
-    above = _reached(groups, cliques, home)
-    rows = np.zeros(len(sizes), np.int64)
-    starts, at = [], 0
-    for group in groups:
-        starts.append(at)
-        for i in group:
-            rows[i] = at
-            at += sizes[i]
-    starts.append(at)
-    first = rows.tolist()
-
-    heads, widths, columns, segments = [], [], [0], []
-    maps = []  # of each panel: where runs of consecutive rows begin, in the eliminated vector and in the panel
-    length = 0
-    for g, nodes in enumerate(above):
-        pieces = []
-        for i in sorted(nodes, key=first.__getitem__):
-            if pieces and sum(pieces[-1]) == first[i]:
-                pieces[-1][1] += sizes[i]
-            else:
-                pieces.append([first[i], sizes[i]])
-        size = starts[g + 1] - starts[g]
-        froms, places, width = [starts[g]], [0], size
-        for start, count in pieces:
-            froms.append(start)
-            places.append(width)
-            width += count
-        maps.append((froms, places))
-        segments += pieces
-        columns.append(len(segments))
-        heads.append(length)
-        widths.append(width)
-        length += size * width
-
-    def column(g, row):
-        froms, places = maps[g]
-        run = bisect_right(froms, row) - 1
-        place = places[run] + row - froms[run]
-        if place >= (places[run + 1] if run + 1 < len(places) else widths[g]):
-            raise KeyError("these nodes are not coupled")
-        return place
-
-    def where(i, j):
-        if not sizes[i] or not sizes[j]:
-            return 0, 0, False  # a block without entries
-        transposed = first[i] > first[j]
-        if transposed:
-            i, j = j, i
-        g = home[i]
-        return heads[g] + (first[i] - starts[g]) * widths[g] + column(g, first[j]), widths[g], transposed
-
-    updates, records = [0], []
-    for g in range(len(groups)):
-        froms, places = maps[g]
-        pieces = [(froms[k], place, end - place) for k, (place, end) in enumerate(_spans(places, widths[g])) if k]
-        for k, (start, place, count) in enumerate(pieces):
-            while count > 0:
-                target = bisect_right(starts, start) - 1
-                taken = min(count, starts[target + 1] - start)
-                head = heads[target] + (start - starts[target]) * widths[target]
-                runs = []
-                for row, run, span in [(start, place, count), *pieces[k + 1 :]]:
-                    to = column(target, row)
-                    if runs and runs[-1][2] + runs[-1][1] == to:
-                        runs[-1][1] += span
-                    else:
-                        runs.append([run, span, to])
-                for run, span, to in runs:
-                    records.append((place, taken, run, span, head + to, widths[target]))
-                start, place, count = start + taken, place + taken, count - taken
-        updates.append(len(records))
-
-    def pack(numbers):
-        return np.array(numbers, np.int64).reshape(-1)
-
-    shape = pack([at, length, length + at])
-    return (
-        rows,
-        Pattern(shape, *map(pack, (starts, heads, widths, columns, segments, updates, records, ()))),
-        where,
-    )
-
-
-def _spans(places, width):
-    return zip(places, [*places[1:], width], strict=True)
-
-
-def _reached(groups, cliques, home):
-    """For each group, the set of later nodes that its elimination reaches."""
-    waiting = [[] for _ in groups]
-    for clique in cliques:
-        if clique:
-            waiting[min(home[i] for i in clique)].append(clique)
-    above = []
-    for g, group in enumerate(groups):
-        union = set().union(*waiting[g]).difference(group)
-        waiting[g] = None
-        if union:
-            waiting[min(home[i] for i in union)].append(union)
-        above.append(union)
-    return above

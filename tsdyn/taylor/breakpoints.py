@@ -5,21 +5,19 @@ from ..jit.kernels import kernel
 from ..maths.dense_linalg import is_finite
 from ..runs.breakpoints import amend, take_pieces
 from ..runs.outputs import store_now
-from ..runs.run_state import T
-from .step_parts import EXPAND, REACH, call_expand, call_reach
-from .workspace import LOWEST, NEXT, TOP
+from .step_parts import call_expand, call_reach
 
 NOT_FINITE = int(Status.NOT_FINITE)
 
 
 @kernel
-def cross_stop(context, c, r, log, steps):
+def cross_stop(context, c, r, log):
     """At a stop: poses and accelerations after it, for its output and the next series. Status."""
     w = c.work
     take_pieces(c.system, r, log)
-    status = call_reach(steps[REACH], context, r.clock[T], -1.0)
+    status = call_reach(r.kernels.reach, context, r.clock.t, -1.0)
     if status == 0:
-        call_expand(steps[EXPAND], context, 0)
+        call_expand(r.kernels.expand, context, 0)
         if not is_finite(w.qdd):
             return NOT_FINITE
         store_now(w, r)
@@ -33,6 +31,6 @@ def lower_order(order, rho, tol, h):
 
     rho is the radius of convergence as the coefficients up to that order have it.
     """
-    top = order[TOP]
-    if top > order[LOWEST] and rho * tol ** (1.0 / top) > h:
-        order[NEXT] = top - 1
+    top = order.top
+    if top > order.lowest and rho * tol ** (1.0 / top) > h:
+        order.next = top - 1

@@ -16,13 +16,9 @@ import numpy as np
 from ..elements.loops.body_poses import OMEGA, POSE, RD, R
 from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R, S_SPIN, call_series
 from ..jit.kernels import kernel
-from ..jit.simd import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times, total
+from ..jit.simd import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times
 from ..maths.dense_linalg import copy
-from ..rows.independent_rows import drop
-from ..rows.schur_complement import scatter, weigh
-from ..sparse.constraint_graph import N_COUNT, N_FIRST_INT, N_FIRST_REAL, N_REALS
-from ..sparse.factorisation import solve
-from ..sparse.massless_axes import AXIS_BODY, AXIS_H, AXIS_ROW
+from ..rows.interface import solve_series, weigh
 
 MOST_ORDERS = 64
 
@@ -133,29 +129,30 @@ def _put_product(array, o, x, f, low, exact):
 
 
 @kernel
-def run_loops(network, reals, mode, k, orders, bodies, values, places, b, Z):
-    """One mode of the series loops of every kind."""
+def run_loops(network, reals, mode, k, x, f):
+    """One mode of the series loops of every kind; x is an `Expansion`, f a `Free`."""
     for i in range(network.kinds.shape[0]):
-        kind = network.kinds[i]
+        kind, series = network.kinds[i], x.places[i]
         call_series(
-            places[i, 0], mode, k, orders, kind[N_COUNT], kind[N_REALS], places[i, 2],
-            network.table[kind[N_FIRST_INT] :], reals[kind[N_FIRST_REAL] :], bodies, values[places[i, 1] :], b, Z,
+            series.loop, mode, k, x.order.room, kind.count, kind.stride, series.width,
+            network.table[kind.table :], reals[kind.reals :],
+            x.bodies, x.constraints[series.values :], f.b, f.Z,
         )  # fmt: skip
 
 
 @kernel
-def run_forces(reals, x, k, orders, poses, Z):
+def run_forces(reals, x, k, f):
     """Order k of all forces, onto Z; at k = 0 the poses are those of order zero."""
     for i in range(x.forces.shape[0]):
         kind = x.forces[i]
         call_series(
-            kind[0], 0, k, orders, kind[2], kind[3], kind[6], x.table[kind[4] :], reals[kind[5] :],
-            x.bodies, x.loads[kind[1] :], poses, Z,
+            kind.loop, 0, k, x.order.room, kind.count, kind.stride, kind.width,
+            x.table[kind.table :], reals[kind.reals :], x.bodies, x.loads[kind.values :], f.poses, f.Z,
         )  # fmt: skip
 
 
 @kernel
-def expand(network, system, k, last, ahead, orders, refine, x, f):
+def expand(network, system, k, last, ahead, refine, x, f):
     """Order k of the forces and multipliers, k + 1 of omega', k + 2 of r and A; k in turn from zero, after `begin`.
 
     On entry Z has the gyroscopic torques of order k, and A_{k+2} what (1) has without omega'_{k+1}; on exit both are
@@ -165,14 +162,15 @@ def expand(network, system, k, last, ahead, orders, refine, x, f):
     rounding errors have the same sign in every step, and add up. With `ahead`, a constant, the next body's numbers are
     prefetched: that pays where the series don't fit into the cache. x is an `Expansion`, f a `Free`.
     """
-    bodies, Z = x.bodies, f.Z
+    bodies, Z, orders = x.bodies, f.Z, x.order.room
     nb, size = network.bodies.shape[0], orders * BODY_ROW
-    run_loops(network, system.reals, ADVANCE, k, orders, bodies, x.constraints, x.places, f.b, Z)
-    run_forces(system.reals, x, k, orders, f.poses, Z)
+    run_loops(network, system.reals, ADVANCE, k, x, f)
+    run_forces(system.reals, x, k, f)
     exact = refine > 1
     g, h, g_low, h_low = splat(ONE_INTEGRAL[k, 0]), splat(TWO_INTEGRALS[k, 0]), splat(0.0), splat(0.0)
     if exact:
         g_low, h_low = splat(ONE_INTEGRAL[k, 1]), splat(TWO_INTEGRALS[k, 1])
+    inverse = g, h, g_low, h_low
     for b in range(nb):
         at = b * size
         if ahead:
@@ -184,11 +182,11 @@ def expand(network, system, k, last, ahead, orders, refine, x, f):
             _turn(bodies, at, k + 2, _product(four(Z, 8 * b + 4), h, h_low))
     refined = k < refine
     if refined:
-        _solve(network, system, k, orders, x, f, False)
+        _solve(network, system, k, x, f, False)
         copy(f.b, f.gamma)
         for b in range(nb):
-            _change(network, b, bodies, b * size, orders, k, g, h, g_low, h_low, exact, Z)
-    _solve(network, system, k, orders, x, f, refined)
+            _change(network, b, x, k, inverse, exact, Z)
+    _solve(network, system, k, x, f, refined)
     if refined:
         for e in range(f.b.size):
             f.b[e] += f.gamma[e]
@@ -198,7 +196,7 @@ def expand(network, system, k, last, ahead, orders, refine, x, f):
             _fetch_next(bodies, at + size, orders, 12 * (k + 3), k + 2)
             fetch(bodies, at + size + S_OMEGA * orders, 4 * (k + 1))
             fetch(bodies, at + size + S_SPIN * orders, 4 * (k + 2))
-        _change(network, b, bodies, at, orders, k, g, h, g_low, h_low, exact, Z)
+        _change(network, b, x, k, inverse, exact, Z)
         put(Z, 8 * b, splat(0.0))
         if network.bodies[b, 1] == 7 and not last:
             put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, k + 1))
@@ -206,29 +204,22 @@ def expand(network, system, k, last, ahead, orders, refine, x, f):
 
 
 @kernel
-def _solve(network, system, k, orders, x, f, refined):
+def _solve(network, system, k, x, f, refined):
     """b = lam_k, or what it lacks to gamma where it is `refined`, and with it Z = -W H^T lam_k."""
-    run_loops(network, system.reals, RESIDUAL, k, orders, x.bodies, x.constraints, x.places, f.b, f.Z)
-    for i in range(network.welds.shape[0]):
-        f.b[network.welds[i, 0]] = 0.0
-    for i in range(network.axes.rows.shape[0]):
-        e, b = network.axes.rows[i, AXIS_ROW], network.axes.rows[i, AXIS_BODY]
-        omega = four(x.bodies, (b * BODY_ROW + S_OMEGA) * orders + 4 * (k + 1))
-        f.b[e] = (k + 1.0) * total(times(four(network.axes.values[i], AXIS_H), omega))
-        f.b[e] += f.gamma[e] if refined else 0.0
-    drop(f.dropped, f.b)
-    solve(network.pattern, f.S, f.b)
-    for i in range(f.Z.size):
-        f.Z[i] = 0.0
-    scatter(network, f.Y, f.b, f.Z)
+    orders = x.order.room
+    run_loops(network, system.reals, RESIDUAL, k, x, f)
+    solve_series(network, f, x.bodies, S_OMEGA * orders + 4 * (k + 1), BODY_ROW * orders, k, refined)
 
 
 @kernel
-def _change(network, b, bodies, at, orders, k, g, h, g_low, h_low, exact, Z):
+def _change(network, b, x, k, inverse, exact, Z):
     """Add what Z makes of a body's r_{k+2}, omega'_{k+1} and A_{k+2}.
 
-    g + g_low = 1 / (k + 1), h + h_low = 1 / ((k + 1) (k + 2)); `exact`: the low parts are not zero.
+    inverse: g + g_low = 1 / (k + 1), h + h_low = 1 / ((k + 1) (k + 2)); `exact`: the low parts are not zero.
     """
+    g, h, g_low, h_low = inverse
+    bodies, orders = x.bodies, x.order.room
+    at = b * orders * BODY_ROW
     push, o = four(Z, 8 * b), at + S_R * orders + 4 * (k + 2)
     if exact:
         put(bodies, o, add(four(bodies, o), _product(push, h, h_low)))

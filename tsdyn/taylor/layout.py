@@ -12,16 +12,16 @@ from ..elements.markers import POINT
 from ..errors import InvalidConstraint, InvalidForce
 from ..formulations.locked_orientations import instances
 from ..jit.aligned_arrays import zeros
-from ..jit.kernels import twin
+from ..jit.kernels import records, twin
 from ..model.packed_forces import members_of
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tables import is_data
-from ..sparse.constraint_graph import DRIFT, N_COUNT, N_FIRST_INT
-from .workspace import Expansion
+from .tables import ConstraintSeries, ForceSeries, MotionSeries
+from .tolerances import FAR
+from .workspace import Expansion, Orders
 
 SHOWN = 5  # in a message
-FAR = 1 << 15  # orders of all bodies, each some hundred bytes
 
 
 def refusal(packed):
@@ -93,20 +93,21 @@ def allocate_expansion(network, kinds, packed, highest):
     loops = ("far_series", "far_driven_series") if is_far(network, highest) else ("series", "driven_series")
     bodies = zeros((nb + 1) * orders * BODY_ROW)
     bodies.reshape(nb + 1, -1)[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
-    places, total = np.zeros((len(kinds), 3), np.int64), 0
+    rows, total = [], 0
     for i, kind in enumerate(kinds):
-        first, count = network.kinds[i, N_FIRST_INT], int(network.kinds[i, N_COUNT])
+        first, count = network.kinds[i].table, int(network.kinds[i].count)
         masks = network.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
         varies = bool((masks & ((1 << GROUND) - 1)).any())
-        driven = bool(network.kinds[i, DRIFT])
+        driven = bool(network.kinds[i].drift)
         slots = kind.slots + (len(kind.quantities()) if driven else 0)
         width = instance_width(len(kind.markers), kind.rows, slots, orders, varies, driven)
-        places[i] = address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint), total, width
+        rows.append([address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint), total, width])
         total += count * width
+    places = records(ConstraintSeries, rows)
     forces, table, loads = _forces(packed, orders)
     constraints = zeros(total + 4)
     return Expansion(
-        order=np.array([highest, orders, highest, highest, highest, 0]),
+        order=Orders(top=highest, room=orders, next=highest, lowest=highest, highest=highest),
         bodies=bodies,
         constraints=constraints,
         places=places,
@@ -121,8 +122,8 @@ def _motions(network, packed, orders, places, constraints):
     """Expansion.motions; what is prescribed and constant is written now."""
     motions, rows = iter(packed.system.motions), []
     for i, (kind, members) in enumerate(instances(packed, network)):
-        for at, (_, given) in enumerate(members if network.kinds[i, DRIFT] != 0 else ()):
-            first = places[i, 1] + at * places[i, 2] + scratch_at(len(kind.markers), kind.rows, orders, True)
+        for at, (_, given) in enumerate(members if network.kinds[i].drift != 0 else ()):
+            first = places[i].values + at * places[i].width + scratch_at(len(kind.markers), kind.rows, orders, True)
             entry = 0
             for j in range(len(kind.quantities())):
                 row = first + (kind.slots + j) * orders
@@ -133,7 +134,7 @@ def _motions(network, packed, orders, places, constraints):
                 else:
                     constraints[row] = given[entry]
                 entry += 1 if moves else 3
-    return np.array(rows, np.int64).reshape(-1, 3)
+    return records(MotionSeries, rows)
 
 
 def _forces(packed, orders):
@@ -146,12 +147,12 @@ def _forces(packed, orders):
         kind = members[0].force
         series = address(kind.kernels, "series", kind.name, InvalidForce)
         width = force_series.instance_width(len(kind.markers), kind.slots, orders)
-        rows.append([series, total, len(members), row.stride, len(table), row.reals, width])
+        rows.append([series, total, width, len(members), row.stride, len(table), row.reals])
         total += len(members) * width
         for load in members:
             pair = [index.get(id(body), nb) for body in (load.force.a, load.force.b)]
             table += [*pair, (pair[0] == nb) | (pair[1] == nb) << 1]
-    return np.array(rows, np.int64).reshape(-1, 7), np.array(table, np.int64), zeros(total + 4)
+    return records(ForceSeries, rows), np.array(table, np.int64), zeros(total + 4)
 
 
 def masks(network, packed):
@@ -164,7 +165,7 @@ def masks(network, packed):
     for row, (kind, members) in zip(network.kinds, instances(packed, network), strict=True):
         motions, patterns, series = {}, {}, twin(kind.series)
         for i, (constraint, par) in enumerate(members):
-            entry = network.table[row[N_FIRST_INT] + i * INTS :][:INTS]
+            entry = network.table[row.table + i * INTS :][:INTS]
             length = [lengths[entry[BODY + (marker.body == "b")]] for marker in kind.markers]
             grounded = tuple(
                 isinstance(constraint.body_of(marker), Ground) or (size == STILL and marker.code != POINT)

@@ -6,15 +6,8 @@ from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..formulations.chart_validity import ROUNDING
 from ..jit.kernels import kernel
 from ..jit.simd import first, four, larger, second, splat, third
-from ..rows.singularity import NEAR
-from ..rows.tangent_workspace import END_SHARE, LARGEST_SHARE, SHARE
-from ..runs.run_state import ATOL, RTOL
-from ..workspaces.workspace import FLOOR, SIZE
-from .workspace import HIGHEST, LOWEST, NEXT, ORDERS, TOP
-
-LEAST_ORDER = 5  # of the series of a step past such a place
-FAR_PASSING, PASSING = 1e-13, 1e-10  # the loosest tolerance of a step past: from elsewhere, and from close by
-STEP_COST = 3  # of a step's landing, in orders
+from ..rows.interface import is_near_singular
+from .tolerances import FAR_PASSING, LEAST_ORDER, PASSING, STEP_COST
 
 
 @kernel
@@ -54,14 +47,14 @@ def radius(bodies, nb, orders, top, far, fast):
 @kernel
 def weights(c, r):
     """What coefficients of r and omega' are multiplied by to be compared with those of A; sets the floor of Phi."""
-    x, orders = c.expansion, c.expansion.order[ORDERS]
-    rtol, atol = r.clock[RTOL], r.clock[ATOL]
+    x, orders = c.expansion, c.expansion.order.room
+    rtol, atol = r.clock.rtol, r.clock.atol
     far, fast = splat(0.0), splat(0.0)
     for b in range(c.network.bodies.shape[0]):
         at = b * orders * BODY_ROW
         far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
     far, fast = _most(far), _most(fast)
-    c.work.control[FLOOR] = ROUNDING * (c.work.control[SIZE] + far)
+    c.work.control.floor = ROUNDING * (c.work.control.size + far)
     tol = atol + rtol
     return tol / (atol + rtol * far), tol / (atol + rtol * fast)
 
@@ -70,14 +63,14 @@ def weights(c, r):
 def step_length(c, r):
     """h = rho tol^(1 / (top + 2)); and the order of the next step, that with the longer step for the work."""
     x, nb = c.expansion, c.network.bodies.shape[0]
-    top, orders = x.order[TOP], x.order[ORDERS]
-    tol = r.clock[ATOL] + r.clock[RTOL]
+    top, orders = x.order.top, x.order.room
+    tol = r.clock.atol + r.clock.rtol
     far, fast = weights(c, r)
     h = radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2))
-    if x.order[HIGHEST] > x.order[LOWEST]:
+    if x.order.highest > x.order.lowest:
         lower = radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top)
         change = 1 if h * (top + STEP_COST - 2) > lower * (top + STEP_COST) else -1
-        x.order[NEXT] = min(max(top + change, x.order[LOWEST]), x.order[HIGHEST])
+        x.order.next = min(max(top + change, x.order.lowest), x.order.highest)
     return h
 
 
@@ -92,26 +85,20 @@ def longest(c, r, tol, most):
     far, fast = weights(c, r)
     h = 0.0
     for k in range(most, LEAST_ORDER, -1):
-        longer = radius(x.bodies, nb, x.order[ORDERS], k, far, fast) * tol ** (1.0 / (k + 2))
+        longer = radius(x.bodies, nb, x.order.room, k, far, fast) * tol ** (1.0 / (k + 2))
         if longer > h:
-            h, x.order[TOP] = longer, k
+            h, x.order.top = longer, k
     return h
-
-
-@kernel
-def is_next_to(share, c):
-    """Return True if a configuration with this indicator is near a singular one."""
-    return share < NEAR * c.free.sizes[LARGEST_SHARE]
 
 
 @kernel
 def loosest(c, tol):
     """The loosest tolerance of a step past a singular configuration: next to it lam has few digits."""
-    return max(tol, PASSING if is_next_to(c.free.sizes[SHARE], c) else FAR_PASSING)
+    return max(tol, PASSING if is_near_singular(c.free, c.free.indicator.start) else FAR_PASSING)
 
 
 @kernel
 def is_near(c, part):
     """Return True if a step ends near a singular configuration: the indicator is below `part` of its start value."""
-    sizes = c.free.sizes
-    return is_next_to(sizes[END_SHARE], c) and sizes[END_SHARE] < part * sizes[SHARE]
+    indicator = c.free.indicator
+    return is_near_singular(c.free, indicator.end) and indicator.end < part * indicator.start

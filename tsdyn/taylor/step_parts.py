@@ -7,24 +7,25 @@ from ..elements.loops.body_poses import write_accelerations, write_positions, wr
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..errors import Status
 from ..formulations.accelerations import accelerate_bodies
+from ..formulations.chart_validity import ROUNDING
 from ..formulations.projection import find_drift, land, land_velocities, sum_series
 from ..jit.kernels import callback, caller, kernel
 from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import is_finite
 from ..model.equations import set_time
-from ..rows.evaluation import run_loops
-from ..rows.independent_rows import select, weakest
-from ..rows.singularity import NEAR
-from ..rows.tangent_workspace import LARGEST_SHARE, SHARE
-from ..sparse.constraint_graph import REDUCED
+from ..rows.interface import (
+    is_near_singular,
+    return_to_selection,
+    save_selection,
+    select_rows,
+    singularity_indicator,
+)
 from .coefficients import begin, expand
 from .prescribed_series import expand_motions
-from .workspace import ORDERS, REFINED, TOP, load_series
+from .tolerances import GONE, NEXT_TO_SINGULAR
+from .workspace import load_series
 
 NOT_FINITE, SINGULAR = int(Status.NOT_FINITE), int(Status.SINGULAR)
-NEXT_TO_SINGULAR = 1e-8  # as a share of pivots: accelerations by elimination have lost as many digits
-GONE = 1e-10  # rows with less are left out: they would make more of what positions are off by than the series is
-EXPAND, REACH, WITHIN, PASS, STEPS = range(5)  # of the addresses that the driver is given
 call_expand, call_reach = caller("pi"), caller("pdd")
 
 
@@ -44,13 +45,13 @@ def expand_far_series(context, k):
 def _expand(context, k, ahead):
     c = load_series(context)
     w, x, f = c.work, c.expansion, c.free
-    orders = x.order[ORDERS]
+    orders = x.order.room
     if k == 0:
         expand_motions(c.system, x)
         begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
-    near = f.sizes[SHARE] < NEAR * f.sizes[LARGEST_SHARE]  # there rounding of lam grows from order to order
-    refine = orders if near else x.order[REFINED]
-    expand(c.network, c.system, k, k > 0 and k + 1 == x.order[TOP], ahead, orders, refine, x, f)
+    near = is_near_singular(f, f.indicator.start)  # there rounding of lam grows from order to order
+    refine = orders if near else x.order.refined
+    expand(c.network, c.system, k, k > 0 and k + 1 == x.order.top, ahead, refine, x, f)
     if k == 0:
         for b in range(c.network.bodies.shape[0]):
             at = b * orders * BODY_ROW
@@ -82,7 +83,7 @@ def reach(context, t, h):
     if is_driven(c.system) and not set_time(c.system, t):
         return NOT_FINITE
     if h >= 0.0:
-        sum_series(c.network, x.bodies, x.order[ORDERS], x.order[TOP], h, f.poses, f.p)
+        sum_series(c.network, x.bodies, x.order.room, x.order.top, h, f.poses, f.p)
     status = land(c.network, c.system, w, f, t)
     if status == 0:
         _land_rates(c, t)
@@ -109,14 +110,13 @@ def pass_singular(context, t, h):
     """
     c = load_series(context)
     w, x, f, network = c.work, c.expansion, c.free, c.network
-    count, orders, top = f.dropped[0], x.order[ORDERS], x.order[TOP]
+    orders, top = x.order.room, x.order.top
+    save_selection(f)
     sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
     status = land(network, c.system, w, f, t)
-    if status == SINGULAR or (status == 0 and weakest(network, f.S) < GONE):
+    if status == SINGULAR or (status == 0 and singularity_indicator(network, f.rows) < GONE):
         sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
-        f.dropped[0] = 0
-        run_loops(network, c.system.reals, REDUCED, f, t, f.b, f.H)
-        if select(network, f, f.H, f.Y, f.S, -1, GONE):
+        if select_rows(network, c.system, f, t, GONE) >= 0:
             status = land(network, c.system, w, f, t)
     if status == 0:
         _land_rates(c, t)
@@ -130,15 +130,29 @@ def pass_singular(context, t, h):
         write_positions(network.bodies, f.poses, w.q)
         write_velocities(network.bodies, f.poses, w.qd)
         write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
-    f.dropped[0] = count
+    return_to_selection(f)
     return status
 
 
 @kernel
-def state_within(context, steps, t, h):
+def is_singular(c, status):
+    """Whether the state that `reach` has come to, or could not reach, is next to a singular configuration."""
+    return status == SINGULAR or (status == 0 and singularity_indicator(c.network, c.free.rows) < NEXT_TO_SINGULAR)
+
+
+@kernel
+def state_within(context, c, kernels, t, h):
     """q, qd, qdd at t, h after the series' origin. Status."""
-    status = call_reach(steps[REACH], context, t, h)
-    f = load_series(context).free
-    if status == SINGULAR or (status == 0 and weakest(load_series(context).network, f.S) < NEXT_TO_SINGULAR):
-        return call_reach(steps[PASS], context, t, h)
-    return call_reach(steps[WITHIN], context, t, h) if status == 0 else status
+    status = call_reach(kernels.reach, context, t, h)
+    if is_singular(c, status):
+        return call_reach(kernels.pass_singular, context, t, h)
+    return call_reach(kernels.accelerate_here, context, t, h) if status == 0 else status
+
+
+@kernel
+def set_floor(c, q):
+    """The |Phi| that rounding of positions q leaves."""
+    largest = 0.0
+    for i in range(q.size):
+        largest = max(largest, abs(q[i]))
+    c.work.control.floor = ROUNDING * (c.work.control.size + largest)

@@ -1,337 +1,206 @@
 """The Taylor driver: series, step length, projection. One kernel serves every scene.
 
 Each step has its own chart: the series gives q and qd at the end of the step to truncation error, and a projection
-along W Phi_q^T returns both to the constraint manifold.
+along W Phi_q^T returns both to the constraint manifold. A step is proposed from the radius of convergence, tried (its
+end reached), and taken or tried again with another length: the same series serves all of them.
 """
 
-import math
-
-from ..elements.loops.body_poses import OMEGA, POSE, RD, move_bodies, place_bodies
+from ..elements.loops.body_poses import OMEGA, POSE, RD
 from ..errors import Status
 from ..formulations.chart_validity import AT_START, BY_SERIES, ROUNDING
 from ..jit.kernels import entry, kernel
 from ..maths.dense_linalg import copy, is_finite
-from ..model.equations import remember, set_time
+from ..model.equations import remember
 from ..model.joint_turns import count_turns
-from ..rows.independent_rows import weakest
-from ..rows.tangent_workspace import END_SHARE, LARGEST_SHARE, MOVED, RESIDUAL, SHARE
-from ..runs.breakpoints import cut_fixed, is_sampled, next_stop, take_pieces
+from ..rows.interface import singularity_indicator
+from ..runs.breakpoints import is_sampled, next_stop, take_pieces
 from ..runs.outputs import record, store_now
-from ..runs.run_state import (
-    ADAPTIVE,
-    AT_LIMIT,
-    ATOL,
-    BEGUN,
-    BLOCKS,
-    CHART_ROWS,
-    CUTS,
-    DENSE,
-    HISTORY,
-    LANDED,
-    LEAVE_WHEN_STIFF,
-    MAX_STEP,
-    NEAR_STEPS,
-    NEXT_EVAL,
-    REJECTED,
-    RTOL,
-    STEPS,
-    STEPS_WANTED,
-    STIFF,
-    STORED,
-    T_END,
-    T_ORIGIN,
-    WAITING,
-    H,
-    T,
-    load_run,
-    no_record,
-)
-from ..runs.step_control import gets_on, stretch
-from ..runs.trajectory import B_CHART, B_DATA, B_END, B_H, B_START
-from ..workspaces.workspace import CHARTS, EVALUATIONS, FLOOR, SIZE
+from ..runs.run_log import close_chart, is_full, no_log, note_accepted, open_chart
+from ..runs.step_outputs import head_block, is_wanted_before, record_end, store_block
+from ..workspaces.run_state import B_DATA, load_run
 from .breakpoints import cross_stop, lower_order
-from .step_length import is_near, is_next_to, longest, loosest, radius, step_length, weights
-from .step_parts import EXPAND, NEXT_TO_SINGULAR, PASS, REACH, call_expand, call_reach, state_within
-from .workspace import NEXT, ORDERS, TOP, load_series
+from .step_length import radius, weights
+from .step_parts import call_expand, call_reach, set_floor, state_within
+from .step_trials import go_to_start, make_step, stand_at
+from .tolerances import SMALL, SMALL_STEPS, SPARE, TIGHTEST, WARY
+from .workspace import load_series
 
-SLICE_DONE, STEP_COLLAPSED = int(Status.SLICE_DONE), int(Status.STEP_COLLAPSED)
-NOT_FINITE, SINGULAR, PASSAGE = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.PASSAGE)
-MISSED = 100.0  # times the tolerance: a landing further away than this is no truncation error
-# of the share at a step's start: one that ends next to such a place with less has come closer; too close to go on from;
-# too close if it has passed
-CLOSER, CLOSE, PASSED = 0.3, 0.1, 0.02
-AVOID, AVOIDING = 0.7, 5  # a step that ends there is made shorter by this factor, so many times
-TIGHTER, TIGHTEST = 0.01, 1e-16  # times the tolerance of a step from next to such a place; no less than
-WARY, SPARE = 0.06, 0.1  # of the largest share: a run that has come to less goes on with this part of its tolerance
-LOOSER = 2.0  # times that, as long as the step doesn't pass
-MOST_TURN = 1.0  # rad in a step, where turns are counted
-SMALL, SMALL_STEPS = 0.02, 40  # a step that turns and moves everything by less; so many of them, and it may be stiff
-
-
-@kernel
-def _mind_singular(c):
-    """Record the singularity indicator after a step."""
-    sizes = c.free.sizes
-    sizes[SHARE] = sizes[END_SHARE]
-    sizes[LARGEST_SHARE] = max(sizes[SHARE], sizes[LARGEST_SHARE])
-
-
-@kernel
-def _store_block(c, r, log, t0, h, t1):
-    block = r.block
-    block[B_START], block[B_H], block[B_END], block[B_CHART] = t0, h, t1, r.numbers[CHART_ROWS]
-    block[B_DATA] = float(c.expansion.order[TOP])
-    copy(r.now[0], block[B_DATA + 1 :])
-    copy(c.expansion.bodies, block[B_DATA + 1 + c.work.q.size :])
-    copy(r.remembered, block[block.size - r.remembered.size :])
-    if r.numbers[DENSE] == STORED:
-        copy(block, log.blocks[r.numbers[BLOCKS]])
-        r.numbers[BLOCKS] += 1
-
-
-@kernel
-def _accept(context, c, r, log, steps, t, ended):
-    """The poses as they are now are the state at t, and qdd, where the run has `ended` in a singular place. Status."""
-    w = c.work
-    _mind_singular(c)
-    remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
-    if not ended:
-        call_expand(steps[EXPAND], context, 0)
-    if not is_finite(w.qdd):
-        return NOT_FINITE
-    count_turns(r, w.q, w.qd, t - r.clock[T])
-    store_now(w, r)
-    r.clock[T] = t
-    if log.t_eval.size == 0:
-        record(r, log, t, w.q, w.qd, w.qdd)
-    elif r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] == t:
-        record(r, log, t, w.q, w.qd, w.qdd)
-        r.numbers[NEXT_EVAL] += 1
-    return 0
+SLICE_DONE, NOT_FINITE = int(Status.SLICE_DONE), int(Status.NOT_FINITE)
 
 
 @kernel
 def _open_chart(w, r, log, t, reason):
-    row = log.charts[r.numbers[CHART_ROWS]]
-    row[0], row[1], row[2], row[3], row[4] = t, reason, 1.0, 0.0, 0.0
-    w.counters[CHARTS] += 1
+    open_chart(r, log, t, reason)
+    w.counters.charts += 1
 
 
 @kernel
-def _stand_at(context, c, state, t, steps):
-    """Poses, H and the factors of S at q, qd = state[:2], for a series to begin there. Status."""
-    w = c.work
-    set_time(c.system, t)
-    copy(state[0], w.q)
-    copy(state[1], w.qd)
-    place_bodies(c.network.bodies, w.q, c.free.poses)
-    move_bodies(c.network.bodies, w.q, w.qd, c.free.poses)
-    return call_reach(steps[REACH], context, t, -1.0)
-
-
-@kernel
-def _begin_run(context, c, r, log, steps):
-    w, f = c.work, c.free
-    largest = 0.0
-    for i in range(w.q.size):
-        largest = max(largest, abs(w.q[i]))
-    w.control[FLOOR] = ROUNDING * (w.control[SIZE] + largest)
-    copy(w.q, r.now[0])
-    copy(w.qd, r.now[1])
-    status = _stand_at(context, c, r.now, r.clock[T], steps)
-    f.sizes[END_SHARE] = weakest(c.network, f.S) if status == 0 else 0.0
-    _open_chart(w, r, log, r.clock[T], AT_START)
-    return _accept(context, c, r, log, steps, r.clock[T], False) if status == 0 else status
-
-
-@kernel
-def _go_to_start(c, r):
-    """The poses at the step's start, from where p is followed."""
-    copy(r.now[0], c.work.q)
-    place_bodies(c.network.bodies, c.work.q, c.free.poses)
-
-
-@kernel
-def _within(context, c, r, log, steps, t0, t1):
-    """What t_eval asks for in (t0, t1). Status."""
-    w = c.work
-    while r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
-        t = log.t_eval[r.numbers[NEXT_EVAL]]
-        _go_to_start(c, r)
-        status = state_within(context, steps, t, t - t0)
-        if status != 0:
-            return status
-        record(r, log, t, w.q, w.qd, w.qdd)
-        r.numbers[NEXT_EVAL] += 1
+def _stand(context, c, r, log, t):
+    """The poses as they are now are the state at t: the series of order zero gives qdd. Status."""
+    w, indicator = c.work, c.free.indicator
+    indicator.start = indicator.end
+    indicator.largest = max(indicator.start, indicator.largest)
+    remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
+    if c.trial.singular == 0:
+        call_expand(r.kernels.expand, context, 0)
+    if not is_finite(w.qdd):
+        return NOT_FINITE
+    count_turns(r, w.q, w.qd, t - r.clock.t)
+    store_now(w, r)
+    r.clock.t = t
+    record_end(w, r, log, t)
     return 0
 
 
 @kernel
-def _fastest(c):
-    """Return the largest angular velocity."""
-    square = 0.0
-    for b in range(c.network.bodies.shape[0]):
-        w = c.free.poses[b * POSE + OMEGA : b * POSE + OMEGA + 3]
-        square = max(square, w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    return math.sqrt(square)
+def _enter(context, c, r, log):
+    """Begin the run, with its first output. Status."""
+    w, f, t = c.work, c.free, r.clock.t
+    take_pieces(c.system, r, log)
+    set_floor(c, w.q)
+    w.control.condition = 1.0
+    c.trial.singular = 0
+    status = stand_at(context, c, r, t)
+    f.indicator.end = singularity_indicator(c.network, f.rows) if status == 0 else 0.0
+    _open_chart(w, r, log, t, AT_START)
+    if status == 0:
+        status = _stand(context, c, r, log, t)
+    r.numbers.begun = 1 if status == 0 else 0
+    return status
 
 
 @kernel
-def _watch(c, r, h):
-    """Return True if the motion is found stiff: many steps in which nothing rotates or moves far."""
-    far, p = SMALL * c.work.control[FLOOR] / (ROUNDING * h), c.free.poses
+def _expand(context, c, r):
+    """The series of the next step, order by order."""
+    order = c.expansion.order
+    order.top = order.next
+    for k in range(1, order.top):
+        call_expand(r.kernels.expand, context, k)
+    c.work.counters.evaluations += order.top
+
+
+@kernel
+def _mind_singular(c, r):
+    """Near a singular configuration: the rest of the run has a tighter tolerance."""
+    indicator, clock = c.free.indicator, r.clock
+    if min(indicator.end, indicator.start) < WARY * indicator.largest:
+        if r.numbers.near_steps == 0:
+            tol = clock.atol + clock.rtol
+            spare = max(SPARE, min(TIGHTEST / tol, 1.0))
+            clock.atol, clock.rtol = spare * clock.atol, spare * clock.rtol
+        r.numbers.near_steps += 1
+        clock.largest_landing = max(clock.largest_landing, c.free.landing.moved)
+
+
+@kernel
+def _watch_stiffness(c, r, h):
+    """Return True if the motion has just been found stiff: many steps in which nothing rotates or moves far."""
+    far, p = SMALL * c.work.control.floor / (ROUNDING * h), c.free.poses
     for b in range(c.network.bodies.shape[0]):
         at = b * POSE
         for i in range(3):
             if abs(p[at + OMEGA + i]) * h > SMALL or abs(p[at + RD + i]) > far:
-                r.numbers[AT_LIMIT] = 0
+                r.numbers.at_limit = 0
                 return False
-    r.numbers[AT_LIMIT] += 1
-    if r.numbers[AT_LIMIT] == SMALL_STEPS:
-        r.numbers[STIFF] = 1
-        return r.numbers[LEAVE_WHEN_STIFF] == 1
+    r.numbers.at_limit += 1
+    if r.numbers.at_limit == SMALL_STEPS:
+        r.numbers.stiff = 1
+        return r.numbers.leave_when_stiff == 1
     return False
 
 
-@entry("pp", no_record(), "wi")
-def advance_series(context, run, log, steps, most):
+@kernel
+def _mind_stop(c, r, h):
+    """After a step that a stop has cut to h: the order of the next one."""
+    x, tol = c.expansion, r.clock.atol + r.clock.rtol
+    far, fast = weights(c, r)
+    rho = radius(x.bodies, c.network.bodies.shape[0], x.order.room, x.order.top - 2, far, fast)
+    lower_order(x.order, rho, tol, h)
+
+
+@kernel
+def _fill_block(c, r, log, t0, t1):
+    """The block of a step: its top order, q at its start, the series of all bodies."""
+    data = r.block[B_DATA:]
+    head_block(r, t0, t1)
+    data[0] = float(c.expansion.order.top)
+    copy(r.now[0], data[1:])
+    copy(c.expansion.bodies, data[1 + c.work.q.size :])
+    store_block(r, log)
+
+
+@kernel
+def _record_within(context, c, r, log, t0, t1):
+    """What t_eval asks for in (t0, t1), then back to t1. Status."""
+    w = c.work
+    while is_wanted_before(r, log, t1):
+        t = log.t_eval[r.numbers.next_eval]
+        go_to_start(c, r)
+        status = state_within(context, c, r.kernels, t, t - t0)
+        if status != 0:
+            return status
+        record(r, log, t, w.q, w.qd, w.qdd)
+        r.numbers.next_eval += 1
+    go_to_start(c, r)
+    reach = r.kernels.pass_singular if c.trial.singular == 1 else r.kernels.reach
+    return call_reach(reach, context, t1, t1 - t0)
+
+
+@kernel
+def _move_on(context, c, r, log, t1):
+    """The end of the step is where the run is now, and where the next series begins. Status."""
+    r.numbers.in_chart = 1
+    if c.trial.last == 0:
+        close_chart(r, log, 1.0, 0.0)
+        _open_chart(c.work, r, log, t1, BY_SERIES)
+    r.numbers.steps += 1
+    r.numbers.cuts += c.trial.cut
+    return _stand(context, c, r, log, t1)
+
+
+@entry("pp", no_log(), "i")
+def advance_series(context, run, log, most):
     """Make up to `most` steps, as `stepper.advance` does; context is the address of a `SeriesContext`. Status."""
     c, r = load_series(context), load_run(run)
-    w, f, x = c.work, c.free, c.expansion
-    if r.numbers[BEGUN] == 0 and most != 0:
-        take_pieces(c.system, r, log)
-        status = _begin_run(context, c, r, log, steps)
-        if status != 0:
-            return status
-        r.numbers[BEGUN] = 1
-    adaptive = r.numbers[ADAPTIVE] == 1
-    if r.numbers[WAITING] == 1:
-        r.numbers[WAITING] = 0
-        status = cross_stop(context, c, r, log, steps)
-        if status != 0:
-            return status
-    tol = r.clock[ATOL] + r.clock[RTOL]
+    adaptive, status = r.numbers.adaptive == 1, 0
+    if r.numbers.begun == 0 and most != 0:
+        status = _enter(context, c, r, log)
+    elif r.numbers.waiting == 1:
+        r.numbers.waiting = 0
+        status = cross_stop(context, c, r, log)
     for _ in range(most):
-        if r.numbers[CHART_ROWS] + 2 >= log.charts.shape[0] or r.numbers[HISTORY] >= log.history.shape[0]:
+        if status != 0 or is_full(r, log):
             break
-        t0 = r.clock[T]
-        if t0 >= r.clock[T_END]:
-            return 0
-        stop = next_stop(r, log)
-        end, cut = min(stop, r.clock[T_END]), False
-        x.order[TOP] = x.order[NEXT]
-        for k in range(1, x.order[TOP]):
-            call_expand(steps[EXPAND], context, k)
-        w.counters[EVALUATIONS] += x.order[TOP]
-        h, t1, last, shorter, highest, wanted = step_length(c, r), t0, False, 0, x.order[TOP], tol
-        if adaptive and is_next_to(f.sizes[SHARE], c):
-            wanted = max(TIGHTER * tol, min(tol, TIGHTEST))
-            h = longest(c, r, wanted, highest)
-        limit = r.clock[MAX_STEP]
-        if not adaptive:
-            h = limit = r.clock[H]
-        if c.system.memory.size > 0:  # what counts turns must see each of them
-            limit = min(limit, MOST_TURN / max(_fastest(c), 1e-300))
-        if r.numbers[STEPS] == 0 and r.clock[H] > 0.0:
-            limit = min(limit, r.clock[H])
-        h = min(h, limit)
-        own, top, tight, before, serves, looser = h, x.order[TOP], wanted, math.inf, False, adaptive
-        while True:
-            t1 = t0 + h
-            done = r.numbers[STEPS] + 1 - r.numbers[CUTS]
-            if not adaptive:
-                t1 = r.clock[T_ORIGIN] + done * r.clock[H]
-            if not gets_on(r, t0, t1):
-                return STEP_COLLAPSED
-            if adaptive:
-                if t1 + stretch(h, r.clock[MAX_STEP]) >= end:
-                    t1 = end
-                last = t1 == r.clock[T_END]
-            else:
-                last = done == r.numbers[STEPS_WANTED]
-                t1 = r.clock[T_END] if last else t1
-                if stop < math.inf:
-                    t1, cut = cut_fixed(stop, t1, r.clock[H], last)
-                    last = last and not cut
-            row = log.history[r.numbers[HISTORY]]
-            row[0], row[1], row[2] = t0, t1 - t0, 0.0
-            status, way = call_reach(steps[REACH], context, t1, t1 - t0), REACH
-            if last and (status == SINGULAR or (status == 0 and weakest(c.network, f.S) < NEXT_TO_SINGULAR)):
-                if steps[PASS] == 0:  # it isn't loaded before it is needed
-                    status = _stand_at(context, c, r.now, r.clock[T], steps)
-                    call_expand(steps[EXPAND], context, 0)
-                    return PASSAGE if status == 0 else status
-                status, way = call_reach(steps[PASS], context, t1, t1 - t0), PASS
-            landed = status == 0 and (not adaptive or f.sizes[RESIDUAL] <= MISSED * (wanted + w.control[FLOOR]))
-            if landed:
-                f.sizes[END_SHARE] = weakest(c.network, f.S)
-            if landed and (not adaptive or shorter == AVOIDING or last):
-                break
-            if not adaptive:
-                return status
-            if landed and not is_near(c, CLOSER if looser else CLOSE):
-                break
-            if looser and landed and f.sizes[END_SHARE] > before and not is_near(c, PASSED):
-                break
-            serves = serves or (landed and before == math.inf and not is_near(c, CLOSE))
-            longer = 0.0
-            if looser and landed and LOOSER * wanted <= loosest(c, tol):
-                before, wanted = f.sizes[END_SHARE], LOOSER * wanted
-                longer = min(longest(c, r, wanted, highest), limit)
-            if longer > h:
-                h = longer
-            elif looser and serves and h == own:
-                break
-            else:
-                if looser:  # no step passes: the own one, or a shorter one
-                    h, x.order[TOP], wanted, looser, landed = own, top, tight, False, landed or before < math.inf
-                if not serves:
-                    shorter += 1 if landed else 0
-                    h *= AVOID if landed else 0.5
-                serves = False
-            _go_to_start(c, r)
-            r.numbers[REJECTED] += 1  # the same series serves another step
-            if r.numbers[HISTORY] + 1 < log.history.shape[0]:
-                r.numbers[HISTORY] += 1
-        row[2] = 1.0
-        r.numbers[HISTORY] += 1
-        if min(f.sizes[END_SHARE], f.sizes[SHARE]) < WARY * f.sizes[LARGEST_SHARE]:
-            if r.numbers[NEAR_STEPS] == 0:  # what is lost here is gained elsewhere
-                spare = max(SPARE, min(TIGHTEST / tol, 1.0))
-                tol, r.clock[ATOL], r.clock[RTOL] = spare * tol, spare * r.clock[ATOL], spare * r.clock[RTOL]
-            r.numbers[NEAR_STEPS] += 1
-            r.clock[LANDED] = max(r.clock[LANDED], f.sizes[MOVED])
+        t0, stop = r.clock.t, next_stop(r, log)
+        if t0 >= r.clock.t_end:
+            break
+        _expand(context, c, r)
+        status = make_step(context, c, r, log, stop)
+        if status != 0:
+            break
+        t1 = c.trial.t1
+        r.numbers.history += 1
+        note_accepted(r, log)
+        _mind_singular(c, r)
         if adaptive:
-            r.clock[H] = t1 - t0
+            r.clock.h = t1 - t0
         leave = False
-        if t1 != stop:  # which is no sign of stiffness
-            leave = _watch(c, r, t1 - t0)
-        elif adaptive:
-            far, fast = weights(c, r)
-            rho = radius(x.bodies, c.network.bodies.shape[0], x.order[ORDERS], x.order[TOP] - 2, far, fast)
-            lower_order(x.order, rho, tol, t1 - t0)
-        if r.numbers[DENSE] != 0:
-            _store_block(c, r, log, t0, t1 - t0, t1)
-        if r.numbers[NEXT_EVAL] < log.t_eval.size and log.t_eval[r.numbers[NEXT_EVAL]] < t1:
-            status = _within(context, c, r, log, steps, t0, t1)
-            if status == 0:
-                _go_to_start(c, r)
-                status = call_reach(steps[way], context, t1, t1 - t0)
-            if status != 0:
-                return status
-        log.charts[r.numbers[CHART_ROWS], 4] = 1.0
-        if not last:
-            r.numbers[CHART_ROWS] += 1
-            _open_chart(w, r, log, t1, BY_SERIES)
-        r.numbers[STEPS] += 1
-        r.numbers[CUTS] += 1 if cut else 0
-        status = _accept(context, c, r, log, steps, t1, way == PASS)
-        if status == 0 and t1 == stop and way == REACH:
+        if t1 != stop:
+            leave = _watch_stiffness(c, r, t1 - t0)
+        elif adaptive:  # a step that is cut is no sign of stiffness
+            _mind_stop(c, r, t1 - t0)
+        if r.numbers.dense != 0:
+            _fill_block(c, r, log, t0, t1)
+        if is_wanted_before(r, log, t1):
+            status = _record_within(context, c, r, log, t0, t1)
+        if status == 0:
+            status = _move_on(context, c, r, log, t1)
+        if status == 0 and t1 == stop and c.trial.singular == 0:
             if is_sampled(r, log, t1):
                 break
-            status = cross_stop(context, c, r, log, steps)
-        if status != 0:
-            return status
+            status = cross_stop(context, c, r, log)
         if leave:
             break
-    return 0 if r.clock[T] >= r.clock[T_END] and r.numbers[WAITING] == 0 else SLICE_DONE
+    if status != 0:
+        return status
+    return 0 if r.clock.t >= r.clock.t_end and r.numbers.waiting == 0 else SLICE_DONE

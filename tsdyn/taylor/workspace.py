@@ -4,28 +4,56 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit.kernels import loader
+from ..jit.kernels import Record, loader, records
 from ..model.packed import System
-from ..rows.tangent_workspace import Free
+from ..rows.interface import Free
 from ..sparse.constraint_graph import Network
 from ..workspaces.workspace import Work, plain_context
+from .tables import ConstraintSeries, ForceSeries, MotionSeries
 
-TOP, ORDERS, NEXT, LOWEST, HIGHEST, REFINED, NUMBERS = range(7)  # of Expansion.order
+
+class Orders(Record):
+    """Orders of the series: those of omega' are one less than those of r and A."""
+
+    top: int  # of omega', in this step
+    room: int  # for so many, from zero on
+    next: int  # top of the next step
+    lowest: int  # bounds of top
+    highest: int
+    refined: int  # how many orders of lam, from zero on, are refined
 
 
 class Expansion(NamedTuple):
     """The series of a step; orders is what fits, from zero to two above the order of the method."""
 
-    order: np.ndarray  # int64 (6,): TOP of omega', one less than that of r and A; room for; the next step's; bounds;
-    # how many orders of lam, from zero on, are refined
+    order: Orders
     bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
     constraints: np.ndarray  # each kind's instances; constraint_series.series
-    places: np.ndarray  # int64 (kinds, 3): addresses of the loops; where a kind's series begin, floats of an instance
-    forces: np.ndarray  # int64 (kinds, 7): address, first of loads, instances, reals each, first in table, in reals;
-    # and floats of an instance
+    places: np.ndarray  # (kinds,) of tables.ConstraintSeries
+    forces: np.ndarray  # (kinds,) of tables.ForceSeries
     table: np.ndarray  # int64: the bodies of each force
     loads: np.ndarray  # each kind of force's instances
-    motions: np.ndarray  # int64 (motions, 3): what runs a motion's program; its place in reals; and in constraints
+    motions: np.ndarray  # (motions,) of tables.MotionSeries
+
+
+class Trial(Record):
+    """The step that is tried."""
+
+    h: float
+    limit: float  # of h, but by the series
+    tol: float  # that the step is held to
+    own_h: float  # by the tolerance of the run: to go back to when no longer one passes a singular configuration
+    own_tol: float
+    own_top: int
+    highest: int  # order that has been expanded
+    share: float  # singularity indicator at the end of the try before; inf for none
+    looser: int  # whether longer steps at looser tolerances are tried
+    serves: int  # whether the own step is a good one
+    shorter: int  # times that it was shortened, not to end near a singular configuration
+    t1: float  # its end
+    last: int  # whether that is the run's
+    cut: int  # whether a stop cuts a fixed step
+    singular: int  # whether it ends in a singular configuration
 
 
 class SeriesContext(NamedTuple):
@@ -36,14 +64,20 @@ class SeriesContext(NamedTuple):
     network: Network
     free: Free
     expansion: Expansion
+    trial: Trial
+
+
+def no_series(orders, bodies):
+    """An `Expansion` with the series of bodies alone, and room for so many orders."""
+    none, kinds = np.zeros(0), (records(kind, []) for kind in (ConstraintSeries, ForceSeries))
+    return Expansion(Orders(room=orders), bodies, none, *kinds, np.zeros(0, np.int64), none, records(MotionSeries, []))
 
 
 def _example():
     """One of the right types."""
-    line, whole, table = np.zeros(1), np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    expansion = Expansion(whole, line, line, table, table, whole, line, table)
+    expansion = no_series(1, np.zeros(1))
     plain = plain_context()
-    return SeriesContext(plain.system, plain.work, plain.network, plain.free, expansion)
+    return SeriesContext(plain.system, plain.work, plain.network, plain.free, expansion, Trial())
 
 
 load_series = loader(_example())

@@ -11,46 +11,58 @@ from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OM
 from ..elements.loops.marker_jacobians import state
 from ..elements.markers import PARAMETERS, POINT, TURN
 from ..errors import CheckFailed
-from ..jit.kernels import entry, twin
+from ..jit.kernels import entry, resident, twin
 from ..maths.euler_parameters import rotate
 from ..maths.power_series import Truncated
 from ..model.equations import set_time
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..observables.diagnostics import starts_of
+from ..rows.interface import allocate_free
 from ..sparse.graph_builder import build
 from ..taylor.coefficients import run_forces, run_loops
 from ..taylor.layout import allocate_expansion, masks
 from ..taylor.prescribed_series import expand_motions
-from ..taylor.workspace import ORDERS
+from ..taylor.workspace import SeriesContext, Trial, load_series
+from ..workspaces.workspace import plain_work
 from .tolerances import ORDER, ROUNDED, SHRINK
 
 _AXES = ("x", "y", "z")
 
 
 @entry
-def constraint_coefficients(network, reals, x, k, b, Z):
-    """b = (k + 1)(k + 2) Phi_{k+2}, x being an Expansion with the bodies' series; k in turn from zero."""
-    orders = x.order[ORDERS]
-    for i in range(b.size):
-        b[i] = 0.0  # the multipliers
-    run_loops(network, reals, ADVANCE, k, orders, x.bodies, x.constraints, x.places, b, Z)
-    run_loops(network, reals, RESIDUAL, k, orders, x.bodies, x.constraints, x.places, b, Z)
+def constraint_coefficients(context, k):
+    """b = (k + 1)(k + 2) Phi_{k+2} from the bodies' series; k in turn from zero."""
+    c = load_series(context)
+    for i in range(c.free.b.size):
+        c.free.b[i] = 0.0  # the multipliers
+    run_loops(c.network, c.system.reals, ADVANCE, k, c.expansion, c.free)
+    run_loops(c.network, c.system.reals, RESIDUAL, k, c.expansion, c.free)
 
 
 @entry
-def begin_motions(system, x, t):
-    """The series of all motions about t, x being an Expansion."""
-    set_time(system, t)
-    expand_motions(system, x)
+def begin_motions(context, t):
+    """The series of all motions about t."""
+    c = load_series(context)
+    set_time(c.system, t)
+    expand_motions(c.system, c.expansion)
 
 
 @entry
-def force_coefficients(reals, x, k, poses, Z):
+def force_coefficients(context, k):
     """Z ((b + 1) 8,) = order k of the forces and body torques; k in turn from zero."""
-    for i in range(Z.size):
-        Z[i] = 0.0
-    run_forces(reals, x, k, x.order[ORDERS], poses, Z)
+    c = load_series(context)
+    for i in range(c.free.Z.size):
+        c.free.Z[i] = 0.0
+    run_forces(c.system.reals, c.expansion, k, c.free)
+
+
+def series_context(packed, network, kinds):
+    """A `SeriesContext` of orders up to ORDER, and what its kernels find it by."""
+    n, system = int(packed.system.bodies[:, 1].sum()), packed.system._replace(reals=packed.system.reals.copy())
+    expansion, free = allocate_expansion(network, kinds, packed, ORDER), allocate_free(network, n)
+    context = SeriesContext(system, plain_work(n), network, free, expansion, Trial())
+    return context, resident(context)
 
 
 def check_constraint_series(scene, constraint, name, rng):
@@ -65,17 +77,16 @@ def check_constraint_series(scene, constraint, name, rng):
         return
     q, t = random_motion(scene, rng), _time(rng)
     Phi = np.concatenate([_check_rows(scene, part, name, q, t) for part in parts])
-    packed, m = scene.packed, len(Phi)
+    packed = scene.packed
     network, kinds = build(packed)
     Phi = Phi[network.row]
     masks(network, packed)
-    expansion = allocate_expansion(network, kinds, packed, ORDER)
-    write_bodies(scene, q, expansion)
-    begin_motions(packed.system._replace(reals=packed.system.reals.copy()), expansion, t.c[0])
-    b, Z = np.zeros(m), np.zeros(8 * (len(scene.bodies) + 1))
+    context, (where, *_keep) = series_context(packed, network, kinds)
+    write_bodies(scene, q, context.expansion)
+    begin_motions(where, t.c[0])
     for k in range(ORDER - 1):
-        constraint_coefficients(network, packed.system.reals, expansion, k, b, Z)
-        value = b / ((k + 1) * (k + 2))
+        constraint_coefficients(where, k)
+        value = context.free.b / ((k + 1) * (k + 2))
         _compare(name, k + 2, [f"compiled Phi[{i}]" for i in network.row], value, Phi)
 
 
@@ -127,16 +138,14 @@ def check_force_series(scene, force, name, rng):
         _compare(name, k, labels, out, f)
 
     network, kinds = build(packed)
-    expansion = allocate_expansion(network, kinds, packed, ORDER)
-    poses = write_bodies(scene, q, expansion)
-    reals = packed.system.reals.copy()
-    reals[packed.system.memory] = par[len(load.parameters) :]
+    context, (where, *_keep) = series_context(packed, network, kinds)
+    context.free.poses[:] = write_bodies(scene, q, context.expansion).ravel()
+    context.system.reals[packed.system.memory] = par[len(load.parameters) :]
     expected = _carried_back(scene, load, q, f)
     labels = [f"{what} {axis} of {b.name}" for b in scene.bodies for what in ("force", "body torque") for axis in _AXES]
-    Z = np.zeros(8 * (len(scene.bodies) + 1))
     for k in range(ORDER):
-        force_coefficients(reals, expansion, k, poses, Z)
-        got = Z.reshape(-1, 2, 4)[:-1, :, :3].ravel()
+        force_coefficients(where, k)
+        got = context.free.Z.reshape(-1, 2, 4)[:-1, :, :3].ravel()
         _compare(name, k, [f"compiled {label}" for label in labels], got, expected)
 
 
@@ -168,7 +177,7 @@ def along(scene, attachment, coordinates, q):
 
 def write_bodies(scene, q, expansion):
     """Write the bodies' series into an Expansion; return the poses ((b + 1) * POSE,) at order zero."""
-    orders, known = int(expansion.order[ORDERS]), q[0].c.size
+    orders, known = int(expansion.order.room), q[0].c.size
     poses = np.zeros((len(scene.bodies) + 1, POSE))
     poses[:, P] = 1.0
     for b, row in enumerate(expansion.bodies.reshape(-1, BODY_ROW * orders)[:-1]):

@@ -2,6 +2,7 @@
 
 Imports rows and below.
 
-Begin with workspace.py. tangent_memory.py allocates what the basis-free form needs, chart_workspace.py what a chart
-does.
+Begin with workspace.py: that of the forms with a basis, and the tuple of all that a formulation's kernels get.
+run_state.py is what drivers, step kernels and interpolants share, chart_workspace.py the workspace of a chart; that of
+the constraint rows is of package rows.
 """

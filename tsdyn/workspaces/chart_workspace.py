@@ -11,6 +11,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..jit.aligned_arrays import zeros
+from ..jit.kernels import Record
+from ..rows.interface import Rows, allocate_rows
+
+
+class ChartState(Record):
+    """What is known at the present configuration."""
+
+    time: float  # of the last position solve
+    factored: int  # 1 if lower and upper hold factors of N
+    off: float  # error of these factors at the configuration itself, relative
+    placement: int  # number of the position solve at the end of the last step; 0 if the chart is of no use
 
 
 class Local(NamedTuple):
@@ -20,19 +31,12 @@ class Local(NamedTuple):
     d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 of the present place; chart_coordinates.displace
     x: np.ndarray  # ((b + 1) * 8,)  its coordinates; tangent.place
     y: np.ndarray  # ((b + 1) * 8,)  their rates; tangent.accelerate
-    H0: np.ndarray  # (m * 16,)  rows of [Phi_r, Phi_pi'] at q0; chart_validity.touch
-    Y0: np.ndarray  # (m * 16,)  W0 H0^T
-    S0: np.ndarray  # factors of H0 W0 H0^T
-    X: np.ndarray  # (m * 16,)  C Y0; chart_coordinates.factorise_normal
-    lower: np.ndarray  # factors of N = H C Y0; chart_coordinates.factorise_normal
+    rows0: Rows  # H0, Y0, S0: the rows at q0; chart_validity.touch
+    X: np.ndarray  # (m * 16,)  C Y0; chart_matrix.factorise_chart_matrix
+    lower: np.ndarray  # factors of N = H C Y0; chart_matrix.factorise_chart_matrix
     upper: np.ndarray
     drift: np.ndarray  # (m,)  Phi_t
-    numbers: np.ndarray  # (NUMBERS,)  below
-
-
-# the time last placed at; whether lower and upper hold factors, and by how much of N they are off at the place itself;
-# the count of placements at the last step's end
-TIME, FACTORED, OFF, END, NUMBERS = range(5)
+    state: ChartState
 
 
 def allocate_local(network):
@@ -42,6 +46,6 @@ def allocate_local(network):
     base = zeros(8 * (nb + 1))
     base[4::8] = 1.0
     return Local(
-        base, zeros(4 * (nb + 1)), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(16 * m), zeros(16 * m), zeros(size),
-        zeros(16 * m), zeros(size), zeros(size), zeros(m), zeros(NUMBERS),
+        base, zeros(4 * (nb + 1)), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)),
+        allocate_rows(network), zeros(16 * m), zeros(size), zeros(size), zeros(m), ChartState(),
     )  # fmt: skip

@@ -5,18 +5,47 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit.kernels import loader
+from ..jit.kernels import Record, loader
 from ..model.packed import System, no_system
-from ..rows.tangent_workspace import Free
+from ..rows.interface import Free, allocate_free
 from ..sparse.constraint_graph import Network, no_network
 from .chart_workspace import Local, allocate_local
-from .tangent_memory import allocate_free
+from .stage_records import StageKernels, StageNumbers
+
+
+class Control(Record):
+    """Tolerances, and criteria of the present chart."""
+
+    u_tol: float  # |Phi| of the position solve, Eq. 29
+    b_tol: float  # ||Phi_q U B - I||, Eq. 28
+    size: float  # of the numbers that enter Phi, m
+    floor: float  # |Phi| that rounding leaves
+    rate: float  # of Newton's method for positions: of residuals, in the tangent form over the residual
+    contraction: float  # of the chart, dimensionless; chart_validity.py
+    condition: float  # of N as far as the contraction says
+
+
+class Counters(Record):
+    """How often it was done in a run."""
+
+    evaluations: int  # of accelerations
+    placements: int  # of position solves
+    newton: int  # sweeps of Eq. 29
+    b_iterations: int  # of Eq. 28
+    factorizations: int
+    charts: int
+    jacobians: int  # of implicit methods
+    iteration_matrices: int
+    stage_iterations: int
+    at_rounding: int  # position solves that started at rounding
+    unverified: int  # corrections that were known to suffice
+    kept: int  # factorisations whose older factors served
 
 
 class Work(NamedTuple):
-    """n coordinates, m constraints, k = n - m + d degrees of freedom, d redundant rows left out, b bodies.
+    """n coordinates, m constraints, k = n - m + d degrees of freedom, d redundant rows, b bodies.
 
-    "computed by" names the kernel. What belongs to a row that is left out is zero, on the diagonal of N and B one.
+    "computed by" names the kernel. What belongs to a redundant row is zero, on the diagonal of N and B one.
     """
 
     q: np.ndarray  # (n,)    positions; computed by newton_iterations.solve_positions
@@ -45,17 +74,9 @@ class Work(NamedTuple):
     Q: np.ndarray  # (n,)    applied forces without gravity; null_space.reduced_acceleration
     h: np.ndarray  # (n,)    -U B gamma; null_space.reduced_acceleration
     householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; dense_linalg.null_space
-    control: np.ndarray  # (CONTROLS,)  tolerances and criteria, below
-    counters: np.ndarray  # int64 (COUNTERS,)  what was done how often, below
-    left_out: np.ndarray  # int64 (d + 1,)  number of redundant rows of Phi, and which; null_space_chart.new_chart
-
-
-U_TOL, B_TOL, SIZE, FLOOR, RATE, CONDITION, CONDITION_M0, CONTRACTION, CONTROLS = range(9)
-EVALUATIONS, PLACEMENTS, NEWTON, B_ITERATIONS, FACTORIZATIONS, CHARTS = range(6)
-JACOBIANS, ITERATION_MATRICES, STAGE_ITERATIONS, AT_ROUNDING, UNVERIFIED, KEPT, COUNTERS = range(6, 13)
-
-
-ROOM = 16  # for implicit.KERNELS addresses and implicit.NUMBERS floats
+    control: Control
+    counters: Counters
+    redundant: np.ndarray  # int64 (d + 1,)  number of redundant rows of Phi, and which; dense_rows.take_selection
 
 
 class Linear(NamedTuple):
@@ -88,8 +109,8 @@ class Linear(NamedTuple):
     pivots: np.ndarray  # int64 (k,)  row exchanges of P
     now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point; the run's own array
     before: np.ndarray  # (3, n)  at the one before; the run's own array
-    kernels: np.ndarray  # int64 (KERNELS,)  addresses, implicit.LINEARISE ... ERROR_NORM
-    numbers: np.ndarray  # (NUMBERS,)  implicit.RTOL ... EAGER
+    kernels: StageKernels
+    numbers: StageNumbers
 
 
 class Parts(NamedTuple):
@@ -143,11 +164,10 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "v": (k,),
         "E": (3 * bodies, k),
         "A": (k, k),
-        "control": (CONTROLS,),
     }
-    work = Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), left_out=np.zeros(redundant + 1, np.int64))
-    work.control[U_TOL] = work.control[B_TOL] = constraint_tol
-    work.control[SIZE] = size
+    work = Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(redundant + 1, np.int64))
+    work.control.u_tol = work.control.b_tol = constraint_tol
+    work.control.size = size
     return work
 
 
@@ -169,8 +189,8 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
         **dict.fromkeys(("K_hat", "C_hat", "P"), (k, k)),
         "b": (k,),
     }
-    shapes |= {"now": (3, n), "before": (3, n), "numbers": (ROOM,)}
-    return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=np.zeros(ROOM, np.int64))
+    shapes |= {"now": (3, n), "before": (3, n)}
+    return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=StageKernels(), numbers=StageNumbers())
 
 
 def basis_free_parts(network, n, basis):
@@ -191,10 +211,10 @@ load = loader(plain_context())
 
 def plain_work(n):
     """A `Work` for n coordinates that has no matrices."""
-    whole = ("counters", "left_out")
-    shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name not in whole}
-    shapes |= {"q": (n,), "qd": (n,), "qdd": (n,), "control": (CONTROLS,)}
-    return Work(**carve(shapes), counters=np.zeros(COUNTERS, np.int64), left_out=np.zeros(1, np.int64))
+    others = ("control", "counters", "redundant")
+    shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name not in others}
+    shapes |= {"q": (n,), "qd": (n,), "qdd": (n,)}
+    return Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(1, np.int64))
 
 
 def parts(system, network, n):

@@ -1,0 +1,126 @@
+"""DOP853: its tableau, its order, and that errors follow the tolerances down to rounding."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from tests.helpers.reference import load, run
+from tests.helpers.tolerances import HELD, ROUNDING
+from tsdyn.methods.tableau import RungeKuttaTableau
+
+DOP853, RK45 = ts.integrators.DOP853, ts.integrators.RK45
+SCENES = ("sliding_top", "two_body_pendulum", "two_body_pendulum_spatial")
+FORMS = ("tangent", "maggi-kane")
+
+
+def test_tableau_meets_its_order_conditions():
+    """Quadrature and stage sums by the class; here the bushy trees of orders five to eight, and Hairer's C(q)."""
+    tableau = DOP853().tableau
+    a, b, c = tableau.arrays
+    size = np.abs(a).sum(axis=1).max()
+    for power in range(2, 7):
+        for chain in range(1, 8 - power):
+            left = b.copy()
+            for _ in range(chain):
+                left = left @ a
+            expected = 1.0 / np.prod(np.arange(power + 1, power + chain + 2, dtype=float))
+            assert abs(left @ c**power - expected) < ROUNDING * size
+    wrong = {"a": tableau.a, "b": (*tableau.b[:-1], tableau.b[-1] + 1e-9), "c": tableau.c, "order": 8}
+    with pytest.raises(ts.InvalidArgument, match="b c"):
+        RungeKuttaTableau(**wrong)
+    with pytest.raises(ts.InvalidArgument, match="13 weights"):
+        RungeKuttaTableau(tableau.a, tableau.b, tableau.c, 8, error=(1.0, -1.0))
+
+
+@pytest.mark.slow_for("*maggi-kane")
+@pytest.mark.parametrize("formulation", FORMS)
+@pytest.mark.parametrize("name", SCENES[1:])
+def test_order_with_a_chart_every_step(name, formulation):
+    steps, off = 1.0 / np.array([150, 165, 180, 200, 220]), []
+    for h in steps:
+        solution, worst = run(name, DOP853(step=h), formulation=formulation, chart_interval=1)
+        assert solution.stats.charts > 1000
+        off.append(worst)
+    assert abs(np.polyfit(np.log(steps), np.log(off), 1)[0] - 8.0) < 0.2
+
+
+@pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+@pytest.mark.parametrize("name", SCENES)
+def test_error_follows_the_tolerance(name, tol):
+    solution, off = run(name, DOP853(rtol=tol, atol=tol))
+    assert off < max(30.0 * tol, 3e-11)
+    levels = solution.constraint_error
+    for level, values, factor in zip(levels, (solution.q, solution.qd, solution.qdd), (50, 500, 5000), strict=True):
+        assert (level <= factor * np.finfo(float).eps * (1.0 + np.abs(values).max(axis=1))).all()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_down_to_rounding(name):
+    assert run(name, DOP853(rtol=1e-13, atol=1e-13))[1] < HELD
+
+
+@pytest.mark.parametrize("formulation", FORMS)
+def test_it_takes_fewer_evaluations_than_rk45(formulation):
+    ends = [
+        run("two_body_pendulum", method(1e-12, 1e-12), formulation=formulation)[0].stats.evaluations
+        for method in (DOP853, RK45)
+    ]
+    assert ends[0] < 0.5 * ends[1]
+
+
+def test_evaluations_are_counted():
+    """Twelve a step, the end's among them; three more and one an output only where a step's inside is asked for."""
+    scene, _ = load("sliding_top")
+    method = DOP853(1e-8, 1e-8)
+    plain = ts.simulate(scene, (0.0, 10.0), integrator=method)
+    tried = plain.stats.steps + plain.stats.rejected
+    assert plain.stats.evaluations == 12 * tried + 2
+    at_steps = ts.simulate(scene, (0.0, 10.0), integrator=method, t_eval=plain.t[::7])
+    assert at_steps.stats.evaluations == plain.stats.evaluations
+    inside = ts.simulate(scene, (0.0, 10.0), integrator=method, t_eval=(plain.t[:2].mean(), plain.t[5:7].mean()))
+    assert inside.stats.evaluations == plain.stats.evaluations + 2 * (3 + 1)
+
+
+@pytest.mark.parametrize("method", [RK45, DOP853])
+def test_a_new_chart_does_not_make_the_control_forget(method):
+    """The error before enters the next step; forgotten at every chart, steps would be a fifth longer or shorter.
+
+    Young charts have a little less of an error, so that there may be fewer steps.
+    """
+    scene, _ = load("two_body_pendulum")
+    often, seldom = (
+        ts.simulate(scene, (0.0, 5.0), integrator=method(1e-9, 1e-9), chart_interval=interval) for interval in (1, None)
+    )
+    assert often.stats.charts > 3 * seldom.stats.charts
+    assert 0.93 < often.stats.steps / seldom.stats.steps < 1.03
+    times = np.linspace(0.5, 4.5, 50)
+    h = [np.interp(times, s.steps.t[s.steps.accepted], s.steps.h[s.steps.accepted]) for s in (often, seldom)]
+    assert 0.97 < np.median(h[0] / h[1]) < 1.08
+
+
+def test_by_its_name_and_with_settings():
+    scene, _ = load("sliding_top")
+    one = ts.simulate(scene, (0.0, 1.0), integrator="dop853", rtol=1e-9, atol=1e-9)
+    two = ts.simulate(scene, (0.0, 1.0), integrator=DOP853(1e-9, 1e-9))
+    np.testing.assert_array_equal(one.q, two.q)
+    assert "DOP853" in str(one)
+    bounded = ts.simulate(scene, (0.0, 1.0), integrator=DOP853(1e-3, 1e-3, max_step=0.01, first_step=1e-3))
+    assert bounded.steps.h[0] == 1e-3
+    assert bounded.steps.h.max() <= 0.01 * (1 + HELD)
+    with pytest.raises(ts.InvalidArgument, match="rtol"):
+        DOP853(rtol=-1.0)
+
+
+@pytest.mark.slow
+def test_scipy_integrate_is_imported_when_needed():
+    code = (
+        "import sys, tsdyn; m = tsdyn.integrators.DOP853(); a = 'scipy.integrate' in sys.modules; m.tableau;"
+        "print(a, 'scipy.integrate' in sys.modules)"
+    )
+    root = Path(__file__).parents[2]
+    result = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
+    assert result.stdout.split() == ["False", "True"]

@@ -1,0 +1,268 @@
+"""ImplicitTrapezoid and SDIRK54: orders, errors, dense output, what is counted, and how they end or refuse."""
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from benchmarks.stiff import hung, jointed
+from tests.helpers.driven_rod import driven
+from tests.helpers.reference import demand_on_the_manifold, load, run
+from tests.helpers.tolerances import CLOSE, EPS, HELD, LOOSE
+
+I = ts.integrators
+SDIRK54, ImplicitTrapezoid, RK45 = I.SDIRK54, I.ImplicitTrapezoid, I.RK45
+SCENES = ("sliding_top", "two_body_pendulum", "two_body_pendulum_spatial")
+METHODS = (ImplicitTrapezoid, SDIRK54)
+by_name = {"ids": lambda x: getattr(x, "__name__", str(x))}
+
+
+# order, errors
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("method", "counts", "interval"),
+    [(ImplicitTrapezoid, (200, 400, 800, 1600), None), (SDIRK54, (160, 240, 320, 480), 1)],
+    **by_name,
+)
+@pytest.mark.parametrize("name", SCENES)
+def test_order(name, method, counts, interval):
+    """SDIRK54 with a chart every step, so its own error is seen alone and not charts of many steps cancelling it."""
+    found = [run(name, method(step=1 / n), chart_interval=interval) for n in counts]
+    assert min(solution.stats.charts for solution, _ in found) > 50
+    slope = np.polyfit(-np.log(counts), np.log([off for _, off in found]), 1)[0]
+    assert abs(slope - method.order) < 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_order_of_sdirk54_with_charts_by_the_criteria(name):
+    counts = (120, 160, 240, 320)
+    found = [run(name, SDIRK54(step=1 / n)) for n in counts]
+    assert min(solution.stats.charts for solution, _ in found) > 50
+    assert abs(np.polyfit(-np.log(counts), np.log([off for _, off in found]), 1)[0] - 5.0) < 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("method", "tol"),
+    [(SDIRK54, tol) for tol in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)] + [(ImplicitTrapezoid, tol) for tol in (1e-3, 1e-5)],
+    **by_name,
+)
+@pytest.mark.parametrize("name", SCENES)
+def test_error_follows_the_tolerance(name, method, tol):
+    """And constraints hold at every output, and one Jacobian serves the whole run."""
+    solution, off = run(name, method(tol, tol))
+    assert off < max(100.0 * tol, 3e-11)
+    demand_on_the_manifold(solution, solution)
+    assert solution.stats.jacobians == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "method", "tol", "end"),
+    [
+        ("chain_4", SDIRK54, 1e-9, 1.0),
+        ("chain_4", ImplicitTrapezoid, 1e-4, 1.0),
+        ("chain_16", SDIRK54, 1e-6, 0.4),
+        ("chain_16", ImplicitTrapezoid, 1e-3, 0.4),
+    ],
+    **by_name,
+)
+def test_chains_with_a_force_on_the_last_body(name, method, tol, end):
+    solution, off = run(name, method(tol, tol), end)
+    assert off < 10.0 * tol
+    assert solution.stats.jacobians == 1
+
+
+@pytest.mark.parametrize("method", METHODS, **by_name)
+def test_driven_scene(method):
+    """The rod's length is what it is told to be, and the motion is RK45's."""
+    tol = {ImplicitTrapezoid: 1e-5, SDIRK54: 1e-8}[method]
+    times = np.linspace(0.0, 4.0, 41)
+    solution, fine = (
+        ts.simulate(driven(), (0.0, 4.0), integrator=m, t_eval=times).raise_if_failed()
+        for m in (method(tol, tol), RK45(1e-11, 1e-11))
+    )
+    np.testing.assert_allclose(solution.q, fine.q, rtol=0, atol=100.0 * tol)
+    demand_on_the_manifold(solution, solution)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", [3.0, 1.0, 1e-5])
+@pytest.mark.parametrize("method", METHODS, **by_name)
+def test_a_first_step_of_any_length(method, first):
+    """One far too long is tried and rejected, by a failed stage or by its error, even where no step is before it."""
+    tol = {ImplicitTrapezoid: 1e-5, SDIRK54: 1e-7}[method]
+    solution, off = run("two_body_pendulum", method(tol, tol, first_step=first))
+    assert off < 100.0 * tol
+    history = solution.steps
+    assert history.h[0] == first
+    assert history.accepted.sum() == solution.stats.steps
+    assert (~history.accepted).sum() == solution.stats.rejected
+    assert history.accepted[0] == (first < 0.1)
+    accepted = history.t[history.accepted]
+    np.testing.assert_allclose(np.diff(accepted), history.h[history.accepted][:-1], rtol=CLOSE)
+
+
+# dense output
+
+
+@pytest.mark.slow_but("driven-*", "hung-*")
+@pytest.mark.parametrize("method", [ImplicitTrapezoid(1e-3, 1e-3), SDIRK54(1e-7, 1e-7), SDIRK54(1e-2, 1e-2)], ids=repr)
+@pytest.mark.parametrize("make", [lambda: load(SCENES[0])[0], lambda: load(SCENES[2])[0], driven, jointed, hung])
+def test_dense_output_is_on_the_manifold_and_changes_nothing(make, method, rng):
+    dense, plain = (ts.simulate(make(), (0.0, 2.0), integrator=method, dense_output=d) for d in (True, False))
+    state = dense.raise_if_failed().at(rng.uniform(0.0, 2.0, 300))
+    demand_on_the_manifold(dense, state)
+    demand_on_the_manifold(dense, dense.at(dense.t))
+    demand_on_the_manifold(dense, dense)
+    for name in ("t", "q", "qd", "qdd"):
+        np.testing.assert_array_equal(getattr(dense, name), getattr(plain, name))
+    np.testing.assert_array_equal(dense.steps.h, plain.steps.h)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("method", "counts"), [(ImplicitTrapezoid, (200, 400, 800)), (SDIRK54, (80, 120, 160, 240))], **by_name
+)
+def test_order_of_dense_output(method, counts, rng):
+    """Of q, qd and qdd alike, all along a run of many charts."""
+    times, parts, off = rng.uniform(0.0, 4.0, 300), ("q", "qd", "qdd"), []
+    exact = ts.simulate(load("sliding_top")[0], (0.0, 4.0), integrator=I.DOP853(1e-13, 1e-13), dense_output=True)
+    exact = exact.at(times)
+    for n in counts:
+        solution = ts.simulate(
+            load("sliding_top")[0], (0.0, 4.0), integrator=method(step=1 / n), dense_output=True, chart_interval=4
+        )
+        assert solution.stats.charts > 50
+        state = solution.at(times)
+        off.append([np.abs(getattr(state, name) - getattr(exact, name)).max() for name in parts])
+    for column in np.transpose(off):
+        assert abs(np.polyfit(-np.log(counts), np.log(column), 1)[0] - method.order) < 0.3
+
+
+# what is counted
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tol", [1e-3, 1e-5])
+@pytest.mark.parametrize("method", METHODS, **by_name)
+def test_work_is_counted(method, tol):
+    """Every stage iteration is an evaluation; besides, one at each step's end, and two to begin."""
+    scene, _ = load("two_body_pendulum")
+    stats = ts.simulate(scene, (0.0, 10.0), integrator=method(tol, tol)).stats
+    tried, implicit_stages = stats.steps + stats.rejected, len(method.tableau.c) - 1
+    assert stats.evaluations == stats.stage_iterations + tried + 2
+    assert implicit_stages * tried <= stats.stage_iterations <= 8 * implicit_stages * tried
+    assert stats.jacobians <= 2
+    assert stats.charts <= stats.iteration_matrices < 0.5 * stats.stage_iterations
+    explicit = ts.simulate(scene, (0.0, 1.0), integrator="rk45").stats
+    assert explicit.jacobians == explicit.iteration_matrices == explicit.stage_iterations == 0
+
+
+# ends and refusals
+
+
+def pushed_late():
+    """A mass that rests for a second, then is pushed ever harder: at a step of 0.1 s nothing foretells that."""
+    scene = ts.Scene(gravity=(0.0, 0.0, 0.0))
+    mass = scene.add_point_mass(1.0, (1.0, 0.0, 0.0))
+    scene.add(ts.constraints.PlaneContact(mass, scene.ground, normal_b=(0.0, 0.0, 1.0)))
+    scene.add(ts.forces.PointForce(mass, force=lambda t: (1e6 * max(t - 1.0, 0.0), 0.0, 0.0)))
+    return scene
+
+
+def demand_a_failed_stage(solution):
+    assert solution.status == ts.Status.STAGE_FAILED
+    assert not solution.success
+    assert all(np.isfinite(part).all() for part in (solution.q, solution.qd, solution.qdd))
+    assert solution.t.size == solution.stats.steps + 1
+    assert "stage" in solution.message
+    assert "smaller step" in solution.message
+    with pytest.raises(ts.StepFailure, match="stage") as caught:
+        solution.raise_if_failed()
+    assert caught.value.solution is solution
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", METHODS, **by_name)
+def test_a_stage_that_fails_midway(method):
+    """The run hands back what it had, which an adaptive one goes on from, past the same place."""
+    solution = ts.simulate(pushed_late(), (0.0, 2.0), integrator=method(step=0.1))
+    demand_a_failed_stage(solution)
+    assert solution.t[-1] == pytest.approx(1.0)
+    assert solution.stats.steps == 10
+    np.testing.assert_allclose(solution.q, [(1.0, 0.0, 0.0)] * 11, atol=HELD)
+    state = solution.state
+    after = ts.simulate(pushed_late(), (state.t, 2.0), state=state, integrator=method(1e-5, 1e-5)).raise_if_failed()
+    assert after.q[-1, 0] == pytest.approx(1.0 + 1e6 / 6.0, rel=LOOSE)
+
+
+@pytest.mark.parametrize(("method", "step"), [(ImplicitTrapezoid, 0.2), (SDIRK54, 0.5)], **by_name)
+def test_a_stage_of_a_step_far_too_long(method, step):
+    demand_a_failed_stage(ts.simulate(hung(), (0.0, 5.0), integrator=method(step=step)))
+
+
+@pytest.mark.parametrize("method", METHODS, **by_name)
+def test_maggi_kane_is_refused(method):
+    for integrator in (method(), method.__name__.lower()):
+        with pytest.raises(ts.InvalidArgument, match=r"tangent-space.*'dop853', 'nystrom4', 'rk45'") as caught:
+            ts.simulate(load("sliding_top")[0], (0.0, 1.0), integrator=integrator, formulation="maggi-kane")
+        assert "'sdirk54'" not in str(caught.value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", METHODS, **by_name)
+def test_by_its_name_and_with_settings(method):
+    scene, _ = load("sliding_top")
+    name = method.__name__.lower()
+    one = ts.simulate(scene, (0.0, 1.0), integrator=name, rtol=1e-5, atol=1e-5)
+    two = ts.simulate(scene, (0.0, 1.0), integrator=method(1e-5, 1e-5), formulation="null-space")
+    np.testing.assert_array_equal(one.q, two.q)
+    assert method.__name__ in str(one)
+    bounded = ts.simulate(scene, (0.0, 1.0), integrator=method(1e-2, 1e-2, max_step=0.01, first_step=1e-3))
+    assert bounded.steps.h[0] == 1e-3
+    assert bounded.steps.h.max() <= 0.01 * (1 + HELD)
+    fixed = ts.simulate(scene, (0.0, 1.0), integrator=method(step=0.03))
+    np.testing.assert_allclose(fixed.steps.h, [*[0.03] * 33, 0.01], rtol=HELD)
+    assert repr(method(step=0.03)) == f"{method.__name__}(step=0.03)"
+    with pytest.raises(ts.InvalidArgument, match="rtol"):
+        ts.simulate(scene, (0.0, 1.0), integrator=method(), rtol=1e-5)
+
+
+@pytest.mark.parametrize("method", METHODS, **by_name)
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [("rtol", 0.0), ("atol", np.nan), ("step", -1.0), ("max_step", "1"), ("first_step", 0.0), ("rtol", np.inf)],
+)
+def test_bad_arguments(method, setting, value):
+    with pytest.raises(ts.InvalidArgument, match=f"{method.__name__}: {setting}"):
+        method(**{setting: value})
+
+
+def governor():
+    """A flyball governor: shaft, sleeve on a damped spring, two balls."""
+    scene, angle, arm, rate = ts.Scene(gravity=(0.0, 0.0, -9.81)), 0.6, 0.5, 8.0
+    omega, low = (0.0, 0.0, rate), (0.0, 0.0, -2.0 * arm * np.cos(angle))
+    shaft = scene.add_body(2.0, (0.02, 0.02, 0.01), angular_velocity=omega, name="shaft")
+    sleeve = scene.add_body(1.0, (0.01, 0.01, 0.01), position=low, angular_velocity=omega, name="sleeve")
+    scene.add(ts.constraints.Revolute.at(scene.ground, shaft, point=(0, 0, 0), axis=(0, 0, 1)))
+    scene.add(ts.constraints.Translational.at(shaft, sleeve, point=low, axis=(0, 0, 1)))
+    for side in (1.0, -1.0):
+        x = side * arm * np.sin(angle)
+        ball = scene.add_body(
+            3.0, (0.05, 0.06, 0.04), (x, 0.0, low[2] / 2), velocity=(0.0, rate * x, 0.0), angular_velocity=omega
+        )
+        scene.add(ts.constraints.Revolute.at(shaft, ball, point=(0, 0, 0), axis=(0, 1, 0)))
+        scene.add(ts.constraints.Distance(ball, sleeve))
+    scene.add(ts.forces.Spring(shaft, sleeve, stiffness=300.0, damping=5.0))
+    return scene
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", METHODS)
+def test_velocity_constraints_hold_as_by_explicit_methods(method):
+    solution = ts.simulate(governor(), (0.0, 2.0), integrator=method(rtol=1e-5, atol=1e-5))
+    assert solution.success
+    assert solution.constraint_error.velocity.max() < 8.0 * EPS * np.abs(solution.qd).max()

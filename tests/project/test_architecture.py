@@ -1,0 +1,262 @@
+"""The shape of the house: imports run one way, kernels are compiled in one place, files stay short."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PLACES = {"tsdyn": ROOT / "tsdyn", "tsdyn.constraints": ROOT / "constraints", "tsdyn.integrators": ROOT / "integrators"}
+# lowest first: a module imports from its own package and those (or modules that lie flat in tsdyn/) before it
+ORDER = [
+    "errors",
+    "_discovery",
+    "_moved",
+    "_version",
+    "validation",
+    "calls",
+    "docstrings",
+    "drawing",
+    "jit",
+    "maths",
+    "shapes",
+    "motions",
+    "elements",
+    "model",
+    "sparse",
+    "rows",
+    "workspaces",
+    "methods",
+    "plugins",
+    "constraints",
+    "forces",
+    "integrators",
+    "formulations",
+    "observables",
+    "runs",
+    "taylor",
+    "configuration",
+    "ahead",
+    "simulation",
+    "benchmarking",
+    "profiling",
+    "plots",
+    "testing",
+    "cli",
+    "hints",
+    "__init__",
+    "__main__",
+]
+FLAT = 14  # modules at most that lie flat in tsdyn/
+LONGEST = 400  # lines of a file
+
+
+def _modules():
+    """Every module by its dotted name, and its file."""
+    found = {}
+    for package, folder in PLACES.items():
+        for file in sorted(folder.rglob("*.py")):
+            parts = [*package.split("."), *file.relative_to(folder).with_suffix("").parts]
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
+    return found
+
+
+FILES = _modules()
+PACKAGES = {name for name, file in FILES.items() if file.name == "__init__.py"}
+
+
+def _district(module):
+    """The package, or the module that lies flat in tsdyn/, that a module belongs to."""
+    return module.split(".")[1] if "." in module else "__init__"
+
+
+def imports(module):
+    """The modules of tsdyn that a module imports, lazily or at its top; what type checkers alone import is none."""
+    here = module.split(".") if module in PACKAGES else module.split(".")[:-1]
+    tree = ast.parse(FILES[module].read_text())
+    blocks = [node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
+    typed = {node for block in blocks for part in block.body for node in ast.walk(part)}
+    for node in ast.walk(tree):
+        if node in typed or not isinstance(node, ast.ImportFrom) or not node.level:
+            continue
+        base = [*here[: len(here) - node.level + 1], *(node.module or "").split(".")]
+        base = ".".join(part for part in base if part)
+        for alias in node.names:
+            name = f"{base}.{alias.name}"
+            yield name if name in FILES else base
+
+
+EDGES = {module: sorted(set(imports(module)) - {module}) for module in FILES}
+
+
+@pytest.mark.parametrize("module", FILES, ids=str)
+def test_packages_import_one_way(module):
+    for target in EDGES[module]:
+        assert target in FILES, f"{module} imports {target}, which is no module"
+        assert ORDER.index(_district(target)) <= ORDER.index(_district(module)), f"{module} imports {target}, above it"
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    left = {module: set(targets) - PACKAGES for module, targets in EDGES.items() if module not in PACKAGES}
+    while left:
+        free = [module for module, targets in left.items() if not targets & left.keys()]
+        assert free, f"a circle among {sorted(left)}"
+        for module in free:
+            del left[module]
+
+
+def test_constraint_rows_have_one_interface():
+    for module, targets in EDGES.items():
+        if _district(module) in ("rows", "sparse"):
+            continue
+        below = {target for target in targets if _district(target) == "rows"} - {"tsdyn.rows.interface"}
+        assert not below | set(targets) & {"tsdyn.sparse.factorisation", "tsdyn.sparse.block_operations"}, module
+
+
+def test_redundant_rows_are_dropped_behind_the_interface():
+    for module, file in FILES.items():
+        if _district(module) not in ("rows", "sparse"):
+            names = {getattr(node, "attr", "") for node in ast.walk(ast.parse(file.read_text()))}
+            assert not names & {"dropped", "anew"}, module
+
+
+WAY = """
+import sys
+import tsdyn as ts
+from examples.pendulum_chain import build
+
+calls, landing = [], False
+
+def follow(frame, event, argument):
+    global landing
+    name, function = frame.f_globals["__name__"], frame.f_code.co_name
+    if event == "call" and function == "land":
+        calls.clear()
+        landing = True
+    if landing and event == "call" and name.startswith("tsdyn") and ".jit" not in name and ".maths" not in name:
+        calls.append((frame.f_back.f_globals["__name__"], name, function))
+    if event == "return" and function == "land":
+        landing = False
+    if landing and event == "return" and function == "find_correction":
+        sys.setprofile(None)
+
+scene = build()
+sys.setprofile(follow)
+ts.simulate(scene, (0.0, 0.1), integrator=ts.integrators.Taylor(tol=1e-3))
+print(*dict.fromkeys(call for call in calls if call[0] != call[1]), sep="\\n")
+"""
+
+
+def test_a_row_gets_from_the_projection_to_its_factor_and_back_in_few_calls():
+    """Calls between modules, in a chain of spherical joints."""
+    options = {"cwd": ROOT, "capture_output": True, "text": True, "check": True}
+    result = subprocess.run([sys.executable, "-c", WAY], env={**os.environ, "TSDYN_DEBUG": "1"}, **options)
+    calls = result.stdout.splitlines()
+    assert "factorisation" in calls[-1]
+    assert 5 < len(calls) - 1 < 15, result.stdout  # the first one is that of `land`
+
+
+@pytest.mark.parametrize("package", sorted(PACKAGES - {"tsdyn"}), ids=str)
+def test_packages_say_what_they_are_for(package):
+    text = ast.get_docstring(ast.parse(FILES[package].read_text()))
+    if package in ("tsdyn.constraints", "tsdyn.integrators", "tsdyn.forces"):
+        return  # a class a file
+    assert 3 <= len(text.splitlines()) <= 10
+    assert "Imports " in text
+    assert "Begin with " in text
+
+
+# arguments of kernels that have one order everywhere, and the packages whose kernels keep to it
+ARGUMENTS = ("context", "network", "system", "w", "f", "l", "linear", "q", "qd", "qdd", "t", "out")
+NAMED_THRESHOLDS = ("rows", "sparse", "formulations", "workspaces")  # no bare numbers in kernels
+ORDERED = ("rows", "sparse", "formulations", "workspaces", "constraints", "forces", "taylor", "configuration", "maths")
+
+
+@pytest.mark.parametrize("module", [name for name in FILES if _district(name) in ORDERED], ids=str)
+def test_arguments_of_kernels_have_one_order(module):
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if isinstance(node, ast.FunctionDef) and node.decorator_list:
+            places = [ARGUMENTS.index(given.arg) for given in node.args.args if given.arg in ARGUMENTS]
+            assert places == sorted(places), f"{node.name}: {', '.join(ARGUMENTS[place] for place in places)}"
+
+
+@pytest.mark.parametrize("module", [name for name in FILES if _district(name) in NAMED_THRESHOLDS], ids=str)
+def test_kernels_have_no_bare_thresholds(module):
+    """Their numbers are multiples of a half, up to eight; all others have names in tolerances.py."""
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if isinstance(node, ast.FunctionDef) and node.decorator_list:
+            numbers = [one.value for one in ast.walk(node) if isinstance(getattr(one, "value", None), float)]
+            assert all(number <= 8.0 and (2.0 * number).is_integer() for number in numbers), f"{node.name}: {numbers}"
+
+
+def test_few_modules_lie_flat():
+    assert len(list((ROOT / "tsdyn").glob("*.py"))) <= FLAT
+    assert {_district(module) for module in FILES} == set(ORDER) - {"__main__"} | {_district("tsdyn.__main__")}
+
+
+def test_the_wheel_has_every_package():
+    listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    assert sorted(listed) == sorted(PACKAGES)
+
+
+def test_built_in_classes_are_written_with_what_plug_ins_have():
+    for name, file in FILES.items():
+        if _district(name) in ("constraints", "forces", "integrators") and file.name != "__init__.py":
+            districts = {_district(target) for target in EDGES[name]}
+            assert districts <= {"plugins", "constraints", "forces", "integrators"}, name
+
+
+@pytest.mark.parametrize("module", ["recurrences", "stepping", "joint", "force"])
+def test_modules_of_former_plug_ins_say_where_they_are(module):
+    with pytest.raises(ModuleNotFoundError, match=r"tsdyn\.plugins"):
+        import_module(f"tsdyn.{module}")
+
+
+@pytest.mark.parametrize("module", FILES, ids=str)
+def test_modules_import_each_other_relatively(module):
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if isinstance(node, ast.ImportFrom) and not node.level:
+            assert not node.module.startswith("tsdyn")
+        if isinstance(node, ast.Import):
+            assert not any(alias.name.startswith("tsdyn") for alias in node.names)
+
+
+@pytest.mark.parametrize("module", FILES, ids=str)
+def test_numba_is_used_in_one_place(module):
+    if _district(module) == "jit":
+        return
+    names = {
+        alias.name
+        for node in ast.walk(ast.parse(FILES[module].read_text()))
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for alias in node.names
+        if (getattr(node, "module", None) or alias.name).startswith(("numba", "llvmlite"))
+    }
+    assert names <= {"NumbaError"}
+
+
+@pytest.mark.parametrize("module", FILES, ids=str)
+def test_files_stay_short(module):
+    text = re.sub(r'\n +Examples\n +-+\n.*?"""', "", FILES[module].read_text(), flags=re.DOTALL)
+    assert len(text.splitlines()) <= LONGEST
+
+
+@pytest.mark.parametrize("folder", ["constraints", "integrators"])
+def test_folders_are_no_packages_of_their_own(folder):
+    code = f"import {folder}"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode != 0
+    assert "relative import" in result.stderr
+
+
+def test_no_optional_dependency_is_imported():
+    names = ("matplotlib", "tqdm", "scipy.linalg", "scipy.integrate", "scipy.optimize")
+    code = f"import sys, tsdyn; print([m for m in {names} if m in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"

@@ -1,0 +1,70 @@
+"""The project's own pages and metadata: links lead somewhere, the version stands in one place."""
+
+import ast
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import tsdyn as ts
+from docs import draw
+
+ROOT = Path(__file__).parents[2]
+PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+
+
+def anchors(page):
+    """The anchors of a page's headings, as GitHub and most renderers make them."""
+    prose = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+    for heading in re.findall(r"^#+ +(.*)$", prose, re.MULTILINE):
+        yield re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_between_pages_resolve(page):
+    for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        if "://" in link:
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f"{page.name}: {link}"
+        if anchor:
+            assert anchor in set(anchors(target)), f"{page.name}: {link}"
+
+
+def test_version_has_one_source():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    assert "version" not in project["project"]
+    assert not re.search(r"^version:", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    module, name = project["tool"]["setuptools"]["dynamic"]["version"]["attr"].rsplit(".", 1)
+    literals = [
+        node.value.value  # of a literal: setuptools reads it without importing the package
+        for node in ast.parse((ROOT / module.replace(".", "/")).with_suffix(".py").read_text()).body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == name
+    ]
+    assert literals == [ts.__version__]
+
+
+def test_the_architecture_page_names_every_package():
+    table = set(re.findall(r"^\| `(\w+)` \|", (ROOT / "docs" / "architecture.md").read_text(), re.MULTILINE))
+    assert table >= draw.packages().keys()
+
+
+def test_the_pictures_are_those_of_the_code():
+    """Draw them anew by python -m docs.draw after a change of packages, or of the functions that a step calls."""
+    shown = (ROOT / "docs" / "images" / "packages.svg").read_text()
+    assert all(f">{name}<" in shown for name in draw.packages())
+    shown = (ROOT / "docs" / "images" / "step.svg").read_text()
+    for _, module, function in draw.STEP:
+        assert draw.caption(module, function)
+        assert f">{module}.{function}<" in shown
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_files_that_pages_name_exist(page):
+    if page.name == "CHANGELOG.md":
+        return  # of the past, too
+    folders = "tsdyn|constraints|integrators|tests|examples|benchmarks|docs"
+    for path in re.findall(rf"`((?:{folders})/[\w/.]*)`", page.read_text()):
+        assert (ROOT / path).exists(), f"{page.name}: {path}"

@@ -1,0 +1,125 @@
+"""Scenes far from the origin, and small ones: as exact as those of metres beside it."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from tests.helpers.tolerances import CLOSE, FAIR, FINE, NEAR, ROUGH, ROUNDING
+
+C, I, F = ts.constraints, ts.integrators, ts.forces
+X, _, Z = np.eye(3)
+AWAY = np.array([1e6, -7e5, 3e5])
+
+
+def pendulum(place, joint="Revolute", arm=1.0):
+    """A rod on a pin, or a point on a rod, that starts at speed."""
+    scene = ts.Scene()
+    place = np.array(place, float)
+    if joint == "Revolute":
+        rod = scene.add_body(1.0, (0.1, 0.1, 0.1), place + arm * X, velocity=(0, 0, 2.0), angular_velocity=(0, -2.0, 0))
+        scene.add(C.Revolute.at(scene.ground, rod, point=place, axis=(0.0, 1.0, 0.0)))
+    else:
+        bob = scene.add_point_mass(mass=1.0, position=place + arm * X, velocity=(0.0, 1.0, 2.0))
+        scene.add(C.Distance(scene.ground, bob, point_a=place))
+        scene.add(F.Spring(scene.ground, bob, point_a=place + 2.0 * Z, stiffness=3.0))
+    return scene
+
+
+@pytest.mark.parametrize("joint", ["Revolute", "Distance"])
+@pytest.mark.parametrize("method", [I.DOP853(1e-12, 1e-12), I.Taylor(tol=1e-13)], ids=str)
+def test_a_pendulum_far_away_moves_as_one_at_the_origin(joint, method):
+    options = {"integrator": method, "t_eval": np.linspace(0.0, 1.0, 11), "dense_output": True, "events": falls}
+    near, far = (ts.simulate(pendulum(place, joint), (0.0, 1.0), **options) for place in (np.zeros(3), AWAY))
+    assert near.success
+    assert far.success
+    assert abs(far.stats.steps - near.stats.steps) <= 2
+    body, other = near.scene.bodies[0], far.scene.bodies[0]
+    np.testing.assert_allclose(far.position(other) - AWAY, near.position(body), rtol=0.0, atol=2 * CLOSE)
+    np.testing.assert_allclose(far.qd, near.qd, rtol=0.0, atol=FINE)
+    np.testing.assert_allclose(far.at(0.55).q[:3] - AWAY, near.at(0.55).q[:3], rtol=0.0, atol=2 * CLOSE)
+    np.testing.assert_allclose(far.t_events[0], near.t_events[0], rtol=0.0, atol=NEAR)
+    np.testing.assert_allclose(far.q_events[0][:, :3] - AWAY, near.q_events[0][:, :3], rtol=0.0, atol=FAIR)
+    if joint == "Revolute":  # whose velocity rows know nothing of positions
+        assert far.constraint_error.velocity.max() < ROUNDING
+    assert far.constraint_error.position.max() < CLOSE
+    again = ts.simulate(far.scene, (1.0, 1.5), integrator=method, state=far.state)
+    assert again.success
+
+
+def falls(t, state):
+    """Where the velocity changes from up to down."""
+    return state.qd[2]
+
+
+def test_events_see_the_scene_s_own_positions():
+    seen = []
+
+    def height(t, state):
+        seen.append(state.q[0])
+        return state.q[2] - AWAY[2]
+
+    solution = ts.simulate(pendulum(AWAY), (0.0, 1.0), integrator=I.Nystrom4(step=0.02), events=height)
+    assert solution.success
+    assert min(seen) > AWAY[0] - 3.0
+
+
+def test_a_function_of_the_state_is_given_the_scene_s_own_positions():
+    scene = pendulum(AWAY)
+    scene.add(F.PointForce(scene.bodies[0], force=attraction))
+    solution = ts.simulate(scene, (0.0, 0.01), integrator=I.Nystrom4(step=0.01))
+    state = scene.evaluate(solution.q[-1], solution.qd[-1], solution.t[-1])
+    np.testing.assert_allclose(solution.qdd[-1], state.qdd, rtol=0.0, atol=ROUGH)
+
+
+def test_where_no_origin_can_be_moved_tolerances_are_what_rounding_allows():
+    scene = pendulum(AWAY)
+    scene.add(F.PointForce(scene.bodies[0], force=attraction))
+    solution = ts.simulate(scene, (0.0, 1.0), integrator=I.DOP853(1e-12, 1e-12), max_steps=1000)
+    assert solution.success
+    assert "The tolerances were raised to rtol=" in solution.message
+    assert "1e+06 m from the origin, where on a lever of 1 m no more digits" in solution.message
+
+
+def attraction(t, state):
+    """Towards the origin."""
+    return (-1e-6 * state[0], 0.0, 0.0)
+
+
+def test_a_run_that_would_never_end_is_ended():
+    scene = ts.Scene()
+    bob = scene.add_point_mass(mass=1.0, position=(1.0, 0.0, 0.0))
+    scene.add(F.Spring(scene.ground, bob, stiffness=1e10, free_length=0.9))
+    solution = ts.simulate(scene, (0.0, 1e6), integrator=I.DOP853())
+    assert solution.status == ts.Status.STEP_COLLAPSED
+    assert "At the pace of the last 1000 steps" in solution.message
+    assert solution.stats.steps < 10_000
+    assert ts.simulate(scene, (0.0, 1e6), integrator=I.DOP853(), max_steps=5000).status == ts.Status.MAX_STEPS
+
+
+def four_bar(size):
+    """Rods on balls, of density 1000 and of this size in m."""
+    scene, corners = ts.Scene(), size * np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.5, 0.0, 1.5), (2.0, 0.0, 0.0)])
+    mass = 1e3 * size**3
+    bodies = [
+        scene.add_body(mass, mass * size**2 * np.array((0.1, 0.1, 0.1)), 0.5 * (a + b)) for a, b in pairwise(corners)
+    ]
+    around = [scene.ground, *bodies, scene.ground]
+    for i, point in enumerate(corners):
+        scene.add(C.Spherical.at(around[i], around[i + 1], point=point))
+    for body in bodies:
+        scene.add(C.Dot1.at(scene.ground, body, axis_a=(0.0, 1.0, 0.0), axis_b=(1.0, 0.0, 0.0)))
+    return scene
+
+
+@pytest.mark.slow_for("SDIRK54")
+@pytest.mark.parametrize("method", [I.SDIRK54, I.DOP853])
+def test_a_four_bar_of_nanometres(method):
+    runs = []
+    for size in (1.0, 1e-9):
+        time = np.sqrt(size)
+        solution = ts.simulate(four_bar(size), (0.0, 0.3 * time), integrator=method(step=0.01 * time))
+        assert solution.success, solution.message
+        runs.append(solution.orientation(solution.scene.bodies[1])[-1])
+    np.testing.assert_allclose(runs[1], runs[0], rtol=0.0, atol=CLOSE)

@@ -1,0 +1,220 @@
+"""The Taylor integrator: accuracy, steps and orders, output between steps, scenes of every kind, refusals."""
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from tests.helpers.closed_loops import bricard
+from tests.helpers.reference import demand_on_the_manifold, error, load
+from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, NEAR, ROUNDING, TIGHT
+
+C, F, I = ts.constraints, ts.forces, ts.integrators
+TOLERANCES = (1e-4, 1e-8, 1e-12)
+SPANS = {"sliding_top": 10.0, "two_body_pendulum_spatial": 10.0, "chain_4": 1.0, "chain_16": 1.0}
+
+
+@pytest.mark.parametrize("name", SPANS)
+@pytest.mark.parametrize("tol", TOLERANCES)
+def test_errors_keep_to_the_tolerance(name, tol):
+    scene, reference = load(name)
+    reference = reference.until(SPANS[name])
+    solution = ts.simulate(scene, (0.0, SPANS[name]), integrator=I.Taylor(tol), t_eval=reference.t)
+    assert error(solution, reference) < 100.0 * tol + HELD
+    demand_on_the_manifold(solution, solution)
+    assert solution.stats.rejected == 0
+
+
+def test_full_accuracy_by_default():
+    scene, reference = load("sliding_top")
+    reference = reference.until(10.0)
+    solution = ts.simulate(scene, (0.0, 10.0), integrator=I.Taylor(), t_eval=reference.t)
+    assert error(solution, reference) < 2 * ALGEBRA
+    assert solution.stats.steps < 60
+
+
+def test_fixed_orders_and_the_free_one():
+    scene, _ = load("chain_4")
+    steps = {
+        order: ts.simulate(scene, (0.0, 1.0), integrator=I.Taylor(1e-8, order=order)).stats.steps
+        for order in (8, 12, 20, None)
+    }
+    assert steps[8] > steps[12] > steps[20]
+    assert steps[20] <= steps[None] <= steps[12]
+
+
+def pendulum():
+    scene = ts.Scene()
+    mass = scene.add_point_mass(mass=2.0, position=(0.6, 0.0, -0.8))
+    scene.add(C.Distance(mass, scene.ground, length=1.0))
+    return scene, mass
+
+
+def test_point_masses():
+    scene, mass = pendulum()
+    runs = [
+        ts.simulate(scene, (0.0, 3.0), integrator=method, t_eval=np.linspace(0.0, 3.0, 7))
+        for method in (I.Taylor(1e-13), I.DOP853(1e-12, 1e-12))
+    ]
+    assert np.abs(runs[0].position(mass) - runs[1].position(mass)).max() < FINE
+    assert np.ptp(runs[0].energy) < HELD
+
+
+def test_a_free_body_without_any_constraint():
+    scene = ts.Scene(gravity=(0.0, 0.0, -2.0))
+    body = scene.add_body(
+        mass=1.0, inertia=(2.0, 2.0, 2.0), velocity=(1.0, 0.0, 3.0), angular_velocity=(0.0, 40.0, 0.0)
+    )
+    solution = ts.simulate(scene, (0.0, 2.0), integrator=I.Taylor(1e-12), t_eval=np.linspace(0.0, 2.0, 400))
+    t = solution.t[:, None]
+    assert np.abs(solution.position(body) - (t * [1.0, 0.0, 3.0] + t * t * [0.0, 0.0, -1.0])).max() < HELD
+    angle = 20.0 * solution.t  # half the angle: p itself goes on, without a change of sign, over many turns
+    p = np.stack([np.cos(angle), 0.0 * angle, np.sin(angle), 0.0 * angle], axis=1)
+    assert np.abs(solution.orientation(body) - p).max() < TIGHT
+
+
+def test_bodies_that_are_not_spherical_tumble():
+    scene = ts.Scene(gravity=(0.0, 0.0, 0.0))
+    J = [[3.0, 0.2, 0.1], [0.2, 2.0, 0.0], [0.1, 0.0, 1.2]]
+    scene.add_body(mass=1.0, inertia=J, angular_velocity=(0.1, 6.0, 0.1))
+    solution = ts.simulate(scene, (0.0, 10.0), integrator=I.Taylor(1e-13))
+    assert np.ptp(solution.energy) < TIGHT
+    assert np.ptp(solution.angular_momentum, axis=0).max() < TIGHT
+
+
+def test_output_between_steps_is_the_series_and_changes_nothing():
+    scene, _ = load("two_body_pendulum_spatial")
+    plain = ts.simulate(scene, (0.0, 2.0), integrator=I.Taylor(1e-10))
+    dense = ts.simulate(scene, (0.0, 2.0), integrator=I.Taylor(1e-10), dense_output=True)
+    times = np.linspace(0.0, 2.0, 41)
+    asked = ts.simulate(scene, (0.0, 2.0), integrator=I.Taylor(1e-10), t_eval=times)
+    assert np.array_equal(plain.t, dense.t)
+    assert np.array_equal(plain.q, dense.q)
+    assert asked.stats.steps == plain.stats.steps
+    state = dense.at(times)
+    assert np.abs(state.q - asked.q).max() < ROUNDING * (1.0 + np.abs(asked.q).max())
+    assert np.abs(state.qd - asked.qd).max() < ALGEBRA * (1.0 + np.abs(asked.qd).max())
+    assert np.abs(state.qdd - asked.qdd).max() < TIGHT * (1.0 + np.abs(asked.qdd).max())
+    demand_on_the_manifold(dense, state)
+    ends = dense.at(dense.t)
+    assert np.abs(ends.q - dense.q).max() < ROUNDING * (1.0 + np.abs(dense.q).max())
+    h = 1e-3  # the states are derivatives of each other
+    fine = dense.at(1.0 + h * np.arange(-3, 4))
+    quotient = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / (60.0 * h)
+    assert np.abs(quotient @ fine.q - fine.qd[3]).max() < CLOSE
+    assert np.abs(quotient @ fine.qd - fine.qdd[3]).max() < NEAR
+
+
+def test_events_and_going_on():
+    scene, _ = pendulum()
+
+    def lowest(t, state):
+        return state.q[0]
+
+    lowest.terminal = True
+    solution = ts.simulate(scene, (0.0, 3.0), integrator=I.Taylor(1e-13), events=lowest)
+    assert solution.status == ts.Status.EVENT
+    assert abs(solution.q_events[0][0, 0]) < ALGEBRA
+    rest = ts.simulate(scene, (solution.state.t, 3.0), integrator=I.Taylor(1e-13), state=solution.state)
+    whole = ts.simulate(scene, (0.0, 3.0), integrator=I.Taylor(1e-13))
+    assert np.abs(rest.q[-1] - whole.q[-1]).max() < HELD
+
+
+def test_turns_are_counted():
+    scene = ts.Scene(gravity=(0.0, 0.0, 0.0))
+    wheel = scene.add_body(mass=1.0, inertia=(0.4, 0.4, 0.5), angular_velocity=(0.0, 0.0, 30.0))
+    scene.add(C.Spherical(wheel, scene.ground))
+    for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
+        scene.add(C.Dot1(wheel, scene.ground, axis_a=(0.0, 0.0, 1.0), axis_b=axis))
+    z, x = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+    scene.add(F.TorsionalSpring(scene.ground, wheel, axis_a=z, reference_a=x, reference_b=x, stiffness=2.0))
+    times = np.linspace(0.0, 5.0, 11)
+    solution = ts.simulate(scene, (0.0, 5.0), integrator=I.Taylor(1e-12), t_eval=times)
+    rate = np.sqrt(2.0 / 0.5)  # J angle'' = -k angle, over more than two turns
+    assert np.abs(solution.angular_velocity(wheel)[:, 2] - 30.0 * np.cos(rate * times)).max() < CLOSE
+
+
+def test_steps_can_be_bounded_and_fixed():
+    scene, _ = load("chain_4")
+    fixed = ts.simulate(scene, (0.0, 0.1), integrator=I.Taylor(step=0.004, order=6))
+    assert np.allclose(fixed.steps.h, 0.004, rtol=HELD)
+    assert len(fixed.t) == 26
+    bounded = ts.simulate(scene, (0.0, 0.1), integrator=I.Taylor(1e-6, max_step=0.01, first_step=0.001))
+    assert bounded.steps.h[0] == 0.001
+    assert bounded.steps.h.max() <= 0.0101
+
+
+def test_every_step_has_a_chart():
+    scene, _ = load("chain_4")
+    solution = ts.simulate(scene, (0.0, 0.5), integrator=I.Taylor(1e-8))
+    assert len(solution.charts.t) == solution.stats.steps
+    assert set(solution.charts.reason) == {"start", "step of a series"}
+    assert np.array_equal(solution.charts.t, solution.t[:-1])
+
+
+def test_other_formulations_are_refused():
+    scene, _ = load("chain_4")
+    for form in ("null-space", "maggi-kane"):
+        with pytest.raises(ts.InvalidArgument, match=r"no other form than 'tangent'.*dop853"):
+            ts.simulate(scene, (0.0, 1.0), integrator=I.Taylor(), formulation=form)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"tol": 0.0}, "Taylor: tol"),
+        ({"tol": float("nan")}, "Taylor: tol"),
+        ({"order": 3}, "order must be from 4 to 30, got 3"),
+        ({"order": 31}, "order must be from 4 to 30, got 31"),
+        ({"order": 7.5}, "Taylor: order"),
+        ({"rtol": -1.0}, "Taylor: rtol"),
+        ({"step": 0.0}, "Taylor: step"),
+    ],
+)
+def test_bad_settings(settings, message):
+    with pytest.raises(ts.InvalidArgument, match=message):
+        I.Taylor(**settings)
+
+
+# the default method
+
+
+def test_the_default_is_taylor_where_everything_has_a_series():
+    scene, _ = load("chain_4")
+    solution = ts.simulate(scene, (0.0, 0.1), rtol=1e-6, atol=1e-9)
+    assert solution.method == "Taylor(rtol=1e-06, atol=1e-09)"
+    assert ts.simulate(scene, (0.0, 0.1), formulation="null-space").method.startswith("DOP853")
+    scene.add(F.CoulombFriction(scene.bodies[0], scene.ground, force=0.1))
+    assert ts.simulate(scene, (0.0, 0.1)).method.startswith("DOP853")
+
+
+@pytest.mark.slow
+def test_a_stiff_motion_is_handed_to_an_implicit_method():
+    scene = ts.Scene()
+    arm = scene.add_body(
+        mass=1.0, inertia=(0.1, 0.1, 0.02), position=(0.0, 0.0, -0.5), angular_velocity=(0.5, 0.0, 0.0)
+    )
+    scene.add(F.Bushing(arm, scene.ground, point_a=(0.0, 0.0, 0.5), stiffness=1e8, damping=1e5))
+    solution = ts.simulate(scene, (0.0, 1.0), rtol=1e-4, atol=1e-4)
+    assert solution.method.startswith("SDIRK54")
+    solution.raise_if_failed()
+
+
+@pytest.mark.parametrize("tol", [1e-13, 1e-15])
+def test_the_energy_error_at_the_limit_of_rounding_is_a_random_walk(tol):
+    """Errors of one sign reach 59 eps sqrt(steps) here; of either sign, about one."""
+    solution = ts.simulate(bricard(), (0.0, 300.0), integrator=I.Taylor(tol))
+    size = solution.kinetic_energy.max() + np.abs(solution.potential_energy).max()
+    error = np.abs(solution.energy - solution.energy[0]) / size
+    assert solution.stats.steps > 2000
+    assert error.max() < 4.0 * EPS * np.sqrt(solution.stats.steps)
+
+
+def test_steps_follow_the_tolerance_down_to_the_limit_of_rounding():
+    """1e-15 is finer than 1e-13; from 1e-12 up a step is held to a thousandth."""
+    steps = [
+        ts.simulate(load("two_body_pendulum_spatial")[0], (0.0, 50.0), integrator=I.Taylor(tol)).stats.steps
+        for tol in (1e-12, 1e-13, 1e-15)
+    ]
+    assert steps[0] < steps[1] < steps[2]
+    assert [I.Taylor(tol).step_tolerances()[0] for tol in (1e-8, 1e-12)] == [1e-8 / 1000.0, 1e-12 / 1000.0]
+    assert I.Taylor(1e-12).refined == 0 < I.Taylor(9e-13).refined

@@ -1,0 +1,78 @@
+"""Thresholds of the formulations: quantity, unit, and where each number comes from."""
+
+# --- rounding
+# |Phi| over the size of the numbers that enter Phi: below it a residual is rounding. A row is a sum of a dozen products
+# of these numbers, each rounded by 1.1e-16: 4e-16 as a random walk, 1.3e-15 at worst.
+ROUNDING = 1e-15
+
+# |rd| + size |omega'| in the same way, for Phi_q qd: two units in the last place, since few terms of a row are large.
+SPEED_ROUNDING = 2e-16
+
+# Multipliers over the largest: a correction below it is rounding of one number.
+LOAD_ROUNDING = 2e-16
+
+# The same for normal loads of the null-space form, which are sums over the multipliers of a joint.
+BASIS_LOAD_ROUNDING = 4e-16
+
+# Residuals over the rounding of Phi: a residual that has stopped falling is rounding up to this, an error above it.
+# Two digits: rounding grows along closed loops and with the distance from the origin.
+ROUNDING_AT_MOST = 100.0
+
+# m and rad: a correction of positions above it has changed H by more than rounding, so S is made anew.
+LEAST_MOVE = 1e-15
+
+# |p.p - 1|: below it p is a unit quaternion to rounding, four squares of 1.1e-16 each and their sum.
+UNIT_ROUNDING = 1e-15
+
+# --- convergence of Newton's method, ratios of successive residuals or corrections
+SLOW = 0.25  # positions: above it the matrix of an older configuration is replaced; two sweeps gain a digit at it
+STALLED = 0.5  # projection, Eq. 28, velocities: above it nothing is gained but rounding; twice that diverges
+SLOW_VELOCITIES = 0.1  # velocities with the factors of S: above it a factorisation of N costs less than more sweeps
+SLOW_LOADS = 0.1  # reactions with friction: the same for the matrix of the normal loads
+
+# Residual of Eq. 28, ||Phi_q U B - I||: above it B is factorised afresh. The iteration squares it and diverges from 1.
+B_OUTDATED = 0.5
+
+# Sweeps until a solve is taken for failed. At the rate SLOW 24 sweeps take fourteen digits, as many as there are.
+SWEEPS, B_SWEEPS, LAND_SWEEPS = 24, 30, 12
+RENEWALS = 4  # of N within one solve from the tangent plane, before the step counts as too long
+
+# Normal loads: full steps in the first ones, half ones then, for a load whose sign alternates.
+LOAD_SWEEPS, DAMPED, DAMPED_SHARE = 40, 12, 0.5
+
+# Correction of the multipliers over the largest: if the matrix is new, a correction below the square root of rounding
+# leaves rounding; two digits less are asked for, since the matrix is that of the multipliers before.
+NEWTON_DONE = 1e-10
+
+# 1 / m: what Newton's method leaves of an error, over its square, until it is measured. One over a metre: links of
+# usual size; a wrong value costs one sweep.
+CURVATURE = 1.0
+
+# The same for the null-space form, as a ratio.
+FIRST_RATE = 0.1
+
+# --- charts, dimensionless; docs/design-decisions.md, "Charts are small"
+CONTRACTION_LIMIT = 0.15  # relative loss of a pivot of N since q0
+TURN_LIMIT = 0.25  # |d|: the sine of half the rotation of a body since q0; 29 degrees
+CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a rotation of 60 degrees
+FARTHEST = 0.9  # |d|^2: d0 = 0.32, and C grows as 1 / d0
+TURN_SHARE = 0.55  # of |d|, as a contraction: a rotation that no constraint depends on reaches 0.9 in a step, 0.5 here
+# Error of the factors of N at the end of a solve, relative: below it they give the contraction to four digits
+SAME = 1e-6
+
+# --- rank
+# Pivot of D^T M D over its diagonal entry: below it the reduced mass is singular. A hundred roundings.
+MASS_PIVOT = 1e-14
+
+# Smallest singular value of Phi_q over the largest, rows of length one: less is rounding. S, in the metric of the
+# masses, says what is independent: rows of points that are a nanometre apart differ by 1e-9.
+RANK_LIMIT = 1e-14
+
+# Smallest over largest squared singular value of the rows that hold an orientation: less doesn't hold a body; 1e-6 rad.
+HOLDING = 1e-12
+
+# --- series
+MOST_PARTS = 100.0  # of a step on which p is followed, about one for each radian
+
+# Largest finite size: a sum above it is taken for an overflow.
+HUGE, TINY = 1e300, 1e-300

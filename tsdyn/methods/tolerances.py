@@ -1,0 +1,50 @@
+"""Thresholds of methods: order conditions, and Newton's iteration of an implicit stage (diagonally_implicit.py).
+
+Sizes of corrections are error norms: 1 is the step's tolerance. Contraction is the ratio of two such sizes in a row.
+"""
+
+# Residual of an order condition of a tableau, relative to the size of its terms: rounding of coefficients that are
+# written as quotients of integers.
+ORDER_CONDITION = 1e-14
+
+# Corrections of a stage at most: as many as KAPPA takes at a contraction of 0.7, and some after a new matrix.
+ITERATIONS = 20
+
+# Error norm that a stage's iteration may leave. Hairer and Wanner, Solving ODEs II, IV.8, take 0.01 to 0.1 for Radau;
+# a run adds up the residuals of as many stages as it has, and a thousandth of a step's error stays below its estimate.
+KAPPA = 1e-3
+
+# Contraction above which the iteration matrix is rebuilt: up to it three corrections reach KAPPA
+# (docs/design-decisions.md, one Jacobian for many steps; benchmarks/stiff.py counts matrices).
+SLOW = 0.1
+
+# Contraction assumed where none has been measured, and the least that one measurement is trusted with: a stage that
+# converges by chance at once says nothing of the next one.
+GUESS, LEAST = 0.3, 0.02
+
+# Contraction above which an iteration counts as diverging.
+DIVERGING = 0.9
+
+# New matrices within one stage, of which the last has new stiffness and damping; diverging iterations, all with a new
+# matrix, with which a stage is given up.
+MATRICES, APART = 3, 3
+
+# Stages that begin with a matrix of their own after an older one has failed: five steps of SDIRK54.
+EAGER_STAGES = 30
+
+# Relative change of g = h a_ii up to which the factors of P are tried again: a damped stiff mode then contracts by
+# |1 - g / g_P| < 0.43. Measured contraction decides whether they are kept.
+SAME_G = 0.3
+
+# Correction, relative to 1 + size, that is rounding of v and vd: 18 units in the last place of f evaluated by a
+# factorised matrix. Residuals within AT_FLOOR of it that no longer contract are rounding, too.
+RESIDUAL_FLOOR = 4e-15
+AT_FLOOR = 100.0
+
+# Distance of a stage's positions from their prediction, relative to 1 + size: a solution further away may be another
+# one of the nonlinear equations.
+TOO_FAR = 0.1
+
+# rtol and atol of the iteration with a fixed step, where no tolerance sets the step: that of the constraints
+# (constraint_tol of `simulate`).
+FIXED_TOL = 1e-12

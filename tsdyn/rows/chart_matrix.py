@@ -1,0 +1,145 @@
+"""The chart matrix N = H C Y0, the derivative of Phi with respect to -u, and other matrices H X^T.
+
+    omega'  = C etad,       C = d0 I - d~ + d d^T / d0        X^T = C Y0
+
+At the parts of a split body N has the products with the welds, whose rows are W0 at q0 and C W0 at q.
+"""
+
+from ..jit.kernels import kernel, long_kernel, stack
+from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, times, total
+from ..sparse.constraint_graph import (
+    ROWS,
+    ROWS_WELD,
+    W_MASS,
+    W_ROTATION,
+    WEIGHTS,
+    WELDS,
+)
+from ..sparse.factorisation import factor_lu, solve_lu
+from .axis_rows import leave_axes_out, multiply_axes_both
+from .redundant_rows import set_redundant_diagonal
+from .schur_complement import inner, inner_both, more
+from .tolerances import ZERO_PIVOT
+
+
+@kernel
+def _multiply_both(network, H, X, lower, upper):
+    """Set H X^T in the blocks of the pattern as `factor_lu` expects: upper triangle, lower triangle transposed."""
+    products = network.products
+    for i in range(network.pattern.shape[1]):
+        let(upper, i, 0.0)
+        let(lower, i, 0.0)
+    for i in range(products.shape[0]):
+        product = products[i]
+        left, right, rows, columns = product.left, product.right, product.rows, product.columns
+        target, stride = product.target, product.stride
+        if product.same != 0:
+            for r in range(rows):
+                more(upper, target + r, inner_both(H, left + 16 * r, X, right + 16 * r))
+                for c in range(r + 1, columns):
+                    more(upper, target + c, inner_both(H, left + 16 * r, X, right + 16 * c))
+                    more(lower, target + c, inner_both(H, right + 16 * c, X, left + 16 * r))
+                target += stride
+        else:
+            for r in range(rows):
+                for c in range(columns):
+                    more(upper, target + c, inner(H, left + 16 * r, X, right + 16 * c))
+                    more(lower, target + c, inner(H, right + 16 * c, X, left + 16 * r))
+                target += stride
+
+
+@kernel
+def rotate_rate(l, b, rate):
+    """Return C rate of body b, rate in four lanes."""
+    x, y, z, w = l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2], l.d[4 * b + 3]
+    d = lanes(x, y, z)
+    along = total(times(d, rate)) / (1.0 + w)
+    return add(rate, sub(fma(d, splat(along), times(rate, splat(w))), cross(d, rate)))
+
+
+@long_kernel
+def factorise_chart_matrix(network, f, l):
+    """Set the LU factors of N = H C Y0 at the present H; return True if N is nonsingular."""
+    Y0 = l.rows0.Y
+    for e in range(network.sides.shape[0]):
+        for k in range(2):
+            at = 16 * e + 8 * k
+            put(l.X, at, four(Y0, at))
+            put(l.X, at + 4, rotate_rate(l, network.sides[e, k], four(Y0, at + 4)))
+    _multiply_both(network, f.rows.H, l.X, l.lower, l.upper)
+    if network.parts.shape[0] > 0:
+        _multiply_parts(network, f.rows.H, l)
+    for values in (l.lower, l.upper):
+        set_redundant_diagonal(network, f, values)
+        leave_axes_out(network, values)
+    return factor_lu(network.pattern, l.lower, l.upper, ZERO_PIVOT) < 0
+
+
+@kernel
+def factorise_product(network, f, X, lower, upper):
+    """Set the LU factors of H X^T at the present H, with axis rows; return True if the matrix is nonsingular."""
+    _multiply_both(network, f.rows.H, X, lower, upper)
+    multiply_axes_both(network, f.rows.H, X, lower, upper)
+    set_redundant_diagonal(network, f, lower)
+    set_redundant_diagonal(network, f, upper)
+    return factor_lu(network.pattern, lower, upper, ZERO_PIVOT) < 0
+
+
+@kernel
+def solve_product(network, lower, upper, b):
+    """b <- (H X^T)^-1 b, by the factors of `factorise_chart_matrix` or `factorise_product`; those of S serve twice."""
+    solve_lu(network.pattern, lower, upper, b)
+
+
+@kernel
+def pivot_loss(network, l):
+    """Return max |1 - n / s|, with n and s the pivots of N and of S0."""
+    pattern, worst = network.pattern, 0.0
+    for j in range(pattern.heads.size):
+        at, step = pattern.heads[j], pattern.widths[j] + 1
+        for _ in range(pattern.starts[j + 1] - pattern.starts[j]):
+            worst = max(worst, abs(1.0 - get(l.rows0.S, at) / get(l.upper, at)))
+            at += step
+    return worst
+
+
+@kernel
+def _multiply_parts(network, H, l):
+    """Add the products at the parts of split bodies."""
+    t, lower, upper = stack(12), l.lower, l.upper  # t: C W0 of a body
+    for i in range(network.parts.shape[0]):
+        part, scale = network.parts[i], network.scales[i]
+        left, rows, right, columns = part.left, part.rows, part.right, part.columns
+        target, stride, kind, b = part.target, part.stride, part.kind, part.body
+        light, w = network.inverse[WEIGHTS * b + W_MASS], WEIGHTS * b + W_ROTATION
+        if kind != ROWS and network.bodies[b, 1] == 7:
+            for c in range(3):
+                put(t, 4 * c, rotate_rate(l, b, four(network.inverse, w + 4 * c)))
+        for r in range(rows):
+            for c in range(columns):
+                at, h = target + r * stride + c, left + 16 * r
+                if kind == ROWS:
+                    other = right + 16 * c
+                    if left != right or c >= r:
+                        more(upper, at, scale * inner(H, h, l.X, other))
+                    if left != right or c > r:
+                        more(lower, at, scale * inner(H, other, l.X, h))
+                elif kind == WELDS:
+                    if r < 3 and r == c:
+                        more(upper, at, scale * light)
+                        more(lower, at, scale * light)
+                    elif r >= 3 and c >= 3:
+                        more(upper, at, scale * t[4 * (c - 3) + r - 3])
+                        more(lower, at, scale * t[4 * (r - 3) + c - 3])
+                else:
+                    turned = light * H[h + c]
+                    if c >= 3:
+                        o = 4 * (c - 3)
+                        turned = H[h + 4] * t[o] + H[h + 5] * t[o + 1] + H[h + 6] * t[o + 2]
+                    placed = l.X[h + c + c // 3]
+                    if kind == ROWS_WELD:
+                        more(upper, at, scale * turned)
+                        more(lower, at, scale * placed)
+                    else:
+                        more(upper, target + c * stride + r, scale * placed)
+                        more(lower, target + c * stride + r, scale * turned)

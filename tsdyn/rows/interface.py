@@ -1,0 +1,129 @@
+"""Constraint rows for all other packages. Redundant rows are dropped below this module.
+
+    H = [Phi_r, Phi_pi'],    Y = W H^T,    S = H W H^T        `Rows`: f.rows at the poses of f, l.rows0 at q0 of a chart
+
+Evaluate, at the poses of f, t and the velocities:
+    evaluate_rows           f.b = Phi, H            evaluate_residuals      f.b = Phi
+    evaluate_bias           f.gamma = gamma         evaluate_drift          out = Phi_t
+Factorise:
+    factorise_rows          Y, S = L D L^T          factorise_chart_matrix  N = H C Y0 = L D U
+    factorise_product       H X^T = L D U
+Solve:
+    solve_rows              b <- S^-1 b             solve_product           b <- N^-1 b
+    multiply_rows           out = H Z               apply_multipliers       Z <- Z - Y^T lam
+    find_correction         lam = S^-1 b, Z = -Y^T lam
+    project                 lam = S^-1 H Z, Z <- Z - Y^T lam
+    constrain               lam = S^-1 (H Z + c), Z <- Z - Y^T lam
+    constrain_accelerations the same with axis rows, for Z = W F and c = gamma
+    balance_loads           lam = S^-1 H W F, F <- F - H^T lam
+    solve_series            the same for one order of a Taylor series
+Ask:
+    redundant_rows_hold, mark_redundant, self_stress          of redundant rows
+    singularity_indicator, is_near_singular                   of the distance to a singular configuration
+
+Right-hand sides and multipliers are in the order of the network; `Network.row` names the rows of Phi.
+"""
+
+from .axis_rows import add_axis_multipliers, is_axis
+from .chart_matrix import factorise_chart_matrix, factorise_product, pivot_loss, rotate_rate, solve_product
+from .evaluation import evaluate_bias, evaluate_drift, evaluate_every_row, evaluate_residuals, evaluate_rows
+from .redundant_rows import (
+    clear_redundant,
+    keep_every_row,
+    list_redundant,
+    mark_redundant,
+    redundant_rows_hold,
+    restore_selection,
+    return_to_selection,
+    save_selection,
+)
+from .reselection import factorise_rows, select_rows, selection_serves
+from .row_memory import allocate_free, allocate_rows, redundancy, redundant_of, reset_selection, set_selection
+from .row_workspace import Free, Rows
+from .schur_complement import (
+    DYNAMICS,
+    METRIC,
+    acceleration_residuals,
+    apply_multipliers,
+    balance_loads,
+    constrain,
+    constrain_accelerations,
+    factorise_selected_rows,
+    find_correction,
+    inner,
+    multiply_rates,
+    multiply_rows,
+    project,
+    solve_rows,
+    weigh,
+    weigh_bodies,
+)
+from .self_stress import count_self_stresses, self_stress
+from .series import solve_series
+from .singularity import (
+    is_near_singular,
+    is_next_to_singular,
+    is_singular_within_a_step,
+    note_indicator,
+    singularity_indicator,
+)
+from .tolerances import MOST_ROWS
+
+__all__ = [
+    "DYNAMICS",
+    "METRIC",
+    "MOST_ROWS",
+    "Free",
+    "Rows",
+    "acceleration_residuals",
+    "add_axis_multipliers",
+    "allocate_free",
+    "allocate_rows",
+    "apply_multipliers",
+    "balance_loads",
+    "clear_redundant",
+    "constrain",
+    "constrain_accelerations",
+    "count_self_stresses",
+    "evaluate_bias",
+    "evaluate_drift",
+    "evaluate_every_row",
+    "evaluate_residuals",
+    "evaluate_rows",
+    "factorise_chart_matrix",
+    "factorise_product",
+    "factorise_rows",
+    "factorise_selected_rows",
+    "find_correction",
+    "inner",
+    "is_axis",
+    "is_near_singular",
+    "is_next_to_singular",
+    "is_singular_within_a_step",
+    "keep_every_row",
+    "list_redundant",
+    "mark_redundant",
+    "multiply_rates",
+    "multiply_rows",
+    "note_indicator",
+    "pivot_loss",
+    "project",
+    "redundancy",
+    "redundant_of",
+    "redundant_rows_hold",
+    "reset_selection",
+    "restore_selection",
+    "return_to_selection",
+    "rotate_rate",
+    "save_selection",
+    "select_rows",
+    "selection_serves",
+    "self_stress",
+    "set_selection",
+    "singularity_indicator",
+    "solve_product",
+    "solve_rows",
+    "solve_series",
+    "weigh",
+    "weigh_bodies",
+]

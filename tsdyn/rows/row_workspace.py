@@ -1,0 +1,87 @@
+"""The workspace of constraint rows: named arrays of the basis-free forms."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..jit.kernels import Record
+
+
+class Rows(NamedTuple):
+    """Constraint rows at one configuration: H, Y = W H^T and the factors of S = H W H^T; m rows, none a normalisation.
+
+    Without the redundant rows: these are zero in H and Y, and have a one on the diagonal of S.
+    """
+
+    H: np.ndarray  # (m * 16,)  rows of [Phi_r, Phi_pi'] of bodies a and b; constraint_rows.reduced
+    Y: np.ndarray  # (m * 16,)  W H^T; schur_complement.weigh_rows
+    S: np.ndarray  # H W H^T, then its factors; schur_complement.multiply_rows, factorisation.factor
+
+
+class Friction(NamedTuple):
+    """k frictions of joints; of no size where there are none. "computed by" as in `Free`."""
+
+    g: np.ndarray  # (k * 16,)  W times each for a normal load of one, on bodies a and b; friction_solve
+    load: np.ndarray  # (k * 7,)  normal load, and its derivative by the reaction; friction.normal_load
+    lam: np.ndarray  # (m,)  multipliers, from one evaluation to the next; friction_solve
+    Z: np.ndarray  # ((b + 1) * 8,)  accelerations of bodies without friction and reactions; friction_solve
+    X: np.ndarray  # (m * 16,)  W (H^T - g N_lam); friction_solve
+    lower: np.ndarray  # factors of S - H W g N_lam; friction_solve
+    upper: np.ndarray
+    basis: np.ndarray  # (k, n + rows of Phi)  by each for a load of one, vdd and multipliers; friction_basis
+    J: np.ndarray  # (k, k)  I - N_lam lam_N; friction_basis
+    pivots: np.ndarray  # int64 (k,)
+    numbers: np.ndarray  # (2 (rows of Phi + n + k),)  multipliers without and with friction, scratch; friction_basis
+
+
+class Landing(Record):
+    """The last projection of positions onto the manifold."""
+
+    residual: float  # the largest |Phi| that it met
+    moved: float  # the largest displacement of a body, m or rad
+
+
+class Selection(Record):
+    """Quality of the selection of redundant rows."""
+
+    unheld: float  # the largest |Phi| of the redundant rows
+    weakest: float  # the smallest relative pivot of the others: its largest value since the selection
+
+
+class Indicator(Record):
+    """The singularity indicator, see singularity.py."""
+
+    start: float  # of a step
+    end: float
+    largest: float  # in the run
+
+
+class Free(NamedTuple):
+    """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
+
+    poses: np.ndarray  # ((b + 1) * 28,)  see body_poses.py; projection, tangent
+    rows: Rows  # at the poses; interface.evaluate_rows, factorise_rows
+    b: np.ndarray  # (m,)  right-hand sides and solutions
+    gamma: np.ndarray  # (m,)  acceleration bias in terms of omega'; constraint_rows.bias
+    Z: np.ndarray  # ((b + 1) * 8,)  forces, then accelerations of bodies
+    a: np.ndarray  # ((b + 1) * 8,)  accelerations of bodies; taylor
+    Q: np.ndarray  # (n,)  applied forces
+    p: np.ndarray  # (4,)  scratch
+    landing: Landing
+    selection: Selection
+    indicator: Indicator
+    dropped: np.ndarray  # int64 (m + 1,)  how many rows are redundant, and which; independent_rows.select
+    saved: np.ndarray  # int64 (m + 1,)  the same before a passing selection; redundant_rows.save_selection
+    chosen: np.ndarray  # int64 (m + 1,)  scratch of independent_rows.select, as the next two
+    order: np.ndarray  # int64 (m,)
+    block: np.ndarray  # (largest block, or m, squared)
+    friction: Friction
+    anew: np.ndarray  # int64 (2,)  address of reselection.choose_anew, and of its `Choice`; zero where it isn't needed
+
+
+def no_free():
+    """The `Free` of nothing, for its type."""
+    none, whole, square = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
+    friction = Friction(*[none] * 7, square, square, whole, none)
+    rows, records = Rows(none, none, none), (Landing(), Selection(), Indicator())
+    return Free(none, rows, *[none] * 6, *records, whole, whole, whole, whole, none, friction, whole)

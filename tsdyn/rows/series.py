@@ -1,0 +1,24 @@
+"""Multipliers of one order of a Taylor series, by the factors of S at order zero."""
+
+from ..jit.kernels import kernel
+from .axis_rows import add_axis_multipliers, gather_axes
+from .evaluation import clear_welds
+from .redundant_rows import clear_redundant
+from .schur_complement import find_correction
+
+
+@kernel
+def solve_series(network, f, omega, at, stride, k, correction):
+    """lam of order k from f.b, the residuals of Phi_{k+2}.
+
+    S lam = f.b,    f.Z = -Y^T lam
+
+    Order k + 1 of omega' of body i is at omega[at + stride * i]. With `correction` f.b becomes what f.gamma, a first
+    solution, lacks.
+    """
+    clear_welds(network, f.b)
+    gather_axes(network, omega, at, stride, k + 1.0, f.b)
+    if correction:
+        add_axis_multipliers(network, f.gamma, f.b)
+    clear_redundant(f, f.b)
+    find_correction(network, f.rows, f.b, f.Z)

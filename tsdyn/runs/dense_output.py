@@ -1,0 +1,133 @@
+"""Dense output of step methods: v and vd are interpolated in the chart, then positions and velocities are solved for.
+
+The driver uses it at the times of t_eval, in its own workspace. `Solution.at` and events use it through `read` and a
+workspace of their own (reader.py), where the chart of a step is rebuilt: q0 and the time determine it.
+"""
+
+from ..errors import Status
+from ..jit.kernels import caller, entry, kernel
+from ..maths.dense_linalg import copy, is_finite
+from ..methods.explicit import call_accelerate, call_place
+from ..methods.interpolants import call_value
+from ..workspaces.run_state import B_CHART, B_DATA, B_H, B_START, load_run
+from ..workspaces.workspace import load
+
+NOT_FINITE = int(Status.NOT_FINITE)
+
+call_complete = caller("pp")
+call_chart = caller("pdpppp")
+
+
+@kernel
+def evaluate(context, w, r, t, x, y, yd, xd):
+    """q, qd, qdd, yd (and xd) at (t, x, y). Status."""
+    status = call_place(r.kernels.place, context, t, x)
+    if status == 0:
+        status = call_accelerate(r.kernels.accelerate, context, t, y, yd, xd)
+    if status == 0:
+        status = call_complete(r.kernels.complete, context, yd)
+    if status == 0 and not (is_finite(w.q) and is_finite(w.qd) and is_finite(w.qdd)):
+        return NOT_FINITE
+    return status
+
+
+@kernel
+def between(context, w, r, t, block):
+    """q, qd, qdd at a time within the step of this block. Status. xd, the next step's, is left alone.
+
+    Placed twice: Newton's method comes from further away than in a run, and ends nearer to rounding from nearby.
+    """
+    h, n, nx, ny, data = block[B_H], w.q.size, r.xs.size, r.ys.size, block[B_DATA:]
+    s = (t - block[B_START]) / h
+    call_value(r.kernels.value, s, h, n, nx, ny, data, r.xs, r.ys)
+    status = call_place(r.kernels.place, context, t, r.xs)
+    if status == 0:
+        status = evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
+    if status == 0 and r.kernels.second != 0:  # what f would amplify in a stiff scene
+        call_value(r.kernels.second, s, h, n, nx, ny, data, r.xs, r.yds)
+        call_complete(r.kernels.complete, context, r.yds)
+    return status
+
+
+@kernel
+def keep(w, store):
+    """Copy what the Newton solvers start from."""
+    _warm(w, store, True)
+
+
+@kernel
+def bring_back(w, store):
+    """Put it back."""
+    _warm(w, store, False)
+
+
+@kernel
+def _warm(w, store, out):
+    i = 0
+    for part in (w.u, w.v):
+        for j in range(part.size):
+            if out:
+                store[i] = part[j]
+            else:
+                part[j] = store[i]
+            i += 1
+    for part in (w.B, w.T):
+        for a in range(part.shape[0]):
+            for b in range(part.shape[1]):
+                if out:
+                    store[i] = part[a, b]
+                else:
+                    part[a, b] = store[i]
+                i += 1
+    if out:
+        store[i] = w.control.rate
+    else:
+        w.control.rate = store[i]
+
+
+def warm_size(work):
+    """Floats that `keep` stores."""
+    return work.u.size + work.v.size + work.B.size + work.T.size + 1
+
+
+@kernel
+def recall(system, block):
+    """Let forces remember what a block ends with."""
+    first = block.size - system.memory.size
+    for j in range(system.memory.size):
+        system.reals[system.memory[j]] = block[first + j]
+
+
+@kernel
+def put_state(w, out):
+    """out (3, n) = q, qd, qdd."""
+    copy(w.q, out[0])
+    copy(w.qd, out[1])
+    copy(w.qdd, out[2])
+
+
+@entry
+def read(context, run, t, rows, blocks, charts, points, out):
+    """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows]. Status.
+
+    Every time starts from its chart's q0, so that it gives the same numbers whatever was asked for before it.
+    """
+    c, r = load(context), load_run(run)
+    w, chart = c.work, -1
+    for i in range(t.size):
+        block = blocks[rows[i]]
+        if int(block[B_CHART]) == chart:
+            bring_back(w, r.warm)
+        else:
+            chart = int(block[B_CHART])
+            copy(points[chart], w.q)
+            status = call_chart(r.kernels.start_chart, context, charts[chart, 0], r.xs, r.ys, r.yds, r.dx)
+            if status != 0:
+                return status
+            keep(w, r.warm)
+        recall(c.system, block)
+        status = between(context, w, r, t[i], block)
+        if status != 0:
+            return status
+        put_state(w, out[i])
+    return 0

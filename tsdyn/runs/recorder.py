@@ -1,0 +1,107 @@
+"""The records of a run: room for those of a slice, and what earlier slices have recorded."""
+
+import numpy as np
+
+from ..workspaces.run_state import STORED
+from .history import ChartLog, StepLog
+from .run_log import RunLog
+
+CHART_ROOM = 64  # charts of a slice at first, half of what there is room for
+LARGEST_SLICE = 1 << 17  # steps, and charts that are kept in one piece
+BLOCK_ROOM = 1 << 22  # floats of a slice's blocks
+
+
+class Recorder:
+    """All that a run records, slice by slice.
+
+    Attributes
+    ----------
+    log : RunLog
+        Of the present slice.
+    out, blocks : ndarray
+        After `close`: those of the whole run.
+    steps : StepLog
+        Or None, where no history is kept.
+    passed : ChartLog
+        The charts before those of the log; or None.
+    most : int
+        Steps of a slice at most.
+    """
+
+    def __init__(self, task, run):
+        self.run, self.times, self.stops = run, task.times, task.stops
+        self.per_step, self.dense = task.times.size == 0, run.numbers.dense == STORED
+        self.steps, self.passed = (StepLog(), ChartLog()) if task.history else (None, None)
+        self.most = max(BLOCK_ROOM // run.block.size, 1) if self.dense else LARGEST_SLICE
+        n, rooms = run.now.shape[1], 2 * CHART_ROOM
+        self.charts, self.points = np.empty((rooms, 5)), np.empty((rooms if run.numbers.dense else 0, n))
+        self.out = np.empty((task.times.size, 1 + 3 * n + run.remembered.size))
+        self.blocks, self.log = np.empty((0, run.block.size)), None
+        self._parts = [], []  # of out and blocks
+
+    def begin_slice(self, rows):
+        """Make room for a slice of so many steps; what was recorded before is kept."""
+        if self.log is not None:
+            self._collect()
+            self._make_room_for_charts()
+        if self.per_step:
+            self.out = np.empty((rows + 1, self.out.shape[1]))
+        if self.dense:
+            self.blocks = np.empty((rows, self.blocks.shape[1]))
+        history = np.empty((rows, 3))
+        self.log = RunLog(self.times, self.stops, self.out, history, self.charts, self.points, self.blocks)
+
+    def close(self):
+        """Put the slices together."""
+        run = self.run.numbers
+        self._collect()
+        if not self.dense and run.chart_rows > CHART_ROOM:  # fewer are logged with the last one
+            self._pass_charts()
+        self.out = _joined(self.out, self._parts[0]) if self.per_step else self.out[: run.rows]
+        if self.dense:
+            self.blocks = _joined(self.blocks, self._parts[1])
+
+    def chart_history(self, charts):
+        """The history of charts, with those that are left at the end; or None."""
+        if self.passed is not None:
+            self.passed.add(charts, self.steps)
+        return self.passed
+
+    def _collect(self):
+        """Take what the slice has written, so that the driver begins at the first rows again."""
+        run, (out, blocks) = self.run.numbers, self._parts
+        if self.per_step and run.rows:
+            out.append(self.out[: run.rows])
+            run.rows = 0
+        if self.dense and run.blocks:
+            blocks.append(self.blocks[: run.blocks])
+            run.blocks = 0
+        if run.history:
+            if self.steps is not None:
+                self.steps.add(self.log.history[: run.history])
+            run.history = 0
+
+    def _make_room_for_charts(self):
+        full = self.run.numbers.chart_rows + CHART_ROOM > len(self.charts)
+        if not self.dense:
+            self._pass_charts()
+        if full and (self.dense or len(self.charts) < LARGEST_SLICE):
+            self.charts, self.points = _doubled(self.charts), _doubled(self.points)
+
+    def _pass_charts(self):
+        """Log the charts that have been left, and let the present one be the first."""
+        run, charts, points = self.run.numbers, self.charts, self.points
+        left = run.chart_rows
+        if self.passed is not None:
+            self.passed.add(charts[:left], self.steps)
+        charts[0], points[:1] = charts[left], points[left : left + 1]
+        run.chart_rows = 0
+
+
+def _doubled(rows):
+    return np.concatenate((rows, np.empty_like(rows)))
+
+
+def _joined(rows, parts):
+    """The parts in one array, which is none of theirs."""
+    return parts[0].copy() if len(parts) == 1 else np.concatenate((rows[:0], *parts))

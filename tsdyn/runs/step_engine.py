@@ -1,0 +1,110 @@
+"""The engine of methods with a step kernel; see run.py."""
+
+from ..formulations.registry import formulation
+from ..methods.diagonally_implicit import prepare_implicit
+from ..methods.plug_in import called_for
+from ..rows.interface import redundancy
+from ..workspaces.run_state import lay_out
+from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
+from .dense_output import read, warm_size
+from .reader import Reading
+from .step_memory import StepMemory
+
+
+class StepEngine:
+    """A run by a method with a step kernel, in a formulation."""
+
+    def __init__(self, task):
+        prepared, method, form = task.prepared, task.method, task.form.serving(task.method)
+        self.task = task._replace(form=form)
+        n, m, packed = prepared.n, prepared.m, prepared.packed
+        self.network = form.network(packed)
+        self.sizes = form.sizes(n, m, self.network)
+        self.step, self.tableau, scratch = method.kernel(form.first_order)
+        self.interpolant = method.interpolant(form.first_order)
+        lengths = self.tableau.size, scratch(*self.sizes), self.interpolant.size(n, *self.sizes)
+        self.lengths = dict(zip(("tableau", "memory", "block"), lengths, strict=True))
+        self.system, kept = prepared.system(method.implicit)
+        rows = len(self.network.row) if form.basis_free else None
+        self.kind = form.name, rows, method.implicit, kept, *self.sizes, *lengths
+        self.skipped = (prepared.spheres, prepared.still, 0) if form.basis_free else (0, 0, 0)
+
+    def memory(self):
+        """A new `StepMemory`."""
+        task = self.task
+        given = task.form.basis_free, task.method.implicit, self.sizes, self.lengths
+        return StepMemory(task.prepared, self.network, *given)
+
+    def serves(self, memory):
+        """Whether the memory is not that of the scene before it was changed."""
+        return memory.network is self.network
+
+    def enter(self, memory):
+        """Clear the memory, and enter the task and the numbers of the method."""
+        task, method, run, nx = self.task, self.task.method, memory.run, self.sizes[0]
+        memory.clear(task, self.system)
+        run.tableau[:] = self.tableau
+        given = method, task.form, self.step, self.interpolant
+        _set(run.kernels, kernels_of(*given, adaptive=method.step is None, within=task.within))
+        run.numbers.first_order = task.form.first_order
+        if method.step is None:
+            run.clock.turn_share = run.clock.error_before = 1.0
+            run.clock.exponent = 1.0 / (method.embedded_order + 1)
+            if method.stability_limit and not task.form.first_order:
+                run.clock.stability_limit = method.stability_limit
+                run.numbers.last_stage = 2 * len(method.tableau.c) * nx
+        if method.implicit:
+            prepare_implicit(memory.context.linear, method, task.form.implicit())
+            run.numbers.stage_at = (2 * len(method.tableau.c) + 1) * nx
+
+    def reading(self, memory):
+        """A `Reading` of the steps; a function and its arguments that make it in another process."""
+        task, kernels = self.task, memory.run.kernels.as_dict()
+        packed, again = task.prepared.packed, (task.method, task.form.name, task.constraint_tol)
+        return _reading(packed, task.form, task.constraint_tol, kernels), (read_again, packed, *again)
+
+
+def read_again(packed, method, name, constraint_tol):
+    """A `Reading` in another process than the run's."""
+    form = formulation(name).serving(method)
+    step, interpolant = method.kernel(form.first_order)[0], method.interpolant(form.first_order)
+    kernels = kernels_of(method, form, step, interpolant, adaptive=False, within=True)
+    return _reading(packed, form, constraint_tol, kernels)
+
+
+def _reading(packed, form, constraint_tol, kernels):
+    n, m, system = int(packed.system.bodies[:, 1].sum()), len(packed.system.segments), packed.system
+    network = form.network(packed)
+    sizes = form.sizes(n, m, network)
+    rows, redundant = len(network.row) if form.basis_free else None, redundancy(network)
+
+    def workspace():
+        own = system._replace(reals=system.reals.copy())  # the motions' places are written to
+        work = allocate(n, m, len(packed.bodies), constraint_tol, packed.size, rows, redundant)
+        parts = basis_free_parts(network, n, not form.basis_free)
+        run = lay_out(n, *sizes, 0, 0, warm=warm_size(work))
+        _set(run.kernels, kernels)
+        return Context(own, work, allocate_linear(own, n, m, False), *parts), run
+
+    return Reading(read, workspace, system, shift=1, degree=8)
+
+
+def kernels_of(method, form, step, interpolant, adaptive, within):
+    """Addresses that the driver and the reader call, by their names in `Kernels`.
+
+    within: whether anything is asked for between the ends of steps.
+    """
+    called, plug_in = called_for(step)
+    kernels = {"step": called, "plug_in": plug_in}
+    if adaptive:
+        kernels |= dict(zip(("error", "second_error"), method.errors, strict=False))
+        kernels["error_norm"] = form.kernels.error_norm
+    if within:
+        kernels |= {"fill": interpolant.fill, "value": interpolant.value}
+        kernels["second"] = method.second if method.implicit else None
+    return form.addresses() | {name: kernel.address for name, kernel in kernels.items() if kernel is not None}
+
+
+def _set(record, numbers):
+    for name, number in numbers.items():
+        setattr(record, name, number)

@@ -1,0 +1,91 @@
+"""Thresholds of the drivers: step control, stops, charts, events, slices. Those of root isolation are in maths."""
+
+from ..maths.root_isolation import EPS
+
+# --- times -----------------------------------------------------------------------------------------------------------
+# Shortest step, relative to |t|: two units in the last place. Near t = 0 relative to FROM_ZERO of the interval.
+SHORTEST, FROM_ZERO = 4e-16, 1e-3
+
+# Part of a step by which the last one of a run may be longer than chosen, so that no tiny one is left: a thousandth
+# changes its error by less than a hundredth at order 8. A step that is at max_step already (AT_LONGEST of it) may pass
+# it by rounding only.
+STRETCH, AT_LONGEST, ROUNDING_STRETCH = 1e-3, 0.999, 1e-9
+
+# Part of a fixed step: a stop nearer than this to a time of the grid stands for it, rather than leave a step of which
+# only rounding is seen.
+SLIVER = 1e-6
+
+# Part of the step wanted: a step cut to less at a stop says nothing of the next one.
+CUT_SHORT = 0.5
+
+# Part of a sampling period: instants that are nearer are the same one, computed in two ways.
+SAME_INSTANT = 1e-9
+
+# Sampling instants of a run at most: 16 bytes each, 0.5 GB.
+MOST_INSTANTS = 1 << 25
+
+# --- step control ----------------------------------------------------------------------------------------------------
+# Safety factor, and bounds on the ratio of a step to the one before: Hairer, Norsett, Wanner, Solving ODEs I, II.4.
+SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
+
+# Exponents of the PI control, times 1 / (order of the estimate + 1): Gustafsson's, as in Solving ODEs II, IV.2.
+PI_ERROR, PI_BEFORE = 0.7, 0.4
+
+# Errors, over the tolerance, below which the next step is not made longer still; and that the control remembers.
+LEAST_ERROR, LEAST_BEFORE = 1e-10, 1e-4
+
+# Weight of the second estimate in Hairer's combination of two orders (DOP853: Solving ODEs I, II.10).
+SECOND_ESTIMATE = 0.1
+
+# First step (Solving ODEs I, II.4): norms below TOO_SMALL don't tell it, and it is TRIAL s; its error is to be
+# FIRST_ERROR; x' and x'' below NO_SLOPE count as zero; it is FIRST_GROWTH times the trial at most, and the trial
+# FIRST_PART of the run.
+TOO_SMALL, TRIAL, FIRST_ERROR, NO_SLOPE, FIRST_GROWTH, FIRST_PART = 1e-5, 1e-6, 0.01, 1e-15, 100.0, 0.1
+
+# Factors of the step after a stage that was not solved, and after a step that left a chart at once.
+HALVED, QUARTERED = 0.5, 0.25
+
+# Steps at the limit of stability until a motion is called stiff; below it until they are forgotten: Solving ODEs II,
+# IV.2, takes 15 and 6.
+STIFF_STEPS, MILD_STEPS = 15, 6
+
+# --- charts ----------------------------------------------------------------------------------------------------------
+# |d| of all bodies, the sine of half the turn since q0: a step that turns bodies by less (11 degrees) is no long one,
+# and a chart that it loses is a small one.
+HARDLY_TURNED = 0.1
+
+# --- rotation limit of driven scenes ---------------------------------------------------------------------------------
+# rad in a step, from speeds and accelerations at its start: a sine is sampled six times a turn.
+MOST_TURN = 1.0
+# rad, from the speeds at both ends, from which a step is rejected: short of half a turn, which reads as one backwards.
+TOO_FAR = 2.5
+# Growth of the part of MOST_TURN that is tried, from step to step, after a chart has failed at all of it.
+TURN_GAIN = 1.05
+
+# --- events ----------------------------------------------------------------------------------------------------------
+# rad that a body turns in a step: less needs half of the samples, more needs the most.
+SLOW_TURN, FAST_TURN = 0.1, 2.0
+
+# A value, or a time, that is no more than this beside others is that of the run's start: rounding of some dozen
+# operations of an event function.
+START_ZERO = 64.0 * EPS
+
+# Relative change of a state by which the rounding error of an event function is measured, and how much larger than the
+# largest change it is taken for: three changes of random signs are tried.
+SHAKEN, NOISE = 4.0 * EPS, 4.0
+
+# s, and relative: how near to a zero Brent's method comes.
+ROOT = 4.0 * EPS
+
+# --- slices ----------------------------------------------------------------------------------------------------------
+# s between returns to Python: progress bars and Ctrl-C answer at once, at a cost of 0.1 ms a slice.
+SLICE_SECONDS = 0.2
+
+# Steps tried over which the pace of a run is taken; a run with HOPELESS as many to go would take days.
+PACED, HOPELESS = 1000, 1e10
+
+# A run whose pace, in s a step, has more than doubled since it was taken last gets on.
+GETTING_ON = 2.0
+
+# Relative rounding error of (t1 - t0) / step that counts no step more.
+SAME_COUNT = 1e-12

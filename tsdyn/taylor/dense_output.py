@@ -1,0 +1,45 @@
+"""Dense output of a Taylor run: the series of a step, evaluated and projected onto the manifold."""
+
+import numpy as np
+
+from ..elements.loops.body_poses import place_bodies
+from ..elements.loops.constraint_series import BODY_ROW
+from ..jit.kernels import entry
+from ..maths.dense_linalg import copy
+from ..rows.interface import allocate_free
+from ..runs.dense_output import put_state, recall
+from ..workspaces.run_state import B_DATA, B_START, lay_out, load_run
+from ..workspaces.workspace import plain_work
+from .step_parts import set_floor, state_within
+from .workspace import SeriesContext, Trial, load_series, no_series
+
+
+@entry
+def read_series(context, run, t, rows, blocks, charts, points, out):
+    """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows]; as runs.dense_output.read. Status."""
+    c, r = load_series(context), load_run(run)
+    w, x = c.work, c.expansion
+    for i in range(t.size):
+        block = blocks[rows[i]]
+        data = block[B_DATA:]
+        x.order.top = int(data[0])
+        copy(data[1:][: w.q.size], w.q)
+        copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
+        recall(c.system, block)
+        set_floor(c, w.q)
+        place_bodies(c.network.bodies, w.q, c.free.poses)  # which of p and -p is meant
+        status = state_within(context, c, r.kernels, t[i], t[i] - block[B_START])
+        if status != 0:
+            return status
+        put_state(w, out[i])
+    return 0
+
+
+def reading_workspace(system, network, orders, size):
+    """Context and run of a reader, with room for so many orders; size: of the numbers in the constraints."""
+    own = system._replace(reals=system.reals.copy())
+    n = int(own.bodies[:, 1].sum())
+    work = plain_work(n)
+    work.control.size = size
+    expansion = no_series(orders, np.zeros((len(network.bodies) + 1) * BODY_ROW * orders))
+    return SeriesContext(own, work, network, allocate_free(network, n), expansion, Trial()), lay_out(n, 0, 0, 0, 0)

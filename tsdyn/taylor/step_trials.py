@@ -1,0 +1,178 @@
+"""Trials of a Taylor step: its length, its end, and what is tried next near a singular configuration.
+
+A step that ends near a singular configuration is lengthened, at looser tolerances, until it ends beyond; if no length
+passes, the step that the tolerance of the run asks for is taken where it serves, or is shortened to end before.
+"""
+
+import math
+
+from ..elements.loops.body_poses import OMEGA, POSE, move_bodies, place_bodies
+from ..errors import Status
+from ..jit.kernels import kernel
+from ..maths.dense_linalg import copy
+from ..model.equations import set_time
+from ..rows.interface import is_near_singular, singularity_indicator
+from ..runs.breakpoints import fixed_end
+from ..runs.run_log import note_try
+from ..runs.step_control import gets_on, stretch
+from .step_length import is_near, longest, loosest, step_length
+from .step_parts import call_expand, call_reach, is_singular
+from .tolerances import (
+    AVOID,
+    AVOIDING,
+    CLOSE,
+    CLOSER,
+    HALVED,
+    LOOSER,
+    MISSED,
+    MOST_TURN,
+    NO_SPEED,
+    PASSED,
+    TIGHTER,
+    TIGHTEST,
+)
+
+STEP_COLLAPSED, PASSAGE = int(Status.STEP_COLLAPSED), int(Status.PASSAGE)
+
+
+@kernel
+def go_to_start(c, r):
+    """The poses at the step's start, from where p is followed."""
+    copy(r.now[0], c.work.q)
+    place_bodies(c.network.bodies, c.work.q, c.free.poses)
+
+
+@kernel
+def stand_at(context, c, r, t):
+    """Poses, H and the factors of S at the last accepted q, qd, for a series to begin there. Status."""
+    w = c.work
+    set_time(c.system, t)
+    copy(r.now[0], w.q)
+    copy(r.now[1], w.qd)
+    place_bodies(c.network.bodies, w.q, c.free.poses)
+    move_bodies(c.network.bodies, w.q, w.qd, c.free.poses)
+    return call_reach(r.kernels.reach, context, t, -1.0)
+
+
+@kernel
+def _fastest(c):
+    """Return the largest angular velocity."""
+    square = 0.0
+    for b in range(c.network.bodies.shape[0]):
+        w = c.free.poses[b * POSE + OMEGA : b * POSE + OMEGA + 3]
+        square = max(square, w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    return math.sqrt(square)
+
+
+@kernel
+def _propose(c, r, tol):
+    """The first step to try."""
+    s, order = c.trial, c.expansion.order
+    s.shorter, s.share, s.serves, s.looser, s.tol, s.highest = 0, math.inf, 0, r.numbers.adaptive, tol, order.top
+    s.h = step_length(c, r)
+    if r.numbers.adaptive == 0:
+        s.h = r.clock.h
+        return
+    if is_near_singular(c.free, c.free.indicator.start):
+        s.tol = max(TIGHTER * tol, min(tol, TIGHTEST))
+        s.h = longest(c, r, s.tol, s.highest)
+    s.limit = r.clock.max_step
+    if c.system.memory.size > 0:  # what counts turns must see each of them
+        s.limit = min(s.limit, MOST_TURN / max(_fastest(c), NO_SPEED))
+    if r.numbers.steps == 0 and r.clock.h > 0.0:
+        s.limit = min(s.limit, r.clock.h)
+    s.h = min(s.h, s.limit)
+    s.own_h, s.own_top, s.own_tol = s.h, order.top, s.tol
+
+
+@kernel
+def _end(s, r, stop):
+    """Where the step tried ends; False if it is no more than the rounding of t."""
+    if r.numbers.adaptive == 0:
+        s.t1, last, cut = fixed_end(r, stop)
+        s.last, s.cut = 1 if last else 0, 1 if cut else 0
+    else:
+        end = min(stop, r.clock.t_end)
+        s.t1 = r.clock.t + s.h
+        if s.t1 + stretch(s.h, r.clock.max_step) >= end:
+            s.t1 = end
+        s.last, s.cut = 1 if s.t1 == r.clock.t_end else 0, 0
+    return gets_on(r, r.clock.t, r.clock.t + s.h)
+
+
+@kernel
+def _attempt(context, c, r):
+    """The state at the end of the step tried. Status; PASSAGE if that takes a kernel that isn't loaded."""
+    s, h = c.trial, c.trial.t1 - r.clock.t
+    s.singular = 0
+    status = call_reach(r.kernels.reach, context, s.t1, h)
+    if s.last == 1 and is_singular(c, status):
+        if r.kernels.pass_singular == 0:
+            return PASSAGE
+        s.singular = 1
+        status = call_reach(r.kernels.pass_singular, context, s.t1, h)
+    return status
+
+
+@kernel
+def _is_taken(c, landed):
+    """Whether a step that has landed, or not, is taken as it is."""
+    s = c.trial
+    if not landed:
+        return False
+    if s.shorter == AVOIDING or s.last == 1 or not is_near(c, CLOSER if s.looser == 1 else CLOSE):
+        return True
+    return s.looser == 1 and c.free.indicator.end > s.share and not is_near(c, PASSED)
+
+
+@kernel
+def _choose_next(c, r, landed, tol):
+    """Choose the next step to try; False if there is none better than the last one."""
+    s, order = c.trial, c.expansion.order
+    if landed and s.share == math.inf and not is_near(c, CLOSE):
+        s.serves = 1
+    longer = 0.0
+    if s.looser == 1 and landed and LOOSER * s.tol <= loosest(c, tol):
+        s.share, s.tol = c.free.indicator.end, LOOSER * s.tol
+        longer = min(longest(c, r, s.tol, s.highest), s.limit)
+    if longer > s.h:
+        s.h = longer
+        return True
+    if s.looser == 1 and s.serves == 1 and s.h == s.own_h:
+        return False
+    if s.looser == 1:  # no step passes: the own one, or a shorter one
+        landed = landed or s.share < math.inf
+        s.h, order.top, s.tol, s.looser = s.own_h, s.own_top, s.own_tol, 0
+    if s.serves == 0:
+        s.shorter += 1 if landed else 0
+        s.h *= AVOID if landed else HALVED
+    s.serves = 0
+    return True
+
+
+@kernel
+def make_step(context, c, r, log, stop):
+    """Reach the end of the next step, t1 of the trial, by a series that has been expanded. Status."""
+    f, s, tol = c.free, c.trial, r.clock.atol + r.clock.rtol
+    adaptive = r.numbers.adaptive == 1
+    _propose(c, r, tol)
+    while True:
+        if not _end(s, r, stop):
+            return STEP_COLLAPSED
+        note_try(r, log, r.clock.t, s.t1 - r.clock.t)
+        status = _attempt(context, c, r)
+        if status == PASSAGE:  # back to where the run is
+            status = stand_at(context, c, r, r.clock.t)
+            call_expand(r.kernels.expand, context, 0)
+            return PASSAGE if status == 0 else status
+        landed = status == 0 and (not adaptive or f.landing.residual <= MISSED * (s.tol + c.work.control.floor))
+        if landed:
+            f.indicator.end = singularity_indicator(c.network, f.rows)
+        if not adaptive:
+            return status
+        if _is_taken(c, landed) or not _choose_next(c, r, landed, tol):
+            return 0
+        go_to_start(c, r)
+        r.numbers.rejected += 1
+        if r.numbers.history + 1 < log.history.shape[0]:
+            r.numbers.history += 1

@@ -1,0 +1,58 @@
+"""Thresholds of Taylor runs: length of a step, passage of singular configurations, stiffness.
+
+Shares are values of the singularity indicator (rows/singularity.py), which falls as the square of the distance.
+"""
+
+# --- length and order ------------------------------------------------------------------------------------------------
+# Cost of a step's end (projection, factors of S, poses), in orders of its series: benchmarks/measure.py, chain of 16.
+STEP_COST = 3
+
+# Landing, over tolerance and rounding of Phi, beyond which the projection corrects no truncation error: the radius of
+# convergence was wrong.
+MISSED = 100.0
+
+# rad of the fastest body in a step where joint angles are counted by forces: two steps a turn would do.
+MOST_TURN = 1.0
+
+# Factor of a step whose end was not reached.
+HALVED = 0.5
+
+# Angular velocity (rad/s) that counts as none.
+NO_SPEED = 1e-300
+
+# --- stiffness -------------------------------------------------------------------------------------------------------
+# rad, and part of the scene's size: a step that turns and moves everything by less is limited by something that can't
+# be seen. So many of them in a row, and the motion may be stiff (docs/design-decisions.md).
+SMALL, SMALL_STEPS = 0.02, 40
+
+# --- singular configurations -----------------------------------------------------------------------------------------
+# Pivot of S, over its diagonal entry, below which accelerations by elimination have lost as many digits, so that those
+# of the series are taken. Below GONE a row is left out of a projection: it would make more of what positions are off by
+# than the series is.
+NEXT_TO_SINGULAR, GONE = 1e-8, 1e-10
+
+# Share of a step's end, over that of its start, from which the step has come closer; is too close to go on from; is
+# too close even if it has passed. Measured on rows of parallelograms (tests/test_singular_passage.py).
+CLOSER, CLOSE, PASSED = 0.3, 0.1, 0.02
+
+# A step that ends there is shortened by this factor, so many times: to 0.17 of its length.
+AVOID, AVOIDING = 0.7, 5
+
+# Factor of the tolerance from one try to pass to the next; loosest tolerance of a step past from elsewhere, and from
+# close by, where lam has few digits; least order of its series.
+LOOSER, FAR_PASSING, PASSING, LEAST_ORDER = 2.0, 1e-13, 1e-10, 5
+
+# Tolerance of a step that starts next to a singular configuration, over that of the run, and the least of it: rounding
+# errors of lam grow there by the ratio of step length to distance.
+TIGHTER, TIGHTEST = 0.01, 1e-16
+
+# Share, over the largest one of the run, below which a run goes on with a part SPARE of its tolerance: what is lost
+# there is made up elsewhere.
+WARY, SPARE = 0.06, 0.1
+
+# --- size ------------------------------------------------------------------------------------------------------------
+# Bodies from which lam is refined once in every run: errors of a solution by elimination grow with their number.
+MANY = 100
+
+# Orders of all bodies, about a hundred bytes each, from which series exceed the near caches (3 MB).
+FAR = 1 << 15

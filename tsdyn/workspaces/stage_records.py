@@ -1,0 +1,28 @@
+"""Numbers and addresses of an implicit method's stages, in its `Linear`."""
+
+from ..jit.kernels import Record
+
+
+class StageNumbers(Record):
+    """Settings of the stages' Newton iteration, and what it knows from one stage to the next."""
+
+    rtol: float
+    atol: float
+    g: float  # h a_ii of the factors in P; 0 where there are none
+    chart: int  # counter of charts when P was made
+    known: int  # whether there are stiffness and damping
+    theta: float  # contraction that the last stage measured
+    t_before: float  # s, start of the last step; -inf for the first one
+    eager: int  # stages that are still to be begun with a matrix of their own
+
+
+class StageKernels(Record):
+    """Addresses of the kernels in formulations/linearisation.py, of `complete` and of the error norm."""
+
+    linearise: int
+    reduce: int
+    factorise: int
+    solve: int
+    soften: int
+    complete: int
+    error_norm: int

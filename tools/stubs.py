@@ -58,6 +58,7 @@ def _class(cls: type, public: set[str]) -> str:
     inherited = {name for base in bases for name in dir(base)} - {"at"}
     inherited |= {name for base in cls.__mro__ for name in inspect.get_annotations(base)}
     inherited |= {*inspect.signature(cls).parameters}  # said by _attributes
+    inherited |= {name for pair in pairs for name in vars(getattr(hints, PAIRS[pair]))}
     for name in [name for name in dir(cls) if not name.startswith("_") and name not in inherited]:
         value = inspect.getattr_static(cls, name)
         if name == "at":

@@ -107,6 +107,10 @@ class JointLoads:
     def which(self) -> int:
         """The index of the coordinate."""
 
+    @property
+    def geometry(self) -> Any:
+        """Where the coordinate is measured."""
+
 
 class References:
     """Attributes of one that measures an angle between two directions."""

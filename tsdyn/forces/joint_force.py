@@ -8,10 +8,8 @@
 The power of (1) is F sd for any motion of the bodies.
 """
 
-import math
-
 from ..constraints.translational import Translational
-from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements
+from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements, load_at
 
 
 class JointForce(JointLoad, Force):
@@ -76,19 +74,12 @@ class JointForce(JointLoad, Force):
         return par[0]
 
 
-function = None  # filled in by `ByState`
-
-
 def _law(x, xd, par, t, out):
     s, rate = 0.0, 0.0
     for i in range(3):
         s += x[i] * (x[6 + i] - x[3 + i])
         rate += x[i] * (xd[6 + i] - xd[3 + i]) + xd[i] * (x[6 + i] - x[3 + i])
-    force = math.nan
-    try:
-        force = float(function(t, s, rate))
-    except Exception:
-        force = math.nan
+    force = load_at(t, s, rate)
     for i in range(3):
         out[i], out[3 + i], out[6 + i] = force * (x[6 + i] - x[3 + i]), -force * x[i], force * x[i]
 

@@ -7,12 +7,10 @@
 The power of (1) is T times the rate of the angle if the joint holds the axis.
 """
 
-import math
-
 import numpy as np
 
 from ..constraints.revolute import Revolute
-from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles
+from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles, load_at
 
 
 class JointTorque(JointLoad, Force):
@@ -88,17 +86,10 @@ class JointTorque(JointLoad, Force):
         return par[0]
 
 
-function = None  # filled in by `ByState`
-
-
 def _law(x, xd, par, t, out):
     turned = angle_about(x, par[0])
     rate = x[0] * (xd[12] - xd[9]) + x[1] * (xd[13] - xd[10]) + x[2] * (xd[14] - xd[11])
-    torque = math.nan
-    try:
-        torque = float(function(t, turned, rate))
-    except Exception:
-        torque = math.nan
+    torque = load_at(t, turned, rate)
     for i in range(9):
         out[i] = 0.0
     for i in range(3):

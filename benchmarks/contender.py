@@ -1,6 +1,8 @@
 """The interface of a contender: it runs a scene to its end at a tolerance or step size and reports the time."""
 
 import time
+from importlib import import_module
+from importlib.metadata import version
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +31,8 @@ class Contender:
         "tolerance" or "step" (s).
     values : tuple of float
         What is worth trying, the cheapest first.
+    package : str
+        The module that it runs, installed from the registry.
     largest : int
         The largest scene with a definition of its own that it runs, in bodies.
     calls : int
@@ -40,13 +44,17 @@ class Contender:
     name = ""
     setting = "tolerance"
     values = tuple(10.0**-k for k in range(2, 15))
+    package = ""
     largest = 0
     calls = 9
     get = ""
 
     def version(self):
         """What of which version runs, as text; raises ImportError (or OSError) where it isn't there."""
-        return ""
+        if not self.package:
+            return ""
+        import_module(self.package)
+        return f"{self.package} {version(self.package.replace('_', '-'))}"
 
     def missing(self):
         """Return a line that says how to get it, empty where it is there."""

@@ -23,20 +23,20 @@ if TYPE_CHECKING:
 
 
 class AngleDriver(Primitive):
-    """Keep the angle from a direction of a to a direction of b, about an axis of a, as a function of time.
+    """Prescribe the angle from a direction of a to a direction of b, about an axis of a, as a function of time.
 
-    `RotationMotor` is made of it and finds the directions by itself.
+    `RotationMotor` is the joint that uses it and derives the directions.
 
     Parameters
     ----------
     a, b : Body or ground
         Two different bodies of one scene, held on a common axis by a joint.
     reference_a, across_a : array_like (3,)
-        Directions of a across the axis, at right angles: the angles 0 and pi/2. Scaled to unit length.
+        Directions of a at the angles 0 and pi/2, perpendicular to the axis; scaled to unit length.
     reference_b : array_like (3,)
-        The direction of b that is at the angle.
+        The direction of b whose angle is prescribed.
     angle : one of ts.motions, function(s) of time, or float, rad
-        The angle prescribed; it may go on over any number of turns.
+        The prescribed angle, over any number of turns.
 
     Examples
     --------
@@ -61,12 +61,12 @@ class AngleDriver(Primitive):
         self.angle = angle
 
     def __setattr__(self, name, value):
-        """Set an attribute, checked; an angle is always a motion."""
+        """Set a checked attribute; an angle is always a motion."""
         super().__setattr__(name, Motion.always(value, f"{self.name}: angle") if name == "angle" else value)
 
     @property
     def opposed(self) -> tuple[Any, ...]:
-        """The directions that must not be opposed: that at the angle, and reference_b."""
+        """The pair of directions that must not be opposed: the one at the prescribed angle, and reference_b."""
         return (((self.a, Turned(self.reference_a, self.across_a, self.angle)), (self.b, self.reference_b)),)
 
     def parameters(self):
@@ -132,7 +132,7 @@ class AngleDriver(Primitive):
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random instance; its angle stands still."""
+        """A random instance with constant angle."""
         f, g, h = rng.normal(size=(3, 3))
         return cls(a, b, reference_a=f, across_a=g, reference_b=h, angle=rng.normal())
 
@@ -152,7 +152,7 @@ def sine_cosine_rates(x, xd, h):
 
 
 class Turned:
-    """The direction at a motion's angle between two that are at right angles: a function of time."""
+    """The direction at a prescribed angle in the plane of two perpendicular directions: a function of time."""
 
     def __init__(self, f: float, g: float, angle: Prescribed) -> None:
         self.f, self.g, self.angle = f, g, angle

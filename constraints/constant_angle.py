@@ -20,13 +20,12 @@ if TYPE_CHECKING:
 
 
 class ConstantAngle(Joint):
-    """Keep the angle between a direction of one body and a direction of another.
+    """Constant angle between a direction of one body and a direction of another.
 
     Parameters
     ----------
     angle : float or one of ts.motions, rad; optional
-        The angle kept, between 0 and pi (exclusive: there the row is singular); None takes that of the bodies as they
-        stand now.
+        The angle, between 0 and pi (exclusive: the row is singular there); None takes the angle of the present poses.
 
     Raises
     ------
@@ -58,7 +57,7 @@ class ConstantAngle(Joint):
         self.check()
 
     def check(self):
-        """An angle at which the row is regular."""
+        """Refuse an angle at which the row is singular."""
         angle = number(self.angle(0.0) if isinstance(self.angle, Smooth) else self.angle)
         if not (0.0 < angle < math.pi and abs(math.cos(angle)) < 1.0):
             raise self.error(

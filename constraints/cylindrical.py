@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Cylindrical(Joint):
-    """Let one body turn about an axis of another and slide along it.
+    """Rotation about a common axis and translation along it: a cylindrical joint.
 
     Notes
     -----

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 class Distance(Primitive):
-    """Keep a distance between a point of one body and a point of another: a massless rod with two ball ends.
+    """Distance between a point of one body and a point of another: a massless rod with two ball joints.
 
     Parameters
     ----------
     length : float, or three functions of time (L, Ld, Ldd), m; optional
-        The distance kept, > 0; None takes the distance of the bodies as they stand now.
+        The distance, > 0; None takes the distance in the present poses.
 
     Raises
     ------
@@ -62,7 +62,7 @@ class Distance(Primitive):
         self.check()
 
     def check(self):
-        """A positive length."""
+        """Refuse a length that is not positive."""
         initial = Motion.at_start(self.length)
         if not initial > 0.0:
             raise self.error(

@@ -18,13 +18,34 @@ if TYPE_CHECKING:
     from ..hints import BodyLike, Prescribed
 
 
-class Dot1(Primitive):
-    """Keep the cosine of the angle between two body-fixed directions; by default keep them perpendicular.
+class Prescribed:
+    """Mixed in before `Primitive`: one row f(x) - value(t), Phi_t of Eq. (3)."""
+
+    rows = 1
+    prescribed = "value"
+
+    def parameters(self):
+        """(c, cd, cdd)."""
+        return Motion.places(self.value)
+
+    @staticmethod
+    def phi_t(x, par, t, out):
+        """Eq. (3)."""
+        out[0] = -par[1]
+
+    @staticmethod
+    def series_t(x, par, k, s, out):
+        """Of Eq. (3); c is in row 0."""
+        out[0] = -(k + 1.0) * s[0, k + 1]
+
+
+class Dot1(Prescribed, Primitive):
+    """Cosine of the angle between two body-fixed directions; by default zero: they are perpendicular.
 
     Parameters
     ----------
     value : float, or three functions of time (c, cd, cdd); default 0
-        The cosine, between -1 and 1 (exclusive: there the row is singular).
+        The cosine, between -1 and 1 (exclusive: the row is singular there).
 
     Examples
     --------
@@ -37,9 +58,7 @@ class Dot1(Primitive):
     5
     """
 
-    rows = 1
     markers = (Vector("a"), Vector("b"))
-    prescribed = "value"
 
     def __init__(self, a: BodyLike, b: BodyLike, *, value: Prescribed = 0.0, **places: Any) -> None:
         super().__init__(a, b, **places)
@@ -47,17 +66,13 @@ class Dot1(Primitive):
         self.check()
 
     def check(self):
-        """A cosine."""
+        """Refuse a value that is no cosine."""
         initial = Motion.at_start(self.value)
         if not -1.0 < initial < 1.0:
             raise self.error(
                 f"{self.name}: value is the cosine of an angle and must lie between -1 and 1, got {initial:g}; "
-                "to make two axes parallel, keep each of two directions across one of them perpendicular to the other."
+                "for parallel axes use Parallel."
             )
-
-    def parameters(self):
-        """(c, cd, cdd)."""
-        return Motion.places(self.value)
 
     @staticmethod
     def phi(x, par, t, out):
@@ -72,19 +87,9 @@ class Dot1(Primitive):
             out[0, 3 + i] = x[i]
 
     @staticmethod
-    def phi_t(x, par, t, out):
-        """Eq. (3)."""
-        out[0] = -par[1]
-
-    @staticmethod
     def gamma(x, xd, par, t, out):
         """Eq. (4)."""
         out[0] = 2.0 * (xd[0] * xd[3] + xd[1] * xd[4] + xd[2] * xd[5]) - par[2]
-
-    @staticmethod
-    def series_t(x, par, k, s, out):
-        """Of Eq. (3); c is in row 0."""
-        out[0] = -(k + 1.0) * s[0, k + 1]
 
     @staticmethod
     def series(x, par, k, s, out):

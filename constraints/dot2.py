@@ -13,19 +13,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import Motion, Point, Primitive, Vector
+from ..plugins import Point, Primitive, Vector
+from .dot1 import Prescribed
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Prescribed
 
 
-class Dot2(Primitive):
-    """Keep the offset of a point of b from a point of a, measured along an axis of a.
+class Dot2(Prescribed, Primitive):
+    """Offset of a point of b from a point of a, along an axis of a.
 
     Parameters
     ----------
     value : float, or three functions of time (c, cd, cdd), m; default 0
-        The offset kept.
+        The offset.
 
     Examples
     --------
@@ -41,17 +42,11 @@ class Dot2(Primitive):
     [1.  0.  0.5] moved by 0.10 m
     """
 
-    rows = 1
     markers = (Vector("a"), Point("a"), Point("b"))
-    prescribed = "value"
 
     def __init__(self, a: BodyLike, b: BodyLike, *, value: Prescribed = 0.0, **places: Any) -> None:
         super().__init__(a, b, **places)
         self.value = value
-
-    def parameters(self):
-        """(c, cd, cdd)."""
-        return Motion.places(self.value)
 
     @staticmethod
     def phi(x, par, t, out):
@@ -67,19 +62,9 @@ class Dot2(Primitive):
             out[0, 6 + i] = x[i]
 
     @staticmethod
-    def phi_t(x, par, t, out):
-        """Eq. (3)."""
-        out[0] = -par[1]
-
-    @staticmethod
     def gamma(x, xd, par, t, out):
         """Eq. (4)."""
         out[0] = 2.0 * (xd[0] * (xd[6] - xd[3]) + xd[1] * (xd[7] - xd[4]) + xd[2] * (xd[8] - xd[5])) - par[2]
-
-    @staticmethod
-    def series_t(x, par, k, s, out):
-        """Of Eq. (3); c is in row 0."""
-        out[0] = -(k + 1.0) * s[0, k + 1]
 
     @staticmethod
     def series(x, par, k, s, out):

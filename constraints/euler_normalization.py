@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class EulerNormalization(Primitive):
-    """Keep the Euler parameters of a rigid body at unit length; `scene.add` returns the one that the body has.
+    """Unit length of the Euler parameters of a rigid body; `scene.add` returns the existing row of the body.
 
     Parameters
     ----------

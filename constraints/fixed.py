@@ -20,7 +20,7 @@ from .spherical import Spherical
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike
 
-DEFAULT = (0.0, 0.0, 1.0)  # the axis in a's frame; any would do
+DEFAULT = (0.0, 0.0, 1.0)  # the axis in the frame of a; its choice is arbitrary
 
 
 class Fixed(FramedJoint):
@@ -29,8 +29,8 @@ class Fixed(FramedJoint):
     Parameters
     ----------
     axis_a, axis_b, reference_a, reference_b : array_like (3,), optional
-        An axis and a direction beside it, in the bodies' own frames, that the joint keeps parallel; what is left out
-        follows from the bodies as they stand now. Without any, the bodies keep the orientation that they have.
+        An axis and a direction not parallel to it, in the body frames, which the joint keeps parallel. Directions that
+        aren't given follow from the present poses; without any, the present relative orientation is kept.
 
     Notes
     -----
@@ -55,7 +55,7 @@ class Fixed(FramedJoint):
 
     @Placing
     def at(cls, a: BodyLike, b: BodyLike | None = None, *, point: ArrayLike | None = None, **arguments: Any) -> Self:
-        """Make one from points and directions in the ground frame; none are needed."""
+        """Make the joint from points and directions in the ground frame; all are optional."""
         bodies = [body for body in (b, a) if isinstance(body, (PointMass, Ground))]
         if point is None and len(bodies) == 2 and not {"point_a", "point_b"} & arguments.keys():
             point = (bodies[0] if bodies[0].dimension else bodies[1]).position
@@ -64,7 +64,7 @@ class Fixed(FramedJoint):
         return super().at(a, b, **arguments)
 
     def _places(self, given):
-        """Fill in the axes that were left out: as the bodies stand."""
+        """Fill in missing axes from the present poses."""
         axes = [self._place(self.markers[i], DEFAULT if given[i] is None else given[i]) for i in (2, 3)]
         A, B = (rotation_matrix(body.orientation) for body in (self.a, self.b))
         if given[2] is None and given[3] is not None:

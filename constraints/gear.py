@@ -44,22 +44,22 @@ _dot, _cross = vectors.dot, vectors.cross  # by name: `twin` follows the names o
 
 
 class Gear(Primitive):
-    """Let two wheels turn in a fixed ratio, measured against the line between their centres.
+    """Fixed ratio of the rotations of two wheels, relative to the line of centres.
 
     Parameters
     ----------
     a, b : Body
-        The wheels, on parallel axes that joints to the ground or to a common carrier hold.
+        The wheels, on parallel axes held by joints to the ground or to a common carrier.
     point_a, point_b : array_like (3,), m
-        Their centres, in the bodies' own frames.
+        The centres, in the body frames.
     reference_a, reference_b : array_like (3,), optional
-        Directions across the axis in the bodies' own frames, whose angles from the line of centres are counted; by
-        default both are along it now.
+        Directions perpendicular to the axis, in the body frames, whose angles from the line of centres are counted; by
+        default along the line of centres in the present poses.
     ratio : float
-        Turn of b over turn of a, both against the carrier: -radius_a / radius_b of wheels that mesh on the outside,
-        positive for one inside the other. Not zero.
+        Rotation of b over rotation of a, both relative to the carrier: -radius_a / radius_b for external gears,
+        positive for an internal gear. Not zero.
     offset : float, rad; optional
-        theta_b - ratio theta_a; None takes that of the bodies as they stand now.
+        theta_b - ratio theta_a; None takes the value in the present poses.
 
     Raises
     ------
@@ -68,8 +68,8 @@ class Gear(Primitive):
 
     Notes
     -----
-    `Gear.at(a, b, point_a=, point_b=, axis=, ratio=)` takes the centres and the axis in the ground frame. At a start
-    theta_a lies in (-pi, pi], unless it goes on from the state of another run.
+    `Gear.at(a, b, point_a=, point_b=, axis=, ratio=)` takes the centres and the axis in the ground frame. At the start
+    theta_a lies in (-pi, pi], unless the run continues from a state.
 
     Examples
     --------
@@ -100,7 +100,7 @@ class Gear(Primitive):
         u, f, h, l = self._now()
         for word, v in (("reference_a", f), ("reference_b", h), ("the line of centres", l)):
             if not np.linalg.norm(np.cross(u, v)) > PARALLEL * np.linalg.norm(v):
-                raise self.error(f"{self.name}: {word} is along the axis at the start; it must be across it.")
+                raise self.error(f"{self.name}: {word} is along the axis at the start; it must be perpendicular to it.")
         if offset is None:
             self.check()
             one, other = (np.arctan2(u @ np.cross(l, w), l @ w) for w in (f, h))
@@ -109,7 +109,7 @@ class Gear(Primitive):
         self.check()
 
     def _places(self, given):
-        """Fill in the references that were left out: along the line of centres, far from where angles jump."""
+        """Fill in missing references: along the line of centres, far from the branch cut of the angle."""
         axis, one, other, *points = given
         if one is None or other is None:
             u = rotation_matrix(self.a.orientation) @ self._place(self.markers[0], axis)
@@ -122,7 +122,7 @@ class Gear(Primitive):
         return super()._places([axis, one, other, *points])
 
     def _now(self):
-        """u, f, h and l as the bodies stand now, ground frame."""
+        """u, f, h and l in the present poses, ground frame."""
         A, B = (rotation_matrix(body.orientation) for body in (self.a, self.b))
         u, f = A @ self.axis_a, A @ self.reference_a
         return u, beside(u, f)[0] if np.linalg.norm(np.cross(u, f)) > 0 else f, B @ self.reference_b, self._line()
@@ -136,7 +136,7 @@ class Gear(Primitive):
         if not (np.isfinite(ratio) and ratio != 0.0):
             raise self.error(
                 f"{self.name}: ratio is the turn of b over that of a and must be a finite number other than zero, got "
-                f"{self.ratio!r}; it is negative where the wheels turn opposite ways."
+                f"{self.ratio!r}; it is negative if the wheels rotate in opposite directions."
             )
         if "offset" in self.__dict__ and not np.isfinite(number(self.offset)):
             raise self.error(f"{self.name}: offset must be a finite angle in rad, got {self.offset!r}.")

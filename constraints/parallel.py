@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Parallel(Joint):
-    """Keep a direction of one body parallel to a direction of another, both pointing the same way.
+    """Directions of two bodies parallel, with the same sense.
 
     Notes
     -----

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Planar(Joint):
-    """Let one body slide on a plane of another and turn about its normal, flat on it on either side.
+    """Translation in a common plane and rotation about its normal: a planar joint.
 
     Notes
     -----

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class PlaneContact(Primitive):
-    """Keep a point of one body in a plane fixed to another, without friction and without lifting off.
+    """A point of one body in a plane fixed to another: bilateral contact without friction.
 
     Notes
     -----

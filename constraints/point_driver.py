@@ -19,23 +19,24 @@ if TYPE_CHECKING:
 
 
 class PointDriver(Joint):
-    """Lead a point of b along a path in the frame of a; its three rotations stay free.
+    """Prescribed path of a point of b in the frame of a; three rotations are free.
 
     Parameters
     ----------
     a, b : Body or ground
         Two different bodies of one scene; a is often the ground.
     path : sequence of three, m
-        The coordinates of point_b against point_a along the axes of a: one of ts.motions, a function f of time or three
-        (f, fd, fdd), data, or a float. Or data of vectors: a ts.Table, a spline of SciPy's, or (t, x) with x (k, 3).
+        The coordinates of point_b relative to point_a along the axes of a: one of ts.motions, a function f of time or
+        three (f, fd, fdd), data, or a float. Or data of vectors: a ts.Table, a spline of SciPy's, or (t, x) with x (k,
+        3).
 
     Notes
     -----
-    Three rows: path[0] to path[2]. The force that leads b is that of `solution.reaction(driver, on=b)`.
+    Three rows: path[0] to path[2]. `solution.reaction(driver, on=b)` is the driving force.
 
     Examples
     --------
-    The pivot of a pendulum goes round a circle:
+    The pivot of a pendulum moves on a circle:
 
     >>> import numpy as np
     >>> import tsdyn as ts
@@ -78,6 +79,6 @@ class PointDriver(Joint):
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random instance that stands still."""
+        """A random instance at rest."""
         one, two, path = rng.normal(size=(3, 3))
         return cls(a, b, point_a=one, point_b=two, path=path)

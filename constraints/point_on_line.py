@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class PointOnLine(Joint):
-    """Keep a point of one body on a line fixed to another.
+    """A point of one body on a line fixed to another.
 
     Notes
     -----

@@ -20,25 +20,25 @@ if TYPE_CHECKING:
 
 
 class RackAndPinion(Joint):
-    """Roll a pinion along a rack: its centre travels by radius times its turn, against the rack.
+    """A pinion on a rack: its centre travels by radius times its rotation, relative to the rack.
 
     Parameters
     ----------
     a, b : Body or ground
-        The rack and the pinion, held by other joints: the pinion turns about its axis, and the two slide along the rack
-        without turning. Often the rack slides in the ground and the pinion turns there.
+        The rack and the pinion, held by other joints, which leave rotation of the pinion about its axis and translation
+        along the rack. Often both are mounted on the ground.
     point_a, point_b : array_like (3,), m
-        A point of the rack and one on the pinion's axis, in the bodies' own frames.
+        A point of the rack and a point on the pinion's axis, in the body frames.
     axis_a, axis_b : array_like (3,)
         The pinion's axis, in the bodies' own frames; scaled to unit length.
     direction_a : array_like (3,)
-        The rack's direction, across the axis: turning the pinion positively about the axis (right hand) moves it that
-        way along the rack, or the rack the other way.
+        Direction of the rack, perpendicular to the axis: a positive rotation of the pinion about the axis (right-hand
+        rule) moves the pinion in this direction relative to the rack.
     reference_b : array_like (3,), optional
-        The direction of the pinion that is along the rack where the points are level; by default it follows from the
-        bodies as they stand now.
+        Direction of the pinion that is along the rack when the points are level; by default derived from the present
+        poses.
     radius : float, m
-        Pitch radius: travel over turn, not zero.
+        Pitch radius, travel over rotation; not zero.
 
     Raises
     ------
@@ -53,7 +53,7 @@ class RackAndPinion(Joint):
 
     Examples
     --------
-    A pinion of 0.1 m turns in the ground and moves a rack along x:
+    A pinion of 0.1 m radius moves a rack along x:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
@@ -81,7 +81,7 @@ class RackAndPinion(Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, radius: float | None = None, **places: Any) -> None:
         follows = places.get("reference_b") is None
         if follows:
-            places["reference_b"] = places.get("direction_a")  # for now
+            places["reference_b"] = places.get("direction_a")  # provisional
         super().__init__(a, b, **places)
         self.radius = demand_lead(self, "radius", radius)
         if follows:
@@ -91,11 +91,11 @@ class RackAndPinion(Joint):
         self.check()
 
     def check(self):
-        """A radius, a rack across the axis, and a reference beside it."""
+        """Refuse a radius of zero, a rack not perpendicular to the axis, and a reference along the axis."""
         demand_lead(self, "radius", self.radius)
         if abs(self.axis_a @ self.direction_a) > PARALLEL:
             raise self.error(
-                f"{self.name}: direction_a must be across axis_a, the pinion's axis; they are at an angle of "
+                f"{self.name}: direction_a must be perpendicular to axis_a, the pinion's axis; their angle is "
                 f"{np.degrees(np.arccos(np.clip(self.axis_a @ self.direction_a, -1, 1))):g} degrees."
             )
         if np.linalg.norm(np.cross(self.axis_b, self.reference_b)) < PARALLEL:
@@ -104,7 +104,7 @@ class RackAndPinion(Joint):
             )
 
     def counted_from(self, t, *displacements):
-        """The angle that goes with the travel."""
+        """The angle of the present travel."""
         return displacements[0] / self.radius
 
     def compose(self):
@@ -127,7 +127,7 @@ class RackAndPinion(Joint):
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random instance; it need not hold."""
+        """A random instance; its rows need not be satisfied."""
         one, two, axis, other, beside_, reference = rng.normal(size=(6, 3))
         return cls(
             a,

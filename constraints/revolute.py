@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 class Revolute(Joint):
-    """Let one body turn about an axis of another, and do nothing else: a hinge.
+    """Rotation about a common axis: a revolute joint, or hinge.
 
     Notes
     -----
     The points lie on the axis. Rows: point[0] to point[2], axis[0], axis[1]. `Revolute.at(a, b, point=, axis=)` takes
-    the point and the axis in the ground frame, the bodies being where they stand now.
+    a point and the direction of the axis in the ground frame, in the present poses.
 
     Examples
     --------

@@ -20,18 +20,18 @@ if TYPE_CHECKING:
 
 
 class RotationMotor(FramedJoint):
-    """Turn one body about an axis of another as a function of time says: a motor on a hinge, full turns included.
+    """Prescribed rotation about an axis, over any number of turns: a motor on a hinge.
 
     Parameters
     ----------
     a, b : Body or ground
         Two different bodies of one scene, held on a common axis by a joint (Revolute, Cylindrical, ...).
     reference_a, reference_b : array_like (3,), optional
-        Directions beside the axis, in the bodies' own frames; the angle goes from the first to the second about the
-        axis (right hand). What is left out follows from the bodies as they stand now: their angle is that at t = 0,
-        or at the time nearest to it that data cover.
+        Directions not parallel to the axis, in the body frames; the angle is measured from the first to the second
+        about the axis (right-hand rule). Missing directions follow from the present poses, taken as those at t = 0, or
+        at the time nearest to it that data cover.
     angle : one of ts.motions, a function f of time or three (f, fd, fdd), or float, rad
-        The angle of b against a.
+        The angle of b relative to a.
 
     Raises
     ------
@@ -40,13 +40,13 @@ class RotationMotor(FramedJoint):
 
     Notes
     -----
-    One row: turn; the points are those about which reactions are given. `RotationMotor.of(joint, angle=)` drives a
+    One row: turn. Reactions are about the points. `RotationMotor.of(joint, angle=)` drives a
     joint that has an axis; `RotationMotor.at(a, b, axis=, angle=)` takes the axis in the ground frame. The torque on b
     about the axis is that of `solution.reaction(motor, on=b)`, its power part of `solution.power`.
 
     Examples
     --------
-    A motor brings a flywheel of 2 kg m^2 up with 3 rad/s^2:
+    A motor accelerates a flywheel of 2 kg m^2 with 3 rad/s^2:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
@@ -68,17 +68,17 @@ class RotationMotor(FramedJoint):
         self.check()
 
     def __setattr__(self, name, value):
-        """Set an attribute, checked; an angle is always a motion."""
+        """Set a checked attribute; an angle is always a motion."""
         super().__setattr__(name, Motion.always(value, f"{self.name}: angle") if name == "angle" else value)
 
     def counted_from(self, t, *displacements):
-        """The angle prescribed."""
+        """The prescribed angle."""
         return self.angle.value(t)[0]
 
     @classmethod
     @fitting
     def of(cls, joint: Joint, *, angle: Prescribed, name: str = "") -> Self:
-        """Make the motor that turns b of a joint against a, about its axis, from where the bodies stand now."""
+        """Make the motor of a joint: it rotates b relative to a about the axis of the joint, from the present poses."""
         return cls(*geometry(joint), **axes(joint), angle=angle, name=name)
 
     def compose(self):
@@ -92,32 +92,32 @@ class RotationMotor(FramedJoint):
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random instance that stands still."""
+        """A random instance at rest."""
         places = {marker.argument: rng.normal(size=3) for marker in cls.markers}
         return cls(a, b, **places, angle=rng.normal())
 
 
 def geometry(joint):
-    """The two bodies of a joint, or an error where it has no axis on both."""
+    """Return the two bodies of a joint; refuse a joint without an axis on both."""
     given = [getattr(joint, name, np.zeros(3)) for name in ("axis_a", "axis_b")]
     pairs = [[u, v] for (_, u), (_, v) in getattr(joint, "opposed", ()) if not callable(u)]
     known = any(np.allclose(pair, given, rtol=0.0, atol=1e-12) for pair in pairs)
     if not known:
         raise InvalidConstraint(
-            f"{joint!r} has no axis that a motor could drive; give a Revolute, Cylindrical, Translational or another "
+            f"{joint!r} has no axis to be driven; give a Revolute, Cylindrical, Translational or another "
             "joint that keeps axis_a along axis_b."
         )
     return joint.a, joint.b
 
 
 def axes(joint):
-    """The points and axes of a joint, as arguments."""
+    """Return the points and axes of a joint, as arguments."""
     names = ("point_a", "point_b", "axis_a", "axis_b")
     return {name: place for name in names if isinstance(place := getattr(joint, name, None), np.ndarray)}
 
 
 def set_apart(joint, places, angle):
-    """Turn a reference of a framed joint that was left out of its arguments: the bodies now stand at this angle."""
+    """Rotate a missing reference of a framed joint so that the angle in the present poses is as given."""
     if places.get("reference_b") is None:
         joint.reference_b = turned_about(joint.axis_b, beside(joint.axis_b, joint.reference_b)[0], angle)
     elif places.get("reference_a") is None:

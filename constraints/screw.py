@@ -23,15 +23,16 @@ if TYPE_CHECKING:
 
 
 class Screw(FramedJoint):
-    """Let one body turn about an axis of another and move along it in proportion: a screw in its nut.
+    """Rotation about a common axis in proportion to translation along it: a screw joint.
 
     Parameters
     ----------
     reference_a, reference_b : array_like (3,), optional
-        Directions beside the axis, in the bodies' own frames, which point the same way where the points coincide; what
-        is left out follows from the bodies as they stand now.
+        Directions not parallel to the axis, in the body frames, which are parallel when the points coincide; missing
+        directions follow from the present poses.
     lead : float, m/rad
-        Travel of b along the axis over its turn about it (right hand), against a. Negative for a left-handed thread.
+        Travel of b along the axis over its rotation about it (right-hand rule), relative to a; negative for a
+        left-handed thread.
 
     Raises
     ------
@@ -42,11 +43,12 @@ class Screw(FramedJoint):
     Notes
     -----
     The points lie on the axis. Rows: axis[0], axis[1], line[0], line[1], thread. `Screw.at(a, b, point=, axis=, lead=)`
-    takes a point and the direction of the axis in the ground frame. A thread of one pitch p in m has lead = p / (2 pi).
+    takes a point and the direction of the axis in the ground frame. A single-start thread of pitch p, m, has lead = p /
+    (2 pi).
 
     Examples
     --------
-    A nut that may only turn on a vertical screw of 0.1 m/rad:
+    A nut falls on a vertical screw of 0.1 m/rad:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))
@@ -67,7 +69,7 @@ class Screw(FramedJoint):
         self.check()
 
     def check(self):
-        """A lead, and references across their axes."""
+        """Refuse a lead of zero, and references along the axes."""
         demand_lead(self, "lead", self.lead)
         super().check()
 
@@ -97,15 +99,15 @@ class Screw(FramedJoint):
         return self.lead
 
     def counted_from(self, t, *displacements):
-        """The angle that goes with the travel."""
+        """The angle of the present travel."""
         return displacements[0] / self.lead
 
     def aligned(self):
-        """Nothing more than Parallel says."""
+        """None besides those of Parallel."""
         return ()
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random instance; it need not hold."""
+        """A random instance; its rows need not be satisfied."""
         places = {marker.argument: rng.normal(size=3) for marker in cls.markers}
         return cls(a, b, **places, lead=rng.uniform(0.5, 2.0))

@@ -40,26 +40,26 @@ if TYPE_CHECKING:
 
 
 class Thread(Primitive):
-    """Keep the turn of b against a in proportion to its travel; `Screw` and `RackAndPinion` are made of it.
+    """Rotation of b relative to a in proportion to its travel: the row of `Screw` and `RackAndPinion`.
+
+    Other joints must leave rotation of b about f x g alone.
 
     Parameters
     ----------
-    a, b : Body or ground
-        Two different bodies of one scene, held by other joints so that b turns about f x g alone.
     reference_a, across_a : array_like (3,)
-        Directions of a across the axis of turning, at right angles: the angles 0 and pi/2. Scaled to unit length.
+        Directions of a at the angles 0 and pi/2, perpendicular to the axis of rotation; scaled to unit length.
     axis_a : array_like (3,)
         The direction of the travel.
     reference_b : array_like (3,)
-        The direction of b that turns.
+        The direction of b whose angle is measured.
     point_a, point_b : array_like (3,), m
         The points whose distance along axis_a is the travel.
     lead : float, m/rad
-        Travel over turn, not zero; negative for a left-handed thread.
+        Travel over rotation, not zero; negative for a left-handed thread.
 
     Examples
     --------
-    One row; a `Screw` has those that keep the axes on one line, too:
+    One row; a `Screw` also keeps the axes aligned:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
@@ -87,7 +87,7 @@ class Thread(Primitive):
         self.check()
 
     def check(self):
-        """A lead."""
+        """Refuse a lead of zero."""
         demand_lead(self, "lead", self.lead)
 
     def parameters(self):
@@ -173,16 +173,16 @@ def turn_and_travel(x, lead):
 
 
 def demand_lead(constraint, word, value):
-    """The lead or radius, refused where there is no travel in a turn."""
+    """Return the lead or radius; refuse zero."""
     result = number(value)
     if not (np.isfinite(result) and result != 0.0):
         raise InvalidConstraint(
-            f"{constraint.name}: {word} is the travel over the turn (m/rad) and must be a finite number other than "
+            f"{constraint.name}: {word} is the travel over the rotation (m/rad) and must be a finite number other than "
             f"zero, got {value!r}; a screw without travel is a Revolute joint."
         )
     return result
 
 
 def travel(a, b, direction, point_a, point_b):
-    """How far the point of b is from that of a along a direction of a, as the bodies stand now."""
+    """Return the offset of the point of b from that of a along a direction of a, in the present poses."""
     return float((rotation_matrix(a.orientation) @ direction) @ (ground_point(b, point_b) - ground_point(a, point_a)))

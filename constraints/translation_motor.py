@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 
 class TranslationMotor(Joint):
-    """Move one body along an axis of another as a function of time says: a linear drive on a slider.
+    """Prescribed displacement along an axis: a linear drive.
 
-    A joint lets them slide (Translational, Cylindrical, ...).
+    Other joints guide the motion (Translational, Cylindrical, ...).
 
     Parameters
     ----------
     displacement : one of ts.motions, a function f of time or three (f, fd, fdd), or float, m
-        Of point_b against point_a along axis_a.
+        Of point_b relative to point_a along axis_a.
 
     Notes
     -----
@@ -64,7 +64,7 @@ class TranslationMotor(Joint):
     @classmethod
     @fitting
     def of(cls, joint: Joint, *, displacement: Prescribed, name: str = "") -> Self:
-        """Make the motor that moves b of a joint against a, along its axis, measured between the joint's points."""
+        """Make the motor of a joint: it moves b relative to a along the axis, measured between the joint's points."""
         bodies, given = geometry(joint), axes(joint)
         given.pop("axis_b")
         return cls(*bodies, **given, displacement=displacement, name=name)

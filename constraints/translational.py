@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 
 class Translational(FramedJoint):
-    """Let one body slide along an axis of another without turning: a slider.
+    """Translation along a common axis without rotation: a prismatic joint, or slider.
 
     Parameters
     ----------
     reference_a, reference_b : array_like (3,), optional
-        Directions beside the axis, in the bodies' own frames, that the joint keeps parallel; what is left out follows
-        from the bodies as they stand now.
+        Directions not parallel to the axis, in the body frames, which the joint keeps parallel; missing directions
+        follow from the present poses.
 
     Notes
     -----

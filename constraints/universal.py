@@ -20,17 +20,17 @@ from .spherical import Spherical
 if TYPE_CHECKING:
     from ..hints import BodyLike
 
-ALONG = 1e-6  # sine of the angle below which an arm would lie along the shaft
+ALONG = 1e-6  # sine of an angle: below it the arm would be along the shaft
 
 
 class Universal(Joint):
-    """Let one body turn about each of two axes at right angles, one of which is fixed in either body.
+    """Rotation about two perpendicular axes, one fixed in each body: a universal (Hooke, Cardan) joint.
 
     Parameters
     ----------
     axis_a, axis_b : array_like (3,)
-        The axis that each body turns about on the cross between them, in the body's own frame; scaled to unit length.
-        Both are across the shafts that the joint connects, and at right angles to each other.
+        The arm of the cross that is fixed in each body, body frame; scaled to unit length. Both are perpendicular to
+        the shafts and to each other.
 
     Notes
     -----
@@ -58,7 +58,7 @@ class Universal(Joint):
 
     @Placing
     def at(cls, a: BodyLike, b: BodyLike | None = None, **arguments: Any) -> Self:
-        """Make one from its point and axes in the ground frame, the bodies being where they stand now.
+        """Make the joint from its point and axes in the ground frame, in the present poses.
 
         Parameters
         ----------
@@ -66,8 +66,8 @@ class Universal(Joint):
         axis : array_like (3,)
             The axis fixed in a.
         axis_b : array_like (3,), optional
-            The axis fixed in b; None takes the one across `axis` and the line from the point to the centroid of b (of
-            a, where b is the ground), which is right where b is a shaft with its centroid on its line.
+            The axis fixed in b; None takes the normal of `axis` and the line from the point to the centroid of b (of a,
+            if b is the ground), which is right for a shaft with its centroid on its axis.
         """
         axis, axis_b = arguments.pop("axis", None), arguments.pop("axis_b", None)
         axis = arguments.pop("axis_a", axis)

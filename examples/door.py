@@ -70,8 +70,7 @@ def main():
     """Let it swing for 10 s and print how good it is."""
     solution = ts.simulate(build(), (0.0, 10.0), integrator="dop853", rtol=1e-11, atol=1e-11, events=lowest)
     check(solution)
-    print(solution)
-    print(f"  hangs lowest at {np.round(solution.t_events[0], 6)} s")
+    print(solution, f"  hangs lowest at {np.round(solution.t_events[0], 6)} s", sep="\n")
     print(f"  distance from SciPy {np.abs(turn(solution) - reference(solution.t)[0]).max():.1e} rad")
 
 

@@ -32,20 +32,22 @@ ANY = 1 << 40  # the length of an array that the kernel is trusted with
 
 
 @ts.kernel
-def derivatives(context, place, accelerate, second_order, t, x, y, xd, yd):
+def derivatives(system, t, x, y, xd, yd):
     """x' and y' at (t, x, y). Status."""
+    context, place, accelerate, second_order = system
     status = call_place(place, context, t, x)
     if status == 0:
         status = call_accelerate(accelerate, context, t, y, yd, xd)  # writes x' of a first-order system
-    if second_order:
+    if second_order != 0:
         for c in range(xd.size):
             xd[c] = y[c]
     return status
 
 
 @ts.kernel
-def extrapolate(context, place, accelerate, second_order, t, h, nx, ny, x, y, yd, xd, memory, dx, dy):
+def extrapolate(system, t, h, x, y, xd, yd, memory, dx, dy):  # two of each kind: of positions, of velocities
     """Increments by the table T[j, k] = T[j, k-1] + (T[j, k-1] - T[j-1, k-1]) / ((n_j / n_(j-k))^2 - 1). Status."""
+    nx, ny = x.size, y.size
     n = nx + ny
     z, slope, last, now, table = memory[:n], memory[n:], memory[2 * n :], memory[3 * n :], memory[4 * n :]
     for j in range(COLUMNS):
@@ -57,9 +59,7 @@ def extrapolate(context, place, accelerate, second_order, t, h, nx, ny, x, y, yd
         for i in range(1, parts):
             for c in range(n):
                 z[c] = now[c] + (x[c] if c < nx else y[c - nx])
-            status = derivatives(
-                context, place, accelerate, second_order, t + i * part, z[:nx], z[nx:], slope[:nx], slope[nx:n]
-            )
+            status = derivatives(system, t + i * part, z[:nx], z[nx:n], slope[:nx], slope[nx:n])
             if status != 0:
                 return status
             for c in range(n):
@@ -80,18 +80,21 @@ def extrapolate(context, place, accelerate, second_order, t, h, nx, ny, x, y, yd
     return 0
 
 
+# step and error kernels have the arguments that drivers give: docs/plug-ins.md
+
+
 @step_kernel
 def second_order_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, numbers, memory, dx, dy):
     """A step of the tangent-space ODE, where x' = y."""
     x, y, yd, dx, dy = vector(x, nx), vector(y, nx), vector(yd, nx), vector(dx, nx), vector(dy, nx)
-    return extrapolate(context, place, accelerate, True, t, h, nx, nx, x, y, yd, y, vector(memory, ANY), dx, dy)
+    return extrapolate((context, place, accelerate, 1), t, h, x, y, y, yd, vector(memory, ANY), dx, dy)
 
 
 @step_kernel
 def first_order_step(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, numbers, memory, dx, dy):
     """A step of the Maggi/Kane form."""
     x, y, yd, xd, dx, dy = vector(x, nx), vector(y, ny), vector(yd, ny), vector(xd, nx), vector(dx, nx), vector(dy, ny)
-    return extrapolate(context, place, accelerate, False, t, h, nx, ny, x, y, yd, xd, vector(memory, ANY), dx, dy)
+    return extrapolate((context, place, accelerate, 0), t, h, x, y, xd, yd, vector(memory, ANY), dx, dy)
 
 
 @error_kernel

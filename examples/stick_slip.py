@@ -95,10 +95,10 @@ def check(solution, tol=1e-9):
 def main():
     """Run it for 2 s and print how often it jumps."""
     solution = ts.simulate(build(), (0.0, 2.0), integrator="dop853", rtol=1e-11, atol=1e-11, events=overtakes)
-    print(solution)
+    x = solution.position("slide")[:, 0]
     check(solution)
-    print(f"  it jumps at {np.round(solution.t_events[0], 6)} s")
-    print(f"  distance from SciPy {np.abs(solution.position('slide')[:, 0] - reference(solution.t)[0]).max():.1e} m")
+    print(solution, f"  it jumps at {np.round(solution.t_events[0], 6)} s", sep="\n")
+    print(f"  distance from SciPy {np.abs(x - reference(solution.t)[0]).max():.1e} m")
 
 
 if __name__ == "__main__":

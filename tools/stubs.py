@@ -28,6 +28,7 @@ PAIRS = {  # arguments: the class of hints.py that has them as attributes
     ("point_a", "point_b"): "Points",
     ("axis_a", "axis_b"): "Axes",
     ("reference_a", "reference_b"): "References",
+    ("joint", "function", "period", "which"): "JointLoads",
 }
 READ = {"ArrayLike": "Floats", "Prescribed": "Any", "Path": "Any", "Load": "Any", "VectorLoad": "Any"}  # what is kept
 
@@ -57,6 +58,7 @@ def _class(cls: type, public: set[str]) -> str:
     inherited = {name for base in bases for name in dir(base)} - {"at"}
     inherited |= {name for base in cls.__mro__ for name in inspect.get_annotations(base)}
     inherited |= {*inspect.signature(cls).parameters}  # said by _attributes
+    inherited |= {name for pair in pairs for name in vars(getattr(hints, PAIRS[pair]))}
     for name in [name for name in dir(cls) if not name.startswith("_") and name not in inherited]:
         value = inspect.getattr_static(cls, name)
         if name == "at":

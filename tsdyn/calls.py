@@ -1,4 +1,4 @@
-"""Calls of public functions and classes: a call that doesn't match the signature is answered with the nearest match.
+"""Calls of public functions and classes: a wrong call is refused with the nearest match.
 
 `fitting` wraps a function and costs nothing for a valid call; `Placing` is the descriptor of `.at`, which gives every
 class its own signature.
@@ -25,14 +25,14 @@ BY_POSITION = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_O
 
 
 def unknown_argument(title, name, known):
-    """The error of a keyword that a call doesn't have."""
+    """Return the error of an unknown keyword."""
     return InvalidCall(f"{title}() has no argument {name}{nearest(name, known)} It has {', '.join(known)}.")
 
 
 def fitting(function: Function, then: Callable[[Any], None] | None = None) -> Function:
     """Wrap a public function, or an `__init__`: a call that doesn't fit its signature raises InvalidCall.
 
-    `then` is called with an instance when its `__init__` has ended, that of its own class.
+    `then` is called with an instance after the `__init__` of its own class.
     """
 
     @wraps(function)
@@ -65,7 +65,7 @@ def fitting_methods(cls: Class) -> Class:
 
 
 def misfit_of(title, signature, arguments, keywords):
-    """The InvalidCall of a call that a signature doesn't allow, or None."""
+    """Return the InvalidCall of a call that doesn't fit a signature, or None."""
     try:
         signature.bind(*arguments, **keywords)
         return None
@@ -86,7 +86,7 @@ def misfit_of(title, signature, arguments, keywords):
 
 
 def complete_signature(cls):
-    """The signature of a class, what its __init__ passes on by **keywords filled in from its bases.
+    """Return the signature of a class; parameters passed on by **keywords are those of its bases.
 
     `**places` stands for the arguments that place the markers of the class, and for `name`.
     """
@@ -112,7 +112,7 @@ def complete_signature(cls):
 
 
 class Placing:
-    """Decorate `at`: a classmethod whose signature has the arguments of the class that it is asked of.
+    """Decorate `at`: a classmethod with the arguments of the class that it is called on.
 
     A point or an axis is given once, as `point` for `point_a` and `point_b`, or by the name that it has on one body.
     """

@@ -36,19 +36,19 @@ def complete_docstring(cls: type, standard: Iterable[str] = (), raises: str = ""
 
 
 def _split(text: str) -> tuple[str, dict[str, str]]:
-    """What stands before the first section, and the sections by their titles."""
+    """Return the text before the first section, and the sections by title."""
     head, *parts = SECTION.split(inspect.cleandoc(text))
     titles, bodies = parts[::2], parts[1::2]
     return head.strip(), {title: body.strip() for title, body in zip(titles, bodies, strict=True)}
 
 
 def _entries(section: str) -> list[str]:
-    """The entries of a section: a line with names, and the indented lines after it."""
+    """Return the entries of a section: a line of names, with the indented lines after it."""
     return [entry for entry in re.split(r"\n(?=\S)", section) if entry]
 
 
 def _in_order(entries: list[str], arguments: Iterable[str]) -> list[str]:
-    """For each argument, in their order, the first entry that names it and arguments alone; each entry once."""
+    """Return the first entry of each argument, in order, without repetition; entries of other names are left out."""
     named = [(entry, re.findall(r"\w+", entry.split("\n")[0].split(" :")[0])) for entry in entries]
     found = []
     for argument in arguments:

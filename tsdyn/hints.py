@@ -93,6 +93,25 @@ class Axes:
     axis_b: Attribute[ArrayLike, Floats]
 
 
+class JointLoads:
+    """Attributes of a load on a joint coordinate, for stubs."""
+
+    function: JointLaw
+    period: float | None
+
+    @property
+    def joint(self) -> Attachment:
+        """The joint."""
+
+    @property
+    def which(self) -> int:
+        """The index of the coordinate."""
+
+    @property
+    def geometry(self) -> Any:
+        """Where the coordinate is measured."""
+
+
 class References:
     """Attributes of one that measures an angle between two directions."""
 
@@ -136,6 +155,7 @@ __all__ = [
     "ItemLike",
     "Joint",
     "JointLaw",
+    "JointLoads",
     "Kinematics",
     "Load",
     "Matrix",

@@ -18,7 +18,7 @@ from .elements.joint_load import JointLoad
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
 from .elements.tolerances import PARALLEL
-from .elements.user_functions import ByState, arguments_of, fill_state, state_load
+from .elements.user_functions import ByState, arguments_of, fill_state, load_at, state_load
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
 from .maths import vectors
@@ -127,6 +127,7 @@ __all__ = [
     "kernel",
     "linear_second",
     "load",
+    "load_at",
     "not_negative",
     "number",
     "optional",

@@ -80,30 +80,30 @@ def one_of(value, options, what, error=InvalidArgument):
 
 
 def label(name, what, error):
-    """A name as text: that of a string or a whole number, "" for None, or raise `error`."""
+    """Return a name as text, "" for None, or raise `error`."""
     if name is None or (isinstance(name, (str, int, np.integer)) and not isinstance(name, bool)):
         return "" if name is None else str(name)
     raise error(f"{what}: name must be text, got {name!r}.")
 
 
 def counted(count, noun, nouns=None):
-    """A number of things, in words: 1 row, 2 rows."""
+    """Return a count with its noun: 1 row, 2 rows."""
     return f"{count} {noun if count == 1 else nouns or noun + 's'}"
 
 
 def close(name, known):
-    """The names that are near to a wrong one, at most three."""
+    """Return up to three known names similar to a wrong one."""
     return difflib.get_close_matches(str(name), known, 3)
 
 
 def nearest(name, known):
-    """The end of a sentence on a wrong name: the right ones that are near to it."""
+    """Return the end of a sentence on a wrong name: similar known names."""
     near = close(name, known)
     return f"; did you mean {' or '.join(near)}?" if near else "."
 
 
 def unknown_name(what, name, known):
-    """The error of a name that there isn't."""
+    """Return the error of an unknown name."""
     return InvalidArgument(f"unknown {what} {name!r}; there are {', '.join(map(repr, known))}{nearest(name, known)}")
 
 

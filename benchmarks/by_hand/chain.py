@@ -35,7 +35,7 @@ def times(w, v0, v1, v2):
 
 
 @numba.njit(**PART)
-def pivot(w, d, e, a0, a1, a2, b0, b1, b2, last):
+def pivot(w, d, e, a0, a1, a2, b0, b1, b2, last):  # vectors as numbers: the loops of three are unrolled by hand
     """The inverse of d I - e (a a^T + b b^T) less what elimination of the rod before, of workspace `last`, takes."""
     s00, s01, s02 = d - e * (a0 * a0 + b0 * b0), -e * (a0 * a1 + b0 * b1), -e * (a0 * a2 + b0 * b2)
     s11, s12, s22 = d - e * (a1 * a1 + b1 * b1), -e * (a1 * a2 + b1 * b2), d - e * (a2 * a2 + b2 * b2)

@@ -25,8 +25,9 @@ def jacobian(q, P):
 
 
 @numba.njit(**OPTIONS)
-def evaluate(v, vd, q0, V, U, B, u, tol, q, qd, P, D, E, A, vdd):
-    """vdd of Eq. 26; returns the number of Newton sweeps."""
+def place(v, tol, chart, B, u, q, P):
+    """q and Phi_q at v, with B = (Phi_q U)^-1; returns the number of Newton sweeps."""
+    q0, V, U = chart
     sweeps = 0
     while True:
         for i in range(N):
@@ -53,6 +54,16 @@ def evaluate(v, vd, q0, V, U, B, u, tol, q, qd, P, D, E, A, vdd):
         d += P[1, i] * U[i, 1]
     r = 1.0 / (a * d - b * c)
     B[0, 0], B[0, 1], B[1, 0], B[1, 1] = d * r, -b * r, -c * r, a * r
+    return sweeps
+
+
+@numba.njit(**OPTIONS)
+def evaluate(v, vd, tol, chart, work, vdd):
+    """vdd of Eq. 26; returns the number of Newton sweeps."""
+    _, V, U = chart
+    B, u, q, qd, P, D, E, A = work
+    sweeps = place(v, tol, chart, B, u, q, P)
+    e0, e1, e2, e3 = q[3], q[4], q[5], q[6]
     for j in range(K):
         x, y = 0.0, 0.0
         for i in range(2, N):
@@ -96,6 +107,13 @@ def evaluate(v, vd, q0, V, U, B, u, tol, q, qd, P, D, E, A, vdd):
             A[i, j] = MASS * (D[0, i] * D[0, j] + D[1, i] * D[1, j] + D[2, i] * D[2, j]) + (
                 JX * E[0, i] * E[0, j] + JY * E[1, i] * E[1, j] + JZ * E[2, i] * E[2, j]
             )
+    solve(A, vdd)
+    return sweeps
+
+
+@numba.njit(**OPTIONS)
+def solve(A, x):
+    """x = A^-1 x by Cholesky, of the lower half of A."""
     for j in range(K):
         s = A[j, j]
         for k in range(j):
@@ -108,16 +126,15 @@ def evaluate(v, vd, q0, V, U, B, u, tol, q, qd, P, D, E, A, vdd):
                 t -= A[i, k] * A[j, k]
             A[i, j] = t * s
     for i in range(K):
-        s = vdd[i]
+        s = x[i]
         for k in range(i):
-            s -= A[i, k] * vdd[k]
-        vdd[i] = s * A[i, i]
+            s -= A[i, k] * x[k]
+        x[i] = s * A[i, i]
     for i in range(K - 1, -1, -1):
-        s = vdd[i]
+        s = x[i]
         for k in range(i + 1, K):
-            s -= A[k, i] * vdd[k]
-        vdd[i] = s * A[i, i]
-    return sweeps
+            s -= A[k, i] * x[k]
+        x[i] = s * A[i, i]
 
 
 @numba.njit(**OPTIONS)
@@ -128,34 +145,35 @@ def simulate(q, qd, end, steps, tol, interval):
     k1, k2, k3, k4 = np.zeros(K), np.zeros(K), np.zeros(K), np.zeros(K)
     v, vd, vs, ws, u = np.zeros(K), np.zeros(K), np.zeros(K), np.zeros(K), np.zeros(M)
     V, U, B, q0 = np.zeros((N, K)), np.zeros((N, M)), np.zeros((M, M)), np.zeros(N)
-    sweeps = 0
+    chart, work, sweeps = (q0, V, U), (B, u, q, qd, P, D, E, A), 0
     for step in range(steps):
         if step % interval == 0:
             if step:
-                sweeps += evaluate(v, vd, q0, V, U, B, u, tol, q, qd, P, D, E, A, k1)
+                sweeps += evaluate(v, vd, tol, chart, work, k1)
             jacobian(q, P)
             U = np.ascontiguousarray(P.T)
             V = np.ascontiguousarray(np.linalg.svd(P)[2][M:].T)
             B = np.linalg.inv(P @ U)
+            chart, work = (q0, V, U), (B, u, q, qd, P, D, E, A)
             q0[:] = q
             v[:], u[:] = 0.0, 0.0
             vd = V.T @ qd
-        sweeps += evaluate(v, vd, q0, V, U, B, u, tol, q, qd, P, D, E, A, k1)
+        sweeps += evaluate(v, vd, tol, chart, work, k1)
         for i in range(K):
             vs[i] = v[i] + h / 2 * vd[i] + h * h / 8 * k1[i]
             ws[i] = vd[i] + h / 2 * k1[i]
-        sweeps += evaluate(vs, ws, q0, V, U, B, u, tol, q, qd, P, D, E, A, k2)
+        sweeps += evaluate(vs, ws, tol, chart, work, k2)
         for i in range(K):
             ws[i] = vd[i] + h / 2 * k2[i]
-        sweeps += evaluate(vs, ws, q0, V, U, B, u, tol, q, qd, P, D, E, A, k3)
+        sweeps += evaluate(vs, ws, tol, chart, work, k3)
         for i in range(K):
             vs[i] = v[i] + h * vd[i] + h * h / 2 * k3[i]
             ws[i] = vd[i] + h * k3[i]
-        sweeps += evaluate(vs, ws, q0, V, U, B, u, tol, q, qd, P, D, E, A, k4)
+        sweeps += evaluate(vs, ws, tol, chart, work, k4)
         for i in range(K):
             v[i] += h * vd[i] + h * h / 6 * (k1[i] + k2[i] + k3[i])
             vd[i] += h / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i])
-    return sweeps + evaluate(v, vd, q0, V, U, B, u, tol, q, qd, P, D, E, A, k1)
+    return sweeps + evaluate(v, vd, tol, chart, work, k1)
 
 
 def start():

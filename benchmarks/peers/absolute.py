@@ -82,23 +82,24 @@ def unpack(integers, reals):
 
 
 @numba.njit(**OPTIONS)
-def turned(x, s, out):
-    """out = A(p) s for unit p; x is a body's state."""
-    a, b, c = x[4], x[5], x[6]
+def rotate(e0, a, b, c, s, out):
+    """out = A(p) s for unit p = (e0, a, b, c)."""
     t0, t1, t2 = 2 * (b * s[2] - c * s[1]), 2 * (c * s[0] - a * s[2]), 2 * (a * s[1] - b * s[0])
-    out[0] = s[0] + x[3] * t0 + b * t2 - c * t1
-    out[1] = s[1] + x[3] * t1 + c * t0 - a * t2
-    out[2] = s[2] + x[3] * t2 + a * t1 - b * t0
+    out[0] = s[0] + e0 * t0 + b * t2 - c * t1
+    out[1] = s[1] + e0 * t1 + c * t0 - a * t2
+    out[2] = s[2] + e0 * t2 + a * t1 - b * t0
+
+
+@numba.njit(**OPTIONS)
+def turned(x, s, out):
+    """out = A(p) s; x is a body's state."""
+    rotate(x[3], x[4], x[5], x[6], s, out)
 
 
 @numba.njit(**OPTIONS)
 def back(x, s, out):
     """out = A(p)^T s."""
-    a, b, c = -x[4], -x[5], -x[6]
-    t0, t1, t2 = 2 * (b * s[2] - c * s[1]), 2 * (c * s[0] - a * s[2]), 2 * (a * s[1] - b * s[0])
-    out[0] = s[0] + x[3] * t0 + b * t2 - c * t1
-    out[1] = s[1] + x[3] * t1 + c * t0 - a * t2
-    out[2] = s[2] + x[3] * t2 + a * t1 - b * t0
+    rotate(x[3], -x[4], -x[5], -x[6], s, out)
 
 
 @numba.njit(**OPTIONS)
@@ -292,8 +293,9 @@ def residual(integers, reals, y, yd, out):
 
 
 @numba.njit(**OPTIONS)
-def differences(integers, reals, y, yd, shift, group, first, rows, values):
+def differences(packed, y, yd, shift, group, first, rows, values):
     """Entries of dF/dy + shift dF/dyd by columns, rows[first[j]:first[j + 1]] of column j, a group at once."""
+    integers, reals = packed
     n = y.size
     y, yd, f, g = y.copy(), yd.copy(), np.empty(n), np.empty(n)
     residual(integers, reals, y, yd, f)

@@ -52,7 +52,7 @@ class System:
 
     def jacobian(self, y, yd, shift):
         """Entries of dF/dy + shift dF/dyd in the order of the pattern (CSC)."""
-        differences(*self.packed, y, yd, shift, self.group, self.first, self.rows, self.values)
+        differences(self.packed, y, yd, shift, self.group, self.first, self.rows, self.values)
         return self.values
 
     def outcome(self, seconds, y):

@@ -13,13 +13,7 @@ class Heyoka(Contender):
 
     name = "heyoka, minimal coordinates"
     values = tuple(10.0**-k for k in range(3, 17))
-    get = "pip install heyoka"
-
-    def version(self):
-        """The package's."""
-        import heyoka
-
-        return f"heyoka {heyoka.__version__}"
+    package, get = "heyoka", "pip install heyoka"
 
     def serves(self, scene):
         """The sliding top."""

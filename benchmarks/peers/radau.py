@@ -11,15 +11,7 @@ class Radau(Contender):
     name = "Radau (scipy_dae)"
     largest = 64
     values = tuple(10.0**-k for k in range(3, 13))
-    get = "pip install scipy-dae"
-
-    def version(self):
-        """The package's."""
-        from importlib.metadata import version
-
-        import scipy_dae  # noqa: F401
-
-        return f"scipy_dae {version('scipy_dae')}"
+    package, get = "scipy_dae", "pip install scipy-dae"
 
     def prepare(self, scene):
         """Compile, and find the pattern."""

@@ -36,19 +36,11 @@ def body(scene, rng, near=(0.0, 0.0, 0.0)):
     )
 
 
-def length(t):
-    return 0.9 + 0.1 * np.sin(2.0 * t)
-
-
-def length_d(t):
-    return 0.2 * np.cos(2.0 * t)
-
-
-def length_dd(t):
-    return -0.4 * np.sin(2.0 * t)
-
-
-LENGTH = (length, length_d, length_dd)
+LENGTH = (
+    lambda t: 0.9 + 0.1 * np.sin(2.0 * t),
+    lambda t: 0.2 * np.cos(2.0 * t),
+    lambda t: -0.4 * np.sin(2.0 * t),
+)
 
 
 def mechanism(rng):

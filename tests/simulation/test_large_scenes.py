@@ -58,8 +58,8 @@ def spider(legs):
 
 
 def numbers(value):
-    """Of how many bytes the arrays in a tuple of them are."""
-    return value.nbytes if isinstance(value, np.ndarray) else sum(map(numbers, value))
+    """Bytes of the arrays and records in a tuple of them."""
+    return sum(map(numbers, value)) if isinstance(value, tuple) else memoryview(value).nbytes
 
 
 def memory(scene):
@@ -273,7 +273,7 @@ def test_assembly_with_sparse_matrices(rng, monkeypatch):
     before, fixed, found = scene.start, scene.bodies[3:4], []
     for large in (kinetic.LARGE, 0):
         scene.place(*before)
-        monkeypatch.setattr(kinetic, "LISTED_ENTRIES", large)
+        monkeypatch.setattr(kinetic, "LARGE", large)
         report = scene.assemble(fixed=fixed)
         found.append((*scene.start, report.moved, report.residual, report.velocity_residual))
     for dense, sparse in zip(*found, strict=True):

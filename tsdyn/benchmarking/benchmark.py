@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @fitting
-def benchmark(
+def benchmark(  # many arguments, by name: those of runs, and of how they are measured
     scene: Scene,
     methods: Methods | None = None,
     tolerances: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10),
@@ -52,20 +52,20 @@ def benchmark(
         without an error estimate runs with each of `steps`. Default all known adaptive methods that serve the
         formulation.
     tolerances : sequence of float
-        Taken as rtol and atol.
+        Values of rtol and atol.
     t_span : (float, float), s
     steps : sequence of float, s
-        For methods of fixed step.
+        For methods with fixed step.
     t_eval : array_like, s, optional
-        Times at which errors are taken; default 101 over t_span. Ignored where a reference is given.
+        Times of error evaluation; default 101 over t_span. Ignored with a reference.
     repeats : int
         Timed runs of each method and tolerance, interleaved; their median is reported.
     formulation, constraint_tol
-        As for `simulate`. The reference is always by the tangent-space ODE.
+        As for `simulate`. The reference always uses the tangent-space ODE.
     max_steps : int
-        A run that needs more is reported as failed.
+        A run with more steps is reported as failed.
     reference : reference_solution.Reference, optional
-        By default two methods, refined until they agree, give the reference.
+        Default: two methods, refined until they agree.
     progress : callable, optional
         Receives the fraction done, 0 to 1.
 
@@ -82,7 +82,7 @@ def benchmark(
 
     Examples
     --------
-    Two methods on a pendulum at one tolerance:
+    A pendulum by two methods, at one tolerance only:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))
@@ -126,7 +126,7 @@ def benchmark(
 
 
 def _measure(plan, run, reference, repeats, rows, report, pressed):
-    """Every run once for its errors, the kernels compiled by it, then the timed rounds."""
+    """Run everything once for the errors, which compiles the kernels, then the timed rounds."""
     total, made = len(plan) * (1 + repeats), []
     for i, (label, setting, value, make) in enumerate(plan):
         solution, message = _try(make, run, pressed)
@@ -146,7 +146,7 @@ def _measure(plan, run, reference, repeats, rows, report, pressed):
 
 
 def _try(make, run, pressed):
-    """A solution, or None, and what went wrong with it."""
+    """Return a solution, or None, and the reason of a failure."""
     solution = None
     try:
         solution = run(integrator=make())

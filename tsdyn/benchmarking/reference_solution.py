@@ -10,11 +10,9 @@ import numpy as np
 from ..errors import InvalidArgument, Status
 from ..integrators import DOP853, RK45, SDIRK54
 from ..simulation.simulate import simulate
+from .tolerances import ENOUGH, REFERENCE_TOLERANCES, ROOM
 
 PAIRS = ((DOP853, RK45), (DOP853, SDIRK54), (SDIRK54, RK45))  # the next one where a method doesn't get through
-TOLERANCES = (1e-10, 1e-12, 1e-13)
-ENOUGH = 1e-12  # agreement that need not be bettered
-ROOM = 2.0  # times the difference of the two, which the error is taken to be below
 
 
 class Reference(NamedTuple):
@@ -60,7 +58,7 @@ def agreed(scene, t_span, times, max_steps):
     """
     best, said = None, []
     for pair in PAIRS:
-        for tol in TOLERANCES:
+        for tol in REFERENCE_TOLERANCES:
             runs = [_run(scene, t_span, times, kind, tol, max_steps) for kind in pair]
             failed = [run for run in runs if not run.success]
             if failed:

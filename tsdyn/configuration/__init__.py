@@ -2,7 +2,8 @@
 
 Imports taylor and below.
 
-Begin with initial_conditions.py (a start is checked and projected; start_violations.py refuses those that break
-constraints, mirrored_branches.py those with axes opposed) and assemble.py (`scene.assemble`). continuation.py leads
-from a sketch to the manifold, mobility.py counts degrees of freedom, row_dependence.py names redundant rows.
+Begin with initial_conditions.py (a start is checked, projected, and its redundant rows are dropped;
+start_violations.py refuses broken constraints, mirrored_branches.py opposed axes) and assemble.py (`scene.assemble`).
+continuation.py leads from a sketch to the manifold, mobility.py counts degrees of freedom. row_dependence.py finds
+redundant rows and the rows that they depend on; rank.py writes the message that names them.
 """

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class AssemblyReport:
-    """What `scene.assemble` did.
+    """Result of `scene.assemble`.
 
     Attributes
     ----------
@@ -42,8 +42,8 @@ class AssemblyReport:
         Largest |Phi_q qd + Phi_t| left.
     iterations : int
     folded : tuple of str
-        Joints of closed loops whose links are folded to the other side than the sketch shows, by 0.1 rad or more: by
-        less than is sure (see `folds` of `assemble`), or because of `folds="free"`.
+        Joints of closed loops whose links are folded to the other side than in the sketch, by 0.1 rad or more: the
+        sketch was ambiguous (see `folds` of `assemble`), or `folds="free"` was given.
     """
 
     moved: float
@@ -71,11 +71,11 @@ def assemble(
     fixed : sequence of Body, or names
         Bodies whose pose (not velocity) must stay as it is.
     t : float, s
-        The time at which constraints that depend on time are met.
+        Time at which rheonomic constraints are satisfied.
     folds : "keep" or "free"
-        Whether the links of closed loops must fold the way they are drawn, where that is clear: by 0.2 rad or more, by
-        the directions of the links and by the places of their joints. "free" takes the nearest configuration, whatever
-        its branch. Whatever is folded over is in the report.
+        "keep": links of closed loops fold as in the sketch wherever the sketch is unambiguous, that is by 0.2 rad or
+        more, by the directions of the links and by the positions of their joints. "free": the nearest configuration
+        on any branch. The report lists links that fold over.
 
     Returns
     -------
@@ -85,16 +85,16 @@ def assemble(
     Raises
     ------
     InconsistentState
-        If the constraints can't be met, which names the smallest set of them that conflicts (`.constraints` of the
-        error), or if what was found is a mirrored joint or another branch than the sketch's. The bodies are as before.
+        If the constraints can't be satisfied (the error names a smallest set in conflict, `.constraints`), or only by
+        a mirrored joint or on another branch than the sketch's. The bodies are unchanged.
     SingularConfiguration
         If a row of Phi_q vanishes at the configuration found.
 
     Notes
     -----
-    Bodies hang on springs at their places in the sketch, in the metric of kinetic energy, and constraints are springs
-    that stiffen until they hold; then Gauss-Newton steps. Redundant rows are welcome. The velocity correction is the
-    smallest in kinetic energy.
+    Springs hold the bodies at their poses in the sketch, in the metric of kinetic energy; the constraints are springs
+    whose stiffness increases until they hold. Gauss-Newton steps follow. Redundant rows are allowed. The velocity
+    correction has the least kinetic energy.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def assemble(
 
 
 def _held(scene, fixed):
-    """Which coordinates stay, (n,)."""
+    """Return True for each coordinate that is held, (n,)."""
     if isinstance(fixed, str) or not hasattr(fixed, "__iter__"):
         raise InvalidBody(f"fixed must be a sequence of bodies, such as (body,), got {fixed!r}.")
     bodies = scene.system.bodies
@@ -160,7 +160,7 @@ def _held(scene, fixed):
 
 
 def _unfolded(scene, metric, sketch, found, links, drawn, tol):
-    """The configuration found, or one beside it that folds the links as the sketch does."""
+    """Return the configuration found, or a nearby one whose links fold as in the sketch."""
     turned = links.turned(metric, found.q, drawn)
     kept, total, first = set(), found.iterations, turned
     for softness in STIFFER:
@@ -196,7 +196,7 @@ def _unfolded(scene, metric, sketch, found, links, drawn, tol):
 
 
 def _velocities(scene, metric, q, qd, A, Phi_t):
-    """qd with the angular velocities that the user set, however bodies have been turned, and the nearest that fits."""
+    """Return qd of the angular velocities as set, at the new orientations, and the nearest consistent qd."""
     rigid = [body for body in scene.bodies if body.dimension == 7]
     turning = np.array([body.angular_velocity for body in rigid]).reshape(-1, 3)
     x = metric.speeds(qd[metric.r], turning)
@@ -213,25 +213,25 @@ def _velocities(scene, metric, q, qd, A, Phi_t):
 
 
 def _demand_direction(scene, metric, found):
-    """Refuse a constraint whose derivative vanishes where it isn't met: no correction is determined."""
+    """Refuse a violated constraint whose derivative vanishes: the correction is undetermined."""
     still = stuck(metric, found.q, found.Phi)
     if still.size and metric.columns.size == metric.size:
         name = scene.row_names()[metric.own[still[0]]]
         raise InconsistentState(
             f"{name}: Phi = {found.Phi[still[0]]:.3g} and its derivative vanishes, so the direction of a correction is "
-            "undetermined. Move its bodies a little in the right direction."
+            "undetermined. Displace its bodies slightly towards the intended configuration."
         )
 
 
 def _demand_regular(scene, metric, A):
-    """Refuse rows that vanish."""
+    """Refuse zero rows."""
     zero = np.flatnonzero(row_lengths(A) == 0.0)
     if zero.size:
         refuse_vanished(scene.row_names()[metric.own[zero[0]]])
 
 
 def _demand_compatible(scene, residual, tol):
-    """Refuse velocities that can't be met, by name: of redundant rows that depend on time differently."""
+    """Refuse redundant rows with different rates, by name."""
     bad = np.flatnonzero(~(np.abs(residual) <= tol))
     if bad.size:
         names = scene.row_names()

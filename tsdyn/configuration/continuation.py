@@ -35,7 +35,7 @@ from .tolerances import (
 
 
 class Found(NamedTuple):
-    """Where an approach ended."""
+    """End of a continuation."""
 
     q: np.ndarray  # (n,)
     Phi: np.ndarray  # (rows,)
@@ -44,16 +44,16 @@ class Found(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Pairs of bodies whose relative orientation is to stay as in the sketch, as springs of a softness."""
+    """Pairs of bodies whose relative orientation in the sketch is held by springs of the given softness."""
 
     pairs: np.ndarray  # (k, 2) body numbers, the ground's is the last
     softness: float
 
 
 def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
-    """The configuration near a sketch (n,) that meets some rows to tol (1 + max |q|), or the nearest thing to it.
+    """Return the configuration nearest to a sketch (n,) that satisfies rows to tol (1 + max |q|), or the best found.
 
-    Where the way from the sketch ends elsewhere, other starts are tried: `also`, and the sketch shaken at random.
+    If continuation from the sketch fails, other starts are tried: `also`, and random perturbations of the sketch.
     """
     rng, best, total = np.random.default_rng(0), None, 0
     shakes = shakes[:2] if metric.n > MANY else shakes
@@ -85,7 +85,7 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
 
 
 def settle(metric, sketch, q, rows=None):
-    """Go along the constraints to where the distance from the sketch has no slope. Returns q, Phi, how many steps."""
+    """Minimise the distance to the sketch along the constraints. Return q, Phi and the number of steps."""
     steps, last = 0, np.inf
     Phi, A = metric.linear(q, rows)
     while steps < MOST_SETTLING and metric.columns.size:
@@ -108,13 +108,13 @@ def settle(metric, sketch, q, rows=None):
 
 
 def stuck(metric, q, Phi, rows=None):
-    """Rows that are not met and whose derivative vanishes."""
+    """Return violated rows whose derivative vanishes."""
     size = np.abs(Phi)
     return np.flatnonzero((row_lengths(metric.linear(q, rows)[1]) == 0.0) & (size > STUCK * size.max(initial=0.0)))
 
 
 def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
-    """Follow the equilibrium as the constraints' springs stiffen, from q. Returns q and how many steps it took."""
+    """Follow the equilibrium from q while the constraint springs stiffen. Return q and the number of steps."""
     Phi, A = metric.linear(q, rows)
     if not (Phi.size and metric.columns.size):
         return q, 0
@@ -124,7 +124,7 @@ def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
         stages = stages[-1:]
 
     def strained(q):
-        """Unit rows with what is left of them, the wish, softness and energy."""
+        """Return residuals, unit rows, the step towards the sketch, softness and energy."""
         Phi, A = metric.linear(q, rows)
         residual, A = Phi * weights, _weighed(A, weights)
         soft = np.full(residual.size, softness)
@@ -164,7 +164,7 @@ def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
 
 
 def close(metric, q, rows=None):
-    """Gauss-Newton steps, smallest in kinetic energy, down to rounding. Returns q, Phi of those rows, how many."""
+    """Take Gauss-Newton steps of least kinetic energy, down to rounding. Return q, Phi and the number of steps."""
     Phi, A = metric.linear(q, rows)
     steps = 0
     while steps < MOST_CLOSING and Phi.size and metric.columns.size:
@@ -198,7 +198,7 @@ class _Relative:
         self.places, self.rise = metric.turns()
 
     def rows(self, q):
-        """What is left (3 k,) and unit rows (3 k, free columns)."""
+        """Return residuals (3 k,) and unit rows (3 k, free columns)."""
         R, (a, b) = self.metric.rotations(q), self.pairs.T
         between = R[a].swapaxes(1, 2) @ R[b]
         residual = np.array([_logarithm(E) for E in between @ self.drawn.swapaxes(1, 2)])
@@ -214,7 +214,7 @@ class _Relative:
 
 
 def _logarithm(E):
-    """The rotation vector of a rotation matrix, (3,), of less than half a turn."""
+    """Return the rotation vector (3,) of a rotation matrix, for angles below pi."""
     v = np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]]) / 2.0
     sine = np.linalg.norm(v)
     return v * (np.arctan2(sine, (np.trace(E) - 1.0) / 2.0) / sine) if sine > NO_AXIS else v

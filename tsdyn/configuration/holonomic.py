@@ -33,7 +33,7 @@ def demand_holonomic(packed, q, t, form):
         if row is not None:
             raise InvalidConstraint(
                 f"{constraint.name}: row {row} of its jacobian is not the derivative of its phi: it is not holonomic, "
-                f"which {form!r} with this method would run wrongly. Correct the kernels with the help of "
+                f"for which {form!r} with this method gives wrong results. Correct the kernels with "
                 f"ts.testing.check_primitive({kind.__name__}); a row on velocities alone is served by "
                 "formulation='tangent' with an explicit method."
             )
@@ -41,7 +41,7 @@ def demand_holonomic(packed, q, t, form):
 
 
 def _markers(packed, constraint, places, q):
-    """x of a constraint."""
+    """Return the marker coordinates x of a constraint."""
     starts, parts = starts_of(packed), []
     for marker, s in zip(constraint.markers, places, strict=True):
         body, x = constraint.body_of(marker), np.zeros(marker.size)
@@ -51,7 +51,7 @@ def _markers(packed, constraint, places, q):
 
 
 def _wrong_row(constraint, par, x, t):
-    """A row in which no difference quotient of phi is the jacobian's; None where there is none, or none can be had."""
+    """Return a row of the jacobian that no difference quotient of phi confirms; None if there is none."""
     kind = type(constraint)
     phi, jacobian = twin(kind.phi), twin(kind.jacobian)
 
@@ -70,7 +70,7 @@ def _wrong_row(constraint, par, x, t):
             h = step * max(np.abs(x).max(), LEAST_X) * direction
             quotient = (value(x + h) - value(x - h)) * np.abs(direction).max() / (2.0 * np.abs(h).max())
             off = np.fmin(off, np.abs(quotient - rate))
-    except Exception:  # the compiled kernels will say
+    except Exception:  # the compiled kernels report it
         return None
     wrong = np.flatnonzero(off > QUOTIENT_ERROR * size)
     return int(wrong[0]) if wrong.size else None

@@ -19,7 +19,7 @@ TRIAL_SHAKES = (0.1, 0.3, 0.6, 1.0)
 
 
 def refuse(scene, metric, sketch, found, tol, held=()):
-    """Raise InconsistentState that names the constraints in conflict; the error has them as `.constraints`."""
+    """Raise InconsistentState that names the constraints in conflict, also as `.constraints`."""
     packed = scene.packed
     members = [member for member in packed.members if not getattr(member.constraint, "normalises", False)]
     left = np.zeros(len(packed.system.segments))
@@ -60,14 +60,14 @@ def refuse(scene, metric, sketch, found, tol, held=()):
 
 
 def _wider(suspects, members):
-    """Those that share a body with these: where a derivative vanishes, more are needed for a conflict."""
+    """Return the constraints that share a body with these: vanishing derivatives hide rows of a conflict."""
     bodies = {id(body) for member in suspects for body in (member.constraint.a, member.constraint.b)}
     bodies -= {id(None), id(suspects[0].constraint.scene.ground)}
     return [member for member in members if bodies & {id(member.constraint.a), id(member.constraint.b)}]
 
 
 def smallest(suspects, trial):
-    """A smallest set of members that can't be met, and whether it is known that each is needed."""
+    """Return a minimal infeasible subset, and True if each of its members is known to be necessary."""
     if len(suspects) <= FEW:
         for size in range(1, len(suspects)):
             for chosen in combinations(suspects, size):

@@ -38,10 +38,10 @@ DEPENDENT = (
 
 
 def consistent(scene, system, q, qd, t, tol, allowed=False):
-    """Check positions and velocities against the constraints, then remove what rounding is left. Returns (q, qd).
+    """Check positions and velocities against the constraints, then project them to rounding. Return (q, qd).
 
-    Positions and velocities change by the least in the metric of kinetic energy. Where redundant rows are `allowed` and
-    there are some, the networks of the packed scene drop them from now on.
+    The projection is the smallest in the metric of kinetic energy. If redundant rows are `allowed`, the constraint
+    graphs of the packed scene drop them from now on.
     """
     packed = scene.packed
     start = _Start(scene, system, q, qd, t, tol)
@@ -52,7 +52,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     start.demand_velocities()
     known = packed.derived.redundant
     if dependent < 0:
-        if known is not None:  # another start had too many rows
+        if known is not None:  # an earlier start had redundant rows
             set_redundant(packed, None)
             start = start.again()
         start.demand_inertia()
@@ -72,7 +72,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
 
 
 class _Start:
-    """The memory in which a start is looked at."""
+    """A start under check, with its workspace."""
 
     def __init__(self, scene, system, q, qd, t, tol):
         self.given = scene, system, q, qd, t, tol
@@ -93,37 +93,37 @@ class _Start:
         work.control.floor = ROUNDING * (self.packed.size + np.abs(q).max())
 
     def demand_velocities(self):
-        """Refuse those that are off."""
+        """Refuse velocities that violate the constraints."""
         tol = self.tol * (1.0 + np.abs(self.qd).max())
         demand_small(self.scene, self.velocity, tol, "velocity", "Phi_q qd + Phi_t")
 
     def loose_axis(self):
-        """The row of an axis without inertia that the rows which are kept leave free; -1 where there is none."""
+        """Return the row of a massless axis about which the kept rows leave rotation free, or -1."""
         return free_axis(self.context, self.q, self.t) if len(self.network.axes.rows) else -1
 
     def demand_inertia(self):
-        """Refuse an axis that nothing holds and that carries no inertia."""
+        """Refuse a massless axis about which rotation is free."""
         self.refuse_axis(self.loose_axis())
 
     def refuse_axis(self, row):
-        """By body and axis; -1 is none."""
+        """Refuse the axis of a row, by its body; -1 is none."""
         if row < 0:
             return
         body, axis = axis_of(self.network.axes, row)
         raise SingularConfiguration(
-            f"{self.scene.bodies[body].name}: turning about the axis {np.round(axis, 3) + 0.0} of its frame is free "
-            "and carries no inertia, so the accelerations are not determined. Give it inertia about that axis, or add "
+            f"{self.scene.bodies[body].name}: rotation about the axis {np.round(axis, 3) + 0.0} of its frame is free "
+            "and has no inertia, so the accelerations are not determined. Give it inertia about that axis, or add "
             "the constraint that holds it."
         )
 
     def again(self):
-        """The same on the network as it is made now."""
+        """Return the same start on the present constraint graph."""
         other = _Start(*self.given)
         other.check()
         return other
 
     def check(self):
-        """Refuse what is off; the row of H that depends on those before it, or -1."""
+        """Refuse violated rows; return the first row of H that depends on those before it, or -1."""
         scene, network, free, q, qd = self.scene, self.network, self.free, self.q, self.qd
         dependent = evaluate_start(self.context, q, qd, self.t, self.rates, 1)
         rows, real = network.normals[network.normals >= 0], network.row >= 0
@@ -141,7 +141,7 @@ class _Start:
         return dependent
 
     def redundant_rows(self):
-        """The rows that follow from others, here and near by; a singular configuration is refused."""
+        """Return the rows that are redundant here and nearby; refuse a singular configuration."""
         names, row, H = self.scene.row_names(), self.network.row, self.free.rows.H.reshape(-1, 16)
         gone = np.flatnonzero(~H.any(axis=1) & (row >= 0))
         if gone.size:
@@ -175,23 +175,23 @@ class _Start:
         )
 
     def chosen_of_all(self):
-        """The rows that follow from others by pivoted QR of all at once: for scenes that blocks part badly."""
+        """Return the redundant rows by pivoted QR of all rows: for scenes in which block-wise selection fails."""
         network, q = self.network, self.q
         joints = np.flatnonzero(network.row >= 0)
         if q.size * joints.size > DENSE_ENTRIES or network.welds.size:
             return np.empty(0, int)
         A = constraint_arrays(self.scene.system, q, self.qd, self.t)[1][network.row[joints]]
-        for at in self.at:  # without the changes of length of p, which the normalisations hold
+        for at in self.at:  # without the component along p, which the normalisations hold
             A[:, at] -= np.outer(A[:, at] @ q[at], q[at])
         return joints[np.sort(dependent(A))]
 
     def serve(self, rows):
-        """Take these rows for redundant; whether S of the others is regular."""
+        """Take these rows for redundant; return True if S of the others is nonsingular."""
         set_selection(self.free, rows)
         return evaluate_start(self.context, self.q, self.qd, self.t, self.rates, 0) < 0 and self.loose_axis() < 0
 
     def hold_near_by(self, way):
-        """Whether the redundant rows hold on the way to a place near by: in one go, or in shorter legs."""
+        """Return True if the redundant rows hold along the way to a nearby configuration."""
         gone, leg = 0.0, NEIGHBOURHOOD
         while gone < NEIGHBOURHOOD:
             here = self.free.poses.copy()
@@ -208,7 +208,7 @@ class _Start:
         return True
 
     def landed(self):
-        """Positions and velocities on the manifold, where they are not to rounding."""
+        """Return positions and velocities, projected unless they are at rounding."""
         q, qd, at = self.q, self.qd, self.at
         if self.far:
             q = q.copy()
@@ -217,13 +217,13 @@ class _Start:
             self.work.q[:], self.work.qd[:] = q, qd
             if land_start(self.context, self.t) == 0:
                 q, qd = self.work.q.copy(), self.work.qd.copy()
-            else:  # what holds an orientation has not put it right
+            else:  # a locked orientation was not corrected
                 keep_turning(self.packed, still(self.packed).bodies.tolist())
         return q, qd
 
 
 def _refuse(scene, start, dependent):
-    """Say which rows are dependent; return where a closer look finds none."""
+    """Refuse dependent rows, by name; return if dense rank analysis finds none."""
     network, free, q = start.network, start.free, start.q
     if q.size * len(scene.system.segments) < LISTED_ENTRIES:
         check_rank(scene, constraint_arrays(scene.system, q, start.qd, start.t)[1])

@@ -11,14 +11,15 @@ import numpy as np
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
 from ..maths.row_rank import row_lengths
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
-from ..observables.evaluate import LARGE, constraint_arrays
+from ..observables.evaluate import constraint_arrays
+from ..observables.tolerances import LARGE
 from .tolerances import IMMOBILE, LEAST_DIVISOR, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
 
 
 class Metric:
     """Constraints of a packed scene at time t as rows (m', x), dense or (above 1000 coordinates) sparse.
 
-    held (n,) says which coordinates must stay.
+    held (n,) marks coordinates that are fixed.
     """
 
     def __init__(self, packed, held=None, t=0.0):
@@ -123,7 +124,7 @@ class Metric:
         return qd
 
     def reach(self, q):
-        """A length of the scene's, m: of its joints from the centroids, or of its bodies from each other."""
+        """Return a characteristic length, m: of joints from centroids, or of bodies from each other."""
         return float(self.packed.size) or float(np.ptp(q[self.r], axis=0).max()) or 1.0
 
     def extent(self, x):
@@ -155,7 +156,7 @@ class Metric:
 
 
 def rotation_vectors(p, target):
-    """The turns (b, 3) that take orientations p (b, 4) to others, in the frames of p, at most half a turn."""
+    """Return the rotation vectors (b, 3) from orientations p (b, 4) to the target, in the frames of p, up to pi."""
     e = np.einsum("bij,bj->bi", transform_g(p), target)
     e0, size = np.einsum("bi,bi->b", p, target), np.linalg.norm(e, axis=1)
     angle = 2.0 * np.arctan2(size, np.abs(e0))
@@ -164,7 +165,7 @@ def rotation_vectors(p, target):
 
 
 def soft_step(A, residual, wish, softness):
-    """The x nearest to a wish that meets residual + A x = 0, rows being springs of stiffness 1 / softness (rows,)."""
+    """Return the x nearest to a wish with residual + A x = 0, the rows being springs of stiffness 1 / softness."""
     if not A.shape[0]:
         return wish
     if isinstance(A, np.ndarray):
@@ -179,7 +180,7 @@ def soft_step(A, residual, wish, softness):
 
 
 def least_step(A, residual, rcond=SOLVED):
-    """The smallest x with residual + A x = 0, by least squares; rcond: singular values of unit rows that are none."""
+    """Return the smallest least-squares x of residual + A x = 0; rcond: share of singular values taken as zero."""
     lengths = row_lengths(A)
     some = lengths > 0.0
     if not some.any():
@@ -194,7 +195,7 @@ def least_step(A, residual, rcond=SOLVED):
 
 
 def unit_tangent(metric, q, rng):
-    """A random direction that the constraints leave, moving the scene by its size or turning it by 1 rad; or None."""
+    """Return a random tangent direction that displaces the scene by its size or rotates it by 1 rad; or None."""
     _, A = metric.linear(q)
     reach = metric.reach(q)
     wish = metric.speeds(reach * rng.normal(size=metric.r.shape), rng.normal(size=(len(metric.p), 3)))

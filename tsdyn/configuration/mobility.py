@@ -205,7 +205,7 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
 
 
 def _core(metric, q, rows):
-    """Numbers (among those that are no normalisations) of rows that may depend on each other, and the rows, dense."""
+    """Return the indices (normalisations not counted) of rows that may be dependent, and the rows, dense."""
     _, A = metric.linear(q)
     if not metric.sparse:
         return (np.arange(A.shape[0]), A) if rows is None else (rows, A[rows])
@@ -223,7 +223,7 @@ def _core(metric, q, rows):
 
 
 def _neighbours(metric, q, A):
-    """Consistent configurations beside q, along directions that the constraints leave, at random."""
+    """Yield consistent configurations near q, along random tangent directions."""
     rng = np.random.default_rng(0)
     for _ in range(TRIES):
         step = unit_tangent(metric, q, rng)
@@ -235,14 +235,14 @@ def _neighbours(metric, q, A):
 
 
 def _groups(packed, metric, rows):
-    """Numbers of `rows` constraint by constraint."""
+    """Return the indices of `rows`, one array for each constraint."""
     owner = np.repeat(np.arange(len(packed.members)), [member.constraint.rows for member in packed.members])
     whose = owner[metric.own[rows]] if len(rows) else np.zeros(0, int)
     return [np.flatnonzero(whose == member) for member in np.unique(whose)]
 
 
 def _listed(names):
-    """Names of rows, those of one constraint together."""
+    """Return the names of rows, grouped by constraint."""
     if not names:
         return "nothing else: it vanishes"
     heads = Counter(map(_head, names))

@@ -35,9 +35,9 @@ def check_rank(scene, Phi_q):
 
 
 def weakest_row(scene, Phi_q, redundant=0):
-    """Name the row of Phi_q nearest to depending on the others; and the share of its smallest singular value.
+    """Return the name of the row of Phi_q nearest to dependence, and the smallest singular value over the largest.
 
-    So many redundant rows, the nearest ones, are passed over.
+    `redundant` rows, those nearest to dependence, are skipped.
     """
     if not (Phi_q.size and np.isfinite(Phi_q).all()):
         return "", 1.0
@@ -48,9 +48,9 @@ def weakest_row(scene, Phi_q, redundant=0):
 
 
 def _pivots(scene, rows):
-    """The rows in an order in which each is the farthest from those before it, the normalisations first.
+    """Return the rows ordered by pivoted QR, normalisations first.
 
-    Normalisations belong to the bodies: what depends on them is for the user's constraints to mend.
+    Normalisations belong to the bodies, so dependence on them is attributed to the user's constraints.
     """
     own = np.array([type(c) is EulerNormalization for c in scene.constraints for _ in range(c.rows)])
     rest, first = np.flatnonzero(~own), np.flatnonzero(own)

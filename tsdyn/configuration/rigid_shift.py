@@ -11,7 +11,7 @@ from ..maths.vectors import cross
 
 
 class RigidShift:
-    """Moves the bodies on one side of a joint; their velocities against the other side go along.
+    """Moves the bodies on one side of a joint; their velocities relative to the other side are preserved.
 
     Parameters
     ----------
@@ -19,7 +19,7 @@ class RigidShift:
     stays, goes : Body or ground
         Its two bodies.
     bodies : list of Body
-        Those that move: `goes`, and all that hang on it.
+        The moving bodies: `goes`, and all bodies beyond it.
     """
 
     def __init__(self, joint, stays, goes, bodies):
@@ -27,7 +27,7 @@ class RigidShift:
 
     @classmethod
     def of(cls, scene, joint):
-        """The shift of a joint's coordinates; None where the joint is a part of a loop."""
+        """Return the shift across a joint; None if the joint is in a loop."""
         for stays, goes in ((joint.a, joint.b), (joint.b, joint.a)):
             found = _beyond(scene, stays, goes)
             if not any(body is stays or body is scene.ground for body in found):
@@ -35,7 +35,7 @@ class RigidShift:
         return None
 
     def gain(self, goals):
-        """Give the coordinates of some goals their new rates."""
+        """Set the rates of the goals' coordinates."""
         for goal in goals:
             axis, centre, sense = self._line(goal)
             gain = sense * (goal.new_rate - goal.rate) * axis
@@ -48,7 +48,7 @@ class RigidShift:
                     body.angular_velocity = body.angular_velocity + rotation_matrix(body.orientation).T @ gain
 
     def move(self, goals, share):
-        """Move by a share of the way of some goals."""
+        """Move by a share of the goals' increments."""
         for goal in goals:
             axis, centre, sense = self._line(goal)
             way = sense * share * (goal.new_value - goal.value)
@@ -66,7 +66,7 @@ class RigidShift:
                     body.angular_velocity = rotation_matrix(body.orientation).T @ (omega + R @ (w - omega))
 
     def _line(self, goal):
-        """The axis of a goal's coordinate, ground frame, a point on it, and which way is positive for what moves."""
+        """Return the axis of a goal's coordinate (ground frame), a point on it, and the sign for the moving side."""
         geometry, point = goal.geometry, "point_a" if self.goes is self.joint.a else "point_b"
         direction = cross(geometry.f, geometry.g) if goal.turns else geometry.e
         axis = rotation_matrix(_orientation(geometry.own)) @ direction
@@ -76,7 +76,7 @@ class RigidShift:
 
 
 def _beyond(scene, stays, goes):
-    """The bodies that hang on one of two, without the links between the two; with the other where there is a loop."""
+    """Return the bodies on one side when the links between two are cut; in a loop, the other is among them."""
     links = {}
     for constraint in scene.constraints:
         a, b = constraint.a, constraint.b

@@ -2,14 +2,15 @@
 
 import numpy as np
 
-from ..maths.row_rank import RANK_TOL, farthest_first, rank_of, singular_values, unit_rows
+from ..maths.row_rank import farthest_first, rank_of, singular_values, unit_rows
+from ..maths.tolerances import RANK_TOL
 from .tolerances import FIRM, TAKES_PART
 
 
 def divide(A, groups):
-    """Kept and redundant rows of A (rows, x): those of a group that depend on it and on the groups before it.
+    """Return kept and redundant rows of A (rows, x), by groups: redundant rows depend on rows before them.
 
-    groups is a list of arrays of row numbers. Within a group the rows kept are those farthest from the rest.
+    groups is a list of index arrays. Within a group, pivoted QR chooses the rows to keep.
     """
     from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
 
@@ -25,14 +26,14 @@ def divide(A, groups):
         basis = np.vstack((basis, Q.T[:count]))
         kept += sorted(rows[order[:count]].tolist())
         redundant += sorted(rows[order[count:]].tolist())
-    if len(kept) != rank:  # near the edge of what rank means: take the rows farthest from each other, wherever they are
+    if len(kept) != rank:  # the rank is ambiguous: choose among all rows at once
         order, _ = farthest_first(unit)
         kept, redundant = sorted(order[:rank].tolist()), sorted(order[rank:].tolist())
     return kept, redundant
 
 
 def partners(A, kept, redundant):
-    """For each redundant row, the rows among those kept of which it is a combination."""
+    """Return, for each redundant row, the kept rows of which it is a combination."""
     unit = unit_rows(A)
     if not (kept and redundant):
         return [[] for _ in redundant]
@@ -41,10 +42,10 @@ def partners(A, kept, redundant):
 
 
 def put_aside(A, owners):
-    """Rows of a sparse A that are independent of all others for sure: those of bodies that all their rows hold firmly.
+    """Remove rows of a sparse A that are certainly independent; return the remaining rows.
 
-    owners (x,) is the body of each column. A body whose rows, restricted to its columns, are independent takes them
-    away with it, as the links of an open chain do from the end. Returns the rows that are left.
+    owners (x,) is the body of each column. If the rows of a body are independent in its columns alone, they are
+    independent of all other rows, and the body is removed with them, as the links of an open chain are from its end.
     """
     from scipy.sparse import csr_array
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class Goal:
-    """A coordinate of a joint: where it is as the bodies stand now, and where it is to go."""
+    """A joint coordinate: its present value, and the value to be reached."""
 
     def __init__(self, geometry, value, rate, new_value, new_rate):
         self.geometry, self.turns = geometry, isinstance(geometry, AngleGeometry)
@@ -42,7 +42,7 @@ class Goal:
         self.new_rate = rate if new_rate is None else new_rate
 
     def driver(self, share, t, joint):
-        """The constraint that holds it after a share of the way, with its new rate, at t."""
+        """Return the constraint that prescribes a share of the way, with the new rate, at t."""
         g, value = self.geometry, self.value + share * (self.new_value - self.value)
         motion = Polynomial((value - self.new_rate * t, self.new_rate))
         name = f"{joint.name} at {value:.6g} {'rad' if self.turns else 'm'}, {self.new_rate:.6g} a second"
@@ -52,7 +52,7 @@ class Goal:
         return Dot2(g.own, g.other, axis_a=g.e, **points, value=motion, name=name)
 
 
-def set_joint(
+def set_joint(  # by name: a value and a rate of each coordinate
     scene: Scene,
     joint: ItemLike,
     *,
@@ -64,42 +64,42 @@ def set_joint(
     keep: Sequence[ItemLike] = (),
     t: float = 0.0,
 ) -> AssemblyReport:
-    """Give a joint's coordinates and their rates at the start, and assemble the rest of the scene.
+    """Set the initial coordinates and rates of a joint, and assemble the rest of the scene.
 
     Parameters
     ----------
     joint : joint or str
         With an angle or a displacement, such as Revolute or Translational; or its name.
     angle : float, rad; optional
-        Of b against a, as of `solution.angle`; any number of turns, which a run counts on from. Two for Universal.
+        Of b relative to a, as `solution.angle` counts it, over any number of turns. Two for Universal.
     displacement : float, m; optional
-        As of `solution.displacement`.
+        As given by `solution.displacement`.
     rate : float, rad/s or m/s; optional
-        Of the joint's only coordinate, or of its only angle where one is given.
+        Of the only coordinate of the joint, or of the coordinate that is set.
     angle_rate, displacement_rate : float, rad/s and m/s; optional
-        The same by name, for joints that have both.
+        The same, for joints that have both.
     keep : sequence of joints, or names; optional
-        In closed loops: other joints whose coordinates and rates are to stay as they are.
+        In closed loops: other joints that keep their coordinates and rates.
     t : float, s
-        The time at which constraints that depend on time are met.
+        Time at which rheonomic constraints are satisfied.
 
     Returns
     -------
     AssemblyReport
-        Of the last step.
+        Of the last assembly.
 
     Raises
     ------
     InvalidConstraint, InvalidArgument
         If the joint has no such coordinate, or a number is not finite.
     InconsistentState
-        If the scene can't be assembled so. The bodies are as before.
+        If the scene can't be assembled with these values. The bodies are unchanged.
 
     Notes
     -----
-    What is not given stays as it is. In a tree of joints, the bodies beyond the joint follow as one: no other joint
-    changes. In closed loops the joint goes to its value in small steps, on the branch of the configuration that the
-    scene has; what is nearest in the metric of kinetic energy decides about other freedoms.
+    Coordinates that aren't given keep their values. In a tree, the bodies beyond the joint move as one rigid body: no
+    other joint changes. In a closed loop the joint is driven to its value in small steps, on the present branch; other
+    freedoms take the nearest values in the metric of kinetic energy.
 
     Examples
     --------
@@ -140,7 +140,7 @@ def set_joint(
 
 
 def _link(joint, given):
-    """Where a joint has a lead, its angle says its displacement, and the other way round."""
+    """Derive the displacement of a joint with a lead from its angle, or the angle from the displacement."""
     lead = getattr(joint, "travel_per_radian", None)
     if lead is not None:
         for i, (turn, travel) in enumerate(zip(*given.values(), strict=True)):
@@ -151,7 +151,7 @@ def _link(joint, given):
 
 
 def _kind_of_rate(handles, joint, given):
-    """What `rate` is the rate of: the kind that is given, or the only one that the joint has."""
+    """Return the kind of coordinate that `rate` refers to: the one that is set, or the joint's only one."""
     asked = [kind for kind, pair in given.items() if pair[0] is not None]
     kinds = asked if len(asked) == 1 else _kinds(handles, joint)
     if len(kinds) > 1:
@@ -163,13 +163,13 @@ def _kind_of_rate(handles, joint, given):
 
 
 def _kinds(handles, joint):
-    """The kinds of coordinates that a joint has; of what has none "angle", which is refused by name later."""
+    """Return the kinds of coordinates of a joint; ("angle",) for anything without, to be refused by name later."""
     declared = getattr(handles.item(joint), "joint_coordinates", ())
     return list(dict.fromkeys("angle" if isinstance(each, Angle) else "displacement" for each in declared)) or ["angle"]
 
 
 def _goals(scene, handles, joint, kind, pair, t):
-    """A `Goal` for each coordinate of a kind, from what is given of it: (value, rate)."""
+    """Return a `Goal` for each coordinate of a kind, from (value, rate)."""
     row = handles.row(joint, kind)
     geometries, (q, qd) = getattr(row, f"{kind}s"), scene.start
     evaluate, near = getattr(joint_motion, kind), handles.angles_at_start(t, q)
@@ -185,7 +185,7 @@ def _goals(scene, handles, joint, kind, pair, t):
 
 
 def _numbers(joint, name, value, count):
-    """The numbers given for some coordinates; None for each that is left as it is."""
+    """Return the numbers given; None for each coordinate that keeps its value."""
     if value is None:
         return [None] * count
     numbers = np.atleast_1d(floats(value))
@@ -196,12 +196,12 @@ def _numbers(joint, name, value, count):
 
 
 def _present(scene, handles, joint, t):
-    """All coordinates of a joint, to stay as they are."""
+    """Return goals that hold all coordinates of a joint."""
     return [goal for kind in _kinds(handles, joint) for goal in _goals(scene, handles, joint, kind, (None, None), t)]
 
 
 def _drive(scene, joint, goals, held, t):
-    """Bring a joint to its goals; the report of the last assembly."""
+    """Drive a joint to its goals; return the report of the last assembly."""
     threaded = any(isinstance(part, Thread) for part in scene.primitives)
     size, steps = _size(scene), 1
     shift = RigidShift.of(scene, joint)
@@ -235,7 +235,7 @@ def _drive(scene, joint, goals, held, t):
 
 
 def _assembled(scene, drivers, t):
-    """Assemble the scene with some constraints that it does not keep."""
+    """Assemble the scene with temporary constraints."""
     for driver in drivers:
         settle(driver)
     scene._added.extend(drivers)
@@ -248,6 +248,6 @@ def _assembled(scene, drivers, t):
 
 
 def _size(scene):
-    """How far the scene reaches, m."""
+    """Return the extent of the scene, m."""
     places = np.array([body.position for body in scene.bodies])
     return max(float(np.ptp(places, axis=0).max()), scene.packed.size, LEAST_DIVISOR)

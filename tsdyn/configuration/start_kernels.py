@@ -46,7 +46,7 @@ def evaluate_start(context, q, qd, t, velocity, every):
 
 @entry("pd")
 def land_start(context, t):
-    """Put w.q and w.qd onto the manifold. Status."""
+    """Project w.q and w.qd onto the constraint manifold. Status."""
     c = load_parts(context)
     network, system, w, f = c.network, c.system, c.work, c.free
     set_time(system, t)

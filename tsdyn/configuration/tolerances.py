@@ -18,16 +18,16 @@ LEAST_VELOCITY_TOL = 1e-9
 
 # --- redundant rows of a start ---
 # Shares of a pivot of S in its diagonal entry below which the row is dropped, tried in turn. Pivots are squares of
-# distances between rows, which joints of crooked data bring to 1e-3; rounding leaves 1e-15 of them.
+# distances between rows: inexact joint data bring them to 1e-3, rounding leaves 1e-15.
 REDUNDANT_SHARES = 1e-3, 1e-6, 1e-9, 1e-12
 # How far a dropped row must hold on the way from the start, and at least: rad, or share of the scene's size. A row that
-# is tangent by chance opens as the square of the way: 1e-4 at 1e-2, far above rounding.
+# is dependent at the start alone is violated by the square of the distance: 1e-4 at 1e-2, far above rounding.
 NEIGHBOURHOOD, LEAST_NEIGHBOURHOOD = 1e-2, 1e-3
 # A leg of that way whose end can't be projected is shortened to a quarter, down to this share of the whole.
 SHORTENING, SHORTEST_LEG = 0.25, 1e-3
-# Share of a direction that is left when it has been made tangent: less is rounding, and nothing can move.
+# Share of a direction that remains after projection onto the tangent space: less is rounding, and nothing can move.
 IMMOBILE = 1e-9
-# m; a scene of points in one place has no size, and lengths are compared with this.
+# m; the size of a scene whose points coincide.
 LEAST_SIZE = 1e-3
 # Entries of Phi_q (8 bytes each): up to the first, dependent rows are listed with their partners; up to the second,
 # rows are selected by dense QR where blocks fail.

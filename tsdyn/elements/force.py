@@ -46,8 +46,8 @@ _OPTIONAL = {"potential": 3, "dissipation": 4, "remember": 4, "series": 6, "norm
 class Force(Attachment):
     """Base class of all forces.
 
-    Subclass it in one file of your own: set `markers`, write `law` as a static method, and pass the bodies and the
-    marker coordinates on in `__init__`. `tsdyn.testing.check_force` checks the result.
+    Subclass it in one file of your own: set `markers`, write `law` as a static method; an `__init__` with
+    further arguments passes the bodies and `**places` on. `tsdyn.testing.check_force` checks the result.
 
     Attributes
     ----------
@@ -76,25 +76,20 @@ class Force(Attachment):
 
     Examples
     --------
-    A point of a body is pulled back to the z axis by -k d:
+    A point of a body is pulled back to the z axis by -8 d:
 
     >>> import tsdyn as ts
     >>> class Pole(ts.Force):
     ...     markers = (ts.Point("a"),)
-    ...     def __init__(self, a, *, stiffness=1.0, **places):
-    ...         super().__init__(a, None, **places)
-    ...         self.stiffness = float(stiffness)
-    ...     def parameters(self):
-    ...         return (self.stiffness,)
     ...     @staticmethod
     ...     def law(x, xd, par, t, out):
-    ...         out[0], out[1] = -par[0] * x[0], -par[0] * x[1]
+    ...         out[0], out[1] = -8.0 * x[0], -8.0 * x[1]
     ...     @staticmethod
     ...     def potential(x, par, t):
-    ...         return par[0] * (x[0] * x[0] + x[1] * x[1]) / 2
+    ...         return 4.0 * (x[0] * x[0] + x[1] * x[1])
     >>> scene = ts.Scene()
     >>> ball = scene.add_point_mass(mass=1.0, position=(0.5, 0, 0))
-    >>> scene.add(Pole(ball, stiffness=8.0))
+    >>> scene.add(Pole(ball))
     <Pole 'Pole(body1)'>
     """
 

@@ -35,8 +35,8 @@ class Composition(NamedTuple):
 class Joint(Attachment):
     """Base class of all constraints that are composed of others.
 
-    Subclass it in one file of your own: set `markers`, pass the bodies and the marker coordinates on in `__init__`, and
-    yield the parts in `compose`. `tsdyn.testing.check_primitive` checks the result.
+    Subclass it in one file of your own: set `markers` and yield the parts in `compose`; an `__init__` with further
+    arguments passes the bodies and `**places` on. `tsdyn.testing.check_primitive` checks the result.
 
     Attributes
     ----------
@@ -53,8 +53,6 @@ class Joint(Attachment):
     >>> import tsdyn as ts
     >>> class PinInSlot(ts.Joint):
     ...     markers = (ts.Point("a"), ts.Point("b"))
-    ...     def __init__(self, a, b, *, point_a=(0, 0, 0), point_b=(0, 0, 0), name=""):
-    ...         super().__init__(a, b, (point_a, point_b), name)
     ...     def compose(self):
     ...         points = {"point_a": self.point_a, "point_b": self.point_b}
     ...         yield "axis", ts.constraints.Parallel(self.a, self.b, axis_a=(0, 0, 1), axis_b=(0, 0, 1))

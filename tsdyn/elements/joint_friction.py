@@ -40,18 +40,18 @@ class JointFriction:
     Parameters
     ----------
     joint : constraint
-        It must have been added to its scene; where it is follows from it.
+        A joint or contact of the scene; it determines where the friction acts.
     kinetic : float
         Coefficient of friction while sliding.
     static : float, optional
-        That near rest, at least the kinetic one, which it is by default.
+        Coefficient near rest, at least the kinetic one (default).
     slip_velocity : float, m/s
-        Regularisation: at this velocity the friction is 71% of its size. What should stick creeps, slower than this.
+        Regularisation: velocity at which the friction is 71% of its magnitude. Sticking is replaced by slower creep.
     stribeck_velocity : float, m/s, optional
-        At this velocity what the static coefficient is above the kinetic one has fallen to 37%; by default ten times
-        slip_velocity.
+        Velocity at which the excess of the static over the kinetic coefficient has fallen to 37%; by default
+        10 slip_velocity.
     preload : float, N
-        Normal load besides that of the reaction.
+        Normal load in addition to the reaction.
     name : str, optional
 
     Raises
@@ -59,7 +59,7 @@ class JointFriction:
     InvalidForce
         If the joint is of another class or isn't in its scene, or a number is negative, not finite or impossible.
     RedundantConstraints
-        When a run begins, if the reaction that it needs isn't unique.
+        At the start of a run, if the reaction is not unique.
 
     Attributes
     ----------

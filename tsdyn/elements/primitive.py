@@ -43,8 +43,8 @@ _OPTIONAL = {"phi_t": 4, "series": 5, "series_t": 5, "remember": 3}
 class Primitive(Attachment):
     """Base class of all constraints that have rows of their own.
 
-    Subclass it in one file of your own: set `rows` and `markers`, write the kernels as static methods, and pass the
-    bodies and the marker coordinates on in `__init__`. `tsdyn.testing.check_primitive` checks the result.
+    Subclass it in one file of your own: set `rows` and `markers`, write the kernels as static methods; an `__init__`
+    with further arguments passes the bodies and `**places` on. `tsdyn.testing.check_primitive` checks the result.
 
     Attributes
     ----------
@@ -71,8 +71,8 @@ class Primitive(Attachment):
     >>> import tsdyn as ts
     >>> class OnCylinder(ts.Primitive):
     ...     rows, markers = 1, (ts.Point("a"),)
-    ...     def __init__(self, a, *, point_a=(0, 0, 0), radius=1.0, name=""):
-    ...         super().__init__(a, None, (point_a,), name)
+    ...     def __init__(self, a, *, radius=1.0, **places):
+    ...         super().__init__(a, None, **places)
     ...         self.radius = float(radius)
     ...     def parameters(self):
     ...         return (self.radius,)

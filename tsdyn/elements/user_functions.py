@@ -8,7 +8,7 @@ from types import FunctionType
 from typing import Any
 
 from ..jit.compiled_once import compiled_once
-from ..jit.kernels import kernel, specialised
+from ..jit.kernels import kernel, part, specialised
 from .force import callbacks
 
 STATE = 13  # position, Euler parameters, velocity, angular velocity
@@ -63,6 +63,20 @@ def variant(cls, mixin):
     """The private subclass of a public class that has a mixin, or the class itself where there is none."""
     private = (kind for kind in cls.__subclasses__() if kind.__name__.startswith("_"))
     return next((kind for kind in private if issubclass(kind, mixin)), cls)
+
+
+function = None  # filled in by `ByState`
+
+
+@part
+def load_at(t, coordinate, rate):
+    """The load of a user's function of a joint coordinate; NaN if it raises."""
+    load = math.nan
+    try:
+        load = float(function(t, coordinate, rate))
+    except Exception:
+        load = math.nan
+    return load
 
 
 class ByState:

@@ -4,7 +4,7 @@ from typing import Any, Self
 
 from .. import JointFriction
 from ..constraints import Revolute, Translational
-from ..hints import ArrayLike, Attachment, Attribute, Axes, Body, BodyLike, Floats, Force, Frame, JointLaw, Load, PointMass, Points, References, VectorLoad
+from ..hints import ArrayLike, Attachment, Attribute, Axes, Body, BodyLike, Floats, Force, Frame, JointLaw, JointLoads, Load, PointMass, Points, References, VectorLoad
 
 class Bushing(Points, Force):
     stiffness: Attribute[ArrayLike, Floats]
@@ -55,31 +55,15 @@ class CoulombFriction(Force):
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., force: float = ..., torque: float = ..., slip_velocity: float = ..., slip_rate: float = ..., point_a: ArrayLike = ..., name: str = ...) -> Self: ...
 
-class JointForce(Force):
-    @property
-    def joint(self) -> Attachment: ...
-    function: JointLaw
-    period: float | None
-    @property
-    def which(self) -> int: ...
+class JointForce(JointLoads, Force):
     def __init__(self, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...) -> Self: ...
-    @property
-    def geometry(self) -> Any: ...
 
-class JointTorque(Force):
-    @property
-    def joint(self) -> Attachment: ...
-    function: JointLaw
-    period: float | None
-    @property
-    def which(self) -> int: ...
+class JointTorque(JointLoads, Force):
     def __init__(self, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...) -> Self: ...
-    @property
-    def geometry(self) -> Any: ...
 
 class PointForce(Force):
     point_a: Attribute[ArrayLike, Floats]

@@ -36,7 +36,7 @@ def _three(value, what, error):
 
 
 class Bushing(Force):
-    """Hold two frames together by springs and dampers along and about the three axes of body a.
+    """Springs and dampers between two frames, along and about the three axes of body a.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class Bushing(Force):
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random bushing, other along every axis."""
+        """A random bushing, different along every axis."""
         numbers = dict(zip(cls.quantities, rng.uniform(0.5, 2.0, size=(4, 3)), strict=True))
         return cls(a, b, point_a=rng.normal(size=3), point_b=rng.normal(size=3), **numbers)
 

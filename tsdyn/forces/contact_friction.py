@@ -15,14 +15,14 @@ from ..plugins import Force, JointFriction, Point, Turn, Vector, act, coefficien
 
 
 class ContactFriction(JointFriction, Force):
-    """Coulomb friction with Stribeck's peak in a plane contact, in proportion to the contact's reaction.
+    """Coulomb friction with Stribeck effect in a plane contact, proportional to the contact reaction.
 
-    The contact is two-sided: where it pulls instead of pushing it rubs, too.
+    The contact is bilateral: friction acts under tension, too.
 
     Parameters
     ----------
     joint : PlaneContact
-        Added to its scene.
+        Of the scene.
 
     Examples
     --------

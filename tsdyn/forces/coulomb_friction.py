@@ -22,18 +22,18 @@ if TYPE_CHECKING:
 
 
 class CoulombFriction(BodyFriction, Force):
-    """Resist the motion of a relative to b by a force and a torque of constant size.
+    """Friction force and torque of constant magnitude against the motion of a relative to b.
 
     Parameters
     ----------
     force : float, N
-        Size of the friction force: the friction coefficient times the normal force.
+        Magnitude of the friction force: coefficient of friction times normal force.
     torque : float, N m
-        Size of the friction torque.
+        Magnitude of the friction torque.
     slip_velocity : float, m/s
-        Regularisation: at this velocity the force is 71% of its size.
+        Regularisation: velocity at which the force is 71% of its magnitude.
     slip_rate : float, rad/s
-        The same for the torque.
+        Regularisation of the torque.
 
     Examples
     --------
@@ -86,6 +86,6 @@ class CoulombFriction(BodyFriction, Force):
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random one, regularised over the velocities of a test."""
+        """A random instance, regularised over the velocities of a test."""
         R, N, v, w = rng.uniform(0.5, 2.0, 4)
         return cls(a, b, point_a=rng.normal(size=3), force=R, torque=N, slip_velocity=v, slip_rate=w)

@@ -8,14 +8,12 @@
 The power of (1) is F sd for any motion of the bodies.
 """
 
-import math
-
 from ..constraints.translational import Translational
-from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements
+from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements, load_at
 
 
 class JointForce(JointLoad, Force):
-    """Push b of a joint along its axis by a function of time, displacement and rate; with a period, sampled and held.
+    """Force along the axis of a joint, a function of time, displacement and rate; sampled and held if it has a period.
 
     Parameters
     ----------
@@ -26,7 +24,7 @@ class JointForce(JointLoad, Force):
     period : float, s, optional
         As for JointTorque.
     which : int
-        Which displacement, of a joint that has several.
+        Index of the displacement, of a joint with several.
 
     Raises
     ------
@@ -72,11 +70,8 @@ class JointForce(JointLoad, Force):
 
     @staticmethod
     def remember(x, xd, par, t):
-        """The force, as it is held."""
+        """The held force."""
         return par[0]
-
-
-function = None  # filled in by `ByState`
 
 
 def _law(x, xd, par, t, out):
@@ -84,11 +79,7 @@ def _law(x, xd, par, t, out):
     for i in range(3):
         s += x[i] * (x[6 + i] - x[3 + i])
         rate += x[i] * (xd[6 + i] - xd[3 + i]) + xd[i] * (x[6 + i] - x[3 + i])
-    force = math.nan
-    try:
-        force = float(function(t, s, rate))
-    except Exception:
-        force = math.nan
+    force = load_at(t, s, rate)
     for i in range(3):
         out[i], out[3 + i], out[6 + i] = force * (x[6 + i] - x[3 + i]), -force * x[i], force * x[i]
 

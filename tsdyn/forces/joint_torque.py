@@ -7,46 +7,44 @@
 The power of (1) is T times the rate of the angle if the joint holds the axis.
 """
 
-import math
-
 import numpy as np
 
 from ..constraints.revolute import Revolute
-from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles
+from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles, load_at
 
 
 class JointTorque(JointLoad, Force):
-    """Turn b of a joint against a by a function of time, angle and rate; with a period, sampled and held.
+    """Torque about the axis of a joint, a function of time, angle and rate; sampled and held if it has a period.
 
     Parameters
     ----------
     joint : Joint
         Of the scene, with an angle: Revolute, Cylindrical, Universal, ... The torque has the sign of the angle.
     function : callable (t, angle, rate) -> float, N m
-        t in s, the angle in rad as built from zero and counted over full turns, the rate in rad/s. Without a period a
-        plain Python function that Numba can compile. With one, any object: it is called in Python at the instants only,
-        in their order, so it may keep what it likes from one to the next, such as the integral of a PID controller. If
-        it has a method `reset()`, that is called before each run that does not go on from a state.
+        t in s, the angle in rad, counted over full turns, the rate in rad/s. Without a period, a plain Python function
+        that Numba can compile. With a period, any callable: it is called in Python at the sampling times only, in
+        their order, and may have a state of its own, such as the integral of a PID controller. Its method `reset()`,
+        if any, is called before each run that doesn't continue from a state.
     period : float, s, optional
-        Between the instants k period at which the function is called; the torque is held from each to the next. Steps
-        end there, and every method keeps its order.
+        Sampling period: the function is called at k period, and the torque is held in between. Steps end at sampling
+        times, so every method keeps its order.
     which : int
-        Which angle, of a joint that has several (Universal).
+        Index of the angle, of a joint with several (Universal).
 
     Raises
     ------
     InvalidForce
-        If the joint has no such angle or is not of the scene, the period is not positive, or the function can't be
-        called so.
+        If the joint has no such angle or isn't in the scene, the period is not positive, or the function has other
+        arguments.
 
     Notes
     -----
-    Its power is applied power. Turns are counted as for `solution.angle(joint)`. What the function raises, or a value
-    that is not finite, ends the run.
+    Its power is applied power. Turns are counted as for `solution.angle(joint)`. An exception of the function, or a
+    value that is not finite, ends the run.
 
     Examples
     --------
-    A controller that is sampled every 10 ms holds a wheel at 1 rad:
+    A controller with a sampling period of 10 ms holds a wheel at 1 rad:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
@@ -84,21 +82,14 @@ class JointTorque(JointLoad, Force):
 
     @staticmethod
     def remember(x, xd, par, t):
-        """The torque, as it is held."""
+        """The held torque."""
         return par[0]
-
-
-function = None  # filled in by `ByState`
 
 
 def _law(x, xd, par, t, out):
     turned = angle_about(x, par[0])
     rate = x[0] * (xd[12] - xd[9]) + x[1] * (xd[13] - xd[10]) + x[2] * (xd[14] - xd[11])
-    torque = math.nan
-    try:
-        torque = float(function(t, turned, rate))
-    except Exception:
-        torque = math.nan
+    torque = load_at(t, turned, rate)
     for i in range(9):
         out[i] = 0.0
     for i in range(3):
@@ -118,7 +109,7 @@ class _ContinuousTorque(ByState, JointTorque):
 
     @staticmethod
     def directions(geometry):
-        """The axis, and the directions whose angle it is."""
+        """The axis, and the two directions that enclose the angle."""
         return np.cross(geometry.f, geometry.g), geometry.f, geometry.h
 
     @staticmethod

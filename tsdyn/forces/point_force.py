@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class PointForce(Given, Force):
-    """Push a point of a body.
+    """Force on a point of a body.
 
     Parameters
     ----------
@@ -28,8 +28,8 @@ class PointForce(Given, Force):
 
     Notes
     -----
-    Its power is applied power. Whether it is a function of state is settled when it is made; a new function of the same
-    sort may be set.
+    Its power is applied power. The kind of force (vector, function of time, function of state) is fixed when it is
+    made; a new one of the same kind may be set.
 
     Examples
     --------
@@ -60,7 +60,7 @@ class PointForce(Given, Force):
 
 
 class _BodyPointForce(GivenInBody, PointForce):
-    """The same in axes of the body."""
+    """In axes of the body."""
 
     markers = (Point("a"), Parameters("a"))
 

@@ -21,18 +21,18 @@ from ..plugins import AXIS, Force, JointFriction, along_and_across, coefficient,
 
 
 class RevoluteFriction(JointFriction, Force):
-    """Coulomb friction with Stribeck's peak in a revolute joint, in proportion to the joint's reaction.
+    """Coulomb friction with Stribeck effect in a revolute joint, proportional to the joint reaction.
 
     Parameters
     ----------
     joint : Revolute
-        Added to its scene.
+        Of the scene.
     radius : float, m
         Of the pin.
     collar_radius : float, m
-        Where the force along the axis rubs; 0: it causes no friction.
+        Radius at which the axial force causes friction; 0: none.
     length : float, m, optional
-        Of the bearing, which carries torques that tilt the pin as a pair of forces; None: they cause no friction.
+        Length of the bearing, over which tilting torques are carried by a couple; None: they cause no friction.
 
     Examples
     --------

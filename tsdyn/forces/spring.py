@@ -23,16 +23,16 @@ if TYPE_CHECKING:
 
 
 class Spring(Force):
-    """Pull two points together by stiffness (l - free_length) + damping ld + actuator, l being their distance.
+    """Spring, damper and actuator between two points: stiffness (l - free_length) + damping ld + actuator pulls.
 
     Parameters
     ----------
     stiffness : float, N/m
     damping : float, N s/m
     free_length : float, m; optional
-        None takes the distance of the bodies as they stand now.
+        None takes the distance in the present poses.
     actuator : float, function of time, or ts.Table, N
-        A tension of its own; its power is applied power.
+        Additional tension; its power is applied power.
 
     Raises
     ------
@@ -77,7 +77,7 @@ class Spring(Force):
         length = np.linalg.norm(ends[0] - ends[1])
         if not length > 0.0:
             raise self.error(
-                f"{self.name}: its two points coincide at the start, so it has no direction; move point_a or point_b."
+                f"{self.name}: its points coincide at the start, so the force has no direction; move one of them."
             )
         self.stiffness, self.damping, self.actuator = stiffness, damping, actuator
         self.free_length = length if free_length is None else free_length

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Torque(Given, Force):
-    """Turn a rigid body.
+    """Torque on a rigid body.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Torque(Given, Force):
 
     Notes
     -----
-    Its power is applied power. A new function of the same sort may be set, as of PointForce.
+    Its power is applied power. A new torque of the same kind may be set, as for PointForce.
 
     Examples
     --------
@@ -57,7 +57,7 @@ class Torque(Given, Force):
 
 
 class _BodyTorque(GivenInBody, Torque):
-    """The same in axes of the body."""
+    """In axes of the body."""
 
     markers = (Turn("a"), Parameters("a"))
 

@@ -47,23 +47,23 @@ if TYPE_CHECKING:
 
 
 class TorsionalSpring(Force):
-    """Turn b about an axis of a by actuator - stiffness (angle - free_angle) - damping times its rate, and a back.
+    """Torque actuator - stiffness (angle - free_angle) - damping rate about an axis of a, on b; the opposite on a.
 
     Parameters
     ----------
     a, b : Body or ground
-        Two different bodies of one scene, held on a common axis by a joint. Without one the moment about axis_a has no
-        potential, and what it adds is counted as applied power.
+        Two different bodies of one scene, held on a common axis by a joint. Without a joint the torque has no
+        potential, and the remainder counts as applied power.
     axis_a, axis_b : array_like (3,)
-        The axis, in the bodies' own frames; turning b positively about it (right hand) increases the angle. One of them
-        is enough: the other follows from where the bodies stand.
+        The axis, in the body frames; positive rotation of b about it (right-hand rule) increases the angle. One
+        suffices: the other follows from the present poses.
     reference_a, reference_b : array_like (3,), optional
-        Directions in the frames of a and b; the angle goes from the first to the second about the axis. reference_a is
-        made perpendicular to the axis. What is left out follows from where the bodies stand: the angle is zero there.
+        Directions in the frames of a and b; the angle is measured from the first to the second about the axis.
+        reference_a is made perpendicular to the axis. Without references, the angle is zero in the present poses.
     stiffness : float, N m/rad
     damping : float, N m s/rad
     free_angle : float, rad
-        The angle at the start lies in (-pi, pi].
+        The initial angle lies in (-pi, pi].
     actuator : float, function of time, or ts.Table, N m
         Torque about the axis on b, the opposite on a; its power is applied power.
 
@@ -91,7 +91,7 @@ class TorsionalSpring(Force):
     joint_coordinates = (Angle(reference="reference_a", direction="reference_b"),)
     memory = 1
     slots = 20
-    conservative = False  # only about an axis that a joint holds
+    conservative = False  # unless a joint holds the axis
     quantities = MappingProxyType(
         {"stiffness": not_negative, "damping": not_negative, "free_angle": finite, "actuator": load}
     )
@@ -117,27 +117,27 @@ class TorsionalSpring(Force):
         axis, _, reference = (self._turned(i) for i in range(3))
         if np.linalg.norm(np.cross(axis, reference)) < PARALLEL:
             raise self.error(
-                f"{self.name}: reference_b is parallel to the axis at the start; choose one across it, such as the one "
-                "that coincides with reference_a at the angle zero."
+                f"{self.name}: reference_b is parallel to the axis at the start; choose a perpendicular one, such as "
+                "the direction that coincides with reference_a at angle zero."
             )
         self.check()
 
     @Placing
     def at(cls, a: BodyLike, b: BodyLike | None = None, **arguments: Any) -> Self:
-        """Make one from directions in the ground frame, the bodies being where they stand now.
+        """Make the spring from directions in the ground frame, in the present poses.
 
         Parameters
         ----------
         axis : array_like (3,)
         reference : array_like (3,), optional
-            Of both bodies: the angle is zero now.
+            For both bodies: the present angle is zero.
         """
         if arguments.get("axis_b") is not None:
             arguments["axis_b"] = in_frame(b, Vector("b"), arguments["axis_b"])
         return super().at(a, b, **arguments)
 
     def _places(self, given):
-        """Fill in the axis and the references that were left out: as the bodies stand, the angle is zero."""
+        """Fill in a missing axis and missing references: the angle in the present poses is zero."""
         axis_a, reference_a, reference_b, *rest = given
         axis_b = self.__dict__.pop("_given")
         if axis_b is not None:
@@ -145,7 +145,7 @@ class TorsionalSpring(Force):
             if axis_a is None:
                 axis_a = along
             elif not np.linalg.norm(np.cross(self._place(self.markers[0], axis_a), along)) < PARALLEL:
-                raise self.error(f"{self.name}: axis_b is not along axis_a as the bodies stand; give one of them.")
+                raise self.error(f"{self.name}: axis_b is not along axis_a in the present poses; give one of them.")
         axis_a = self._place(self.markers[0], axis_a)
         if reference_a is None:
             free = reference_b is None
@@ -157,19 +157,19 @@ class TorsionalSpring(Force):
 
     @staticmethod
     def _carried(body, direction, other):
-        """A direction of one body as one of the other, as they stand."""
+        """Return a direction of one body in the frame of the other, in the present poses."""
         return rotation_matrix(other.orientation).T @ (rotation_matrix(body.orientation) @ direction)
 
     @property
     def axis_b(self) -> Floats:
-        """The axis in the frame of b, as the bodies stand."""
+        """The axis in the frame of b, in the present poses."""
         return self._carried(self.a, self.axis_a, self.b)
 
     def _turned(self, i):
         return rotation_matrix(self.body_of(self.markers[i]).orientation) @ self.coordinates[i]
 
     def __setattr__(self, name, value):
-        """Set an attribute; reference_a is made perpendicular to the axis, as is the present one to a new axis."""
+        """Set an attribute; reference_a is kept perpendicular to the axis."""
         if name == "axis_b":
             name, value = "axis_a", self._carried(self.b, self._place(Vector("b"), value), self.a)
         if name == "reference_a" and "coordinates" in self.__dict__:
@@ -182,11 +182,13 @@ class TorsionalSpring(Force):
         value = vector3(value, f"{self.name}: reference_a", InvalidForce)
         across = value - axis * (axis @ value)
         if not np.linalg.norm(across) > PARALLEL * np.linalg.norm(value):
-            raise self.error(f"{self.name}: reference_a is parallel to axis_a; choose a direction across the axis.")
+            raise self.error(
+                f"{self.name}: reference_a is parallel to axis_a; choose a direction perpendicular to the axis."
+            )
         return across
 
     def parameters(self):
-        """(k, c, free angle, actuator), and the angle remembered."""
+        """(k, c, free angle, actuator), and the counted angle."""
         return self.stiffness, self.damping, self.free_angle, *Signal.places(self.actuator)
 
     @staticmethod

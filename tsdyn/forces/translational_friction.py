@@ -22,17 +22,17 @@ from ..plugins import AXIS, Force, JointFriction, act, along_and_across, coeffic
 
 
 class TranslationalFriction(JointFriction, Force):
-    """Coulomb friction with Stribeck's peak in a translational joint, in proportion to the joint's reaction.
+    """Coulomb friction with Stribeck effect in a translational joint, proportional to the joint reaction.
 
     Parameters
     ----------
     joint : Translational
-        Added to its scene.
+        Of the scene.
     length : float, m, optional
-        Of the part that is guided, the body that `joint.on` is, about the joint's point on it: it carries torques that
-        tilt the slide as a pair of forces. None: they cause no friction.
+        Length of the slide `joint.on`, centred at the joint's point, over which tilting torques are carried by a
+        couple; None: they cause no friction.
     width : float, m, optional
-        Arm at which the guide carries a torque about the axis; None: that causes no friction.
+        Lever arm at which the guide carries the torque about the axis; None: it causes no friction.
 
     Examples
     --------

@@ -53,20 +53,20 @@ def _law(x, xd, par, t, out):
 
 
 class UserForce(ByState, Force):
-    """A force and torque on a, and the opposite on b, by a function of time and of both states.
+    """Force and torque on a, and the opposite on b, as a function of time and of both states.
 
     Parameters
     ----------
     a : Body
     b : Body or ground, optional
-        None is the ground.
+        Default: the ground.
     function : callable (t, a, b, par, out)
         A plain Python function that Numba can compile. a and b are arrays (13,): position of the point (m), Euler
         parameters, velocity of the point (m/s), angular velocity (rad/s), all in the ground frame; those of the ground
         are point_b, (1, 0, 0, 0) and zeros. It writes out (6,): force on a at point_a (N), torque on a (N m), ground
-        frame. It may compare and allocate; what it raises ends the run. A NaN does, too.
+        frame. It may compare and allocate; an exception or a NaN ends the run.
     parameters : array_like, optional
-        Numbers that the function gets as par; to be changed as `force.values`.
+        The numbers par of the function; `force.values` changes them.
 
     Raises
     ------
@@ -75,8 +75,8 @@ class UserForce(ByState, Force):
 
     Notes
     -----
-    b gets the opposite force at the place x_a, so momentum is conserved. A point mass takes no torque: on one the
-    force alone acts, and its Euler parameters are (1, 0, 0, 0). The power of the force is applied power.
+    The opposite force acts on b at x_a, so momentum is conserved. On a point mass the force alone acts, and the Euler
+    parameters are (1, 0, 0, 0). The power is applied power.
 
     Examples
     --------
@@ -120,7 +120,7 @@ class UserForce(ByState, Force):
         self.check()
 
     def check(self):
-        """A plain function of five arguments."""
+        """Refuse all but plain functions of five arguments."""
         if arguments_of(self.function) != 5:
             raise self.error(
                 f"{self.name}: function must be a plain Python function of five arguments (t, a, b, par, out), got "
@@ -128,12 +128,12 @@ class UserForce(ByState, Force):
             )
 
     def parameters(self):
-        """The numbers given."""
+        """The numbers par."""
         return tuple(self.values)
 
     @classmethod
     def example(cls, rng, a, b):
-        """A drag that depends on everything."""
+        """A drag that depends on all arguments."""
         return cls(a, b, function=_example, point_a=rng.normal(size=3), point_b=rng.normal(size=3), parameters=(0.7,))
 
 

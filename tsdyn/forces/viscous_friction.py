@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class ViscousFriction(BodyFriction, Force):
-    """Resist the motion of a relative to b in proportion to its velocity.
+    """Friction force and torque proportional to the velocity of a relative to b.
 
     Parameters
     ----------
@@ -84,6 +84,6 @@ class ViscousFriction(BodyFriction, Force):
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random one."""
+        """A random instance."""
         c, c_t = rng.uniform(0.5, 2.0, 2)
         return cls(a, b, point_a=rng.normal(size=3), damping=c, torsional_damping=c_t)

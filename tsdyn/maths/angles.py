@@ -11,7 +11,7 @@ TURN_ROUND = 2.0 * np.pi
 def angle(y, x):
     """The angle atan2(y, x) in (-pi, pi], exact to first order in an imaginary part and to second order of a series.
 
-    The point is turned back by its real angle, so that what is left, atan(s / c) with s = 0, is s / c to second order.
+    The point is rotated back by its real angle; the remainder atan(s / c) with s = 0 is s / c to second order.
     """
     real = np.arctan2(y.real, x.real)
     cosine, sine = np.cos(real), np.sin(real)

@@ -6,15 +6,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from .tolerances import REAL
+
 FINE = 4  # cells of the fine grid between two nodes
-CHECK = -float(np.cos(0.3 * np.pi))  # well off the nodes of every degree that is a power of two
+CHECK = -float(np.cos(0.3 * np.pi))  # far from the nodes of every degree that is a power of two
 
 
 class Table(NamedTuple):
-    """The interpolant of degree N, a power of two, through samples at N + 1 nodes; one more sample is to check it."""
+    """The interpolant of degree N, a power of two, through samples at N + 1 nodes; one more sample checks it."""
 
     nodes: np.ndarray  # (N + 1,)  Chebyshev points of the second kind, increasing; those of N / 2 are every other one
-    points: np.ndarray  # (N + 2,)  the same and CHECK
+    points: np.ndarray  # (N + 2,)  nodes and CHECK
     at_nodes: np.ndarray  # (N + 1,)  which of them are nodes
     known: np.ndarray  # (N / 2 + 2,)  which of them are points of N / 2
     fresh: np.ndarray  # (N / 2,)  which are not
@@ -22,7 +24,7 @@ class Table(NamedTuple):
     fine: np.ndarray  # (FINE N + 1,)  grid of which the nodes are every FINE-th point
     coefficients: np.ndarray  # (N + 1, N + 1)  samples at nodes -> Chebyshev coefficients
     values: np.ndarray  # (FINE N + 1, N + 2)  samples at points -> values on the fine grid
-    errors: np.ndarray  # (N / 2 + 1, N + 2)  samples at points -> what is missed at CHECK, and the higher coefficients
+    errors: np.ndarray  # (N / 2 + 1, N + 2)  samples at points -> error at CHECK, and the higher coefficients
 
 
 @cache
@@ -59,4 +61,4 @@ def extremes(coefficients):
     if slope.size < 2:
         return np.empty(0)
     roots = chebyshev.chebroots(slope)
-    return np.sort(roots.real[np.abs(roots.imag) < 1e-6])
+    return np.sort(roots.real[np.abs(roots.imag) < REAL])

@@ -3,11 +3,12 @@
 import math
 
 from ..jit.kernels import kernel
+from .tolerances import CONVERGED, ORTHOGONAL
 
 
 @kernel
 def is_finite(x):
-    """Whether all numbers of a vector are finite."""
+    """Return True if all numbers of a vector are finite."""
     total = 0.0
     for i in range(x.size):
         total += abs(x[i])
@@ -35,7 +36,7 @@ def transposed_times(A, x, out):
 def cholesky(A, n, limit):
     """Factor the lower triangle of A (n, n) in place, A = L L^T; the diagonal holds the reciprocals of L's.
 
-    False where A is not positive definite: where elimination leaves less than `limit` of a diagonal entry.
+    Return False if A is not positive definite: if a pivot is below `limit` times its diagonal entry.
     """
     for j in range(n):
         s = A[j, j]
@@ -70,7 +71,7 @@ def cholesky_solve(L, b, n):
 
 @kernel
 def invert(A, X, n):
-    """X = A^-1 by Gauss-Jordan elimination with partial pivoting; A is destroyed; False where A is singular."""
+    """X = A^-1 by Gauss-Jordan elimination with partial pivoting; A is destroyed. Return False if A is singular."""
     for i in range(n):
         for j in range(n):
             X[i, j] = 1.0 if i == j else 0.0
@@ -100,7 +101,7 @@ def invert(A, X, n):
 
 @kernel
 def null_space(W, n, m, V, R, tau):
-    """Singular values of W (n, m), m <= n, and the orthonormal basis V (n, n - m) of what is orthogonal to its columns.
+    """Singular values of W (n, m), m <= n, and an orthonormal basis V (n, n - m) of the complement of its columns.
 
     Householder QR, W = Q [R; 0], then the singular value decomposition of R by one-sided Jacobi rotations (Hestenes
     1958; Drmac and Veselic, SIAM J. Matrix Anal. Appl. 29, 2008): together the full SVD of W, whose left vectors of
@@ -162,7 +163,7 @@ def _jacobi(R, m):
                     continue
                 size = abs(c) / math.sqrt(a * b)
                 worst = max(worst, size)
-                if size < 1e-15:
+                if size < ORTHOGONAL:
                     continue
                 zeta = (b - a) / (2.0 * c)
                 t = 1.0 / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
@@ -174,7 +175,7 @@ def _jacobi(R, m):
                     x, y = R[i, k], R[j, k]
                     R[i, k] = cosine * x - sine * y
                     R[j, k] = sine * x + cosine * y
-        if not worst > 1e-10:
+        if not worst > CONVERGED:
             break
     smallest, largest = math.inf, 0.0
     for i in range(m):
@@ -188,7 +189,7 @@ def _jacobi(R, m):
 
 @kernel
 def lu(A, pivots, n):
-    """Factor A (n, n) in place with partial pivoting; False where it is singular or not finite."""
+    """Factor A (n, n) in place with partial pivoting; return False if it is singular or not finite."""
     for c in range(n):
         p = c
         for i in range(c + 1, n):
@@ -211,7 +212,7 @@ def lu(A, pivots, n):
 
 @kernel
 def lu_solve(A, pivots, b, n):
-    """Solve in place with the factors that `lu` left."""
+    """Solve in place with the factors of `lu`."""
     for i in range(n):
         p = pivots[i]
         if p != i:
@@ -226,7 +227,7 @@ def lu_solve(A, pivots, b, n):
 
 @kernel
 def largest(values):
-    """The largest size; infinite where one is not finite."""
+    """Return the largest magnitude; infinity if an entry is not finite."""
     worst = 0.0
     for i in range(values.size):
         size = abs(values[i])

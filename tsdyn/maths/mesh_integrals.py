@@ -4,14 +4,13 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..validation import floats
-
-FLAT = 1e-12  # of the cube of the mesh's size: less volume is none
+from .tolerances import FLAT
 
 
 def moments(vertices, faces):
     """Volume, m^3, centroid (3,), m, and the integral of x x^T about it (3, 3), m^5.
 
-    Each triangle makes a tetrahedron with a point amid the mesh, of signed volume d / 6 with d = a.(b x c), and
+    Each triangle and a point inside the mesh span a tetrahedron of signed volume d / 6, d = a.(b x c), with
 
         integral of x x^T = d / 120 (a a^T + b b^T + c c^T + s s^T),  s = a + b + c
 
@@ -30,7 +29,7 @@ def moments(vertices, faces):
     if abs(volume) <= FLAT:
         raise InvalidArgument("from_mesh: the mesh encloses no volume; all of its faces lie in a plane, or cancel out.")
     if volume < 0.0:
-        raise InvalidArgument("from_mesh: all faces are turned inward; turn them around: faces[:, ::-1].")
+        raise InvalidArgument("from_mesh: all faces are oriented inward; reverse them: faces[:, ::-1].")
     total = corners.sum(axis=1)
     centroid = d @ total / (24.0 * volume)
     second = np.einsum("f,fki,fkj->ij", d, corners, corners) + np.einsum("f,fi,fj->ij", d, total, total)
@@ -39,7 +38,7 @@ def moments(vertices, faces):
 
 
 def _checked(vertices, faces):
-    """Vertices (v, 3) and triangles (f, 3) of a closed mesh whose triangles turn the same way."""
+    """Return vertices (v, 3) and triangles (f, 3) of a closed mesh with consistent orientation."""
     x, given = floats(vertices), np.asarray(faces)
     if x.ndim != 2 or x.shape[1:] != (3,) or not np.isfinite(x).all():
         raise InvalidArgument("from_mesh: vertices must be finite numbers of shape (v, 3), in m.")
@@ -61,8 +60,8 @@ def _checked(vertices, faces):
     if (times > 1).any():
         edge = ends[first[np.argmax(times > 1)]]
         raise InvalidArgument(
-            f"from_mesh: faces {_faces_with(ends, edge)} go along the edge {edge.tolist()} the same way; turn one of "
-            "them around, or leave out a face that is there twice."
+            f"from_mesh: faces {_faces_with(ends, edge)} go along the edge {edge.tolist()} the same way; reverse "
+            "one, or remove a duplicate face."
         )
     open_ = np.flatnonzero(~np.isin(back, known))
     if open_.size:
@@ -75,5 +74,5 @@ def _checked(vertices, faces):
 
 
 def _faces_with(ends, edge):
-    """The faces that go along an edge in its direction."""
+    """Return the faces that run along an edge in its direction."""
     return (np.flatnonzero((ends == edge).all(axis=1)) // 3).tolist()

@@ -16,12 +16,12 @@ class Truncated:
         self.c = np.asarray(c, float)
 
     def of(self, value):
-        """The value itself, or a constant as a series like this one."""
+        """Return a series, or a constant as a series of the same length."""
         return value if isinstance(value, Truncated) else Truncated([value, *[0.0] * (self.c.size - 1)])
 
     @property
     def real(self):
-        """Itself: it stands for real numbers."""
+        """The series itself, which is real."""
         return self
 
     @property
@@ -137,7 +137,7 @@ _FUNCTIONS = {
     "arctan": _arctangent,
     "square": lambda x: x * x,
     "negative": lambda x: -x,
-    "floor": lambda x: x.of(np.floor(x.c[0])),  # of an angle's turns: constant where it is analytic
+    "floor": lambda x: x.of(np.floor(x.c[0])),  # of turns of an angle: piecewise constant
 }
 _OPERATORS = {
     "add": lambda x, y: x + y,

@@ -28,7 +28,7 @@ from ..jit.kernels import kernel
 @kernel
 def product(a, b, k):
     """Coefficient k of a b."""
-    even, odd = a[0] * b[k], 0.0  # two sums, since each waits for its last
+    even, odd = a[0] * b[k], 0.0  # two sums: each addition waits for the one before
     for j in range(1, k, 2):
         odd += a[j] * b[k - j]
         even += a[j + 1] * b[k - j - 1]
@@ -131,7 +131,7 @@ def rotated_back(s, a, v, k):
 
 @kernel
 def quotient(a, b, q, k):
-    """Coefficient k of q = a / b, Eq. (1); b must not begin at zero."""
+    """Coefficient k of q = a / b, Eq. (1); b[0] is not zero."""
     total = a[k]
     for j in range(1, k + 1):
         total -= b[j] * q[k - j]
@@ -140,7 +140,7 @@ def quotient(a, b, q, k):
 
 @kernel
 def root(a, r, k):
-    """Coefficient k of r = sqrt(a), Eq. (2); a must begin above zero."""
+    """Coefficient k of r = sqrt(a), Eq. (2); a[0] > 0."""
     if k == 0:
         return np.sqrt(a[0])
     total = 0.0
@@ -152,7 +152,7 @@ def root(a, r, k):
 
 @kernel
 def power(a, u, n, k):
-    """Coefficient k of u = a^n, Eq. (3), n any constant; a must not begin at zero, nor below for a broken n."""
+    """Coefficient k of u = a^n, Eq. (3), n any constant; a[0] is not zero, and positive for fractional n."""
     if k == 0:
         return a[0] ** n
     total, steep = 0.0, n + 1.0
@@ -163,7 +163,7 @@ def power(a, u, n, k):
 
 @kernel
 def inverse_root(a, u, k):
-    """Coefficient k of u = 1 / sqrt(a), Eq. (3) with n = -1/2; a must begin above zero."""
+    """Coefficient k of u = 1 / sqrt(a), Eq. (3) with n = -1/2; a[0] > 0."""
     if k == 0:
         return 1.0 / np.sqrt(a[0])
     total = 0.0

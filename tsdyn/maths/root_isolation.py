@@ -11,26 +11,32 @@ from typing import NamedTuple
 import numpy as np
 
 from .chebyshev import FINE, extremes, table
+from .tolerances import (
+    AT_ZERO,
+    CLEAR,
+    DEEPEST,
+    EPS,
+    EXTREME,
+    HOPELESS,
+    NEAR,
+    NO_NOISE,
+    NOISE_RATIO,
+    SHORTEST,
+    TIGHT,
+    TINY,
+    WIDEST_NOISE,
+)
 
-EPS = float(np.finfo(float).eps)
 LARGEST = 32  # degree
 # shares of the largest sample
-TIGHT = 1e-10  # error of an interpolant that has resolved the function
-HOPELESS = 0.05  # error of an interpolant of degree 16 that is not worth one of degree 32
-NEAR = 0.01  # an extreme that is nearer to zero is sampled
-AT_ZERO = 1e-6  # next to an end that is nearer to zero an extreme is looked for
 
-CLEAR = 10.0  # times what the higher half of the coefficients adds: further away from zero there is no zero
-CALM = 12  # halvings in a row that leave one half resolved: the rest is a kink or a jump
-TINY = 1e-7  # of the interval: what is rough on so little is rounding
-SHORTEST = 1e4 * EPS  # of the time: an interval that is not halved
-DEEPEST = 2.0**-24  # of the whole interval: likewise
-POLISH = 16  # degree of the interpolant by which an extreme is found
+CALM = 12  # consecutive halvings that leave one half resolved: the other has a kink or a jump
+POLISH = 16  # degree of the interpolant for an extremum
 MOST = 1 << 20  # samples of one search
 
 
 class TooFast(Exception):
-    """A function has more turns than can be followed."""
+    """A function has too many extrema to be followed."""
 
 
 class Fit(NamedTuple):
@@ -43,7 +49,7 @@ class Fit(NamedTuple):
     samples: np.ndarray  # (N + 2,)
     fine: np.ndarray  # (FINE N + 1,)  the interpolant on the fine grid
     off: float  # its error
-    clear: float  # how far from zero it stays; 0 if it changes sign
+    clear: float  # distance from zero; 0 if it changes sign
     scale: float  # the largest sample
     resolved: bool
 
@@ -56,15 +62,15 @@ class Search:
     sample : function
         Values (k,) at increasing times (k,); NaN where there is none.
     shaken : function
-        What the value at a time is off by, rounding errors of the state being what they are.
+        Error of the value at a time that rounding of the state causes.
     noise : float
-        Rounding error that the values are known to have.
+        Known rounding error of the values.
 
     Attributes
     ----------
     points : list of (float, float)
-        Times, increasing, and values; zero for a value that touches zero within rounding. Where nothing stands out of
-        the noise there are none.
+        Times, increasing, and values; zero for a value that touches zero within rounding. Empty where all values are
+        noise.
     spent : int
         Samples taken.
     """
@@ -76,7 +82,7 @@ class Search:
     def run(self, a, value, b, degree):
         """Search [a, b], the value at a being known, with interpolants of this degree at first.
 
-        The degree that was needed, and the value at b. Raises TooFast.
+        Return the degree needed and the value at b. Raises TooFast.
         """
         self.points.append((a, value))
         self._shortest = max(DEEPEST * (b - a), SHORTEST * max(abs(a), abs(b)))
@@ -94,7 +100,7 @@ class Search:
         return self.sample(times)
 
     def _fit(self, a, b, first, last, degree):
-        """The `Fit` of the degree that resolves the function on [a, b], or of the highest that is worth trying."""
+        """Return the `Fit` of the degree that resolves the function on [a, b], or of the highest worth trying."""
         half, grid = 0.5 * (b - a), table(degree)
         times, samples = a + half * (grid.points + 1.0), np.empty(degree + 2)
         times[-1], samples[0] = b, first
@@ -122,19 +128,19 @@ class Search:
         return Fit(a, b, degree, times, samples, fine, off, clear, scale, resolved)
 
     def _rounding(self, fit):
-        """The rounding error of the values: what high degrees add where a smooth function is of a low one."""
+        """Return the rounding error of the values: high coefficients where a smooth function has none."""
         t, least = fit.a + 0.382 * (fit.b - fit.a), SHORTEST * max(abs(fit.a), abs(fit.b))
         half, found = max(TINY * (fit.b - fit.a), least), np.inf
-        while half < 1e-3 * (fit.b - fit.a):
+        while half < WIDEST_NOISE * (fit.b - fit.a):
             rough = table(8).coefficients[5:] @ self._values(t + half * table(8).nodes)
             found = min(found, 10.0 * float(np.abs(rough).max()))
-            if found <= 1e-12 * fit.scale or half == least:
+            if found <= NO_NOISE * fit.scale or half == least:
                 break
-            half = max(1e-3 * half, least)
+            half = max(NOISE_RATIO * half, least)
         return found if found < np.inf else 0.0
 
     def _follow(self, fit, calm):
-        """Take the points of a fit or of its halves; so many halvings before have left one half resolved."""
+        """Collect the points of a fit or of its halves; calm: consecutive halvings that left one half resolved."""
         if fit.resolved:
             self._take(fit)
         elif calm == CALM or fit.off != fit.off or fit.b - fit.a <= self._shortest:
@@ -149,7 +155,7 @@ class Search:
             self._follow(right, calm)
 
     def _take(self, fit):
-        """The samples, and the extremes next to zero and beyond it that they miss."""
+        """Collect the samples, and extrema near or beyond zero between them."""
         if fit.scale <= self.noise:
             return
         found = dict(zip(fit.times.tolist(), fit.samples.tolist(), strict=True))
@@ -162,18 +168,18 @@ class Search:
 
     @staticmethod
     def _spans(fit):
-        """Between which points of the fine grid extremes are to be looked at."""
+        """Yield intervals of the fine grid in which extrema are located."""
         fine, last = fit.fine.copy(), fit.fine.size - 1
         fine[::FINE] = fit.samples[table(fit.degree).at_nodes]
         size, sign = np.abs(fine), np.sign(fine)
         least = (size[1:-1] <= np.minimum(size[:-2], size[2:])) & (sign[:-2] == sign[2:])
         yield from ((i, i + 2) for i in np.flatnonzero(least & (size[1:-1] <= NEAR * fit.scale)).tolist())
         runs = (np.flatnonzero(sign[1:] != sign[:-1]) + 1).tolist()
-        yield from ((i - 1, j) for i, j in pairwise(runs) if -(-i // FINE) * FINE >= j)  # that no node is in
+        yield from ((i - 1, j) for i, j in pairwise(runs) if -(-i // FINE) * FINE >= j)  # without a node
         yield from ((i, i + 1) for i, end in ((0, 0), (last - 1, last)) if size[end] <= AT_ZERO * fit.scale)
 
     def _polish(self, a, b):
-        """Extremes between a and b, and an end that touches zero with one of them: values by their times."""
+        """Return extrema between a and b, and an end that touches zero: values by time."""
         times = a + 0.5 * (b - a) * (table(POLISH).nodes + 1.0)
         times[-1] = b
         samples = self._values(times)
@@ -191,7 +197,7 @@ class Search:
         return found
 
     def _take_rough(self, fit):
-        """The samples, and the least between two of the same sign."""
+        """Collect the samples, and minima between samples of the same sign."""
         good = ~np.isnan(fit.samples)
         times, samples = fit.times[good], fit.samples[good]
         found = dict(zip(times.tolist(), samples.tolist(), strict=True))
@@ -202,17 +208,17 @@ class Search:
         self._append(found)
 
     def _least(self, a, b, sign, scale):
-        """The least of sign times the function between a and b, as good as zero if it is AT_ZERO."""
-        from scipy.optimize import minimize_scalar  # takes a while to import
+        """Return the minimum of sign times the function between a and b; AT_ZERO counts as zero."""
+        from scipy.optimize import minimize_scalar  # slow to import
 
         value = lambda s: sign * self._values(np.array([a + s]))[0]  # noqa: E731
-        found = minimize_scalar(value, bounds=(0.0, b - a), method="bounded", options={"xatol": 1e-9 * (b - a)})
+        found = minimize_scalar(value, bounds=(0.0, b - a), method="bounded", options={"xatol": EXTREME * (b - a)})
         if not abs(found.fun) < np.inf:
             return {}
         return {a + float(found.x): 0.0 if abs(found.fun) <= AT_ZERO * scale else sign * float(found.fun)}
 
     def _append(self, found):
-        """Add values by their times; the first may be known already."""
+        """Add values by time; the first may be known already."""
         if self.points and self.points[-1][0] in found:
             t, value = self.points.pop()
             found[t] = value if value == 0.0 else found[t]

@@ -1,19 +1,19 @@
-"""The rank of dense rows, and which of them to keep: by singular values, and by QR with pivoting."""
+"""Rank of dense rows by singular values; selection of independent rows by pivoted QR."""
 
 import numpy as np
 
-RANK_TOL = 1e-7  # of the largest singular value of rows of unit length: less is zero; charts work with the squares
+from .tolerances import NO_LENGTH, RANK_TOL
 
 
 def row_lengths(A):
-    """Lengths of the rows of A, dense or sparse; next to nothing counts as nothing."""
+    """Return the lengths of the rows of A, dense or sparse; rounding counts as zero."""
     squares = (A * A).sum(axis=1) if isinstance(A, np.ndarray) else A.multiply(A).sum(axis=1)
     lengths = np.sqrt(np.asarray(squares).ravel())
-    return np.where(lengths > 1e-12 * lengths.max(initial=0.0), lengths, 0.0)
+    return np.where(lengths > NO_LENGTH * lengths.max(initial=0.0), lengths, 0.0)
 
 
 def unit_rows(A):
-    """The rows at length one; those of length zero stay so."""
+    """Return the rows scaled to unit length; zero rows remain zero."""
     lengths = row_lengths(A)
     return A / np.where(lengths > 0.0, lengths, 1.0)[:, None]
 
@@ -24,13 +24,13 @@ def singular_values(rows):
 
 
 def rank_of(A):
-    """The rank of dense rows, scaled to unit length."""
+    """Return the rank of dense rows, scaled to unit length."""
     size = singular_values(unit_rows(A))
     return int((size > RANK_TOL * size.max(initial=0.0)).sum())
 
 
 def farthest_first(rows):
-    """The order in which each row is the farthest from the span of those before it, and how far that is."""
+    """Return the order of the rows by pivoted QR, and their distances from the span of the rows before them."""
     from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
 
     R, order = qr(rows.T, mode="r", pivoting=True)
@@ -38,6 +38,6 @@ def farthest_first(rows):
 
 
 def dependent(A):
-    """Rows of a dense A that follow from the others; those that are farthest from each other are kept."""
+    """Return the dependent rows of a dense A; pivoted QR chooses the independent ones."""
     order, far = farthest_first(unit_rows(A))
     return order[(far > RANK_TOL * far.max(initial=0.0)).sum() :]

@@ -1,7 +1,7 @@
 """Second-order Taylor numbers (2-jets) x + x' t + x'' t^2 / 2: value and two derivatives through any formula.
 
-They turn a primitive's phi into Phi, its rate and its acceleration along a motion, without jacobian and gamma, and so
-make the constraint errors of a solution independent of the solver.
+The phi of a primitive, evaluated on 2-jets, gives Phi and its two time derivatives without jacobian and gamma, so
+constraint errors of a solution are independent of the solver.
 """
 
 import operator
@@ -24,7 +24,7 @@ class Jet:
 
     @property
     def real(self):
-        """The value without its derivatives, as complex numbers have it."""
+        """The value without derivatives, by analogy with complex numbers."""
         return self.x
 
     def __add__(self, other):

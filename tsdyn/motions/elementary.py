@@ -1,4 +1,4 @@
-"""Elementary motions, which others are made of: polynomials of the time, data, sines and exponentials."""
+"""Elementary motions: polynomials of time, piecewise data, sines and exponentials."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class Polynomial(Smooth):
     Parameters
     ----------
     coefficients : array_like (n,)
-        c_0 first; in the unit of what is moved, over s^k.
+        c_0 first; unit of the moved quantity over s^k.
 
     Raises
     ------
     InvalidArgument
-        If they are no finite numbers.
+        If a coefficient is not a finite number.
 
     Examples
     --------
@@ -49,7 +49,7 @@ class Polynomial(Smooth):
 
 
 class Constant(Polynomial):
-    """A value that stays.
+    """Constant value.
 
     Examples
     --------
@@ -79,23 +79,23 @@ class Ramp(Polynomial):
 
 
 class Piecewise(Smooth):
-    """A motion from data: a spline or another piecewise polynomial of the time.
+    """A motion from data: a spline or another piecewise polynomial of time.
 
     Parameters
     ----------
     source : ts.Table, (times, values), or SciPy's PPoly (CubicSpline, PchipInterpolator, ...), BPoly or BSpline
-        Of numbers. Outside its times it goes on where SciPy's object says so by `extrapolate`; else a run that leaves
+        Of numbers. Outside its times it is extrapolated if the SciPy object has `extrapolate`; otherwise a run beyond
         them is refused.
 
     Raises
     ------
     InvalidArgument
-        If it is none of these, its times don't increase, or its values are not real numbers.
+        If the source is none of these, the times don't increase, or a value is not a real number.
 
     Notes
     -----
-    Steps of a run end at the knots, so a method keeps its order. A constraint follows no jump of value or rate, and a
-    run over one is refused; jumps of acceleration are followed.
+    Steps of a run end at the knots, so every method keeps its order. Constraints can't follow jumps of value or rate:
+    a run across one is refused. Jumps of acceleration are allowed.
 
     Examples
     --------
@@ -123,7 +123,7 @@ class Piecewise(Smooth):
         """One motion for each component of a source of vectors."""
         if not isinstance(source, Table):
             return tuple(cls._of(pieces) for pieces in pieces_of(source))
-        if source.motions is None:  # many may share a table's numbers
+        if source.motions is None:  # motions of one table share its numbers
             source.motions = tuple(cls._of(pieces) for pieces in source.pieces())
         return source.motions
 
@@ -174,7 +174,7 @@ class Exponential(Smooth):
 
 
 def _demand(motion, **given):
-    """The numbers, or an error that names the one that is none."""
+    """Return the numbers; refuse, by name, a value that is not a finite number."""
     for name, value in given.items():
         if not math.isfinite(number(value)):
             raise InvalidArgument(f"{type(motion).__name__}: {name} must be a finite number, got {value!r}.")

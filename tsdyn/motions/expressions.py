@@ -5,7 +5,7 @@
     + - * / of them and of numbers, powers, and np.sin, cos, tan, exp, log, sqrt, sinh, cosh, tanh, arctan of them
 
 A motion is a graph of operations. `jet` evaluates value and two derivatives in Python, `motion_program` the series in a
-run; the two are independent.
+run, independently.
 """
 
 from __future__ import annotations
@@ -24,16 +24,21 @@ from ..validation import number
 from . import program as code
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import TypeAlias
+
     from ..hints import ArrayLike, Floats, Value
+
+    Operator: TypeAlias = Callable[["Smooth", "Smooth | float"], "Smooth"]
 
 
 class Operation(NamedTuple):
-    """One kind of node: what it does in a program, and to numbers."""
+    """One kind of node: its code in a program, and its effect on numbers."""
 
     code: int
-    rows: int  # that it writes
-    result: int  # which of them is its own
-    apply: object  # of the values of its operands, and of its numbers; of the time, where it has no operands
+    rows: int  # written
+    result: int  # index of the result
+    apply: object  # of the operands' values and the numbers; of time, without operands
 
 
 def _horner(t, c):
@@ -60,8 +65,13 @@ _OPERATIONS = {
 }
 
 
+def _operators(operation: str) -> tuple[Operator, Operator]:
+    """Return a binary operator of motions, and the same with a number on the left."""
+    return lambda self, other: _binary(operation, self, other), lambda self, other: _binary(operation, other, self)
+
+
 class Smooth:
-    """Base of all smooth motions: one operation on others, or a polynomial of the time, whole or in pieces.
+    """Base of all smooth motions: an operation on others, or a (piecewise) polynomial of time.
 
     Examples
     --------
@@ -99,7 +109,7 @@ class Smooth:
 
     @property
     def pieces(self) -> list[Any]:
-        """The `Pieces` that it is made of."""
+        """The `Pieces` among its nodes."""
         return [node._numbers for node in self._order() if node._operation == "piecewise"]
 
     def sides(self, t: ArrayLike) -> Floats:
@@ -111,7 +121,7 @@ class Smooth:
         return Jet.of(self._on(Jet(t, 1.0)))
 
     def _on(self, t, left=False):
-        """The value where the time is any kind of number; left: at a knot that of the piece which ends there."""
+        """The value for time of any numeric type; left: at a knot, of the piece that ends there."""
         found = {}
         for node in self._order():
             operation = _OPERATIONS[node._operation]
@@ -141,7 +151,7 @@ class Smooth:
         return ready
 
     def program(self) -> list[float]:
-        """The numbers that `motion_program` runs, with room for its rows."""
+        """The numbers that `motion_program` interprets, with space for its rows."""
         row, constants, instructions, rows = {}, [], [], 0
         for node in self._order():
             operation = _OPERATIONS[node._operation]
@@ -159,29 +169,10 @@ class Smooth:
         head = [0.0, len(instructions) // code.STEP, *places, rows, row[id(self)]]
         return [float(x) for x in (*head, *instructions, *constants)] + [0.0] * (rows * code.WIDTH)
 
-    def __add__(self, other: Smooth | float) -> Smooth:
-        return _binary("add", self, other)
-
-    def __radd__(self, other: Smooth | float) -> Smooth:
-        return _binary("add", other, self)
-
-    def __sub__(self, other: Smooth | float) -> Smooth:
-        return _binary("subtract", self, other)
-
-    def __rsub__(self, other: Smooth | float) -> Smooth:
-        return _binary("subtract", other, self)
-
-    def __mul__(self, other: Smooth | float) -> Smooth:
-        return _binary("multiply", self, other)
-
-    def __rmul__(self, other: Smooth | float) -> Smooth:
-        return _binary("multiply", other, self)
-
-    def __truediv__(self, other: Smooth | float) -> Smooth:
-        return _binary("divide", self, other)
-
-    def __rtruediv__(self, other: Smooth | float) -> Smooth:
-        return _binary("divide", other, self)
+    __add__, __radd__ = _operators("add")
+    __sub__, __rsub__ = _operators("subtract")
+    __mul__, __rmul__ = _operators("multiply")
+    __truediv__, __rtruediv__ = _operators("divide")
 
     def __neg__(self) -> Smooth:
         return _binary("multiply", -1.0, self)
@@ -217,7 +208,7 @@ class Smooth:
 
 
 def constant(value: float) -> Smooth:
-    """A value that stays."""
+    """Constant value."""
     return Smooth("polynomial", (), (value,))
 
 
@@ -226,7 +217,7 @@ def _binary(operation, x, y):
 
 
 def _plain(value):
-    """A number that a motion is combined with."""
+    """Return a number to be combined with a motion."""
     result = number(value)
     if not math.isfinite(result):
         raise InvalidArgument(f"a motion can be combined with motions and finite numbers, not with {value!r}.")

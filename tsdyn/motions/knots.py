@@ -3,14 +3,11 @@
 import numpy as np
 
 from ..errors import InvalidConstraint
-
-TOGETHER = 1e-14  # of the time, or a thousandth of the run: knots that are nearer to each other are one
-JUMP = 1e-9  # of the largest value or rate; less is rounding of the data
-ROUNDING = 1e-12  # of the largest value, over the shortest piece beside a knot: as much of a rate is rounding
+from .tolerances import JUMP, LEAST_SPAN, ROUNDING, TOGETHER
 
 
 def demand_covered(motion, t0, t1, what, error):
-    """Refuse a run that leaves the times for which a motion has values."""
+    """Refuse a run beyond the times for which a motion has values."""
     for pieces in motion.pieces:
         first, last = pieces.covers
         if t0 < first or t1 > last:
@@ -43,16 +40,16 @@ def demand_followed(motion, t0, t1, what):
         if not excess[i] <= 0.0:
             raise InvalidConstraint(
                 f"{what}: its {name} jumps from {sides[0][level][i]:.9g} to {sides[1][level][i]:.9g} at t = "
-                f"{times[i]:.9g} s, and no constraint can follow; join the values by a smoother curve, such as "
+                f"{times[i]:.9g} s, which no constraint can follow; join the values by a smoother curve, such as "
                 "scipy.interpolate.CubicSpline."
             )
 
 
 def stops_of(parameters, instants, t0, t1):
-    """Where steps of a run from t0 to t1 end: at knots of a scene's Motions and Signals, and instants; (k, 2).
+    """Return the stops of a run from t0 to t1: knots of a scene's Motions and Signals, and sampling times; (k, 2).
 
-    Those that rounding has parted are one, the last of them, and t1 stands for what is next to it. The second number
-    is whether a function is asked there, in Python.
+    Times that differ by rounding are merged into the last, or into t1. The second column marks sampling times, at
+    which a Python function is called.
     """
     found = [joints(motion, t0, t1) for given in parameters for motion in given.motions if motion.pieces]
     if not (instants.size or found):
@@ -60,12 +57,12 @@ def stops_of(parameters, instants, t0, t1):
     times = np.concatenate([instants, *found])
     order = np.argsort(times, kind="stable")
     times, asked = times[order], np.where(order < instants.size, 1.0, 0.0)
-    near = TOGETHER * max(abs(t0), abs(t1), 1e-3 * (t1 - t0))
+    near = TOGETHER * max(abs(t0), abs(t1), LEAST_SPAN * (t1 - t0))
     late = t1 - times <= near
     times, asked = np.where(late, t1, times), np.where(late, 0.0, asked)
     kept = times - t0 > near
     times, asked = times[kept], asked[kept]
     if not times.size:
         return np.empty((0, 2))
-    ends = np.flatnonzero(np.append(np.diff(times) > near, True))  # of those that are one
+    ends = np.flatnonzero(np.append(np.diff(times) > near, True))  # of each group
     return np.column_stack((times[ends], np.maximum.reduceat(asked, np.append(0, ends[:-1] + 1))))

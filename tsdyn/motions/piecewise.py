@@ -14,7 +14,7 @@ NEXT_AFTER = 4  # neighbours tried where a knot of a later period is rounded int
 
 
 class Pieces:
-    """A piecewise polynomial of the time.
+    """A piecewise polynomial of time.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ class Pieces:
     c : ndarray (n, k)
         Coefficients of each piece about its first knot, the constant one first.
     beyond : bool or "periodic"
-        What there is outside the knots: nothing, the end pieces going on, or the same again.
+        Outside the knots: no value, extrapolation of the end pieces, or periodic continuation.
     """
 
     def __init__(self, knots, c, beyond=False):
@@ -35,16 +35,16 @@ class Pieces:
 
     @property
     def period(self):
-        """The period, s; 0 where there is none."""
+        """The period, s; 0 if there is none."""
         return self.knots[-1] - self.knots[0] if self.beyond == "periodic" else 0.0
 
     @property
     def covers(self):
-        """(first, last) time that it has a value for, s."""
+        """First and last time with a value, s."""
         return (self.knots[0], self.knots[-1]) if self.beyond is False else (-np.inf, np.inf)
 
     def find(self, t, left=False):
-        """The piece at times t, and how far its knots are shifted there; left: at a knot the piece that ends there."""
+        """Return the piece at times t, and the shift of its knots; left: at a knot, the piece that ends there."""
         first, last, period = self.knots[0], self.knots.size - 2, self.period
         shift = np.floor((t - first) / period) * period if period else np.zeros_like(t)
         if left and period:
@@ -53,7 +53,7 @@ class Pieces:
         return np.clip(i, 0, last), shift
 
     def value(self, t, left=False):
-        """The value where the time is any kind of number."""
+        """Return the value for time of any numeric type."""
         at = np.asarray((t.c[0] if isinstance(t, Truncated) else t).real, float)
         i, shift = self.find(at, left)
         x, c = (t - shift) - self.knots[i], self.c[i]
@@ -76,7 +76,7 @@ class Pieces:
         return times[(times > t0) & (times <= t1)]
 
     def numbers(self):
-        """What `motion_program` gets, a list of floats."""
+        """Return the numbers of the piece for `motion_program`, a list of floats."""
         head = [self.c.shape[0], self.c.shape[1], self.period, self.beyond is not False, 0, 0, 0]
         return [*map(float, head), *self.knots.tolist(), *self.c.ravel().tolist()]
 

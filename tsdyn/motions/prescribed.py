@@ -20,6 +20,7 @@ from .expressions import FUNCTIONS, Smooth
 from .knots import demand_covered, demand_followed
 from .program import run_program
 from .tables import is_data
+from .tolerances import QUOTIENT_ERROR, QUOTIENT_NOISE, QUOTIENT_STEPS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -32,17 +33,17 @@ call_motion = caller(SIGNATURE, "d")
 
 
 class Motion:
-    """f(t), fd(t), fdd(t): a length, an angle or another quantity that the user prescribes.
+    """A prescribed quantity f(t) with its derivatives fd(t), fdd(t): a length, an angle, ...
 
     Parameters
     ----------
     f, fd, fdd : callable
         Plain functions of one float, the time in s, that Numba can compile; fd and fdd are the exact first and second
-        derivatives of f. The compiled code is cached on disk by all the code and constants it depends on. Without fd
-        and fdd they are derived from f, which then is arithmetic and functions that `ts.motions` knows; or f is one of
-        `ts.motions`, for which nothing is compiled and Taylor has the series.
+        derivatives of f. The compiled code is cached on disk under all code and constants that it depends on. Without
+        fd and fdd, f is differentiated: it may use arithmetic and the functions of `ts.motions`. For one of
+        `ts.motions` nothing is compiled, and the Taylor integrator has its series.
     what : str
-        What error messages call it.
+        Name in error messages.
 
     Examples
     --------
@@ -87,18 +88,18 @@ class Motion:
 
     @property
     def motions(self) -> tuple[Smooth, ...]:
-        """The motions of `ts.motions` that it is made of."""
+        """The motions of `ts.motions` in it."""
         return () if self.smooth is None else (self.smooth,)
 
     @property
     def origin(self) -> float:
-        """The time that is nearest to t = 0 among those for which it has a value, s."""
+        """The time nearest to t = 0 with a value, s."""
         covers = [pieces.covers for motion in self.motions for pieces in motion.pieces]
         return float(min([max([0.0, *(first for first, _ in covers)]), *(last for _, last in covers)]))
 
     @classmethod
     def always(cls, value: Prescribed, what: str) -> Motion:
-        """Return a Motion, of a number too."""
+        """Return a Motion, also for a number."""
         value = cls.wrap(value, what)
         return value if isinstance(value, Motion) else cls(Constant(value), what=what)
 
@@ -106,7 +107,7 @@ class Motion:
     def wrap(cls, value: Prescribed, what: str) -> Motion | float:
         """Return a Motion for functions, one of `ts.motions`, data or a Motion; a finite float for a number."""
         if isinstance(value, Motion):
-            what = what if value.what == UNNAMED else value.what  # a part's motion is its joint's
+            what = what if value.what == UNNAMED else value.what  # parts share the motion of their joint
             return cls(*(value.given or (value.smooth,)), what=what)
         if is_data(value):
             return cls(value, what=what)
@@ -124,7 +125,7 @@ class Motion:
 
     @staticmethod
     def components(value: Data, count: int, what: str) -> tuple[Piecewise, ...]:
-        """The motions of so many components that data say; each a `Piecewise`."""
+        """Return the motions of the components of data; each a `Piecewise`."""
         try:
             motions = Piecewise.each(value)
         except InvalidArgument as reason:
@@ -135,22 +136,22 @@ class Motion:
 
     @staticmethod
     def numbers(given: Iterable[Motion | float]) -> list[float]:
-        """Parameters as kernels have them: a Motion is its value, rate and acceleration at its origin."""
+        """Parameters as kernels receive them: value, rate and acceleration of a Motion at its origin."""
         return [x for value in given for x in (value.value(value.origin) if isinstance(value, Motion) else (value,))]
 
     @staticmethod
     def places(value: Motion | float) -> tuple[Motion | float, ...]:
-        """What a prescribed value contributes to `parameters()`: three places for value, rate and acceleration."""
+        """Return the entries of a prescribed value in `parameters()`: value, rate and acceleration."""
         return (value,) if isinstance(value, Motion) else (value, 0.0, 0.0)
 
     @staticmethod
     def at_start(value: Motion | float) -> float:
-        """The value itself, or that of a Motion at its origin: t = 0, or the time nearest to it that data cover."""
+        """Return a number, or the value of a Motion at its origin: t = 0, or the time nearest to it that data cover."""
         return value.value(value.origin)[0] if isinstance(value, Motion) else value
 
     def value(self, t: float) -> tuple[float, ...]:
         """Return (f, fd, fdd) at t, by the plain Python functions."""
-        t = t if self.smooth is None else np.float64(t)  # so that nothing raises
+        t = t if self.smooth is None else np.float64(t)  # no division by zero raises
         try:
             with np.errstate(all="ignore"):
                 result = tuple(float(f(t)) for f in self.functions)
@@ -161,11 +162,11 @@ class Motion:
         return result
 
     def check(self, t0: float, t1: float) -> None:
-        """Refuse derivatives that are not those of f, by difference quotients at a few times; data with a jump.
+        """Refuse wrong derivatives, by difference quotients at a few times, and data with a jump.
 
-        Several quotients are tried at each time, and most times must fail: a kink or a short wave is no error.
+        Several quotients are tried at each time, and most times must fail: kinks and short waves are no errors.
         """
-        if self.smooth is not None:  # they are
+        if self.smooth is not None:  # exact by construction
             demand_covered(self.smooth, t0, t1, self.what, InvalidConstraint)
             demand_followed(self.smooth, t0, t1, self.what)
             return
@@ -173,14 +174,14 @@ class Motion:
         for i, names in ((0, ("f", "fd")), (1, ("fd", "fdd"))):
             given, values = self._at(i + 1, times), self._at(i, times)
             off = np.full(times.size, np.inf)
-            for h in min(1.0, t1 - t0) * np.array([1e-2, 1e-3, 1e-4, 1e-5]):
+            for h in min(1.0, t1 - t0) * np.array(QUOTIENT_STEPS):
                 near = [self._at(i, times + k * h) for k in (-2, -1, 1, 2)]
                 with np.errstate(invalid="ignore"):
                     quotient = (near[0] - 8.0 * near[1] + 8.0 * near[2] - near[3]) / (12.0 * h)
-                    off = np.fmin(off, np.abs(quotient - given) - 1e-9 * np.abs(values) / h)
+                    off = np.fmin(off, np.abs(quotient - given) - QUOTIENT_NOISE * np.abs(values) / h)
             if not (np.isfinite(given).all() and np.isfinite(values).all()):
-                continue  # the run ends there, and says so
-            if (off > 1e-3 * (np.abs(given).max() + np.abs(values).max())).sum() > times.size // 2:
+                continue  # the run ends there with a message
+            if (off > QUOTIENT_ERROR * (np.abs(given).max() + np.abs(values).max())).sum() > times.size // 2:
                 raise InvalidConstraint(
                     f"{self.what}: {names[1]} is not the derivative of {names[0]}: at t = {times[0]:g} it gives "
                     f"{given[0]:g}, and a difference quotient of {names[0]} does not. Correct the derivatives."
@@ -202,17 +203,17 @@ class Motion:
             ) from error
 
     def __getstate__(self):
-        return {**self.__dict__, "_callbacks": None}  # machine code is not for pickling
+        return {**self.__dict__, "_callbacks": None}  # machine code can't be pickled
 
     def forget(self) -> None:
-        """Drop what was compiled or derived; it is made again when asked for."""
+        """Drop compiled and derived functions; they are made again on demand."""
         self._callbacks = None
         if self.given and self.smooth is not None:
             self.smooth = _derived(self.given[0], self.what)
 
     @property
     def addresses(self) -> tuple[int, ...]:
-        """The addresses of the three compiled functions; of a program, what runs it and two zeros."""
+        """The addresses of the three compiled functions; for a program, of its interpreter and two zeros."""
         if self.smooth is not None:
             return run_program.address, 0, 0
         try:
@@ -227,7 +228,7 @@ class Motion:
 
 
 def _plain_function(function, what):
-    """A user's function, or an error where it is none of one argument."""
+    """Return a user's function; refuse all but plain functions of one argument."""
     if not callable(function):
         raise InvalidConstraint(f"{what}: a motion is three functions of time (f, fd, fdd), got {function!r}.")
     plain = getattr(function, "py_func", function)
@@ -239,7 +240,7 @@ def _plain_function(function, what):
 
 
 def _derived(f, what):
-    """A user's function as a `Smooth`, by running it once on the time as a motion; its `math` is NumPy there."""
+    """Return a user's function as a `Smooth`, by evaluation on time as a motion; `math` is replaced by NumPy."""
     plain = getattr(f, "py_func", f)
     known = {name: _of_motions(value) for name, value in plain.__globals__.items()}
     twin = FunctionType(plain.__code__, known, plain.__name__, plain.__defaults__, plain.__closure__)
@@ -259,7 +260,7 @@ def _derived(f, what):
 
 
 def _of_motions(value):
-    """What a global of a user's function stands for where it is run on a motion."""
+    """Return the replacement of a global of a user's function evaluated on a motion."""
     if value is math:
         return _Math
     name = getattr(value, "__name__", "")
@@ -270,7 +271,7 @@ _NUMPY = {"atan": "arctan", "fabs": "abs", "pow": "power"}
 
 
 class _Math:
-    """The module `math` with NumPy's functions, which know motions."""
+    """The module `math` with NumPy's functions, which accept motions."""
 
     pi, e, tau = math.pi, math.e, math.tau
     sin, cos, tan, exp, log, sqrt = np.sin, np.cos, np.tan, np.exp, np.log, np.sqrt
@@ -278,7 +279,7 @@ class _Math:
 
 
 def _guarded(t):
-    """The function, or NaN where it raises: an error must not be taken for a zero."""
+    """Call the function; NaN if it raises, since an error must not pass for zero."""
     try:
         return float(function(t))
     except Exception:

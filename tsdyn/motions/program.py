@@ -13,10 +13,10 @@ from ..maths.recurrences import exponential, power, product, quotient, sine_cosi
 from .piecewise import HEAD as PIECES_HEAD
 
 POLYNOMIAL, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, SINE, EXP, LOG, TANH, ARCTAN, PIECEWISE = range(12)
-HEAD, STEP, WIDTH = 6, 4, 36  # numbers before the instructions, of each, and room for coefficients in a row
+HEAD, STEP, WIDTH = 6, 4, 36  # numbers before the instructions, numbers of an instruction, coefficients of a row
 HOLD = 0  # as a count: stay with the pieces at t
 SIGNATURE = "pdip"  # program, t, how many coefficients, where they go
-# what a piecewise constant begins with, see Pieces.numbers
+# header of piecewise constants, see Pieces.numbers
 COUNT, SIZE, PERIOD, BEYOND, PIECE, SHIFT, HELD = range(PIECES_HEAD)
 call_smooth = caller(SIGNATURE)
 
@@ -58,7 +58,7 @@ def _hyperbolic(a, y, w, k):
 
 @kernel
 def _find_piece(c, t):
-    """Note the piece at t, and how far its knots are shifted there."""
+    """Store the piece at t and the shift of its knots."""
     knots, low, high = c[PIECES_HEAD:], 0, int(c[COUNT])
     c[SHIFT] = np.floor((t - knots[0]) / c[PERIOD]) * c[PERIOD] if c[PERIOD] > 0.0 else 0.0
     x = t - c[SHIFT]
@@ -73,7 +73,7 @@ def _find_piece(c, t):
 
 @kernel
 def _piecewise(c, t, k):
-    """Coefficient k about t of a piecewise polynomial; NaN where it has none."""
+    """Coefficient k about t of a piecewise polynomial; NaN outside its times."""
     count, size, knots = int(c[COUNT]), int(c[SIZE]), c[PIECES_HEAD:]
     if c[HELD] == 0.0 and k == 0:
         _find_piece(c, t)
@@ -85,7 +85,7 @@ def _piecewise(c, t, k):
 
 @kernel
 def _hold(p, t):
-    """Let everything piecewise stay with its piece at t, whatever time it is asked for."""
+    """Hold the pieces at t for all following evaluations."""
     constants = int(p[2])
     for i in range(int(p[1])):
         at = HEAD + STEP * i

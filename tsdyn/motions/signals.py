@@ -32,9 +32,9 @@ class Signal:
         `ts.motions`, or data, for which nothing is compiled.
     width : int
     what : str
-        What error messages call it.
+        Name in error messages.
     error : type
-        What they raise.
+        Class of errors raised.
     """
 
     def __init__(self, source, width, what, error):
@@ -88,7 +88,7 @@ class Signal:
 
     @staticmethod
     def places(value):
-        """What a load contributes to `parameters()`."""
+        """Return the entries of a load in `parameters()`."""
         return tuple(value) if isinstance(value, np.ndarray) else (value,)
 
     @staticmethod
@@ -127,12 +127,12 @@ class Signal:
             demand_covered(motion, t0, t1, self.what, self.error)
 
     def forget(self):
-        """Drop the compiled function; it is made again when asked for."""
+        """Drop the compiled function; it is made again on demand."""
         self._callback = None
 
     @property
     def address(self):
-        """The address of the compiled function, or of what runs motions."""
+        """The address of the compiled function, or of the interpreter of motions."""
         if self.motions:
             return run_program.address
         try:
@@ -147,11 +147,11 @@ class Signal:
             ) from error
 
     def __getstate__(self):
-        return {**self.__dict__, "_callback": None}  # machine code is not for pickling
+        return {**self.__dict__, "_callback": None}  # machine code can't be pickled
 
 
 def _one(t, out):
-    """The number, or NaN where the function raises: an error must not be taken for a zero."""
+    """Call the function; NaN if it raises, since an error must not pass for zero."""
     out = vector(out, 1)
     out[0] = math.nan
     try:

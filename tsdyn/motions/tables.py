@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 
 class Table:
-    """Values at given times, joined by a cubic spline (SciPy's CubicSpline, not-a-knot): a load, or a motion.
+    """Values at given times, interpolated by a cubic spline (SciPy's CubicSpline, not-a-knot): a load or a motion.
 
     Parameters
     ----------
     times : array_like (k,), s
         Increasing, at least two.
     values : array_like (k,) or (k, 3)
-        Numbers or vectors, in the unit of what the table is given to.
+        Numbers or vectors, in the unit of the load or motion.
 
     Raises
     ------
@@ -34,7 +34,7 @@ class Table:
 
     Notes
     -----
-    A run must stay within the times. For other joints between the values, or for values beyond the ends, give a SciPy
+    A run must stay within the times. For other interpolation, or for extrapolation, give a SciPy
     object instead: CubicSpline, PchipInterpolator, make_interp_spline(...), any PPoly or BSpline.
 
     Examples
@@ -56,10 +56,10 @@ class Table:
                 f"Table: values must be {k} finite numbers or {k} vectors of three, one for each time; their shape is "
                 f"{np.shape(values)}."
             )
-        from scipy.interpolate import CubicSpline  # it takes long to import
+        from scipy.interpolate import CubicSpline  # slow to import
 
         self._spline = CubicSpline(self.times, self.values, extrapolate=False)
-        self.motions = None  # of `ts.motions`, once there are
+        self.motions = None  # of `ts.motions`, on demand
         self.times.setflags(write=False)
         self.values.setflags(write=False)
 
@@ -68,7 +68,7 @@ class Table:
         return self._spline(t)
 
     def pieces(self) -> list[Any]:
-        """One `Pieces` a component."""
+        """A `Pieces` for each component."""
         return pieces_of(self._spline)
 
     def __repr__(self) -> str:
@@ -83,7 +83,7 @@ def is_data(value):
 
 
 def pieces_of(value):
-    """The `Pieces` of a Table, of SciPy's PPoly, BPoly or BSpline, or of (times, values); one a component.
+    """Return the `Pieces` of a Table, of SciPy's PPoly, BPoly or BSpline, or of (times, values), by components.
 
     Raises
     ------
@@ -117,6 +117,6 @@ def pieces_of(value):
 
 
 def _scipy():
-    """SciPy's classes of piecewise polynomials, where it has been imported: without it there is none of them."""
+    """SciPy's classes of piecewise polynomials if SciPy is imported: otherwise nothing is an instance of them."""
     module = sys.modules.get("scipy.interpolate")
     return (module.PPoly, module.BPoly, module.BSpline) if module is not None else ()

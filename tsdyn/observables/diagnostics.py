@@ -19,7 +19,7 @@ from ..motions.prescribed import Motion
 if TYPE_CHECKING:
     from ..hints import Floats
 
-AT_ONCE = 1 << 16  # numbers in an array: constraints and bodies are taken together up to that
+AT_ONCE = 1 << 16  # numbers in an array, at most: so many constraints or bodies are evaluated together
 
 
 class ConstraintError(NamedTuple):
@@ -33,8 +33,8 @@ class ConstraintError(NamedTuple):
 def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0, memory=None):
     """Phi and its first two time derivatives along a trajectory of a packed scene: three arrays (k, m).
 
-    With time_rate=0 time stands still: the derivatives are those along (qd, qdd) alone. memory (k, slots) is what
-    constraints remember.
+    With time_rate=0 the derivatives are those along (qd, qdd) at fixed time. memory (k, slots) is the memory of
+    constraints.
     """
     levels = tuple(np.zeros((t.size, len(packed.system.segments))) for _ in range(3))
     for rows, part in _groups(packed, t, q, qd, qdd, time_rate, memory):
@@ -53,7 +53,7 @@ def constraint_error(packed, t, q, qd, qdd, memory=None):
 
 
 def _groups(packed, t, q, qd, qdd, time_rate, memory):
-    """Yield rows of Phi (r,) and their three levels, (k, r) each: constraints of one form at a time."""
+    """Yield rows of Phi (r,) and their three levels, (k, r) each: for constraints of one form at a time."""
     starts, groups, row = starts_of(packed), {}, 0
     lists = packed.constraints, packed.parameters, packed.coordinates, packed.slots
     for constraint, values, places, slot in zip(*lists, strict=True):
@@ -74,13 +74,13 @@ def _groups(packed, t, q, qd, qdd, time_rate, memory):
             some = members[first : first + most]
             try:
                 found = [_levels(constraint, some, t, q, qd, qdd, time_rate)]
-            except (TypeError, ValueError):  # a plug-in's phi that takes no arrays for its parameters
+            except (TypeError, ValueError):  # phi of a plug-in doesn't accept arrays of parameters
                 found = (_levels(constraint, [one], t, q, qd, qdd, time_rate) for one in some)
             yield from found
 
 
 def _levels(constraint, members, t, q, qd, qdd, time_rate):
-    """The rows of constraints of the form of this one, and their levels, instances along the last axis."""
+    """Return the rows of all constraints of the form of this one, and their levels, instances along the last axis."""
     starts, places, values, rows = zip(*members, strict=True)
     places, starts = np.array(places), np.array(starts)
     x = []
@@ -99,7 +99,7 @@ def _levels(constraint, members, t, q, qd, qdd, time_rate):
 
 def _parameter(given, t, rate):
     """One parameter of some instances, (instances,) or one number for all, or Jets (k, instances) of Motions."""
-    if isinstance(given[0], np.ndarray):  # what each remembers
+    if isinstance(given[0], np.ndarray):  # memory of each
         return [np.transpose(given)]
     if not isinstance(given[0], Motion):
         same = all(value == given[0] for value in given)
@@ -109,7 +109,7 @@ def _parameter(given, t, rate):
 
 
 def starts_of(packed):
-    """Where the coordinates of each body begin."""
+    """Return the first coordinate of each body."""
     if packed.derived.coordinate_starts is None:
         packed.derived.coordinate_starts = dict(zip(packed.bodies, packed.system.bodies[:, 0].tolist(), strict=True))
     return packed.derived.coordinate_starts
@@ -149,7 +149,7 @@ def _rotate(p, s):
 
 
 class Motions(NamedTuple):
-    """The motion of some bodies of one kind at every output."""
+    """Motion of bodies of one kind at every output."""
 
     mass: np.ndarray  # (b,)
     inertia: np.ndarray  # (b, 3, 3)
@@ -160,7 +160,7 @@ class Motions(NamedTuple):
 
 
 def body_motions(system, q, qd):
-    """Yield a `Motions` for the point masses, and one for the rigid bodies, some at a time; masses are the run's."""
+    """Yield a `Motions` for the point masses, and one for the rigid bodies, in batches; masses are those of the run."""
     most = max(AT_ONCE // max(len(q), 1), 1)
     for length in (3, 7):
         bodies = np.flatnonzero(system.bodies[:, 1] == length)

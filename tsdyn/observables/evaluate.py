@@ -10,11 +10,13 @@ from ..calls import fitting
 from ..elements.bodies import transform_g
 from ..errors import InvalidArgument, SingularConfiguration
 from ..formulations.dependent_rows import dependent_rows
-from ..maths.row_rank import RANK_TOL, dependent, farthest_first
+from ..maths.row_rank import dependent, farthest_first
+from ..maths.tolerances import RANK_TOL
 from ..model.equations import evaluate_constraints
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..validation import finite_vector, number
 from .generalised_forces import applied_loads, velocity_forces
+from .tolerances import INDEPENDENT, LARGE, LEAST_DIVISOR, LOST, LOST_DENSE, REDUNDANT_SHARES
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Floats, Matrix, Scene
@@ -23,11 +25,7 @@ NOT_UNIQUE = (
     "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
     "leave free carries no inertia."
 )
-LOST = 1e-13  # of the largest pivot of a sparse factorisation: less is rounding
-SHARES = 3e-2, 1e-3, 1e-6, 1e-9  # of what elimination leaves of rows that are kept, in turn
 ROUNDS, MOST_AT_ONCE = 8, 64  # of taking back rows that were left out wrongly; how many pushes tell which
-INDEPENDENT = 1e-3  # of what the rows move at most that are left out: more is independent of others that are
-LARGE = 1000  # coordinates from which on matrices are sparse
 
 
 class Evaluation(NamedTuple):
@@ -160,7 +158,7 @@ def _evaluate_sparse(packed, q, qd, t):
 def _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t):
     """As `_of_independent_rows`, of sparse arrays."""
     m, found = len(gamma), False
-    for share in SHARES:
+    for share in REDUNDANT_SHARES:
         redundant = dependent_rows(packed, q, t, share)
         if redundant is None or not redundant.size:
             continue
@@ -204,7 +202,7 @@ def _sparse_solver(M, Phi_q, lost=LOST):
     from scipy.sparse.linalg import splu
 
     kkt = block_array([[M, Phi_q.T], [Phi_q, None]], format="csc")
-    scale = 1.0 / np.sqrt(np.maximum(abs(kkt).max(axis=1).toarray().ravel(), 1e-300))
+    scale = 1.0 / np.sqrt(np.maximum(abs(kkt).max(axis=1).toarray().ravel(), LEAST_DIVISOR))
     weights = diags_array(scale)
     try:
         factors = splu((weights @ kkt @ weights).tocsc())
@@ -218,9 +216,9 @@ def _sparse_solver(M, Phi_q, lost=LOST):
 
 def equilibrated_solve(A, b):
     """Solve a symmetric system scaled to unit rows; LinAlgError where it is singular to working precision."""
-    scale = 1.0 / np.sqrt(np.maximum(np.abs(A).max(axis=1), 1e-300))
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(A).max(axis=1), LEAST_DIVISOR))
     scaled = A * scale[:, None] * scale
-    if A.size and np.linalg.cond(scaled) > 1e14:
+    if A.size and np.linalg.cond(scaled) > 1.0 / LOST_DENSE:
         raise np.linalg.LinAlgError
     return np.linalg.solve(scaled, b * scale) * scale
 

@@ -8,10 +8,9 @@ from ..jit.kernels import twin
 from .diagnostics import starts_of
 from .generalised_forces import force_loads
 from .power import marker_states
+from .tolerances import BALANCED, COMPLEX_STEP
 
 SWEEPS = 50
-ROUNDING = 1e-15
-STEP = 1e-40  # of complex steps
 JAMMED = (
     "no reactions are consistent with the friction of the joints: with large coefficients of friction the mechanism "
     "may jam here."
@@ -19,7 +18,7 @@ JAMMED = (
 
 
 def balance(packed, t, q, qd, Phi_q, solve):
-    """Frictions (n,) and the solution of the equations of motion with them; solve(load) is linear but for solve(0).
+    """Return friction forces (n,) and the solution of the equations of motion; solve(load) is affine in the load.
 
     Newton's method for the normal loads N = N(lam_0 + sum_i lam_i N_i).
     """
@@ -39,27 +38,27 @@ def balance(packed, t, q, qd, Phi_q, solve):
         except np.linalg.LinAlgError as error:
             raise SingularConfiguration(JAMMED) from error
         N = N + step
-        if not np.abs(step).max() > ROUNDING * np.abs(N).max():
+        if not np.abs(step).max() > BALANCED * np.abs(N).max():
             return N @ np.array(units), first + N @ parts
     raise SingularConfiguration(JAMMED)
 
 
 def _unit(system, load, t, q, qd):
-    """Generalised forces (n,) of one friction for a normal load of one."""
+    """Return the generalised forces g (n,) of one friction for unit normal load."""
     memory = np.zeros((1, system.memory.size + system.normals.size))
     memory[0, system.memory.size + load.normal] = 1.0
     return force_loads(system._replace(forces=load.alone), np.array([t]), q[None], qd[None], memory)[0]
 
 
 def _reaction(packed, load, q, qd, Phi_q):
-    """Make the function of multipliers (m,) that gives a normal load and its derivative (m,)."""
+    """Return a normal load as a function of multipliers (m,), with its derivative (m,)."""
     force, member = load.force, next(m for m in packed.members if m.constraint is load.force.joint)
     rows = Phi_q[member.rows]
     rows = rows if isinstance(rows, np.ndarray) else rows.toarray()
     at, (jets, _) = starts_of(packed)[force.on], marker_states(packed, load, q[None], qd[None])
     x = [float(np.squeeze(jet.x)) for jet in jets]
     s = np.array(x[:3] if force.on is force.a else x[6:9]) - q[at : at + 3]
-    wrench = np.zeros((6, rows.shape[0]))  # of multipliers of one: force, and torque about the point
+    wrench = np.zeros((6, rows.shape[0]))  # for unit multipliers: force, and torque about the point
     wrench[:3] = -rows[:, at : at + 3].T
     if force.on.dimension == 7:
         p = q[at + 3 : at + 7]
@@ -69,9 +68,9 @@ def _reaction(packed, load, q, qd, Phi_q):
 
     def find(lam):
         f = wrench @ lam[member.rows]
-        values = [normal(x, f + STEP * 1j * e, par) for e in np.eye(6)]
+        values = [normal(x, f + COMPLEX_STEP * 1j * e, par) for e in np.eye(6)]
         change = np.zeros(lam.size)
-        change[member.rows] = np.imag(values) / STEP @ wrench
+        change[member.rows] = np.imag(values) / COMPLEX_STEP @ wrench
         return np.real(values[0]), change
 
     return find

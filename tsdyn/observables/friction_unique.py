@@ -10,7 +10,8 @@ from ..rows.interface import count_self_stresses, redundancy, self_stress
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
-from .uniqueness import NEXT_TO_NOTHING, find_rows
+from .tolerances import NO_STRESS
+from .uniqueness import find_rows
 
 
 @entry
@@ -46,7 +47,7 @@ def demand_unique(packed, q, t):
     context, *_keep = resident(parts(system, network, q.size))
     free = np.zeros(len(network.frictions))
     _free_loads(context, t, q, np.zeros(16 * len(network.row)), free)
-    wrong = [load.force for load in packed.loads if load.normal >= 0 and free[load.normal] > NEXT_TO_NOTHING]
+    wrong = [load.force for load in packed.loads if load.normal >= 0 and free[load.normal] > NO_STRESS]
     if wrong:
         names = ", ".join(force.name for force in wrong)
         joints = ", ".join(force.joint.name for force in wrong)

@@ -9,7 +9,7 @@ from ..model.equations import applied_forces, set_time
 
 @entry
 def sum_forces(s, t, q, qd, memory, out):
-    """out (k, n) += all forces but gravity; memory (k, ...) is what they remember at each output, then normal loads."""
+    """out (k, n) += all forces but gravity; memory (k, ...): of forces at each output, then normal loads."""
     for row in range(t.size):
         set_time(s, t[row])
         for i in range(s.memory.size):
@@ -20,7 +20,7 @@ def sum_forces(s, t, q, qd, memory, out):
 
 
 def force_loads(system, t, q, qd, memory=None):
-    """Forces without gravity (k, n); no kernel is loaded where there are none."""
+    """Forces without gravity (k, n); without forces no kernel is loaded."""
     out = np.zeros_like(q)
     if len(system.forces):
         system = system._replace(reals=system.reals.copy())  # signals and memory are written to
@@ -37,7 +37,7 @@ def applied_loads(system, t, q, qd, memory=None):
 
 
 def velocity_forces(system, q, qd):
-    """S (k, n): 8 Gd^T J' Gd p on p."""
+    """Q_v (k, n): 8 Gd^T J' Gd p on p."""
     S, at = np.zeros_like(q), _places(system, 3, 7)
     if at.size:
         S[:, at] = 8.0 * _turned(qd[:, at], system, q[:, at])
@@ -55,7 +55,7 @@ def inertial_forces(system, q, qdd):
 
 
 def _places(system, first, end):
-    """Where these coordinates of the bodies that have them stand, (b, end - first)."""
+    """Return the indices of coordinates first to end of each body that has them, (b, end - first)."""
     bodies = system.bodies[system.bodies[:, 1] >= end, :1]
     return bodies + np.arange(first, end)
 

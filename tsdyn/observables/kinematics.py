@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 class Anchor(NamedTuple):
-    """A point of the run in the same step, from which the turns of the joints' angles are known."""
+    """An instant of the run in the same step at which the turns of the joint angles are known."""
 
-    angles: np.ndarray  # (count,) or (k, count) there; right to less than half a turn
-    h: object = 0.0  # s since then, a number or (k,); below zero before it
-    levels: tuple = ()  # q, qd there, (n,) or (k, n); empty for the point itself
+    angles: np.ndarray  # (count,) or (k, count) there, correct to less than half a turn
+    h: object = 0.0  # s since then, a number or (k,); may be negative
+    levels: tuple = ()  # q, qd there, (n,) or (k, n); empty at the instant itself
 
 
 Coordinate = TypeVar("Coordinate")  # of a joint: a number at one instant, an array along a run
@@ -30,9 +30,9 @@ Coordinate = TypeVar("Coordinate")  # of a joint: a number at one instant, an ar
 
 @fitting_methods
 class Kinematics(Generic[Coordinate]):
-    """Mixed into what has `handles`, q, qd and qdd, (n,) at one instant or (k, n) along a run, and an `anchor`.
+    """Mixed into classes with `handles`, q, qd and qdd, (n,) at an instant or (k, n) along a run, and an `anchor`.
 
-    A body is a handle or a name, and so is a joint. Along a run there is a leading k in every shape given here.
+    Bodies and joints are given by handle or name. Along a run every shape below has a leading k.
     """
 
     __slots__ = ()
@@ -72,10 +72,10 @@ class Kinematics(Generic[Coordinate]):
         return angular_velocity(self.orientation(body), self.qdd[..., self._parameters(body)])
 
     def angle(self, joint: ItemLike) -> Coordinate:
-        """Angle of a joint, rad: of b against a about its axis (right hand), counted over any number of turns.
+        """Angle of a joint, rad: of b relative to a about its axis (right-hand rule), counted over any number of turns.
 
-        Zero as built, or between the references of a joint that has them. A run begins within half a turn of zero,
-        unless `scene.set`, a motor, a thread or the state that the run goes on from says otherwise.
+        Zero as built, or when the references of the joint coincide. A run begins within half a turn of zero unless
+        `scene.set`, a motor, a thread or the initial state determines the turn.
 
         Returns
         -------
@@ -85,7 +85,7 @@ class Kinematics(Generic[Coordinate]):
         Raises
         ------
         InvalidConstraint
-            If the joint has no angle, or is not of this scene.
+            If the joint has no angle, or isn't in this scene.
         """
         row = self.handles.row(joint, "angle")
         return _one([self._counted(j, geometry) for j, geometry in enumerate(row.angles, row.first)])
@@ -99,12 +99,12 @@ class Kinematics(Generic[Coordinate]):
         return self._coordinate(joint, "angle", 2)
 
     def displacement(self, joint: ItemLike) -> Coordinate:
-        """Displacement of a joint, m: of its point of b from that of a along the axis; a number, or (k,) along a run.
+        """Displacement of a joint, m: of its point on b from that on a along the axis; a number, or (k,) along a run.
 
         Raises
         ------
         InvalidConstraint
-            If the joint has no displacement, or is not of this scene.
+            If the joint has no displacement, or isn't in this scene.
         """
         return self._coordinate(joint, "displacement", 0)
 
@@ -118,7 +118,7 @@ class Kinematics(Generic[Coordinate]):
 
     @property
     def angles(self) -> Floats:
-        """All angles that the run counts (count,), in the order of the joints."""
+        """All counted angles (count,), in the order of the joints."""
         counted = [self._counted(row.first + i, g) for row in self.handles.rows for i, g in enumerate(row.angles)]
         return np.stack(counted, axis=-1) if counted else np.zeros((*np.shape(self.q)[:-1], 0))
 
@@ -128,7 +128,7 @@ class Kinematics(Generic[Coordinate]):
         return _one([evaluate(g, *self._motions(g), level) for g in geometries])
 
     def _counted(self, j, geometry):
-        """Angle j: on the turn that follows from the anchor's angle, and the rates there and here."""
+        """Angle j, on the turn predicted from the anchor's angle and the rates at both instants."""
         bodies, anchor = self._motions(geometry), self.anchor
         near = anchor.angles[..., j]
         if anchor.levels:
@@ -148,11 +148,11 @@ class Kinematics(Generic[Coordinate]):
             return levels[level][..., at : at + 3]
         s = vector3(point, f"{body.name}: point (m, body frame)", InvalidArgument)
         if dimension == 3 and s.any():
-            raise InvalidArgument(f"{body.name}: a point mass has no other point than (0, 0, 0), got {point!r}.")
+            raise InvalidArgument(f"{body.name}: a point mass has the point (0, 0, 0) only, got {point!r}.")
         return np.array(joint_motion.BodyMotion(at, dimension, levels).point(s.tolist(), level)).T
 
     def _parameters(self, body):
-        """Where the Euler parameters of a body are."""
+        """Return the slice of the Euler parameters of a body."""
         body = self.handles.body(body)
         body.orientation  # noqa: B018  a point mass says that it has none
         at, _ = self.handles.where(body)

@@ -54,7 +54,7 @@ def load_powers(packed, load, t, q, qd, memory):
             f = [0.0] * len(x)
             twin(kind.law)(values, xd, par, t, f)
             work = sum(a * b for a, b in zip(f, xd, strict=True))
-        else:  # a function of a user's has no twin on arrays
+        else:  # user functions don't accept arrays
             system = packed.system._replace(forces=load.alone)
             work = np.einsum("kn,kn->k", force_loads(system, t, q, qd, memory), qd)
     return U.x, lost, work + U.xd + lost
@@ -83,7 +83,7 @@ def _turning(p, pd):
 
 
 def power_of(solution, item):
-    """Power (k,) that a constraint puts in, lam . Phi_t of its rows, or a force: applied, less what it dissipates.
+    """Power (k,) of a constraint, lam . Phi_t of its rows, or of a force: applied power less dissipation.
 
     item is a packed.Member or a packed_forces.Load.
     """

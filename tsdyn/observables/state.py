@@ -32,12 +32,12 @@ class State(Kinematics["float | Any"], _Arrays):
 
     Notes
     -----
-    A state that a run hands out (`solution.state`, `solution.at(t)`, what an event is given) knows its scene, so it can
-    be asked for the motion of bodies and joints, too.
+    A state made by a run (`solution.state`, `solution.at(t)`, the argument of an event) knows its scene and gives the
+    motion of bodies and joints, too.
 
     Examples
     --------
-    A run that stops half-way, and another one that goes on:
+    A run, continued by another:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))
@@ -56,21 +56,21 @@ class State(Kinematics["float | Any"], _Arrays):
     def handles(self) -> Handles:
         """The bodies and joints of its scene."""
         raise InvalidArgument(
-            "this state is arrays alone and knows no bodies and joints: ask solution.state, solution.at(t), or the "
-            "state that an event is given."
+            "this state has arrays alone and no bodies and joints: use solution.state, solution.at(t), or the "
+            "state that an event receives."
         )
 
 
 class RememberingState(State):
-    """A State that knows the bodies and joints of its scene, and what forces remember, so that a run from it goes on.
+    """A State with the bodies and joints of its scene and the memory of forces, from which a run continues.
 
     Attributes
     ----------
     memory : ndarray (slots,) or (k, slots)
-        What forces remember.
+        Memory of forces.
     handles : Handles
     anchor : Anchor
-        What the turns of joints are counted from.
+        Reference of turn counts.
     """
 
     handles: Any = None
@@ -79,7 +79,7 @@ class RememberingState(State):
 
     @classmethod
     def of(cls, handles, memory, anchor, *parts):
-        """A state, or k states."""
+        """Make a state, or k states."""
         state = cls(*parts)
         state.handles, state.memory, state.anchor = handles, memory, anchor
         return state
@@ -89,7 +89,7 @@ class RememberingState(State):
 
 
 def remembered(state, prepared, t, q):
-    """What a run from a state given to `simulate`, or None, goes on from: joints' angles, then what forces remember."""
+    """Return the memory with which a run from a state (or None) begins: joint angles, then memory of forces."""
     slots, memory = prepared.packed.system.memory.size, getattr(state, "memory", None)
     if state is None and not (slots or prepared.handles.count):
         return np.empty(0)

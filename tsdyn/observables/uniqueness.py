@@ -15,8 +15,7 @@ from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
 from .factorised_rows import factorise_at
-
-NEXT_TO_NOTHING = 1e-7  # of the rows' own size
+from .tolerances import LEAST_DIVISOR, NO_STRESS
 
 
 @long_kernel
@@ -44,7 +43,7 @@ def free_loads(context, t, q, rows, sides, whole, out):
                     load += f.b[rows[i]] * h
                 f.Z[c] = load
             for c in range(8):
-                out[k] = max(out[k], abs(f.Z[c]) / max(largest * size, 1e-300))
+                out[k] = max(out[k], abs(f.Z[c]) / max(largest * size, LEAST_DIVISOR))
 
 
 def unique(solution, rows, body):
@@ -58,4 +57,4 @@ def unique(solution, rows, body):
     context, *_keep = resident(parts(system, network, solution.q.shape[1]))
     out = np.zeros(solution.t.size)
     free_loads(context, solution.t, solution.q, wanted, sides, np.zeros(16 * len(network.row)), out)
-    return out < NEXT_TO_NOTHING
+    return out < NO_STRESS

@@ -17,17 +17,26 @@ from ..integrators import SDIRK54, Taylor
 from ..simulation.method_choice import LARGEST_PILOT
 from ..simulation.scene_cache import prepared
 from ..taylor.layout import lacking, without_series
+from .tolerances import (
+    ALTERNATIVE,
+    CAPPED,
+    CHARTS,
+    ERRORS,
+    FORCE,
+    LARGEST_GAP,
+    LONGEST,
+    LOOSER,
+    LOOSEST,
+    ONCE,
+    OUTPUTS,
+    PYTHON,
+    QUICKER,
+    REJECTED,
+    SHORT,
+)
 from .units import duration
 
-# shares of the call from which on a part is worth a word
-CHARTS, OUTPUTS, PYTHON, FORCE, REJECTED, CAPPED = 0.03, 0.1, 0.3, 0.25, 0.2, 0.5
-QUICKER = 1.2  # times, from which on an alternative is
-ONCE = 3.0  # times the call, from which on a first call's own part is
-LOOSER, LOOSEST = 100.0, 1e-3  # times the tolerances; not looser than that
-LONGEST = 10.0  # s, of calls beside which nothing is tried
-SAMPLE, SHORT = 0.1, 20  # s of an alternative's calls; steps by which its whole time is guessed
 SHOWN = 3
-ERRORS, LARGEST_GAP = 100.0, 1e-2  # times the tolerances, and in all, that the ends of advised alternatives may differ
 
 
 class Alternative(NamedTuple):
@@ -206,7 +215,7 @@ def _attempt(run, options, limit, solution):
         if seconds * (end - start) > 5.0 * limit * (some.state.t - start):
             return None
         seconds, spent = np.inf, 0.0
-        while spent < SAMPLE:
+        while spent < ALTERNATIVE:
             began = time.perf_counter()
             found = run(**options)
             taken = time.perf_counter() - began

@@ -11,10 +11,9 @@ from ..rows.interface import DYNAMICS, factorise_selected_rows
 from ..taylor.workspace import load_series
 from ..workspaces.run_state import load_run
 from ..workspaces.workspace import load
+from .tolerances import BRIEF, ROUNDS
 
 SYSTEM, NORMAL, VELOCITIES, MASS = range(4)
-BRIEF = 2e-3  # s, of a sample
-ROUNDS = 5
 
 
 @kernel

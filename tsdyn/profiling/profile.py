@@ -26,12 +26,11 @@ from .micro_benchmarks import prices
 from .phases import Phase, of_series, of_steps, orders
 from .report import Profile
 from .timers import own_cost
+from .tolerances import FEWEST, LONG, MOST, RESOLUTION, SAMPLE
 
 if TYPE_CHECKING:
     from ..hints import Span
 
-SAMPLE, FEWEST, MOST = 1.0, 2, 40  # s of calls of each sort, and how many
-LONG = 5.0  # s, of calls that are made as few times as can be
 OUTPUTS = {"t_eval": "times of t_eval", "dense_output": "dense output", "events": "events"}
 
 
@@ -178,7 +177,9 @@ def _outputs(asked, least, chosen, solution):
     if not asked:
         return [Phase("outputs", "every step", solution.t.size, total)]
     more = (
-        {name: max(least[name] - least["plain"], 1e-9) for name in asked} if len(asked) > 1 else dict.fromkeys(asked, 1)
+        {name: max(least[name] - least["plain"], RESOLUTION) for name in asked}
+        if len(asked) > 1
+        else dict.fromkeys(asked, 1)
     )
     calls = {"t_eval": solution.t.size, "dense_output": solution.stats.steps, "events": solution.stats.steps}
     share = total / sum(more.values())

@@ -45,7 +45,7 @@ class Profile(Drawn):
     solution : Solution
     """
 
-    def __init__(
+    def __init__(  # called in one place
         self,
         scene: Scene,
         solution: Solution,

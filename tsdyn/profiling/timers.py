@@ -116,7 +116,7 @@ def _before(context):
     return integers(context - 8, 1)[0]
 
 
-# The templates; ROLE and COLUMN are filled in by `_timer`.
+# The templates; ROLE and COLUMN are filled in by `_timer`. Each has the arguments of the kernels that it stands for.
 ROLE = COLUMN = 0
 
 

@@ -2,7 +2,7 @@
 
 Imports ahead and below.
 
-Begin with simulate.py. scene_cache.py holds data shared by the runs of a scene, method_choice.py chooses the default
-method, singularity_crossing.py takes step methods across singular configurations, termination.py reports the end of
-a run.
+Begin with simulate.py, whose arguments options.py checks. scene_cache.py holds data shared by the runs of a scene,
+method_choice.py chooses the default method, singularity_crossing.py takes step methods across singular configurations,
+termination.py reports the end of a run.
 """

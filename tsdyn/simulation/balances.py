@@ -1,4 +1,4 @@
-"""Balances of a run: energies, powers and momenta, which a `Solution` has."""
+"""Balances of a run: energies, powers and momenta, mixed into `Solution`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Balances:
 
     @cached_property
     def potential_energy(self) -> Floats:
-        """Potential energy (k,), J, of gravity, zero at the ground's origin, and of springs; loads have none."""
+        """Potential energy (k,), J, of gravity (zero at the origin) and of springs; applied loads have none."""
         return diagnostics.potential_energy(self.system, self.q) + self._force_powers.potential
 
     @property
@@ -44,14 +44,14 @@ class Balances:
 
     @property
     def dissipation(self) -> Floats:
-        """Power (k,), W, that dampers and friction take; not negative."""
+        """Power (k,), W, dissipated by dampers and friction; not negative."""
         return self._force_powers.dissipation
 
     @cached_property
     def work(self) -> Floats:
-        """Work (k,), J, since the start: of applied and driving forces, less what dampers and friction have taken.
+        """Work (k,), J, since the start: of applied and driving forces, less dissipation.
 
-        energy - work is constant but for the method's error. It is integrated over the dense output.
+        energy - work is constant up to the integration error. The work is integrated over the dense output.
 
         Raises
         ------
@@ -61,15 +61,15 @@ class Balances:
         return self._integrated(None)
 
     def power_of(self, item: ItemLike) -> Floats:
-        """Power (k,), W, that one constraint or force, or that of a name, puts in: what dE/dt owes to it.
+        """Power (k,), W, supplied by one constraint or force (or its name): its share of dE/dt.
 
-        Of a motor or a driver: of its force or torque along the motion prescribed. Of a force: of its loads and
-        actuators, less what it dissipates; what a spring stores is energy, not power. Of any other constraint: zero.
+        Of a motor or a driver: the power of its force or torque along the prescribed motion. Of a force: the power of
+        its loads and actuators, less dissipation; stored energy of a spring doesn't count. Of other constraints: zero.
         """
         return power.power_of(self, self._part(item))
 
     def work_of(self, item: ItemLike) -> Floats:
-        """Work (k,), J, since the start, of `power_of` one constraint or force: the energy that a motor has put in.
+        """Work (k,), J, since the start, of one constraint or force: the integral of `power_of`.
 
         Raises
         ------

@@ -5,15 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 
 from ..observables import diagnostics, power
+from .tolerances import NO_POWER
 
-MOST_OUTPUTS = 200  # that are looked at
-ZERO = 1e-9  # of the largest kinetic energy a second: more power than this isn't rounding
+MOST_OUTPUTS = 200  # examined
 
 
 def energy_error(solution, task):
-    """Largest change of the energy since the start, of the largest kinetic energy; None where it isn't constant.
+    """Return the largest change of energy since the start over the largest kinetic energy; None if it isn't conserved.
 
-    Outputs and the point reached are looked at.
+    Outputs and the last state are compared.
     """
     system, packed = solution.system, solution.packed
     if system.rheonomic[0] or system.normals.size:
@@ -30,7 +30,9 @@ def energy_error(solution, task):
     forces = power.force_powers(SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=packed))
     kinetic = diagnostics.kinetic_energy(system, q, qd)
     largest = kinetic.max()
-    if not (largest > 0.0 and max(np.abs(forces.applied).max(), np.abs(forces.dissipation).max()) <= ZERO * largest):
+    if not (
+        largest > 0.0 and max(np.abs(forces.applied).max(), np.abs(forces.dissipation).max()) <= NO_POWER * largest
+    ):
         return None
     energy = kinetic + diagnostics.potential_energy(system, q) + forces.potential
     return float(np.abs(energy - energy[0]).max() / largest)

@@ -20,22 +20,22 @@ WHAT = "body, constraint or force"  # has a name
 
 
 def remove(scene: Scene, item: Any) -> Any:
-    """Take a body, constraint, joint or force out of the scene; solutions made before go on to serve.
+    """Remove a body, constraint, joint or force from the scene; earlier solutions remain valid.
 
     Parameters
     ----------
     item : Body, constraint, joint, force or str
-        A handle, or a name that only one of them has.
+        A handle, or a unique name.
 
     Returns
     -------
     Body, constraint, joint or force
-        What has been removed. A constraint or force may be added again, a body may not.
+        The removed item. A constraint or force may be added again, a body may not.
 
     Raises
     ------
     InvalidArgument
-        If the scene has no such thing, the name is that of several, or a constraint or force refers to it.
+        If the scene has no such item, the name is ambiguous, or a constraint or force refers to the item.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def remove(scene: Scene, item: Any) -> Any:
     return item
 
 
-REMOVED = -1  # index of a body that its scene has no more
+REMOVED = -1  # index of a removed body
 
 
 def demand_present(item, bodies):
@@ -80,7 +80,7 @@ def demand_present(item, bodies):
 
 
 def found(scene, item):
-    """The handle itself, or the one thing that has this name."""
+    """Return the item of a handle or a unique name."""
     present = [*scene._bodies, *scene._added, *scene._forces]
     if isinstance(item, str):
         item = named([*present, *scene._normalisations.values()], item, WHAT)
@@ -89,11 +89,11 @@ def found(scene, item):
     if isinstance(item, Ground):
         raise InvalidArgument("the ground can't be removed.")
     if any(item is own for own in scene._normalisations.values()):
-        raise InvalidArgument(f"{item.name} belongs to its body and goes with it; remove the body.")
+        raise InvalidArgument(f"{item.name} belongs to its body; remove the body.")
     owner = getattr(item, "owner", None)
     if owner is not None:
         raise InvalidArgument(f"{item.name} is a part of {owner.title}; remove that instead.")
-    raise InvalidArgument(f"the scene has nothing like {item!r}: give a body, constraint or force of it, or a name.")
+    raise InvalidArgument(f"the scene has no {item!r}: give a body, constraint or force of the scene, or its name.")
 
 
 def _users(scene, item):
@@ -106,12 +106,12 @@ def _users(scene, item):
 
 
 def copy(scene: Scene) -> Scene:
-    """An independent scene with handles of its own: `copy[handle]` is that of a handle of this one.
+    """Return an independent scene with handles of its own; `copy[handle]` is the counterpart of a handle of this scene.
 
     Returns
     -------
     Scene
-        With the same names, numbers and functions; objects that are asked as controllers are copied, too.
+        With the same names, numbers and functions; controller objects are copied, too.
 
     Examples
     --------
@@ -135,7 +135,7 @@ def copy(scene: Scene) -> Scene:
 
 
 def _freeze(given, copied):
-    """Arrays that are read-only in one dictionary are in the other: a change would not reach the packed numbers."""
+    """Make arrays read-only where the originals are: changes in place would not reach the packed numbers."""
     for name, value in given.items():
         pairs = zip(value, copied[name], strict=True) if isinstance(value, tuple) else ((value, copied[name]),)
         for one, other in pairs:

@@ -17,12 +17,11 @@ from ..model.derived import Derived
 from ..model.packed import classes
 from ..runs.events import Instant
 from .scene_cache import Prepared
-
-FAR = 100.0  # sizes of a scene: its distance from the origin above which it has one of its own
+from .tolerances import FAR_ORIGIN
 
 
 def origin_of(packed, q):
-    """The origin (3,) for a run from positions q (n,), or None for that of the scene."""
+    """Return the local origin (3,) for a run from positions q (n,); None for the origin of the scene."""
     of, origin = packed.derived.origin
     if of is not q:
         origin = _origin(packed, q)
@@ -34,19 +33,19 @@ def _origin(packed, q):
     if packed.derived.grounded is None:
         packed.derived.grounded = _points(packed)
     grounded, longest = packed.derived.grounded
-    if np.maximum.reduce(np.abs(q)) <= FAR * longest:
+    if np.maximum.reduce(np.abs(q)) <= FAR_ORIGIN * longest:
         return None
     places = np.concatenate((q[packed.system.bodies[:, :1] + np.arange(3)], grounded))
     low, high = places.min(axis=0), places.max(axis=0)
     size, centre = max(float((high - low).max()), longest), 0.5 * (low + high)
-    if not (size > 0.0 and np.abs(centre).max() > FAR * size and _sees_differences(packed)):
+    if not (size > 0.0 and np.abs(centre).max() > FAR_ORIGIN * size and _sees_differences(packed)):
         return None
     step = 2.0 ** np.floor(np.log2(size))
     return np.round(centre / step) * step
 
 
 def _points(packed):
-    """The corners (2, 3) of a box with the points of the ground that items are on, and the longest lever on a body."""
+    """Return the corners (2, 3) of a box around all ground points of items, and the longest lever on a body."""
     grounded, longest = [], 0.0
     pairs = [*zip(packed.constraints, packed.coordinates, strict=True)]
     pairs += [(load.force, load.coordinates) for load in packed.loads]
@@ -61,7 +60,7 @@ def _points(packed):
 
 
 def _sees_differences(packed):
-    """Return True if there are constraints or forces, and none that may depend on positions as they are."""
+    """Return True if there are constraints or forces, and none that may depend on absolute positions."""
     items = [*packed.constraints, *(load.force for load in packed.loads)]
     joined = packed.loads or not all(constraint.normalises for constraint in packed.constraints)
     own = joined and all(is_ours(type(item).__module__) for item in items)
@@ -69,7 +68,7 @@ def _sees_differences(packed):
 
 
 def run_near(driver, task, scene, origin, tol):
-    """The `Outcome` of a task whose positions are taken from an origin; tol as of `Prepared.start`."""
+    """Return the `Outcome` of a task run relative to a local origin; tol as for `Prepared.start`."""
     packed = task.prepared.packed
     local, shift = _local(task.prepared, scene, origin), np.zeros(task.q.size)
     shift[packed.system.bodies[:, :1] + np.arange(3)] = origin
@@ -102,7 +101,7 @@ def run_near(driver, task, scene, origin, tol):
 
 
 def _local(prepared, scene, origin):
-    """The `Prepared` of the scene with that origin; kept for the next run."""
+    """Return the `Prepared` of the scene relative to that origin; kept for the next run."""
     kept = prepared.packed.derived.local
     if kept is None or (kept[0] != origin).any():
         kept = prepared.packed.derived.local = origin, Prepared(scene, _moved(prepared.packed, origin))
@@ -142,7 +141,7 @@ def _moved(packed, origin):
 
 
 def _away(function, packed, shift):
-    """A user's event function that is given positions as they are in the scene."""
+    """Return an event function that receives positions in the scene's coordinates."""
 
     def moved(t, instant):
         begin, state, angles = instant._beside
@@ -164,7 +163,7 @@ class _Moved:
         return getattr(self.trajectory, name)
 
     def __call__(self, t):
-        """As of a `Trajectory`."""
+        """Evaluate as a `Trajectory` does."""
         states, memory, status = self.trajectory(t)
         states[:, 0] += self.shift
         return states, memory, status

@@ -7,16 +7,16 @@ import numpy as np
 from ..observables.friction_reactions import with_normal_loads
 from ..observables.power import driving_power, force_powers, power_of
 from ..observables.reactions import multipliers
+from .tolerances import AGREE, DEEPEST
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
-AT_ONCE = 2000  # pieces of the interval
-AGREE, DEEPEST = 1e-11, 8  # of a piece's two halves with the whole; how often it is cut
+AT_ONCE = 2000  # pieces of the interval, evaluated in one call
 
 
 def work(solution, trajectory, item=None):
-    """Work (k,), J, since the start: of applied and driving forces, less what dampers and friction have taken.
+    """Work (k,), J, since the start: of applied and driving forces, less dissipation.
 
-    item restricts it to one constraint or force, as of `power.power_of`.
+    item restricts it to one constraint or force, as in `power.power_of`.
     """
     edges = np.unique(np.concatenate([[trajectory.start], trajectory.edges, solution.t]))
     pieces = np.zeros(0)
@@ -27,7 +27,7 @@ def work(solution, trajectory, item=None):
 
 
 def _integrals(solution, trajectory, item, a, b, depth):
-    """The work from each a to its b; what is driven may swing often in a step, so pieces are cut until halves agree."""
+    """Return the work from each a to its b, by bisection until halves agree: drives may oscillate within a step."""
     done, size = _quadrature(solution, trajectory, item, a, b)
     if not solution.system.rheonomic[0] or depth == DEEPEST or not a.size:
         return done

@@ -1,8 +1,8 @@
 """Choice of the default method: Taylor; DOP853 where a part of the scene has no series; SDIRK54 where it is stiff.
 
-The two explicit methods monitor stiffness: DOP853 by its stability limit, Taylor by a count of steps in which nothing
-moves far. When stiffness is detected, a pilot run of SDIRK54 continues from there, and the numbers of evaluations per
-second of motion decide.
+The two explicit methods monitor stiffness: DOP853 by its stability limit, Taylor by the number of steps in which the
+motion is negligible. When stiffness is detected, a pilot run of SDIRK54 continues from that state, and the numbers of
+evaluations per second of simulated time are compared.
 """
 
 from types import SimpleNamespace
@@ -12,16 +12,11 @@ import numpy as np
 from ..errors import Status, TsdynError
 from ..integrators import DOP853, SDIRK54, Taylor
 from ..runs.arguments import tolerances
-
-PILOT = 60  # steps
-COST = 1.5  # of an evaluation in an implicit stage, its share of matrices included, against an explicit one
-
-
-LARGEST_PILOT = 700  # coordinates: above that implicit methods, whose matrices are dense, cost more than they save
+from .tolerances import COST, LARGEST_PILOT, PILOT
 
 
 def explicit(prepared, rtol, atol, series):
-    """The method that a run begins with; series: whether Taylor may be it."""
+    """Return the initial method; series: True if Taylor is admissible."""
     given, known = (rtol, atol, series), prepared.explicit
     if not all(value is None or type(value) is float for value in given[:2]) or given not in known:
         kind = Taylor if series and not prepared.refusal else DOP853
@@ -31,12 +26,12 @@ def explicit(prepared, rtol, atol, series):
 
 
 def implicit(method):
-    """The method that takes over, to the same tolerances."""
+    """Return the implicit method of the same tolerances."""
     return SDIRK54(method.rtol, method.atol)
 
 
 def chooser(simulate, scene, method, end, options):
-    """Make the function that the driver asks when the motion of a run is found stiff: whether to change."""
+    """Return the function that decides, when the motion is found stiff, whether to change to an implicit method."""
 
     def choose(run):
         if run.now.shape[1] > LARGEST_PILOT:

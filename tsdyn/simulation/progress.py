@@ -6,7 +6,7 @@ from ..errors import InvalidArgument, MissingDependency
 
 
 def reporter(progress):
-    """Return a function that is given the fraction done, and None at the end."""
+    """Return a function that receives the fraction done, and None at the end."""
     if progress is None or progress is False:
         return lambda fraction: None
     if callable(progress):

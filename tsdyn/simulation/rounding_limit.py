@@ -6,28 +6,28 @@ import numpy as np
 
 from ..formulations.tolerances import ROUNDING
 from ..sparse.massless_axes import levers
+from .tolerances import FAR_LEVER
 
-NOISE = 4.0 * ROUNDING  # of a position, over the lever: what a placement leaves of a direction
-FAR = 1e4  # levers: below that no tolerance is touched
+NOISE = 4.0 * ROUNDING  # direction error of a placement: rounding of a position over the lever
 
 
 def within_rounding(method, packed, q):
-    """A method whose steps look for no smaller errors than there are digits for, and a sentence if it is another.
+    """Return the method with attainable tolerances, and a sentence if they were raised.
 
-    Series know by themselves what a landing leaves.
+    The Taylor method accounts for the rounding of its projection itself.
     """
     if method.step is not None or method.driver != "steps":
         return method, ""
     if packed.derived.levers is None:
         packed.derived.levers = levers(packed)
     arms = packed.derived.levers
-    if np.abs(q).max() < FAR * arms.min(where=arms > 0.0, initial=np.inf):
+    if np.abs(q).max() < FAR_LEVER * arms.min(where=arms > 0.0, initial=np.inf):
         return method, ""
     far = np.abs(q[packed.system.bodies[:, :1] + np.arange(3)]).max(axis=1)
     ratios = np.where(arms > 0.0, far / np.where(arms > 0.0, arms, 1.0), 0.0)
     worst = int(np.argmax(ratios))
     noise = NOISE * ratios[worst]
-    if ratios[worst] < FAR or min(method.step_tolerances()) >= noise:
+    if ratios[worst] < FAR_LEVER or min(method.step_tolerances()) >= noise:
         return method, ""
     other = copy.copy(method)
     for i, name in enumerate(("rtol", "atol")):

@@ -61,7 +61,7 @@ class Scene:
 
     Examples
     --------
-    A pendulum has two degrees of freedom, since its rod may point anywhere:
+    A spherical pendulum has two degrees of freedom:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, -10))
@@ -80,14 +80,14 @@ class Scene:
         self.ground = Ground(self)
         self._bodies, self._added, self._forces, self._normalisations = [], [], [], {}
         self._waiting, self._titles = {}, None  # see membership.py
-        self._names = None  # of ground and bodies; None where one may have been renamed
+        self._names = None  # of ground and bodies; None if a body may have been renamed
         self._twins = None  # handle of the scene that this one is a copy of -> handle here
         self.gravity = gravity
 
     ground: AnyBody
 
     def __setattr__(self, name: str, value: Never) -> None:
-        """Set an attribute that there is; a misspelt one is refused."""
+        """Set an existing attribute; refuse a misspelt one."""
         demand_known(self, name, ("ground",))
         super().__setattr__(name, value)
 
@@ -216,11 +216,11 @@ class Scene:
         Raises
         ------
         InvalidConstraint, InvalidForce
-            If it is neither, belongs to another scene, or has been added before.
+            If the item is neither, belongs to another scene, or was added before.
 
         Examples
         --------
-        Names stand for handles:
+        A name serves instead of a handle:
 
         >>> import tsdyn as ts
         >>> scene = ts.Scene(gravity=(0, 0, -10))
@@ -256,24 +256,24 @@ class Scene:
         return item
 
     def refresh(self) -> None:
-        """Compile those functions of a user's again of which a global has changed since the scene was packed."""
+        """Recompile user functions whose globals have changed since the scene was packed."""
         if self._packed is not None and self._users and _marks(self._users) != self._functions:
             for owner, _ in self._users:
                 owner.forget()
             self.touch()
 
     def __getstate__(self):
-        """What is packed holds addresses of this process, so it stays here."""
+        """Leave out the packed scene, which holds addresses of this process."""
         gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins"))
         return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
 
     def touch(self) -> None:
-        """Forget the packed numbers: something has changed."""
+        """Discard the packed numbers after a change."""
         self._packed = self._start = self._prepared = None
 
     @property
     def packed(self) -> Packed:
-        """Bodies, constraints and their numbers as they are now, a `Packed`; made again after a change only."""
+        """The scene as a `Packed`; packed anew only after a change."""
         if not self._bodies:
             raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
         if self._packed is None:
@@ -284,17 +284,17 @@ class Scene:
 
     @property
     def system(self) -> System:
-        """What the kernels see, a `System`."""
+        """The arrays that kernels read, a `System`."""
         return self.packed.system
 
     def motions(self) -> list[Any]:
-        """The functions of time and tables that constraints and forces are given."""
+        """The functions of time and tables of constraints and forces."""
         given = [*self.packed.parameters, *(load.parameters for load in self.packed.loads)]
         return [value for values in given for value in values if isinstance(value, (Motion, Signal))]
 
     @property
     def start(self) -> tuple[Floats, Floats]:
-        """(q, qd) that the bodies say, shapes (n,), (n,)."""
+        """Initial (q, qd) of the bodies, shapes (n,), (n,)."""
         if self._start is None:
             self._start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
         return tuple(array.copy() for array in self._start)
@@ -307,7 +307,7 @@ class Scene:
         raise InvalidBody(f"no body is named {name!r}; there are {', '.join(b.name for b in self._bodies) or 'none'}.")
 
     def __getitem__(self, item: Any) -> Any:
-        """The body, constraint or force of this name; in a copy also that of a handle of the scene it was made of."""
+        """The body, constraint or force of a name, or, in a copy, the counterpart of a handle of the original."""
         if isinstance(item, str):
             return named([self.ground, *self._bodies, *self.constraints, *self._forces], item, WHAT)
         known = isinstance(item, (PointMass, Ground, Primitive, Joint, Force))
@@ -315,7 +315,7 @@ class Scene:
         return found(self, item) if twin is None else twin
 
     def row_names(self) -> list[str]:
-        """Name the rows of Phi, in order: a constraint's title, with the row's label where it has several."""
+        """Return the names of the rows of Phi, in order: title of the constraint, and label of the row."""
         names, seen = [], Counter()
         for constraint in self.constraints:
             title = constraint.title
@@ -325,7 +325,7 @@ class Scene:
         return names
 
     def place(self, q: Floats, qd: Floats) -> None:
-        """Write coordinates q (n,) and velocities qd (n,) into the bodies as their values at the start."""
+        """Make q (n,) and qd (n,) the initial values of the bodies."""
         at = 0
         for body in self._bodies:
             span = slice(at, at := at + body.dimension)
@@ -350,5 +350,5 @@ class Scene:
 
 
 def _marks(users):
-    """What the compiled forms of the users' functions depend on."""
+    """Return the dependences of compiled user functions."""
     return [deep_hash(function) for _, functions in users for function in functions]

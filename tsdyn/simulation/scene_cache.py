@@ -14,13 +14,13 @@ from ..observables.friction_unique import demand_unique
 from ..taylor.layout import refusal
 from ..taylor.run_memory import Series
 
-SPARE = 8  # memories of a kind that are kept for further runs: as many may run at once without making new ones
-KINDS = 8  # of memory, and of shapes of a scene, before all are dropped
-LARGEST = 1 << 24  # bytes of a memory that is kept
+SPARE = 8  # idle memories of a kind that are kept: as many runs at once allocate nothing
+KINDS = 8  # kinds of memory, and shapes of a scene, at most
+LARGEST = 1 << 24  # bytes of a memory that is kept, at most
 
 
 def prepared(scene):
-    """The `Prepared` of a scene as it is now."""
+    """Return the `Prepared` of the present scene."""
     scene.refresh()
     packed, kept = scene.packed, scene._prepared
     if kept is None or kept.packed is not packed:
@@ -29,9 +29,9 @@ def prepared(scene):
 
 
 class Prepared:
-    """A packed scene and the start that was last found consistent; and the memory of runs that have ended.
+    """A packed scene, its last consistent start, and the memory of finished runs.
 
-    That memory is the scene's own: one whose numbers have changed, and nothing else, uses it again.
+    The memory belongs to the scene; after a change of numbers alone it is used again.
     """
 
     def __init__(self, scene, packed):
@@ -46,36 +46,36 @@ class Prepared:
 
     @cached_property
     def implicit(self):
-        """The system with what implicit methods need, and how many floats they keep for forces."""
+        """The system with the arrays of implicit methods, and their number of floats for forces."""
         return with_force_jacobians(self.packed._replace(system=with_curvatures(self.packed)))
 
     @cached_property
     def spheres(self):
-        """How many rigid bodies have no gyroscopic torque, whatever they do."""
+        """Number of rigid bodies with spherical inertia, which have no gyroscopic torque."""
         J = self.packed.system.inertia[self.packed.system.bodies[:, 1] == 7].reshape(-1, 3, 3)
         return int((J[:, :1, :1] * np.eye(3) == J).all(axis=(1, 2)).sum())
 
     @property
     def still(self):
-        """How many rigid bodies never turn."""
+        """Number of rigid bodies with locked orientation."""
         return len(still(self.packed).bodies)
 
     @cached_property
     def refusal(self):
-        """Why Taylor series can't run the scene; empty where they can."""
+        """The reason why the scene has no Taylor series; empty if it has."""
         return refusal(self.packed)
 
     @cached_property
     def series(self):
-        """What Taylor runs share, a `Series`."""
+        """Data shared by Taylor runs, a `Series`."""
         return Series(self.packed, self.refusal)
 
     def system(self, implicit):
-        """The system for a method, and how many floats it keeps for forces."""
+        """Return the system for a method, and its number of floats for forces."""
         return self.implicit if implicit else (self.packed.system, 0)
 
     def start(self, scene, q, qd, t, tol, remembered, redundant_allowed):
-        """(q, qd) checked against the constraints and freed of rounding; looked at once for the same numbers."""
+        """Return (q, qd) checked and projected; the same numbers are checked once."""
         given = q.tobytes(), qd.tobytes(), t, tol, remembered.tobytes(), redundant_allowed
         known, start = self._start
         if known != given:
@@ -86,7 +86,7 @@ class Prepared:
                 system.reals[system.memory] = remembered[self.handles.count :]
             start = consistent(scene, system, q, qd, t, tol, redundant_allowed)
             if self.packed.derived.redundant is not redundant or still(self.packed) is not before:
-                self.__dict__.pop("series", None)  # the rows that are left out belong to a network
+                self.__dict__.pop("series", None)  # its graph has other redundant rows
                 self._spare.clear()
             demand_aligned(self.packed, start[0], t)
             demand_unique(self.packed, start[0], t)
@@ -95,14 +95,14 @@ class Prepared:
         return start
 
     def take(self, kind, make):
-        """A memory of some kind, for one run: one that is spare, or make()."""
+        """Return a memory of a kind for one run: an idle one, or make()."""
         try:
             return self._spare[kind].pop()
         except (KeyError, IndexError):
             return make()
 
     def give(self, kind, memory):
-        """Take back a memory that nothing refers to any more."""
+        """Take back a memory that is no longer in use."""
         if memory.nbytes > LARGEST:
             return
         if len(self._spare) >= KINDS:

@@ -6,27 +6,21 @@ import time
 from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..ahead.first_run import prepare_first_run
 from ..calls import fitting
 from ..configuration.holonomic import demand_holonomic
 from ..elements.membership import warn_of_waiting
 from ..errors import InvalidArgument, Status
-from ..formulations.registry import formulation as find_formulation
-from ..methods.integrator import registered
 from ..motions.knots import stops_of
 from ..observables.state import remembered
-from ..runs.arguments import interval, method_of, output_times, state_arrays
-from ..runs.events import prepare
+from ..runs.arguments import state_arrays
 from ..runs.run import run
 from ..runs.sampling import Sampling, instants_of, sampled
-from ..runs.task import Task, between
+from ..runs.task import Task
 from ..taylor.series_engine import SeriesEngine
-from ..validation import one_of, positive, whole
 from . import method_choice
 from .local_origin import origin_of, run_near
-from .progress import reporter
+from .options import checked
 from .rounding_limit import within_rounding
 from .scene import Scene
 from .scene_cache import prepared
@@ -42,7 +36,7 @@ DRIVERS = {"steps": run_past, "series": partial(run, engine=SeriesEngine)}  # by
 
 
 @fitting
-def simulate(
+def simulate(  # many arguments, by name: each is an option of a run
     scene: Scene,
     t_span: Span,
     *,
@@ -69,11 +63,11 @@ def simulate(
     ----------
     scene : Scene
     t_span : (float, float), s
-        Start and end, the end later.
+        Start and end, start < end.
     integrator : Integrator or str, optional
-        A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor;
-        DOP853 where a part of the scene has no series; SDIRK54, from the start, where the motion is found stiff and
-        SDIRK54 needs fewer evaluations.
+        A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor; DOP853 if a part of the
+        scene has no series; SDIRK54, restarted from t_span[0], if the motion is found stiff and SDIRK54 needs fewer
+        evaluations.
     rtol, atol : float, optional
         Tolerances of the default method, or of an adaptive method given by name; default 1e-8. An instance has its own
         tolerances; rtol or atol beside an instance is refused.
@@ -106,8 +100,7 @@ def simulate(
     max_step : float, s, optional
         Longest step, for every method; a longer fixed step is reduced to it.
     history : bool
-        Keep `solution.steps` and `solution.charts`: 8 bytes a step, 16 to 40 more for each step rejected and each
-        chart.
+        Keep `solution.steps` and `solution.charts`: 8 bytes per step, 16 to 40 more per rejected step and chart.
     progress : bool or callable, optional
         True shows a bar (needs tqdm); a callable receives the fraction done, 0 to 1.
     chart_interval : int, optional
@@ -141,84 +134,54 @@ def simulate(
     >>> bool(solution.constraint_error.position.max() < 1e-12)
     True
     """
+    given = {**locals()}
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     warn_of_waiting(scene, 3)
-    span = interval(t_span)
-    form = find_formulation(formulation)
-    chart_interval = whole(chart_interval, "chart_interval")
-    method = None if integrator is None else method_of(integrator, rtol, atol)
-    if method is not None and method.implicit and form.first_order:
-        others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
-        raise InvalidArgument(
-            f"{type(method).__name__} solves its stages in the tangent-space form only; formulation={form.name!r} is "
-            f"served by {others}."
-        )
-    longest = None if max_step is None else positive(max_step, "max_step (s)")
-    constraint_tol = positive(constraint_tol, "constraint_tol")
-    initial_tol = positive(initial_tol, "initial_tol")
-    one_of(redundancy, ("drop", "refuse"), "redundancy")
-    for name, value in (("dense_output", dense_output), ("history", history)):
-        if not isinstance(value, (bool, np.bool_)):
-            raise InvalidArgument(f"{name} must be True or False, got {value!r}.")
-    watched = prepare(events)
-    times = output_times(t_eval, *span)
-    max_steps = whole(max_steps, "max_steps")
-    default = rtol, atol, form.name == "tangent" and chart_interval is None
-    within = bool(dense_output) or watched is not None or between(times, span)
-    prepare_first_run(scene, method, form, within, default)
+    options = checked(given)
+    prepare_first_run(scene, options.method, options.form, options.within, options.default)
     kept = prepared(scene)
-    if method is None:
-        method = method_choice.explicit(kept, *default)
-    if longest is not None:
-        method = method.bounded(longest)
-    report = reporter(progress)
+    method = options.method or method_choice.explicit(kept, *options.default)
+    if options.max_step is not None:
+        method = method.bounded(options.max_step)
 
     started = time.perf_counter()
+    task = _request(scene, kept, method, options, state)
+    if integrator is None and task.sampling is None:  # a sampled controller can't be rerun
+        same = {name: given[name] for name in ("constraint_tol", "initial_tol", "max_step")}
+        task = task._replace(choose=method_choice.chooser(simulate, scene, method, task.span[1], same))
+    outcome = _run(task, scene, options.initial_tol)
+    ended = time.perf_counter()
+    if outcome.status == Status.STIFF:
+        return simulate(**{**given, "integrator": method_choice.implicit(method), "rtol": None, "atol": None})
+    return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
+
+
+def _request(scene, kept, method, options, state):
+    """Return the run request, with a start that is consistent with the constraints."""
+    span, form = options.span, options.form
     for motion in kept.motions:
         motion.check(*span)
     q, qd = scene.start if state is None else state_arrays(state, kept.n)
     memory = remembered(state, kept, span[0], q)
-    q, qd = kept.start(scene, q, qd, span[0], initial_tol, memory, redundancy == "drop")
+    q, qd = kept.start(scene, q, qd, span[0], options.initial_tol, memory, options.drop)
     if not form.serving(method).basis_free:
         demand_holonomic(kept.packed, q, span[0], form.name)
+    asked = {name: value for name, value in options._asdict().items() if name in Task._fields}
     stops = stops_of(kept.motions, instants_of(kept.packed, *span), *span)
     sampling = Sampling(kept, state is not None) if sampled(kept.packed) else None
-    choose = None
-    if integrator is None and sampling is None:  # what is asked in Python is asked once
-        options = {"constraint_tol": constraint_tol, "initial_tol": initial_tol, "max_step": max_step}
-        choose = method_choice.chooser(simulate, scene, method, span[1], options)
-    task = Task(
-        kept, method, form, span, q, qd, memory, times, bool(dense_output),
-        watched, constraint_tol, max_steps, chart_interval or 0, report, bool(history), choose, stops, sampling,
-    )  # fmt: skip
-    driver, origin, said = DRIVERS.get(method.driver, method.driver), origin_of(kept.packed, q), ""
-    if origin is None:
-        limited, said = within_rounding(method, kept.packed, q)
-        outcome = driver(task if limited is method else task._replace(method=limited))
-    else:
-        outcome = run_near(driver, task, scene, origin, initial_tol)
-    ended = time.perf_counter()
-    if outcome.status == Status.STIFF:
-        return simulate(
-            scene,
-            t_span,
-            integrator=method_choice.implicit(method),
-            formulation=formulation,
-            constraint_tol=constraint_tol,
-            initial_tol=initial_tol,
-            redundancy=redundancy,
-            t_eval=t_eval,
-            dense_output=dense_output,
-            events=events,
-            max_steps=max_steps,
-            max_step=max_step,
-            history=history,
-            progress=progress,
-            chart_interval=chart_interval,
-            state=state,
-        )
-    if said:
+    made = {"prepared": kept, "method": method, "q": q, "qd": qd, "remembered": memory, "choose": None}
+    return Task(**{**asked, **made}, interval=options.chart_interval or 0, stops=stops, sampling=sampling)
+
+
+def _run(task, scene, initial_tol):
+    """Run the method's driver, relative to a local origin if the scene is far from its own."""
+    driver, packed = DRIVERS.get(task.method.driver, task.method.driver), task.prepared.packed
+    origin = origin_of(packed, task.q)
+    if origin is not None:
+        return run_near(driver, task, scene, origin, initial_tol)
+    limited, said = within_rounding(task.method, packed, task.q)
+    outcome = driver(task if limited is task.method else task._replace(method=limited))
+    if outcome.status != Status.STIFF and said:
         outcome = outcome._replace(reason=" ".join(part for part in (outcome.reason, said) if part))
-    seconds = {"prepare": outcome.began - started, "run": ended - outcome.began}
-    return Solution(scene, task, outcome, seconds)
+    return outcome

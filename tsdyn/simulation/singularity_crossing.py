@@ -19,10 +19,7 @@ from ..runs.segments import Relay
 from ..runs.step_engine import StepEngine
 from ..runs.trajectory import Pieces
 from ..taylor.series_engine import SeriesEngine
-
-REGULAR = 0.02  # of the largest share of the weakest row: as much is regular again, as it is for Taylor
-FINEST = 1e-10  # tolerance of the series, if the method has none that is less
-NO_STEP = 1e-6  # of a fixed step: a time of the grid that is nearer has been reached
+from .tolerances import FINEST, NO_STEP, REGULAR
 
 
 def run_past(task, observe=None):
@@ -38,12 +35,12 @@ def run_past(task, observe=None):
 
 
 def _until_its_end(report):
-    """A report that is not told of the end: others may go on."""
+    """Return a progress report without the end: further segments may follow."""
     return lambda fraction: None if fraction is None else report(fraction)
 
 
 def _go_on(task, relay, first):
-    """The whole run, of which the first part has ended next to a singular configuration."""
+    """Complete a run whose first segment has ended near a singular configuration."""
     parts = [first]
     try:
         while parts[-1].status == Status.PASSAGE:
@@ -57,7 +54,7 @@ def _go_on(task, relay, first):
                     part = run(rest, SeriesEngine, relay=relay, past=lambda memory: Carrier(memory, task, relay.share))
                 else:
                     part = run(rest, StepEngine, relay=relay)
-            except TsdynError as error:  # what has been computed is worth more
+            except TsdynError as error:  # the partial result is returned
                 parts[-1] = parts[-1]._replace(status=Status.SINGULAR, reason=str(error))
                 break
             parts.append(part)
@@ -76,7 +73,7 @@ def _go_on(task, relay, first):
 
 
 def _said(parts):
-    """How often series have carried the motion, and from where at first."""
+    """Say how often the Taylor series took over, and when first."""
     way = zip(parts[::2], parts[1::2], strict=False)
     passed = [before.reached for before, series in way if series.status in (Status.PASSAGE, Status.SUCCESS)]
     if not passed:
@@ -86,16 +83,16 @@ def _said(parts):
 
 
 def _new_rows(task, part, i):
-    """Those rows of part i that the part before doesn't end with."""
+    """Return the output rows of segment i that the segment before doesn't end with."""
     return part.rows[1:] if i and task.times.size == 0 else part.rows
 
 
 def _rest(task, parts, series):
-    """The task that is left, for series or for the method itself."""
+    """Return the remaining task, for the Taylor method or the method itself."""
     last, times, left = parts[-1], task.times, task.max_steps
     if times.size:
         times = times[sum(len(part.rows) for part in parts) :]
-        times = times if times.size else np.array([np.inf])  # none would be every step
+        times = times if times.size else np.array([np.inf])  # an empty array would ask for every step
     if left is not None:
         left = max(left - sum(part.counts["steps"] for part in parts), 0)
     (start, end), reached = task.span, last.reached
@@ -116,13 +113,13 @@ def _rest(task, parts, series):
 
 
 def _summed(counts):
-    """Counts of the whole run."""
+    """Return the counts of the whole run."""
     ways = {"stiff": any, "largest_landing": max}
     return {name: ways.get(name, sum)(each[name] for each in counts) for name in counts[0]}
 
 
 class Carrier:
-    """The memory of a run by series that is advanced until the configuration is regular again.
+    """The memory of a Taylor run that is advanced until the configuration is regular again.
 
     Parameters
     ----------
@@ -130,7 +127,7 @@ class Carrier:
     task : Task
         The whole run's.
     share : float
-        That the weakest row had at the start: it is to have more, so that the method can go on.
+        Pivot share of the weakest row at the start; the method resumes when it has grown.
     """
 
     def __init__(self, memory, task, share):
@@ -138,10 +135,10 @@ class Carrier:
         self.run, self.weight, self.context = memory.run, memory.weight, memory.context
         self.origin, self.end = task.span
         self.step = task.method.step
-        self.grid = math.nan  # the time of the grid that is made for
+        self.grid = math.nan  # the grid time that is aimed at
 
     def advance(self, log, most):
-        """As `Memory.advance`; Status.PASSAGE where the configuration is regular again."""
+        """Advance as `Memory` does; Status.PASSAGE when the configuration is regular again."""
         if most <= 0:
             return self.memory.advance(log, most)
         numbers, clock = self.run.numbers, self.run.clock
@@ -162,7 +159,7 @@ class Carrier:
 
     @property
     def reason(self):
-        """What there is to say of how the run ended."""
+        """A sentence on the end of the run."""
         return self.memory.reason
 
     def _is_regular(self):
@@ -170,6 +167,6 @@ class Carrier:
         return indicator.start >= max(REGULAR * indicator.largest, self.share)
 
     def _next(self):
-        """The first time of the grid after the present one."""
+        """Return the next time of the grid."""
         done = (self.run.clock.t - self.origin) / self.step
         return min(self.origin + math.ceil(done + NO_STEP) * self.step, self.end)

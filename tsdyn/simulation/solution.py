@@ -35,7 +35,7 @@ class Steps(NamedTuple):
 
 
 class Charts(NamedTuple):
-    """Every chart: its time, s, the reason for it, and at its end condition, contraction and number of steps."""
+    """Every chart: its time, s, its reason, and condition, contraction and number of steps at its end."""
 
     t: Floats
     reason: tuple[str, ...]
@@ -55,7 +55,7 @@ class Solution(Balances, Kinematics["Floats"]):
         7 coordinates a rigid body (r, then p) and 3 a point mass, in the order added.
     multipliers : ndarray (k, m)
         M qdd + Phi_q^T lam = Q_A + Q_v; rows in the order added, then the normalisations in body order. NaN for rows
-        that were left out as redundant, see `reaction_unique`.
+        that were dropped as redundant, see `reaction_unique`.
     success : bool
         Whether the run reached the end of the interval, or a terminal event.
     status : Status
@@ -91,7 +91,7 @@ class Solution(Balances, Kinematics["Floats"]):
     message: str
     stats: SimpleNamespace
     t: Floats
-    t_events: list[Floats] | Any  # None where no events were asked for
+    t_events: list[Floats] | Any  # None without events
     q_events: list[Floats] | Any
     qd_events: list[Floats] | Any
 
@@ -113,10 +113,10 @@ class Solution(Balances, Kinematics["Floats"]):
         self.stats = SimpleNamespace(**outcome.counts, seconds=seconds, energy_error=None)
         if self.stats.steps_near_singular:
             self.stats.energy_error = energy_error(self, task)
-        self.message = account(self, scene, outcome.reason)  # now: the scene may change
+        self.message = account(self, scene, outcome.reason)  # written now, since the scene may change
 
     def __setstate__(self, state):
-        """Take over what was pickled; the packed scene finds its kernels again."""
+        """Restore a pickled solution; the packed scene looks its kernels up."""
         self.__dict__.update(state, system=state["packed"].system)
 
     @property
@@ -145,7 +145,7 @@ class Solution(Balances, Kinematics["Floats"]):
         return RememberingState.of(*remembered, self._reached, q, qd, qdd, lam)
 
     def at(self, t: ArrayLike) -> RememberingState:
-        """State at any time of a run with dense_output=True, on the manifold as the steps are.
+        """Return the state at any time of a run with dense_output=True, on the constraint manifold.
 
         Parameters
         ----------
@@ -155,8 +155,8 @@ class Solution(Balances, Kinematics["Floats"]):
         Returns
         -------
         State
-            t, q (n,), qd, qdd and multipliers (m,), with (k,) before each for a vector of times. Between steps they
-            are of the interpolant's order; at a step's ends they are the step's own to rounding.
+            t, q (n,), qd, qdd and multipliers (m,), with a leading dimension (k,) for a vector of times. Between steps
+            they are of the interpolant's order, at the ends of steps those of the steps, to rounding.
 
         Raises
         ------
@@ -195,7 +195,7 @@ class Solution(Balances, Kinematics["Floats"]):
         return RememberingState.of(self.handles, memory[0], anchor, float(times), *(part[0] for part in parts))
 
     def _anchor_of(self, t):
-        """What angles at times t (k,) are counted from: the starts of the steps that they are in."""
+        """Return the turn counts at times t (k,): those at the starts of their steps."""
         start, angles = self._trajectory.anchors(t)
         if not angles.size:
             return Anchor(angles, np.zeros(t.size))
@@ -222,12 +222,12 @@ class Solution(Balances, Kinematics["Floats"]):
 
     @cached_property
     def _memory(self):
-        """What forces remember, and the normal loads of joints' frictions, (k, ...)."""
+        """Memory of forces and normal loads of joint friction, (k, ...)."""
         return with_normal_loads(self.packed, self.t, self.q, self.qd, self.qdd, self._remembers)
 
     @cached_property
     def multipliers(self) -> Floats:
-        """Multipliers (k, m), computed when first asked for."""
+        """Multipliers (k, m), computed on first access."""
         return reactions.multipliers(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
 
     @cached_property
@@ -267,10 +267,10 @@ class Solution(Balances, Kinematics["Floats"]):
         return reactions.reaction(self, member, self._acted(item, on))
 
     def reaction_unique(self, item: ItemLike, on: BodyLike | None = None) -> Bools:
-        """Whether what `reaction` gives is the only answer, at each output: bool (k,).
+        """Return True where `reaction` is unique, at each output: bool (k,).
 
-        Redundant constraints can share their loads in many ways with the same motion; `reaction` is then one of them,
-        with the multipliers of redundant rows (NaN in `multipliers`) taken as zero.
+        Redundant constraints can share their load in many ways without a change of motion; `reaction` is then the
+        solution whose multipliers of redundant rows (NaN in `multipliers`) are zero.
         """
         item = self.handles.item(item)
         if id(item) in reactions.loads_of(self.packed):
@@ -278,7 +278,7 @@ class Solution(Balances, Kinematics["Floats"]):
         return uniqueness.unique(self, self._member(item).rows, self._acted(item, on))
 
     def rows(self, constraint: ItemLike) -> slice:
-        """The columns of `multipliers` that belong to a constraint, as a slice."""
+        """Return the columns of `multipliers` of a constraint, as a slice."""
         return self._member(self.handles.item(constraint)).rows
 
     def _member(self, constraint):
@@ -288,14 +288,14 @@ class Solution(Balances, Kinematics["Floats"]):
         return member
 
     def _acted(self, item, on):
-        """The body that a reaction is asked for."""
+        """Return the body on which a reaction is requested."""
         if on is None:
             return item.on
         on = self.handles.body(on) if isinstance(on, str) else on
         if on is item.a or on is item.b:
             if on.dimension:
                 return on
-            raise InvalidBody(f"{item.name}: what acts on the ground is the opposite of what acts on {item.on.name!r}.")
+            raise InvalidBody(f"{item.name}: the load on the ground is the opposite of the load on {item.on.name!r}.")
         raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
 
     def _facts(self):
@@ -316,7 +316,7 @@ class Solution(Balances, Kinematics["Floats"]):
         return "\n".join(["Solution", *lines, *([] if self.success else ["  " + self.message])])
 
     def _repr_html_(self) -> str:
-        """The same in a notebook."""
+        """Return the text as a table, for notebooks."""
         facts = self._facts() | ({} if self.success else {"message": self.message})
         rows = "".join(f"<tr><th>{name}</th><td>{html.escape(fact)}</td></tr>" for name, fact in facts.items())
         return f"<table><caption>Solution</caption>{rows}</table>"

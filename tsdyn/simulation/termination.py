@@ -9,15 +9,13 @@ from ..observables.evaluate import constraint_arrays
 from ..sparse.constraint_graphs import redundant_rows
 from ..taylor.layout import without_series
 from ..validation import counted
+from .tolerances import BLOW_UP, MOST_SINGULAR, NEARLY_SINGULAR
 
-NEARLY_SINGULAR = 0.05
-MOST = 600  # coordinates for which singular values are worked out
-FEW = 3  # parts of a scene that are named
-BLOW_UP = 1e4  # growth of the largest velocity that is worth a word
+FEW = 3  # items named in a message
 
 
 def account(solution, scene, reason):
-    """How the run of a solution ended, in words."""
+    """Return the termination message of a run."""
     reason = " ".join(part for part in (reason, _kept(solution.stats)) if part)
     if solution.success:
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
@@ -35,7 +33,7 @@ def account(solution, scene, reason):
 
 
 def _kept(stats):
-    """The accuracy near singular configurations, from energy and projections."""
+    """Report the accuracy near singular configurations, from energy and projections."""
     if not stats.steps_near_singular:
         return ""
     error = stats.energy_error
@@ -47,7 +45,7 @@ def _kept(stats):
 
 
 def _locked(solution):
-    """Say so where redundant rows leave nothing free."""
+    """Report that redundant rows leave no degree of freedom."""
     redundant = len(redundant_rows(solution.packed))
     still = redundant and not solution.system.rheonomic[0]
     if not (still and solution.q.shape[1] == len(solution.system.segments) - redundant):
@@ -65,10 +63,10 @@ def _growth(solution):
 
 
 def _suspect(solution, scene):
-    """Name what is nearly singular at the last point."""
+    """Name the nearly singular item at the last state."""
     if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
         return ""
-    if solution.q.shape[1] > MOST:
+    if solution.q.shape[1] > MOST_SINGULAR:
         return _suspect_of_many(solution, scene)
     _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)
     rows, share = weakest_row(scene, Phi_q, len(redundant_rows(solution.packed)))
@@ -81,7 +79,7 @@ def _suspect(solution, scene):
 
 
 def _suspect_of_many(solution, scene):
-    """The same by elimination, at a cost of O(N)."""
+    """Do the same by elimination, in O(N)."""
     packed = solution.packed
     rows = dependent_rows(packed, solution._last[0], solution._reached, NEARLY_SINGULAR**2)
     redundant = len(redundant_rows(packed))

@@ -1,7 +1,10 @@
 """Checks of plug-ins (`ts.testing`): constraints, forces and integrators against the properties they must have.
 
-Imports simulation and below. Begin with primitive_checks.py: Phi_q, gamma and series of a constraint against complex
-steps and truncated power series; force_checks.py and integrator_checks.py do the same for forces and methods.
+Imports simulation and below.
+
+Begin with primitive_checks.py: Phi_q, gamma and series of a constraint against complex steps and truncated power
+series; force_checks.py does the same for forces. integrator_checks.py fits the order of a method (observed_order.py)
+and checks its adaptive steps (adaptive_checks.py).
 """
 
 from ..errors import CheckFailed

@@ -7,24 +7,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..elements.force import Force
-from ..errors import CheckFailed, InvalidArgument, InvalidForce
+from ..errors import CheckFailed, InvalidForce
 from ..jit.kernels import entry, twin
 from ..model.equations import force_jacobian, set_time
 from ..model.packed_forces import with_force_jacobians
 from ..motions.signals import Signal
 from ..observables.generalised_forces import force_loads
 from ..observables.power import load_powers, marker_states
-from .instances import instances
+from .instances import instances, maker
 from .series_checks import check_force_series
+from .tolerances import QUOTIENT, ROUNDED, SPACING
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ..hints import AnyBody
-
-SPACING = 4e-3  # of central differences of sixth order
-QUOTIENT = 1e-8  # what they leave, relative to the size of the Jacobian
-ROUNDING = 1e-11  # relative to the size of what is compared
 
 
 @entry
@@ -67,27 +64,13 @@ def check_force(kind: type[Force] | Callable[[AnyBody, AnyBody], Force], *, seed
     >>> ts.testing.check_force(ts.forces.Spring, states=1)
     """
     rng = np.random.default_rng(seed)
-    for scene, force, arrangement in instances(lambda *bodies: _make(kind, rng, *bodies), rng, states):
+    make = maker(kind, (Force,), InvalidForce, lambda a, b: kind.example(rng, a, b))
+    for scene, force, arrangement in instances(make, rng, states):
         for body in scene.bodies:
             body.velocity, body.angular_velocity = rng.normal(size=3), 3.0 * rng.normal(size=3)
         name = f"{force._kind()} ({arrangement})"
         _check(scene, force, name, rng)
         check_force_series(scene, force, name, rng)
-
-
-def _make(kind, rng, a, b, alone):
-    """An instance, or None where it means nothing between a body and the ground."""
-    if isinstance(kind, type) and issubclass(kind, Force):
-        single = not any(marker.body == "b" for marker in kind.markers)
-        return None if single and alone else kind.example(rng, a, b)
-    if not callable(kind):
-        raise InvalidArgument(f"check_force needs a Force class or a callable (a, b), got {kind!r}.")
-    try:
-        return kind(a, b)
-    except InvalidForce:
-        if alone:
-            return None
-        raise
 
 
 def _check(scene, force, name, rng):
@@ -108,10 +91,10 @@ def _check(scene, force, name, rng):
     _check_jacobians(packed, name, Q, q, qd, t[0], coordinates)
     _, lost, applied = (np.broadcast_to(x, (1,))[0] for x in load_powers(packed, load, t, q[None], qd[None], memory))
     size = np.abs(value) @ np.abs(qd)
-    if lost < -ROUNDING * size:
+    if lost < -ROUNDED * size:
         raise CheckFailed(f"{name}: dissipation is {lost:.6g} W; it is what the force takes and can't be negative.")
     undriven = force.conservative and all(Signal.is_zero(getattr(force, attribute)) for attribute in force.loads)
-    if undriven and not abs(applied) <= ROUNDING * (1.0 + size):
+    if undriven and not abs(applied) <= ROUNDED * (1.0 + size):
         raise CheckFailed(
             f"{name}: its power {value @ qd:.15g} W is not that of its potential and dissipation, {applied:.6g} W are "
             "left over. Correct them, or name the attributes that drive it in `loads`."
@@ -131,7 +114,7 @@ def _check_twin(packed, load, name, t, q, qd, value, coordinates):
         direction[j] = 1.0
         _, W = marker_states(packed, load, q[None], direction[None])
         expected = sum(float(np.squeeze(a)) * b for a, b in zip(W, f, strict=True))
-        _compare(name, f"compiled Q[{j}] ({label})", value[j], expected, value, ROUNDING)
+        _compare(name, f"compiled Q[{j}] ({label})", value[j], expected, value, ROUNDED)
 
 
 def _check_jacobians(packed, name, Q, q, qd, t, coordinates):

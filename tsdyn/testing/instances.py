@@ -2,9 +2,32 @@
 
 import numpy as np
 
+from ..errors import InvalidArgument
 from ..simulation.scene import Scene
 
 ARRANGEMENTS = ("body to body", "body to ground", "ground to body")
+
+
+def maker(kind, bases, error, example):
+    """Make the `make` of `instances`: of a class by example(a, b), or a callable (a, b)."""
+
+    def make(a, b, alone):
+        if isinstance(kind, type) and issubclass(kind, bases):
+            single = not any(marker.body == "b" for marker in kind.markers)
+            return None if single and alone else example(a, b)
+        if not callable(kind):
+            raise InvalidArgument(
+                f"a check needs a {bases[0].__name__} class or a callable (a, b) that makes one, got {kind!r}."
+            )
+        try:
+            made = kind(a, b)
+        except error:
+            if alone:
+                return None
+            raise
+        return None if alone and made.b is None else made
+
+    return make
 
 
 def instances(make, rng, states):

@@ -9,10 +9,10 @@ from ..constraints import Distance, PlaneContact, Spherical
 from ..integrators import DOP853, RK45
 from ..simulation.scene import Scene
 from ..simulation.simulate import simulate
+from .tolerances import TIGHT
 
 GRID = 16  # equal parts of the span, at whose ends fixed steps are compared
 INNER = np.sort(np.random.default_rng(1).uniform(0.01, 0.99, 40))  # fractions of the span, within the steps
-TIGHT = 1e-13
 
 
 class Case(NamedTuple):
@@ -54,21 +54,14 @@ def driven_pendulum():
     body = scene.add_body(
         1.0, (0.02, 0.03, 0.04), position=(0.5, 0.0, 0.1), velocity=(0.4, 0.6, 0.0), angular_velocity=(1.0, 2.0, -1.0)
     )
-    scene.add(Distance(body, scene.ground, point_a=(0.0, 0.0, -0.1), length=(_length, _length_d, _length_dd)))
+    length = (
+        lambda t: 0.5 + 0.1 * np.sin(4.0 * t),
+        lambda t: 0.4 * np.cos(4.0 * t),
+        lambda t: -1.6 * np.sin(4.0 * t),
+    )
+    scene.add(Distance(body, scene.ground, point_a=(0.0, 0.0, -0.1), length=length))
     scene.assemble()
     return scene
-
-
-def _length(t):
-    return 0.5 + 0.1 * np.sin(4.0 * t)
-
-
-def _length_d(t):
-    return 0.4 * np.cos(4.0 * t)
-
-
-def _length_dd(t):
-    return -1.6 * np.sin(4.0 * t)
 
 
 SCENES: dict[str, tuple[Callable[[], Scene], float]] = {

@@ -11,22 +11,21 @@ from numba.core.errors import NumbaError
 
 from ..elements.joint import Joint
 from ..elements.primitive import Primitive
-from ..errors import CheckFailed, InvalidArgument, InvalidCall, TsdynError
+from ..errors import CheckFailed, InvalidCall, TsdynError
 from ..jit.kernels import twin
 from ..maths.two_jets import Jet
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
-from .instances import instances
+from .instances import instances, maker
 from .series_checks import check_constraint_series
+from .tolerances import COMPLEX_STEP, NOT_ANALYTIC, REAL_STEP, ROUNDED
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ..hints import AnyBody
 
-STEP = 1e-40  # of complex steps: no cancellation, so as small as can be
-TOLERANCE = 1e-11  # relative to the size of what is compared
 NOT_HOLONOMIC = (
     " A row on velocities that is the rate of no phi is not holonomic; constraints are functions of positions and time."
 )
@@ -69,7 +68,8 @@ def check_primitive(
     >>> ts.testing.check_primitive(ts.constraints.Distance, states=1)
     """
     rng = np.random.default_rng(seed)
-    for scene, constraint, arrangement in instances(lambda *bodies: _make(kind, rng, *bodies), rng, states):
+    make = maker(kind, (Primitive, Joint), TsdynError, lambda a, b: _example(kind, rng, a, b))
+    for scene, constraint, arrangement in instances(make, rng, states):
         name = f"{type(constraint).__name__} ({arrangement})"
         for part in constraint.parts:
             own = name if part is constraint else f"{type(part).__name__} in {name}"
@@ -78,22 +78,6 @@ def check_primitive(
                 _check_perturbed(part, own, rng)
         _check_assembled(scene, constraint, name, rng)
         check_constraint_series(scene, constraint, name, rng)
-
-
-def _make(kind, rng, a, b, alone):
-    """An instance, or None where it means nothing between a body and the ground."""
-    if isinstance(kind, type) and issubclass(kind, (Primitive, Joint)):
-        single = not any(marker.body == "b" for marker in kind.markers)
-        return None if single and alone else _example(kind, rng, a, b)
-    if not callable(kind):
-        raise InvalidArgument(f"check_primitive needs a Primitive class or a callable (a, b), got {kind!r}.")
-    try:
-        constraint = kind(a, b)
-    except TsdynError:
-        if alone:
-            return None
-        raise
-    return None if alone and constraint.b is None else constraint
 
 
 def _example(kind, rng, a, b):
@@ -143,11 +127,11 @@ def _check_kernels(constraint, name, rng, par):
     fixed = _vector(f.phi, kind.rows, x, t) == _vector(f.phi, kind.rows, x + xd, t)
     for j in range(size):
         step = np.zeros(size, complex)
-        step[j] = 1j * STEP
-        expected = _vector(f.phi, kind.rows, x + step, t).imag / STEP
-        h = 1e-5 * step.imag / STEP
-        quotient = (_vector(f.phi, kind.rows, x + h, t) - _vector(f.phi, kind.rows, x - h, t)).real / 2e-5
-        if not np.allclose(quotient, expected, rtol=1e-4, atol=1e-4 * (1.0 + np.abs(Phi_x).max())):
+        step[j] = 1j * COMPLEX_STEP
+        expected = _vector(f.phi, kind.rows, x + step, t).imag / COMPLEX_STEP
+        h = REAL_STEP * step.imag / COMPLEX_STEP
+        quotient = (_vector(f.phi, kind.rows, x + h, t) - _vector(f.phi, kind.rows, x - h, t)).real / (2.0 * REAL_STEP)
+        if not np.allclose(quotient, expected, rtol=NOT_ANALYTIC, atol=NOT_ANALYTIC * (1.0 + np.abs(Phi_x).max())):
             raise CheckFailed(
                 f"{name}: phi is not analytic, so its complex steps say nothing: it compares, or takes abs or norm of, "
                 "x. Write np.sqrt(x[0] ** 2 + ...) for a norm."
@@ -156,7 +140,7 @@ def _check_kernels(constraint, name, rng, par):
             entry = f"jacobian[{i}, {j}] (d phi[{i}] / d {labels[j]})"
             _compare(name, entry, Phi_x[i, j], expected[i], Phi_x, NOT_HOLONOMIC if fixed[i] else "")
 
-    expected = _vector(f.phi, kind.rows, x, t + 1j * STEP).imag / STEP
+    expected = _vector(f.phi, kind.rows, x, t + 1j * COMPLEX_STEP).imag / COMPLEX_STEP
     if hasattr(f, "phi_t"):
         Phi_t = _vector(f.phi_t, kind.rows, x, t)
         for i in range(kind.rows):
@@ -172,7 +156,7 @@ def _check_kernels(constraint, name, rng, par):
         total = jacobian @ xd
         return total + _vector(f.phi_t, kind.rows, x + s * xd, t + s) if hasattr(f, "phi_t") else total
 
-    expected = rate(1j * STEP).imag / STEP
+    expected = rate(1j * COMPLEX_STEP).imag / COMPLEX_STEP
     gamma = np.zeros(kind.rows)
     f.gamma(x, t, gamma, xd)
     scale = np.abs(np.abs(Phi_x) @ xd**2)
@@ -263,5 +247,5 @@ def _check_assembled(scene, constraint, name, rng):
 
 def _compare(name, entry, got, expected, scale, remark=""):
     size = max(1.0, np.abs(expected), np.abs(scale).max(initial=0.0))
-    if not abs(got - expected) <= TOLERANCE * size:
+    if not abs(got - expected) <= ROUNDED * size:
         raise CheckFailed(f"{name}: {entry} is {got:.15g} and should be {np.real(expected):.15g}.{remark}")

@@ -25,10 +25,8 @@ from ..taylor.layout import allocate_expansion, masks
 from ..taylor.prescribed_series import expand_motions
 from ..taylor.workspace import SeriesContext, Trial, load_series
 from ..workspaces.workspace import plain_work
+from .tolerances import ORDER, ROUNDED, SHRINK
 
-ORDER = 8
-TOLERANCE = 1e-11  # relative to the largest coefficient up to the one compared
-SHRINK = 0.5  # of the motions' coefficients from order to order
 _AXES = ("x", "y", "z")
 
 
@@ -274,7 +272,7 @@ def _compare(name, k, labels, got, expected):
     scale = max(1.0, *(np.abs(_series(e).c[: k + 1]).max() for e in np.ravel(expected)))
     for label, value, series in zip(np.ravel(labels), np.ravel(got), np.ravel(expected), strict=True):
         right = _series(series).c[k]
-        if not abs(value - right) <= TOLERANCE * scale:
+        if not abs(value - right) <= ROUNDED * scale:
             raise CheckFailed(f"{name}: series: coefficient {k} of {label} is {value:.15g} and should be {right:.15g}.")
 
 

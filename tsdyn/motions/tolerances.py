@@ -1,0 +1,15 @@
+"""Limits of prescribed motions and data, as shares of what is named."""
+
+# Of the time: knots that are nearer to each other are one (some 50 roundings); of the run's length, the time that this
+# is at least a share of.
+TOGETHER, LEAST_SPAN = 1e-14, 1e-3
+# Of the largest value or rate at a knot: smaller differences between its sides are rounding of data.
+JUMP = 1e-9
+# Of the largest value, over the shortest piece at a knot, s: the rounding error of a rate.
+ROUNDING = 1e-12
+
+# Derivatives given as functions are compared with quotients over these shares of the run's length (at most 1 s each),
+# four points each; of the largest value, the noise that a function may have; of both sizes, an error that is no slip.
+QUOTIENT_STEPS = (1e-2, 1e-3, 1e-4, 1e-5)
+QUOTIENT_NOISE = 1e-9
+QUOTIENT_ERROR = 1e-3

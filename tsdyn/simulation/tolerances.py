@@ -1,0 +1,33 @@
+"""Limits of the preparation and assessment of runs; dimensionless unless a unit is named."""
+
+# --- choice of the method ---
+# Steps of the pilot run of an implicit method, and the cost of an evaluation within an implicit stage, its share of the
+# matrices included, in evaluations of an explicit one: measured by benchmarks/stiff.py.
+PILOT, COST = 60, 1.5
+# Coordinates above which implicit methods, whose matrices are dense, cost more than they save.
+LARGEST_PILOT = 700
+
+# --- scenes far from the origin ---
+# Sizes of a scene: beyond that distance from the origin it gets an origin of its own.
+FAR_ORIGIN = 100.0
+# Levers: at shorter distances from the origin rounding of positions touches no tolerance.
+FAR_LEVER = 1e4
+
+# --- singular configurations ---
+# Of the largest share that the weakest row has had: as much is regular again, for other methods and for Taylor alike.
+REGULAR = 0.02
+# Tolerance of the series that cross a singular configuration, if the method has none that is tighter.
+FINEST = 1e-10
+# Of a fixed step: a time of the grid that is nearer has been reached.
+NO_STEP = 1e-6
+# Smallest singular value, of the largest, below which a failure is put down to a singular configuration; coordinates up
+# to which singular values are computed for that.
+NEARLY_SINGULAR, MOST_SINGULAR = 0.05, 600
+# Growth of the largest velocity at which a failure is put down to a motion that runs away.
+BLOW_UP = 1e4
+
+# --- energy ---
+# Of the largest kinetic energy per second: power below it is rounding.
+NO_POWER = 1e-9
+# Of a piece's integral: its two halves agree with the whole; halvings at most.
+AGREE, DEEPEST = 1e-11, 8

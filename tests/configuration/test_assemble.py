@@ -10,8 +10,6 @@ from tests.helpers.mechanisms import (
     SEEDS,
     assert_same,
     body,
-    length,
-    length_d,
     map_of_speeds,
     masses,
     mechanism,
@@ -21,6 +19,7 @@ from tests.helpers.mechanisms import (
     snapshot,
     speeds,
 )
+from tests.helpers.scenes import length, length_d
 from tests.helpers.tolerances import ALGEBRA, COARSE, EXACT, FINE, HELD, ROUNDING
 
 C = ts.constraints

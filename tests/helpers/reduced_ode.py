@@ -73,7 +73,7 @@ class Tangent:
         parts = basis_free_parts(form.network(packed), n, True)
         self.context = Context(system, work, allocate_linear(system, n, m, True, kept), *parts)
         self.address, *self._keep = resident(self.context)
-        self.at = np.array([*form.addresses(), *form.implicit()[:5]], np.int64)
+        self.at = np.array([*form.addresses().values(), *form.implicit().values()][:10], np.int64)
         self.k, self.t = n - m, t
         v, self.vd, vdd = np.zeros((3, self.k))
         assert _start(self.address, self.at, t, v, self.vd, vdd) == 0

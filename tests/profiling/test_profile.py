@@ -147,7 +147,7 @@ def test_timers_change_no_number_and_stay_in_no_memory():
     timers = {timer.address for timer in TIMERS.values() if timer._address}
     spare = [memory for some in prepared(scene)._spare.values() for memory in some]
     assert spare
-    assert not any(timers & set(memory.addresses.tolist()) for memory in spare)
+    assert not any(timers & set(memory.run.kernels.as_dict().values()) for memory in spare)
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """Redundant constraints: the same motion as without them, all rows held, and nothing said to be unique that is not."""
 
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from tests.helpers import closed_loops
 from tests.helpers.closed_loops import angles, rod
 from tests.helpers.minimal_coordinates import balance
 from tests.helpers.tolerances import ALGEBRA, CLOSE, FAIR, HELD, NEAR, ROUNDING, TIGHT
+from tsdyn.jit.kernels import twin
+from tsdyn.rows.interface import return_to_selection, save_selection
 
 C = ts.constraints
 I = ts.integrators
@@ -234,3 +237,12 @@ def test_a_hub_with_redundant_joints():
     heights = np.array([solution.position(body)[:, 2] for body in scene.bodies[1:]])
     np.testing.assert_allclose(heights, np.broadcast_to(heights[0], heights.shape), atol=TIGHT)
     assert solution.constraint_error.position.max() < ALGEBRA
+
+
+def test_a_selection_of_redundant_rows_is_restored_whole():
+    """After a passing one, of other rows and of another number."""
+    f = SimpleNamespace(dropped=np.array([2, 4, 1, 0, 0, 0]), saved=np.zeros(6, int))
+    twin(save_selection)(f)
+    f.dropped[:] = 3, 0, 2, 3, 0, 0
+    twin(return_to_selection)(f)
+    assert f.dropped[:3].tolist() == [2, 4, 1]

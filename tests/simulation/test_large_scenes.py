@@ -58,8 +58,8 @@ def spider(legs):
 
 
 def numbers(value):
-    """Of how many bytes the arrays in a tuple of them are."""
-    return value.nbytes if isinstance(value, np.ndarray) else sum(map(numbers, value))
+    """Bytes of the arrays and records in a tuple of them."""
+    return sum(map(numbers, value)) if isinstance(value, tuple) else memoryview(value).nbytes
 
 
 def memory(scene):

@@ -5,7 +5,8 @@
 # of these numbers, each rounded by 1.1e-16: 4e-16 as a random walk, 1.3e-15 at worst.
 ROUNDING = 1e-15
 
-# |rd| + size |omega'| in the same way, for Phi_q qd: two units in the last place, since few terms of a row are large.
+# |Phi_q qd + Phi_t| over |rd| + size |omega'|, in the same way: one unit in the last place, since few terms of a row
+# are large.
 SPEED_ROUNDING = 2e-16
 
 # Multipliers over the largest: a correction below it is rounding of one number.
@@ -27,7 +28,7 @@ UNIT_ROUNDING = 1e-15
 # --- convergence of Newton's method, ratios of successive residuals or corrections
 SLOW = 0.25  # positions: above it the matrix of an older configuration is replaced; two sweeps gain a digit at it
 STALLED = 0.5  # projection, Eq. 28, velocities: above it nothing is gained but rounding; twice that diverges
-SLOW_VELOCITIES = 0.1  # velocities with the factors of S: above it a factorisation of N costs less than more sweeps
+SLOW_VELOCITIES = 0.1  # velocities with the factors of S: above it N is factorised; below, a sweep gains a digit
 SLOW_LOADS = 0.1  # reactions with friction: the same for the matrix of the normal loads
 
 # Residual of Eq. 28, ||Phi_q U B - I||: above it B is factorised afresh. The iteration squares it and diverges from 1.
@@ -45,7 +46,7 @@ LOAD_SWEEPS, DAMPED, DAMPED_SHARE = 40, 12, 0.5
 NEWTON_DONE = 1e-10
 
 # 1 / m: what Newton's method leaves of an error, over its square, until it is measured. One over a metre: links of
-# usual size; a wrong value costs one sweep.
+# usual size.
 CURVATURE = 1.0
 
 # The same for the null-space form, as a ratio.
@@ -57,7 +58,7 @@ TURN_LIMIT = 0.25  # |d|: the sine of half the rotation of a body since q0; 29 d
 CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a rotation of 60 degrees
 FARTHEST = 0.9  # |d|^2: d0 = 0.32, and C grows as 1 / d0
 TURN_SHARE = 0.55  # of |d|, as a contraction: a rotation that no constraint depends on reaches 0.9 in a step, 0.5 here
-# Error of the factors of N at the end of a solve, relative: below it they give the contraction to four digits
+# Error of the factors of N at the end of a solve, relative: below it they tell the contraction (limit 0.15)
 SAME = 1e-6
 
 # --- rank

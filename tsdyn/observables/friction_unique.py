@@ -16,7 +16,7 @@ from .uniqueness import find_rows
 
 @entry
 def _free_loads(context, t, q, whole, out):
-    """out (frictions,): the largest normal load that a self-stress of size one makes."""
+    """out (frictions,): the largest normal load in a unit self-stress."""
     c = load_parts(context)
     network, s, f = c.network, c.system, c.free
     reaction, none, found = stack(6), stack(7), stack(7)
@@ -39,7 +39,7 @@ def _free_loads(context, t, q, whole, out):
 
 
 def demand_unique(packed, q, t):
-    """Raise RedundantConstraints where a friction needs a reaction that isn't unique at q."""
+    """Raise RedundantConstraints if a friction depends on a reaction that isn't unique at q."""
     network = network_of(packed, REDUCED)
     if not (redundancy(network) and len(network.frictions)):
         return

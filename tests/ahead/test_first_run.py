@@ -78,7 +78,7 @@ print(sorted(map(label, used - asked)), sorted(map(label, {kernel for kernel in 
 """
 
 
-@pytest.mark.slow_but("top-dop853-tangent-within")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "method", "form", "times"),
     [

@@ -72,7 +72,7 @@ def test_workers_fill_the_cache_without_running_the_program_again(tmp_path, way)
     assert (again, err) == ("{} 0 0 3 False", "")
 
 
-@pytest.mark.slow_but("one processor")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "started"),
     [

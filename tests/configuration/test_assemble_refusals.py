@@ -82,6 +82,7 @@ def test_rows_that_say_the_same_are_no_hindrance():
     assert bead.velocity[1] == 2.0
 
 
+@pytest.mark.slow
 def test_a_row_that_vanishes_where_it_is_met_is_refused():
     scene = ts.Scene()
     bead = scene.add_point_mass(1.0, name="bead")

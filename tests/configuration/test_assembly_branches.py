@@ -14,7 +14,7 @@ C = ts.constraints
 COUNT = 20
 
 
-@pytest.mark.slow_but("four_bar", "hooke_joint")
+@pytest.mark.slow_but("four_bar")
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_sketches_assemble_on_their_branch(name):
     """Each body is off by up to 0.3 of its link and 0.5 rad; starts are 0.1 rad and more from a dead centre.

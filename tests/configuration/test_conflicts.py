@@ -167,6 +167,7 @@ def test_a_rod_whose_ends_a_ball_holds_together():
     assert names == {"ball 3", "rod"}
 
 
+@pytest.mark.slow
 def test_rates_that_contradict_are_named():
     """Two rods of one length that say the same now; one of them is about to shorten."""
     scene = ts.Scene()

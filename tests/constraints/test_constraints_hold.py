@@ -130,7 +130,7 @@ def test_rigid_bodies_and_point_masses(rng):
     check(run(scene, 2.0, t_eval=between_steps(rng, 2.0), constraint_tol=EPS))
 
 
-@pytest.mark.slow_but("Dot2", "Spherical")
+@pytest.mark.slow_but("Dot2")
 @pytest.mark.parametrize("name", PRIMITIVES)
 def test_the_errors_reported_are_the_errors(name, rng):
     """constraint_error against formulas of the tests' own, off the constraints as well as on them."""

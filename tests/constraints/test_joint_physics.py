@@ -105,6 +105,7 @@ def test_reactions_balance_newton_and_euler(options, rng):
     assert error.acceleration.max() < 2e4 * EPS * (1.0 + np.abs(solution.qdd).max())
 
 
+@pytest.mark.slow
 def test_all_methods_agree(rng):
     scene = everything(rng)
     ends = [ts.simulate(scene, (0.0, 0.3), **options).raise_if_failed().q[-1] for options in RUNS.values()]

@@ -107,6 +107,7 @@ def test_taylor_refuses_by_name_and_the_default_takes_another():
     assert "DOP853" in ts.simulate(scene, (0.0, 0.05)).method
 
 
+@pytest.mark.slow
 def test_attributes_can_be_set_and_geometry_is_the_joints():
     scene, _bar, pin, friction = pendulum()
     before = ts.simulate(scene, (0.0, 0.5), **PRECISE).q[-1]

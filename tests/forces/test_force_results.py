@@ -71,6 +71,7 @@ def test_harmonic_oscillator():
     np.testing.assert_allclose(solution.q[:, 0], expected, atol=CLOSE)
 
 
+@pytest.mark.slow
 def test_reactions_of_forces_and_constraints_are_what_moves_the_bodies(rng):
     """Newton and Euler for each body from all reactions."""
     scene, _ = everything(rng)

@@ -78,7 +78,7 @@ def follow(t, state):
 TABLE = ts.Table(np.linspace(0, 1, 9), np.sin(np.arange(27.0)).reshape(9, 3))
 
 
-@pytest.mark.slow_but("*constant-ground")
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["ground", "body"])
 @pytest.mark.parametrize("load", [(1, 2, 3), wave, follow, TABLE], ids=["constant", "time", "state", "table"])
 @pytest.mark.parametrize(("kind", "word"), [(F.PointForce, "force"), (F.Torque, "torque")])
@@ -155,6 +155,7 @@ def test_bushing_is_linear_for_small_turns(rng):
     np.testing.assert_allclose(load_of(scene, a)[1], torque, rtol=0, atol=TIGHT)
 
 
+@pytest.mark.slow
 def test_point_force_and_torque(rng):
     scene, a, _ = pair(rng)
     s, load, A = rng.normal(size=3), rng.normal(size=3), rotation(a.orientation)
@@ -256,6 +257,7 @@ def test_user_force_has_all_of_both_states(rng):
         force.values = 2 * weights
 
 
+@pytest.mark.slow
 def test_one_function_is_compiled_once(rng):
     scene, a, b = pair(rng)
     forces = [scene.add(F.UserForce(body, function=gravitation, parameters=[k])) for k, body in ((1.0, a), (2.0, b))]
@@ -266,6 +268,7 @@ def test_one_function_is_compiled_once(rng):
 INTERNAL = [kind for kind in FORCES if kind not in (F.PointForce, F.Torque)]
 
 
+@pytest.mark.slow_for("UserForce", "*Friction")
 @pytest.mark.parametrize("kind", INTERNAL, ids=lambda kind: kind.__name__)
 def test_internal_forces_keep_the_momentum(kind, rng):
     scene, a, b = pair(rng)

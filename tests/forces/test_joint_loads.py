@@ -148,7 +148,7 @@ def spring_and_damper(t, x, rate):
     return -4.0 * (x - 10.0) - 1.0 * rate + 0.5 * math.sin(t)
 
 
-@pytest.mark.slow_but("slider")
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [wheel, slider])
 def test_a_continuous_load(make):
     """By more than a turn: it is that of a spring, a damper and an actuator."""

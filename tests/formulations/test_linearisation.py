@@ -108,6 +108,7 @@ def points(rng):
     return scene
 
 
+@pytest.mark.slow
 def test_jacobian_of_point_masses(rng):
     demand_derivatives(points(rng), rng)
 

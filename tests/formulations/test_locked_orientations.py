@@ -215,6 +215,7 @@ def test_what_a_function_of_time_turns_is_not_still():
         np.testing.assert_allclose(solution.angular_velocity(body)[:, 2], 2.0, rtol=0, atol=HELD)
 
 
+@pytest.mark.slow
 def test_a_value_that_becomes_a_function_of_time_sets_a_body_free():
     scene = floating()
     assert run(scene).stats.rotations_skipped > 0

@@ -8,21 +8,25 @@ import tsdyn as ts
 from tests.helpers.built_in import FORCES, PRIMITIVES
 from tsdyn.ahead.first_run import of_constraint, of_force, of_method
 from tsdyn.configuration import start_kernels
+from tsdyn.formulations import dependent_rows
 from tsdyn.formulations.registry import FORMULATIONS
 from tsdyn.jit.compiled import is_declared
 from tsdyn.motions.program import run_program
+from tsdyn.observables.reactions import solve_multipliers
 from tsdyn.rows.reselection import choose_anew
 
 
 def shared_kernels():
     """Yield them, with repetitions."""
     I, (tangent, *others) = ts.integrators, FORMULATIONS.values()
-    for method in (I.Taylor(1e-8), I.DOP853(1e-8, 1e-8), I.Nystrom4(), I.RK45(1e-6, 1e-6), I.SDIRK54(1e-6, 1e-6)):
+    explicit = I.DOP853(1e-8, 1e-8), I.RK45(1e-6, 1e-6), I.Nystrom4()
+    for method in (I.Taylor(1e-8), *explicit, I.SDIRK54(1e-6, 1e-6), I.ImplicitTrapezoid(1e-4, 1e-4)):
         yield from of_method(method, tangent, True)
     for form in others:
-        yield from of_method(I.DOP853(1e-8, 1e-8), form, True)
+        for method in explicit:
+            yield from of_method(method, form, True)
     yield from filter(is_declared, vars(start_kernels).values())  # those of assembly
-    yield from (choose_anew, run_program)
+    yield from (choose_anew, run_program, solve_multipliers, dependent_rows._choose)
     for kind in PRIMITIVES:
         for moving in (False, *[True] * ("phi_t" in kind.kernels)):
             yield from of_constraint(kind, moving, implicit=kind is ts.constraints.Distance)

@@ -32,7 +32,7 @@ def one_scene(monkeypatch):
     monkeypatch.setattr(integrator_scenes, "SCENES", {"sliding top": (integrator_scenes.sliding_top, 10.0)})
 
 
-@pytest.mark.slow_but("Nystrom4", "Taylor")
+@pytest.mark.slow_but("Taylor")
 @pytest.mark.parametrize("kind", INTEGRATORS)
 def test_built_in(kind):
     series = kind is I.Taylor

@@ -59,6 +59,7 @@ def change(one, two):
     )
 
 
+@pytest.mark.slow_but("sliding_top")
 @pytest.mark.parametrize("name", SCENES)
 def test_order(name):
     solutions, errors, _ = study(name)
@@ -96,6 +97,7 @@ def test_a_chart_every_so_many_steps_keeps_the_order(name, interval):
         assert change(one, two) < truncation
 
 
+@pytest.mark.slow_but("*sliding_top")
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("interval", [1, 10, 50])
 def test_below_truncation_a_chart_changes_rounding_only(name, interval):

@@ -8,6 +8,7 @@ from tests.helpers.processes import REPORT, run
 from tests.helpers.tolerances import EXACT
 
 
+@pytest.mark.slow
 def test_second_process_compiles_nothing(warm):
     code = (
         REPORT

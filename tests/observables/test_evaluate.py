@@ -144,6 +144,7 @@ def test_accelerations_and_multipliers_solve_the_equations(definition):
         close(got.Phi_q @ got.qdd + got.gamma, 0.0 * got.gamma, size=[got.gamma, np.abs(got.Phi_q) @ np.abs(got.qdd)])
 
 
+@pytest.mark.slow_but("*body to body", "*-free", "*-chain*")
 @cases
 @pytest.mark.parametrize("formulation", ["tangent", "null-space", "maggi-kane"])
 def test_first_row_of_a_solution(definition, formulation):

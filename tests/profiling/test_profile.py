@@ -40,7 +40,7 @@ def by_stages():
 # what is measured
 
 
-@pytest.mark.slow_but("by_steps")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["by_steps", "by_series", "by_stages"])
 def test_phases_add_up(name, request):
     found = request.getfixturevalue(name)
@@ -52,6 +52,7 @@ def test_phases_add_up(name, request):
     assert sum(map(found.share, found.groups())) == pytest.approx(sum(p.seconds for p in found.phases) / found.seconds)
 
 
+@pytest.mark.slow
 def test_calls_of_steps_are_those_counted(by_steps):
     stats = by_steps.solution.stats
     assert calls(by_steps, "positions", "corrections") == stats.placements
@@ -243,6 +244,7 @@ def test_text_notebook_and_one_line(by_steps, by_series):
     assert by_series.skipped["forces_skipped"] == by_series.solution.stats.evaluations
 
 
+@pytest.mark.slow
 def test_plot(by_steps, tmp_path):
     pytest.importorskip("matplotlib")
     figure = by_steps.plot(tmp_path / "figure.png")
@@ -250,6 +252,7 @@ def test_plot(by_steps, tmp_path):
     assert len(figure.axes[0].patches) == len(by_steps.phases)
 
 
+@pytest.mark.slow
 def test_plot_without_matplotlib(by_steps, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(ts.MissingDependency, match="pip install"):

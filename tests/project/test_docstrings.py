@@ -31,7 +31,9 @@ def registries():
         registry.update(before)
 
 
-@pytest.mark.slow_for("tsdyn.forces.CoulombFriction", "tsdyn.profile", "tsdyn.testing.*", "tsdyn.forces.*Friction")
+@pytest.mark.slow_for(
+    "tsdyn.forces.CoulombFriction", "tsdyn.profile", "tsdyn.testing.*", "tsdyn.forces.*Friction", "tsdyn.forces.Torque"
+)
 @pytest.mark.parametrize("name", OBJECTS | METHODS)
 def test_examples_print_what_they_say(name, registries):
     if "plots" in name:

@@ -115,6 +115,7 @@ def test_main_reports(module, capsys, monkeypatch):
     assert "Solution" in capsys.readouterr().out
 
 
+@pytest.mark.slow_for("driven_pivot")
 @pytest.mark.parametrize(
     ("build", "end"),
     [(build, end) for _, build, end, _ in RUNS.values()]
@@ -130,6 +131,7 @@ def test_energy_less_work_is_constant(build, end):
     assert np.ptp(solution.energy - solution.work) < NEAR * size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", ["tangent", "maggi-kane"])
 def test_plug_in_integrator(formulation):
     for method in plug_in_integrator.METHODS:

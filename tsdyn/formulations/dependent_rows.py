@@ -12,7 +12,7 @@ from ..sparse.constraint_graphs import network_of
 from ..workspaces.workspace import load_parts, parts
 
 
-@entry
+@entry("pvdd")
 def _choose(context, q, t, share):
     """Select redundant rows at q, those with pivots below a share; return their number, or -1."""
     c = load_parts(context)

@@ -22,8 +22,10 @@ from .factorised_rows import factorise_at
 from .friction_reactions import with_normal_loads
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
 
+MATRIX = np.zeros((0, 0))  # its type
 
-@entry
+
+@entry("pv", MATRIX, MATRIX, MATRIX, MATRIX)
 def solve_multipliers(context, t, q, r, rows, out):
     """out (k, m) with Phi_q^T lam = r, by least squares; r (k, n) is Q_A + Q_v - M qdd. NaN where Phi_q is singular.
 

@@ -7,11 +7,13 @@ coefficients.py. At the end of a step, positions and velocities are projected on
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 from ..plugins import Integrator, InvalidArgument, positive, whole
 
 LOWEST, HIGHEST = 4, 30
 TIGHT = 1e-12  # mean of rtol and atol: below it rounding counts
+FINE = 1e-16  # of a step, above TIGHT: less than rounding of a step makes no difference
 FINEST = 4e-18  # of a step: truncation of one sign that stays below the rounding of a million steps
 REFINED = 3  # orders of the multipliers that are refined where rounding counts
 
@@ -83,27 +85,18 @@ class Taylor(Integrator):
         Truncation has one sign for many steps and adds up, rounding has either. So below TIGHT the margin grows, until
         truncation is a small part of rounding.
         """
-        if not self._tight:
-            return max(self.rtol / self.margin, 1e-16), max(self.atol / self.margin, 1e-16)
-        share = 0.5 * (self.rtol + self.atol) / TIGHT / self.margin
-        return max(self.rtol * share, FINEST), max(self.atol * share, FINEST)
-
-    @property
-    def _tight(self):
-        return 0.5 * (self.rtol + self.atol) < TIGHT
+        return _step_tolerances(self.rtol, self.atol, self.margin)
 
     @property
     def refined(self) -> int:
         """How many orders of the multipliers are refined, from zero on."""
-        return REFINED if self._tight else 0
+        return REFINED if _is_tight(self.rtol, self.atol) else 0
 
     def orders(self) -> tuple[int, int, int]:
         """Return the first step's order, and the lowest and highest of all."""
         if self.fixed is not None:
             return self.fixed, self.fixed, self.fixed
-        digits = -math.log10(sum(self.step_tolerances()))
-        first = min(max(round(3.0 + 1.25 * digits), LOWEST), HIGHEST)
-        return first, LOWEST, min(first + 8, HIGHEST)
+        return _orders(sum(self.step_tolerances()))
 
     @property
     def stages(self) -> int:
@@ -117,3 +110,22 @@ class Taylor(Integrator):
         if self.step is not None:
             tolerance = f"step={self.step:g}"
         return f"Taylor({tolerance}" + (")" if self.fixed is None else f", order={self.fixed})")
+
+
+def _is_tight(rtol, atol):
+    return 0.5 * (rtol + atol) < TIGHT
+
+
+@lru_cache
+def _step_tolerances(rtol, atol, margin):
+    if not _is_tight(rtol, atol):
+        return max(rtol / margin, FINE), max(atol / margin, FINE)
+    share = 0.5 * (rtol + atol) / TIGHT / margin
+    return max(rtol * share, FINEST), max(atol * share, FINEST)
+
+
+@lru_cache
+def _orders(tolerance):
+    """The first step's order by the tolerance of a step, and the lowest and highest of all."""
+    first = min(max(round(3.0 - 1.25 * math.log10(tolerance)), LOWEST), HIGHEST)
+    return first, LOWEST, min(first + 8, HIGHEST)

@@ -114,7 +114,7 @@ def looked_up_too(t):
 
 def locked():
     """The kernels whose compilation still holds its lock."""
-    caches = [item for item in gc.get_objects() if type(item) is _cache.KernelCache]
+    caches = [item for item in gc.get_objects() if issubclass(type(item), _cache.KernelCache)]
     return [cache._name for cache in caches if "looked_up" in cache._name and cache._lock is not None]
 
 

@@ -54,7 +54,7 @@ ORDER = [
     "__main__",
 ]
 FLAT = 14  # modules at most that lie flat in tsdyn/
-LONGEST = 400  # lines of a file
+LONGEST = 350  # lines of a file
 
 
 def _modules():

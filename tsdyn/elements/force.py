@@ -179,12 +179,12 @@ def callbacks(cls, functions, owner=None):
     label = f"{owner.__qualname__}.{cls.__name__}" if owner else cls.__qualname__
     names = {**constants, "kernel_law": make(functions["law"])}
     steps = loops.complex_steps if cls.analytic else loops.central_differences
-    names["kernel_derivatives"] = make(specialised(steps, f"{label}.derivatives", home, **names))
+    names["kernel_derivatives"] = make(specialised(steps, f"{label}.derivatives", home, make, **names))
     names["KEPT"] = loops.kept_size(cls.markers)
     names["ALONG"] = 3 if [type(m) for m in cls.markers] == [Point, Point] else -1  # a frame along its two points
     result = {}
     for name, template, signature in (("force", loops.forces, SIGNATURE), ("jacobian", loops.jacobian, loops.JACOBIAN)):
-        copy = specialised(template, f"{label}.{name}_loop", home, **names)
+        copy = specialised(template, f"{label}.{name}_loop", home, make, **names)
         result[name] = Callback(copy, signature, allocates=owner is not None)
     if "remember" in functions:
         home = getattr(functions["remember"], "py_func", functions["remember"])

@@ -13,9 +13,8 @@ from ..errors import Status
 from ..jit.kernels import callback, kernel, stack, vector
 from ..maths.dense_linalg import cholesky_solve, copy, largest, lu, lu_solve
 from ..maths.euler_parameters import multiply_g
-from ..model.packed_friction import FR_BODY, FR_COUNT, FR_FIRST, FR_ON
 from ..workspaces.workspace import load
-from .friction_loads import RUB, is_settled, normal_load, step_share, unit_friction
+from .friction_loads import RUB, body_of, is_settled, normal_load, step_share, unit_friction
 from .tolerances import BASIS_LOAD_ROUNDING, LOAD_SWEEPS
 
 OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
@@ -98,7 +97,7 @@ def _find_bases(network, system, w, f, t, vdd):
         for j in range(k):
             a[j] = 0.0
         for side in range(2):
-            body = friction[FR_BODY + side]
+            body = body_of(friction, side)
             if body < system.mass.size:
                 at = system.bodies[body, 0]
                 for c in range(system.bodies[body, 1]):
@@ -115,13 +114,13 @@ def _find_bases(network, system, w, f, t, vdd):
 @kernel
 def _find_load(network, system, w, friction, lam, t, out, by_row):
     """out (7,) as of friction_solve.normal_load, and by_row (m,) its derivative by the multipliers, of its own rows."""
-    body = friction[FR_BODY + friction[FR_ON]]
+    body = body_of(friction, friction.on)
     at, turns = system.bodies[body, 0], system.bodies[body, 1] == 7
     reaction, half, torque = stack(6), stack(4), stack(3)
     for c in range(6):
         reaction[c] = 0.0
     for only_sum in range(2):
-        for j in range(friction[FR_FIRST], friction[FR_FIRST] + friction[FR_COUNT]):
+        for j in range(friction.first, friction.first + friction.count):
             e = network.row[network.friction_rows[j, 0]]
             row = w.Phi_q[e]
             for c in range(3):
@@ -170,7 +169,7 @@ def rub(context, t, vdd):
             b[i] = r.load[7 * i] - loads[i]
             for j in range(frictions):
                 x = 1.0 if i == j else 0.0
-                for h in range(friction[FR_FIRST], friction[FR_FIRST] + friction[FR_COUNT]):
+                for h in range(friction.first, friction.first + friction.count):
                     e = network.row[network.friction_rows[h, 0]]
                     x -= by_row[e] * r.basis[j, n + e]
                 r.J[i, j] = x

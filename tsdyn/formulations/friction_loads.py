@@ -3,7 +3,6 @@
 from ..elements.loops.forces import INTS
 from ..elements.loops.friction import call_normal_load, call_unit_friction
 from ..jit.kernels import caller, kernel
-from ..model.packed_friction import FR_INDEX, FR_KIND, FR_NORMAL, FR_ON, FR_UNIT
 from .tolerances import DAMPED, DAMPED_SHARE
 
 RUB = "pdp"  # context, t, vdd where the form has a basis: solves for friction and accelerations
@@ -11,10 +10,16 @@ call_rub = caller(RUB)
 
 
 @kernel
+def body_of(friction, side):
+    """The body of a side, 0 for a and 1 for b."""
+    return friction.body_a if side == 0 else friction.body_b
+
+
+@kernel
 def _instance(system, friction):
     """Floats of the instance; where its table and its floats begin."""
-    kind = system.forces[friction[FR_KIND]]
-    index = friction[FR_INDEX]
+    kind = system.forces[friction.kind]
+    index = friction.index
     return kind.stride, kind.table + INTS * index, kind.reals + kind.stride * index
 
 
@@ -22,7 +27,7 @@ def _instance(system, friction):
 def unit_friction(system, friction, q, qd, t, out):
     """out (14,) = generalised forces on the bodies a and b, for a normal load of one."""
     stride, own, real = _instance(system, friction)
-    call_unit_friction(friction[FR_UNIT], stride, system.table[own:], system.reals[real:], q, qd, t, out)
+    call_unit_friction(friction.unit, stride, system.table[own:], system.reals[real:], q, qd, t, out)
 
 
 @kernel
@@ -30,7 +35,7 @@ def normal_load(system, friction, q, qd, t, derive, reaction, out):
     """out (7,) = the normal load of a reaction (6,) and, with derive = 1, its derivative by that."""
     stride, own, real = _instance(system, friction)
     call_normal_load(
-        friction[FR_NORMAL], stride, system.table[own:], system.reals[real:], q, qd, t, friction[FR_ON], derive,
+        friction.normal, stride, system.table[own:], system.reals[real:], q, qd, t, friction.on, derive,
         reaction, out,
     )  # fmt: skip
 

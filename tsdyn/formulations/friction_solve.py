@@ -19,7 +19,6 @@ from ..errors import Status
 from ..jit.kernels import callback, kernel, long_kernel, stack
 from ..jit.simd import add, four, put, splat, sub, times
 from ..maths.dense_linalg import copy, largest
-from ..model.packed_friction import FR_BODY, FR_COUNT, FR_FIRST
 from ..rows.interface import (
     acceleration_residuals,
     add_axis_multipliers,
@@ -34,7 +33,7 @@ from ..rows.interface import (
 )
 from ..workspaces.workspace import load
 from .accelerations import body_forces
-from .friction_loads import RUB, forget_loads, is_settled, normal_load, step_share, unit_friction
+from .friction_loads import RUB, body_of, forget_loads, is_settled, normal_load, step_share, unit_friction
 from .tolerances import DAMPED, LOAD_ROUNDING, LOAD_SWEEPS, NEWTON_DONE, SLOW_LOADS
 
 OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
@@ -48,7 +47,7 @@ def _weigh_units(network, system, f, q, qd, t):
         friction = network.frictions[i]
         unit_friction(system, friction, q, qd, t, Q)
         for k in range(2):
-            body, at, o = friction[FR_BODY + k], 16 * i + 8 * k, 7 * k
+            body, at, o = body_of(friction, k), 16 * i + 8 * k, 7 * k
             put(r.g, at + 4, splat(0.0))
             for c in range(3):
                 r.g[at + c] = Q[o + c]
@@ -66,7 +65,7 @@ def _find_loads(network, system, f, q, qd, t, derive):
         friction = network.frictions[i]
         for c in range(6):
             reaction[c] = 0.0
-        for j in range(friction[FR_FIRST], friction[FR_FIRST] + friction[FR_COUNT]):
+        for j in range(friction.first, friction.first + friction.count):
             e, side = network.friction_rows[j]
             at = 16 * e + 8 * side
             for c in range(3):
@@ -83,7 +82,7 @@ def _rub_bodies(network, f):
     for i in range(network.frictions.shape[0]):
         N = splat(r.load[7 * i])
         for k in range(2):
-            z, at = 8 * network.frictions[i, FR_BODY + k], 16 * i + 8 * k
+            z, at = 8 * body_of(network.frictions[i], k), 16 * i + 8 * k
             put(f.Z, z, add(four(f.Z, z), times(four(r.g, at), N)))
             put(f.Z, z + 4, add(four(f.Z, z + 4), times(four(r.g, at + 4), N)))
     apply_multipliers(network, f.rows, r.lam, f.Z)
@@ -97,11 +96,11 @@ def _factorise(network, f, cold):
     if not cold:
         for i in range(network.frictions.shape[0]):
             friction = network.frictions[i]
-            a, b = friction[FR_BODY], friction[FR_BODY + 1]
+            a, b = friction.body_a, friction.body_b
             change[3] = change[7] = 0.0
             for c in range(3):
                 change[c], change[4 + c] = r.load[7 * i + 1 + c], r.load[7 * i + 4 + c]
-            for j in range(friction[FR_FIRST], friction[FR_FIRST] + friction[FR_COUNT]):
+            for j in range(friction.first, friction.first + friction.count):
                 e, side = network.friction_rows[j]
                 n = splat(-inner(f.rows.H, 16 * e + 8 * side, change, 0))
                 for k in range(2):

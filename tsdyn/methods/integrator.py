@@ -83,6 +83,9 @@ class Integrator:
     def __init__(self, step: float) -> None:
         self.step = positive(step, f"{type(self).__name__}: step (s)")
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}(step={self.step:g})"
+
     def bounded(self, longest: float) -> Self:
         """Return the method with steps of at most `longest`, s."""
         method = copy(self)
@@ -98,15 +101,14 @@ class Integrator:
         """Return the `Interpolant` of its steps; the one for every method uses their two ends alone."""
         return HERMITE_FIRST_ORDER if first_order else HERMITE
 
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}(step={self.step:g})"
-
 
 class ExplicitNystrom(Integrator):
     """A method that is a `NystromTableau`, with the Runge-Kutta tableau of its first-order equivalent.
 
     Examples
     --------
+    The midpoint rule:
+
     >>> import tsdyn as ts
     >>> class Midpoint(ts.ExplicitNystrom):
     ...     order = 2
@@ -180,6 +182,8 @@ class ExplicitRungeKutta(Adaptive):
 
     Examples
     --------
+    The pair of Bogacki and Shampine, of order 3(2):
+
     >>> import tsdyn as ts
     >>> class BogackiShampine(ts.ExplicitRungeKutta):
     ...     order = 3
@@ -214,6 +218,8 @@ class DiagonallyImplicit(Adaptive):
 
     Examples
     --------
+    The trapezoidal rule, with fixed steps:
+
     >>> import tsdyn as ts
     >>> class Trapezoid(ts.DiagonallyImplicit):
     ...     order = 2

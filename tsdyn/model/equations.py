@@ -94,7 +94,7 @@ def constraint_curvature(s, q, qd, qdd, t, lam, K, G1, G2):
     for i in range(s.kinds.shape[0]):
         kind = s.kinds[i]
         table, reals = s.table[kind.table :], s.reals[kind.reals :]
-        call_curvature(kind.curvature, kind.count, kind.stride, table, reals, q, qd, qdd, t, lam, q.size, K, G1, G2)
+        call_curvature(kind.curvature, kind.count, kind.stride, table, reals, q, qd, qdd, t, lam, K, G1, G2)
 
 
 @kernel

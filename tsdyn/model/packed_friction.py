@@ -5,10 +5,21 @@ import numpy as np
 from ..elements.element import address
 from ..elements.loops.forces import INTS
 from ..errors import InvalidForce
+from ..jit.kernels import Record, records
 
-# columns of Network.frictions: bodies a and b; the side that the reaction is taken on; where its rows are in
-# Network.friction_rows; row of System.forces and place in it; addresses of the loops of friction_loops
-FR_BODY, FR_ON, FR_FIRST, FR_COUNT, FR_KIND, FR_INDEX, FR_UNIT, FR_NORMAL, FR_COLUMNS = 0, *range(2, 10)
+
+class FrictionPlace(Record):
+    """A joint friction among the bodies and rows of a constraint graph."""
+
+    body_a: int
+    body_b: int
+    on: int  # the side, 0 for a and 1 for b, on which the reaction is taken
+    first: int  # where its rows begin in Network.friction_rows
+    count: int  # and how many they are
+    kind: int  # row of System.forces
+    index: int  # and its instance there
+    unit: int  # addresses of friction.unit_friction and friction.normal_load
+    normal: int
 
 
 def frictions_of(packed, bodies, rows_of, sides):
@@ -28,7 +39,7 @@ def frictions_of(packed, bodies, rows_of, sides):
         loops = (address(force.kernels, name, force.name, InvalidForce) for name in ("unit_friction", "normal_load"))
         pair = (bodies.get(id(body), len(bodies)) for body in (force.a, force.b))
         frictions.append([*pair, on, first, len(rows) - first, kind, index, *loops])
-    return np.array(frictions, np.int64).reshape(-1, FR_COLUMNS), np.array(rows, np.int64).reshape(-1, 2)
+    return records(FrictionPlace, frictions), np.array(rows, np.int64).reshape(-1, 2)
 
 
 def _place(kinds, row):

@@ -25,7 +25,7 @@ NOT_UNIQUE = (
     "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
     "leave free carries no inertia."
 )
-ROUNDS, MOST_AT_ONCE = 8, 64  # of taking back rows that were left out wrongly; how many pushes tell which
+ROUNDS, MOST_AT_ONCE = 8, 64  # of restoring rows dropped wrongly; random loads that identify them
 
 
 class Evaluation(NamedTuple):
@@ -49,21 +49,21 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
     Parameters
     ----------
     q, qd : array_like (n,), optional
-        Positions and velocities; default the start values of the bodies. They need not satisfy the constraints.
+        Positions and velocities; default: the initial values. They need not satisfy the constraints.
     t : float, s
 
     Returns
     -------
     Evaluation
         Named tuple of arrays: Phi, Phi_q, Phi_t, gamma, M, Q_A, S, multipliers, qdd; Phi_q and M are SciPy sparse
-        arrays where n is above 1000. Multipliers are NaN for rows that follow from others.
+        arrays where n is above 1000. Multipliers are NaN for redundant rows.
 
     Raises
     ------
     InvalidArgument
         If q or qd is not n finite numbers, or t is not finite.
     SingularConfiguration
-        If accelerations are not unique there, or rows that depend on each other contradict each other.
+        If the accelerations are not unique, or dependent rows are incompatible.
 
     Notes
     -----
@@ -87,23 +87,23 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
     if q.size > LARGE:
         return _evaluate_sparse(scene.packed, q, qd, float(t))
     Phi, Phi_q, Phi_t, gamma = constraint_arrays(system, q, qd, t)
-    M, S = mass_matrix(system, q), velocity_forces(system, q[None], qd[None])[0]
+    M, Q_v = mass_matrix(system, q), velocity_forces(system, q[None], qd[None])[0]
     Q_A = applied_loads(system, np.array([float(t)]), q[None], qd[None])[0]
     m, n = Phi_q.shape
     kkt = np.block([[M, Phi_q.T], [Phi_q, np.zeros((m, m))]])
 
     def solve(friction):
         try:
-            return equilibrated_solve(kkt, np.concatenate((Q_A + S + friction, -gamma)))
+            return equilibrated_solve(kkt, np.concatenate((Q_A + Q_v + friction, -gamma)))
         except np.linalg.LinAlgError:
-            return _of_independent_rows(M, Phi_q, Q_A + S + friction, gamma)
+            return _of_independent_rows(M, Phi_q, Q_A + Q_v + friction, gamma)
 
     friction, solution = _with_friction(scene.packed, t, q, qd, Phi_q, solve)
-    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, S, solution[n:], solution[:n])
+    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, Q_v, solution[n:], solution[:n])
 
 
 def _with_friction(packed, t, q, qd, Phi_q, solve):
-    """Frictions of joints (n,), and what solve(friction) gives of them."""
+    """Return friction forces of joints (n,), and solve(friction) with them."""
     if not packed.system.normals.size:
         return 0.0, solve(0.0)
     from .friction_balance import balance  # imported here: few scenes need it
@@ -112,7 +112,7 @@ def _with_friction(packed, t, q, qd, Phi_q, solve):
 
 
 def _of_independent_rows(M, Phi_q, load, gamma):
-    """(qdd, lam) with NaN for rows of Phi_q that follow from others, and hold with them."""
+    """Return (qdd, lam) with NaN for redundant rows, which hold all the same."""
     redundant = dependent(Phi_q)
     if not redundant.size:
         raise SingularConfiguration(NOT_UNIQUE)
@@ -126,7 +126,7 @@ def _of_independent_rows(M, Phi_q, load, gamma):
 
 
 def _with_gaps(found, kept, Phi_q, gamma):
-    """(qdd, lam) of all rows, from that of the kept ones; refused where some row doesn't hold with them."""
+    """Return (qdd, lam) of all rows, from that of the kept ones; refuse if a dropped row is violated."""
     m, n = Phi_q.shape
     left = Phi_q @ found[:n] + gamma
     if np.abs(left).max(initial=0.0) > RANK_TOL * (1.0 + np.abs(found[:n]).max()):
@@ -141,22 +141,22 @@ def _evaluate_sparse(packed, q, qd, t):
     n = q.size
     Phi, rows, Phi_t, gamma = constraint_arrays(system, q, qd, t, WIDTH)
     Phi_q, M = as_csr(packed, rows), mass_matrix_sparse(system, q)
-    S = velocity_forces(system, q[None], qd[None])[0]
+    Q_v = velocity_forces(system, q[None], qd[None])[0]
     Q_A = applied_loads(system, np.array([t]), q[None], qd[None])[0]
     regular = _sparse_solver(M, Phi_q)
 
     def solve(friction):
-        load = Q_A + S + friction
+        load = Q_A + Q_v + friction
         if regular is None:
             return _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t)
         return regular(load, gamma)
 
     friction, solution = _with_friction(packed, t, q, qd, Phi_q, solve)
-    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, S, solution[n:], solution[:n])
+    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, Q_v, solution[n:], solution[:n])
 
 
 def _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t):
-    """As `_of_independent_rows`, of sparse arrays."""
+    """Do the same as `_of_independent_rows` with sparse arrays."""
     m, found = len(gamma), False
     for share in REDUNDANT_SHARES:
         redundant = dependent_rows(packed, q, t, share)
@@ -172,16 +172,16 @@ def _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t):
             if not wrong.size:
                 return _with_gaps(solve(load, gamma[kept]), kept, Phi_q, gamma)
             redundant = np.delete(redundant, wrong)
-    solve = None if found else _sparse_solver(M, Phi_q, 0.0)  # regular, if not by much
+    solve = None if found else _sparse_solver(M, Phi_q, 0.0)  # nonsingular, however badly conditioned
     if solve is None:
         raise SingularConfiguration(NOT_UNIQUE)
     return solve(load, gamma)
 
 
 def _independent(rows, solve, still):
-    """Which of the rows that were left out are independent of the kept ones, and of one another.
+    """Return the dropped rows that are independent of the kept ones, and of one another.
 
-    What the kept ones let move, pushed at random, leaves those at rest that follow from them; `still` is their gamma.
+    Random accelerations admitted by the kept rows leave dependent rows unchanged; `still` is their gamma.
     """
     rng, n, count = np.random.default_rng(0), rows.shape[1], 1
     while True:
@@ -197,7 +197,7 @@ def _independent(rows, solve, still):
 
 
 def _sparse_solver(M, Phi_q, lost=LOST):
-    """(qdd, lam) of a load and gamma, by a sparse factorisation; None where it is singular to working precision."""
+    """Return the solver (load, gamma) -> (qdd, lam) by a sparse factorisation; None if it is numerically singular."""
     from scipy.sparse import block_array, diags_array
     from scipy.sparse.linalg import splu
 
@@ -215,7 +215,7 @@ def _sparse_solver(M, Phi_q, lost=LOST):
 
 
 def equilibrated_solve(A, b):
-    """Solve a symmetric system scaled to unit rows; LinAlgError where it is singular to working precision."""
+    """Solve a symmetric system scaled to unit rows; LinAlgError if it is numerically singular."""
     scale = 1.0 / np.sqrt(np.maximum(np.abs(A).max(axis=1), LEAST_DIVISOR))
     scaled = A * scale[:, None] * scale
     if A.size and np.linalg.cond(scaled) > 1.0 / LOST_DENSE:
@@ -224,8 +224,8 @@ def equilibrated_solve(A, b):
 
 
 def constraint_arrays(system, q, qd, t, width=None):
-    """Phi, Phi_q, Phi_t and gamma as the kernels give them; with a width, of a system with short rows."""
-    system = system._replace(reals=system.reals.copy())  # the motions' places are written to
+    """Return Phi, Phi_q, Phi_t and gamma by the kernels; width: length of short rows."""
+    system = system._replace(reals=system.reals.copy())  # kernels write motions there
     m, n = system.segments.shape[0], width or q.size
     Phi, Phi_q, Phi_t, gamma = np.zeros(m), np.zeros((m, n)), np.zeros(m), np.zeros(m)
     evaluate_constraints(system, q, qd, float(t), Phi, Phi_q, Phi_t, gamma)

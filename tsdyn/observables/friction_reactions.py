@@ -15,9 +15,9 @@ from .generalised_forces import applied_loads, inertial_forces, velocity_forces
 
 @entry
 def _solve(context, t, q, qd, r, out):
-    """out (k, frictions): normal loads with which Phi_q^T lam less the frictions is r (k, n); NaN where there are none.
+    """out (k, frictions): normal loads with Phi_q^T lam - sum_i g_i N_i = r (k, n); NaN if there are none.
 
-    H W (H^T lam - sum_i g_i N_i(lam)) = H W r: the equation of the accelerations, of what is left of the forces.
+    H W (H^T lam - sum_i g_i N_i(lam)) = H W r: the acceleration equation for the residual forces.
     """
     c = load_parts(context)
     network, s, f = c.network, c.system, c.free
@@ -33,7 +33,7 @@ def _solve(context, t, q, qd, r, out):
 
 
 def with_normal_loads(packed, t, q, qd, qdd, memory):
-    """What forces remember (k, slots) and then the normal loads of joints' frictions; memory as it is without any."""
+    """Return the memory of forces (k, slots), then normal loads of joint friction if there is any."""
     system = packed.system
     if not system.normals.size:
         return memory

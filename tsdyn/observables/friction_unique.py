@@ -5,7 +5,6 @@ import numpy as np
 from ..errors import RedundantConstraints
 from ..formulations.friction_loads import normal_load
 from ..jit.kernels import entry, resident, stack
-from ..model.packed_friction import FR_COUNT, FR_FIRST
 from ..rows.interface import count_self_stresses, redundancy, self_stress
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import network_of
@@ -16,7 +15,7 @@ from .uniqueness import find_rows
 
 @entry
 def _free_loads(context, t, q, whole, out):
-    """out (frictions,): the largest normal load that a self-stress of size one makes."""
+    """out (frictions,): the largest normal load in a unit self-stress."""
     c = load_parts(context)
     network, s, f = c.network, c.system, c.free
     reaction, none, found = stack(6), stack(7), stack(7)
@@ -28,7 +27,7 @@ def _free_loads(context, t, q, whole, out):
             for c in range(6):
                 reaction[c] = 0.0
             normal_load(s, friction, q, q, t, 0, reaction, none)
-            for j in range(friction[FR_FIRST], friction[FR_FIRST] + friction[FR_COUNT]):
+            for j in range(friction.first, friction.first + friction.count):
                 e, side = network.friction_rows[j]
                 at = 16 * e + 8 * side
                 for c in range(3):
@@ -39,7 +38,7 @@ def _free_loads(context, t, q, whole, out):
 
 
 def demand_unique(packed, q, t):
-    """Raise RedundantConstraints where a friction needs a reaction that isn't unique at q."""
+    """Raise RedundantConstraints if a friction depends on a reaction that isn't unique at q."""
     network = network_of(packed, REDUCED)
     if not (redundancy(network) and len(network.frictions)):
         return

@@ -27,10 +27,10 @@ MATRIX = np.zeros((0, 0))  # its type
 
 @entry("pv", MATRIX, MATRIX, MATRIX, MATRIX)
 def solve_multipliers(context, t, q, r, rows, out):
-    """out (k, m) with Phi_q^T lam = r, by least squares; r (k, n) is Q_A + S - M qdd. NaN where Phi_q is singular.
+    """out (k, m) with Phi_q^T lam = r, by least squares; r (k, n) is Q_A + Q_v - M qdd. NaN where Phi_q is singular.
 
-    S lam = H W r on the network with one step of refinement, r in terms of bodies, then the normalisations from what is
-    left of r along p. The system is that with short rows, rows (m, 14) scratch, zero on entry.
+    S lam = H W r on the network with one step of refinement, r in terms of bodies, then the normalisations from the
+    remainder of r along p. The system is that with short rows, rows (m, 14) scratch, zero on entry.
     """
     whole = load_parts(context)
     network, s, f = whole.network, whole.system, whole.free
@@ -47,7 +47,7 @@ def solve_multipliers(context, t, q, r, rows, out):
             for e in range(f.b.size):
                 if network.row[e] >= 0:
                     out[k, network.row[e]] += f.b[e]
-        for i in range(out.shape[1]):  # what the joints leave of r
+        for i in range(out.shape[1]):  # remainder of r
             for half in range(2):
                 at = s.segments[i, 2 * half]
                 for c in range(s.segments[i, 2 * half + 1]):
@@ -68,7 +68,7 @@ def solve_multipliers(context, t, q, r, rows, out):
 def multipliers(packed, t, q, qd, qdd, memory=None):
     """Multipliers (k, m) of M qdd + Phi_q^T lam = Q_A + Q_v; NaN where Phi_q has lost rank.
 
-    memory (k, slots) is what forces remember, zeros by default.
+    memory (k, slots): memory of forces, zeros by default.
     """
     memory = with_normal_loads(packed, t, q, qd, qdd, memory)
     system, network = with_short_rows(packed), network_of(packed, REDUCED)
@@ -100,7 +100,7 @@ def reaction(solution, member, body):
     system = system._replace(reals=system.reals.copy(), kinds=only(packed, member.parts))
     load = np.zeros((solution.t.size, system.bodies[index_of(packed, body), 1]))
     rows = np.zeros((len(system.segments), WIDTH))
-    halves = []  # where the body's numbers are in each row
+    halves = []  # half of each row that belongs to the body
     for part in packed.constraints[member.parts]:
         halves += [0 if body is part.a else WIDTH // 2 if body is part.b else -1] * part.rows
     lam = np.ascontiguousarray(particular(solution.multipliers)[:, member.rows])
@@ -110,7 +110,7 @@ def reaction(solution, member, body):
 
 
 def only(packed, parts):
-    """Of System.kinds what these primitives, a slice, need: a row each."""
+    """Return the entries of System.kinds for these primitives, a slice: one for each."""
     if packed.derived.places_within is None:
         seen, within = Counter(), []
         for constraint in packed.constraints:
@@ -127,7 +127,7 @@ def only(packed, parts):
 
 
 def loads_of(packed):
-    """The loads by the id of their force."""
+    """Return the loads by the id of their force."""
     if packed.derived.loads is None:
         packed.derived.loads = {id(load.force): load for load in packed.loads}
     return packed.derived.loads
@@ -161,7 +161,7 @@ def _at_first_point(solution, body, load, item, coordinates):
 def constraint_loads(s, t, q, lam, first, halves, rows, out):
     """out (k, 7 or 3) = -Phi_q^T lam of one body; lam (k, rows of the constraint), which begin at first.
 
-    halves (rows,) says where the body's numbers begin in each row, below zero where it has none.
+    halves (rows,) is the first entry of the body in each row, negative if there is none.
     """
     for k in range(t.size):
         set_time(s, t[k])

@@ -56,7 +56,7 @@ class State(Kinematics["float | Any"], _Arrays):
     def handles(self) -> Handles:
         """The bodies and joints of its scene."""
         raise InvalidArgument(
-            "this state has arrays alone and no bodies and joints: use solution.state, solution.at(t), or the "
+            "this state is arrays alone and knows no bodies and joints: ask solution.state, solution.at(t), or the "
             "state that an event receives."
         )
 

@@ -28,7 +28,7 @@ def find_rows(network, s, f, q, t, whole):
 
 @entry
 def free_loads(context, t, q, rows, sides, whole, out):
-    """out (k,): the largest load that a self-stress of size one has these rows put on a body, by their own size."""
+    """out (k,): the largest load on a body by these rows in a unit self-stress, relative to their size."""
     c = load_parts(context)
     network, s, f = c.network, c.system, c.free
     for k in range(t.size):

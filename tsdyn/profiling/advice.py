@@ -17,6 +17,7 @@ from ..integrators import SDIRK54, Taylor
 from ..simulation.method_choice import LARGEST_PILOT
 from ..simulation.scene_cache import prepared
 from ..taylor.layout import lacking, without_series
+from .phases import duration
 from .tolerances import (
     ALTERNATIVE,
     CAPPED,
@@ -34,13 +35,12 @@ from .tolerances import (
     REJECTED,
     SHORT,
 )
-from .units import duration
 
 SHOWN = 3
 
 
 class Alternative(NamedTuple):
-    """Another call for the same motion."""
+    """An alternative call for the same motion."""
 
     seconds: float
     gap: float  # of positions (m) and rotation matrices at the end
@@ -48,7 +48,7 @@ class Alternative(NamedTuple):
 
 
 def advise(profile, simulate, plain, options):
-    """What to change, a tuple of sentences.
+    """Return advice, a tuple of sentences.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def _steps(profile):
 
 
 def _alternatives(profile, run, plain, options, limit):
-    """Those that were tried and found quicker than the limit, s."""
+    """Return the alternatives that are faster than the limit, s."""
     method, solution = profile.method, profile.solution
     astray = []
 
@@ -179,13 +179,13 @@ def _alternatives(profile, run, plain, options, limit):
 
 
 def _allowed(integrator, method):
-    """How far apart the ends may be for an alternative to be advised."""
+    """Return the largest admissible difference of the final states."""
     tolerances = [tol for each in (integrator, method) if each is not None for tol in (each.rtol, each.atol) if tol]
     return min(ERRORS * max(tolerances), LARGEST_GAP) if tolerances else LARGEST_GAP
 
 
 def _series(profile, plain, limit, simulate):
-    """Why Taylor series can't run the scene; what they would cost without the forces in their way."""
+    """Return the reason why the scene has no Taylor series, and the time of a run without the forces at fault."""
     scene, method = profile.scene, profile.method
     packed = prepared(scene).packed
     found = lacking(packed)
@@ -206,9 +206,9 @@ def _series(profile, plain, limit, simulate):
 
 
 def _attempt(run, options, limit, solution):
-    """An `Alternative` to a solution, or to none, that is quicker by QUICKER; or None."""
+    """Return an `Alternative` that is faster by QUICKER, or None."""
     try:
-        run(**{**options, "max_steps": 1})  # loads what it needs
+        run(**{**options, "max_steps": 1})  # loads the kernels
         began = time.perf_counter()
         some = run(**{**options, "max_steps": SHORT})
         seconds, (start, end) = time.perf_counter() - began, some.span

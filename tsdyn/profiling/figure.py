@@ -2,7 +2,7 @@
 
 from ..benchmarking.figure import COLOURS
 from ..drawing import GREY, new_figure
-from .units import duration
+from .phases import duration
 
 
 def figure(profile):

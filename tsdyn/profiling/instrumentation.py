@@ -17,12 +17,12 @@ OF_FORCE = "force", "remember"
 
 
 class Entry(NamedTuple):
-    """What has run within something else, how often and for how long, less what has run within it."""
+    """Calls and exclusive time of one role within another."""
 
     role: int
     within: int  # the role
-    order: int  # of series; else -1
-    kind: int  # of constraint or force, as in Timekeeper.kinds; else -1
+    order: int  # of series; otherwise -1
+    kind: int  # of constraint or force, as in Timekeeper.kinds; otherwise -1
     loop: int  # which of its loops
     calls: int
     seconds: float
@@ -36,7 +36,7 @@ class Kind(NamedTuple):
 
 
 class Stopwatch:
-    """Seconds in the compiled driver. `observe` is for a driver: it is given the memory before the run."""
+    """Seconds in the compiled driver; a driver calls `observe` with the memory of a run before it starts."""
 
     def __init__(self):
         self.seconds, self.memory = 0.0, None
@@ -56,7 +56,7 @@ class Stopwatch:
         memory.advance = timed
 
     def release(self):
-        """After the run: the memory, which holds this, goes when nobody holds it."""
+        """Release the memory after the run, which refers to this object."""
         self.memory.__dict__.pop("advance", None)
 
     def begin(self):
@@ -67,7 +67,7 @@ class Stopwatch:
 
 
 class Timekeeper(Stopwatch):
-    """The same by what it does."""
+    """Times of the phases of a run."""
 
     def __init__(self):
         super().__init__()
@@ -82,7 +82,7 @@ class Timekeeper(Stopwatch):
         timers.stop(self.notes)
 
     def observe(self, memory):
-        """Put timers in."""
+        """Install the timers."""
         super().observe(memory)
         c, series = memory.context, hasattr(memory, "series")
         network, system = c.network, c.system
@@ -141,7 +141,7 @@ class Timekeeper(Stopwatch):
         return x._replace(places=places, table=table, forces=loads)
 
     def _in_driver(self, kernels, roles):
-        """Timers in place of addresses (not all of which need be there)."""
+        """Replace addresses by timers; an address may be zero."""
         for name, role in roles.items():
             address = getattr(kernels, name)
             if address:
@@ -149,7 +149,7 @@ class Timekeeper(Stopwatch):
                 setattr(kernels, name, timers.TIMERS[role].address)
 
     def _headed(self, table, rows):
-        """A table with a header before each kind's rows, which are given by place, length and loops; their places."""
+        """Return a table with a header before the rows of each kind, and the first row of each kind."""
         parts, firsts, at = [np.zeros(0, np.int64)], [], 0
         for first, length, loops, kind in rows:
             header = np.zeros(timers.HEADER, np.int64)
@@ -165,7 +165,7 @@ class Timekeeper(Stopwatch):
         return np.concatenate(parts), np.array(firsts, np.int64)
 
     def entries(self, cost):
-        """What has run, a list of `Entry`, the driver first, freed of what a timer costs (`timers.own_cost`)."""
+        """Return the readings, a list of `Entry`, the driver first, less the cost of the timers (`timers.own_cost`)."""
         half = 0.5 * cost
         slots = self.notes[timers.SLOTS :].reshape(-1, 2)
         unit, found = self.seconds / slots[:, 1].sum(), []

@@ -24,7 +24,7 @@ def _system(network, f):
 
 @entry
 def again(context, run, what, count):
-    """A part of the form without a basis."""
+    """Repeat a part of the tangent form."""
     c, r = load(context), load_run(run)
     w, f, l = c.work, c.free, c.local
     for _ in range(count):
@@ -39,7 +39,7 @@ def again(context, run, what, count):
 
 @entry
 def again_with_basis(context, run, what, count):
-    """A part of the forms with one."""
+    """Repeat a part of the forms with a basis."""
     c, r = load(context), load_run(run)
     for _ in range(count):
         if what == MASS:
@@ -50,14 +50,14 @@ def again_with_basis(context, run, what, count):
 
 @entry
 def again_in_series(context, run, what, count):
-    """A part of a Taylor step."""
+    """Repeat a part of a Taylor step."""
     c = load_series(context)
     for _ in range(count):
         _system(c.network, c.free)
 
 
 def prices(memory):
-    """Seconds of each part that the memory's form has, by name, at the state that its run has left."""
+    """Return seconds of each part of the memory's form, by name, at the final state of its run."""
     if hasattr(memory, "series"):
         function, parts = again_in_series, {"system": SYSTEM}
     elif memory.basis_free:
@@ -68,7 +68,7 @@ def prices(memory):
 
 
 def _seconds(call):
-    """Of one of n that call(n) makes: the least of some samples."""
+    """Return seconds of one of n repetitions in call(n): the least of several samples."""
     call(1)
     n, spent = 1, 0.0
     while True:

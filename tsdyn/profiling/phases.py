@@ -8,7 +8,7 @@ from . import timers as role
 
 
 class Phase(NamedTuple):
-    """A part of a call: what it belongs to, what it is, how often it ran, s altogether."""
+    """A part of a call: group, name, number of calls, total time in s."""
 
     group: str
     part: str
@@ -17,7 +17,7 @@ class Phase(NamedTuple):
 
     @property
     def each(self) -> float:
-        """Seconds a call; nan for what isn't called."""
+        """Seconds per call; nan without calls."""
         return self.seconds / self.calls if self.calls else float("nan")
 
 
@@ -28,7 +28,7 @@ class _Times:
         self.entries, self.kinds = entries, kinds
 
     def of(self, *roles, within=None):
-        """Calls and seconds of roles, alone."""
+        """Return calls and exclusive seconds of roles."""
         found = [e for e in self.entries if e.role in roles and within in (None, e.within)]
         return sum(e.calls for e in found), sum(e.seconds for e in found)
 
@@ -118,20 +118,28 @@ def orders(entries):
 
 
 class _Purse:
-    """Seconds, some of which are known to be spent on something."""
+    """A total of seconds from which known parts are taken."""
 
     def __init__(self, seconds):
         self.left = max(seconds, 0.0)
 
     def take(self, calls, price):
-        """What so many calls take of it, no more than there is."""
+        """Take the time of some calls, at most the remainder."""
         spent = min(calls * price, self.left)
         self.left -= spent
         return spent
 
 
 def _sorted(found):
-    """Those that ran, group by group; a timer's own cost may have left less than nothing."""
+    """Return the phases that ran, by groups; subtraction of timer costs may have made some negative."""
     groups = list(dict.fromkeys(phase.group for phase in found))
     kept = [phase._replace(seconds=max(phase.seconds, 0.0)) for phase in found if phase.calls]
     return sorted(kept, key=lambda phase: groups.index(phase.group))
+
+
+def duration(seconds):
+    """Seconds with a unit, three digits."""
+    for scale, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
+        if seconds >= scale:
+            return f"{seconds / scale:.3g} {unit}"
+    return f"{seconds * 1e9:.3g} ns"

@@ -49,7 +49,7 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     advice : bool
         Whether to run alternatives that may be faster, such as another method or looser tolerances.
     **options
-        As for `simulate`, but progress.
+        As for `simulate`, without progress.
 
     Returns
     -------
@@ -74,13 +74,13 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     if "progress" in options:
-        raise InvalidArgument("profile makes many runs, and so has no progress to show; leave progress out.")
+        raise InvalidArgument("profile makes many runs and has no progress; leave progress out.")
     if not isinstance(advice, (bool, np.bool_)):
         raise InvalidArgument(f"advice must be True or False, got {advice!r}.")
     before = dict(statistics)
     solution, seconds = _timed(scene, t_span, options)
     loaded = {name: statistics[name] - before.get(name, 0) for name in ("hits", "misses", "seconds")}
-    if solution.stats.seconds["run"] < LONG:  # what it took besides may be of kernels loaded or compiled
+    if solution.stats.seconds["run"] < LONG:  # the first call may have loaded or compiled kernels
         solution, seconds = _timed(scene, t_span, options)
     start, end = interval(t_span)[0], solution.reached
     if not end > start:
@@ -119,7 +119,7 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
 
 
 def _timed(scene, t_span, options):
-    """A solution, and the seconds of its call; Ctrl-C ends the profile."""
+    """Return a solution and the seconds of its call; Ctrl-C ends the profile."""
     began = time.perf_counter()
     solution = simulate(scene, t_span, **options)
     seconds = time.perf_counter() - began
@@ -133,13 +133,13 @@ def _without(options):
 
 
 def _first(scene, options):
-    """The method that a call begins with where none is named."""
+    """Return the initial default method."""
     series = options.get("formulation", "tangent") == "tangent" and options.get("chart_interval") is None
     return method_choice.explicit(prepared(scene), options.get("rtol"), options.get("atol"), series)
 
 
 def _method(scene, solution, options):
-    """The method that made a solution."""
+    """Return the method of a solution."""
     if options.get("integrator") is not None:
         return method_of(options["integrator"], options.get("rtol"), options.get("atol"))
     method = _first(scene, options)
@@ -147,14 +147,14 @@ def _method(scene, solution, options):
 
 
 def _observed(method, observer):
-    """The method with a driver that lets an observer see its memory."""
+    """Return the method with a driver that passes its memory to an observer."""
     method = copy.copy(method)
     method.driver = partial(DRIVERS[method.driver], observe=observer.observe)
     return method
 
 
 def _rounds(scene, method, span, plain, sorts, seconds):
-    """The least seconds of each sort of call, in turn; the last stopwatch, the quickest timekeeper and its solution."""
+    """Return the least seconds of each kind of call, the last stopwatch, the fastest timekeeper and its solution."""
     least, keeper, run = {}, None, None
     _timed(scene, span, {**plain, "integrator": _observed(method, Timekeeper()), "max_steps": 1})  # loads the timers
     for _ in range(int(np.clip(SAMPLE / seconds, FEWEST if seconds < LONG else 1, MOST))):
@@ -172,7 +172,7 @@ def _rounds(scene, method, span, plain, sorts, seconds):
 
 
 def _outputs(asked, least, chosen, solution):
-    """What is asked for besides the two ends, each by what a call takes longer with it."""
+    """Return the phases of requested outputs, each by the additional time of a call."""
     total = max(chosen - least["plain"], 0.0)
     if not asked:
         return [Phase("outputs", "every step", solution.t.size, total)]
@@ -187,7 +187,7 @@ def _outputs(asked, least, chosen, solution):
 
 
 def _once(scene, method, options, start):
-    """Seconds of what a scene's first call does and later ones find done."""
+    """Return seconds of work that only the first call of a scene does."""
     seconds, clock = {}, time.perf_counter
     scene.touch()
     began = clock()

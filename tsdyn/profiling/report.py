@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from ..hints import Integrator, Phase, Scene, Solution
 
 from ..drawing import Drawn
-from .units import duration
+from .phases import duration
 
 SKIPPED = {
     "solves_skipped": "position solves, on the constraints to rounding already",
@@ -29,19 +29,19 @@ class Profile(Drawn):
     Attributes
     ----------
     seconds : float
-        Of the call, once everything is loaded: the least of some.
+        Time of the call with all kernels loaded: the least of several.
     driver : float
-        Seconds of it in the compiled driver, without outputs between the steps.
+        Time in the compiled driver, without outputs between steps.
     phases : tuple of Phase
-        group, part, calls, seconds; and `each`, seconds a call.
+        group, part, calls, seconds; and `each`, seconds per call.
     orders : tuple of (int, float)
-        Of Taylor: calls and seconds of each order from zero, without its loops over constraints and forces.
+        Taylor method: calls and seconds of each order from zero, without loops over constraints and forces.
     once : dict
-        Seconds of what only a scene's first call does, by name.
+        Seconds of work of the first call alone, by name.
     skipped : dict
-        What was not needed, by its name in `Solution.stats`.
+        Skipped work, by its name in `Solution.stats`.
     advice : tuple of str
-        What to change, each with what it was measured to bring; empty where nothing stands out.
+        Advice, each item with its measurement; empty if nothing stands out.
     solution : Solution
     """
 
@@ -64,16 +64,16 @@ class Profile(Drawn):
 
     @property
     def accounted(self) -> float:
-        """The share of the driver's time that its phases add up to: what timers add and what they miss is off it."""
+        """The sum of the phases over the time of the driver; timer errors make the difference to 1."""
         return sum(p.seconds for p in self.phases if p.group not in _OUTSIDE) / self.driver
 
     @property
     def skipped(self) -> dict[str, int]:
-        """What was not needed, by its name in `Solution.stats`."""
+        """Skipped work, by its name in `Solution.stats`."""
         return {name: getattr(self.solution.stats, name) for name in SKIPPED}
 
     def share(self, group: str, part: str | None = None) -> float:
-        """The share of the call that a group takes, or a part of it."""
+        """The share of a group in the call, or of a part of a group."""
         return sum(p.seconds for p in self.phases if p.group == group and part in (None, p.part)) / self.seconds
 
     def groups(self) -> dict[str, float]:
@@ -84,7 +84,7 @@ class Profile(Drawn):
         }
 
     def _rows(self):
-        """(whether a group's own, cells) of the table."""
+        """Yield (True for a group, False for a part; cells) of the table."""
         for group, seconds in self.groups().items():
             parts = [phase for phase in self.phases if phase.group == group]
             only = parts[0] if len(parts) == 1 else None
@@ -137,7 +137,7 @@ class Profile(Drawn):
         )
 
     def _repr_html_(self) -> str:
-        """The same in a notebook."""
+        """Return the text as a table, for notebooks."""
         rows = ["".join(f"<th>{cell}</th>" for cell in HEAD)]
         for own, cells in self._rows():
             tag = "th" if own else "td"

@@ -41,7 +41,7 @@ from ..runs.dense_output import call_chart, call_complete
 from ..runs.stepper import call_check
 from ..taylor.step_parts import call_expand, call_reach
 
-# what may run: the driver, and what it and others call; ROWS is any loop over constraints or forces
+# roles: the driver, and the kernels called by address; ROWS is any loop over constraints or forces
 DRIVER, PLACE, ACCELERATE, COMPLETE, CHECK, CHART, STEP, NORM = range(8)
 LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, EXPAND, REACH, ROWS, ROLES = range(8, 17)
 # roles of the kernels whose addresses drivers are given, by their names in `Kernels` and `StageKernels`
@@ -84,7 +84,7 @@ call_clock = caller("pp")
 
 @kernel
 def _now(notes):
-    """The time, in units of whatever tells it."""
+    """Return the time, in units of the clock."""
     if notes[CLOCK] == 0:
         return cycles()
     call_clock(notes[CLOCK], notes[FIRST], data_of(notes) + 8 * BUFFER)
@@ -93,7 +93,7 @@ def _now(notes):
 
 @kernel
 def _enter(notes, slot, role):
-    """From here on the time is that of a slot, of those that begin there the one of the role that has been running."""
+    """Attribute time to a slot from now on, offset by the role that was running."""
     now, top = _now(notes), notes[DEPTH]
     running = STACK + 2 * top
     slot += notes[running + 1]
@@ -105,7 +105,7 @@ def _enter(notes, slot, role):
 
 @kernel
 def _leave(notes):
-    """Back to what was running before."""
+    """Return to the slot that was running before."""
     now, top = _now(notes), notes[DEPTH]
     notes[SLOTS + 2 * notes[STACK + 2 * top] + 1] += now - notes[LAST]
     notes[DEPTH], notes[LAST] = top - 1, now
@@ -265,7 +265,7 @@ SERIES_TIMER = _timer(_series, SERIES, "series")
 
 
 def new_notes(kinds):
-    """Notes of a run with so many kinds of constraints and forces."""
+    """Return the notes of a run, for a number of kinds of constraints and forces."""
     notes = np.zeros(SLOTS + 2 * (FIRST_KIND + kinds * LOOPS * ROLES), np.int64)
     if HAS_CYCLES:
         return notes
@@ -281,14 +281,14 @@ def new_notes(kinds):
 
 @entry
 def start(notes):
-    """The driver runs from now on."""
+    """Start the clock of the driver."""
     notes[DEPTH] = 0
     notes[LAST] = _now(notes)
 
 
 @entry
 def stop(notes):
-    """It has run until now."""
+    """Stop the clock of the driver."""
     now = _now(notes)
     notes[SLOTS + 1] += now - notes[LAST]
 
@@ -303,7 +303,7 @@ LITTLE = 20  # numbers
 
 
 def _do_little(context):
-    """Something for the processor to do besides, as there always is: what a reading takes is partly hidden by it."""
+    """Work of a typical callback: it hides part of the cost of a reading."""
     x = vector(context, LITTLE)
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     for i in range(0, LITTLE, 4):
@@ -319,7 +319,7 @@ _little = Callback(_do_little, "p")
 
 
 def own_cost(count=10000, rounds=15):
-    """Seconds that a timer takes, half of them within what it times: the least of some rounds with, less without."""
+    """Return the seconds of a timer, half of them in the timed phase: least time with it, less least time without."""
     notes, context = new_notes(0), np.zeros(1 + LITTLE)
     notes[TARGETS + CHECK] = _little.address
     context[:1].view(np.int64)[0] = notes.ctypes.data

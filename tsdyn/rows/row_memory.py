@@ -47,8 +47,8 @@ def _allocate_friction(network, n, basis):
 
 def reset_selection(network, free):
     """Select the rows of the scene's first start again, and forget multipliers and singularity indicators."""
-    free.friction.lam[:] = 0.0
-    free.friction.load[:] = 0.0
+    free.friction.lam.fill(0.0)
+    free.friction.load.fill(0.0)
     set_selection(free, network.dropped)
     free.selection.weakest = 1.0
     free.indicator.clear()

@@ -60,11 +60,11 @@ class Memory:
         for array in self._written:
             array.fill(0)
         reset_selection(self.network, self.context.free)
-        own.reals[:] = system.reals  # motions, signals and what forces remember are written there
+        own.reals[...] = system.reals  # motions, signals and what forces remember are written there
         enter_joints(run, task.prepared.handles, task.remembered)
         if own.memory.size:
             own.reals[own.memory] = task.remembered[len(run.joints) :]
-        work.q[:], work.qd[:] = task.q, task.qd
+        work.q[...], work.qd[...] = task.q, task.qd
         run.now[0], run.now[1] = task.q, task.qd
         control = work.control
         control.u_tol = control.b_tol = task.constraint_tol

@@ -16,7 +16,7 @@ class StepEngine:
 
     def __init__(self, task):
         prepared, method, form = task.prepared, task.method, task.form.serving(task.method)
-        self.task = task._replace(form=form)
+        self.task = task if form is task.form else task._replace(form=form)
         n, m, packed = prepared.n, prepared.m, prepared.packed
         self.network = form.network(packed)
         self.sizes = form.sizes(n, m, self.network)

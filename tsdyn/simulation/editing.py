@@ -93,7 +93,7 @@ def found(scene, item):
     owner = getattr(item, "owner", None)
     if owner is not None:
         raise InvalidArgument(f"{item.name} is a part of {owner.title}; remove that instead.")
-    raise InvalidArgument(f"the scene has no {item!r}: give a body, constraint or force of the scene, or its name.")
+    raise InvalidArgument(f"the scene has nothing like {item!r}: give a body, constraint or force of it, or a name.")
 
 
 def _users(scene, item):

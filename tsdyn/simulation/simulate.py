@@ -146,10 +146,11 @@ def simulate(  # many arguments, by name: each is an option of a run
         method = method.bounded(options.max_step)
 
     started = time.perf_counter()
-    task = _request(scene, kept, method, options, state)
-    if integrator is None and task.sampling is None:  # a sampled controller can't be rerun
-        same = {name: given[name] for name in ("constraint_tol", "initial_tol", "max_step")}
-        task = task._replace(choose=method_choice.chooser(simulate, scene, method, task.span[1], same))
+    choose = None
+    if integrator is None:
+        same = {"constraint_tol": constraint_tol, "initial_tol": initial_tol, "max_step": max_step}
+        choose = method_choice.chooser(simulate, scene, method, options.span[1], same)
+    task = _request(scene, kept, method, options, state, choose)
     outcome = _run(task, scene, options.initial_tol)
     ended = time.perf_counter()
     if outcome.status == Status.STIFF:
@@ -157,7 +158,7 @@ def simulate(  # many arguments, by name: each is an option of a run
     return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
 
-def _request(scene, kept, method, options, state):
+def _request(scene, kept, method, options, state, choose):
     """Return the run request, with a start that is consistent with the constraints."""
     span, form = options.span, options.form
     for motion in kept.motions:
@@ -167,11 +168,13 @@ def _request(scene, kept, method, options, state):
     q, qd = kept.start(scene, q, qd, span[0], options.initial_tol, memory, options.drop)
     if not form.serving(method).basis_free:
         demand_holonomic(kept.packed, q, span[0], form.name)
-    asked = {name: value for name, value in options._asdict().items() if name in Task._fields}
     stops = stops_of(kept.motions, instants_of(kept.packed, *span), *span)
     sampling = Sampling(kept, state is not None) if sampled(kept.packed) else None
-    made = {"prepared": kept, "method": method, "q": q, "qd": qd, "remembered": memory, "choose": None}
-    return Task(**{**asked, **made}, interval=options.chart_interval or 0, stops=stops, sampling=sampling)
+    return Task(
+        kept, method, form, span, q, qd, memory, options.times, options.dense_output,
+        options.events, options.constraint_tol, options.max_steps, options.chart_interval or 0, options.report,
+        options.history, choose if sampling is None else None, stops, sampling,  # a sampled controller can't be rerun
+    )  # fmt: skip
 
 
 def _run(task, scene, initial_tol):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..jit.kernels import Record, records
-from ..model.packed_friction import FR_COLUMNS
+from ..model.packed_friction import FrictionPlace
 from .massless_axes import Axes, no_axes
 from .panels import Pattern
 from .symbolic import analyse
@@ -81,7 +81,7 @@ class Network(NamedTuple):
     dropped: (
         np.ndarray
     )  # int64: rows that follow from the others, as chosen at the first start; see independent_rows.py
-    frictions: np.ndarray  # int64 (frictions, FR_COLUMNS): those that follow from reactions; see packed_friction.py
+    frictions: np.ndarray  # (frictions,) of FrictionPlace: those that follow from reactions
     friction_rows: np.ndarray  # int64 (rows of their joints, 2): which row, and on which side its reaction is taken
     rub: np.ndarray  # int64 (1,): address of what solves for them, as the form needs it
     axes: Axes  # rows of bodies with next to no inertia about an axis
@@ -94,6 +94,6 @@ def no_network():
     kinds, products, parts = records(RowKind), records(Product), records(PartProduct)
     return Network(
         pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none, parts, np.zeros(0),
-        pairs, none, none, np.zeros((0, FR_COLUMNS), np.int64), pairs, np.zeros(1, np.int64),
+        pairs, none, none, records(FrictionPlace), pairs, np.zeros(1, np.int64),
         no_axes(),
     )  # fmt: skip

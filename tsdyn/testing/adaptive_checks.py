@@ -18,7 +18,7 @@ from .tolerances import (
 
 
 def check_tolerances(method, case, form, where, order):
-    """Errors that follow the tolerance, steps that follow the order of the estimate."""
+    """Check that errors follow the tolerance, and steps the order of the estimate."""
     tolerances, found, asked, steps = BY_ORDER[order >= 4], [], [], []
     for tol in tolerances:
         made = make_method(method, rtol=tol, atol=tol)
@@ -48,7 +48,7 @@ def check_tolerances(method, case, form, where, order):
 
 
 def _history(solution, where):
-    """Accepted steps that follow on each other, and all steps counted."""
+    """Check that accepted steps are contiguous, and all steps counted."""
     h = solution.steps
     t, accepted = h.t[h.accepted], h.h[h.accepted]
     gap = np.abs(t[:-1] + accepted[:-1] - t[1:]).max(initial=0.0)
@@ -59,7 +59,7 @@ def _history(solution, where):
 
 
 def check_rejections(method, case, form, where):
-    """The first accepted step after a rejection ends where it ends when it is tried at once."""
+    """Check that the step after a rejection is the step without one."""
     bold = make_method(method, rtol=REJECTED, atol=REJECTED)
     bold.first_step = case.end / 10.0
     after = run_case(case, bold, form, max_steps=1)
@@ -79,7 +79,7 @@ def check_rejections(method, case, form, where):
 
 
 def check_bounds(method, case, form, where):
-    """first_step and max_step are kept."""
+    """Check that first_step and max_step are respected."""
     made = make_method(method, rtol=BOUNDED, atol=BOUNDED)
     made.first_step, made.max_step = case.end / 1000.0, case.end / 400.0
     steps = finished(run_case(case, made, form), where).steps

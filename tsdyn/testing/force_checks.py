@@ -48,7 +48,7 @@ def check_force(kind: type[Force] | Callable[[AnyBody, AnyBody], Force], *, seed
     Parameters
     ----------
     kind : Force subclass, or callable (a, b) -> Force
-        A class is tried with its own `example(rng, a, b)`.
+        A class is checked with its `example(rng, a, b)`.
     seed, states : int
         As for `check_primitive`.
 
@@ -92,7 +92,7 @@ def _check(scene, force, name, rng):
     _, lost, applied = (np.broadcast_to(x, (1,))[0] for x in load_powers(packed, load, t, q[None], qd[None], memory))
     size = np.abs(value) @ np.abs(qd)
     if lost < -ROUNDED * size:
-        raise CheckFailed(f"{name}: dissipation is {lost:.6g} W; it is what the force takes and can't be negative.")
+        raise CheckFailed(f"{name}: dissipation is {lost:.6g} W; it can't be negative.")
     undriven = force.conservative and all(Signal.is_zero(getattr(force, attribute)) for attribute in force.loads)
     if undriven and not abs(applied) <= ROUNDED * (1.0 + size):
         raise CheckFailed(
@@ -102,7 +102,7 @@ def _check(scene, force, name, rng):
 
 
 def _check_twin(packed, load, name, t, q, qd, value, coordinates):
-    """The compiled force against the Python one, carried back by xd_qd."""
+    """Compare the compiled force with the Python law, transformed by xd_qd."""
     x, xd = marker_states(packed, load, q[None], qd[None])
     par = [part for p in load.parameters for part in (p.value(t[0]) if isinstance(p, Signal) else [p])]
     par += [0.0] * load.force.memory + [1.0] * (load.normal >= 0)

@@ -31,9 +31,9 @@ def maker(kind, bases, error, example):
 
 
 def instances(make, rng, states):
-    """Yield (scene, instance, arrangement); make(a, b, alone) returns None where an arrangement means nothing.
+    """Yield (scene, instance, arrangement); make(a, b, alone) returns None for an arrangement without meaning.
 
-    alone is True where one of a and b is the ground.
+    alone is True if one of a and b is the ground.
     """
     for arrangement in ARRANGEMENTS:
         for _ in range(states):

@@ -20,7 +20,7 @@ FORMS = ("tangent", "maggi-kane")
 
 
 class Finding(NamedTuple):
-    """What was observed of a method on one scene."""
+    """Results of a method on one scene."""
 
     scene: str
     formulation: str

@@ -40,7 +40,7 @@ def check_primitive(
     Parameters
     ----------
     kind : Primitive or Joint subclass, or callable (a, b) -> Primitive or Joint
-        Of a joint every part is checked, then all together. A class is tried with its own `example(rng, a, b)`.
+        Of a joint every part is checked, then all together. A class is checked with its `example(rng, a, b)`.
         Primitives that have markers on a only get b too and may ignore it. The kernels of a primitive that has no
         `example` of its own are checked with its parameters changed at random, too: defaults hide errors.
     seed : int

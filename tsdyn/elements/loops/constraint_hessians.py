@@ -8,11 +8,11 @@ Complex steps of the primitive's jacobian and gamma in the marker coordinates x 
 rounding. The chain rule x(q) is quadratic in q, so its second derivative is `rotate_gradient` with another p.
 """
 
-from ...jit.kernels import ANY, complex_stack, complex_stack2, integers, kernel, matrix, part, stack, stack2, vector
+from ...jit.kernels import ANY, complex_stack, complex_stack2, integers, kernel, part, stack, stack2, vector
 from ...maths.euler_parameters import rotate_gradient
 from ..markers import PARAMETERS, chain_rule, rate
 from ..tolerances import CONSTRAINT_STEP
-from .coordinate_rows import INTS, ROW
+from .coordinate_rows import INTS, ROW, STRIDE
 from .template import (
     AT,
     CODES,
@@ -28,7 +28,7 @@ from .template import (
     move_markers,
 )
 
-SIGNATURE = "iipppppdpippp"  # count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2
+SIGNATURE = "iipppppdpppp"  # count, stride, table, reals, q, qd, qdd, t, lam, K, G1, G2
 SPAN = 14  # coordinates of two bodies
 
 
@@ -150,17 +150,17 @@ def _add_geometric(own, real, lam, J, XHX):
                     XHX[7 * k + 3 + b, 7 * k + 3 + d] += e[b]
 
 
-def loop(count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2):
-    """All instances: K +=, G1 =, G2 =; 13 arguments, as a callback is given each array by its address."""
+def loop(count, stride, table, reals, q, qd, qdd, t, lam, K, G1, G2):
+    """All instances: K +=, G1 =, G2 =; twelve arguments, as a callback is given each array by its address."""
     table, reals, lam = integers(table, ANY), vector(reals, ANY), vector(lam, ANY)
-    q, qd, qdd = vector(q, n), vector(qd, n), vector(qdd, n)
-    K, G1, G2 = matrix(K, n, n), vector(G1, ANY), vector(G2, ANY)
+    q, qd, qdd = vector(q, ANY), vector(qd, ANY), vector(qdd, ANY)
+    K, G1, G2 = vector(K, ANY), vector(G1, ANY), vector(G2, ANY)
     x, xd, xdd = stack(SIZE), stack(SIZE), stack(SIZE)
     J, a1, a2, g_xd = stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE)
     H, XHX = stack2(SIZE, SIZE), stack2(SPAN, SPAN)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        own_lam = lam[own[ROW] :]
+        own_lam, n = lam[own[ROW] :], own[STRIDE]
         move_markers(q, qd, own, real, x, xd, xdd)
         _accelerate_markers(q, qdd, own, real, xdd)
         _derive(x, xd, xdd, real[3 * MARKERS :], t, own_lam, J, a1, a2, g_xd, H)
@@ -178,5 +178,5 @@ def loop(count, stride, table, reals, q, qd, qdd, t, lam, n, K, G1, G2):
             for l in range(2):
                 for c in range(own[DIMENSION + k]):
                     for d in range(own[DIMENSION + l]):
-                        K[own[AT + k] + c, own[AT + l] + d] += XHX[7 * k + c, 7 * l + d]
+                        K[(own[AT + k] + c) * n + own[AT + l] + d] += XHX[7 * k + c, 7 * l + d]
     return 0

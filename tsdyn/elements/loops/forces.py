@@ -68,51 +68,54 @@ def remembers(count, stride, table, reals, q, qd, t, out):
     return 0
 
 
+@part
+def _complex_slope(z, zd, along, c, par, t, g, slope):
+    """slope[:, c] = f_along, by a complex step of along (z or zd), whose imaginary parts are zero."""
+    for r in range(SIZE):
+        g[r] = 0.0
+    here = along[c]
+    along[c] = complex(here.real, FORCE_STEP)
+    kernel_law(z, zd, par, t, g)
+    along[c] = here
+    for r in range(SIZE):
+        slope[r, c] = g[r].imag / FORCE_STEP
+
+
 def complex_steps(x, xd, par, t, fx, fxd):
     """f_x and f_xd (SIZE, SIZE), exact to rounding."""
     z, zd, g = complex_stack(SIZE), complex_stack(SIZE), complex_stack(SIZE)
     for c in range(SIZE):
         z[c], zd[c] = x[c], xd[c]
     for c in range(SIZE):
-        for r in range(SIZE):
-            g[r] = 0.0
-        z[c] = complex(x[c], FORCE_STEP)
-        kernel_law(z, zd, par, t, g)
-        z[c] = x[c]
-        for r in range(SIZE):
-            fx[r, c] = g[r].imag / FORCE_STEP
-            g[r] = 0.0
-        zd[c] = complex(xd[c], FORCE_STEP)
-        kernel_law(z, zd, par, t, g)
-        zd[c] = xd[c]
-        for r in range(SIZE):
-            fxd[r, c] = g[r].imag / FORCE_STEP
+        _complex_slope(z, zd, z, c, par, t, g, fx)
+        _complex_slope(z, zd, zd, c, par, t, g, fxd)
+
+
+@part
+def _central_slope(x, xd, along, c, par, t, g, slope):
+    """slope[:, c] = f_along, by differences of fourth order of along (x or xd)."""
+    here = along[c]
+    h = FORCE_QUOTIENT * max(1.0, abs(here))
+    for r in range(SIZE):
+        slope[r, c] = 0.0
+    for k in range(-2, 3):
+        weight = (8.0 * k if k * k == 1 else -0.5 * k) / 12.0
+        if k != 0:
+            for r in range(SIZE):
+                g[r] = 0.0
+            along[c] = here + k * h
+            kernel_law(x, xd, par, t, g)
+            along[c] = here
+            for r in range(SIZE):
+                slope[r, c] += weight / h * g[r]
 
 
 def central_differences(x, xd, par, t, fx, fxd):
     """f_x and f_xd by differences of fourth order, error about 1e-12 of the force's size."""
     g = stack(SIZE)
     for c in range(SIZE):
-        for r in range(SIZE):
-            fx[r, c], fxd[r, c] = 0.0, 0.0
-        place, rate = x[c], xd[c]
-        h, hd = FORCE_QUOTIENT * max(1.0, abs(place)), FORCE_QUOTIENT * max(1.0, abs(rate))
-        for k in range(-2, 3):
-            weight = (8.0 * k if k * k == 1 else -0.5 * k) / 12.0
-            if k != 0:
-                for r in range(SIZE):
-                    g[r] = 0.0
-                x[c] = place + k * h
-                kernel_law(x, xd, par, t, g)
-                x[c] = place
-                for r in range(SIZE):
-                    fx[r, c] += weight / h * g[r]
-                    g[r] = 0.0
-                xd[c] = rate + k * hd
-                kernel_law(x, xd, par, t, g)
-                xd[c] = rate
-                for r in range(SIZE):
-                    fxd[r, c] += weight / hd * g[r]
+        _central_slope(x, xd, x, c, par, t, g, fx)
+        _central_slope(x, xd, xd, c, par, t, g, fxd)
 
 
 @part

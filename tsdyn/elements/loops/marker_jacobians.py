@@ -57,6 +57,15 @@ def carry_back(code, dimension, at, q, s, f, Q):
 
 
 @kernel
+def _rate(code, p, pd, s, out):
+    """out (3,) = xd of a Vector or of a Turn, bilinear in p and pd."""
+    if code == TURN:
+        turning(p, pd, out)
+    else:
+        rotate_rate(p, pd, s, out)
+
+
+@kernel
 def derivatives(code, dimension, at, q, qd, s, row, column, W, X, Y):
     """W = xd_qd, X = x_q and Y = xd_q of one marker, from [row, column] on; zero on entry."""
     if dimension != 0 and code == POINT:
@@ -76,18 +85,12 @@ def derivatives(code, dimension, at, q, qd, s, row, column, W, X, Y):
             X[row + j, c] = 1.0
             continue
         e[j] = 1.0
-        if code == TURN:
-            turning(p, e, f)
-        else:
-            rotate_rate(p, e, s, f)
+        _rate(code, p, e, s, f)
         for i in range(3):
             W[row + i, c] = f[i]
             if code != TURN:
                 X[row + i, c] = f[i]
-        if code == TURN:
-            turning(e, pd, f)
-        else:
-            rotate_rate(e, pd, s, f)
+        _rate(code, e, pd, s, f)
         for i in range(3):
             Y[row + i, c] = f[i]
         e[j] = 0.0

@@ -7,6 +7,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.mechanisms import (
+    LENGTH,
     SEEDS,
     assert_same,
     body,
@@ -19,7 +20,6 @@ from tests.helpers.mechanisms import (
     snapshot,
     speeds,
 )
-from tests.helpers.scenes import length, length_d
 from tests.helpers.tolerances import ALGEBRA, COARSE, EXACT, FINE, HELD, ROUNDING
 
 C = ts.constraints
@@ -197,6 +197,6 @@ def test_constraints_that_depend_on_time_are_met_at_t(t):
         for b, s in ((two, (0.1, 0.3, 0)), (three, (0, 0, 0.1)))
     ]
     d, dd = ends[0] - ends[1], rates[0] - rates[1]
-    assert np.linalg.norm(d) == pytest.approx(length(t), abs=ALGEBRA)
-    assert d @ dd / np.linalg.norm(d) == pytest.approx(length_d(t), abs=ALGEBRA)
+    assert np.linalg.norm(d) == pytest.approx(LENGTH[0](t), abs=ALGEBRA)
+    assert d @ dd / np.linalg.norm(d) == pytest.approx(LENGTH[1](t), abs=ALGEBRA)
     ts.simulate(scene, (t, t + 0.01), integrator=ts.integrators.Nystrom4(1e-3)).raise_if_failed()

@@ -60,7 +60,7 @@ def test_every_force_is_public():
     assert set(F.__all__) == {kind.__name__ for kind in FORCES} | {"registered"}
 
 
-@pytest.mark.slow_but("0-Spring")
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FORCES, **by_name)
 @pytest.mark.parametrize("seed", range(2))
 def test_kernels_jacobians_and_power(kind, seed):

@@ -78,7 +78,7 @@ def instances(name, rng):
         yield scene
 
 
-@pytest.mark.slow_but("Distance")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KINDS)
 def test_second_derivatives_of_constraints(name, rng):
     """At states that satisfy nothing, |p| other than one; every row against differences of Phi_q, Phi_t and gamma."""
@@ -174,7 +174,7 @@ INTERNAL = [kind for kind in built_in.FORCES if kind not in (F.PointForce, F.Tor
 INTERNAL = [k for k in INTERNAL if k.__module__.startswith("tsdyn.") and not issubclass(k, JointLoad)]
 
 
-@pytest.mark.slow_but("Spring-*")
+@pytest.mark.slow
 @pytest.mark.parametrize("swapped", [False, True], ids=["a to b", "b to a"])
 @pytest.mark.parametrize("kind", INTERNAL, ids=lambda kind: kind.__name__)
 def test_kept_derivatives_are_exact_in_a_scene_turned_as_a_whole(kind, swapped, rng):

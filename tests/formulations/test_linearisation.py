@@ -113,7 +113,7 @@ def test_jacobian_of_point_masses(rng):
     demand_derivatives(points(rng), rng)
 
 
-@pytest.mark.slow_but("hung-*")
+@pytest.mark.slow
 @pytest.mark.parametrize(("make", "scale"), [(jointed, 1e-5), (hung, 1e-4)], ids=lambda x: getattr(x, "__name__", x))
 def test_jacobian_of_stiff_scenes(make, scale, rng):
     """Softened, so that differences of f don't drown in the rounding of its size."""

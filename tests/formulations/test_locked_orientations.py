@@ -327,6 +327,7 @@ def test_memory_is_used_again_after_an_edit(method):
     np.testing.assert_array_equal(again.multipliers, first.multipliers)
 
 
+@pytest.mark.slow
 def test_reactions_among_redundant_rows_are_as_unique_as_before():
     """Of a carriage on two rails the rails' reactions are not, that of the bob's ball joint is."""
     scene = SCENES["rails"][0]()

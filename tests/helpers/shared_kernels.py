@@ -1,7 +1,7 @@
-"""The kernels that most tests need: every method and form, all constraints and forces with the default method.
+"""The kernels that most tests need: explicit methods and Taylor, every form, all constraints and most forces.
 
-What is rare isn't among them, and tests of it are `slow`: implicit methods on constraints other than Distance, series
-of a thousand bodies, joint friction.
+What is rare isn't among them, and tests of it are `slow`: implicit methods, series of a thousand bodies, friction of
+joints.
 """
 
 import tsdyn as ts
@@ -20,7 +20,7 @@ def shared_kernels():
     """Yield them, with repetitions."""
     I, (tangent, *others) = ts.integrators, FORMULATIONS.values()
     explicit = I.DOP853(1e-8, 1e-8), I.RK45(1e-6, 1e-6), I.Nystrom4()
-    for method in (I.Taylor(1e-8), *explicit, I.SDIRK54(1e-6, 1e-6), I.ImplicitTrapezoid(1e-4, 1e-4)):
+    for method in (I.Taylor(1e-8), *explicit):
         yield from of_method(method, tangent, True)
     for form in others:
         for method in explicit:
@@ -29,7 +29,7 @@ def shared_kernels():
     yield from (choose_anew, run_program, solve_multipliers, dependent_rows._choose)
     for kind in PRIMITIVES:
         for moving in (False, *[True] * ("phi_t" in kind.kernels)):
-            yield from of_constraint(kind, moving, implicit=kind is ts.constraints.Distance)
+            yield from of_constraint(kind, moving)
     for kind in FORCES:
         if not issubclass(kind, ts.JointFriction):
-            yield from of_force(kind.own_kernels, implicit=kind is ts.forces.Spring)
+            yield from of_force(kind.own_kernels)

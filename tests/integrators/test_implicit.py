@@ -9,6 +9,7 @@ from tests.helpers.driven_rod import driven
 from tests.helpers.reference import demand_on_the_manifold, load, run
 from tests.helpers.tolerances import CLOSE, EPS, HELD, LOOSE
 
+pytestmark = pytest.mark.slow  # kernels of their own, which explicit methods don't need
 I = ts.integrators
 SDIRK54, ImplicitTrapezoid, RK45 = I.SDIRK54, I.ImplicitTrapezoid, I.RK45
 SCENES = ("sliding_top", "two_body_pendulum", "two_body_pendulum_spatial")

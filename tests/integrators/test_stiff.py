@@ -13,6 +13,7 @@ from tests.helpers.closed_forms import compound_pendulum, point_pendulum
 from tests.helpers.reference import demand_on_the_manifold
 from tests.helpers.tolerances import CLOSE, HELD, NEAR
 
+pytestmark = pytest.mark.slow  # kernels of their own, which explicit methods don't need
 I = ts.integrators
 by_name = {"ids": lambda x: getattr(x, "__name__", str(x))}
 SDIRK54, ImplicitTrapezoid, RK45 = I.SDIRK54, I.ImplicitTrapezoid, I.RK45

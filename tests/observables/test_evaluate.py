@@ -216,7 +216,7 @@ def test_evaluation_leaves_its_arguments_and_the_scene_alone(rng):
     np.testing.assert_array_equal(scene.bodies[0].position, definition["bodies"][0]["position"])
 
 
-@pytest.mark.slow_but("ring")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "redundant"),
     [

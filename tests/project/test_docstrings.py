@@ -32,7 +32,14 @@ def registries():
 
 
 @pytest.mark.slow_for(
-    "tsdyn.forces.CoulombFriction", "tsdyn.profile", "tsdyn.testing.*", "tsdyn.forces.*Friction", "tsdyn.forces.Torque"
+    "tsdyn.forces.CoulombFriction",
+    "tsdyn.profile",
+    "tsdyn.testing.*",
+    "tsdyn.forces.*Friction",
+    "tsdyn.forces.Torque",
+    "tsdyn.integrators.SDIRK54",
+    "tsdyn.integrators.ImplicitTrapezoid",
+    "tsdyn.DiagonallyImplicit",
 )
 @pytest.mark.parametrize("name", OBJECTS | METHODS)
 def test_examples_print_what_they_say(name, registries):

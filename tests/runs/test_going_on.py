@@ -139,6 +139,7 @@ def test_a_result_outlives_a_change_of_its_scene():
     assert two.constraint_error.acceleration.max() < FINE
 
 
+@pytest.mark.slow
 def test_runs_in_threads_are_the_runs_one_after_the_other():
     """Scenes of their own, and one scene for all."""
     shared = SCENES["chain"]()

@@ -59,6 +59,7 @@ def test_a_run_is_the_same_whatever_ran_before(make, rng):
         same(run(scene, way), first[way])
 
 
+@pytest.mark.slow
 def test_a_result_is_not_at_the_mercy_of_later_runs():
     scene = top.build()
     one = run(scene, "dense")

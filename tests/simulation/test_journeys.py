@@ -78,11 +78,7 @@ def runs():
 
 
 @pytest.mark.slow_but(
-    "None-tangent-[!f]*",
-    "*-tangent-point masses-*",
-    "[!is]*-tangent-one body-*",
-    "*-null-space-one body-*",
-    "*-maggi-kane-one body-*",
+    "None-tangent-[!f]*", "[!is]*-tangent-one body-*", "*-null-space-one body-*", "*-maggi-kane-one body-*"
 )
 @pytest.mark.parametrize(("method", "form", "scene", "index"), runs(), ids=str)
 def test_every_result_answers_everything(method, form, scene, index):

@@ -73,6 +73,7 @@ def memory(scene):
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", [*FAMILIES, "wheel"])
 def test_memory_grows_as_the_scene_does(family):
     make = wheel if family == "wheel" else lambda n: mechanisms.build(FAMILIES[family](n))
@@ -96,7 +97,7 @@ def test_constraints_hold_for_a_thousand_bodies(definition, options):
 HUBS = {"hub": lambda: mechanisms.build(mechanisms.hub(40)), "wheel": lambda: wheel(40), "spider": lambda: spider(100)}
 
 
-@pytest.mark.slow_for("*null-space")
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [*METHODS.values(), {"formulation": "null-space"}], ids=[*METHODS, "null-space"])
 @pytest.mark.parametrize("scene", HUBS.values(), ids=HUBS)
 def test_a_hub_moves_as_in_one_piece(scene, options, monkeypatch):
@@ -236,6 +237,7 @@ def test_errors_of_many_constraints_at_once(rng):
         np.testing.assert_allclose(accelerations[i], expected[3], rtol=0, atol=10 * size)
 
 
+@pytest.mark.slow
 def test_reactions_of_one_of_many(rng):
     """A constraint's force is -Phi_r^T lam of its rows alone, driven ones and the last of their kind included."""
     scene = ts.Scene()

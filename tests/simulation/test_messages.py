@@ -194,6 +194,7 @@ def load(factor):
     return lambda t: (factor, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_the_same_source_and_constants_are_compiled_once():
     _, a, _ = two()
     first, second, other = (F.PointForce(a, force=load(factor)).force for factor in (1.0, 1.0, 2.0))

@@ -119,6 +119,7 @@ def check_newton_euler(definition, end=0.5):
         np.testing.assert_allclose(spin_rate, np.broadcast_to(torque, spin_rate.shape), atol=tolerance)
 
 
+@pytest.mark.slow_but("*body to body*")
 @pytest.mark.parametrize("name", PRIMITIVES)
 @pytest.mark.parametrize("between", BETWEEN)
 def test_newton_euler_balance_of_a_pair(name, between, rng):

@@ -152,6 +152,7 @@ def test_charts_have_room_when_a_run_of_many_fails(monkeypatch):
         assert solution.charts.t.size >= solution.stats.steps // interval
 
 
+@pytest.mark.slow
 def test_a_stiff_transient_may_change_velocities_at_once():
     """A fixed step far beyond the transient's time, with an L-stable method."""
     scene = ts.Scene(gravity=(0.0, 0.0, 0.0))

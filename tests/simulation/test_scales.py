@@ -65,6 +65,7 @@ def test_events_see_the_scene_s_own_positions():
     assert min(seen) > AWAY[0] - 3.0
 
 
+@pytest.mark.slow
 def test_a_function_of_the_state_is_given_the_scene_s_own_positions():
     scene = pendulum(AWAY)
     scene.add(F.PointForce(scene.bodies[0], force=attraction))

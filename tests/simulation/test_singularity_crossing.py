@@ -24,6 +24,7 @@ SHAPES = {
 }
 
 
+@pytest.mark.slow_for("*1e-0*")
 @pytest.mark.parametrize("tol", [1e-6, 1e-8, 1e-10, 1e-12])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_parallelogram_turns_over_and_over(shape, tol):

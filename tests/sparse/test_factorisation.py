@@ -246,6 +246,7 @@ def test_a_grid_fills_in_little():
     assert pattern.shape[1] < 31 / 4 * n * math.log2(k)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [0, 4, 17, 29])
 @pytest.mark.parametrize("value", [-1.0, 1e-17, math.nan])  # 1e-17 is what rounding leaves of a repeated row
 def test_failure_names_the_row(row, value):
@@ -272,6 +273,7 @@ def test_failure_names_the_row(row, value):
         assert factor_lu(pattern, lower, upper, 1e-14) == failed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_late_nodes_have_negative_pivots(seed):
     """[A, B; B^T, -C] with A definite and C next to nothing, as bodies without inertia about an axis make it."""

@@ -134,6 +134,7 @@ def chain(rng):
     return build(random_chain(rng, 2))
 
 
+@pytest.mark.slow_for("plug-in*", "force, of the body*", "torque, of the body*")
 @pytest.mark.parametrize(("name", "between"), ALONE)
 def test_a_force_alone(name, between, rng):
     scene = chain(rng)
@@ -151,6 +152,7 @@ def test_a_primitive_alone(name, between, rng):
     follows_the_same_path(scene)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("between", BETWEEN)
 def test_a_plug_in_with_a_square_root(between, rng):
     scene = ts.Scene()

@@ -40,7 +40,7 @@ def torsional(a, b, **numbers):
     return F.TorsionalSpring(a, b, axis_a=(0, 0.2, 1), reference_a=(1, 0, 0), reference_b=(0.2, 1, 0.3), **numbers)
 
 
-@pytest.mark.slow_but("Spring*", "ViscousFriction*")
+@pytest.mark.slow_but("Spring*")
 @pytest.mark.parametrize("make", SMOOTH.values(), ids=SMOOTH.keys())
 def test_series_of_forces(make):
     ts.testing.check_force(make, states=1)
@@ -97,7 +97,7 @@ def pair():
     return scene, *scene.bodies, rng
 
 
-@pytest.mark.slow_but("Spherical")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind", [C.Spherical, C.Distance, C.Dot1, C.Dot2, C.PlaneContact, C.AngleDriver, C.Thread, C.Gear, Rod]
 )
@@ -167,6 +167,7 @@ def test_checker_sees_scratch_memory_that_is_too_small_or_read_too_early():
         check_constraint_series(scene, early, "Early", rng)
 
 
+@pytest.mark.slow
 def test_checker_sees_a_law_that_depends_on_time():
     class Timed(Soft):
         @staticmethod

@@ -135,7 +135,7 @@ class SingularConfiguration(TsdynError, ArithmeticError):
     ...     ts.simulate(scene, (0, 1))
     ... except ts.SingularConfiguration as error:
     ...     print(str(error).partition(", so")[0])
-    needle: rotation about the axis [0. 0. 1.] of its frame is free and has no inertia
+    needle: rotation about the axis [0. 0. 1.] of its frame is free and carries no inertia
     """
 
 

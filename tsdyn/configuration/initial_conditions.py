@@ -112,7 +112,7 @@ class _Start:
         body, axis = axis_of(self.network.axes, row)
         raise SingularConfiguration(
             f"{self.scene.bodies[body].name}: rotation about the axis {np.round(axis, 3) + 0.0} of its frame is free "
-            "and has no inertia, so the accelerations are not determined. Give it inertia about that axis, or add "
+            "and carries no inertia, so the accelerations are not determined. Give it inertia about that axis, or add "
             "the constraint that holds it."
         )
 

@@ -1,8 +1,8 @@
 """What the loops over the instances of a kind are written in: names that each kind has filled in, and shared parts.
 
 A loop is a template. `specialised` copies it, and the parts that it calls, for one kind of constraint or force, with
-the names below replaced by the constants and kernels of that kind. Parts are inlined: many arguments cost nothing there,
-and a loop is given each array by its address, so both may have up to twelve.
+the names below replaced by the constants and kernels of that kind. Parts are inlined, so arguments cost nothing there;
+a loop is given each array by its address. Both may have up to twelve.
 """
 
 from ...jit.kernels import part

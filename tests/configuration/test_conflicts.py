@@ -33,6 +33,15 @@ def bystanders(scene):
     scene.add(C.Distance(bead, rod, length=1.3, name="string"))
 
 
+def chain_of(count):
+    """Links of half a metre in a straight row from the ground, on balls; the builder and the links."""
+    m, points = Builder(), [0.5 * i * polar(0.0) for i in range(count + 1)]
+    links = [m.link(f"link {i}", points[i], points[i + 1]) for i in range(count)]
+    for i in range(count):
+        m.ball(links[i - 1] if i else None, links[i], points[i], f"ball {i}")
+    return m, links
+
+
 def triangle():
     """Three rods of 1, 1 and 3 m between three beads."""
     scene = ts.Scene()
@@ -141,10 +150,7 @@ def test_one_that_nothing_can_meet():
 @pytest.mark.slow
 def test_many_suspects():
     """A chain of ten links that is too short for its ends: all of it conflicts, and the rod across it doesn't."""
-    m, points = Builder(), [0.5 * i * polar(0.0) for i in range(11)]
-    links = [m.link(f"link {i}", points[i], points[i + 1]) for i in range(10)]
-    for i in range(10):
-        m.ball(links[i - 1] if i else None, links[i], points[i], f"ball {i}")
+    m, links = chain_of(10)
     scene = m.scene
     scene.add(C.Spherical(links[-1], scene.ground, point_a=(0.25, 0, 0), point_b=(6, 0, 0), name="far ball"))
     scene.add(C.Dot1(links[4], scene.ground, axis_a=Z, axis_b=Y, value=0.1, name="roll"))
@@ -156,10 +162,7 @@ def test_many_suspects():
 @pytest.mark.slow
 def test_a_rod_whose_ends_a_ball_holds_together():
     """At the least that is left over the rod has no length, nor a derivative; it isn't the rod alone."""
-    m, points = Builder(), [0.5 * i * polar(0.0) for i in range(6)]
-    links = [m.link(f"link {i}", points[i], points[i + 1]) for i in range(5)]
-    for i in range(5):
-        m.ball(links[i - 1] if i else None, links[i], points[i], f"ball {i}")
+    m, links = chain_of(5)
     ends = {"point_a": (0.25, 0, 0), "point_b": (-0.25, 0, 0)}
     m.scene.add(C.Distance(links[2], links[3], **ends, length=0.3, name="rod"))
     links[3].position = np.add(links[3].position, (0.0, 0.02, 0.01))

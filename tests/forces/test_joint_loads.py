@@ -7,17 +7,12 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.helpers.methods import one_of_each
 from tests.helpers.tolerances import COARSE, FINE, HELD, LOOSE, NEAR, ROUGH, ROUNDING
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 PERIOD, INERTIA = 0.1, 2.0
-METHODS = {
-    "taylor": {"integrator": I.Taylor(tol=1e-12)},
-    "dop853": {"integrator": I.DOP853(1e-10, 1e-10)},
-    "null-space": {"integrator": I.DOP853(1e-10, 1e-10), "formulation": "null-space"},
-    "nystrom4": {"integrator": I.Nystrom4(step=0.003)},
-    "sdirk54": {"integrator": I.SDIRK54(1e-9, 1e-9)},
-}
+METHODS = one_of_each(tol=1e-10, step=0.003)
 
 
 class PID:

@@ -26,6 +26,12 @@ def both(make, end, integrator, **options):
     ]
 
 
+def assembled(definition):
+    scene = build(definition)
+    scene.assemble()
+    return scene
+
+
 def demand_same(one, two, growth):
     """The same steps and charts, and states that rounding has driven apart by no more than `growth` eps."""
     assert one.charts.reason == two.charts.reason
@@ -112,25 +118,14 @@ def test_without_any_constraint():
 @pytest.mark.parametrize("name", PRIMITIVES)
 def test_every_primitive(name, between, rng):
     definition = random_pair(rng, name, between)
-
-    def make():
-        scene = build(definition)
-        scene.assemble()
-        return scene
-
-    one, two = both(make, 0.5, I.Nystrom4(step=1e-3))
+    one, two = both(lambda: assembled(definition), 0.5, I.Nystrom4(step=1e-3))
     demand_same(one, two, 1e4)
 
 
 @pytest.mark.slow
 @given(definition=chains(), seed=st.integers(0, 100))
 def test_random_chains(definition, seed):
-    def make():
-        scene = build(definition)
-        scene.assemble()
-        return scene
-
-    one, two = both(make, 0.1, I.Nystrom4(step=2e-3))
+    one, two = both(lambda: assembled(definition), 0.1, I.Nystrom4(step=2e-3))
     demand_same(one, two, 1e5)
 
 

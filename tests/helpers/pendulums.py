@@ -44,3 +44,16 @@ def pendulum(angle, joint="Spherical"):
         for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)):
             scene.add(C.Dot1(body, scene.ground, axis_a=(0.0, 1.0, 0.0), axis_b=axis))
     return scene, body, hinge
+
+
+def pulled_straight():
+    """Two links that a growing distance pulls straight: no motion goes beyond that."""
+    scene = ts.Scene()
+    knee = scene.add_point_mass(1.0, (0.6, 0.0, -0.8), name="knee")
+    hand = scene.add_point_mass(1.0, (1.2, 0.0, 0.0), name="hand")
+    scene.add(C.Distance(knee, scene.ground, name="upper"))
+    scene.add(C.Distance(hand, knee, name="lower"))
+    reach = (lambda t: 1.2 + 0.8 * t, lambda t: 0.8 + 0.0 * t, lambda t: 0.0 * t)
+    scene.add(C.Distance(hand, scene.ground, length=reach, name="reach"))
+    scene.assemble()
+    return scene

@@ -72,3 +72,10 @@ def demand_on_the_manifold(solution, state):
     found = constraint_error(solution.packed, state.t, state.q, state.qd, state.qdd)
     for level, values, factor in zip(found, (state.q, state.qd, state.qdd), (50, 500, 5000), strict=True):
         assert (level <= factor * EPS * (1.0 + np.abs(values).max(axis=1))).all()
+
+
+def demand_every_level(solution):
+    """The three levels of constraints hold to multiples of rounding, row by row."""
+    levels = solution.constraint_error
+    for level, values, factor in zip(levels, (solution.q, solution.qd, solution.qdd), (50, 500, 5000), strict=True):
+        assert (level <= factor * EPS * (1.0 + np.abs(values).max(axis=1))).all()

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.reference import error, load, run
+from tests.helpers.pendulums import pulled_straight
+from tests.helpers.reference import demand_every_level, error, load, run
 from tests.helpers.tolerances import CLOSE, FINE, HELD, ROUGH, ROUNDING
 
 C = ts.constraints
@@ -38,9 +39,7 @@ def test_order_with_charts_by_the_criteria(formulation):
 def test_error_follows_the_tolerance(name, tol):
     solution, off = run(name, RK45(rtol=tol, atol=tol))
     assert off < max(100.0 * tol, 3e-11)
-    levels = solution.constraint_error
-    for level, values, factor in zip(levels, (solution.q, solution.qd, solution.qdd), (50, 500, 5000), strict=True):
-        assert (level <= factor * np.finfo(float).eps * (1.0 + np.abs(values).max(axis=1))).all()
+    demand_every_level(solution)
 
 
 @pytest.mark.parametrize(("name", "tol", "end"), [("chain_4", 1e-9, 1.0), ("chain_16", 1e-6, 0.4)])
@@ -106,16 +105,7 @@ def test_driven_and_free_scenes():
 
 
 def test_collapsing_step_says_where_and_hands_back_what_it_had():
-    """Two links that a growing distance pulls straight: no motion goes beyond that."""
-    scene = ts.Scene()
-    knee = scene.add_point_mass(1.0, (0.6, 0.0, -0.8), name="knee")
-    hand = scene.add_point_mass(1.0, (1.2, 0.0, 0.0), name="hand")
-    scene.add(C.Distance(knee, scene.ground, name="upper"))
-    scene.add(C.Distance(hand, knee, name="lower"))
-    reach = (lambda t: 1.2 + 0.8 * t, lambda t: 0.8 + 0.0 * t, lambda t: 0.0 * t)
-    scene.add(C.Distance(hand, scene.ground, length=reach, name="reach"))
-    scene.assemble()
-    solution = ts.simulate(scene, (0.0, 2.0), integrator=RK45(1e-8, 1e-8))
+    solution = ts.simulate(pulled_straight(), (0.0, 2.0), integrator=RK45(1e-8, 1e-8))
     assert not solution.success
     assert 0.9 < solution.t[-1] <= 1.0
     assert np.isfinite(solution.q).all()

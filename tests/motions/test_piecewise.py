@@ -16,6 +16,7 @@ from scipy.interpolate import (
 )
 
 import tsdyn as ts
+from tests.helpers.methods import one_of_each
 from tests.helpers.motion_series import series
 from tests.helpers.tolerances import ALGEBRA, CLOSE, FINE, HELD, TIGHT
 
@@ -35,13 +36,7 @@ SPLINES = {
     "periodic": CubicSpline(KNOTS[:4], ROUND[[0, 1, 2, 0]], bc_type="periodic"),
     "periodic B": make_interp_spline(KNOTS, ROUND, bc_type="periodic"),
 }
-METHODS = {
-    "taylor": {"integrator": I.Taylor(tol=1e-12)},
-    "dop853": {"integrator": I.DOP853(1e-11, 1e-11)},
-    "null-space": {"integrator": I.DOP853(1e-11, 1e-11), "formulation": "null-space"},
-    "nystrom4": {"integrator": I.Nystrom4(step=0.01)},
-    "sdirk54": {"integrator": I.SDIRK54(1e-9, 1e-9)},
-}
+METHODS = one_of_each(tol=1e-11, step=0.01)
 
 
 def value(spline, t, derivative=0):

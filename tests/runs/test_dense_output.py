@@ -10,6 +10,7 @@ import pytest
 import tsdyn as ts
 from tests.helpers.closed_forms import point_pendulum
 from tests.helpers.driven_rod import driven
+from tests.helpers.pendulums import pulled_straight
 from tests.helpers.reference import load
 from tests.helpers.tolerances import CLOSE, EPS, EXACT, ROUNDING
 from tsdyn.observables.diagnostics import constraint_error
@@ -161,16 +162,7 @@ def test_error_within_one_step(method, power, fine):
 
 
 def test_a_failed_run_keeps_what_it_had():
-    """Two links that a growing distance pulls straight: no motion goes beyond that."""
-    scene = ts.Scene()
-    knee = scene.add_point_mass(1.0, (0.6, 0.0, -0.8), name="knee")
-    hand = scene.add_point_mass(1.0, (1.2, 0.0, 0.0), name="hand")
-    scene.add(C.Distance(knee, scene.ground, name="upper"))
-    scene.add(C.Distance(hand, knee, name="lower"))
-    reach = (lambda t: 1.2 + 0.8 * t, lambda t: 0.8 + 0.0 * t, lambda t: 0.0 * t)
-    scene.add(C.Distance(hand, scene.ground, length=reach, name="reach"))
-    scene.assemble()
-    solution = ts.simulate(scene, (0.0, 2.0), integrator=I.DOP853(1e-8, 1e-8), dense_output=True)
+    solution = ts.simulate(pulled_straight(), (0.0, 2.0), integrator=I.DOP853(1e-8, 1e-8), dense_output=True)
     assert not solution.success
     state = solution.at(solution.t[-1])
     np.testing.assert_allclose(state.q, solution.q[-1], atol=CLOSE)

@@ -10,8 +10,8 @@ import tsdyn as ts
 from tests.helpers.locked_scenes import SCENES, C, F, X, Y, Z, block, floating, slider_crank, slides, welded
 from tests.helpers.minimal_coordinates import balance
 from tests.helpers.tolerances import ALGEBRA, CLOSE, EXACT, FAIR, FINE, HELD, ROUGH, ROUNDING, TIGHT
-from tsdyn.formulations.locked_orientations import keep_turning, moving_network, still
-from tsdyn.sparse.constraint_graphs import network_of
+from tsdyn.formulations.locked_orientations import keep_turning, moving_graph, still
+from tsdyn.sparse.constraint_graphs import graph_of
 
 I = ts.integrators
 END = 1.0
@@ -93,8 +93,8 @@ def test_steps_are_those_with_every_rotation(name):
 @pytest.mark.parametrize("name", SCENES)
 def test_the_equations_are_fewer(name):
     packed = run(SCENES[name][0]()).packed
-    whole, left = network_of(packed), moving_network(packed)
-    counts = [(network.row >= 0).sum() - network.dropped.size for network in (whole, left)]
+    whole, left = graph_of(packed), moving_graph(packed)
+    counts = [(graph.row >= 0).sum() - graph.dropped.size for graph in (whole, left)]
     assert counts[0] - counts[1] == 3 * len(still(packed).bodies) > 0
     assert len(whole.welds) >= len(left.welds) >= len(whole.welds) // 2
     assert (left.bodies[:, 0] == whole.bodies[:, 0]).all()
@@ -104,7 +104,7 @@ def test_a_scene_that_turns_everything_has_one_network():
     plain = ts.Scene()
     body = block(plain, (0.0, 0.0, -1.0), 0.2)
     plain.add(C.Revolute.at(body, plain.ground, point=(0.0, 0.0, 0.0), axis=Y))
-    assert moving_network(plain.packed) is network_of(plain.packed)
+    assert moving_graph(plain.packed) is graph_of(plain.packed)
     assert run(plain).stats.rotations_skipped == 0
 
 

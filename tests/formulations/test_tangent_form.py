@@ -12,7 +12,7 @@ from tests.helpers.reference import NAMES, load
 from tests.helpers.scenes import BETWEEN, MOTION, PRIMITIVES, build, random_body, random_chain, random_pair
 from tests.helpers.tolerances import CLOSE, COARSE, EPS, FINE, HELD, ROUGH, TIGHT
 from tsdyn.formulations.registry import formulation
-from tsdyn.sparse.constraint_graphs import network_of
+from tsdyn.sparse.constraint_graphs import graph_of
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 FORMS = ("tangent", "null-space")
@@ -169,8 +169,8 @@ def test_no_matrix_grows_with_the_square(monkeypatch):
 
 
 def test_network_of_a_chain_has_no_fill():
-    network = network_of(pendulum_chain.build(100).packed)
-    assert network.pattern.shape[1] < 100 * 36
+    graph = graph_of(pendulum_chain.build(100).packed)
+    assert graph.pattern.shape[1] < 100 * 36
 
 
 # levers and units

@@ -70,7 +70,7 @@ class Tangent:
         work = allocate(n, m, len(scene.bodies), 1e-14, packed.size)
         work.q[:], work.qd[:] = q, qd
         form = formulation("null-space")
-        parts = basis_free_parts(form.network(packed), n, True)
+        parts = basis_free_parts(form.graph(packed), n, True)
         self.context = Context(system, work, allocate_linear(system, n, m, True, kept), *parts)
         self.address, *self._keep = resident(self.context)
         self.at = np.array([*form.addresses().values(), *form.implicit().values()][:10], np.int64)

@@ -173,7 +173,7 @@ def test_packages_say_what_they_are_for(package):
 
 
 # arguments of kernels that have one order everywhere, and the packages whose kernels keep to it
-ARGUMENTS = ("context", "network", "system", "w", "f", "l", "linear", "q", "qd", "qdd", "t", "out")
+ARGUMENTS = ("context", "graph", "system", "w", "f", "l", "linear", "q", "qd", "qdd", "t", "out")
 NAMED_THRESHOLDS = ("rows", "sparse", "formulations", "workspaces")  # no bare numbers in kernels
 ORDERED = ("rows", "sparse", "formulations", "workspaces", "constraints", "forces", "taylor", "configuration", "maths")
 

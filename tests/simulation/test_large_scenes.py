@@ -117,10 +117,10 @@ def test_a_hub_moves_as_in_one_piece(scene, options, monkeypatch):
 
 def test_a_hub_is_cut():
     """Uncut, 200 rods would give a dense block of 180 000 numbers, and time that grows with the cube."""
-    network = prepared(mechanisms.build(mechanisms.hub(200))).series.network
-    assert network.pattern.shape[1] < 200 * 120
-    assert network.welds.shape[0] > 0
-    small = prepared(mechanisms.build(mechanisms.hub(12))).series.network
+    graph = prepared(mechanisms.build(mechanisms.hub(200))).series.graph
+    assert graph.pattern.shape[1] < 200 * 120
+    assert graph.welds.shape[0] > 0
+    small = prepared(mechanisms.build(mechanisms.hub(12))).series.graph
     assert small.welds.shape[0] == 0
 
 

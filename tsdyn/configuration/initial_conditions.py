@@ -7,9 +7,9 @@ from ..formulations.locked_orientations import keep_turning, settle, still
 from ..jit.kernels import resident
 from ..maths.row_rank import dependent
 from ..observables.evaluate import constraint_arrays
-from ..rows.interface import allocate_free, redundant_of, set_selection
+from ..rows.interface import allocate_tangent, redundant_of, set_selection
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
-from ..sparse.constraint_graphs import network_of, set_redundant
+from ..sparse.constraint_graphs import graph_of, set_redundant
 from ..sparse.massless_axes import axis_of
 from ..workspaces.workspace import parts
 from .rank import check_rank
@@ -56,7 +56,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
             set_redundant(packed, None)
             start = start.again()
         start.demand_inertia()
-        settle(packed, start.network, start.free.rows.H)
+        settle(packed, start.graph, start.tangent.rows.H)
         return start.landed()
     if known is None:
         set_redundant(packed, np.zeros(0, np.int64))
@@ -67,7 +67,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         start = start.again()
     elif still(packed).bodies.size:
         start.check()  # for H where it starts
-    settle(packed, start.network, start.free.rows.H)
+    settle(packed, start.graph, start.tangent.rows.H)
     return start.landed()
 
 
@@ -77,15 +77,15 @@ class _Start:
     def __init__(self, scene, system, q, qd, t, tol):
         self.given = scene, system, q, qd, t, tol
         self.scene, self.packed, self.q, self.qd, self.t, self.tol = scene, scene.packed, q, qd, t, tol
-        self.network = network_of(self.packed, REDUCED, VALUES, BIAS, DRIFT)
+        self.graph = graph_of(self.packed, REDUCED, VALUES, BIAS, DRIFT)
         system = system._replace(reals=system.reals.copy())
         self.m = len(system.segments)
-        whole = parts(system, self.network, q.size)
+        whole = parts(system, self.graph, q.size)
         if self.packed.derived.redundant is not None:
-            whole = whole._replace(free=allocate_free(self.network, q.size, redundant=True))
-        self.free, self.work, self.rates = whole.free, whole.work, np.zeros(len(self.network.row))
+            whole = whole._replace(tangent=allocate_tangent(self.graph, q.size, redundant=True))
+        self.tangent, self.work, self.rates = whole.tangent, whole.work, np.zeros(len(self.graph.row))
         self.context, *self._keep = resident(whole)
-        rigid = self.network.bodies[self.network.bodies[:, 1] == 7, 0]
+        rigid = self.graph.bodies[self.graph.bodies[:, 1] == 7, 0]
         self.at = rigid[:, None] + np.arange(3, 7)
         self.far = self.fast = False
         work = self.work
@@ -99,7 +99,7 @@ class _Start:
 
     def loose_axis(self):
         """Return the row of a massless axis about which the kept rows leave rotation free, or -1."""
-        return free_axis(self.context, self.q, self.t) if len(self.network.axes.rows) else -1
+        return free_axis(self.context, self.q, self.t) if len(self.graph.axes.rows) else -1
 
     def demand_inertia(self):
         """Refuse a massless axis about which rotation is free."""
@@ -109,7 +109,7 @@ class _Start:
         """Refuse the axis of a row, by its body; -1 is none."""
         if row < 0:
             return
-        body, axis = axis_of(self.network.axes, row)
+        body, axis = axis_of(self.graph.axes, row)
         raise SingularConfiguration(
             f"{self.scene.bodies[body].name}: rotation about the axis {np.round(axis, 3) + 0.0} of its frame is free "
             "and carries no inertia, so the accelerations are not determined. Give it inertia about that axis, or add "
@@ -124,15 +124,15 @@ class _Start:
 
     def check(self):
         """Refuse violated rows; return the first row of H that depends on those before it, or -1."""
-        scene, network, free, q, qd = self.scene, self.network, self.free, self.q, self.qd
+        scene, graph, tangent, q, qd = self.scene, self.graph, self.tangent, self.q, self.qd
         dependent = evaluate_start(self.context, q, qd, self.t, self.rates, 1)
-        rows, real = network.normals[network.normals >= 0], network.row >= 0
+        rows, real = graph.normals[graph.normals >= 0], graph.row >= 0
         Phi, velocity = np.zeros(self.m), np.zeros(self.m)
-        Phi[network.row[real]], velocity[network.row[real]] = free.b[real], self.rates[real]
+        Phi[graph.row[real]], velocity[graph.row[real]] = tangent.b[real], self.rates[real]
         p, pd = q[self.at], qd[self.at]
         Phi[rows], velocity[rows] = 0.5 * ((p * p).sum(axis=1) - 1.0), (p * pd).sum(axis=1)
         H = np.ones((self.m, 1))
-        H[network.row[real], 0] = free.rows.H.reshape(-1, 16)[real].sum(axis=1)
+        H[graph.row[real], 0] = tangent.rows.H.reshape(-1, 16)[real].sum(axis=1)
         demand_finite(scene, Phi, H, velocity)
         demand_small(scene, Phi, self.tol * (1.0 + np.abs(q).max()), "position", "Phi")
         self.velocity = velocity
@@ -142,11 +142,11 @@ class _Start:
 
     def redundant_rows(self):
         """Return the rows that are redundant here and nearby; refuse a singular configuration."""
-        names, row, H = self.scene.row_names(), self.network.row, self.free.rows.H.reshape(-1, 16)
+        names, row, H = self.scene.row_names(), self.graph.row, self.tangent.rows.H.reshape(-1, 16)
         gone = np.flatnonzero(~H.any(axis=1) & (row >= 0))
         if gone.size:
             refuse_vanished(names[row[gone[0]]])
-        way = np.random.default_rng(0).normal(size=(len(self.network.bodies) + 1, 8))
+        way = np.random.default_rng(0).normal(size=(len(self.graph.bodies) + 1, 8))
         way[:, :3] *= max(self.packed.size, LEAST_SIZE)
         way[-1] = way[:, 3] = way[:, 7] = 0.0
         loose = -1
@@ -157,7 +157,7 @@ class _Start:
             loose = self.loose_axis()
             if loose >= 0:
                 continue
-            rows = redundant_of(self.free)
+            rows = redundant_of(self.tangent)
             if self.hold_near_by(way.ravel()):
                 return rows
         self.refuse_axis(loose)
@@ -166,7 +166,7 @@ class _Start:
             return chosen
         which = ", ".join(names[i] for i in sorted(row[rows])[:8])
         count = int((row >= 0).sum())
-        free = int(np.where(self.network.bodies[:, 1] == 7, 6, 3).sum()) - count + rows.size
+        free = int(np.where(self.graph.bodies[:, 1] == 7, 6, 3).sum()) - count + rows.size
         raise SingularConfiguration(
             f"Phi_q has lost rank in this configuration, and has full rank nearby: of {count} rows of the joints "
             f"{count - rows.size} are independent here ({which} depend{'s' if rows.size == 1 else ''} on the "
@@ -176,32 +176,32 @@ class _Start:
 
     def chosen_of_all(self):
         """Return the redundant rows by pivoted QR of all rows: for scenes in which block-wise selection fails."""
-        network, q = self.network, self.q
-        joints = np.flatnonzero(network.row >= 0)
-        if q.size * joints.size > DENSE_ENTRIES or network.welds.size:
+        graph, q = self.graph, self.q
+        joints = np.flatnonzero(graph.row >= 0)
+        if q.size * joints.size > DENSE_ENTRIES or graph.welds.size:
             return np.empty(0, int)
-        A = constraint_arrays(self.scene.system, q, self.qd, self.t)[1][network.row[joints]]
+        A = constraint_arrays(self.scene.system, q, self.qd, self.t)[1][graph.row[joints]]
         for at in self.at:  # without the component along p, which the normalisations hold
             A[:, at] -= np.outer(A[:, at] @ q[at], q[at])
         return joints[np.sort(dependent(A))]
 
     def serve(self, rows):
         """Take these rows for redundant; return True if S of the others is nonsingular."""
-        set_selection(self.free, rows)
+        set_selection(self.tangent, rows)
         return evaluate_start(self.context, self.q, self.qd, self.t, self.rates, 0) < 0 and self.loose_axis() < 0
 
     def hold_near_by(self, way):
         """Return True if the redundant rows hold along the way to a nearby configuration."""
         gone, leg = 0.0, NEIGHBOURHOOD
         while gone < NEIGHBOURHOOD:
-            here = self.free.poses.copy()
+            here = self.tangent.poses.copy()
             status = go_near_by(self.context, self.t, way, leg)
             if status == Status.UNHELD:
                 return False
             if status == Status.SUCCESS:
                 gone += leg
                 continue
-            self.free.poses[:] = here
+            self.tangent.poses[:] = here
             leg *= SHORTENING
             if leg < SHORTEST_LEG * NEIGHBOURHOOD:
                 return gone >= LEAST_NEIGHBOURHOOD
@@ -224,14 +224,14 @@ class _Start:
 
 def _refuse(scene, start, dependent):
     """Refuse dependent rows, by name; return if dense rank analysis finds none."""
-    network, free, q = start.network, start.free, start.q
+    graph, tangent, q = start.graph, start.tangent, start.q
     if q.size * len(scene.system.segments) < LISTED_ENTRIES:
         check_rank(scene, constraint_arrays(scene.system, q, start.qd, start.t)[1])
         return
-    if network.row[dependent] < 0:
-        hub = scene.bodies[dict(network.welds.tolist())[dependent]].name
+    if graph.row[dependent] < 0:
+        hub = scene.bodies[dict(graph.welds.tolist())[dependent]].name
         raise RedundantConstraints(f"the constraints at {hub} depend on one another: {DEPENDENT}")
-    name = scene.row_names()[network.row[dependent]]
-    if not free.rows.H[16 * dependent : 16 * dependent + 16].any():
+    name = scene.row_names()[graph.row[dependent]]
+    if not tangent.rows.H[16 * dependent : 16 * dependent + 16].any():
         refuse_vanished(name)
     raise RedundantConstraints(f"{name} depends on other constraint rows: {DEPENDENT}")

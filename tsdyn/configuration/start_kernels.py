@@ -22,23 +22,23 @@ from .tolerances import IMMOBILE, LEAST_SIZE
 
 @entry("pvvdvi")
 def evaluate_start(context, q, qd, t, velocity, every):
-    """f.b = Phi, velocity = Phi_q qd + Phi_t, H of the network's rows; the first row that depends on others, or -1.
+    """f.b = Phi, velocity = Phi_q qd + Phi_t, H of the graph's rows; the first row that depends on others, or -1.
 
     With every = 1 of every row, with 0 without the redundant ones.
     """
     c = load_parts(context)
-    network, system, f = c.network, c.system, c.free
+    graph, system, f = c.graph, c.system, c.tangent
     set_time(system, t)
-    place_bodies(network.bodies, q, f.poses)
-    move_bodies(network.bodies, q, qd, f.poses)
+    place_bodies(graph.bodies, q, f.poses)
+    move_bodies(graph.bodies, q, qd, f.poses)
     count = keep_every_row(f) if every == 1 else -1
-    evaluate_rows(network, system, f, f.rows, t)
-    gather_speeds(network, f)
-    find_drift(network, system, f, t)
-    multiply_rows(network, f.rows, f.Z, velocity)
+    evaluate_rows(graph, system, f, f.rows, t)
+    gather_speeds(graph, f)
+    find_drift(graph, system, f, t)
+    multiply_rows(graph, f.rows, f.Z, velocity)
     for e in range(velocity.size):
         velocity[e] += f.gamma[e]
-    failed = factorise_selected_rows(network, f, f.rows, METRIC)
+    failed = factorise_selected_rows(graph, f, f.rows, METRIC)
     if every == 1:
         restore_selection(f, count)
     return failed
@@ -48,17 +48,17 @@ def evaluate_start(context, q, qd, t, velocity, every):
 def land_start(context, t):
     """Project w.q and w.qd onto the constraint manifold. Status."""
     c = load_parts(context)
-    network, system, w, f = c.network, c.system, c.work, c.free
+    graph, system, w, f = c.graph, c.system, c.work, c.tangent
     set_time(system, t)
-    place_bodies(network.bodies, w.q, f.poses)
-    move_bodies(network.bodies, w.q, w.qd, f.poses)
-    status = land(network, system, w, f, t)
+    place_bodies(graph.bodies, w.q, f.poses)
+    move_bodies(graph.bodies, w.q, w.qd, f.poses)
+    status = land(graph, system, w, f, t)
     if status != 0:
         return status
-    write_positions(network.bodies, f.poses, w.q)
-    find_drift(network, system, f, t)
-    land_velocities(network, f, True)
-    write_velocities(network.bodies, f.poses, w.qd)
+    write_positions(graph.bodies, f.poses, w.q)
+    find_drift(graph, system, f, t)
+    land_velocities(graph, f, True)
+    write_velocities(graph.bodies, f.poses, w.qd)
     return 0
 
 
@@ -66,21 +66,21 @@ def land_start(context, t):
 def select_redundant(context, t, share):
     """Select redundant rows at the poses, those with pivots below a share; return their number, or -1."""
     c = load_parts(context)
-    network, f = c.network, c.free
-    count = select_rows(network, c.system, f, t, share)
-    return count if factorise_selected_rows(network, f, f.rows, METRIC) < 0 else -1
+    graph, f = c.graph, c.tangent
+    count = select_rows(graph, c.system, f, t, share)
+    return count if factorise_selected_rows(graph, f, f.rows, METRIC) < 0 else -1
 
 
 @entry("pvd")
 def free_axis(context, q, t):
     """Return the row of a massless axis about which the kept rows leave rotation free at q, or -1."""
     c = load_parts(context)
-    network, f = c.network, c.free
+    graph, f = c.graph, c.tangent
     set_time(c.system, t)
-    place_bodies(network.bodies, q, f.poses)
-    evaluate_rows(network, c.system, f, f.rows, t)
-    failed = factorise_selected_rows(network, f, f.rows, DYNAMICS)
-    return failed if is_axis(network, f.rows, failed) else -1
+    place_bodies(graph.bodies, q, f.poses)
+    evaluate_rows(graph, c.system, f, f.rows, t)
+    failed = factorise_selected_rows(graph, f, f.rows, DYNAMICS)
+    return failed if is_axis(graph, f.rows, failed) else -1
 
 
 @entry("pdvd")
@@ -90,28 +90,28 @@ def go_near_by(context, t, way, far):
     way (bodies, 8) is any direction; its tangent part is taken.
     """
     c = load_parts(context)
-    network, f = c.network, c.free
-    status = factorise(network, c.system, c.work, f, t)
+    graph, f = c.graph, c.tangent
+    status = factorise(graph, c.system, c.work, f, t)
     if status != 0:
         return status
     for i in range(f.Z.size):
         f.Z[i] = way[i]
     wanted = _farthest(c)
     for _ in range(2):
-        project(network, f.rows, f.Z, f.b)
+        project(graph, f.rows, f.Z, f.b)
     found = _farthest(c)
     scale = far / found if found > IMMOBILE * wanted else 0.0
     for i in range(f.Z.size):
         f.Z[i] *= scale
-    move_by(network, f)
-    return land(network, c.system, c.work, f, t)
+    move_by(graph, f)
+    return land(graph, c.system, c.work, f, t)
 
 
 @kernel
 def _farthest(c):
     """Return the largest entry of Z: rotations, and displacements as shares of the scene's size."""
-    Z, part, found = c.free.Z, 1.0 / max(c.work.control.size, LEAST_SIZE), 0.0
-    for b in range(c.network.bodies.shape[0]):
+    Z, part, found = c.tangent.Z, 1.0 / max(c.work.control.size, LEAST_SIZE), 0.0
+    for b in range(c.graph.bodies.shape[0]):
         for i in range(3):
             found = max(found, max(abs(Z[8 * b + i]) * part, abs(Z[8 * b + 4 + i])))
     return found

@@ -13,27 +13,27 @@ from ..rows.interface import constrain_accelerations, evaluate_bias, weigh_bodie
 
 
 @kernel
-def body_forces(network, system, w, f, t):
+def body_forces(graph, system, w, f, t):
     """Set Z to applied forces, gravity and gyroscopic torques on the bodies, at w.q, w.qd and the poses."""
     has_forces = system.forces.shape[0] > 0
     if has_forces:
         for i in range(f.Q.size):
             f.Q[i] = 0.0
         applied_forces(system, w.q, w.qd, t, f.Q)
-    for b in range(network.bodies.shape[0]):
-        z, at, m = 8 * b, b * POSE, network.mass[16 * b]
-        i = network.bodies[b, 0]
+    for b in range(graph.bodies.shape[0]):
+        z, at, m = 8 * b, b * POSE, graph.mass[16 * b]
+        i = graph.bodies[b, 0]
         for c in range(3):
             f.Z[z + c] = m * system.gravity[c]
             if has_forces:
                 f.Z[z + c] += f.Q[i + c]
         torque = splat(0.0)
-        if network.bodies[b, 1] == 7:
-            if network.spins[b] != 0:
+        if graph.bodies[b, 1] == 7:
+            if graph.spins[b] != 0:
                 o = 16 * b + 4
-                spin = times(four(network.mass, o), splat(f.poses[at + OMEGA]))
-                spin = fma(four(network.mass, o + 4), splat(f.poses[at + OMEGA + 1]), spin)
-                spin = fma(four(network.mass, o + 8), splat(f.poses[at + OMEGA + 2]), spin)
+                spin = times(four(graph.mass, o), splat(f.poses[at + OMEGA]))
+                spin = fma(four(graph.mass, o + 4), splat(f.poses[at + OMEGA + 1]), spin)
+                spin = fma(four(graph.mass, o + 8), splat(f.poses[at + OMEGA + 2]), spin)
                 torque = sub(torque, cross(four(f.poses, at + OMEGA), spin))
             put(f.Z, z + 4, torque)
             if has_forces:
@@ -41,18 +41,18 @@ def body_forces(network, system, w, f, t):
 
 
 @kernel
-def accelerate_bodies(network, system, w, f, t):
+def accelerate_bodies(graph, system, w, f, t):
     """Set Z = (r'', omega'') and b = lam; H, Y and the factors of S are those of the poses, w.q and w.qd."""
-    solve_accelerations(network, system, w, f, t)
-    write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
+    solve_accelerations(graph, system, w, f, t)
+    write_accelerations(graph.bodies, f.poses, f.Z, w.qdd)
 
 
 @kernel
-def solve_accelerations(network, system, w, f, t):
+def solve_accelerations(graph, system, w, f, t):
     """Solve for accelerations and multipliers, without qdd; w.q and w.qd are read if there are forces."""
-    body_forces(network, system, w, f, t)
-    weigh_bodies(network, f.Z)
+    body_forces(graph, system, w, f, t)
+    weigh_bodies(graph, f.Z)
     if f.b.size == 0:
         return
-    evaluate_bias(network, system, f, t)
-    constrain_accelerations(network, f.rows, f.gamma, f.Z, f.b)
+    evaluate_bias(graph, system, f, t)
+    constrain_accelerations(graph, f.rows, f.gamma, f.Z, f.b)

@@ -15,12 +15,12 @@ from .tolerances import FARTHEST
 
 
 @kernel
-def displace(network, l, poses):
+def displace(graph, l, poses):
     """Set the poses at chart coordinates l.x; False if a body has rotated too far for the chart."""
-    for b in range(network.bodies.shape[0]):
+    for b in range(graph.bodies.shape[0]):
         at, o = b * POSE, 8 * b
         put(poses, at + R, fma(four(l.x, o), splat(1.0), four(l.base, o)))
-        if network.bodies[b, 1] == 7:
+        if graph.bodies[b, 1] == 7:
             x, y, z = 0.5 * l.x[o + 4], 0.5 * l.x[o + 5], 0.5 * l.x[o + 6]
             square = x * x + y * y + z * z
             if not square < FARTHEST:
@@ -42,28 +42,28 @@ def displace(network, l, poses):
 
 
 @kernel
-def turn_rates(network, l, rates, poses):
+def turn_rates(graph, l, rates, poses):
     """Set rd and omega' of the poses from rates of chart coordinates."""
-    for b in range(network.bodies.shape[0]):
+    for b in range(graph.bodies.shape[0]):
         put(poses, b * POSE + RD, four(rates, 8 * b))
-        if network.bodies[b, 1] == 7:
+        if graph.bodies[b, 1] == 7:
             put(poses, b * POSE + OMEGA, rotate_rate(l, b, four(rates, 8 * b + 4)))
 
 
 @kernel
-def factorise_normal(network, w, f, l):
+def factorise_normal(graph, w, f, l):
     """Factorise N = H C Y0 at the present H; False if N is singular."""
     w.counters.factorizations += 1
-    return factorise_chart_matrix(network, f, l)
+    return factorise_chart_matrix(graph, f, l)
 
 
 @kernel
-def write_back(network, l, poses, Z, out):
+def write_back(graph, l, poses, Z, out):
     """Set accelerations of chart coordinates (rhodd, etadd) from (rdd, omega'd); out (8 b,)."""
-    for b in range(network.bodies.shape[0]):
+    for b in range(graph.bodies.shape[0]):
         o, at = 8 * b, b * POSE
         put(out, o, four(Z, o))
-        if network.bodies[b, 1] == 7:
+        if graph.bodies[b, 1] == 7:
             x, y, z, w = l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2], l.d[4 * b + 3]
             d, omega, change = lanes(x, y, z), four(poses, at + OMEGA), four(Z, o + 4)
             square = -0.5 * total(times(omega, omega))
@@ -71,10 +71,10 @@ def write_back(network, l, poses, Z, out):
 
 
 @kernel
-def largest_rates(network, poses):
+def largest_rates(graph, poses):
     """Return the largest entries of |rd| and |omega'|."""
     r, w = 0.0, 0.0
-    for b in range(network.bodies.shape[0]):
+    for b in range(graph.bodies.shape[0]):
         f, g = four(poses, b * POSE + RD), four(poses, b * POSE + OMEGA)
         r = max(r, max(abs(first(f)), max(abs(second(f)), abs(third(f)))))
         w = max(w, max(abs(first(g)), max(abs(second(g)), abs(third(g)))))

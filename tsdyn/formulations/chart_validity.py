@@ -31,22 +31,22 @@ REASONS = (
 
 
 @kernel
-def touch(network, system, w, f, l, t):
+def touch(graph, system, w, f, l, t):
     """Make the chart at w.q: base, H0, Y0, factors of S0. True if the rows of H0 are independent."""
     regular = True
     same = l.state.placement > 0 and l.state.placement == w.counters.placements  # as the chart that was left last
-    if same and network.axes.rows.shape[0] == 0 and selection_serves(network, f, f.rows):
+    if same and graph.axes.rows.shape[0] == 0 and selection_serves(graph, f, f.rows):
         copy(f.rows.H, l.rows0.H)
         copy(f.rows.Y, l.rows0.Y)
         copy(f.rows.S, l.rows0.S)
         w.counters.kept += 1 if f.b.size > 0 else 0
     else:
-        place_bodies(network.bodies, w.q, f.poses)
-        evaluate_rows(network, system, f, l.rows0, t)
+        place_bodies(graph.bodies, w.q, f.poses)
+        evaluate_rows(graph, system, f, l.rows0, t)
         if f.b.size > 0:
             w.counters.factorizations += 1
-            regular = factorise_rows(network, system, f, l.rows0, t, METRIC)
-    for b in range(network.bodies.shape[0]):
+            regular = factorise_rows(graph, system, f, l.rows0, t, METRIC)
+    for b in range(graph.bodies.shape[0]):
         at, o = b * POSE, 8 * b
         for c in range(3):
             l.base[o + c] = f.poses[at + R + c]
@@ -65,11 +65,11 @@ def touch(network, system, w, f, l, t):
 
 
 @kernel
-def measure_turns(network, l, q):
+def measure_turns(graph, l, q):
     """l.d of positions q; (d0, d) = p0* o p."""
-    for b in range(network.bodies.shape[0]):
-        if network.bodies[b, 1] == 7:
-            i, o = network.bodies[b, 0] + 3, 8 * b + 4
+    for b in range(graph.bodies.shape[0]):
+        if graph.bodies[b, 1] == 7:
+            i, o = graph.bodies[b, 0] + 3, 8 * b + 4
             e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
             p0, p1, p2, p3 = q[i], q[i + 1], q[i + 2], q[i + 3]
             l.d[4 * b] = -e1 * p0 + e0 * p1 + e3 * p2 - e2 * p3
@@ -79,13 +79,13 @@ def measure_turns(network, l, q):
 
 
 @kernel
-def turning(network, w, f, l):
+def turning(graph, w, f, l):
     """Return the reason to abandon the chart at l.d and f.rows, or STAY; records contraction and condition."""
     turn, contraction = turned_most(l), 0.0
     if f.b.size > 0:
         known = l.state.factored == 1 and l.state.off < SAME
         w.counters.kept += 1 if known else 0
-        contraction = pivot_loss(network, l) if known or factorise_normal(network, w, f, l) else math.inf
+        contraction = pivot_loss(graph, l) if known or factorise_normal(graph, w, f, l) else math.inf
     l.state.factored = 0  # dense output, if there is any, would come between
     w.control.contraction = max(contraction, TURN_SHARE * turn)
     w.control.condition = (1.0 + w.control.contraction) / max(1.0 - w.control.contraction, TINY)

@@ -13,9 +13,9 @@ from ..rows.interface import list_redundant
 
 
 @kernel
-def take_selection(network, w, f):
+def take_selection(graph, w, f):
     """Drop the rows of Phi that are redundant in the sparse rows."""
-    list_redundant(network, f, w.redundant)
+    list_redundant(graph, f, w.redundant)
 
 
 @kernel

@@ -6,9 +6,9 @@ from ..elements.loops.body_poses import place_bodies
 from ..jit.kernels import entry, resident
 from ..model.derived import Derived
 from ..model.equations import set_time
-from ..rows.interface import allocate_free, redundant_of, select_rows
+from ..rows.interface import allocate_tangent, redundant_of, select_rows
 from ..sparse.constraint_graph import REDUCED
-from ..sparse.constraint_graphs import network_of
+from ..sparse.constraint_graphs import graph_of
 from ..workspaces.workspace import load_parts, parts
 
 
@@ -16,10 +16,10 @@ from ..workspaces.workspace import load_parts, parts
 def _choose(context, q, t, share):
     """Select redundant rows at q, those with pivots below a share; return their number, or -1."""
     c = load_parts(context)
-    network, f = c.network, c.free
+    graph, f = c.graph, c.tangent
     set_time(c.system, t)
-    place_bodies(network.bodies, q, f.poses)
-    return select_rows(network, c.system, f, t, share)
+    place_bodies(graph.bodies, q, f.poses)
+    return select_rows(graph, c.system, f, t, share)
 
 
 def dependent_rows(packed, q, t, share):
@@ -33,9 +33,9 @@ def dependent_rows(packed, q, t, share):
         if known.examined is None:
             known.examined = packed._replace(derived=Derived(redundant=np.zeros(0, np.int64)))
         own = known.examined
-    network = network_of(own, REDUCED)
-    whole = parts(packed.system._replace(reals=packed.system.reals.copy()), network, q.size)
-    free = allocate_free(network, q.size, redundant=True)
-    context, *_keep = resident(whole._replace(free=free))
+    graph = graph_of(own, REDUCED)
+    whole = parts(packed.system._replace(reals=packed.system.reals.copy()), graph, q.size)
+    tangent = allocate_tangent(graph, q.size, redundant=True)
+    context, *_keep = resident(whole._replace(tangent=tangent))
     count = _choose(context, q, t, share)
-    return None if count < 0 else np.sort(network.row[redundant_of(free)])
+    return None if count < 0 else np.sort(graph.row[redundant_of(tangent)])

@@ -71,7 +71,7 @@ def _expand(w, vdd, out):
 
 
 @kernel
-def _find_bases(network, system, w, f, t, vdd):
+def _find_bases(graph, system, w, f, t, vdd):
     """lam_0 and, for each friction, a_i and l_i."""
     r, n, m, k = f.friction, w.q.size, w.Phi.size, vdd.size
     lam, left, x, Q = r.numbers[:m], r.numbers[2 * m : 2 * m + n], r.numbers[2 * m + n : 2 * m + 2 * n], stack(14)
@@ -89,8 +89,8 @@ def _find_bases(network, system, w, f, t, vdd):
     _subtract_inertia(system, w.q, x, left)
     _multipliers(w, left, lam)
     # a_i = (D^T M D)^-1 D^T g_i,    l_i = B^T U^T (g_i - M D a_i)
-    for i in range(network.frictions.shape[0]):
-        friction, a = network.frictions[i], r.basis[i, :k]
+    for i in range(graph.frictions.shape[0]):
+        friction, a = graph.frictions[i], r.basis[i, :k]
         unit_friction(system, friction, w.q, w.qd, t, Q)
         for c in range(n):
             left[c] = x[c] = 0.0
@@ -112,7 +112,7 @@ def _find_bases(network, system, w, f, t, vdd):
 
 
 @kernel
-def _find_load(network, system, w, friction, lam, t, out, by_row):
+def _find_load(graph, system, w, friction, lam, t, out, by_row):
     """out (7,) as of friction_solve.normal_load, and by_row (m,) its derivative by the multipliers, of its own rows."""
     body = body_of(friction, friction.on)
     at, turns = system.bodies[body, 0], system.bodies[body, 1] == 7
@@ -121,7 +121,7 @@ def _find_load(network, system, w, friction, lam, t, out, by_row):
         reaction[c] = 0.0
     for only_sum in range(2):
         for j in range(friction.first, friction.first + friction.count):
-            e = network.row[network.friction_rows[j, 0]]
+            e = graph.row[graph.friction_rows[j, 0]]
             row = w.Phi_q[e]
             for c in range(3):
                 torque[c] = 0.0
@@ -146,11 +146,11 @@ def _find_load(network, system, w, friction, lam, t, out, by_row):
 def rub(context, t, vdd):
     """Add joint friction to vdd. Status."""
     c = load(context)
-    system, w, f, network = c.system, c.work, c.free, c.network
-    r, n, m, frictions = f.friction, w.q.size, w.Phi.size, c.network.frictions.shape[0]
+    system, w, f, graph = c.system, c.work, c.tangent, c.graph
+    r, n, m, frictions = f.friction, w.q.size, w.Phi.size, c.graph.frictions.shape[0]
     k = w.v.size
     vdd = vector(vdd, k)
-    _find_bases(network, system, w, f, t, vdd)
+    _find_bases(graph, system, w, f, t, vdd)
     lam_0, lam, by_row = r.numbers[:m], r.numbers[m : 2 * m], w.z
     b, loads = r.numbers[2 * (m + n) :], r.numbers[2 * (m + n) + frictions :]
     for i in range(frictions):
@@ -164,13 +164,13 @@ def rub(context, t, vdd):
         if done:
             break
         for i in range(frictions):
-            friction = network.frictions[i]
-            _find_load(network, system, w, friction, lam, t, r.load[7 * i :], by_row)
+            friction = graph.frictions[i]
+            _find_load(graph, system, w, friction, lam, t, r.load[7 * i :], by_row)
             b[i] = r.load[7 * i] - loads[i]
             for j in range(frictions):
                 x = 1.0 if i == j else 0.0
                 for h in range(friction.first, friction.first + friction.count):
-                    e = network.row[network.friction_rows[h, 0]]
+                    e = graph.row[graph.friction_rows[h, 0]]
                     x -= by_row[e] * r.basis[j, n + e]
                 r.J[i, j] = x
         if not lu(r.J, r.pivots, frictions):

@@ -40,11 +40,11 @@ OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
 
 
 @kernel
-def _weigh_units(network, system, f, q, qd, t):
+def _weigh_units(graph, system, f, q, qd, t):
     """r.g = W g."""
     r, Q = f.friction, stack(14)
-    for i in range(network.frictions.shape[0]):
-        friction = network.frictions[i]
+    for i in range(graph.frictions.shape[0]):
+        friction = graph.frictions[i]
         unit_friction(system, friction, q, qd, t, Q)
         for k in range(2):
             body, at, o = body_of(friction, k), 16 * i + 8 * k, 7 * k
@@ -52,21 +52,21 @@ def _weigh_units(network, system, f, q, qd, t):
             for c in range(3):
                 r.g[at + c] = Q[o + c]
             r.g[at + 3] = 0.0
-            if body < network.bodies.shape[0] and network.bodies[body, 1] == 7:
+            if body < graph.bodies.shape[0] and graph.bodies[body, 1] == 7:
                 add_torque(f.poses, body * POSE + P, Q, o + 3, r.g, at + 4)
-            weigh(network.inverse, body, r.g, at, r.g, at)
+            weigh(graph.inverse, body, r.g, at, r.g, at)
 
 
 @kernel
-def _find_loads(network, system, f, q, qd, t, derive):
+def _find_loads(graph, system, f, q, qd, t, derive):
     """Normal loads and, with derive = 1, their derivatives at the multipliers r.lam."""
     r, reaction = f.friction, stack(6)
-    for i in range(network.frictions.shape[0]):
-        friction = network.frictions[i]
+    for i in range(graph.frictions.shape[0]):
+        friction = graph.frictions[i]
         for c in range(6):
             reaction[c] = 0.0
         for j in range(friction.first, friction.first + friction.count):
-            e, side = network.friction_rows[j]
+            e, side = graph.friction_rows[j]
             at = 16 * e + 8 * side
             for c in range(3):
                 reaction[c] -= f.rows.H[at + c] * r.lam[e]
@@ -75,51 +75,51 @@ def _find_loads(network, system, f, q, qd, t, derive):
 
 
 @kernel
-def _rub_bodies(network, f):
+def _rub_bodies(graph, f):
     """Z = r.Z + W g N - Y^T lam."""
     r = f.friction
     copy(r.Z, f.Z)
-    for i in range(network.frictions.shape[0]):
+    for i in range(graph.frictions.shape[0]):
         N = splat(r.load[7 * i])
         for k in range(2):
-            z, at = 8 * body_of(network.frictions[i], k), 16 * i + 8 * k
+            z, at = 8 * body_of(graph.frictions[i], k), 16 * i + 8 * k
             put(f.Z, z, add(four(f.Z, z), times(four(r.g, at), N)))
             put(f.Z, z + 4, add(four(f.Z, z + 4), times(four(r.g, at + 4), N)))
-    apply_multipliers(network, f.rows, r.lam, f.Z)
+    apply_multipliers(graph, f.rows, r.lam, f.Z)
 
 
 @kernel
-def _factorise(network, f, cold):
+def _factorise(graph, f, cold):
     """Factorise N~, or S if `cold`; False if the matrix is singular."""
     r, change = f.friction, stack(8)
     copy(f.rows.Y, r.X)
     if not cold:
-        for i in range(network.frictions.shape[0]):
-            friction = network.frictions[i]
+        for i in range(graph.frictions.shape[0]):
+            friction = graph.frictions[i]
             a, b = friction.body_a, friction.body_b
             change[3] = change[7] = 0.0
             for c in range(3):
                 change[c], change[4 + c] = r.load[7 * i + 1 + c], r.load[7 * i + 4 + c]
             for j in range(friction.first, friction.first + friction.count):
-                e, side = network.friction_rows[j]
+                e, side = graph.friction_rows[j]
                 n = splat(-inner(f.rows.H, 16 * e + 8 * side, change, 0))
                 for k in range(2):
-                    body, x = network.sides[e, k], 16 * e + 8 * k
+                    body, x = graph.sides[e, k], 16 * e + 8 * k
                     g = 16 * i if body == a else 16 * i + 8
                     if body in (a, b):
                         put(r.X, x, sub(four(r.X, x), times(four(r.g, g), n)))
                         put(r.X, x + 4, sub(four(r.X, x + 4), times(four(r.g, g + 4), n)))
-    return factorise_product(network, f, r.X, r.lower, r.upper)
+    return factorise_product(graph, f, r.X, r.lower, r.upper)
 
 
 @long_kernel
-def find_reactions(network, system, f, q, qd, t):
+def find_reactions(graph, system, f, q, qd, t):
     """Z = (r'', omega''), r.lam the multipliers and r.load the normal loads; Z is W F on entry, gamma as Eq. 3 has it.
 
     H, Y and S are those of the poses. Return True if reactions were found.
     """
     r = f.friction
-    _weigh_units(network, system, f, q, qd, t)
+    _weigh_units(graph, system, f, q, qd, t)
     copy(f.Z, r.Z)
     clear_redundant(f, r.lam)
     size = largest(r.lam)
@@ -129,15 +129,15 @@ def find_reactions(network, system, f, q, qd, t):
         size = 0.0
     before, anew, done = math.inf, True, False
     for sweep in range(LOAD_SWEEPS):
-        _find_loads(network, system, f, q, qd, t, int(anew and size > 0.0 and not done))
-        _rub_bodies(network, f)
+        _find_loads(graph, system, f, q, qd, t, int(anew and size > 0.0 and not done))
+        _rub_bodies(graph, f)
         if done:
             return True
-        acceleration_residuals(network, f.rows, f.gamma, f.Z, f.b)
-        add_axis_multipliers(network, r.lam, f.b)
-        if anew and not _factorise(network, f, size == 0.0):
+        acceleration_residuals(graph, f.rows, f.gamma, f.Z, f.b)
+        add_axis_multipliers(graph, r.lam, f.b)
+        if anew and not _factorise(graph, f, size == 0.0):
             return False
-        solve_product(network, r.lower, r.upper, f.b)
+        solve_product(graph, r.lower, r.upper, f.b)
         change, share = largest(f.b), step_share(sweep)
         if not change < math.inf:
             return False
@@ -154,12 +154,12 @@ def find_reactions(network, system, f, q, qd, t):
 def rub(context, t, unused):
     """Solve for accelerations as accelerations.solve_accelerations, with joint friction. Status."""
     c = load(context)
-    system, w, f, network = c.system, c.work, c.free, c.network
+    system, w, f, graph = c.system, c.work, c.tangent, c.graph
     forget_loads(system)
-    body_forces(network, system, w, f, t)
-    weigh_bodies(network, f.Z)
-    evaluate_bias(network, system, f, t)
-    found = find_reactions(network, system, f, w.q, w.qd, t)
+    body_forces(graph, system, w, f, t)
+    weigh_bodies(graph, f.Z)
+    evaluate_bias(graph, system, f, t)
+    found = find_reactions(graph, system, f, w.q, w.qd, t)
     for i in range(system.normals.size):
         system.reals[system.normals[i]] = f.friction.load[7 * i]
     copy(f.friction.lam, f.b)

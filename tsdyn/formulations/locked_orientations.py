@@ -14,7 +14,7 @@ from ..elements.markers import PARAMETERS, VECTOR
 from ..model.packed import classes
 from ..motions.prescribed import Motion
 from ..rows.interface import MOST_ROWS
-from ..sparse.constraint_graphs import network_of, redundant_rows, with_loops
+from ..sparse.constraint_graphs import graph_of, redundant_rows, with_loops
 from ..sparse.graph_builder import build
 from .tolerances import HOLDING, UNIT_ROUNDING
 
@@ -41,11 +41,11 @@ def keep_turning(packed, bodies):
     packed.derived.forget_locked()
 
 
-def moving_network(packed, *columns):
-    """As `network_of`, without the rotations of bodies that are still; the same where there are none."""
+def moving_graph(packed, *columns):
+    """As `graph_of`, without the rotations of bodies that are still; the same where there are none."""
     found, known = still(packed), packed.derived
     if not found.bodies.size:
-        return network_of(packed, *columns)
+        return graph_of(packed, *columns)
     if columns not in known.moving_networks:
         if known.moving_graph is None:
             known.moving_graph = build(packed, found)
@@ -54,18 +54,18 @@ def moving_network(packed, *columns):
 
 
 def moving_parts(packed):
-    """The same network without addresses of loops, and the classes of its kinds; a network of the caller's own."""
+    """The same graph without addresses of loops, and the classes of its kinds; a graph of the caller's own."""
     found = still(packed)
     return build(packed, found if found.bodies.size else None)
 
 
-def settle(packed, network, H):
-    """Have bodies turn, from now on, that the rows H of the whole network, (m 16,), don't hold where they stand."""
+def settle(packed, graph, H):
+    """Have bodies turn, from now on, that the rows H of the whole graph, (m 16,), don't hold where they stand."""
     while (found := still(packed)).bodies.size:
-        place, real = np.full(len(packed.system.segments), -1), network.row >= 0
-        place[network.row[real]] = np.flatnonzero(real)
+        place, real = np.full(len(packed.system.segments), -1), graph.row >= 0
+        place[graph.row[real]] = np.flatnonzero(real)
         which, rows = found.holding[:, 0], place[found.holding[:, 1]]
-        side = np.where(network.sides[rows, 0] == found.bodies[which], 0, 1)
+        side = np.where(graph.sides[rows, 0] == found.bodies[which], 0, 1)
         torques, squares = H.reshape(-1, 2, 8)[rows, side, 4:7], np.zeros((len(found.bodies), 3, 3))
         np.add.at(squares, which, torques[:, :, None] * torques[:, None, :])
         sizes = np.linalg.eigvalsh(squares)
@@ -88,13 +88,13 @@ def hold(packed, q, qd):
     return q, qd
 
 
-def instances(packed, network):
-    """For each row of Network.kinds its class, and of its instances each constraint with its parameters."""
+def instances(packed, graph):
+    """For each row of ConstraintGraph.kinds its class, and of its instances each constraint with its parameters."""
     groups = {kind: [] for kind in classes(packed)}
     for pair in zip(packed.constraints, packed.parameters, strict=True):
         groups[type(pair[0])].append(pair)
     kinds, begins, found = list(groups), packed.system.kinds["reals"], []
-    for row in network.kinds:
+    for row in graph.kinds:
         i = int(np.searchsorted(begins, row.reals, side="right")) - 1
         first = int((row.reals - begins[i]) // row.stride)
         found.append((kinds[i], groups[kinds[i]][first : first + int(row.count)]))
@@ -157,7 +157,7 @@ def _redundant(packed, omitted, spare):
     whole = redundant_rows(packed)
     if not len(whole):
         return () if spare == 0 else None
-    gone, row, left, others = set(network_of(packed).row[whole].tolist()), 0, [], []
+    gone, row, left, others = set(graph_of(packed).row[whole].tolist()), 0, [], []
     for i, constraint in enumerate(packed.constraints):
         if i not in omitted and not constraint.normalises:
             for one in range(row, row + constraint.rows):

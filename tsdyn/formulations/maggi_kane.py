@@ -23,7 +23,7 @@ def place(context, t, x):
     c = load(context)
     system, w = c.system, c.work
     w.counters.placements += 1
-    c.local.state.time = t
+    c.chart.state.time = t
     if not set_time(system, t):
         return NOT_FINITE
     copy(vector(x, w.q.size), w.q)
@@ -67,7 +67,7 @@ def start_chart(context, t, x, velocity, wd, xd):
     c = load(context)
     system, w = c.system, c.work
     set_time(system, t)
-    status = new_chart(c.network, system, w, c.free, c.local, t)
+    status = new_chart(c.graph, system, w, c.tangent, c.chart, t)
     copy(w.q, vector(x, w.q.size))
     copy(w.qd, vector(xd, w.q.size))
     project(w, vector(velocity, w.v.size), vector(wd, w.v.size))

@@ -150,12 +150,12 @@ def reduced_acceleration(system, w, t, vdd):
 @kernel
 def frictional_acceleration(context, c, t, vdd):
     """`reduced_acceleration`, then what the frictions of joints change. Status."""
-    system, network = c.system, c.network
-    frictions = network.frictions.shape[0] > 0
+    system, graph = c.system, c.graph
+    frictions = graph.frictions.shape[0] > 0
     if frictions:
         forget_loads(system)
     status = reduced_acceleration(system, c.work, t, vdd)
-    return call_rub(network.rub[0], context, t, vdd) if frictions and status == OK else status
+    return call_rub(graph.rub[0], context, t, vdd) if frictions and status == OK else status
 
 
 @callback(PLACE)
@@ -164,7 +164,7 @@ def place(context, t, v):
     c = load(context)
     system, w = c.system, c.work
     w.counters.placements += 1
-    c.local.state.time = t
+    c.chart.state.time = t
     if not set_time(system, t):
         return NOT_FINITE
     status = solve_positions(system, w, t, vector(v, w.v.size))
@@ -215,11 +215,11 @@ def check(context):
 @kernel
 def look(c):
     """Return the reason to abandon the chart at the present q, or zero."""
-    w, f, l, network = c.work, c.free, c.local, c.network
-    place_bodies(network.bodies, w.q, f.poses)
-    measure_turns(network, l, w.q)
-    evaluate_rows(network, c.system, f, f.rows, l.state.time)
-    return turning(network, w, f, l)
+    w, f, l, graph = c.work, c.tangent, c.chart, c.graph
+    place_bodies(graph.bodies, w.q, f.poses)
+    measure_turns(graph, l, w.q)
+    evaluate_rows(graph, c.system, f, f.rows, l.state.time)
+    return turning(graph, w, f, l)
 
 
 @kernel
@@ -252,13 +252,13 @@ def start_chart(context, t, v, vd, vdd, unused):
     c = load(context)
     system, w = c.system, c.work
     set_time(system, t)
-    status = new_chart(c.network, system, w, c.free, c.local, t)
+    status = new_chart(c.graph, system, w, c.tangent, c.chart, t)
     k = w.v.size
     v = vector(v, k)
     for j in range(k):
         v[j] = 0.0
     project(w, vector(vd, k), vector(vdd, k))
-    return UNHELD if status == OK and not redundant_rows_hold(c.free, w.control.floor) else status
+    return UNHELD if status == OK and not redundant_rows_hold(c.tangent, w.control.floor) else status
 
 
 @kernel

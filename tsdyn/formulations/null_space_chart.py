@@ -18,11 +18,11 @@ from .tolerances import FIRST_RATE, RANK_LIMIT
 
 
 @kernel
-def new_chart(network, system, w, f, l, t):
+def new_chart(graph, system, w, f, l, t):
     """Make a chart at the present q: q0, U, V by SVD, B, L; u = 0, v = 0. Status."""
     n, m, k = w.q.size, w.u.size, w.v.size
-    regular = touch(network, system, w, f, l, t)
-    take_selection(network, w, f)
+    regular = touch(graph, system, w, f, l, t)
+    take_selection(graph, w, f)
     evaluate_dense_rows(system, w, t)
     kept = 0
     for i in range(n):
@@ -44,7 +44,7 @@ def new_chart(network, system, w, f, l, t):
     low, high = null_space(w.householder, n, kept, w.V, w.R, w.z)
     if m > 0 and not (regular and low > RANK_LIMIT * high):
         return SINGULAR
-    _normal_space(network, w, l)
+    _normal_space(graph, w, l)
     form_normal_matrix(system, w)
     if not invert_normal_matrix(w) or update_b(w) != OK:
         return SINGULAR
@@ -54,28 +54,28 @@ def new_chart(network, system, w, f, l, t):
 
 
 @kernel
-def _normal_space(network, w, l):
+def _normal_space(graph, w, l):
     """U from Y0 and p0."""
     for i in range(w.U.shape[0]):
         for j in range(w.U.shape[1]):
             w.U[i, j] = 0.0
-    diagonal = l.rows0.S[network.pattern.shape[1] :]
-    for b in range(network.bodies.shape[0]):
-        if network.normals[b] >= 0:
+    diagonal = l.rows0.S[graph.pattern.shape[1] :]
+    for b in range(graph.bodies.shape[0]):
+        if graph.normals[b] >= 0:
             for c in range(4):
-                w.U[network.bodies[b, 0] + 3 + c, network.normals[b]] = l.base[8 * b + 4 + c]
-    for e in range(network.row.size):
-        if network.row[e] < 0:
+                w.U[graph.bodies[b, 0] + 3 + c, graph.normals[b]] = l.base[8 * b + 4 + c]
+    for e in range(graph.row.size):
+        if graph.row[e] < 0:
             continue
-        j, scale = network.row[e], 1.0 / diagonal[e]
+        j, scale = graph.row[e], 1.0 / diagonal[e]
         for side in range(2):
-            b, y = network.sides[e, side], 16 * e + 8 * side
-            if b == network.bodies.shape[0]:
+            b, y = graph.sides[e, side], 16 * e + 8 * side
+            if b == graph.bodies.shape[0]:
                 continue
-            i, o = network.bodies[b, 0], 8 * b + 4
+            i, o = graph.bodies[b, 0], 8 * b + 4
             for c in range(3):
                 w.U[i + c, j] = scale * l.rows0.Y[y + c]
-            if network.bodies[b, 1] == 7:
+            if graph.bodies[b, 1] == 7:
                 e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
                 f = 0.5 * scale
                 a0, a1, a2 = f * l.rows0.Y[y + 4], f * l.rows0.Y[y + 5], f * l.rows0.Y[y + 6]

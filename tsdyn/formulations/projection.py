@@ -33,28 +33,28 @@ UNHELD = int(Status.UNHELD)
 
 
 @long_kernel
-def factorise(network, system, w, f, t):
+def factorise(graph, system, w, f, t):
     """b = Phi, and H, W H^T and the factors of S, at the present poses. Status."""
-    evaluate_rows(network, system, f, f.rows, t)
+    evaluate_rows(graph, system, f, f.rows, t)
     w.counters.factorizations += 1
-    return OK if factorise_rows(network, system, f, f.rows, t, DYNAMICS) else SINGULAR
+    return OK if factorise_rows(graph, system, f, f.rows, t, DYNAMICS) else SINGULAR
 
 
 @long_kernel
-def land(network, system, w, f, t):
+def land(graph, system, w, f, t):
     """Project positions onto the manifold along W H^T; H, Y and the factors of S are those of the result. Status."""
     floor, before, moved, renew = w.control.floor, math.inf, 0.0, True
     f.landing.residual, f.landing.moved = -1.0, 0.0
     for _ in range(LAND_SWEEPS):
         if renew:
-            status = factorise(network, system, w, f, t)
+            status = factorise(graph, system, w, f, t)
             if status != OK:
                 return status
             if f.landing.residual >= 0.0:
-                return _settle(network, f, floor)
+                return _settle(graph, f, floor)
             renew = False
         else:
-            evaluate_residuals(network, system, f, t)
+            evaluate_residuals(graph, system, f, t)
         worst = largest(f.b)
         f.landing.residual = max(f.landing.residual, worst)
         if not worst < math.inf:
@@ -64,45 +64,45 @@ def land(network, system, w, f, t):
                 return NEWTON_FAILED
             if moved <= LEAST_MOVE:
                 w.counters.at_rounding += 1 if moved == 0.0 else 0
-                return _settle(network, f, floor)
+                return _settle(graph, f, floor)
             renew = True
             continue
         before = worst
         w.counters.newton += 1
-        moved = max(moved, _displace(network, f))
+        moved = max(moved, _displace(graph, f))
         f.landing.moved = moved
     return NEWTON_FAILED
 
 
 @long_kernel
-def _settle(network, f, floor):
+def _settle(graph, f, floor):
     """End a landing, b being Phi: next to a singular configuration it is corrected below its floor. Status.
 
     A residual of Phi there displaces bodies by the residual over the distance.
     """
     if not redundant_rows_hold(f, floor):
         return UNHELD
-    if is_near_singular(f, singularity_indicator(network, f.rows)):
-        _displace(network, f)
+    if is_near_singular(f, singularity_indicator(graph, f.rows)):
+        _displace(graph, f)
     return OK
 
 
 @kernel
-def _displace(network, f):
+def _displace(graph, f):
     """Displace the bodies by the smallest correction of the residuals b; return the largest displacement."""
-    find_correction(network, f.rows, f.b, f.Z)
-    move_by(network, f)
+    find_correction(graph, f.rows, f.b, f.Z)
+    move_by(graph, f)
     return largest(f.Z)
 
 
 @kernel
-def move_by(network, f):
+def move_by(graph, f):
     """Displace the bodies by Z, to first order."""
     p = f.p
-    for b in range(network.bodies.shape[0]):
+    for b in range(graph.bodies.shape[0]):
         at, o = b * POSE, 8 * b
         put(f.poses, at + R, add(four(f.poses, at + R), four(f.Z, o)))
-        if network.bodies[b, 1] == 7:
+        if graph.bodies[b, 1] == 7:
             x, y, z = 0.5 * f.Z[o + 4], 0.5 * f.Z[o + 5], 0.5 * f.Z[o + 6]
             e0, e1, e2, e3 = (f.poses[at + P], f.poses[at + P + 1], f.poses[at + P + 2], f.poses[at + P + 3])
             # p <- p o (1, dpi' / 2)
@@ -123,41 +123,41 @@ def normalise(p):
 
 
 @kernel
-def gather_speeds(network, f):
+def gather_speeds(graph, f):
     """Z = rd and omega' of the poses."""
-    for b in range(network.bodies.shape[0]):
+    for b in range(graph.bodies.shape[0]):
         put(f.Z, 8 * b, four(f.poses, b * POSE + RD))
         put(f.Z, 8 * b + 4, four(f.poses, b * POSE + OMEGA))
 
 
 @kernel
-def find_drift(network, system, f, t):
+def find_drift(graph, system, f, t):
     """gamma = Phi_t, time being set."""
-    evaluate_drift(network, system, f, t, f.gamma)
+    evaluate_drift(graph, system, f, t, f.gamma)
 
 
 @kernel
-def land_velocities(network, f, drifting):
+def land_velocities(graph, f, drifting):
     """Project the velocities of the poses onto the tangent space, twice: the second projection removes rounding.
 
     H, Y and S are those of the poses; with `drifting`, gamma is Phi_t.
     """
-    gather_speeds(network, f)
+    gather_speeds(graph, f)
     for _ in range(2):
         if drifting:
-            constrain(network, f.rows, f.gamma, f.Z, f.b)
+            constrain(graph, f.rows, f.gamma, f.Z, f.b)
         else:
-            project(network, f.rows, f.Z, f.b)
-    for b in range(network.bodies.shape[0]):
+            project(graph, f.rows, f.Z, f.b)
+    for b in range(graph.bodies.shape[0]):
         put(f.poses, b * POSE + RD, four(f.Z, 8 * b))
         put(f.poses, b * POSE + OMEGA, four(f.Z, 8 * b + 4))
 
 
 @kernel
-def sum_series(network, bodies, orders, top, h, poses, p):
+def sum_series(graph, bodies, orders, top, h, poses, p):
     """The poses at h: A and r from coefficients up to top + 1, omega' up to top. A is made orthogonal by way of p."""
     s = splat(h)
-    for b in range(network.bodies.shape[0]):
+    for b in range(graph.bodies.shape[0]):
         first, at = b * orders * BODY_ROW, b * POSE
         o = first + S_R * orders
         r, rd = four(bodies, o + 4 * (top + 1)), splat(0.0)
@@ -166,7 +166,7 @@ def sum_series(network, bodies, orders, top, h, poses, p):
             r = fma(r, s, four(bodies, o + 4 * k))
         put(poses, at + R, r)
         put(poses, at + RD, rd)
-        if network.bodies[b, 1] == 7:
+        if graph.bodies[b, 1] == 7:
             w, o = splat(0.0), first + S_OMEGA * orders
             for k in range(top, -1, -1):
                 w = fma(w, s, four(bodies, o + 4 * k))

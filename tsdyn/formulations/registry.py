@@ -5,10 +5,10 @@ from types import ModuleType
 
 from ..rows.interface import redundancy
 from ..sparse.constraint_graph import REDUCED
-from ..sparse.constraint_graphs import network_of
+from ..sparse.constraint_graphs import graph_of
 from ..validation import unknown_name
 from . import friction_basis, friction_solve, linearisation, maggi_kane, null_space, tangent
-from .locked_orientations import moving_network
+from .locked_orientations import moving_graph
 
 
 @dataclass(frozen=True)
@@ -26,18 +26,18 @@ class Formulation:
             return replace(self, kernels=null_space, basis_free=False)
         return self
 
-    def network(self, packed):
-        """The scene's network with the loops that the kernels call; that of the forms with a basis has every row."""
-        network = moving_network(packed, *self.kernels.COLUMNS) if self.basis_free else network_of(packed, REDUCED)
-        if network.frictions.size and network.rub[0] == 0:
-            network.rub[0] = (friction_solve if self.basis_free else friction_basis).rub.address
-        return network
+    def graph(self, packed):
+        """The scene's graph with the loops that the kernels call; that of the forms with a basis has every row."""
+        graph = moving_graph(packed, *self.kernels.COLUMNS) if self.basis_free else graph_of(packed, REDUCED)
+        if graph.frictions.size and graph.rub[0] == 0:
+            graph.rub[0] = (friction_solve if self.basis_free else friction_basis).rub.address
+        return graph
 
-    def sizes(self, n, m, network):
-        """Lengths of x and y of a network, with n coordinates and m constraint rows."""
+    def sizes(self, n, m, graph):
+        """Lengths of x and y of a graph, with n coordinates and m constraint rows."""
         if self.basis_free:
-            return 8 * len(network.bodies), 8 * len(network.bodies)
-        k = n - m + redundancy(network)
+            return 8 * len(graph.bodies), 8 * len(graph.bodies)
+        k = n - m + redundancy(graph)
         return n if self.first_order else k, k
 
     def addresses(self):

@@ -65,7 +65,7 @@ __all__ = ["error_norm"]  # which is a part of the form, too
 OK, SINGULAR, MASS_SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR), int(Status.MASS_SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
 CHART_LOST, UNHELD = int(Status.CHART_LOST), int(Status.UNHELD)
-COLUMNS = REDUCED, VALUES, BIAS, DRIFT  # the loops of a network that are called
+COLUMNS = REDUCED, VALUES, BIAS, DRIFT  # the loops of a graph that are called
 SPLIT = 2.0**27 + 1.0  # splits a float in two halves
 
 
@@ -73,7 +73,7 @@ SPLIT = 2.0**27 + 1.0  # splits a float in two halves
 def place(context, t, x):
     """Set positions from x (8 b,): poses on the manifold, H, W H^T and the factors of S. Status."""
     c = load(context)
-    system, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    system, w, f, l, graph = c.system, c.work, c.tangent, c.chart, c.graph
     w.counters.placements += 1
     l.state.time = t
     if not set_time(system, t):
@@ -82,26 +82,26 @@ def place(context, t, x):
     for attempt in range(2):
         copy(x, l.x)
         if attempt == 1:  # a long step: from the tangent plane, P0 x
-            multiply_rows(network, l.rows0, l.x, w.u)
-            solve_rows(network, l.rows0, w.u)
-        apply_multipliers(network, l.rows0, w.u, l.x)
-        status = _solve_positions(network, system, w, f, l, t, RENEWALS * attempt)
+            multiply_rows(graph, l.rows0, l.x, w.u)
+            solve_rows(graph, l.rows0, w.u)
+        apply_multipliers(graph, l.rows0, w.u, l.x)
+        status = _solve_positions(graph, system, w, f, l, t, RENEWALS * attempt)
         if status == OK or f.b.size == 0:
             break
     if status != OK:
         return status
     if f.b.size > 0:
         w.counters.factorizations += 1
-        failed = factorise_selected_rows(network, f, f.rows, DYNAMICS)
+        failed = factorise_selected_rows(graph, f, f.rows, DYNAMICS)
         if failed >= 0:
-            return MASS_SINGULAR if is_axis(network, f.rows, failed) else SINGULAR
+            return MASS_SINGULAR if is_axis(graph, f.rows, failed) else SINGULAR
     if system.forces.shape[0] > 0:
-        write_positions(network.bodies, f.poses, w.q)
+        write_positions(graph.bodies, f.poses, w.q)
     return OK
 
 
 @kernel
-def _solve_positions(network, system, w, f, l, t, renewals):
+def _solve_positions(graph, system, w, f, l, t, renewals):
     """Newton's method for u, N being that of its start or made anew so often; poses and H at the solution. Status.
 
     It ends where what is left, |Phi| or what the convergence so far lets expect of it, is below u_tol^(3/2) or
@@ -113,14 +113,14 @@ def _solve_positions(network, system, w, f, l, t, renewals):
     with_H, before, rate, ending, anew = True, math.inf, 0.0, False, 0
     l.state.factored = 0
     for sweep in range(SWEEPS):
-        if not displace(network, l, f.poses):
+        if not displace(graph, l, f.poses):
             return CHART_LOST
         if f.b.size == 0:
             return OK
         if with_H:
-            evaluate_rows(network, system, f, f.rows, t)
+            evaluate_rows(graph, system, f, f.rows, t)
         else:
-            evaluate_residuals(network, system, f, t)
+            evaluate_residuals(graph, system, f, t)
         worst = largest(f.b)
         if not worst < math.inf:
             return NOT_FINITE
@@ -147,12 +147,12 @@ def _solve_positions(network, system, w, f, l, t, renewals):
                 w.control.rate = worst / (before * before)
             rate = worst / before
         if l.state.factored == 0:
-            if not factorise_normal(network, w, f, l):
+            if not factorise_normal(graph, w, f, l):
                 return SINGULAR
             l.state.factored, l.state.off, rate = 1, w.control.rate * worst, 0.0
-        solve_product(network, l.lower, l.upper, f.b)
+        solve_product(graph, l.lower, l.upper, f.b)
         w.counters.newton += 1
-        apply_multipliers(network, l.rows0, f.b, l.x)
+        apply_multipliers(graph, l.rows0, f.b, l.x)
         for e in range(f.b.size):
             w.u[e] += f.b[e]
         expected = worst * (rate if rate > 0.0 else w.control.rate * worst)
@@ -161,7 +161,7 @@ def _solve_positions(network, system, w, f, l, t, renewals):
 
 
 @kernel
-def solve_velocities(network, system, w, f, l, t):
+def solve_velocities(graph, system, w, f, l, t):
     """rd and omega' of the poses from the rates l.y, projected onto the tangent space. False if N is singular.
 
     The factors are those of N at the start of the position solve, or, where it needed none, those of S as long as they
@@ -169,22 +169,22 @@ def solve_velocities(network, system, w, f, l, t):
     """
     rheonomic = is_rheonomic(system)
     if rheonomic:
-        evaluate_drift(network, system, f, t, l.drift)
+        evaluate_drift(graph, system, f, t, l.drift)
     factored = l.state.factored == 1
-    if not factored and network.axes.rows.shape[0] > 0:  # S is of another metric than the chart
-        if not factorise_normal(network, w, f, l):
+    if not factored and graph.axes.rows.shape[0] > 0:  # S is of another metric than the chart
+        if not factorise_normal(graph, w, f, l):
             return False
         factored, l.state.factored, l.state.off = True, 1, 0.0
     lower, upper = l.lower if factored else f.rows.S, l.upper if factored else f.rows.S
     floor, before = 0.0, math.inf
     for sweep in range(SWEEPS):
-        turn_rates(network, l, l.y, f.poses)
+        turn_rates(graph, l, l.y, f.poses)
         if f.b.size == 0:
             return True
         if sweep == 0:
-            speed, spin = largest_rates(network, f.poses)
+            speed, spin = largest_rates(graph, f.poses)
             floor = SPEED_ROUNDING * (speed + w.control.size * spin)
-        multiply_rates(network, f.rows, f.poses, f.b)
+        multiply_rates(graph, f.rows, f.poses, f.b)
         if rheonomic:
             for e in range(f.b.size):
                 f.b[e] += l.drift[e]
@@ -195,12 +195,12 @@ def solve_velocities(network, system, w, f, l, t):
             w.counters.kept += 0 if factored else 1
             return True
         if not factored and worst > SLOW_VELOCITIES * before:
-            if not factorise_normal(network, w, f, l):
+            if not factorise_normal(graph, w, f, l):
                 return False
             lower, upper, factored = l.lower, l.upper, True
             l.state.factored, l.state.off = 1, 0.0
-        solve_product(network, lower, upper, f.b)
-        apply_multipliers(network, l.rows0, f.b, l.y)
+        solve_product(graph, lower, upper, f.b)
+        apply_multipliers(graph, l.rows0, f.b, l.y)
         before = worst
     return True
 
@@ -209,21 +209,21 @@ def solve_velocities(network, system, w, f, l, t):
 def accelerate(context, t, y, yd, unused):
     """Set velocities from y (8 b,) at the current position: velocities, accelerations and y'. Status."""
     c = load(context)
-    system, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    system, w, f, l, graph = c.system, c.work, c.tangent, c.chart, c.graph
     n = l.x.size - 8
     yd = vector(yd, n)
     copy(vector(y, n), l.y)
-    if not solve_velocities(network, system, w, f, l, t):
+    if not solve_velocities(graph, system, w, f, l, t):
         return NOT_FINITE
     if system.forces.shape[0] > 0:
-        write_velocities(network.bodies, f.poses, w.qd)
-    if network.frictions.shape[0] > 0:
-        status = call_rub(network.rub[0], context, t, yd)
+        write_velocities(graph.bodies, f.poses, w.qd)
+    if graph.frictions.shape[0] > 0:
+        status = call_rub(graph.rub[0], context, t, yd)
         if status != OK:
             return status
     else:
-        solve_accelerations(network, system, w, f, t)
-    write_back(network, l, f.poses, f.Z, yd)
+        solve_accelerations(graph, system, w, f, t)
+    write_back(graph, l, f.poses, f.Z, yd)
     w.counters.evaluations += 1
     return OK if is_finite(yd) else NOT_FINITE
 
@@ -232,12 +232,12 @@ def accelerate(context, t, y, yd, unused):
 def complete(context, yd):
     """Write q, qd and qdd after `accelerate`, the accelerations refined once by H (rdd, omega'd) + gamma."""
     c = load(context)
-    w, f, network = c.work, c.free, c.network
+    w, f, graph = c.work, c.tangent, c.graph
     if f.b.size > 0:
-        constrain(network, f.rows, f.gamma, f.Z, f.b)
-    write_positions(network.bodies, f.poses, w.q)
-    write_velocities(network.bodies, f.poses, w.qd)
-    write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
+        constrain(graph, f.rows, f.gamma, f.Z, f.b)
+    write_positions(graph.bodies, f.poses, w.q)
+    write_velocities(graph.bodies, f.poses, w.qd)
+    write_accelerations(graph.bodies, f.poses, f.Z, w.qdd)
     return OK
 
 
@@ -245,8 +245,8 @@ def complete(context, yd):
 def check(context):
     """Return the reason to abandon the chart, or zero."""
     c = load(context)
-    w, f, l = c.work, c.free, c.local
-    reason = turning(c.network, w, f, l)
+    w, f, l = c.work, c.tangent, c.chart
+    reason = turning(c.graph, w, f, l)
     l.state.placement = w.counters.placements if w.control.contraction < CONTRACTION_LOST else 0
     if not redundant_rows_hold(f, w.control.floor):
         return BY_FAILURE  # the next chart can't be made, and says why
@@ -257,21 +257,21 @@ def check(context):
 def start_chart(context, t, x, y, yd, unused):
     """Make a chart at the present q: x = 0, y = (rd, omega'), y' = (rdd, omega'd). Status."""
     c = load(context)
-    system, w, f, l, network = c.system, c.work, c.free, c.local, c.network
+    system, w, f, l, graph = c.system, c.work, c.tangent, c.chart, c.graph
     if not set_time(system, t):
         return NOT_FINITE
-    regular = touch(network, system, w, f, l, t)
+    regular = touch(graph, system, w, f, l, t)
     x, y, yd = vector(x, l.x.size - 8), vector(y, l.x.size - 8), vector(yd, l.x.size - 8)
     for i in range(x.size):
         x[i] = 0.0
     for e in range(w.u.size):
         w.u[e] = 0.0
     w.control.rate = CURVATURE
-    for b in range(network.bodies.shape[0]):
-        i, o = network.bodies[b, 0], 8 * b
+    for b in range(graph.bodies.shape[0]):
+        i, o = graph.bodies[b, 0], 8 * b
         for c in range(3):
             y[o + c], yd[o + c] = w.qd[i + c], w.qdd[i + c]
-        if network.bodies[b, 1] == 7:
+        if graph.bodies[b, 1] == 7:
             _spin(w.q, w.qd, i + 3, y, o + 4)
             _spin(w.q, w.qdd, i + 3, yd, o + 4)
     if not regular:

@@ -10,7 +10,7 @@ from ..workspaces.workspace import load
 
 
 @kernel
-def _weighted_square(network, f, l, e, values, old, at, rtol, atol):
+def _weighted_square(graph, f, l, e, values, old, at, rtol, atol):
     """(dq_i / (atol + rtol |value|))^2 summed, dq the change of coordinates (n,) that P0 e makes at q0.
 
     Nine arguments: the graph, two workspaces, the error e, values at both ends of the step, and tolerances.
@@ -19,14 +19,14 @@ def _weighted_square(network, f, l, e, values, old, at, rtol, atol):
     for i in range(e.size, f.Z.size):
         f.Z[i] = 0.0
     if f.b.size > 0:
-        project(network, l.rows0, f.Z, f.b)
+        project(graph, l.rows0, f.Z, f.b)
     total = 0.0
-    for b in range(network.bodies.shape[0]):
-        i, o = network.bodies[b, 0], 8 * b
+    for b in range(graph.bodies.shape[0]):
+        i, o = graph.bodies[b, 0], 8 * b
         for c in range(3):
             x = f.Z[o + c] / (atol + rtol * max(abs(values[i + c]), abs(old[at + i + c])))
             total += x * x
-        if network.bodies[b, 1] == 7:
+        if graph.bodies[b, 1] == 7:
             i += 3
             e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
             x, y, z = 0.5 * f.Z[o + 4], 0.5 * f.Z[o + 5], 0.5 * f.Z[o + 6]
@@ -48,9 +48,9 @@ def _weighted_square(network, f, l, e, values, old, at, rtol, atol):
 def error_norm(context, ex, ey, old, rtol, atol):
     """Root mean square of the errors P0 ex of q and P0 ey of qd, over atol + rtol times the larger end of the step."""
     c = load(context)
-    w, f, l, network = c.work, c.free, c.local, c.network
+    w, f, l, graph = c.work, c.tangent, c.chart, c.graph
     n, k = w.q.size, l.x.size - 8
     old = vector(old, 3 * n)
-    total = _weighted_square(network, f, l, vector(ex, k), w.q, old, 0, rtol, atol)
-    total += _weighted_square(network, f, l, vector(ey, k), w.qd, old, n, rtol, atol)
+    total = _weighted_square(graph, f, l, vector(ex, k), w.q, old, 0, rtol, atol)
+    total += _weighted_square(graph, f, l, vector(ey, k), w.qd, old, n, rtol, atol)
     return math.sqrt(total / (2 * n))

@@ -13,10 +13,10 @@ class Derived:
     body_indices: dict = None  # packed.index_of
     members: dict = None  # packed.member_of
     short_rows: object = None  # a `System`: sparse_jacobian.with_short_rows
-    graph: tuple = None  # constraint_graph.network_of, and by the loops asked for:
-    networks: dict = field(default_factory=dict)
+    graph: tuple = None  # constraint_graph.graph_of, and by the loops asked for:
+    graphs: dict = field(default_factory=dict)
     locked: object = None  # a `Still`: locked_orientations.still
-    moving_graph: tuple = None  # locked_orientations.moving_network, and by the loops asked for:
+    moving_graph: tuple = None  # locked_orientations.moving_graph, and by the loops asked for:
     moving_networks: dict = field(default_factory=dict)
     examined: object = None  # a `Packed` without redundant rows so far: dependent_rows.dependent_rows
     aligned: tuple = None  # mirrored_branches.demand_aligned
@@ -32,7 +32,7 @@ class Derived:
     def forget_graphs(self):
         """The constraint graph is another."""
         self.graph = None
-        self.networks.clear()
+        self.graphs.clear()
         self.forget_locked()
 
     def forget_locked(self):

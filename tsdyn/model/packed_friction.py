@@ -14,7 +14,7 @@ class FrictionPlace(Record):
     body_a: int
     body_b: int
     on: int  # the side, 0 for a and 1 for b, on which the reaction is taken
-    first: int  # where its rows begin in Network.friction_rows
+    first: int  # where its rows begin in ConstraintGraph.friction_rows
     count: int  # and how many they are
     kind: int  # row of System.forces
     index: int  # and its instance there
@@ -23,7 +23,7 @@ class FrictionPlace(Record):
 
 
 def frictions_of(packed, bodies, rows_of, sides):
-    """Rows of Network.frictions, in the order of System.normals, and of Network.friction_rows.
+    """Rows of ConstraintGraph.frictions, in the order of System.normals, and of ConstraintGraph.friction_rows.
 
     bodies gives the place of a body by its id, rows_of those of a primitive's rows, sides (m, 2) their bodies.
     """

@@ -7,9 +7,9 @@ from ..rows.interface import METRIC, evaluate_rows, factorise_rows
 
 
 @kernel
-def factorise_at(network, s, f, t, q):
+def factorise_at(graph, s, f, t, q):
     """H, Y and the factors of S at t, q. Return True if S is nonsingular."""
     set_time(s, t)
-    place_bodies(network.bodies, q, f.poses)
-    evaluate_rows(network, s, f, f.rows, t)
-    return factorise_rows(network, s, f, f.rows, t, METRIC)
+    place_bodies(graph.bodies, q, f.poses)
+    evaluate_rows(graph, s, f, f.rows, t)
+    return factorise_rows(graph, s, f, f.rows, t, METRIC)

@@ -7,7 +7,7 @@ from ..formulations.friction_solve import find_reactions
 from ..jit.kernels import entry, resident
 from ..rows.interface import weigh_bodies
 from ..sparse.constraint_graph import REDUCED
-from ..sparse.constraint_graphs import network_of
+from ..sparse.constraint_graphs import graph_of
 from ..workspaces.workspace import load_parts, parts
 from .factorised_rows import factorise_at
 from .generalised_forces import applied_loads, inertial_forces, velocity_forces
@@ -20,14 +20,14 @@ def _solve(context, t, q, qd, r, out):
     H W (H^T lam - sum_i g_i N_i(lam)) = H W r: the acceleration equation for the residual forces.
     """
     c = load_parts(context)
-    network, s, f = c.network, c.system, c.free
+    graph, s, f = c.graph, c.system, c.tangent
     for k in range(t.size):
-        found = factorise_at(network, s, f, t[k], q[k])
-        take_loads(network.bodies, q[k], r[k], f.Z)
-        weigh_bodies(network, f.Z)
+        found = factorise_at(graph, s, f, t[k], q[k])
+        take_loads(graph.bodies, q[k], r[k], f.Z)
+        weigh_bodies(graph, f.Z)
         for e in range(f.gamma.size):
             f.gamma[e] = 0.0
-        found = found and find_reactions(network, s, f, q[k], qd[k], t[k])
+        found = found and find_reactions(graph, s, f, q[k], qd[k], t[k])
         for i in range(out.shape[1]):
             out[k, i] = f.friction.load[7 * i] if found else np.nan
 
@@ -44,7 +44,7 @@ def with_normal_loads(packed, t, q, qd, qdd, memory):
     r += velocity_forces(system, q, qd)
     r -= inertial_forces(system, q, qdd)
     own = system._replace(reals=system.reals.copy())
-    context, *_keep = resident(parts(own, network_of(packed, REDUCED), q.shape[1]))
+    context, *_keep = resident(parts(own, graph_of(packed, REDUCED), q.shape[1]))
     loads = np.zeros((t.size, system.normals.size))
     _solve(context, t, q, qd, r, loads)
     return np.hstack((memory, loads))

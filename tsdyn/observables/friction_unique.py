@@ -7,7 +7,7 @@ from ..formulations.friction_loads import normal_load
 from ..jit.kernels import entry, resident, stack
 from ..rows.interface import count_self_stresses, redundancy, self_stress
 from ..sparse.constraint_graph import REDUCED
-from ..sparse.constraint_graphs import network_of
+from ..sparse.constraint_graphs import graph_of
 from ..workspaces.workspace import load_parts, parts
 from .tolerances import NO_STRESS
 from .uniqueness import find_rows
@@ -17,18 +17,18 @@ from .uniqueness import find_rows
 def _free_loads(context, t, q, whole, out):
     """out (frictions,): the largest normal load in a unit self-stress."""
     c = load_parts(context)
-    network, s, f = c.network, c.system, c.free
+    graph, s, f = c.graph, c.system, c.tangent
     reaction, none, found = stack(6), stack(7), stack(7)
-    find_rows(network, s, f, q, t, whole)
+    find_rows(graph, s, f, q, t, whole)
     for d in range(count_self_stresses(f)):
-        largest = self_stress(network, f, whole, d)
+        largest = self_stress(graph, f, whole, d)
         for i in range(out.size):
-            friction = network.frictions[i]
+            friction = graph.frictions[i]
             for c in range(6):
                 reaction[c] = 0.0
             normal_load(s, friction, q, q, t, 0, reaction, none)
             for j in range(friction.first, friction.first + friction.count):
-                e, side = network.friction_rows[j]
+                e, side = graph.friction_rows[j]
                 at = 16 * e + 8 * side
                 for c in range(3):
                     reaction[c] -= whole[at + c] * f.b[e] / largest
@@ -39,13 +39,13 @@ def _free_loads(context, t, q, whole, out):
 
 def demand_unique(packed, q, t):
     """Raise RedundantConstraints if a friction depends on a reaction that isn't unique at q."""
-    network = network_of(packed, REDUCED)
-    if not (redundancy(network) and len(network.frictions)):
+    graph = graph_of(packed, REDUCED)
+    if not (redundancy(graph) and len(graph.frictions)):
         return
     system = packed.system._replace(reals=packed.system.reals.copy())
-    context, *_keep = resident(parts(system, network, q.size))
-    free = np.zeros(len(network.frictions))
-    _free_loads(context, t, q, np.zeros(16 * len(network.row)), free)
+    context, *_keep = resident(parts(system, graph, q.size))
+    free = np.zeros(len(graph.frictions))
+    _free_loads(context, t, q, np.zeros(16 * len(graph.row)), free)
     wrong = [load.force for load in packed.loads if load.normal >= 0 and free[load.normal] > NO_STRESS]
     if wrong:
         names = ", ".join(force.name for force in wrong)

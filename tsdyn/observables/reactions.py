@@ -16,7 +16,7 @@ from ..model.packed import classes, index_of
 from ..model.sparse_jacobian import WIDTH, with_short_rows
 from ..rows.interface import balance_loads, mark_redundant
 from ..sparse.constraint_graph import REDUCED
-from ..sparse.constraint_graphs import network_of
+from ..sparse.constraint_graphs import graph_of
 from ..workspaces.workspace import load_parts, parts
 from .factorised_rows import factorise_at
 from .friction_reactions import with_normal_loads
@@ -29,37 +29,37 @@ MATRIX = np.zeros((0, 0))  # its type
 def solve_multipliers(context, t, q, r, rows, out):
     """out (k, m) with Phi_q^T lam = r, by least squares; r (k, n) is Q_A + Q_v - M qdd. NaN where Phi_q is singular.
 
-    S lam = H W r on the network with one step of refinement, r in terms of bodies, then the normalisations from the
+    S lam = H W r on the graph with one step of refinement, r in terms of bodies, then the normalisations from the
     remainder of r along p. The system is that with short rows, rows (m, 14) scratch, zero on entry.
     """
     whole = load_parts(context)
-    network, s, f = whole.network, whole.system, whole.free
-    bodies = network.bodies
+    graph, s, f = whole.graph, whole.system, whole.tangent
+    bodies = graph.bodies
     for k in range(t.size):
-        regular = factorise_at(network, s, f, t[k], q[k])
+        regular = factorise_at(graph, s, f, t[k], q[k])
         constraint_jacobian(s, q[k], t[k], rows)
         copy(r[k], f.Q)
         take_loads(bodies, q[k], r[k], f.Z)
         for i in range(out.shape[1]):
             out[k, i] = 0.0
         for _ in range(2):
-            balance_loads(network, f.rows, f.Z, f.b)
+            balance_loads(graph, f.rows, f.Z, f.b)
             for e in range(f.b.size):
-                if network.row[e] >= 0:
-                    out[k, network.row[e]] += f.b[e]
+                if graph.row[e] >= 0:
+                    out[k, graph.row[e]] += f.b[e]
         for i in range(out.shape[1]):  # remainder of r
             for half in range(2):
                 at = s.segments[i, 2 * half]
                 for c in range(s.segments[i, 2 * half + 1]):
                     f.Q[at + c] -= rows[i, 7 * half + c] * out[k, i]
         for b in range(bodies.shape[0]):
-            i = network.normals[b]
+            i = graph.normals[b]
             if i >= 0:
                 x = 0.0
                 for c in range(3, 7):
                     x += f.Q[bodies[b, 0] + c] * q[k, bodies[b, 0] + c]
                 out[k, i] = x
-        mark_redundant(network, f, math.nan, out[k])
+        mark_redundant(graph, f, math.nan, out[k])
         if not regular:
             for i in range(out.shape[1]):
                 out[k, i] = math.nan
@@ -71,13 +71,13 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
     memory (k, slots): memory of forces, zeros by default.
     """
     memory = with_normal_loads(packed, t, q, qd, qdd, memory)
-    system, network = with_short_rows(packed), network_of(packed, REDUCED)
+    system, graph = with_short_rows(packed), graph_of(packed, REDUCED)
     out = np.zeros((t.size, len(system.segments)))
     system = system._replace(reals=system.reals.copy())
     f = applied_loads(packed.system, t, q, qd, memory)
     f += velocity_forces(system, q, qd)
     f -= inertial_forces(system, q, qdd)
-    context, *_keep = resident(parts(system, network, q.shape[1]))
+    context, *_keep = resident(parts(system, graph, q.shape[1]))
     solve_multipliers(context, t, q, f, np.zeros((out.shape[1], WIDTH)), out)
     return out
 

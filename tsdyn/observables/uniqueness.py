@@ -12,17 +12,17 @@ from ..jit.kernels import entry, long_kernel, resident
 from ..model.packed import index_of
 from ..rows.interface import Rows, count_self_stresses, evaluate_every_row, redundancy, self_stress
 from ..sparse.constraint_graph import REDUCED
-from ..sparse.constraint_graphs import network_of
+from ..sparse.constraint_graphs import graph_of
 from ..workspaces.workspace import load_parts, parts
 from .factorised_rows import factorise_at
 from .tolerances import LEAST_DIVISOR, NO_STRESS
 
 
 @long_kernel
-def find_rows(network, s, f, q, t, whole):
+def find_rows(graph, s, f, q, t, whole):
     """H at q without redundant rows and, in `whole`, with them, and the factors of S; False if S is singular."""
-    regular = factorise_at(network, s, f, t, q)
-    evaluate_every_row(network, s, f, Rows(whole, f.rows.Y, f.rows.S), t)
+    regular = factorise_at(graph, s, f, t, q)
+    evaluate_every_row(graph, s, f, Rows(whole, f.rows.Y, f.rows.S), t)
     return regular
 
 
@@ -30,11 +30,11 @@ def find_rows(network, s, f, q, t, whole):
 def free_loads(context, t, q, rows, sides, whole, out):
     """out (k,): the largest load on a body by these rows in a unit self-stress, relative to their size."""
     c = load_parts(context)
-    network, s, f = c.network, c.system, c.free
+    graph, s, f = c.graph, c.system, c.tangent
     for k in range(t.size):
-        out[k] = 0.0 if find_rows(network, s, f, q[k], t[k], whole) else math.inf
+        out[k] = 0.0 if find_rows(graph, s, f, q[k], t[k], whole) else math.inf
         for d in range(count_self_stresses(f)):
-            largest, size = self_stress(network, f, whole, d), 0.0
+            largest, size = self_stress(graph, f, whole, d), 0.0
             for c in range(8):
                 load = 0.0
                 for i in range(rows.size):
@@ -48,13 +48,13 @@ def free_loads(context, t, q, rows, sides, whole, out):
 
 def unique(solution, rows, body):
     """Determine whether the reaction of these rows, a slice, on a body is unique: bool (k,)."""
-    network = network_of(solution.packed, REDUCED)
-    if not redundancy(network):
+    graph = graph_of(solution.packed, REDUCED)
+    if not redundancy(graph):
         return np.ones(solution.t.size, bool)
-    wanted = np.flatnonzero((network.row >= rows.start) & (network.row < rows.stop))
-    sides = np.where(network.sides[wanted, 0] == index_of(solution.packed, body), 0, 1)
+    wanted = np.flatnonzero((graph.row >= rows.start) & (graph.row < rows.stop))
+    sides = np.where(graph.sides[wanted, 0] == index_of(solution.packed, body), 0, 1)
     system = solution.system._replace(reals=solution.system.reals.copy())
-    context, *_keep = resident(parts(system, network, solution.q.shape[1]))
+    context, *_keep = resident(parts(system, graph, solution.q.shape[1]))
     out = np.zeros(solution.t.size)
-    free_loads(context, solution.t, solution.q, wanted, sides, np.zeros(16 * len(network.row)), out)
+    free_loads(context, solution.t, solution.q, wanted, sides, np.zeros(16 * len(graph.row)), out)
     return out < NO_STRESS

@@ -85,10 +85,10 @@ class Timekeeper(Stopwatch):
         """Install the timers."""
         super().observe(memory)
         c, series = memory.context, hasattr(memory, "series")
-        network, system = c.network, c.system
+        graph, system = c.graph, c.system
         forces = [members_of(row, memory.packed.loads) for row in system.forces]
         classes = list(dict.fromkeys(map(type, memory.packed.constraints)))
-        joints = [kind for kind, _ in instances(memory.packed, network)]
+        joints = [kind for kind, _ in instances(memory.packed, graph)]
         self.notes = timers.new_notes(len(joints) + len(classes) + 2 * len(forces))
         places = c.expansion.places["loop"] if series else [0] * len(joints)
 
@@ -99,13 +99,13 @@ class Timekeeper(Stopwatch):
                 [*(row[loop] for loop in LOOPS), place],
                 _of_constraints(kind),
             )
-            for kind, row, place in zip(joints, network.kinds, places, strict=True)
+            for kind, row, place in zip(joints, graph.kinds, places, strict=True)
         ]
-        table, firsts = self._headed(network.table, rows)
-        kinds = network.kinds.copy()
+        table, firsts = self._headed(graph.table, rows)
+        kinds = graph.kinds.copy()
         kinds["table"] = firsts
         _instead(kinds, LOOPS, timers.BODY_TIMERS)
-        network = network._replace(table=table, kinds=kinds)
+        graph = graph._replace(table=table, kinds=kinds)
 
         rows = [
             (row.table, row.count * coordinate_rows.INTS, [row[name] for name in OF_KIND], _of_constraints(kind))
@@ -120,7 +120,7 @@ class Timekeeper(Stopwatch):
         kinds["table"], loads["table"] = firsts[: len(kinds)], firsts[len(kinds) :]
         _instead(kinds, OF_KIND, timers.LOOP_TIMERS)
         _instead(loads, OF_FORCE, timers.LOOP_TIMERS)
-        c = c._replace(network=network, system=system._replace(table=table, kinds=kinds, forces=loads))
+        c = c._replace(graph=graph, system=system._replace(table=table, kinds=kinds, forces=loads))
         if series:
             c = c._replace(expansion=self._in_series(c.expansion, forces))
         elif memory.implicit:

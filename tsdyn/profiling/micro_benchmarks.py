@@ -17,24 +17,24 @@ SYSTEM, NORMAL, VELOCITIES, MASS = range(4)
 
 
 @kernel
-def _system(network, f):
+def _system(graph, f):
     """W H^T, H W H^T and its factors."""
-    factorise_selected_rows(network, f, f.rows, DYNAMICS)
+    factorise_selected_rows(graph, f, f.rows, DYNAMICS)
 
 
 @entry
 def again(context, run, what, count):
     """Repeat a part of the tangent form."""
     c, r = load(context), load_run(run)
-    w, f, l = c.work, c.free, c.local
+    w, f, l = c.work, c.tangent, c.chart
     for _ in range(count):
         if what == SYSTEM:
-            _system(c.network, f)
+            _system(c.graph, f)
         elif what == NORMAL:
-            factorise_normal(c.network, w, f, l)
+            factorise_normal(c.graph, w, f, l)
         else:
             copy(r.y, l.y)
-            solve_velocities(c.network, c.system, w, f, l, r.clock.t)
+            solve_velocities(c.graph, c.system, w, f, l, r.clock.t)
 
 
 @entry
@@ -53,7 +53,7 @@ def again_in_series(context, run, what, count):
     """Repeat a part of a Taylor step."""
     c = load_series(context)
     for _ in range(count):
-        _system(c.network, c.free)
+        _system(c.graph, c.tangent)
 
 
 def prices(memory):

@@ -198,7 +198,7 @@ def _once(scene, method, options, start):
         kept.series  # noqa: B018
     else:
         form = formulation(options.get("formulation", "tangent")).serving(method)
-        form.network(kept.packed)
+        form.graph(kept.packed)
         kept.system(method.implicit)
     seconds["order of elimination"] = clock() - began
     state = options.get("state")

@@ -23,10 +23,10 @@ from .tolerances import ZERO_PIVOT
 
 
 @kernel
-def _multiply_both(network, H, X, lower, upper):
+def _multiply_both(graph, H, X, lower, upper):
     """Set H X^T in the blocks of the pattern as `factor_lu` expects: upper triangle, lower triangle transposed."""
-    products = network.products
-    for i in range(network.pattern.shape[1]):
+    products = graph.products
+    for i in range(graph.pattern.shape[1]):
         let(upper, i, 0.0)
         let(lower, i, 0.0)
     for i in range(products.shape[0]):
@@ -58,43 +58,43 @@ def rotate_rate(l, b, rate):
 
 
 @long_kernel
-def factorise_chart_matrix(network, f, l):
+def factorise_chart_matrix(graph, f, l):
     """Set the LU factors of N = H C Y0 at the present H; return True if N is nonsingular."""
     Y0 = l.rows0.Y
-    for e in range(network.sides.shape[0]):
+    for e in range(graph.sides.shape[0]):
         for k in range(2):
             at = 16 * e + 8 * k
             put(l.X, at, four(Y0, at))
-            put(l.X, at + 4, rotate_rate(l, network.sides[e, k], four(Y0, at + 4)))
-    _multiply_both(network, f.rows.H, l.X, l.lower, l.upper)
-    if network.parts.shape[0] > 0:
-        _multiply_parts(network, f.rows.H, l)
+            put(l.X, at + 4, rotate_rate(l, graph.sides[e, k], four(Y0, at + 4)))
+    _multiply_both(graph, f.rows.H, l.X, l.lower, l.upper)
+    if graph.parts.shape[0] > 0:
+        _multiply_parts(graph, f.rows.H, l)
     for values in (l.lower, l.upper):
-        set_redundant_diagonal(network, f, values)
-        leave_axes_out(network, values)
-    return factor_lu(network.pattern, l.lower, l.upper, ZERO_PIVOT) < 0
+        set_redundant_diagonal(graph, f, values)
+        leave_axes_out(graph, values)
+    return factor_lu(graph.pattern, l.lower, l.upper, ZERO_PIVOT) < 0
 
 
 @kernel
-def factorise_product(network, f, X, lower, upper):
+def factorise_product(graph, f, X, lower, upper):
     """Set the LU factors of H X^T at the present H, with axis rows; return True if the matrix is nonsingular."""
-    _multiply_both(network, f.rows.H, X, lower, upper)
-    multiply_axes_both(network, f.rows.H, X, lower, upper)
-    set_redundant_diagonal(network, f, lower)
-    set_redundant_diagonal(network, f, upper)
-    return factor_lu(network.pattern, lower, upper, ZERO_PIVOT) < 0
+    _multiply_both(graph, f.rows.H, X, lower, upper)
+    multiply_axes_both(graph, f.rows.H, X, lower, upper)
+    set_redundant_diagonal(graph, f, lower)
+    set_redundant_diagonal(graph, f, upper)
+    return factor_lu(graph.pattern, lower, upper, ZERO_PIVOT) < 0
 
 
 @kernel
-def solve_product(network, lower, upper, b):
+def solve_product(graph, lower, upper, b):
     """b <- (H X^T)^-1 b, by the factors of `factorise_chart_matrix` or `factorise_product`; those of S serve twice."""
-    solve_lu(network.pattern, lower, upper, b)
+    solve_lu(graph.pattern, lower, upper, b)
 
 
 @kernel
-def pivot_loss(network, l):
+def pivot_loss(graph, l):
     """Return max |1 - n / s|, with n and s the pivots of N and of S0."""
-    pattern, worst = network.pattern, 0.0
+    pattern, worst = graph.pattern, 0.0
     for j in range(pattern.heads.size):
         at, step = pattern.heads[j], pattern.widths[j] + 1
         for _ in range(pattern.starts[j + 1] - pattern.starts[j]):
@@ -104,17 +104,17 @@ def pivot_loss(network, l):
 
 
 @kernel
-def _multiply_parts(network, H, l):
+def _multiply_parts(graph, H, l):
     """Add the products at the parts of split bodies."""
     t, lower, upper = stack(12), l.lower, l.upper  # t: C W0 of a body
-    for i in range(network.parts.shape[0]):
-        part, scale = network.parts[i], network.scales[i]
+    for i in range(graph.parts.shape[0]):
+        part, scale = graph.parts[i], graph.scales[i]
         left, rows, right, columns = part.left, part.rows, part.right, part.columns
         target, stride, kind, b = part.target, part.stride, part.kind, part.body
-        light, w = network.inverse[WEIGHTS * b + W_MASS], WEIGHTS * b + W_ROTATION
-        if kind != ROWS and network.bodies[b, 1] == 7:
+        light, w = graph.inverse[WEIGHTS * b + W_MASS], WEIGHTS * b + W_ROTATION
+        if kind != ROWS and graph.bodies[b, 1] == 7:
             for c in range(3):
-                put(t, 4 * c, rotate_rate(l, b, four(network.inverse, w + 4 * c)))
+                put(t, 4 * c, rotate_rate(l, b, four(graph.inverse, w + 4 * c)))
         for r in range(rows):
             for c in range(columns):
                 at, h = target + r * stride + c, left + 16 * r

@@ -7,86 +7,86 @@ from .redundant_rows import clear_redundant, keep_every_row, leave_redundant_row
 
 
 @kernel
-def _run_loop(network, reals, f, t, kind, loop, out, H):
+def _run_loop(graph, reals, f, t, kind, loop, out, H):
     """Call one of the loops of a kind, by its address, or zero for none."""
     if loop != 0:
         call_body_loop(
-            loop, kind.count, kind.stride, network.table[kind.table :], reals[kind.reals :], f.poses, f.poses, t, out, H
+            loop, kind.count, kind.stride, graph.table[kind.table :], reals[kind.reals :], f.poses, f.poses, t, out, H
         )
 
 
 @kernel
-def _clear_other_rows(network, out):
+def _clear_other_rows(graph, out):
     """out = 0 of welds and axis rows, which are none of Phi."""
-    clear_welds(network, out)
-    if network.axes.rows.shape[0] > 0:
-        clear_axes(network, out)
+    clear_welds(graph, out)
+    if graph.axes.rows.shape[0] > 0:
+        clear_axes(graph, out)
 
 
 @kernel
-def clear_welds(network, out):
+def clear_welds(graph, out):
     """out = 0 of the welds between the parts of a split body."""
-    for i in range(network.welds.shape[0]):
-        out[network.welds[i, 0]] = 0.0
+    for i in range(graph.welds.shape[0]):
+        out[graph.welds[i, 0]] = 0.0
 
 
 @kernel
-def _evaluate(network, reals, f, rows, t):
+def _evaluate(graph, reals, f, rows, t):
     """f.b = Phi and H of every row that is not dropped."""
-    for i in range(network.kinds.shape[0]):
-        kind = network.kinds[i]
-        _run_loop(network, reals, f, t, kind, kind.reduced, f.b, rows.H)
-    _clear_other_rows(network, f.b)
+    for i in range(graph.kinds.shape[0]):
+        kind = graph.kinds[i]
+        _run_loop(graph, reals, f, t, kind, kind.reduced, f.b, rows.H)
+    _clear_other_rows(graph, f.b)
     if f.dropped[0] > 0:
         leave_redundant_rows(f, f.b, rows.H)
 
 
 @kernel
-def evaluate_rows(network, system, f, rows, t):
+def evaluate_rows(graph, system, f, rows, t):
     """f.b = Phi and H = [Phi_r, Phi_pi'], at the poses of f; zero at redundant rows."""
-    _evaluate(network, system.reals, f, rows, t)
+    _evaluate(graph, system.reals, f, rows, t)
 
 
 @kernel
-def evaluate_all(network, reals, f, rows, t):
+def evaluate_all(graph, reals, f, rows, t):
     """As `evaluate_every_row`, reals being System.reals."""
     count = keep_every_row(f)
-    _evaluate(network, reals, f, rows, t)
+    _evaluate(graph, reals, f, rows, t)
     restore_selection(f, count)
 
 
 @long_kernel
-def evaluate_every_row(network, system, f, rows, t):
+def evaluate_every_row(graph, system, f, rows, t):
     """f.b = Phi and H at the poses of f, redundant rows included."""
-    evaluate_all(network, system.reals, f, rows, t)
+    evaluate_all(graph, system.reals, f, rows, t)
 
 
 @kernel
-def evaluate_residuals(network, system, f, t):
+def evaluate_residuals(graph, system, f, t):
     """f.b = Phi, at the poses of f; zero at redundant rows."""
-    for i in range(network.kinds.shape[0]):
-        kind = network.kinds[i]
-        _run_loop(network, system.reals, f, t, kind, kind.values, f.b, f.rows.H)
-    _clear_other_rows(network, f.b)
+    for i in range(graph.kinds.shape[0]):
+        kind = graph.kinds[i]
+        _run_loop(graph, system.reals, f, t, kind, kind.values, f.b, f.rows.H)
+    _clear_other_rows(graph, f.b)
     clear_redundant(f, f.b)
 
 
 @kernel
-def evaluate_bias(network, system, f, t):
+def evaluate_bias(graph, system, f, t):
     """f.gamma = gamma, with H (rdd, omega'd) + gamma = 0."""
-    for i in range(network.kinds.shape[0]):
-        kind = network.kinds[i]
-        _run_loop(network, system.reals, f, t, kind, kind.bias, f.gamma, f.rows.H)
-    _clear_other_rows(network, f.gamma)
+    for i in range(graph.kinds.shape[0]):
+        kind = graph.kinds[i]
+        _run_loop(graph, system.reals, f, t, kind, kind.bias, f.gamma, f.rows.H)
+    _clear_other_rows(graph, f.gamma)
     clear_redundant(f, f.gamma)
 
 
 @kernel
-def evaluate_drift(network, system, f, t, out):
+def evaluate_drift(graph, system, f, t, out):
     """out = Phi_t, with H (rd, omega') + Phi_t = 0."""
     for e in range(out.size):
         out[e] = 0.0
-    for i in range(network.kinds.shape[0]):
-        kind = network.kinds[i]
-        _run_loop(network, system.reals, f, t, kind, kind.drift, out, f.rows.H)
+    for i in range(graph.kinds.shape[0]):
+        kind = graph.kinds[i]
+        _run_loop(graph, system.reals, f, t, kind, kind.drift, out, f.rows.H)
     clear_redundant(f, out)

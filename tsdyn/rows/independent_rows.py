@@ -16,34 +16,34 @@ from .tolerances import FEWER, FIRST_SHARE, ZERO_PIVOT
 
 
 @kernel
-def weakest(network, values):
+def weakest(graph, values):
     """Return the smallest pivot relative to its diagonal entry, axis rows excluded.
 
     values are factors of S.
     """
-    pattern, least = network.pattern, 1.0
+    pattern, least = graph.pattern, 1.0
     kept = values[pattern.shape[1] :]
-    for e in range(network.diagonal.size):
-        share = values[network.diagonal[e]] * kept[e]
+    for e in range(graph.diagonal.size):
+        share = values[graph.diagonal[e]] * kept[e]
         if not share * least < 1.0 and not kept[e] < 0.0:
             least = 1.0 / share
     return least
 
 
 @long_kernel
-def _choose_of_all(network, H, Y, wanted, least, dropped, A, order):
+def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
     """Select rows by global pivoting, A (m, m) scratch; return the number of rows with pivots below `least`."""
-    m, count = network.row.size, 0
+    m, count = graph.row.size, 0
     for i in range(m):
-        if network.row[i] >= 0:
+        if graph.row[i] >= 0:
             order[count] = i
             count += 1
         for j in range(i + 1):
             x = 0.0
             for k in range(2):
                 for l in range(2):
-                    body = network.sides[i, k]
-                    if body == network.sides[j, l] and body < network.bodies.shape[0]:
+                    body = graph.sides[i, k]
+                    if body == graph.sides[j, l] and body < graph.bodies.shape[0]:
                         x += inner(H, 16 * i + 8 * k, Y, 16 * j + 8 * l)
             A[i * m + j] = x
     for i in range(m):
@@ -106,19 +106,19 @@ def _choose(size, width, panel, kept, joints, share, A, order):
 
 
 @long_kernel
-def _eliminate_choosing(network, values, share, dropped, A, order):
+def _eliminate_choosing(graph, values, share, dropped, A, order):
     """Factor S in place without rows whose relative pivots are below `share`; return the number of these rows.
 
     As factorisation.factor; what is left in `values` serves nothing. Negative where a row that must be kept can't be.
     """
-    pattern = network.pattern
+    pattern = graph.pattern
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     keep_diagonal(pattern, values)
     kept, count = values[pattern.shape[1] :], 0
     for j in range(heads.size):
         first, width, panel = starts[j], widths[j], values[heads[j] :]
         size = starts[j + 1] - first
-        rank = _choose(size, width, panel, kept[first:], network.row[first:], share, A, order)
+        rank = _choose(size, width, panel, kept[first:], graph.row[first:], share, A, order)
         for i in range(rank, size):
             row = order[i]
             dropped[1 + count] = first + row
@@ -151,23 +151,23 @@ def _settle(f, count, wanted):
 
 
 @long_kernel
-def select(network, f, rows, wanted, least):
+def select(graph, f, rows, wanted, least):
     """Select `wanted` rows of H to drop; if wanted < 0, all rows with relative pivots below `least`.
 
     Return True if that many exist; f.dropped then lists them in elimination order. Y and S are scratch.
     """
-    m, count = network.row.size, -1
-    if f.block.size >= m * m and network.welds.shape[0] == 0:
-        weigh_rows(network, rows.H, rows.Y)
+    m, count = graph.row.size, -1
+    if f.block.size >= m * m and graph.welds.shape[0] == 0:
+        weigh_rows(graph, rows.H, rows.Y)
         share = ZERO_PIVOT if wanted >= 0 else least
-        count = _choose_of_all(network, rows.H, rows.Y, wanted, share, f.chosen, f.block, f.order)
+        count = _choose_of_all(graph, rows.H, rows.Y, wanted, share, f.chosen, f.block, f.order)
         return _settle(f, count, wanted)
     share = FIRST_SHARE if wanted >= 0 else least
     while True:
-        weigh_rows(network, rows.H, rows.Y)
-        form_schur_complement(network, rows.H, rows.Y, rows.S)
-        leave_axes_out(network, rows.S)
-        count = _eliminate_choosing(network, rows.S, share, f.chosen, f.block, f.order)
+        weigh_rows(graph, rows.H, rows.Y)
+        form_schur_complement(graph, rows.H, rows.Y, rows.S)
+        leave_axes_out(graph, rows.S)
+        count = _eliminate_choosing(graph, rows.S, share, f.chosen, f.block, f.order)
         if _settle(f, count, wanted):
             return True
         share *= FEWER

@@ -21,7 +21,7 @@ Ask:
     redundant_rows_hold, mark_redundant, self_stress          of redundant rows
     singularity_indicator, is_near_singular                   of the distance to a singular configuration
 
-Right-hand sides and multipliers are in the order of the network; `Network.row` names the rows of Phi.
+Right-hand sides and multipliers are in the order of the graph; `ConstraintGraph.row` names the rows of Phi.
 """
 
 from .axis_rows import add_axis_multipliers, is_axis
@@ -38,8 +38,8 @@ from .redundant_rows import (
     save_selection,
 )
 from .reselection import factorise_rows, select_rows, selection_serves
-from .row_memory import allocate_free, allocate_rows, redundancy, redundant_of, reset_selection, set_selection
-from .row_workspace import Free, Rows
+from .row_memory import allocate_rows, allocate_tangent, redundancy, redundant_of, reset_selection, set_selection
+from .row_workspace import Rows, TangentWorkspace
 from .schur_complement import (
     DYNAMICS,
     METRIC,
@@ -73,12 +73,12 @@ __all__ = [
     "DYNAMICS",
     "METRIC",
     "MOST_ROWS",
-    "Free",
     "Rows",
+    "TangentWorkspace",
     "acceleration_residuals",
     "add_axis_multipliers",
-    "allocate_free",
     "allocate_rows",
+    "allocate_tangent",
     "apply_multipliers",
     "balance_loads",
     "clear_redundant",

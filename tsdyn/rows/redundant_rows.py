@@ -39,10 +39,10 @@ def leave_redundant_rows(f, Phi, H):
 
 
 @kernel
-def set_redundant_diagonal(network, f, values):
+def set_redundant_diagonal(graph, f, values):
     """Set ones on the diagonal of S, or of one of the parts of N, at redundant rows."""
     for i in range(f.dropped[0]):
-        values[network.diagonal[f.dropped[1 + i]]] = 1.0
+        values[graph.diagonal[f.dropped[1 + i]]] = 1.0
 
 
 @kernel
@@ -80,15 +80,15 @@ def redundant_rows_hold(f, floor):
 
 
 @kernel
-def list_redundant(network, f, out):
+def list_redundant(graph, f, out):
     """out[0] = number of redundant rows, then their places among the rows of Phi."""
     out[0] = f.dropped[0]
     for i in range(f.dropped[0]):
-        out[1 + i] = network.row[f.dropped[1 + i]]
+        out[1 + i] = graph.row[f.dropped[1 + i]]
 
 
 @kernel
-def mark_redundant(network, f, value, out):
+def mark_redundant(graph, f, value, out):
     """out[i] = value for the redundant rows i of Phi."""
     for i in range(f.dropped[0]):
-        out[network.row[f.dropped[1 + i]]] = value
+        out[graph.row[f.dropped[1 + i]]] = value

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, vector
-from ..sparse.constraint_graph import Network, no_network
+from ..sparse.constraint_graph import ConstraintGraph, no_graph
 from .evaluation import evaluate_all, evaluate_every_row
 from .independent_rows import select, weakest
 from .redundant_rows import clear_redundant_rows, keep_every_row
-from .row_workspace import Free, Rows, no_free
+from .row_workspace import Rows, TangentWorkspace, no_tangent_workspace
 from .schur_complement import factorise_selected_rows
 from .tolerances import WORSE, ZERO_PIVOT
 
@@ -17,37 +17,37 @@ from .tolerances import WORSE, ZERO_PIVOT
 class Choice(NamedTuple):
     """What `choose_anew` gets by one address."""
 
-    network: Network
-    free: Free
+    graph: ConstraintGraph
+    tangent: TangentWorkspace
 
 
-def choosing_anew(network, free):
-    """The `Free` of a network with which kernels can select rows anew."""
+def choosing_anew(graph, tangent):
+    """The `TangentWorkspace` of a graph with which kernels can select rows anew."""
     if DEBUG:
-        free.anew[0] = 1
-        return free
-    words = len(image_of(Choice(network, free)))
+        tangent.anew[0] = 1
+        return tangent
+    words = len(image_of(Choice(graph, tangent)))
     whole = np.zeros(words + 2, np.int64)  # what the view `anew` keeps alive
-    free = free._replace(anew=whole[words:])
-    whole[:words] = image_of(Choice(network, free))
-    free.anew[0], free.anew[1] = choose_anew.address, whole.ctypes.data
-    return free
+    tangent = tangent._replace(anew=whole[words:])
+    whole[:words] = image_of(Choice(graph, tangent))
+    tangent.anew[0], tangent.anew[1] = choose_anew.address, whole.ctypes.data
+    return tangent
 
 
-load_choice = loader(Choice(no_network(), no_free()))
+load_choice = loader(Choice(no_graph(), no_tangent_workspace()))
 CHOOSE = "ppdpppi"
 call_choose = caller(CHOOSE)
 
 
 @kernel
-def _choose(network, reals, f, rows, t, metric):
+def _choose(graph, reals, f, rows, t, metric):
     """Renew the selection of rows; f.b, H, Y and the factors of S follow it. True if S is nonsingular."""
-    evaluate_all(network, reals, f, rows, t)
-    found = select(network, f, rows, f.dropped[0], ZERO_PIVOT)
+    evaluate_all(graph, reals, f, rows, t)
+    found = select(graph, f, rows, f.dropped[0], ZERO_PIVOT)
     clear_redundant_rows(f, f.b, rows.H)
-    regular = factorise_selected_rows(network, f, rows, metric) < 0
+    regular = factorise_selected_rows(graph, f, rows, metric) < 0
     if found and regular:
-        f.selection.weakest = weakest(network, rows.S)
+        f.selection.weakest = weakest(graph, rows.S)
     return regular
 
 
@@ -55,10 +55,10 @@ def _choose(network, reals, f, rows, t, metric):
 def choose_anew(choice, reals, t, H, Y, S, metric):
     """Call `_choose` by address, 1 or 0: few scenes need it, and its code is as long as all other row code."""
     c = load_choice(choice)
-    network, f = c.network, c.free
-    m, size = network.row.size, network.pattern.shape[2]
+    graph, f = c.graph, c.tangent
+    m, size = graph.row.size, graph.pattern.shape[2]
     rows = Rows(vector(H, 16 * m), vector(Y, 16 * m), vector(S, size))
-    return 1 if _choose(network, vector(reals, ANY), f, rows, t, metric) else 0
+    return 1 if _choose(graph, vector(reals, ANY), f, rows, t, metric) else 0
 
 
 if DEBUG:
@@ -66,41 +66,41 @@ if DEBUG:
 else:
 
     @kernel
-    def _choose_by_address(network, reals, f, rows, t, metric):
+    def _choose_by_address(graph, reals, f, rows, t, metric):
         return call_choose(f.anew[0], f.anew[1], reals, t, rows.H, rows.Y, rows.S, metric) != 0
 
 
 @kernel
-def selection_serves(network, f, rows):
+def selection_serves(graph, f, rows):
     """Return True if the selected rows are nearly as independent as at their best, judged by the factors of S."""
     if f.dropped[0] == 0:
         return True
-    share = weakest(network, rows.S)
+    share = weakest(graph, rows.S)
     f.selection.weakest = max(f.selection.weakest, share)  # a selection next to a singular configuration is no measure
     return share >= WORSE * f.selection.weakest
 
 
 @long_kernel
-def factorise_rows(network, system, f, rows, t, metric):
+def factorise_rows(graph, system, f, rows, t, metric):
     """Y = W H^T and the factors of S = H W H^T, after `evaluate_rows`; return True if S is nonsingular.
 
     metric is DYNAMICS or METRIC. Where the kept rows come close to dependence, the selection of redundant rows is
     renewed, and f.b and H are those of the new one.
     """
-    regular = factorise_selected_rows(network, f, rows, metric) < 0
-    if f.dropped[0] == 0 or f.anew[0] == 0 or (regular and selection_serves(network, f, rows)):
+    regular = factorise_selected_rows(graph, f, rows, metric) < 0
+    if f.dropped[0] == 0 or f.anew[0] == 0 or (regular and selection_serves(graph, f, rows)):
         return regular  # rows may be left out for a moment of a scene that has no redundant ones
-    return _choose_by_address(network, system.reals, f, rows, t, metric)
+    return _choose_by_address(graph, system.reals, f, rows, t, metric)
 
 
 @kernel
-def select_rows(network, system, f, t, least):
+def select_rows(graph, system, f, t, least):
     """Select redundant rows at the poses: those whose pivots of S, as a share of the diagonal, are below `least`.
 
     Returns their number, or -1 if no independent selection was found. H is without them.
     """
-    evaluate_every_row(network, system, f, f.rows, t)
+    evaluate_every_row(graph, system, f, f.rows, t)
     keep_every_row(f)
-    found = select(network, f, f.rows, -1, least)
+    found = select(graph, f, f.rows, -1, least)
     clear_redundant_rows(f, f.b, f.rows.H)
     return f.dropped[0] if found else -1

@@ -5,39 +5,39 @@ import numpy as np
 from ..elements.loops.body_poses import POSE
 from ..jit.aligned_arrays import zeros
 from .reselection import choosing_anew
-from .row_workspace import Free, Friction, Indicator, Landing, Rows, Selection
+from .row_workspace import Friction, Indicator, Landing, Rows, Selection, TangentWorkspace
 from .tolerances import MOST_ROWS
 
 
-def allocate_free(network, n, redundant=False, basis=False):
-    """Allocate a `Free`; the ground's pose is set for good, and a point mass has that orientation.
+def allocate_tangent(graph, n, redundant=False, basis=False):
+    """Allocate a `TangentWorkspace`; the ground's pose is set for good, and a point mass has that orientation.
 
     Where rows may be `redundant`, there is room to select among all at once, if they aren't too many. A form with a
     basis needs room for its frictions, too.
     """
-    nb, m = len(network.bodies), len(network.row)
-    choosing = (redundant or network.dropped.size > 0) and m <= MOST_ROWS
-    widest = int(np.diff(network.pattern.starts).max(initial=0))
+    nb, m = len(graph.bodies), len(graph.row)
+    choosing = (redundant or graph.dropped.size > 0) and m <= MOST_ROWS
+    widest = int(np.diff(graph.pattern.starts).max(initial=0))
     poses = zeros((nb + 1) * POSE)
     poses.reshape(-1, POSE)[:, [0, 5, 10, 24]] = 1.0
-    free = Free(
-        poses, allocate_rows(network), zeros(m), zeros(m), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n),
+    tangent = TangentWorkspace(
+        poses, allocate_rows(graph), zeros(m), zeros(m), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n),
         zeros(4), Landing(), Selection(), Indicator(), *(np.zeros(size, np.int64) for size in (m + 1, m + 1, m + 1, m)),
-        zeros(max(widest, m if choosing else 0) ** 2), _allocate_friction(network, n, basis), np.zeros(2, np.int64),
+        zeros(max(widest, m if choosing else 0) ** 2), _allocate_friction(graph, n, basis), np.zeros(2, np.int64),
     )  # fmt: skip
-    reset_selection(network, free)
-    return choosing_anew(network, free) if redundant or network.dropped.size else free
+    reset_selection(graph, tangent)
+    return choosing_anew(graph, tangent) if redundant or graph.dropped.size else tangent
 
 
-def allocate_rows(network):
+def allocate_rows(graph):
     """Allocate `Rows`."""
-    m = len(network.row)
-    return Rows(zeros(16 * m), zeros(16 * m), zeros(network.pattern.shape[2]))
+    m = len(graph.row)
+    return Rows(zeros(16 * m), zeros(16 * m), zeros(graph.pattern.shape[2]))
 
 
-def _allocate_friction(network, n, basis):
-    k, rows = len(network.frictions), len(network.row) + int((network.normals >= 0).sum())
-    m, nb, size = (len(network.row), len(network.bodies), network.pattern.shape[2]) if k else (0, -1, 0)
+def _allocate_friction(graph, n, basis):
+    k, rows = len(graph.frictions), len(graph.row) + int((graph.normals >= 0).sum())
+    m, nb, size = (len(graph.row), len(graph.bodies), graph.pattern.shape[2]) if k else (0, -1, 0)
     free = zeros(16 * k), zeros(7 * k), zeros(m), zeros(8 * (nb + 1)), zeros(16 * m), zeros(size), zeros(size)
     if not basis:
         k = n = rows = 0
@@ -45,26 +45,26 @@ def _allocate_friction(network, n, basis):
     return Friction(*free, *matrices, np.zeros(2 * (rows + n) + 2 * k if k else 0))
 
 
-def reset_selection(network, free):
+def reset_selection(graph, tangent):
     """Select the rows of the scene's first start again, and forget multipliers and singularity indicators."""
-    free.friction.lam.fill(0.0)
-    free.friction.load.fill(0.0)
-    set_selection(free, network.dropped)
-    free.selection.weakest = 1.0
-    free.indicator.clear()
+    tangent.friction.lam.fill(0.0)
+    tangent.friction.load.fill(0.0)
+    set_selection(tangent, graph.dropped)
+    tangent.selection.weakest = 1.0
+    tangent.indicator.clear()
 
 
-def set_selection(free, redundant):
-    """Drop these rows, int64 (k,), in the order of the network."""
-    free.dropped[0] = len(redundant)
-    free.dropped[1 : 1 + len(redundant)] = redundant
+def set_selection(tangent, redundant):
+    """Drop these rows, int64 (k,), in the order of the graph."""
+    tangent.dropped[0] = len(redundant)
+    tangent.dropped[1 : 1 + len(redundant)] = redundant
 
 
-def redundant_of(free):
-    """Rows that are dropped at present, int64 (k,), in the order of the network."""
-    return free.dropped[1 : 1 + free.dropped[0]].copy()
+def redundant_of(tangent):
+    """Rows that are dropped at present, int64 (k,), in the order of the graph."""
+    return tangent.dropped[1 : 1 + tangent.dropped[0]].copy()
 
 
-def redundancy(network):
+def redundancy(graph):
     """Number of redundant rows of a scene, which its number of degrees of freedom depends on."""
-    return len(network.dropped)
+    return len(graph.dropped)

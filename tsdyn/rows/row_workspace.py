@@ -19,7 +19,7 @@ class Rows(NamedTuple):
 
 
 class Friction(NamedTuple):
-    """k frictions of joints; of no size where there are none. "computed by" as in `Free`."""
+    """k frictions of joints; of no size where there are none. "computed by" as in `TangentWorkspace`."""
 
     g: np.ndarray  # (k * 16,)  W times each for a normal load of one, on bodies a and b; friction_solve
     load: np.ndarray  # (k * 7,)  normal load, and its derivative by the reaction; friction.normal_load
@@ -56,7 +56,7 @@ class Indicator(Record):
     largest: float  # in the run
 
 
-class Free(NamedTuple):
+class TangentWorkspace(NamedTuple):
     """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
 
     poses: np.ndarray  # ((b + 1) * 28,)  see body_poses.py; projection, tangent
@@ -79,9 +79,9 @@ class Free(NamedTuple):
     anew: np.ndarray  # int64 (2,)  address of reselection.choose_anew, and of its `Choice`; zero where it isn't needed
 
 
-def no_free():
-    """The `Free` of nothing, for its type."""
+def no_tangent_workspace():
+    """The `TangentWorkspace` of nothing, for its type."""
     none, whole, square = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
     friction = Friction(*[none] * 7, square, square, whole, none)
     rows, records = Rows(none, none, none), (Landing(), Selection(), Indicator())
-    return Free(none, rows, *[none] * 6, *records, whole, whole, whole, whole, none, friction, whole)
+    return TangentWorkspace(none, rows, *[none] * 6, *records, whole, whole, whole, whole, none, friction, whole)

@@ -36,19 +36,19 @@ def weigh(weights, at, values, i, out, o):
 
 
 @kernel
-def weigh_bodies(network, Z):
+def weigh_bodies(graph, Z):
     """Z <- W Z."""
-    for b in range(network.bodies.shape[0]):
-        weigh(network.inverse, b, Z, 8 * b, Z, 8 * b)
+    for b in range(graph.bodies.shape[0]):
+        weigh(graph.inverse, b, Z, 8 * b, Z, 8 * b)
 
 
 @kernel
-def weigh_rows(network, H, Y):
+def weigh_rows(graph, H, Y):
     """Set Y = W H^T, body by body."""
-    for e in range(network.sides.shape[0]):
+    for e in range(graph.sides.shape[0]):
         for k in range(2):
             at = 16 * e + 8 * k
-            weigh(network.inverse, network.sides[e, k], H, at, Y, at)
+            weigh(graph.inverse, graph.sides[e, k], H, at, Y, at)
 
 
 @kernel
@@ -72,10 +72,10 @@ def more(values, at, x):
 
 
 @kernel
-def form_schur_complement(network, H, Y, values):
+def form_schur_complement(graph, H, Y, values):
     """Set the upper triangle of S = H Y^T in the blocks of the pattern, with zeros for fill."""
-    products = network.products
-    for i in range(network.pattern.shape[1]):
+    products = graph.products
+    for i in range(graph.pattern.shape[1]):
         let(values, i, 0.0)
     for i in range(products.shape[0]):
         product = products[i]
@@ -91,15 +91,15 @@ def form_schur_complement(network, H, Y, values):
                 for c in range(columns):
                     more(values, target + c, inner(H, left + 16 * r, Y, right + 16 * c))
                 target += stride
-    if network.parts.shape[0] > 0:
-        _multiply_parts(network, H, Y, values)
+    if graph.parts.shape[0] > 0:
+        _multiply_parts(graph, H, Y, values)
 
 
 @kernel
-def _multiply_parts(network, H, Y, values):
+def _multiply_parts(graph, H, Y, values):
     """Add the products at the parts of split bodies."""
-    for i in range(network.parts.shape[0]):
-        part, scale = network.parts[i], network.scales[i]
+    for i in range(graph.parts.shape[0]):
+        part, scale = graph.parts[i], graph.scales[i]
         left, rows, right, columns = part.left, part.rows, part.right, part.columns
         target, stride, kind, weights = part.target, part.stride, part.kind, WEIGHTS * part.body
         for r in range(rows):
@@ -112,143 +112,143 @@ def _multiply_parts(network, H, Y, values):
                 elif kind == WELD_ROWS:
                     more(values, target + c * stride + r, scale * get(Y, left + 16 * r + c + c // 3))
                 elif r < 3 and r == c:
-                    more(values, target + r * stride + c, scale * get(network.inverse, weights + W_MASS))
+                    more(values, target + r * stride + c, scale * get(graph.inverse, weights + W_MASS))
                 elif r >= 3 and c >= 3:
-                    w = get(network.inverse, weights + W_ROTATION + 4 * (c - 3) + r - 3)
+                    w = get(graph.inverse, weights + W_ROTATION + 4 * (c - 3) + r - 3)
                     more(values, target + r * stride + c, scale * w)
 
 
 @kernel
-def factorise_selected_rows(network, f, rows, metric):
+def factorise_selected_rows(graph, f, rows, metric):
     """Set Y = W H^T and the factors of S = H W H^T, the selection being given; return the row that fails, or -1.
 
     metric as in `factorise_rows`.
     """
-    weigh_rows(network, rows.H, rows.Y)
-    form_schur_complement(network, rows.H, rows.Y, rows.S)
+    weigh_rows(graph, rows.H, rows.Y)
+    form_schur_complement(graph, rows.H, rows.Y, rows.S)
     if f.dropped[0] > 0:
-        set_redundant_diagonal(network, f, rows.S)
-    if network.axes.rows.shape[0] > 0:
-        weigh_axes(network, rows.Y)
+        set_redundant_diagonal(graph, f, rows.S)
+    if graph.axes.rows.shape[0] > 0:
+        weigh_axes(graph, rows.Y)
         if metric == METRIC:
-            leave_axes_out(network, rows.S)
+            leave_axes_out(graph, rows.S)
         else:
-            multiply_axes(network, rows.H, rows.Y, rows.S)
-    return factor(network.pattern, rows.S, ZERO_PIVOT)
+            multiply_axes(graph, rows.H, rows.Y, rows.S)
+    return factor(graph.pattern, rows.S, ZERO_PIVOT)
 
 
 @kernel
-def solve_rows(network, rows, b):
+def solve_rows(graph, rows, b):
     """b <- S^-1 b."""
-    solve(network.pattern, rows.S, b)
+    solve(graph.pattern, rows.S, b)
 
 
 @kernel
-def _gather(network, H, Z, out):
+def _gather(graph, H, Z, out):
     """out = H Z."""
-    for e in range(network.sides.shape[0]):
-        at, a, b = 16 * e, 8 * network.sides[e, 0], 8 * network.sides[e, 1]
+    for e in range(graph.sides.shape[0]):
+        at, a, b = 16 * e, 8 * graph.sides[e, 0], 8 * graph.sides[e, 1]
         f = fma(four(H, at), four(Z, a), times(four(H, at + 4), four(Z, a + 4)))
         g = fma(four(H, at + 8), four(Z, b), times(four(H, at + 12), four(Z, b + 4)))
         out[e] = total(add(f, g))
 
 
 @kernel
-def _scatter(network, Y, lam, Z):
+def _scatter(graph, Y, lam, Z):
     """Z <- Z - Y^T lam."""
-    for e in range(network.sides.shape[0]):
+    for e in range(graph.sides.shape[0]):
         f = splat(-lam[e])
         for k in range(2):
-            at, z = 16 * e + 8 * k, 8 * network.sides[e, k]
+            at, z = 16 * e + 8 * k, 8 * graph.sides[e, k]
             put(Z, z, fma(four(Y, at), f, four(Z, z)))
             put(Z, z + 4, fma(four(Y, at + 4), f, four(Z, z + 4)))
 
 
 @kernel
-def multiply_rows(network, rows, Z, out):
+def multiply_rows(graph, rows, Z, out):
     """out = H Z."""
-    _gather(network, rows.H, Z, out)
+    _gather(graph, rows.H, Z, out)
 
 
 @kernel
-def multiply_rates(network, rows, poses, out):
+def multiply_rates(graph, rows, poses, out):
     """out = H (rd, omega') of the poses."""
     H = rows.H
-    for e in range(network.sides.shape[0]):
-        at, a, b = 16 * e, network.sides[e, 0] * POSE + RD, network.sides[e, 1] * POSE + RD
+    for e in range(graph.sides.shape[0]):
+        at, a, b = 16 * e, graph.sides[e, 0] * POSE + RD, graph.sides[e, 1] * POSE + RD
         g = fma(four(H, at), four(poses, a), times(four(H, at + 4), four(poses, a + 4)))
         g = fma(four(H, at + 8), four(poses, b), fma(four(H, at + 12), four(poses, b + 4), g))
         out[e] = total(g)
 
 
 @kernel
-def apply_multipliers(network, rows, lam, Z):
+def apply_multipliers(graph, rows, lam, Z):
     """Z <- Z - Y^T lam."""
-    _scatter(network, rows.Y, lam, Z)
+    _scatter(graph, rows.Y, lam, Z)
 
 
 @kernel
-def find_correction(network, rows, b, Z):
+def find_correction(graph, rows, b, Z):
     """Smallest Z in the metric with H Z = -b; b becomes its multipliers.
 
     b <- S^-1 b,    Z = -Y^T b
     """
-    solve(network.pattern, rows.S, b)
+    solve(graph.pattern, rows.S, b)
     for i in range(Z.size):
         Z[i] = 0.0
-    _scatter(network, rows.Y, b, Z)
+    _scatter(graph, rows.Y, b, Z)
 
 
 @kernel
-def project(network, rows, Z, lam):
+def project(graph, rows, Z, lam):
     """Project Z onto H Z = 0.
 
     lam = S^-1 H Z,    Z <- Z - Y^T lam
     """
-    _gather(network, rows.H, Z, lam)
-    solve(network.pattern, rows.S, lam)
-    _scatter(network, rows.Y, lam, Z)
+    _gather(graph, rows.H, Z, lam)
+    solve(graph.pattern, rows.S, lam)
+    _scatter(graph, rows.Y, lam, Z)
 
 
 @kernel
-def constrain(network, rows, c, Z, lam):
+def constrain(graph, rows, c, Z, lam):
     """Project Z onto H Z + c = 0.
 
     lam = S^-1 (H Z + c),    Z <- Z - Y^T lam
     """
-    _gather(network, rows.H, Z, lam)
+    _gather(graph, rows.H, Z, lam)
     for e in range(lam.size):
         lam[e] += c[e]
-    solve(network.pattern, rows.S, lam)
-    _scatter(network, rows.Y, lam, Z)
+    solve(graph.pattern, rows.S, lam)
+    _scatter(graph, rows.Y, lam, Z)
 
 
 @kernel
-def acceleration_residuals(network, rows, gamma, Z, out):
+def acceleration_residuals(graph, rows, gamma, Z, out):
     """out = H Z + gamma, and of axis rows c e . Z; Z is (rdd, omega'd)."""
-    _gather(network, rows.H, Z, out)
-    gather_axes(network, Z, 4, 8, 1.0, out)
+    _gather(graph, rows.H, Z, out)
+    gather_axes(graph, Z, 4, 8, 1.0, out)
     for e in range(out.size):
         out[e] += gamma[e]
 
 
 @kernel
-def constrain_accelerations(network, rows, gamma, Z, lam):
+def constrain_accelerations(graph, rows, gamma, Z, lam):
     """Accelerations Z and multipliers from Z = W F, with S of DYNAMICS.
 
     lam = S^-1 (H Z + gamma),    Z <- Z - Y^T lam
     """
-    acceleration_residuals(network, rows, gamma, Z, lam)
-    solve(network.pattern, rows.S, lam)
-    _scatter(network, rows.Y, lam, Z)
+    acceleration_residuals(graph, rows, gamma, Z, lam)
+    solve(graph.pattern, rows.S, lam)
+    _scatter(graph, rows.Y, lam, Z)
 
 
 @kernel
-def balance_loads(network, rows, F, lam):
+def balance_loads(graph, rows, F, lam):
     """Multipliers for H^T lam = F by least squares, and what they leave of F, a load of each body.
 
     lam = S^-1 H W F,    F <- F - H^T lam
     """
-    _gather(network, rows.Y, F, lam)
-    solve(network.pattern, rows.S, lam)
-    _scatter(network, rows.H, lam, F)
+    _gather(graph, rows.Y, F, lam)
+    solve(graph.pattern, rows.S, lam)
+    _scatter(graph, rows.H, lam, F)

@@ -14,17 +14,17 @@ def count_self_stresses(f):
 
 
 @kernel
-def self_stress(network, f, H, i):
+def self_stress(graph, f, H, i):
     """b = z of redundant row i, H being of every row; return the largest |z|. f.rows are factorised."""
     row = f.dropped[1 + i]
     for c in range(f.Z.size):
         f.Z[c] = 0.0
     for side in range(2):
-        body = network.sides[row, side]
-        if body < network.bodies.shape[0]:
-            weigh(network.inverse, body, H, 16 * row + 8 * side, f.Z, 8 * body)
-    multiply_rows(network, f.rows, f.Z, f.b)
-    solve_rows(network, f.rows, f.b)
+        body = graph.sides[row, side]
+        if body < graph.bodies.shape[0]:
+            weigh(graph.inverse, body, H, 16 * row + 8 * side, f.Z, 8 * body)
+    multiply_rows(graph, f.rows, f.Z, f.b)
+    solve_rows(graph, f.rows, f.b)
     largest = 1.0
     for e in range(f.b.size):
         f.b[e] = -f.b[e]

@@ -8,7 +8,7 @@ from .schur_complement import find_correction
 
 
 @kernel
-def solve_series(network, f, omega, at, stride, k, correction):
+def solve_series(graph, f, omega, at, stride, k, correction):
     """lam of order k from f.b, the residuals of Phi_{k+2}.
 
     S lam = f.b,    f.Z = -Y^T lam
@@ -16,9 +16,9 @@ def solve_series(network, f, omega, at, stride, k, correction):
     Order k + 1 of omega' of body i is at omega[at + stride * i]. With `correction` f.b becomes what f.gamma, a first
     solution, lacks.
     """
-    clear_welds(network, f.b)
-    gather_axes(network, omega, at, stride, k + 1.0, f.b)
+    clear_welds(graph, f.b)
+    gather_axes(graph, omega, at, stride, k + 1.0, f.b)
     if correction:
-        add_axis_multipliers(network, f.gamma, f.b)
+        add_axis_multipliers(graph, f.gamma, f.b)
     clear_redundant(f, f.b)
-    find_correction(network, f.rows, f.b, f.Z)
+    find_correction(graph, f.rows, f.b, f.Z)

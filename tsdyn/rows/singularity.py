@@ -10,16 +10,16 @@ from .tolerances import NEAR, NEXT_TO, WITHIN_A_STEP
 
 
 @kernel
-def singularity_indicator(network, rows):
+def singularity_indicator(graph, rows):
     """Return the singularity indicator of rows that are factorised."""
-    return weakest(network, rows.S)
+    return weakest(graph, rows.S)
 
 
 @kernel
-def note_indicator(network, f, rows):
+def note_indicator(graph, f, rows):
     """Record the singularity indicator at a chart or the end of a step."""
     note = f.indicator
-    note.start = singularity_indicator(network, rows)
+    note.start = singularity_indicator(graph, rows)
     note.largest = max(note.start, note.largest)
 
 

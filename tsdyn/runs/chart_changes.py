@@ -28,8 +28,8 @@ def begin_chart(context, c, r, log, reason):
         copy(w.q, log.points[r.numbers.chart_rows])
     status = call_chart(r.kernels.start_chart, context, r.clock.t, r.x, r.y, r.yd, r.xd)
     if r.numbers.may_pass == 1:
-        note_indicator(c.network, c.free, c.local.rows0)
-        if status == 0 and reason != AT_START and is_next_to_singular(c.free):
+        note_indicator(c.graph, c.tangent, c.chart.rows0)
+        if status == 0 and reason != AT_START and is_next_to_singular(c.tangent):
             return PASSAGE
     return status
 
@@ -37,4 +37,4 @@ def begin_chart(context, c, r, log, reason):
 @kernel
 def has_hardly_turned(c):
     """Whether bodies have turned on the present chart, but by little."""
-    return 0.0 < turned_most(c.local) < HARDLY_TURNED
+    return 0.0 < turned_most(c.chart) < HARDLY_TURNED

@@ -27,7 +27,7 @@ class Memory:
     Parameters
     ----------
     prepared : Prepared
-    network : Network
+    graph : ConstraintGraph
         Of the scene, as the form needs it.
     context : Context or SeriesContext
     run : Run
@@ -36,8 +36,8 @@ class Memory:
     reason = ""  # of the end of a run: told by its status
     advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
 
-    def __init__(self, prepared, network, context, run):
-        self.packed, self.weight, self.network, self.run = prepared.packed, prepared.n, network, run
+    def __init__(self, prepared, graph, context, run):
+        self.packed, self.weight, self.graph, self.run = prepared.packed, prepared.n, graph, run
         self.work = work = context.work
         self.settle(context)
         self._run, *self._keep_run = resident(run)
@@ -59,7 +59,7 @@ class Memory:
         own, work, run = self.context.system, self.work, self.run
         for array in self._written:
             array.fill(0)
-        reset_selection(self.network, self.context.free)
+        reset_selection(self.graph, self.context.tangent)
         own.reals[...] = system.reals  # motions, signals and what forces remember are written there
         enter_joints(run, task.prepared.handles, task.remembered)
         if own.memory.size:

@@ -15,11 +15,11 @@ class Relay:
 
     def enter(self, memory):
         """Let a part begin where the last one ended."""
-        memory.context.free.indicator.largest = self.largest
+        memory.context.tangent.indicator.largest = self.largest
 
     def leave(self, memory):
         """Take over how a part ended."""
-        indicator = memory.context.free.indicator
+        indicator = memory.context.tangent.indicator
         self.share, self.largest = indicator.start, indicator.largest
 
     def watching(self, task, reading):

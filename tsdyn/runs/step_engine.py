@@ -18,14 +18,14 @@ class StepEngine:
         prepared, method, form = task.prepared, task.method, task.form.serving(task.method)
         self.task = task if form is task.form else task._replace(form=form)
         n, m, packed = prepared.n, prepared.m, prepared.packed
-        self.network = form.network(packed)
-        self.sizes = form.sizes(n, m, self.network)
+        self.graph = form.graph(packed)
+        self.sizes = form.sizes(n, m, self.graph)
         self.step, self.tableau, scratch = method.kernel(form.first_order)
         self.interpolant = method.interpolant(form.first_order)
         lengths = self.tableau.size, scratch(*self.sizes), self.interpolant.size(n, *self.sizes)
         self.lengths = dict(zip(("tableau", "memory", "block"), lengths, strict=True))
         self.system, kept = prepared.system(method.implicit)
-        rows = len(self.network.row) if form.basis_free else None
+        rows = len(self.graph.row) if form.basis_free else None
         self.kind = form.name, rows, method.implicit, kept, *self.sizes, *lengths
         self.skipped = (prepared.spheres, prepared.still, 0) if form.basis_free else (0, 0, 0)
 
@@ -33,11 +33,11 @@ class StepEngine:
         """A new `StepMemory`."""
         task = self.task
         given = task.form.basis_free, task.method.implicit, self.sizes, self.lengths
-        return StepMemory(task.prepared, self.network, *given)
+        return StepMemory(task.prepared, self.graph, *given)
 
     def serves(self, memory):
         """Whether the memory is not that of the scene before it was changed."""
-        return memory.network is self.network
+        return memory.graph is self.graph
 
     def enter(self, memory):
         """Clear the memory, and enter the task and the numbers of the method."""
@@ -74,14 +74,14 @@ def read_again(packed, method, name, constraint_tol):
 
 def _reading(packed, form, constraint_tol, kernels):
     n, m, system = int(packed.system.bodies[:, 1].sum()), len(packed.system.segments), packed.system
-    network = form.network(packed)
-    sizes = form.sizes(n, m, network)
-    rows, redundant = len(network.row) if form.basis_free else None, redundancy(network)
+    graph = form.graph(packed)
+    sizes = form.sizes(n, m, graph)
+    rows, redundant = len(graph.row) if form.basis_free else None, redundancy(graph)
 
     def workspace():
         own = system._replace(reals=system.reals.copy())  # the motions' places are written to
         work = allocate(n, m, len(packed.bodies), constraint_tol, packed.size, rows, redundant)
-        parts = basis_free_parts(network, n, not form.basis_free)
+        parts = basis_free_parts(graph, n, not form.basis_free)
         run = lay_out(n, *sizes, 0, 0, warm=warm_size(work))
         _set(run.kernels, kernels)
         return Context(own, work, allocate_linear(own, n, m, False), *parts), run

@@ -19,7 +19,7 @@ class StepMemory(Memory):
     Parameters
     ----------
     prepared : Prepared
-    network : Network
+    graph : ConstraintGraph
         Of the scene, as the form needs it.
     basis_free, implicit : bool
     sizes : tuple
@@ -30,12 +30,12 @@ class StepMemory(Memory):
 
     advance_kernel = staticmethod(advance)
 
-    def __init__(self, prepared, network, basis_free, implicit, sizes, lengths):
+    def __init__(self, prepared, graph, basis_free, implicit, sizes, lengths):
         n, m, packed = prepared.n, prepared.m, prepared.packed
         self.implicit, self.basis_free = implicit, basis_free
         self.source, kept = prepared.system(implicit)
-        system, redundant = System(*(array.copy() for array in self.source)), redundancy(network)
-        rows = len(network.row) if basis_free else None
+        system, redundant = System(*(array.copy() for array in self.source)), redundancy(graph)
+        rows = len(graph.row) if basis_free else None
         work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant)
         angles, slots = prepared.handles.count, system.memory.size
         run = lay_out(n, *sizes, angles, slots, warm=warm_size(work), **lengths)
@@ -44,11 +44,11 @@ class StepMemory(Memory):
         written += [np.frombuffer(record, np.int64) for record in (linear.numbers, linear.kernels)]
         if implicit:
             linear = linear._replace(now=run.now, before=run.before)
-        context = Context(system, work, linear, *basis_free_parts(network, n, not basis_free))
-        super().__init__(prepared, network, context, run)
+        context = Context(system, work, linear, *basis_free_parts(graph, n, not basis_free))
+        super().__init__(prepared, graph, context, run)
         self.weight = n if basis_free else n + n**3 // MATRICES
-        self._written += [*written, words(context.local.state)]
-        self.nbytes = sum(array.nbytes for array in (*self._written, context.free.rows.S, context.free.poses))
+        self._written += [*written, words(context.chart.state)]
+        self.nbytes = sum(array.nbytes for array in (*self._written, context.tangent.rows.S, context.tangent.poses))
 
     def clear(self, task, system):
         """As of `Memory`; the system may be another one of the same shape."""

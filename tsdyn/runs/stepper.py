@@ -180,7 +180,7 @@ def _change_chart(context, c, r, log, h, status, driven):
     r.numbers.rejected += 1
     if r.numbers.in_chart == 0:
         if r.numbers.adaptive == 0:
-            near = is_singular_within_a_step(c.free) or (status in OFF_CHART and has_hardly_turned(c))
+            near = is_singular_within_a_step(c.tangent) or (status in OFF_CHART and has_hardly_turned(c))
             return PASSAGE if near and r.numbers.may_pass == 1 else status
         r.numbers.failed = status
         r.clock.h = QUARTERED * h

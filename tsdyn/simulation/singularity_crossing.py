@@ -163,7 +163,7 @@ class Carrier:
         return self.memory.reason
 
     def _is_regular(self):
-        indicator = self.context.free.indicator
+        indicator = self.context.tangent.indicator
         return indicator.start >= max(REGULAR * indicator.largest, self.share)
 
     def _next(self):

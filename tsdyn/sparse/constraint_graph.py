@@ -27,7 +27,7 @@ class RowKind(Record):
     drift: int  # 1 for a moving kind until it is loaded
     count: int  # instances
     stride: int  # reals of each
-    table: int  # where the entries of the first begin in Network.table
+    table: int  # where the entries of the first begin in ConstraintGraph.table
     reals: int  # and in System.reals
 
 
@@ -60,7 +60,7 @@ ROWS, ROWS_WELD, WELD_ROWS, WELDS = range(4)  # kinds
 W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
 
 
-class Network(NamedTuple):
+class ConstraintGraph(NamedTuple):
     """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H, which are zero where row is -1."""
 
     bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length: 7, 3, or poses.STILL of what never turns
@@ -87,12 +87,12 @@ class Network(NamedTuple):
     axes: Axes  # rows of bodies with next to no inertia about an axis
 
 
-def no_network():
-    """The network of nothing, for its type."""
+def no_graph():
+    """The graph of nothing, for its type."""
     none, pattern = np.zeros(0, np.int64), analyse([], [])[1]
     pairs = np.zeros((0, 2), np.int64)
     kinds, products, parts = records(RowKind), records(Product), records(PartProduct)
-    return Network(
+    return ConstraintGraph(
         pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, none, parts, np.zeros(0),
         pairs, none, none, records(FrictionPlace), pairs, np.zeros(1, np.int64),
         no_axes(),

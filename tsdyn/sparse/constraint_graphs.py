@@ -8,18 +8,18 @@ from .constraint_graph import DRIFT
 from .graph_builder import build
 
 
-def network_of(packed, *columns):
-    """The network of a packed scene with the addresses of these loops, made and loaded once."""
+def graph_of(packed, *columns):
+    """The graph of a packed scene with the addresses of these loops, made and loaded once."""
     known = packed.derived
-    if columns not in known.networks:
+    if columns not in known.graphs:
         if known.graph is None:
             known.graph = build(packed)
-        known.networks[columns] = with_loops(*known.graph, *columns)
-    return known.networks[columns]
+        known.graphs[columns] = with_loops(*known.graph, *columns)
+    return known.graphs[columns]
 
 
 def set_redundant(packed, rows):
-    """Have the networks of a scene made anew, with these rows of them redundant, int64 (k,); None where none are.
+    """Have the graphs of a scene made anew, with these rows of them redundant, int64 (k,); None where none are.
 
     Hubs are left whole then: elimination may end with the row of a weld, which can't be left out.
     """
@@ -28,16 +28,16 @@ def set_redundant(packed, rows):
 
 
 def redundant_rows(packed):
-    """Redundant rows of a scene's networks, int64 (k,)."""
+    """Redundant rows of a scene's graphs, int64 (k,)."""
     rows = packed.derived.redundant
     return np.zeros(0, np.int64) if rows is None else rows
 
 
-def with_loops(network, kinds, *columns):
-    """The network with the addresses of these loops, which are loaded now."""
-    table = network.kinds.copy()
+def with_loops(graph, kinds, *columns):
+    """The graph with the addresses of these loops, which are loaded now."""
+    table = graph.kinds.copy()
     for i, kind in enumerate(kinds):
         for loop in columns:
             if loop != DRIFT or table[DRIFT][i] != 0:
                 table[loop][i] = address(kind.kernels, loop, kind.__name__, InvalidConstraint)
-    return network._replace(kinds=table, rub=np.zeros(1, np.int64))
+    return graph._replace(kinds=table, rub=np.zeros(1, np.int64))

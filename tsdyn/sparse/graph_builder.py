@@ -23,7 +23,7 @@ from .constraint_graph import (
     WEIGHTS,
     WELD_ROWS,
     WELDS,
-    Network,
+    ConstraintGraph,
     PartProduct,
     Product,
     RowKind,
@@ -49,11 +49,11 @@ class _Lean(NamedTuple):
 
 
 def build(packed, still=None):
-    """The network of a packed scene, with the addresses of the loops still zero, and the classes of its kinds.
+    """The graph of a packed scene, with the addresses of the loops still zero, and the classes of its kinds.
 
     With `still`, a `locked_orientations.Still`, without the rotations of those bodies and the rows that hold them.
     """
-    return _Builder(packed, still).network()
+    return _Builder(packed, still).graph()
 
 
 class _Builder:
@@ -138,7 +138,7 @@ class _Builder:
         return [(i, self.joints[i].pair.index(body)) for node in nodes for i in self.at_node[node]]
 
     def _product(self, i, side, j, other):
-        """Columns of Network.products, as far as the two joints say them."""
+        """Columns of ConstraintGraph.products, as far as the two joints say them."""
         (node, r), (other_node, c) = self.inside[i], self.inside[j]
         target, stride, _ = self.where(node, other_node)
         left, right = 16 * self.firsts[i] + 8 * side, 16 * self.firsts[j] + 8 * other
@@ -157,7 +157,7 @@ class _Builder:
         return records(Product, products)
 
     def _products_at_hubs(self):
-        """Network.parts and Network.scales: products at the parts of hubs, and with the welds between these."""
+        """`parts` and `scales` of the graph: products at the parts of hubs, and with the welds between these."""
         products, scales = [], []
         for part in self.parts:
             found = self._at_part(part.body, part.nodes)
@@ -193,7 +193,7 @@ class _Builder:
         return np.array(rows, np.int64).reshape(-1, 2)
 
     def _axes(self):
-        """Network.axes; the rows of axes get their body as a side."""
+        """ConstraintGraph.axes; the rows of axes get their body as a side."""
         first = len(self.sizes) - len(self.held)
         shares = [
             Share(
@@ -211,7 +211,7 @@ class _Builder:
         return axes
 
     def _kinds(self, index):
-        """Network.kinds and Network.table, and the class of each of the kinds: runs of instances without a gap."""
+        """`kinds` and `table` of the graph, and the class of each of the kinds: runs of instances without a gap."""
         classes = dict.fromkeys(type(constraint) for constraint in self.packed.constraints)
         kinds, table, used = [], [], []
         for kind, packed_kind in zip(classes, self.system.kinds, strict=True):
@@ -242,7 +242,7 @@ class _Builder:
         return records(RowKind, [row_of(RowKind, **kind) for kind in kinds]), np.array(table, np.int64), tuple(used)
 
     def _weights(self):
-        """Network.inverse, Network.mass and Network.spins."""
+        """ConstraintGraph.inverse, ConstraintGraph.mass and ConstraintGraph.spins."""
         nb, system = self.nb, self.system
         inverse, mass = np.zeros((nb + 1, WEIGHTS)), np.zeros((nb + 1, WEIGHTS))
         spins = np.zeros(nb, np.int64)
@@ -260,8 +260,8 @@ class _Builder:
         redundant = self.packed.derived.redundant
         return np.zeros(0, np.int64) if redundant is None else redundant.copy()
 
-    def network(self):
-        """The `Network`, and the classes of its kinds."""
+    def graph(self):
+        """The `ConstraintGraph`, and the classes of its kinds."""
         parts, scales = self._products_at_hubs()
         axes = self._axes()
         index = {id(joint.constraint): i for i, joint in enumerate(self.joints)}
@@ -273,7 +273,7 @@ class _Builder:
             return range(first, first + part.rows)
 
         frictions, friction_rows = frictions_of(self.packed, self.bodies, rows_of, self.sides)
-        network = Network(
+        graph = ConstraintGraph(
             bodies=self.rows,
             kinds=kinds,
             table=table,
@@ -295,7 +295,7 @@ class _Builder:
             rub=np.zeros(1, np.int64),
             axes=axes,
         )
-        return network, used
+        return graph, used
 
 
 def _diagonal(pattern):

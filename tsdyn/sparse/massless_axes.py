@@ -40,7 +40,7 @@ AXIS_H, AXIS_Y, AXIS_OWN, AXIS_WIDTH = 0, 4, 8, 12
 
 
 class Axes(NamedTuple):
-    """The axis rows of a network."""
+    """The axis rows of a graph."""
 
     rows: np.ndarray  # Axis (axes,)
     values: np.ndarray  # (axes, AXIS_WIDTH)
@@ -95,13 +95,13 @@ class Share(NamedTuple):
 
     body: int
     scale: float  # of the body's mass over its own
-    sides: list  # pairs: the place of a constraint in the network's joints, its side
+    sides: list  # pairs: the place of a constraint in the graph's joints, its side
     welds: list  # pairs: the node of a weld, its sign
     node: int  # of its axis rows
 
 
 def no_axes():
-    """The `Axes` of a network without lean bodies."""
+    """The `Axes` of a graph without lean bodies."""
     return Axes(records(Axis), np.zeros((0, AXIS_WIDTH)), records(AxisProduct), np.zeros(0))
 
 

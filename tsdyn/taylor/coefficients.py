@@ -35,34 +35,34 @@ TWO_INTEGRALS = np.array([_inverse((k + 1) * (k + 2)) for k in range(MOST_ORDERS
 
 
 @kernel
-def begin(network, system, poses, orders, bodies, Z):
+def begin(graph, system, poses, orders, bodies, Z):
     """Order zero of all bodies, order one of their places, and the forces of order zero but those of a series."""
-    for b in range(network.bodies.shape[0]):
-        at, p, m = b * orders * BODY_ROW, b * POSE, network.mass[16 * b]
+    for b in range(graph.bodies.shape[0]):
+        at, p, m = b * orders * BODY_ROW, b * POSE, graph.mass[16 * b]
         for c in range(3):
             put(bodies, at + 4 * c, four(poses, p + 4 * c))
         put(bodies, at + S_R * orders, four(poses, p + R))
         put(bodies, at + S_R * orders + 4, four(poses, p + RD))
         put(Z, 8 * b, lanes(m * system.gravity[0], m * system.gravity[1], m * system.gravity[2]))
-        if network.bodies[b, 1] == 7:
+        if graph.bodies[b, 1] == 7:
             put(bodies, at + S_OMEGA * orders, four(poses, p + OMEGA))
             put(bodies, at + 12, splat(0.0))
             put(bodies, at + 16, splat(0.0))
             put(bodies, at + 20, splat(0.0))
             _turn(bodies, at, 1, four(poses, p + OMEGA))
             _turn_ahead(bodies, at, orders, 1, False)
-            put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, 0))
+            put(Z, 8 * b + 4, _spin(graph, b, bodies, at, orders, 0))
 
 
 @kernel
-def _spin(network, b, bodies, at, orders, k):
+def _spin(graph, b, bodies, at, orders, k):
     """(J' omega')_k and the gyroscopic torque of order k; the body's series begins at bodies[at]."""
     torque = splat(0.0)
-    if network.spins[b] != 0:
+    if graph.spins[b] != 0:
         w, o, spins = 16 * b + 4, at + S_OMEGA * orders, at + S_SPIN * orders
-        f = times(four(network.mass, w), splat(bodies[o + 4 * k]))
-        f = fma(four(network.mass, w + 4), splat(bodies[o + 4 * k + 1]), f)
-        put(bodies, spins + 4 * k, fma(four(network.mass, w + 8), splat(bodies[o + 4 * k + 2]), f))
+        f = times(four(graph.mass, w), splat(bodies[o + 4 * k]))
+        f = fma(four(graph.mass, w + 4), splat(bodies[o + 4 * k + 1]), f)
+        put(bodies, spins + 4 * k, fma(four(graph.mass, w + 8), splat(bodies[o + 4 * k + 2]), f))
         for j in range(k + 1):
             torque = add(torque, cross(four(bodies, spins + 4 * (k - j)), four(bodies, o + 4 * j)))
     return torque
@@ -129,13 +129,13 @@ def _put_product(array, o, x, f, low, exact):
 
 
 @kernel
-def run_loops(network, reals, mode, k, x, f):
-    """One mode of the series loops of every kind; x is an `Expansion`, f a `Free`."""
-    for i in range(network.kinds.shape[0]):
-        kind, series = network.kinds[i], x.places[i]
+def run_loops(graph, reals, mode, k, x, f):
+    """One mode of the series loops of every kind; x is an `Expansion`, f a `TangentWorkspace`."""
+    for i in range(graph.kinds.shape[0]):
+        kind, series = graph.kinds[i], x.places[i]
         call_series(
             series.loop, mode, k, x.order.room, kind.count, kind.stride, series.width,
-            network.table[kind.table :], reals[kind.reals :],
+            graph.table[kind.table :], reals[kind.reals :],
             x.bodies, x.constraints[series.values :], f.b, f.Z,
         )  # fmt: skip
 
@@ -152,7 +152,7 @@ def run_forces(reals, x, k, f):
 
 
 @kernel
-def expand(network, system, k, last, ahead, refine, x, f):
+def expand(graph, system, k, last, ahead, refine, x, f):
     """Order k of the forces and multipliers, k + 1 of omega', k + 2 of r and A; k in turn from zero, after `begin`.
 
     On entry Z has the gyroscopic torques of order k, and A_{k+2} what (1) has without omega'_{k+1}; on exit both are
@@ -160,11 +160,11 @@ def expand(network, system, k, last, ahead, refine, x, f):
 
     The first `refine` orders of lam are refined once. If more than lam_0, factors 1 / n are exact as well: their
     rounding errors have the same sign in every step, and add up. With `ahead`, a constant, the next body's numbers are
-    prefetched: that pays where the series don't fit into the cache. x is an `Expansion`, f a `Free`.
+    prefetched: that pays where the series don't fit into the cache. x is an `Expansion`, f a `TangentWorkspace`.
     """
     bodies, Z, orders = x.bodies, f.Z, x.order.room
-    nb, size = network.bodies.shape[0], orders * BODY_ROW
-    run_loops(network, system.reals, ADVANCE, k, x, f)
+    nb, size = graph.bodies.shape[0], orders * BODY_ROW
+    run_loops(graph, system.reals, ADVANCE, k, x, f)
     run_forces(system.reals, x, k, f)
     exact = refine > 1
     g, h, g_low, h_low = splat(ONE_INTEGRAL[k, 0]), splat(TWO_INTEGRALS[k, 0]), splat(0.0), splat(0.0)
@@ -175,18 +175,18 @@ def expand(network, system, k, last, ahead, refine, x, f):
         at = b * size
         if ahead:
             _fetch_next(bodies, at + size, orders, 12, k + 2)
-        weigh(network.inverse, b, Z, 8 * b, Z, 8 * b)
+        weigh(graph.inverse, b, Z, 8 * b, Z, 8 * b)
         _put_product(bodies, at + S_R * orders + 4 * (k + 2), four(Z, 8 * b), h, h_low, exact)
-        if network.bodies[b, 1] == 7:
+        if graph.bodies[b, 1] == 7:
             _put_product(bodies, at + S_OMEGA * orders + 4 * (k + 1), four(Z, 8 * b + 4), g, g_low, exact)
             _turn(bodies, at, k + 2, _product(four(Z, 8 * b + 4), h, h_low))
     refined = k < refine
     if refined:
-        _solve(network, system, k, x, f, False)
+        _solve(graph, system, k, x, f, False)
         copy(f.b, f.gamma)
         for b in range(nb):
-            _change(network, b, x, k, inverse, exact, Z)
-    _solve(network, system, k, x, f, refined)
+            _change(graph, b, x, k, inverse, exact, Z)
+    _solve(graph, system, k, x, f, refined)
     if refined:
         for e in range(f.b.size):
             f.b[e] += f.gamma[e]
@@ -196,23 +196,23 @@ def expand(network, system, k, last, ahead, refine, x, f):
             _fetch_next(bodies, at + size, orders, 12 * (k + 3), k + 2)
             fetch(bodies, at + size + S_OMEGA * orders, 4 * (k + 1))
             fetch(bodies, at + size + S_SPIN * orders, 4 * (k + 2))
-        _change(network, b, x, k, inverse, exact, Z)
+        _change(graph, b, x, k, inverse, exact, Z)
         put(Z, 8 * b, splat(0.0))
-        if network.bodies[b, 1] == 7 and not last:
-            put(Z, 8 * b + 4, _spin(network, b, bodies, at, orders, k + 1))
+        if graph.bodies[b, 1] == 7 and not last:
+            put(Z, 8 * b + 4, _spin(graph, b, bodies, at, orders, k + 1))
             _turn_ahead(bodies, at, orders, k + 2, exact)
 
 
 @kernel
-def _solve(network, system, k, x, f, refined):
+def _solve(graph, system, k, x, f, refined):
     """b = lam_k, or what it lacks to gamma where it is `refined`, and with it Z = -W H^T lam_k."""
     orders = x.order.room
-    run_loops(network, system.reals, RESIDUAL, k, x, f)
-    solve_series(network, f, x.bodies, S_OMEGA * orders + 4 * (k + 1), BODY_ROW * orders, k, refined)
+    run_loops(graph, system.reals, RESIDUAL, k, x, f)
+    solve_series(graph, f, x.bodies, S_OMEGA * orders + 4 * (k + 1), BODY_ROW * orders, k, refined)
 
 
 @kernel
-def _change(network, b, x, k, inverse, exact, Z):
+def _change(graph, b, x, k, inverse, exact, Z):
     """Add what Z makes of a body's r_{k+2}, omega'_{k+1} and A_{k+2}.
 
     inverse: g + g_low = 1 / (k + 1), h + h_low = 1 / ((k + 1) (k + 2)); `exact`: the low parts are not zero.
@@ -225,7 +225,7 @@ def _change(network, b, x, k, inverse, exact, Z):
         put(bodies, o, add(four(bodies, o), _product(push, h, h_low)))
     else:
         put(bodies, o, fma(push, h, four(bodies, o)))
-    if network.bodies[b, 1] == 7:
+    if graph.bodies[b, 1] == 7:
         change, o = four(Z, 8 * b + 4), at + S_OMEGA * orders + 4 * (k + 1)
         if exact:
             put(bodies, o, add(four(bodies, o), _product(change, g, g_low)))

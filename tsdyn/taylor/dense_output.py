@@ -6,7 +6,7 @@ from ..elements.loops.body_poses import place_bodies
 from ..elements.loops.constraint_series import BODY_ROW
 from ..jit.kernels import entry
 from ..maths.dense_linalg import copy
-from ..rows.interface import allocate_free
+from ..rows.interface import allocate_tangent
 from ..runs.dense_output import put_state, recall
 from ..workspaces.run_state import B_DATA, B_START, lay_out, load_run
 from ..workspaces.workspace import plain_work
@@ -27,7 +27,7 @@ def read_series(context, run, t, rows, blocks, charts, points, out):
         copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
         recall(c.system, block)
         set_floor(c, w.q)
-        place_bodies(c.network.bodies, w.q, c.free.poses)  # which of p and -p is meant
+        place_bodies(c.graph.bodies, w.q, c.tangent.poses)  # which of p and -p is meant
         status = state_within(context, c, r.kernels, t[i], t[i] - block[B_START])
         if status != 0:
             return status
@@ -35,11 +35,11 @@ def read_series(context, run, t, rows, blocks, charts, points, out):
     return 0
 
 
-def reading_workspace(system, network, orders, size):
+def reading_workspace(system, graph, orders, size):
     """Context and run of a reader, with room for so many orders; size: of the numbers in the constraints."""
     own = system._replace(reals=system.reals.copy())
     n = int(own.bodies[:, 1].sum())
     work = plain_work(n)
     work.control.size = size
-    expansion = no_series(orders, np.zeros((len(network.bodies) + 1) * BODY_ROW * orders))
-    return SeriesContext(own, work, network, allocate_free(network, n), expansion, Trial()), lay_out(n, 0, 0, 0, 0)
+    expansion = no_series(orders, np.zeros((len(graph.bodies) + 1) * BODY_ROW * orders))
+    return SeriesContext(own, work, graph, allocate_tangent(graph, n), expansion, Trial()), lay_out(n, 0, 0, 0, 0)

@@ -82,23 +82,23 @@ def room(highest):
     return (highest + 3) | 1  # odd: parts that are powers of two apart would share their places in the cache
 
 
-def is_far(network, highest):
+def is_far(graph, highest):
     """Return True if the series exceed the near caches."""
-    return len(network.bodies) * room(highest) > FAR
+    return len(graph.bodies) * room(highest) > FAR
 
 
-def allocate_expansion(network, kinds, packed, highest):
+def allocate_expansion(graph, kinds, packed, highest):
     """Lay out the series of a run, room for orders up to the highest (of omega'); the loops are loaded now."""
-    orders, nb = room(highest), len(network.bodies)
-    loops = ("far_series", "far_driven_series") if is_far(network, highest) else ("series", "driven_series")
+    orders, nb = room(highest), len(graph.bodies)
+    loops = ("far_series", "far_driven_series") if is_far(graph, highest) else ("series", "driven_series")
     bodies = zeros((nb + 1) * orders * BODY_ROW)
     bodies.reshape(nb + 1, -1)[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
     rows, total = [], 0
     for i, kind in enumerate(kinds):
-        first, count = network.kinds[i].table, int(network.kinds[i].count)
-        masks = network.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
+        first, count = graph.kinds[i].table, int(graph.kinds[i].count)
+        masks = graph.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
         varies = bool((masks & ((1 << GROUND) - 1)).any())
-        driven = bool(network.kinds[i].drift)
+        driven = bool(graph.kinds[i].drift)
         slots = kind.slots + (len(kind.quantities()) if driven else 0)
         width = instance_width(len(kind.markers), kind.rows, slots, orders, varies, driven)
         rows.append([address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint), total, width])
@@ -114,15 +114,15 @@ def allocate_expansion(network, kinds, packed, highest):
         forces=forces,
         table=table,
         loads=loads,
-        motions=_motions(network, packed, orders, places, constraints),
+        motions=_motions(graph, packed, orders, places, constraints),
     )
 
 
-def _motions(network, packed, orders, places, constraints):
+def _motions(graph, packed, orders, places, constraints):
     """Expansion.motions; what is prescribed and constant is written now."""
     motions, rows = iter(packed.system.motions), []
-    for i, (kind, members) in enumerate(instances(packed, network)):
-        for at, (_, given) in enumerate(members if network.kinds[i].drift != 0 else ()):
+    for i, (kind, members) in enumerate(instances(packed, graph)):
+        for at, (_, given) in enumerate(members if graph.kinds[i].drift != 0 else ()):
             first = places[i].values + at * places[i].width + scratch_at(len(kind.markers), kind.rows, orders, True)
             entry = 0
             for j in range(len(kind.quantities())):
@@ -155,17 +155,17 @@ def _forces(packed, orders):
     return records(ForceSeries, rows), np.array(table, np.int64), zeros(total + 4)
 
 
-def masks(network, packed):
-    """Write into the network's table which markers' columns vary along a motion, and which are on the ground.
+def masks(graph, packed):
+    """Write into the graph's table which markers' columns vary along a motion, and which are on the ground.
 
     Directions of bodies that never turn are as good as those of the ground. Columns are constant where the primitive's
     own series says so for a random motion; returns of how many markers.
     """
-    constant, lengths = 0, np.append(network.bodies[:, 1], 0)
-    for row, (kind, members) in zip(network.kinds, instances(packed, network), strict=True):
+    constant, lengths = 0, np.append(graph.bodies[:, 1], 0)
+    for row, (kind, members) in zip(graph.kinds, instances(packed, graph), strict=True):
         motions, patterns, series = {}, {}, twin(kind.series)
         for i, (constraint, par) in enumerate(members):
-            entry = network.table[row.table + i * INTS :][:INTS]
+            entry = graph.table[row.table + i * INTS :][:INTS]
             length = [lengths[entry[BODY + (marker.body == "b")]] for marker in kind.markers]
             grounded = tuple(
                 isinstance(constraint.body_of(marker), Ground) or (size == STILL and marker.code != POINT)

@@ -3,7 +3,7 @@
 from ..errors import InvalidArgument, Status
 from ..formulations.locked_orientations import moving_parts
 from ..model.packed import System
-from ..rows.interface import allocate_free
+from ..rows.interface import allocate_tangent
 from ..runs.run_memory import Memory
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import with_loops
@@ -16,7 +16,7 @@ from .workspace import SeriesContext, Trial
 
 
 class Series:
-    """What the Taylor runs of a packed scene share: its network, with the loops that they need.
+    """What the Taylor runs of a packed scene share: its graph, with the loops that they need.
 
     Parameters
     ----------
@@ -33,9 +33,9 @@ class Series:
     def __init__(self, packed, found):
         if found:
             raise InvalidArgument(found)
-        network, self.kinds = moving_parts(packed)
-        self.constant_columns = masks(network, packed)
-        self.network = with_loops(network, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
+        graph, self.kinds = moving_parts(packed)
+        self.constant_columns = masks(graph, packed)
+        self.graph = with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
         self.packed = packed
 
 
@@ -53,14 +53,14 @@ class SeriesMemory(Memory):
 
     def __init__(self, prepared, highest):
         self.series, packed, n = prepared.series, prepared.packed, prepared.n
-        network, system = self.series.network, System(*(array.copy() for array in packed.system))
-        expansion = allocate_expansion(network, self.series.kinds, packed, highest)
-        free, trial = allocate_free(network, n), Trial()
+        graph, system = self.series.graph, System(*(array.copy() for array in packed.system))
+        expansion = allocate_expansion(graph, self.series.kinds, packed, highest)
+        tangent, trial = allocate_tangent(graph, n), Trial()
         block = 1 + n + expansion.bodies.size
         run = lay_out(n, 0, 0, prepared.handles.count, system.memory.size, block=block)
-        context = SeriesContext(system, plain_work(n), network, free, expansion, trial)
-        super().__init__(prepared, network, context, run)
-        self.nbytes = 8 * (expansion.bodies.size + expansion.constraints.size + free.rows.S.size + run.block.size)
+        context = SeriesContext(system, plain_work(n), graph, tangent, expansion, trial)
+        super().__init__(prepared, graph, context, run)
+        self.nbytes = 8 * (expansion.bodies.size + expansion.constraints.size + tangent.rows.S.size + run.block.size)
 
     def advance(self, log, most):
         """As of `Memory`."""

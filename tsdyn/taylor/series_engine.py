@@ -33,31 +33,31 @@ class SeriesEngine:
 
     def enter(self, memory):
         """Clear the memory, and enter the orders of the method and the kernels."""
-        task, method, network = self.task, self.task.method, self.series.network
+        task, method, graph = self.task, self.task.method, self.series.graph
         memory.clear(task, task.prepared.packed.system)
         order = memory.context.expansion.order
         order.top, order.lowest, order.highest = self.orders
         order.next = order.top
-        order.refined = max(method.refined, int(len(network.bodies) > MANY))
+        order.refined = max(method.refined, int(len(graph.bodies) > MANY))
         if method.step is not None:  # the order follows from tolerances even so
             memory.run.clock.rtol, memory.run.clock.atol = method.step_tolerances()
-        _set_kernels(memory.run, is_far(network, self.highest), task.within)
+        _set_kernels(memory.run, is_far(graph, self.highest), task.within)
 
     def reading(self, memory):
         """A `Reading` of the steps; a function and its arguments that make it in another process."""
-        packed, network = self.task.prepared.packed, self.series.network
-        return _reading(packed, network, self.highest), (read_again, packed, self.highest)
+        packed, graph = self.task.prepared.packed, self.series.graph
+        return _reading(packed, graph, self.highest), (read_again, packed, self.highest)
 
 
 def read_again(packed, highest):
     """A `Reading` in another process than the run's."""
-    return _reading(packed, Series(packed, refusal(packed)).network, highest)
+    return _reading(packed, Series(packed, refusal(packed)).graph, highest)
 
 
-def _reading(packed, network, highest):
+def _reading(packed, graph, highest):
     def workspace():
-        context, run = reading_workspace(system, network, room(highest), packed.size)
-        _set_kernels(run, is_far(network, highest), True)
+        context, run = reading_workspace(system, graph, room(highest), packed.size)
+        _set_kernels(run, is_far(graph, highest), True)
         return context, run
 
     system = packed.system

@@ -50,7 +50,7 @@ def weights(c, r):
     x, orders = c.expansion, c.expansion.order.room
     rtol, atol = r.clock.rtol, r.clock.atol
     far, fast = splat(0.0), splat(0.0)
-    for b in range(c.network.bodies.shape[0]):
+    for b in range(c.graph.bodies.shape[0]):
         at = b * orders * BODY_ROW
         far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
     far, fast = _most(far), _most(fast)
@@ -62,7 +62,7 @@ def weights(c, r):
 @kernel
 def step_length(c, r):
     """h = rho tol^(1 / (top + 2)); and the order of the next step, that with the longer step for the work."""
-    x, nb = c.expansion, c.network.bodies.shape[0]
+    x, nb = c.expansion, c.graph.bodies.shape[0]
     top, orders = x.order.top, x.order.room
     tol = r.clock.atol + r.clock.rtol
     far, fast = weights(c, r)
@@ -81,7 +81,7 @@ def longest(c, r, tol, most):
     Next to a singular configuration rounding of lam grows from order to order as if the motion ended there: high orders
     see no further than to it.
     """
-    x, nb = c.expansion, c.network.bodies.shape[0]
+    x, nb = c.expansion, c.graph.bodies.shape[0]
     far, fast = weights(c, r)
     h = 0.0
     for k in range(most, LEAST_ORDER, -1):
@@ -94,11 +94,11 @@ def longest(c, r, tol, most):
 @kernel
 def loosest(c, tol):
     """The loosest tolerance of a step past a singular configuration: next to it lam has few digits."""
-    return max(tol, PASSING if is_near_singular(c.free, c.free.indicator.start) else FAR_PASSING)
+    return max(tol, PASSING if is_near_singular(c.tangent, c.tangent.indicator.start) else FAR_PASSING)
 
 
 @kernel
 def is_near(c, part):
     """Return True if a step ends near a singular configuration: the indicator is below `part` of its start value."""
-    indicator = c.free.indicator
-    return is_near_singular(c.free, indicator.end) and indicator.end < part * indicator.start
+    indicator = c.tangent.indicator
+    return is_near_singular(c.tangent, indicator.end) and indicator.end < part * indicator.start

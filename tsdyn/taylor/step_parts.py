@@ -44,20 +44,20 @@ def expand_far_series(context, k):
 @kernel
 def _expand(context, k, ahead):
     c = load_series(context)
-    w, x, f = c.work, c.expansion, c.free
+    w, x, f = c.work, c.expansion, c.tangent
     orders = x.order.room
     if k == 0:
         expand_motions(c.system, x)
-        begin(c.network, c.system, f.poses, orders, x.bodies, f.Z)
+        begin(c.graph, c.system, f.poses, orders, x.bodies, f.Z)
     near = is_near_singular(f, f.indicator.start)  # there rounding of lam grows from order to order
     refine = orders if near else x.order.refined
-    expand(c.network, c.system, k, k > 0 and k + 1 == x.order.top, ahead, refine, x, f)
+    expand(c.graph, c.system, k, k > 0 and k + 1 == x.order.top, ahead, refine, x, f)
     if k == 0:
-        for b in range(c.network.bodies.shape[0]):
+        for b in range(c.graph.bodies.shape[0]):
             at = b * orders * BODY_ROW
             put(f.a, 8 * b, times(four(x.bodies, at + S_R * orders + 8), splat(2.0)))
             put(f.a, 8 * b + 4, four(x.bodies, at + S_OMEGA * orders + 4))
-        write_accelerations(c.network.bodies, f.poses, f.a, w.qdd)
+        write_accelerations(c.graph.bodies, f.poses, f.a, w.qdd)
     return 0
 
 
@@ -71,24 +71,24 @@ def is_driven(system):
 def _land_rates(c, t):
     driven = is_driven(c.system)
     if driven:
-        find_drift(c.network, c.system, c.free, t)
-    land_velocities(c.network, c.free, driven)
+        find_drift(c.graph, c.system, c.tangent, t)
+    land_velocities(c.graph, c.tangent, driven)
 
 
 @callback("pdd")
 def reach(context, t, h):
     """The state at t, h after the series' origin, on the manifold, but for qdd; h < 0 takes the poses. Status."""
     c = load_series(context)
-    w, x, f = c.work, c.expansion, c.free
+    w, x, f = c.work, c.expansion, c.tangent
     if is_driven(c.system) and not set_time(c.system, t):
         return NOT_FINITE
     if h >= 0.0:
-        sum_series(c.network, x.bodies, x.order.room, x.order.top, h, f.poses, f.p)
-    status = land(c.network, c.system, w, f, t)
+        sum_series(c.graph, x.bodies, x.order.room, x.order.top, h, f.poses, f.p)
+    status = land(c.graph, c.system, w, f, t)
     if status == 0:
         _land_rates(c, t)
-        write_positions(c.network.bodies, f.poses, w.q)
-        write_velocities(c.network.bodies, f.poses, w.qd)
+        write_positions(c.graph.bodies, f.poses, w.q)
+        write_velocities(c.graph.bodies, f.poses, w.qd)
         if not (is_finite(w.q) and is_finite(w.qd)):
             return NOT_FINITE
     return status
@@ -98,7 +98,7 @@ def reach(context, t, h):
 def accelerate_here(context, t, h):
     """Qdd where `reach` has come to, between the steps: what it asks for outlives no step."""
     c = load_series(context)
-    accelerate_bodies(c.network, c.system, c.work, c.free, t)
+    accelerate_bodies(c.graph, c.system, c.work, c.tangent, t)
     return 0
 
 
@@ -109,27 +109,27 @@ def pass_singular(context, t, h):
     Rows that come near to depending on the others there are left to the series, which is right to the tolerance.
     """
     c = load_series(context)
-    w, x, f, network = c.work, c.expansion, c.free, c.network
+    w, x, f, graph = c.work, c.expansion, c.tangent, c.graph
     orders, top = x.order.room, x.order.top
     save_selection(f)
-    sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
-    status = land(network, c.system, w, f, t)
-    if status == SINGULAR or (status == 0 and singularity_indicator(network, f.rows) < GONE):
-        sum_series(network, x.bodies, orders, top, h, f.poses, f.p)
-        if select_rows(network, c.system, f, t, GONE) >= 0:
-            status = land(network, c.system, w, f, t)
+    sum_series(graph, x.bodies, orders, top, h, f.poses, f.p)
+    status = land(graph, c.system, w, f, t)
+    if status == SINGULAR or (status == 0 and singularity_indicator(graph, f.rows) < GONE):
+        sum_series(graph, x.bodies, orders, top, h, f.poses, f.p)
+        if select_rows(graph, c.system, f, t, GONE) >= 0:
+            status = land(graph, c.system, w, f, t)
     if status == 0:
         _land_rates(c, t)
-        for b in range(network.bodies.shape[0]):
+        for b in range(graph.bodies.shape[0]):
             at, r, omega = b * orders * BODY_ROW, splat(0.0), splat(0.0)
             for k in range(top, 0, -1):
                 r = fma(r, splat(h), times(four(x.bodies, at + S_R * orders + 4 * (k + 1)), splat((k + 1.0) * k)))
                 omega = fma(omega, splat(h), times(four(x.bodies, at + S_OMEGA * orders + 4 * k), splat(float(k))))
             put(f.Z, 8 * b, r)
             put(f.Z, 8 * b + 4, omega)
-        write_positions(network.bodies, f.poses, w.q)
-        write_velocities(network.bodies, f.poses, w.qd)
-        write_accelerations(network.bodies, f.poses, f.Z, w.qdd)
+        write_positions(graph.bodies, f.poses, w.q)
+        write_velocities(graph.bodies, f.poses, w.qd)
+        write_accelerations(graph.bodies, f.poses, f.Z, w.qdd)
     return_to_selection(f)
     return status
 
@@ -137,7 +137,7 @@ def pass_singular(context, t, h):
 @kernel
 def is_singular(c, status):
     """Whether the state that `reach` has come to, or could not reach, is next to a singular configuration."""
-    return status == SINGULAR or (status == 0 and singularity_indicator(c.network, c.free.rows) < NEXT_TO_SINGULAR)
+    return status == SINGULAR or (status == 0 and singularity_indicator(c.graph, c.tangent.rows) < NEXT_TO_SINGULAR)
 
 
 @kernel

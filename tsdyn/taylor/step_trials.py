@@ -39,7 +39,7 @@ STEP_COLLAPSED, PASSAGE = int(Status.STEP_COLLAPSED), int(Status.PASSAGE)
 def go_to_start(c, r):
     """The poses at the step's start, from where p is followed."""
     copy(r.now[0], c.work.q)
-    place_bodies(c.network.bodies, c.work.q, c.free.poses)
+    place_bodies(c.graph.bodies, c.work.q, c.tangent.poses)
 
 
 @kernel
@@ -49,8 +49,8 @@ def stand_at(context, c, r, t):
     set_time(c.system, t)
     copy(r.now[0], w.q)
     copy(r.now[1], w.qd)
-    place_bodies(c.network.bodies, w.q, c.free.poses)
-    move_bodies(c.network.bodies, w.q, w.qd, c.free.poses)
+    place_bodies(c.graph.bodies, w.q, c.tangent.poses)
+    move_bodies(c.graph.bodies, w.q, w.qd, c.tangent.poses)
     return call_reach(r.kernels.reach, context, t, -1.0)
 
 
@@ -58,8 +58,8 @@ def stand_at(context, c, r, t):
 def _fastest(c):
     """Return the largest angular velocity."""
     square = 0.0
-    for b in range(c.network.bodies.shape[0]):
-        w = c.free.poses[b * POSE + OMEGA : b * POSE + OMEGA + 3]
+    for b in range(c.graph.bodies.shape[0]):
+        w = c.tangent.poses[b * POSE + OMEGA : b * POSE + OMEGA + 3]
         square = max(square, w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
     return math.sqrt(square)
 
@@ -73,7 +73,7 @@ def _propose(c, r, tol):
     if r.numbers.adaptive == 0:
         s.h = r.clock.h
         return
-    if is_near_singular(c.free, c.free.indicator.start):
+    if is_near_singular(c.tangent, c.tangent.indicator.start):
         s.tol = max(TIGHTER * tol, min(tol, TIGHTEST))
         s.h = longest(c, r, s.tol, s.highest)
     s.limit = r.clock.max_step
@@ -122,7 +122,7 @@ def _is_taken(c, landed):
         return False
     if s.shorter == AVOIDING or s.last == 1 or not is_near(c, CLOSER if s.looser == 1 else CLOSE):
         return True
-    return s.looser == 1 and c.free.indicator.end > s.share and not is_near(c, PASSED)
+    return s.looser == 1 and c.tangent.indicator.end > s.share and not is_near(c, PASSED)
 
 
 @kernel
@@ -133,7 +133,7 @@ def _choose_next(c, r, landed, tol):
         s.serves = 1
     longer = 0.0
     if s.looser == 1 and landed and LOOSER * s.tol <= loosest(c, tol):
-        s.share, s.tol = c.free.indicator.end, LOOSER * s.tol
+        s.share, s.tol = c.tangent.indicator.end, LOOSER * s.tol
         longer = min(longest(c, r, s.tol, s.highest), s.limit)
     if longer > s.h:
         s.h = longer
@@ -153,7 +153,7 @@ def _choose_next(c, r, landed, tol):
 @kernel
 def make_step(context, c, r, log, stop):
     """Reach the end of the next step, t1 of the trial, by a series that has been expanded. Status."""
-    f, s, tol = c.free, c.trial, r.clock.atol + r.clock.rtol
+    f, s, tol = c.tangent, c.trial, r.clock.atol + r.clock.rtol
     adaptive = r.numbers.adaptive == 1
     _propose(c, r, tol)
     while True:
@@ -167,7 +167,7 @@ def make_step(context, c, r, log, stop):
             return PASSAGE if status == 0 else status
         landed = status == 0 and (not adaptive or f.landing.residual <= MISSED * (s.tol + c.work.control.floor))
         if landed:
-            f.indicator.end = singularity_indicator(c.network, f.rows)
+            f.indicator.end = singularity_indicator(c.graph, f.rows)
         if not adaptive:
             return status
         if _is_taken(c, landed) or not _choose_next(c, r, landed, tol):

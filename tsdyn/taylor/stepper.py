@@ -37,7 +37,7 @@ def _open_chart(w, r, log, t, reason):
 @kernel
 def _stand(context, c, r, log, t):
     """The poses as they are now are the state at t: the series of order zero gives qdd. Status."""
-    w, indicator = c.work, c.free.indicator
+    w, indicator = c.work, c.tangent.indicator
     indicator.start = indicator.end
     indicator.largest = max(indicator.start, indicator.largest)
     remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
@@ -55,13 +55,13 @@ def _stand(context, c, r, log, t):
 @kernel
 def _enter(context, c, r, log):
     """Begin the run, with its first output. Status."""
-    w, f, t = c.work, c.free, r.clock.t
+    w, f, t = c.work, c.tangent, r.clock.t
     take_pieces(c.system, r, log)
     set_floor(c, w.q)
     w.control.condition = 1.0
     c.trial.singular = 0
     status = stand_at(context, c, r, t)
-    f.indicator.end = singularity_indicator(c.network, f.rows) if status == 0 else 0.0
+    f.indicator.end = singularity_indicator(c.graph, f.rows) if status == 0 else 0.0
     _open_chart(w, r, log, t, AT_START)
     if status == 0:
         status = _stand(context, c, r, log, t)
@@ -82,21 +82,21 @@ def _expand(context, c, r):
 @kernel
 def _mind_singular(c, r):
     """Near a singular configuration: the rest of the run has a tighter tolerance."""
-    indicator, clock = c.free.indicator, r.clock
+    indicator, clock = c.tangent.indicator, r.clock
     if min(indicator.end, indicator.start) < WARY * indicator.largest:
         if r.numbers.near_steps == 0:
             tol = clock.atol + clock.rtol
             spare = max(SPARE, min(TIGHTEST / tol, 1.0))
             clock.atol, clock.rtol = spare * clock.atol, spare * clock.rtol
         r.numbers.near_steps += 1
-        clock.largest_landing = max(clock.largest_landing, c.free.landing.moved)
+        clock.largest_landing = max(clock.largest_landing, c.tangent.landing.moved)
 
 
 @kernel
 def _watch_stiffness(c, r, h):
     """Return True if the motion has just been found stiff: many steps in which nothing rotates or moves far."""
-    far, p = SMALL * c.work.control.floor / (ROUNDING * h), c.free.poses
-    for b in range(c.network.bodies.shape[0]):
+    far, p = SMALL * c.work.control.floor / (ROUNDING * h), c.tangent.poses
+    for b in range(c.graph.bodies.shape[0]):
         at = b * POSE
         for i in range(3):
             if abs(p[at + OMEGA + i]) * h > SMALL or abs(p[at + RD + i]) > far:
@@ -114,7 +114,7 @@ def _mind_stop(c, r, h):
     """After a step that a stop has cut to h: the order of the next one."""
     x, tol = c.expansion, r.clock.atol + r.clock.rtol
     far, fast = weights(c, r)
-    rho = radius(x.bodies, c.network.bodies.shape[0], x.order.room, x.order.top - 2, far, fast)
+    rho = radius(x.bodies, c.graph.bodies.shape[0], x.order.room, x.order.top - 2, far, fast)
     lower_order(x.order, rho, tol, h)
 
 

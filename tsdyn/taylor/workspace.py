@@ -6,8 +6,8 @@ import numpy as np
 
 from ..jit.kernels import Record, loader, records
 from ..model.packed import System
-from ..rows.interface import Free
-from ..sparse.constraint_graph import Network
+from ..rows.interface import TangentWorkspace
+from ..sparse.constraint_graph import ConstraintGraph
 from ..workspaces.workspace import Work, plain_context
 from .tables import ConstraintSeries, ForceSeries, MotionSeries
 
@@ -61,8 +61,8 @@ class SeriesContext(NamedTuple):
 
     system: System
     work: Work
-    network: Network
-    free: Free
+    graph: ConstraintGraph
+    tangent: TangentWorkspace
     expansion: Expansion
     trial: Trial
 
@@ -77,7 +77,7 @@ def _example():
     """One of the right types."""
     expansion = no_series(1, np.zeros(1))
     plain = plain_context()
-    return SeriesContext(plain.system, plain.work, plain.network, plain.free, expansion, Trial())
+    return SeriesContext(plain.system, plain.work, plain.graph, plain.tangent, expansion, Trial())
 
 
 load_series = loader(_example())

@@ -18,7 +18,7 @@ from ..model.equations import set_time
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..observables.diagnostics import starts_of
-from ..rows.interface import allocate_free
+from ..rows.interface import allocate_tangent
 from ..sparse.graph_builder import build
 from ..taylor.coefficients import run_forces, run_loops
 from ..taylor.layout import allocate_expansion, masks
@@ -34,10 +34,10 @@ _AXES = ("x", "y", "z")
 def constraint_coefficients(context, k):
     """b = (k + 1)(k + 2) Phi_{k+2} from the bodies' series; k in turn from zero."""
     c = load_series(context)
-    for i in range(c.free.b.size):
-        c.free.b[i] = 0.0  # the multipliers
-    run_loops(c.network, c.system.reals, ADVANCE, k, c.expansion, c.free)
-    run_loops(c.network, c.system.reals, RESIDUAL, k, c.expansion, c.free)
+    for i in range(c.tangent.b.size):
+        c.tangent.b[i] = 0.0  # the multipliers
+    run_loops(c.graph, c.system.reals, ADVANCE, k, c.expansion, c.tangent)
+    run_loops(c.graph, c.system.reals, RESIDUAL, k, c.expansion, c.tangent)
 
 
 @entry
@@ -52,16 +52,16 @@ def begin_motions(context, t):
 def force_coefficients(context, k):
     """Z ((b + 1) 8,) = order k of the forces and body torques; k in turn from zero."""
     c = load_series(context)
-    for i in range(c.free.Z.size):
-        c.free.Z[i] = 0.0
-    run_forces(c.system.reals, c.expansion, k, c.free)
+    for i in range(c.tangent.Z.size):
+        c.tangent.Z[i] = 0.0
+    run_forces(c.system.reals, c.expansion, k, c.tangent)
 
 
-def series_context(packed, network, kinds):
+def series_context(packed, graph, kinds):
     """A `SeriesContext` of orders up to ORDER, and what its kernels find it by."""
     n, system = int(packed.system.bodies[:, 1].sum()), packed.system._replace(reals=packed.system.reals.copy())
-    expansion, free = allocate_expansion(network, kinds, packed, ORDER), allocate_free(network, n)
-    context = SeriesContext(system, plain_work(n), network, free, expansion, Trial())
+    expansion, tangent = allocate_expansion(graph, kinds, packed, ORDER), allocate_tangent(graph, n)
+    context = SeriesContext(system, plain_work(n), graph, tangent, expansion, Trial())
     return context, resident(context)
 
 
@@ -78,16 +78,16 @@ def check_constraint_series(scene, constraint, name, rng):
     q, t = random_motion(scene, rng), _time(rng)
     Phi = np.concatenate([_check_rows(scene, part, name, q, t) for part in parts])
     packed = scene.packed
-    network, kinds = build(packed)
-    Phi = Phi[network.row]
-    masks(network, packed)
-    context, (where, *_keep) = series_context(packed, network, kinds)
+    graph, kinds = build(packed)
+    Phi = Phi[graph.row]
+    masks(graph, packed)
+    context, (where, *_keep) = series_context(packed, graph, kinds)
     write_bodies(scene, q, context.expansion)
     begin_motions(where, t.c[0])
     for k in range(ORDER - 1):
         constraint_coefficients(where, k)
-        value = context.free.b / ((k + 1) * (k + 2))
-        _compare(name, k + 2, [f"compiled Phi[{i}]" for i in network.row], value, Phi)
+        value = context.tangent.b / ((k + 1) * (k + 2))
+        _compare(name, k + 2, [f"compiled Phi[{i}]" for i in graph.row], value, Phi)
 
 
 def _check_rows(scene, primitive, name, q, t):
@@ -137,15 +137,15 @@ def check_force_series(scene, force, name, rng):
     for k, out, _ in _coefficients(kind, name, (x, xd), par, (len(x),)):
         _compare(name, k, labels, out, f)
 
-    network, kinds = build(packed)
-    context, (where, *_keep) = series_context(packed, network, kinds)
-    context.free.poses[:] = write_bodies(scene, q, context.expansion).ravel()
+    graph, kinds = build(packed)
+    context, (where, *_keep) = series_context(packed, graph, kinds)
+    context.tangent.poses[:] = write_bodies(scene, q, context.expansion).ravel()
     context.system.reals[packed.system.memory] = par[len(load.parameters) :]
     expected = _carried_back(scene, load, q, f)
     labels = [f"{what} {axis} of {b.name}" for b in scene.bodies for what in ("force", "body torque") for axis in _AXES]
     for k in range(ORDER):
         force_coefficients(where, k)
-        got = context.free.Z.reshape(-1, 2, 4)[:-1, :, :3].ravel()
+        got = context.tangent.Z.reshape(-1, 2, 4)[:-1, :, :3].ravel()
         _compare(name, k, [f"compiled {label}" for label in labels], got, expected)
 
 

@@ -24,7 +24,7 @@ class ChartState(Record):
     placement: int  # number of the position solve at the end of the last step; 0 if the chart is of no use
 
 
-class Local(NamedTuple):
+class ChartWorkspace(NamedTuple):
     """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
 
     base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; chart_validity.touch
@@ -39,13 +39,13 @@ class Local(NamedTuple):
     state: ChartState
 
 
-def allocate_local(network):
+def allocate_chart(graph):
     """Lay it out; the ground doesn't move, nor does a point mass turn."""
-    nb, m = len(network.bodies), len(network.row)
-    size = network.pattern.shape[2]
+    nb, m = len(graph.bodies), len(graph.row)
+    size = graph.pattern.shape[2]
     base = zeros(8 * (nb + 1))
     base[4::8] = 1.0
-    return Local(
+    return ChartWorkspace(
         base, zeros(4 * (nb + 1)), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)),
-        allocate_rows(network), zeros(16 * m), zeros(size), zeros(size), zeros(m), ChartState(),
+        allocate_rows(graph), zeros(16 * m), zeros(size), zeros(size), zeros(m), ChartState(),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Numbers and addresses of an implicit method's stages, in its `Linear`."""
+"""Numbers and addresses of an implicit method's stages, in its `ImplicitWorkspace`."""
 
 from ..jit.kernels import Record
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from ..jit.kernels import Record, loader
 from ..model.packed import System, no_system
-from ..rows.interface import Free, allocate_free
-from ..sparse.constraint_graph import Network, no_network
-from .chart_workspace import Local, allocate_local
+from ..rows.interface import TangentWorkspace, allocate_tangent
+from ..sparse.constraint_graph import ConstraintGraph, no_graph
+from .chart_workspace import ChartWorkspace, allocate_chart
 from .stage_records import StageKernels, StageNumbers
 
 
@@ -79,7 +79,7 @@ class Work(NamedTuple):
     redundant: np.ndarray  # int64 (d + 1,)  number of redundant rows of Phi, and which; dense_rows.take_selection
 
 
-class Linear(NamedTuple):
+class ImplicitWorkspace(NamedTuple):
     """What implicit methods need besides; empty for explicit ones. l = 6 a rigid body and 3 a point mass.
 
     Body frame means: of a body's displacement, the components A^T dr and dpi' = 2 G dp.
@@ -118,8 +118,8 @@ class Parts(NamedTuple):
 
     system: System
     work: Work
-    network: Network
-    free: Free
+    graph: ConstraintGraph
+    tangent: TangentWorkspace
 
 
 class Context(NamedTuple):
@@ -127,10 +127,10 @@ class Context(NamedTuple):
 
     system: System
     work: Work
-    linear: Linear
-    network: Network
-    free: Free
-    local: Local
+    linear: ImplicitWorkspace
+    graph: ConstraintGraph
+    tangent: TangentWorkspace
+    chart: ChartWorkspace
 
 
 def carve(shapes):
@@ -190,19 +190,21 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
         "b": (k,),
     }
     shapes |= {"now": (3, n), "before": (3, n)}
-    return Linear(**carve(shapes), pivots=np.zeros(k, np.int64), kernels=StageKernels(), numbers=StageNumbers())
+    return ImplicitWorkspace(
+        **carve(shapes), pivots=np.zeros(k, np.int64), kernels=StageKernels(), numbers=StageNumbers()
+    )
 
 
-def basis_free_parts(network, n, basis):
-    """Network, Free and Local of a Context; their memory is small in every form, with a basis or without."""
-    return network, allocate_free(network, n, basis=basis), allocate_local(network)
+def basis_free_parts(graph, n, basis):
+    """Graph and workspaces without matrices of a Context; their memory is small in every form."""
+    return graph, allocate_tangent(graph, n, basis=basis), allocate_chart(graph)
 
 
 def plain_context():
     """A context of the right types."""
     system = no_system()
     return Context(
-        system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False), *basis_free_parts(no_network(), 2, False)
+        system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False), *basis_free_parts(no_graph(), 2, False)
     )
 
 
@@ -217,9 +219,9 @@ def plain_work(n):
     return Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(1, np.int64))
 
 
-def parts(system, network, n):
+def parts(system, graph, n):
     """`Parts` for n coordinates, without matrices."""
-    return Parts(system, plain_work(n), network, allocate_free(network, n))
+    return Parts(system, plain_work(n), graph, allocate_tangent(graph, n))
 
 
-load_parts = loader(parts(plain_context().system, no_network(), 0))
+load_parts = loader(parts(plain_context().system, no_graph(), 0))

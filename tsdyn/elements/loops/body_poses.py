@@ -7,7 +7,7 @@
     p       4   Euler parameters
 
 The ground is the last row, with A = I and zeros, so kernels need no special case for it. Point masses don't rotate, nor
-do rigid bodies with locked orientation (length STILL in the network), whose orientation is kept when bodies are placed.
+do rigid bodies with locked orientation (length STILL in the graph), whose orientation is kept when bodies are placed.
 """
 
 from ...jit.kernels import kernel

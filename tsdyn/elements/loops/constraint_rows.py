@@ -22,7 +22,7 @@ from .template import (
 
 SIGNATURE = "iippppdpp"  # count, reals per instance, table, reals, poses, unused, t, out, H
 call_body_loop = caller(SIGNATURE)
-# what Network.table holds for each instance: places of its two bodies among the poses, its first row, a mask of markers
+# of the graph's table for each instance: places of its two bodies among the poses, its first row, a mask of markers
 BODY, ROW, MASK, INTS = 0, 2, 3, 4
 
 

@@ -98,6 +98,7 @@ def test_text_holds_both_tables(measured):
     assert max(map(len, text.splitlines())) <= 120
 
 
+@pytest.mark.slow
 def test_figure_is_a_png_and_leaves_matplotlib_alone(measured, tmp_path, monkeypatch):
     matplotlib = pytest.importorskip("matplotlib")
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)  # which would choose a backend
@@ -146,6 +147,7 @@ def test_constraint_error_makes_axes_of_its_own():
     pyplot.close(ax.figure)
 
 
+@pytest.mark.slow
 def test_command_prints_and_draws(reuse, measured, capsys, tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     monkeypatch.chdir(tmp_path)

@@ -122,6 +122,7 @@ def draw_sizes():
     return st.one_of(same, graphs.flatmap(with_sizes))
 
 
+@pytest.mark.slow
 @given(draw_sizes(), st.integers(0, 1000))
 def test_symmetric(problem, seed):
     (_, cliques), sizes = problem

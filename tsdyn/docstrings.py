@@ -31,7 +31,6 @@ def complete_docstring(cls: type, standard: Iterable[str] = (), raises: str = ""
     sections.pop("Raises", None)
     sections = {"Parameters": parameters, "Raises": raises, **sections}
     shown = [f"{title}\n{'-' * len(title)}\n{text}" for title, text in sections.items() if text]
-    shown = [f"{title}\n{'-' * len(title)}\n{text}" for title, text in sections.items() if text]
     cls.__doc__ = "\n\n".join([head, *shown])
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import re
+from functools import cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -25,15 +26,16 @@ def complete_docstring(cls: type, standard: Iterable[str] = (), raises: str = ""
         return
     head, sections = _split(cls.__doc__)
     bases = [_split(base.__doc__ or "")[1] for base in cls.__mro__[1:]]
-    entries = [entry for known in (sections, *bases) for entry in _entries(known.pop("Parameters", ""))]
+    entries = [entry for known in (sections, *bases) for entry in _entries(known.get("Parameters", ""))]
     parameters = "\n".join(_in_order([*entries, *standard], inspect.signature(cls.__init__).parameters))
     raises = next((known["Raises"] for known in (sections, *bases) if "Raises" in known), raises)
-    sections.pop("Raises", None)
-    sections = {"Parameters": parameters, "Raises": raises, **sections}
+    first = {"Parameters": parameters, "Raises": raises}
+    sections = first | {title: text for title, text in sections.items() if title not in first}
     shown = [f"{title}\n{'-' * len(title)}\n{text}" for title, text in sections.items() if text]
     cls.__doc__ = "\n\n".join([head, *shown])
 
 
+@cache  # a base is asked by each of its subclasses, at import
 def _split(text: str) -> tuple[str, dict[str, str]]:
     """Return the text before the first section, and the sections by title."""
     head, *parts = SECTION.split(inspect.cleandoc(text))

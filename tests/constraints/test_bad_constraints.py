@@ -13,6 +13,7 @@ from tests.helpers.refusals import (
     branch,
     build,
     case,
+    in_parts,
     made,
     one,
     placed,
@@ -287,6 +288,8 @@ CONSTRAINTS = [
 ]
 
 
-@pytest.mark.parametrize(("call", "error", "words"), CONSTRAINTS)
-def test_constraints(call, error, words):
-    refuse(lambda: call(build()), error, words)
+@pytest.mark.parametrize("cases", in_parts(CONSTRAINTS, 20))
+def test_constraints(cases):
+    for row in cases:
+        call, error, words = row.values
+        refuse(lambda call=call: call(build()), error, words, row.id)

@@ -3,8 +3,6 @@
 import ast
 from pathlib import Path
 
-import pytest
-
 TESTS = Path(__file__).parents[1]
 FILES = {file.relative_to(TESTS).as_posix(): file for file in sorted(TESTS.rglob("*.py"))}
 HOUSE = {file.stem for file in (TESTS.parent / "tsdyn").iterdir()} | {"constraints", "integrators"}
@@ -28,13 +26,13 @@ def test_folders_are_named_after_packages():
     assert folders <= HOUSE | BESIDE
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_files_are_short_and_share_by_helpers(name):
-    file = FILES[name]
-    assert len(file.read_text().splitlines()) <= LONGEST
-    names = set(imported(file))
-    assert not {name for name in names if name.split(".")[-1].startswith("test_") and name.startswith("tests")}
-    assert not names & POSIX
-    assert file.name.startswith("test_") == any(
-        isinstance(node, ast.FunctionDef) and node.name.startswith("test_") for node in ast.parse(file.read_text()).body
-    )
+def test_files_are_short_and_share_by_helpers():
+    for name, file in FILES.items():
+        assert len(file.read_text().splitlines()) <= LONGEST, name
+        names = set(imported(file))
+        tests = {name for name in names if name.split(".")[-1].startswith("test_") and name.startswith("tests")}
+        assert not tests, name
+        assert not names & POSIX, name
+        body = ast.parse(file.read_text()).body
+        has_tests = any(isinstance(node, ast.FunctionDef) and node.name.startswith("test_") for node in body)
+        assert file.name.startswith("test_") == has_tests, name

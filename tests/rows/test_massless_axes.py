@@ -121,6 +121,7 @@ def test_next_to_no_inertia_is_next_to_none(inertia):
     np.testing.assert_allclose(little.q[-1], none.q[-1], rtol=0.0, atol=ALGEBRA + 10.0 * inertia)
 
 
+@pytest.mark.slow
 def test_friction_of_a_joint():
     scene = chain(2, {1})
     scene.add(F.RevoluteFriction(scene.constraints[1], kinetic=0.2, radius=0.05))

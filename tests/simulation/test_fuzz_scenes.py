@@ -9,6 +9,7 @@ def test_every_kind_is_drawn():
     assert {generate(seed, 2, 6).name.partition(",")[0] for seed in range(40)} == set(KINDS)
 
 
+@pytest.mark.slow_for("14")  # friction of joints
 @pytest.mark.parametrize("seed", range(16))
 def test_a_random_scene(seed):
     case = generate(seed, 3, 12)

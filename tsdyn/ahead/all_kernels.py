@@ -6,8 +6,8 @@ from ..elements import force, primitive
 from ..formulations.registry import FORMULATIONS
 from ..integrators import Taylor
 from ..jit import cache
+from ..jit.code_hash import is_ours
 from ..jit.compiled import DEBUG, is_declared, is_stored
-from ..jit.compiler import is_ours
 from .first_run import of_constraint, of_force, of_method
 from .workers import compile_ahead, name_of
 

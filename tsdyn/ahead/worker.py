@@ -11,8 +11,8 @@ from functools import cache
 from importlib import import_module
 
 from ..elements import force, primitive
+from ..jit.code_hash import is_ours
 from ..jit.compiled import is_declared, load
-from ..jit.compiler import is_ours
 
 
 def find(module, name):

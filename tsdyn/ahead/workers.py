@@ -14,8 +14,8 @@ import threading
 from pathlib import Path
 
 from ..jit import cache
+from ..jit.code_hash import is_ours
 from ..jit.compiled import DEBUG, is_loaded, is_stored, load
-from ..jit.compiler import is_ours
 from ..jit.waiting import Waiting
 from .worker import find
 

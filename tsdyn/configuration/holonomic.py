@@ -8,7 +8,7 @@ import numpy as np
 
 from ..elements.loops.marker_jacobians import state
 from ..errors import InvalidConstraint
-from ..jit.compiler import is_ours
+from ..jit.code_hash import is_ours
 from ..jit.kernels import twin
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import starts_of

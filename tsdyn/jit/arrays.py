@@ -8,7 +8,6 @@ from numba import types
 from numba.core import cgutils
 from numba.core.errors import RequireLiteralValue
 from numba.extending import intrinsic
-from numba.np.arrayobj import populate_array
 
 from .compiled import DEBUG
 
@@ -21,6 +20,8 @@ _integers = types.Array(types.int64, 1, "C")
 
 def array_over(context, builder, kind, pointer, shape):
     """An array over memory that somebody else owns."""
+    from numba.np.arrayobj import populate_array  # a third of the time to import tsdyn, and only to compile
+
     array = context.make_array(kind)(context, builder)
     size = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
     strides = [size]

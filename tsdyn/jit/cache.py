@@ -19,11 +19,13 @@ from collections import Counter
 from functools import cache, cached_property
 from pathlib import Path
 
+import llvmlite.binding as llvm
 import numba
 from numba.core.caching import _Cache, dumps
 from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
 
-from .code_hash import deep_hash, platform_hash
+from .code_hash import deep_hash, is_ours, platform_hash
 
 statistics = Counter()  # "hits", "misses", "damaged", "seconds" of this process
 _DAY = 86400.0
@@ -129,7 +131,10 @@ class KernelCache(_Cache):
     def load_overload(self, sig, target_context):
         """Return the compiled function, or None; a miss takes the lock that save_overload gives back."""
         started = time.perf_counter()
-        target_context.refresh()
+        if is_ours(self._function.__module__):
+            rtsys.initialize(target_context)
+        else:  # libraries that a user's kernel calls, such as LAPACK, are found by what Numba imports here
+            target_context.refresh()
         file = self._file(sig, target_context.codegen())
         found = self._load(file, target_context)
         if found is None:
@@ -137,6 +142,7 @@ class KernelCache(_Cache):
             self._lock = _acquire(file)
             found = self._load(file, target_context)
         if found is None:
+            target_context.refresh()  # before the compiler's own context stands over it
             statistics["misses"] += 1
             tell()
         else:
@@ -154,7 +160,8 @@ class KernelCache(_Cache):
         """Store the compiled function and let waiting processes read it."""
         try:
             if not data.lifted and not data.library.has_dynamic_globals and folder() is not None:
-                payload = dumps(data._reduce())
+                (name, kind, (code, bitcode)), *others = data._reduce()
+                payload = dumps(((name, kind, (code, _without_bodies(bitcode))), *others))
                 _write(folder() / self._file(sig, data.codegen), payload)
                 _prune_files()
         except OSError as error:
@@ -190,6 +197,14 @@ class KernelCache(_Cache):
                         os.utime(file)
                 return found
         return None
+
+
+def _without_bodies(bitcode):
+    """LLVM's code with empty functions of the same names, which is all that is read of it: nothing links it in."""
+    functions = [found for found in llvm.parse_bitcode(bitcode).functions if not found.is_declaration]
+    return llvm.parse_assembly(
+        "\n".join(f'define void @"{found.name}"() {{ ret void }}' for found in functions)
+    ).as_bitcode()
 
 
 def _write(path, payload):

@@ -44,6 +44,11 @@ def platform_hash():
     return digest.hexdigest()[:16]
 
 
+def is_ours(module):
+    """Whether a module is one of tsdyn's. A user's kernel may be anything that Numba compiles, such as a recursion."""
+    return (module or "").partition(".")[0] == _PACKAGE
+
+
 def deep_hash(function):
     """Hash a function with all the code, constants and modules that its compiled form depends on."""
     digest = hashlib.sha256(platform_hash().encode())
@@ -59,7 +64,7 @@ def _function_hash(function, above):
     """Hash a function; `above` are the functions whose hashes are being made."""
     if function in above:
         return f"recursion {above.index(function) - len(above)}".encode()
-    ours = (function.__module__ or "").partition(".")[0] == _PACKAGE  # a global of a user's may change
+    ours = is_ours(function.__module__)  # a global of a user's may change
     if ours and function in _known:
         return _known[function]
     digest, above = hashlib.sha256(), (*above, function)

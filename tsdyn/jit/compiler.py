@@ -16,6 +16,9 @@ from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.registry import CPUDispatcher
 from numba.extending import models, register_model
 
+from .cache import KernelCache
+from .code_hash import is_ours
+
 OPTIONS = {"error_model": "numpy", "_nrt": False}  # of every kernel
 _SERVE_OTHERS = {  # passes for closures, with blocks, exceptions, literal_unroll, array expressions, parallel loops
     untyped_passes.WithLifting,
@@ -29,11 +32,6 @@ _SERVE_OTHERS = {  # passes for closures, with blocks, exceptions, literal_unrol
     typed_passes.NopythonRewrites,
     typed_passes.DumpParforDiagnostics,
 }
-
-
-def is_ours(module):
-    """Whether a module is one of tsdyn's. A user's kernel may be anything that Numba compiles, such as a recursion."""
-    return (module or "").partition(".")[0] == __package__.partition(".")[0]
 
 
 class _Operator(types.Function):
@@ -162,10 +160,12 @@ class Callee:
 
     @cached_property
     def _from_python(self):
-        return numba.njit(**self.targetoptions)(self.py_func)
+        dispatcher = numba.njit(**self.targetoptions)(self.py_func)
+        dispatcher._cache = KernelCache(self.py_func)
+        return dispatcher
 
     def __call__(self, *arguments, **keywords):
-        """For whoever tries a kernel: it is compiled once more, for Python."""
+        """For whoever tries a kernel: it is compiled, or loaded, for Python."""
         return self._from_python(*arguments, **keywords)
 
     def __reduce__(self):

@@ -30,8 +30,9 @@ from .arrays import (
     stack2,
     vector,
 )
+from .code_hash import is_ours
 from .compiled import DEBUG, Callback, callback, entry, letters, table
-from .compiler import OPTIONS, Callee, is_ours
+from .compiler import OPTIONS, Callee
 from .resident import Record, image_of, loader, records, resident, row_of
 
 __all__ = [  # what is to be found here, too

@@ -12,7 +12,7 @@ import numpy as np
 from ..elements.bodies import Ground
 from ..elements.markers import POINT
 from ..elements.user_functions import Kernels
-from ..jit.compiler import is_ours
+from ..jit.code_hash import is_ours
 from ..model.derived import Derived
 from ..model.packed import classes
 from ..runs.events import Instant

@@ -37,6 +37,12 @@ SCENES = {
 }
 
 
+@pytest.fixture(params=["explicit", pytest.param("all", marks=pytest.mark.slow)])
+def ways(request):
+    """Names of ways: those without implicit methods, whose kernels are many, and all."""
+    return [way for way in WAYS if request.param == "all" or way != "implicit"]
+
+
 def run(scene, way):
     return ts.simulate(scene, SPAN, **WAYS[way])
 
@@ -50,16 +56,12 @@ def same(one, two):
         np.testing.assert_array_equal(a, b)
 
 
-@pytest.mark.slow_but("chain, explicit")
-@pytest.mark.parametrize(
-    ("make", "ways"),
-    [(SCENES["chain"], {*WAYS} - {"implicit"}), *((make, WAYS) for make in SCENES.values())],
-    ids=["chain, explicit", *SCENES],
-)
+@pytest.mark.slow_for("*top", "*driven")
+@pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
 def test_a_run_is_the_same_whatever_ran_before(make, ways, rng):
     first = {way: run(make(), way) for way in ways}
     scene = make()
-    for way in rng.permutation(sorted(ways) * 3):
+    for way in rng.permutation(ways * 3):
         same(run(scene, way), first[way])
 
 
@@ -100,22 +102,22 @@ def test_runs_inside_a_run():
         same(each, expected)
 
 
-def test_runs_in_threads_on_one_scene():
+def test_runs_in_threads_on_one_scene(ways):
     scene = top.build()
-    expected = {way: run(scene, way) for way in WAYS}
-    jobs = [*WAYS] * 4
+    expected = {way: run(scene, way) for way in ways}
+    jobs = ways * 4
     with ThreadPoolExecutor(4) as pool:
         for way, each in zip(jobs, pool.map(lambda way: run(scene, way), jobs), strict=True):
             same(each, expected[way])
 
 
-def test_an_edited_scene_sees_the_edit():
+def test_an_edited_scene_sees_the_edit(ways):
     scene = top.build()
     for mass in (30.0, 31.0, 30.0):
         scene.bodies[0].mass = mass
         fresh = top.build()
         fresh.bodies[0].mass = mass
-        for way in WAYS:
+        for way in ways:
             same(run(scene, way), run(fresh, way))
     scene.add_point_mass(1.0)
     assert run(scene, "charts").q.shape[1] == 10

@@ -30,6 +30,7 @@ from .errors import (  # noqa: E402
     SingularConfiguration,
     Status,
     StepFailure,
+    StorageError,
     TsdynError,
     UnknownAttribute,
 )
@@ -48,6 +49,7 @@ from .observables.state import State  # noqa: E402
 from .simulation.scene import Scene  # noqa: E402
 from .simulation.simulate import simulate  # noqa: E402
 from .simulation.solution import Solution  # noqa: E402
+from .simulation.stored_runs import resume  # noqa: E402
 
 _moved.install()
 
@@ -85,6 +87,7 @@ __all__ = [
     "State",
     "Status",
     "StepFailure",
+    "StorageError",
     "Table",
     "TsdynError",
     "Turn",
@@ -98,6 +101,7 @@ __all__ = [
     "motions",
     "plots",
     "profile",
+    "resume",
     "shapes",
     "simulate",
     "testing",

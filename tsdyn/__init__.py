@@ -46,10 +46,10 @@ from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau 
 from .motions.prescribed import Motion  # noqa: E402
 from .motions.tables import Table  # noqa: E402
 from .observables.state import State  # noqa: E402
+from .simulation.resume import resume  # noqa: E402
 from .simulation.scene import Scene  # noqa: E402
 from .simulation.simulate import simulate  # noqa: E402
 from .simulation.solution import Solution  # noqa: E402
-from .simulation.stored_runs import resume  # noqa: E402
 
 _moved.install()
 

@@ -27,7 +27,7 @@ class Outputs:
 
     def _take(self, rows, n):
         """Take the rows (k, 1 + 3 n + angles + slots) of a run, or its `StoredOutputs`."""
-        self._stored, self._part = None, slice(None)
+        self._stored, self._slice = None, slice(None)
         if not isinstance(rows, np.ndarray):
             self._stored = rows
             return
@@ -43,7 +43,7 @@ class Outputs:
         stored = self.__dict__.get("_stored")
         if stored is None or name not in _COLUMNS:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        found = stored.read(_COLUMNS[name], self._part)
+        found = stored.read(_COLUMNS[name], self._slice)
         if _COLUMNS[name] != "remembered":
             setattr(self, name, found)
         else:
@@ -52,7 +52,7 @@ class Outputs:
 
     def _length(self):
         """How many outputs there are; of a store without a look at them."""
-        return self.t.size if self._stored is None else len(range(self._stored.count)[self._part])
+        return self.t.size if self._stored is None else len(range(self._stored.count)[self._slice])
 
     def __getitem__(self, part: slice) -> Self:
         """Return a solution of some of the outputs, `solution[a:b]`; of a stored run nothing else is read.
@@ -67,8 +67,8 @@ class Outputs:
         for name in [name for name in vars(other) if name in _COLUMNS or hasattr(type(self), name)]:
             del vars(other)[name]  # what has been read, or derived from it
         if self._stored is not None:
-            found = range(self._stored.count)[self._part][part]
-            other._part = slice(found.start, max(found.stop, found.start), found.step)
+            found = range(self._stored.count)[self._slice][part]
+            other._slice = slice(found.start, max(found.stop, found.start), found.step)
             return other
         for name in ("t", "q", "qd", "qdd", "_remembers"):
             setattr(other, name, getattr(self, name)[part])

@@ -29,9 +29,8 @@ from .solution import Solution
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from os import PathLike
 
-    from ..hints import ArrayLike, Event, Formulation, Method, Progress, Redundancy, Span, State
+    from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Span, State
 
 DRIVERS = {"steps": run_past, "series": partial(run, engine=SeriesEngine)}  # by Integrator.driver; see task.py
 
@@ -54,7 +53,7 @@ def simulate(  # many arguments, by name: each is an option of a run
     max_steps: int | None = None,
     max_step: float | None = None,
     history: bool | None = None,
-    store: str | PathLike[str] | None = None,
+    store: Place | None = None,
     checkpoint: float | None = None,
     progress: Progress | None = None,
     chart_interval: int | None = None,

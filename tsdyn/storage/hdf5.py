@@ -25,9 +25,17 @@ class Store:
         """As formats.py says."""
         return cls(path, _laid_out(path, tables, attributes))
 
+    @property
+    def size(self):
+        """As formats.py says."""
+        return os.path.getsize(self._path)
+
     @classmethod
-    def reopen(cls, path, tables, attributes, counts):
+    def reopen(cls, path, tables, attributes, counts, size=0):
         """As formats.py says; a copy takes the place of the file, which a killed process may have left half-written."""
+        found = os.path.getsize(path) if os.path.exists(path) else 0
+        if found < size:  # HDF5 would wait for the missing part for ever
+            raise StorageError(f"{path} is damaged: it has {found} bytes of {size} that were written.")
         partial = Path(path).with_name(f"{Path(path).name}-partial")
         partial.unlink(missing_ok=True)
         file = _laid_out(partial, tables, attributes)
@@ -73,10 +81,13 @@ def count(path, columns):
 
 
 def _reading(path):
-    try:
-        return h5py.File(path, "r", libver="latest", swmr=True, locking=False)
-    except OSError as error:
-        raise StorageError(f"{path} can't be read as HDF5: {error}.") from error
+    """The file to read: as one that may be written meanwhile, or as another reader in this process has opened it."""
+    for options in ({"libver": "latest", "swmr": True, "locking": False}, {"locking": False}, {}):
+        try:
+            return h5py.File(path, "r", **options)
+        except OSError as error:
+            reason = error
+    raise StorageError(f"{path} can't be read as HDF5: {reason}.") from reason
 
 
 def _laid_out(path, tables, attributes):

@@ -74,8 +74,8 @@ def resume(
             scene = restricted_pickle.loads(arrays["scene"].tobytes())
     except restricted_pickle.Foreign as foreign:
         raise StorageError(
-            f"{path}: the scene has functions or classes of yours ({foreign}), and a file keeps no code. Pass the scene: "
-            "ts.resume(path, scene=scene)."
+            f"{path}: the scene has functions or classes of yours ({foreign}), and a file keeps no code. Pass "
+            "the scene: ts.resume(path, scene=scene)."
         ) from None
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")

@@ -1,13 +1,15 @@
 """Stores in HDF5: written so that others can read meanwhile (SWMR), with the dimensions that netCDF and xarray know."""
 
+import errno
 import os
+import shutil
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from ..errors import StorageError
-from .formats import chunk_rows
+from .formats import CHUNK, chunk_rows
 
 COPIED = 1 << 16  # rows at a time
 
@@ -48,7 +50,10 @@ class Store:
         return cls(path, file)
 
     def write(self, start, rows):
-        """As formats.py says."""
+        """As formats.py says. HDF5 doesn't survive a full disk: there must be room for a chunk more of each column."""
+        needed = sum(values.nbytes for values in rows.values()) + 8 * CHUNK * (len(self._arrays) + 1)
+        if shutil.disk_usage(os.path.dirname(os.path.abspath(self._path))).free < needed:
+            raise OSError(errno.ENOSPC, f"{os.strerror(errno.ENOSPC)} for {needed} bytes more")
         for column, values in rows.items():
             array, end = self._arrays[column], start + len(values)
             array.resize(end, axis=0)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from ..errors import InvalidArgument, MissingDependency, StorageError
 
-CHUNK = 1 << 17  # floats of a chunk
+CHUNK = 1 << 15  # floats of a chunk
 
 
 class Column(NamedTuple):

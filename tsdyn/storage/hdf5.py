@@ -12,6 +12,7 @@ from ..errors import StorageError
 from .formats import CHUNK, chunk_rows
 
 COPIED = 1 << 16  # rows at a time
+CACHE = 1 << 19  # bytes of each array that are kept in memory
 
 
 class Store:
@@ -97,7 +98,7 @@ def _reading(path):
 
 def _laid_out(path, tables, attributes):
     """A new file with empty arrays, and the scales of their dimensions."""
-    file = h5py.File(path, "x", libver="latest", locking=False)
+    file = h5py.File(path, "x", libver="latest", locking=False, rdcc_nbytes=CACHE)
     file.attrs.update(attributes)
     for table in tables.values():
         for dimension, labels in table.labels.items():

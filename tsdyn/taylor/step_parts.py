@@ -3,7 +3,7 @@
 Their argument is the address of a `SeriesContext`.
 """
 
-from ..elements.loops.body_poses import write_accelerations, write_positions, write_velocities
+from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..errors import Status
 from ..formulations.accelerations import accelerate_bodies
@@ -152,7 +152,5 @@ def state_within(context, c, kernels, t, h):
 @kernel
 def set_floor(c, q):
     """The |Phi| that rounding of positions q leaves."""
-    largest = 0.0
-    for i in range(q.size):
-        largest = max(largest, abs(q[i]))
-    c.work.control.floor = ROUNDING * (c.work.control.size + largest)
+    control = c.work.control
+    control.floor = ROUNDING * (control.size + largest_coordinate(c.graph.bodies, q, control.size))

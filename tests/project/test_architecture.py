@@ -49,6 +49,7 @@ ORDER = [
     "profiling",
     "plots",
     "testing",
+    "stress",
     "cli",
     "hints",
     "__init__",

@@ -35,7 +35,7 @@ COLUMNS = (
 )
 LEGEND = (
     "Taylor at tolerance 1e-15. Phi, velocity, acceleration: largest constraint errors (m, m/s, m/s^2).",
-    "energy: error of energy less work, relative to the energies; exponent: of its growth with time, if above rounding.",
+    "energy: error of energy less work, relative to the energies; exponent: of its growth with time, above rounding.",
     "order: observed, of Nystrom4 (declared: 4). methods: largest relative distance of q from DOP853 at 1e-12.",
 )
 

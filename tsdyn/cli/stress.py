@@ -3,6 +3,7 @@
 import json
 import os
 import sys
+from functools import partial
 from pathlib import Path
 
 from ..errors import InvalidArgument
@@ -38,6 +39,7 @@ def _stress(parsed):
     """
     counts, processes = _counts(parsed)
     indices = [] if parsed.fuzz else _cases(parsed.case)
+    _demand_writable(parsed)
 
     from ..stress import campaign, report
 
@@ -47,7 +49,8 @@ def _stress(parsed):
     tally = None
     if complete and any(counts.values()):
         plan = list(campaign.jobs(**counts, seed=parsed.seed))
-        tally = campaign.run(plan, processes, _shower(len(plan), _progress))
+        show = _shower(len(plan), _progress)
+        tally = campaign.run(plan, processes, partial(_report, show=show, silent=parsed.json))
         complete = not tally.interrupted
         if not parsed.json:
             print(report.tally_text(tally, parsed.seed))
@@ -79,6 +82,18 @@ def _counts(parsed):
     return counts, processes
 
 
+def _demand_writable(parsed):
+    """Refuse at once, not after minutes, what can't be written at the end."""
+    for name in ("figure", "markdown"):
+        path = getattr(parsed, name)
+        if path and not Path(path).resolve().parent.is_dir():
+            raise InvalidArgument(f"--{name}: there is no folder {Path(path).resolve().parent}.")
+    if parsed.figure:
+        from ..drawing import demand_matplotlib
+
+        demand_matplotlib()
+
+
 def _cases(words):
     """Indices of the cases that contain one of the words; all without words."""
     from ..stress.gallery.cases import CASES
@@ -106,6 +121,17 @@ def _shower(total, text):
         print(f"\r\033[K{done} of {total}: {text(result)}", end=end, file=sys.stderr, flush=True)
 
     return show
+
+
+def _report(tally, new, show, silent):
+    """Print faults as they come, and show progress."""
+    from ..stress.report import fault_text
+
+    for fault in new:
+        if not silent:
+            print(fault_text(*fault), flush=True)
+    if show:
+        show(tally)
 
 
 def _progress(tally):

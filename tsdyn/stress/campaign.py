@@ -46,13 +46,14 @@ class Tally:
         self.faults, self.slowest, self.seconds, self.interrupted = [], None, 0.0, False
 
     def add(self, job, outcomes):
-        """Count the outcomes of a job."""
+        """Count the outcomes of a job; return its faults."""
+        new = [(job, outcome) for outcome in outcomes if outcome.fault]
+        self.faults += new
         for outcome in outcomes:
             self.counts[job.kind][outcome.word] += 1
-            if outcome.fault:
-                self.faults.append((job, outcome))
             if job.kind == "scenes" and (self.slowest is None or outcome.seconds > self.slowest.seconds):
                 self.slowest = outcome
+        return new
 
     def total(self, kind):
         """Return the number of scenes or calls."""
@@ -69,15 +70,15 @@ def jobs(scenes, calls, seed):
 
 
 def run(plan, processes=1, report=None, limit=LIMIT):
-    """Do all jobs and return the `Tally`, that so far after Ctrl-C; report(tally) is called after each."""
+    """Do all jobs and return the `Tally`, that so far after Ctrl-C; report(tally, new faults) is called after each."""
     tally, began = Tally(), time.perf_counter()
     try:
         with closing(work(plan, processes, limit)) as done:
             for job, outcomes in done:
-                tally.add(job, outcomes)
+                new = tally.add(job, outcomes)
                 tally.seconds = time.perf_counter() - began
                 if report:
-                    report(tally)
+                    report(tally, new)
     except KeyboardInterrupt:
         tally.interrupted = True
     tally.seconds = time.perf_counter() - began

@@ -6,6 +6,7 @@ import numpy as np
 
 from .gallery.cases import CASES
 
+LONGEST = 400  # characters of what a fault said
 NONE = "-"  # of a figure that a case doesn't have
 
 
@@ -85,16 +86,19 @@ def gallery_text(found):
     return "\n".join([*lines, "", *LEGEND, *(text for figures in found for text in wrong(figures))])
 
 
+def fault_text(job, outcome):
+    """Return a fault, with the command that repeats it."""
+    return f"{outcome.word}: {outcome.name}: {outcome.said[:LONGEST]}\n  repeat it: {job.command}"
+
+
 def tally_text(tally, seed):
-    """Return the counts of the random scenes and calls, and the faults with the commands that repeat them."""
+    """Return the counts of the random scenes and calls."""
     lines = []
     for kind in ("scenes", "calls"):
         counts = tally.counts[kind]
         if counts:
             lines.append(f"{tally.total(kind)} random {kind}:")
             lines += [f"{count:9d}  {word}" for word, count in counts.most_common()]
-    for job, outcome in tally.faults:
-        lines += [f"{outcome.word}: {outcome.name}: {outcome.said[:400]}", f"  repeat it: {job.command}"]
     if tally.slowest:
         lines.append(f"The longest scene took {tally.slowest.seconds:.1f} s (seed {tally.slowest.seed}).")
     end = "interrupted" if tally.interrupted else "done"

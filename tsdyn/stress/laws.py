@@ -13,7 +13,7 @@ from ..elements.markers import POINT
 from ..model.sparse_jacobian import WIDTH, places, with_short_rows
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
-from .tolerances import BALANCE, BODIES, EPS, FLOOR, OUTPUTS, ROUNDINGS, ROW_SHARE, SAME
+from .tolerances import BALANCE, BODIES, EPS, FLOOR, NEAR_SINGULAR, OUTPUTS, ROUNDINGS, ROW_SHARE, SAME
 
 LEVELS = ("position", "velocity", "acceleration")
 
@@ -66,22 +66,40 @@ def constraints(solution):
     q, qd, qdd = (array[at] for array in (solution.q, solution.qd, solution.qdd))
     memory = solution._memory[at]
     errors = constraint_rows(solution.packed, solution.t[at], q, qd, qdd, memory=memory)
-    terms = np.array([row_terms(solution.packed, *state) for state in zip(solution.t[at], q, qd, qdd, strict=True)])
+    floors = FLOOR / ROW_SHARE * _scales(solution)
+    states = zip(solution.t[at], q, qd, qdd, strict=True)
+    terms = np.array([row_terms(solution.packed, *state, floors) for state in states])
     if not terms.size:
         return
     limit = ROW_SHARE + rounding_of_places(solution)
     for level, error, sums in zip(LEVELS, errors, terms.swapaxes(0, 1), strict=True):
         if level != "position" and not solution.success:
             return  # velocities may have exploded
-        floor = FLOOR / ROW_SHARE * sums.max(axis=1, keepdims=True)
-        share = np.abs(error) / np.where(floor > 0.0, sums + floor, 1.0)
+        share = np.abs(error) / np.where(sums > 0.0, sums, 1.0)
         worst = np.unravel_index(share.argmax(), share.shape)
         where = f"t = {solution.t[at][worst[0]]:.9g} s, {_row_name(solution.packed, worst[1])}"
         yield Finding(f"constraints, {level}", float(share[worst]), limit, where)
 
 
-def row_terms(packed, t, q, qd, qdd):
-    """Sums of the absolute terms of Phi_q q, Phi_q qd and Phi_q qdd of each row, (3, m)."""
+def _scales(solution):
+    """Sizes of positions and of Euler parameters, of their rates and accelerations, in a run: (3, n).
+
+    What is at rest has the rates that gravity would give it within the run: those that remain are rounding of these.
+    """
+    starts, lengths = solution.system.bodies.T
+    r = (starts[:, None] + np.arange(3)).ravel()
+    p = (starts[lengths == 7, None] + np.arange(3, 7)).ravel()
+    T, size = np.ptp(solution.t), extent(solution) or 1.0
+    fall = float(np.linalg.norm(solution.scene.gravity))
+    scales = np.zeros((3, solution.q.shape[1]))
+    for kind, gain in ((r, fall), (p, fall / size)):
+        q, qd, qdd = (np.abs(x[:, kind]).max(initial=0.0) for x in (solution.q, solution.qd, solution.qdd))
+        scales[:, kind] = np.array([[q], [qd + (qdd + gain) * T], [qdd + gain]])
+    return scales
+
+
+def row_terms(packed, t, q, qd, qdd, floors=0.0):
+    """Sums of the absolute terms of Phi_q q, Phi_q qd and Phi_q qdd of each row, (3, m); floors (3, n) are added."""
     rows = np.abs(constraint_arrays(with_short_rows(packed), q, qd, t, WIDTH)[1])
     at, length = places(packed)
     half = np.arange(WIDTH // 2)
@@ -89,7 +107,7 @@ def row_terms(packed, t, q, qd, qdd):
     rows *= (half < length[:, :, None]).reshape(len(at), WIDTH)
     rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, :1]
     rate = np.abs(qd[rigid + np.arange(3, 7)]).max(initial=0.0)
-    levels = np.abs(q), np.abs(qd), np.abs(qdd) + rate * np.abs(qd)
+    levels = np.array((np.abs(q), np.abs(qd), np.abs(qdd) + rate * np.abs(qd))) + floors
     return np.array([(rows * x[index]).sum(axis=1) for x in levels])
 
 
@@ -193,8 +211,9 @@ def dense_output(solution):
     for name in ("q", "qd"):
         given = getattr(solution, name)[at]
         size = 1.0 + np.abs(given).max(initial=0.0)
+        limit = SAME * (NEAR_SINGULAR if solution.stats.steps_near_singular else 1.0)
         yield Finding(
-            f"dense output, {name}", float(np.abs(getattr(state, name) - given).max(initial=0.0) / size), SAME
+            f"dense output, {name}", float(np.abs(getattr(state, name) - given).max(initial=0.0) / size), limit
         )
 
 

@@ -30,6 +30,7 @@ from .errors import (  # noqa: E402
     SingularConfiguration,
     Status,
     StepFailure,
+    StorageError,
     TsdynError,
     UnknownAttribute,
 )
@@ -45,6 +46,7 @@ from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau 
 from .motions.prescribed import Motion  # noqa: E402
 from .motions.tables import Table  # noqa: E402
 from .observables.state import State  # noqa: E402
+from .simulation.resume import resume  # noqa: E402
 from .simulation.scene import Scene  # noqa: E402
 from .simulation.simulate import simulate  # noqa: E402
 from .simulation.solution import Solution  # noqa: E402
@@ -85,6 +87,7 @@ __all__ = [
     "State",
     "Status",
     "StepFailure",
+    "StorageError",
     "Table",
     "TsdynError",
     "Turn",
@@ -98,6 +101,7 @@ __all__ = [
     "motions",
     "plots",
     "profile",
+    "resume",
     "shapes",
     "simulate",
     "testing",

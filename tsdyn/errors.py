@@ -163,6 +163,17 @@ class MissingDependency(TsdynError, ImportError):
     """
 
 
+class StorageError(TsdynError, OSError):
+    """A store or a checkpoint can't be written, read or gone on with.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> issubclass(ts.StorageError, OSError)
+    True
+    """
+
+
 class StepFailure(TsdynError, ArithmeticError):
     """A run ended early; raised by `Solution.raise_if_failed`, with the partial solution as `.solution`.
 
@@ -229,6 +240,7 @@ class Status(IntEnum):
     JAMMED = 15
     PASSAGE = 16
     SAMPLING_FAILED = 17
+    STORE_FAILED = 18
 
     def __str__(self) -> str:
         return self.name.lower()
@@ -301,4 +313,8 @@ _SENTENCES = {
         "It must return a finite float for every coordinate and rate.",
     ),
     Status.PASSAGE: ("A singular configuration is near; the Taylor integrator takes over.", ""),
+    Status.STORE_FAILED: (
+        "The store could not be written any further.",
+        "Free some space there; ts.resume goes on from the last checkpoint.",
+    ),
 }

@@ -4,6 +4,7 @@ Imported by type checkers alone, so that annotations cost nothing at run time.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
 from typing import Any, Literal, Protocol, TypeAlias, TypeVar
 
 import numpy as np
@@ -54,6 +55,7 @@ Matrix: TypeAlias = Any  # dense, or a sparse array of SciPy's
 Value: TypeAlias = np.float64 | Any  # of a function of time: a number at one time, an array at many
 
 AnyBody: TypeAlias = PointMass | Ground
+Place: TypeAlias = str | PathLike[str]  # of a file
 BodyLike: TypeAlias = PointMass | Ground | str  # a handle, or a name
 ItemLike: TypeAlias = Attachment | str
 Orientation: TypeAlias = ArrayLike | Rotation

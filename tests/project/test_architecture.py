@@ -44,6 +44,7 @@ ORDER = [
     "taylor",
     "configuration",
     "ahead",
+    "storage",
     "simulation",
     "benchmarking",
     "profiling",

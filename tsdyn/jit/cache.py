@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import os
 import pickle
+import platform
 import sys
 import tempfile
 import time
@@ -23,6 +24,7 @@ import llvmlite.binding as llvm
 import numba
 from numba.core.caching import _Cache, dumps
 from numba.core.compiler import CompileResult
+from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 
 from .code_hash import deep_hash, is_ours, platform_hash
@@ -101,6 +103,11 @@ def _prune_files():
         with contextlib.suppress(OSError):
             if time.time() - file.stat().st_mtime > _KEEP:
                 file.unlink()
+
+
+def machine():
+    """The processor as machine code is made for it."""
+    return [platform.machine(), *map(str, cpu_target.target_context.codegen().magic_tuple())]
 
 
 class KernelCache(_Cache):

@@ -1,4 +1,4 @@
-"""Ctrl-C while a kernel compiles.
+"""Ctrl-C while a kernel compiles, or while files are written.
 
 LLVM calls back into Python. An exception raised in such a callback is printed and lost, and Numba then finds no machine
 code. Signals that arrive in a callback are therefore deferred to the end of the compilation.
@@ -30,6 +30,23 @@ def prompt_interrupts():
     except Exception:
         if not interrupted:
             raise
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if interrupted:
+        raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def deferred_interrupts():
+    """Put a Ctrl-C during the block off to its end."""
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    interrupted = []
+    signal.signal(signal.SIGINT, lambda number, frame: interrupted.append(number))
+    try:
+        yield
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if interrupted:

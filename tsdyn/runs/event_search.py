@@ -102,6 +102,23 @@ class Watch:
                 return status, ""
         return status, ""
 
+    def saved(self):
+        """What is known and found between two steps: numbers, and arrays by name."""
+        found = [each for mine in self.list for each in mine]
+        numbers = {"t": self.t, "tracks": [vars(track) for track in self.tracks], "found": [each[:2] for each in found]}
+        states = np.array([each.state for each in found]).reshape(-1, *self.state.shape)
+        return numbers, {"watch.state": self.state, "watch.memory": self.memory, "watch.found": states}
+
+    def restore(self, numbers, arrays):
+        """As it was when it was saved."""
+        self.t, self.state, self.memory = numbers["t"], arrays["watch.state"], arrays["watch.memory"]
+        self.tracks = [Track(0.0) for _ in self.events]
+        for track, known in zip(self.tracks, numbers["tracks"], strict=True):
+            vars(track).update(known | {"significant": known["significant"] and tuple(known["significant"])})
+        self.list = [[] for _ in self.events]
+        for (t, index), state in zip(numbers["found"], arrays["watch.found"], strict=True):
+            self.list[index].append(Occurrence(t, index, state))
+
     def go_back(self, run, log):
         """Let the run end where it has been looked at last."""
         if self.state is not None and run.clock.t > self.t:

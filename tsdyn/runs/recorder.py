@@ -29,20 +29,20 @@ class Recorder:
     """
 
     def __init__(self, task, run):
-        self.run, self.times, self.stops = run, task.times, task.stops
+        self.run, self.times, self.stops, self.archive = run, task.times, task.stops, task.archive
         self.per_step, self.dense = task.times.size == 0, run.numbers.dense == STORED
-        self.steps, self.passed = (StepLog(), ChartLog()) if task.history else (None, None)
+        self.steps, self.passed = (StepLog(), ChartLog()) if task.history and not self.archive else (None, None)
         self.most = max(BLOCK_ROOM // run.block.size, 1) if self.dense else LARGEST_SLICE
         n, rooms = run.now.shape[1], 2 * CHART_ROOM
         self.charts, self.points = np.empty((rooms, 5)), np.empty((rooms if run.numbers.dense else 0, n))
         self.out = np.empty((task.times.size, 1 + 3 * n + run.remembered.size))
         self.blocks, self.log = np.empty((0, run.block.size)), None
-        self._parts = [], []  # of out and blocks
+        self._parts, self._count = ([], []), 0  # of out and blocks; outputs in the archive
 
     def begin_slice(self, rows):
         """Make room for a slice of so many steps; what was recorded before is kept."""
         if self.log is not None:
-            self._collect()
+            self.collect()
             self._make_room_for_charts()
         if self.per_step:
             self.out = np.empty((rows + 1, self.out.shape[1]))
@@ -54,7 +54,10 @@ class Recorder:
     def close(self):
         """Put the slices together."""
         run = self.run.numbers
-        self._collect()
+        self.collect()
+        if self.archive is not None:
+            self.out = range(self._count)
+            return
         if not self.dense and run.chart_rows > CHART_ROOM:  # fewer are logged with the last one
             self._pass_charts()
         self.out = _joined(self.out, self._parts[0]) if self.per_step else self.out[: run.rows]
@@ -63,13 +66,32 @@ class Recorder:
 
     def chart_history(self, charts):
         """The history of charts, with those that are left at the end; or None."""
+        if self.archive is not None:
+            self.archive.add("charts", charts)
         if self.passed is not None:
             self.passed.add(charts, self.steps)
         return self.passed
 
-    def _collect(self):
+    def saved(self):
+        """Outputs so far, and arrays: the charts that are logged, the last of them open."""
+        rows = self.run.numbers.chart_rows + 1
+        return self._count, {"recorder.charts": self.charts[:rows].copy(), "recorder.points": self.points[:rows].copy()}
+
+    def restore(self, count, arrays):
+        """As it was when it was saved."""
+        self._count, charts, points = count, arrays["recorder.charts"], arrays["recorder.points"]
+        while len(self.charts) < len(charts) + CHART_ROOM:
+            self.charts, self.points = _doubled(self.charts), _doubled(self.points)
+        self.charts[: len(charts)], self.points[: len(points)] = charts, points
+
+    def collect(self):
         """Take what the slice has written, so that the driver begins at the first rows again."""
         run, (out, blocks) = self.run.numbers, self._parts
+        if self.archive is not None:
+            self.archive.add("outputs", self.out[: run.rows])
+            self.archive.add("steps", self.log.history[: run.history])
+            self._count += run.rows
+            run.rows = 0
         if self.per_step and run.rows:
             out.append(self.out[: run.rows])
             run.rows = 0
@@ -92,6 +114,8 @@ class Recorder:
         """Log the charts that have been left, and let the present one be the first."""
         run, charts, points = self.run.numbers, self.charts, self.points
         left = run.chart_rows
+        if self.archive is not None:
+            self.archive.add("charts", charts[:left])
         if self.passed is not None:
             self.passed.add(charts[:left], self.steps)
         charts[0], points[:1] = charts[left], points[left : left + 1]

@@ -85,6 +85,13 @@ class Memory:
         numbers.dense, numbers.may_pass, numbers.chart_interval = dense, may_pass, task.interval
         numbers.leave_when_stiff = task.choose is not None
 
+    def saved(self):
+        """What is to be saved of it beside its arrays: nothing."""
+        return {}
+
+    def restore(self, numbers):
+        """As it was when it was saved."""
+
     def load(self):
         """Load the driver, where this process has not called it yet."""
         if not getattr(self.advance_kernel, "overloads", True):

@@ -75,6 +75,14 @@ class Sampled:
         self.run, self.weight, self.context = memory.run, memory.weight, memory.context
         self.reason = ""
 
+    def saved(self):
+        """When each function was asked last."""
+        return {"last": self.sampling.last, "begun": self.sampling.begun}
+
+    def restore(self, numbers):
+        """As it was when it was saved."""
+        self.sampling.last, self.sampling.begun = numbers["last"], numbers["begun"]
+
     def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""
         run, work = self.run, self.memory.context.work

@@ -8,6 +8,8 @@ last one took.
 import time
 
 from ..errors import InconsistentState, SingularConfiguration, Status
+from ..jit.interrupts import deferred_interrupts
+from . import snapshot
 from .recorder import Recorder
 from .tolerances import GETTING_ON, HOPELESS, PACED, SLICE_SECONDS
 
@@ -64,7 +66,7 @@ class Slices:
 
     def drive(self):
         """Advance until the end."""
-        rows = min(self.most, self.limit)
+        rows = min(self.most, self.limit - self.run.numbers.steps)
         while self.status == Status.SLICE_DONE:
             self.recorder.begin_slice(rows)
             self._adapt(rows, self._advance(rows))
@@ -110,6 +112,35 @@ class Slices:
                 self.reason = f"progress raised {type(error).__name__}: {error}."
         if self.status == Status.SLICE_DONE and task.max_steps is None and run.numbers.adaptive:
             self.status, self.reason = self.pace.judge(run.clock.t, run.numbers.history, end)
+        if task.archive is not None and self.status == Status.SLICE_DONE:
+            with deferred_interrupts():
+                self.recorder.collect()
+                task.archive.look_up(self.saved)
+
+    def saved(self):
+        """The state between two slices: numbers, and arrays by name."""
+        outputs, arrays = self.recorder.saved()
+        numbers = {
+            "t": self.run.clock.t,
+            "outputs": outputs,
+            "chooses": self.choose is not None,
+            "pace": vars(self.pace),
+            "memory": self.memory.saved(),
+        }
+        if self.watch is not None:
+            numbers["watch"], watched = self.watch.saved()
+            arrays |= watched
+        return numbers, arrays | snapshot.saved(self.memory)
+
+    def restore(self, numbers, arrays):
+        """Begin between two slices of a run that was left there."""
+        snapshot.restore(self.memory, arrays)
+        self.recorder.restore(numbers["outputs"], arrays)
+        self.choose = self.choose if numbers["chooses"] else None
+        vars(self.pace).update(numbers["pace"])
+        self.memory.restore(numbers["memory"])
+        if self.watch is not None:
+            self.watch.restore(numbers["watch"], arrays)
 
 
 def drive(memory, task, watch):
@@ -119,8 +150,15 @@ def drive(memory, task, watch):
     """
     recorder = Recorder(task, memory.run)
     slices = Slices(memory, task, watch, recorder)
+    if task.archive is not None and task.archive.resumed is not None:
+        slices.restore(*task.archive.resumed)
+        task.archive.resumed = None
     try:
         slices.drive()
+    except OSError as error:
+        if task.archive is None:
+            raise
+        slices.status, slices.reason = Status.STORE_FAILED, f"{type(error).__name__}: {error}."
     except KeyboardInterrupt:
         if watch is not None:
             watch.go_back(memory.run, recorder.log)

@@ -39,6 +39,7 @@ class Task(NamedTuple):
     choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
     stops: np.ndarray = np.empty((0, 2))  # times at which a step ends, s, and whether a function is asked there
     sampling: object = None  # a `sampling.Sampling`, or None
+    archive: object = None  # a `storage.archive.Archive` that outputs and histories go to, or None
 
     @property
     def angles(self):
@@ -56,7 +57,7 @@ class Outcome(NamedTuple):
 
     status: Status
     reason: str  # what there is to say about the status
-    rows: np.ndarray  # (k, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
+    rows: np.ndarray  # (k, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered; a range where an archive has them
     steps: StepLog  # or None
     charts: ChartLog  # or None
     reached: float  # s

@@ -18,15 +18,13 @@ def energy_error(solution, task):
     system, packed = solution.system, solution.packed
     if system.rheonomic[0] or system.normals.size:
         return None
-    some, slots = slice(None, None, max(solution.t.size // MOST_OUTPUTS, 1)), system.memory.size
-    t = np.concatenate(([task.span[0]], solution.t[some], [solution.reached]))
+    some, slots = solution[:: max(solution._length() // MOST_OUTPUTS, 1)], system.memory.size
+    t = np.concatenate(([task.span[0]], some.t, [solution.reached]))
     q, qd = (
-        np.vstack((first, rows[some], last))
-        for first, rows, last in zip((task.q, task.qd), (solution.q, solution.qd), solution._last[:2], strict=True)
+        np.vstack((first, rows, last))
+        for first, rows, last in zip((task.q, task.qd), (some.q, some.qd), solution._last[:2], strict=True)
     )
-    memory = np.vstack(
-        (task.remembered[-slots:] if slots else np.zeros(0), solution._remembers[some], solution._remembered)
-    )
+    memory = np.vstack((task.remembered[-slots:] if slots else np.zeros(0), some._remembers, solution._remembered))
     forces = power.force_powers(SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=packed))
     kinetic = diagnostics.kinetic_energy(system, q, qd)
     largest = kinetic.max()

@@ -80,6 +80,8 @@ def run_near(driver, task, scene, origin, tol):
     )  # fmt: skip
     memory = task.remembered[task.prepared.handles.count :]
     q, qd = local.start(stand_in, q, task.qd, task.span[0], tol, memory, True)
+    if task.archive is not None:
+        task.archive.shift = shift
     watched = task.events and [each._replace(function=_away(each.function, packed, shift)) for each in task.events]
     outcome = driver(
         task._replace(
@@ -90,8 +92,10 @@ def run_near(driver, task, scene, origin, tol):
             choose=task.choose and (lambda run: task.choose(run._replace(now=run.now + [[1.0], [0.0], [0.0]] * shift))),
         )
     )
-    rows, last, events = outcome.rows.copy(), outcome.last.copy(), outcome.events
-    rows[:, 1 : 1 + shift.size] += shift
+    rows, last, events = outcome.rows, outcome.last.copy(), outcome.events
+    if task.archive is None:
+        rows = rows.copy()
+        rows[:, 1 : 1 + shift.size] += shift
     last[0] += shift
     if events is not None:
         times, positions, *rest = events

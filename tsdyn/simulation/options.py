@@ -45,9 +45,10 @@ class Options(NamedTuple):
 def checked(given):
     """The `Options` of the arguments of `simulate`, by name; raises InvalidArgument."""
     span, form = interval(given["t_span"]), find_formulation(given["formulation"])
-    for name in ("dense_output", "history"):
-        if not isinstance(given[name], (bool, np.bool_)):
-            raise InvalidArgument(f"{name} must be True or False, got {given[name]!r}.")
+    history = given["store"] is None if given["history"] is None else given["history"]
+    for name, value in (("dense_output", given["dense_output"]), ("history", history)):
+        if not isinstance(value, (bool, np.bool_)):
+            raise InvalidArgument(f"{name} must be True or False, got {value!r}.")
     chart_interval, longest = whole(given["chart_interval"], "chart_interval"), given["max_step"]
     return Options(
         span=span,
@@ -62,7 +63,7 @@ def checked(given):
         events=prepare(given["events"]),
         max_steps=whole(given["max_steps"], "max_steps"),
         max_step=None if longest is None else positive(longest, "max_step (s)"),
-        history=bool(given["history"]),
+        history=bool(history),
         report=reporter(given["progress"]),
         chart_interval=chart_interval,
     )

@@ -18,7 +18,7 @@ from ..runs.run import run
 from ..runs.sampling import Sampling, instants_of, sampled
 from ..runs.task import Task
 from ..taylor.series_engine import SeriesEngine
-from . import method_choice
+from . import method_choice, stored_runs
 from .local_origin import origin_of, run_near
 from .options import checked
 from .rounding_limit import within_rounding
@@ -30,7 +30,7 @@ from .solution import Solution
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..hints import ArrayLike, Event, Formulation, Method, Progress, Redundancy, Span, State
+    from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Span, State
 
 DRIVERS = {"steps": run_past, "series": partial(run, engine=SeriesEngine)}  # by Integrator.driver; see task.py
 
@@ -52,7 +52,9 @@ def simulate(  # many arguments, by name: each is an option of a run
     events: Event | Sequence[Event] | None = None,
     max_steps: int | None = None,
     max_step: float | None = None,
-    history: bool = True,
+    history: bool | None = None,
+    store: Place | None = None,
+    checkpoint: float | None = None,
     progress: Progress | None = None,
     chart_interval: int | None = None,
     state: State | None = None,
@@ -99,8 +101,15 @@ def simulate(  # many arguments, by name: each is an option of a run
         Largest number of steps; the run ends there.
     max_step : float, s, optional
         Longest step, for every method; a longer fixed step is reduced to it.
-    history : bool
-        Keep `solution.steps` and `solution.charts`: 8 bytes per step, 16 to 40 more per rejected step and chart.
+    history : bool, optional
+        Keep `solution.steps` and `solution.charts`: 8 bytes per step, 16 to 40 more per rejected step and chart. By
+        default they are kept, but for runs with a store, whose histories go to the store if they are asked for.
+    store : str or PathLike, optional
+        Stream the outputs to a file while the run goes on, in constant memory; by its suffix Zarr (.zarr) or HDF5 (.h5,
+        .hdf5, .nc), with dimensions, coordinates and units as xarray reads them (needs `tsdyn[data]`). The solution
+        reads from it.
+    checkpoint : float, s, optional
+        With a store: write a state at least so often, in real time, from which `resume(store)` goes on to the bit.
     progress : bool or callable, optional
         True shows a bar (needs tqdm); a callable receives the fraction done, 0 to 1.
     chart_interval : int, optional
@@ -138,7 +147,17 @@ def simulate(  # many arguments, by name: each is an option of a run
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     warn_of_waiting(scene, 3)
-    options = checked(given)
+    if store is not None or checkpoint is not None:
+        stored_runs.demand_storable(given)
+    return run_from(given)
+
+
+def run_from(given, numbers=None, arrays=None, archive=None):
+    """Run what the arguments of `simulate` ask for; with the numbers and arrays of a checkpoint, from there.
+
+    An archive is that of a run which begins again by another method.
+    """
+    scene, options = given["scene"], checked(given)
     prepare_first_run(scene, options.method, options.form, options.within, options.default)
     kept = prepared(scene)
     method = options.method or method_choice.explicit(kept, *options.default)
@@ -147,15 +166,42 @@ def simulate(  # many arguments, by name: each is an option of a run
 
     started = time.perf_counter()
     choose = None
-    if integrator is None:
-        same = {"constraint_tol": constraint_tol, "initial_tol": initial_tol, "max_step": max_step}
+    if given["integrator"] is None:
+        same = {name: given[name] for name in ("constraint_tol", "initial_tol", "max_step")}
         choose = method_choice.chooser(simulate, scene, method, options.span[1], same)
-    task = _request(scene, kept, method, options, state, choose)
+    task = _request(scene, kept, method, options, given["state"], choose)
+    if given["store"] is not None:
+        return _run_stored(task, given, options, (numbers, arrays), archive)
     outcome = _run(task, scene, options.initial_tol)
     ended = time.perf_counter()
     if outcome.status == Status.STIFF:
-        return simulate(**{**given, "integrator": method_choice.implicit(method), "rtol": None, "atol": None})
+        return run_from(_stiff(given, method))
     return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
+
+
+def _stiff(given, method):
+    """Return the arguments of the run by an implicit method."""
+    return {**given, "integrator": method_choice.implicit(method), "rtol": None, "atol": None}
+
+
+def _run_stored(task, given, options, found, archive):
+    """Run a task whose outputs go to a store, from its start or from what was found in a checkpoint."""
+    scene, (numbers, arrays), kept = given["scene"], found, task.prepared
+    archive = archive or stored_runs.archive_of(given, kept, options.history, numbers, arrays)
+    started = time.perf_counter()
+    if numbers is not None and numbers.get("ended"):
+        outcome = stored_runs.ended_outcome(numbers, arrays, archive)
+        return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
+    try:
+        outcome = _run(task._replace(archive=archive), scene, options.initial_tol)
+        seconds = time.perf_counter() - started
+        if outcome.status == Status.STIFF:
+            given = _stiff(given, task.method)
+            return run_from(given, archive=stored_runs.begin_again(archive, given))
+        outcome = stored_runs.ended(archive, outcome, seconds)
+    finally:
+        archive.close()
+    return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": seconds})
 
 
 def _request(scene, kept, method, options, state, choose):

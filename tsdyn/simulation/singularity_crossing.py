@@ -7,6 +7,7 @@ meet no singular configuration load none of this.
 """
 
 import math
+import time
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from ..runs.history import ChartLog, StepLog
 from ..runs.run import run
 from ..runs.segments import Relay
 from ..runs.step_engine import StepEngine
+from ..runs.task import Outcome
 from ..runs.trajectory import Pieces
 from ..taylor.series_engine import SeriesEngine
 from .tolerances import FINEST, NO_STEP, REGULAR
@@ -26,10 +28,13 @@ def run_past(task, observe=None):
     """Run a `Task` of a step method; return the `Outcome`. An observed run has one segment, without crossings."""
     if observe is not None or task.form.first_order or task.prepared.refusal:
         return run(task, StepEngine, observe)
-    relay = Relay()
+    relay, passed = Relay(), task.archive.passed if task.archive else []
     try:
+        if passed:  # a run that goes on in a later segment
+            relay.share, relay.largest = passed[-1]["relay"]
+            return _go_on(task, relay, [_recalled(task, known) for known in passed])
         outcome = run(task._replace(report=_until_its_end(task.report)), StepEngine, relay=relay)
-        return _go_on(task, relay, outcome) if outcome.status == Status.PASSAGE else outcome
+        return _go_on(task, relay, [outcome]) if outcome.status == Status.PASSAGE else outcome
     finally:
         task.report(None)
 
@@ -39,11 +44,31 @@ def _until_its_end(report):
     return lambda fraction: None if fraction is None else report(fraction)
 
 
-def _go_on(task, relay, first):
-    """Complete a run whose first segment has ended near a singular configuration."""
-    parts = [first]
+def _pass(task, relay, part):
+    """Let the archive know that a segment has ended; per-step outputs begin with the row that it ends with."""
+    if task.archive is not None:
+        numbers = {"status": part.status, "reached": part.reached, "counts": part.counts, "rows": len(part.rows)}
+        arrays = {"last": part.last.tolist(), "remembered": part.remembered.tolist()}
+        task.archive.passed.append({**numbers, **arrays, "relay": [relay.share, relay.largest]})
+        task.archive.skips = task.times.size == 0
+
+
+def _recalled(task, known):
+    """The `Outcome` of a segment that had ended when a checkpoint was written."""
+    return Outcome(
+        Status(known["status"]), "", range(known["rows"]), None, None, known["reached"], np.array(known["last"]),
+        np.array(known["remembered"]), known["counts"], None, None, time.perf_counter(),
+    )  # fmt: skip
+
+
+def _go_on(task, relay, parts):
+    """Complete a run whose segments so far have ended near singular configurations."""
+    first, recalled = parts[0], task.archive is not None and task.archive.resumed is not None
     try:
         while parts[-1].status == Status.PASSAGE:
+            if not recalled:
+                _pass(task, relay, parts[-1])
+            recalled = False
             series = len(parts) % 2 == 1
             rest = _rest(task, parts, series)
             if rest.max_steps == 0:
@@ -63,9 +88,9 @@ def _go_on(task, relay, first):
     last = parts[-1]
     return last._replace(
         reason=" ".join(part for part in (last.reason, _said(parts)) if part),
-        rows=np.concatenate([_new_rows(task, part, i) for i, part in enumerate(parts)]),
-        steps=StepLog([part.steps for part in parts]) if task.history else None,
-        charts=ChartLog([part.charts for part in parts]) if task.history else None,
+        rows=_rows(task, parts),
+        steps=StepLog([part.steps for part in parts]) if task.history and not task.archive else None,
+        charts=ChartLog([part.charts for part in parts]) if task.history and not task.archive else None,
         counts=_summed([part.counts for part in parts]),
         trajectory=Pieces([part.trajectory for part in parts]) if task.dense_output else None,
         began=first.began,
@@ -82,9 +107,12 @@ def _said(parts):
     return f"Taylor series carried the motion past a singular configuration {times} after t = {passed[0]:.6g} s."
 
 
-def _new_rows(task, part, i):
-    """Return the output rows of segment i that the segment before doesn't end with."""
-    return part.rows[1:] if i and task.times.size == 0 else part.rows
+def _rows(task, parts):
+    """Return the output rows of all segments; every step's begin with the row that the segment before ends with."""
+    if task.archive is not None:
+        return range(task.archive.counts["outputs"])
+    first, *others = (part.rows for part in parts)
+    return np.concatenate([first, *(rows[1:] if task.times.size == 0 else rows for rows in others)])
 
 
 def _rest(task, parts, series):
@@ -156,6 +184,15 @@ class Carrier:
             else:
                 clock.t_end = self.grid = self._next()
         return Status.SLICE_DONE
+
+    def saved(self):
+        """The grid time that is aimed at, the share that was met, and what the memory has to say."""
+        return {"grid": self.grid, "share": self.share, "memory": self.memory.saved()}
+
+    def restore(self, numbers):
+        """As it was when it was saved."""
+        self.grid, self.share = numbers["grid"], numbers["share"]
+        self.memory.restore(numbers["memory"])
 
     @property
     def reason(self):

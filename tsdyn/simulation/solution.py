@@ -20,6 +20,7 @@ from ..observables.state import RememberingState
 from ..validation import counted, floats
 from .balances import Balances
 from .conservation import energy_error
+from .outputs import Outputs
 from .termination import account
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class Charts(NamedTuple):
 
 
 @fitting_methods
-class Solution(Balances, Kinematics["Floats"]):
+class Solution(Outputs, Balances, Kinematics["Floats"]):
     """The result of `simulate`; k outputs, n coordinates, m constraint rows.
 
     Attributes
@@ -90,7 +91,6 @@ class Solution(Balances, Kinematics["Floats"]):
     status: Status
     message: str
     stats: SimpleNamespace
-    t: Floats
     t_events: list[Floats] | Any  # None without events
     q_events: list[Floats] | Any
     qd_events: list[Floats] | Any
@@ -102,11 +102,8 @@ class Solution(Balances, Kinematics["Floats"]):
         self.status, self._trajectory = outcome.status, outcome.trajectory
         self.t_events, self.q_events, self.qd_events = outcome.events or (None, None, None)
         self.handles = task.prepared.handles
-        rows, n, angles = outcome.rows, task.q.size, self.handles.count
-        self.t = rows[:, 0].copy()
-        self.q, self.qd, self.qdd = rows[:, 1 : 1 + 3 * n].reshape(-1, 3, n).swapaxes(0, 1).copy()
-        rest = rows[:, 1 + 3 * n :].copy()
-        self.anchor, self._remembers = Anchor(rest[:, :angles]), rest[:, angles:]  # (k, slots), what forces remember
+        self._take(outcome.rows, task.q.size)
+        angles = self.handles.count
         self._reached, self._last = outcome.reached, outcome.last
         self._angles, self._remembered = outcome.remembered[:angles], outcome.remembered[angles:]
         self._step_log, self._chart_log = outcome.steps, outcome.charts
@@ -304,7 +301,7 @@ class Solution(Balances, Kinematics["Floats"]):
         if sweeps and s.placements:  # series place none
             sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement"
         return {
-            "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self.t.size, 'output')}",
+            "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self._length(), 'output')}",
             "method": f"{self.method}, formulation {self.formulation}",
             "steps": f"{s.steps}, {s.rejected} rejected, {counted(s.charts, 'chart')}",
             "work": f"{counted(s.evaluations, 'evaluation')}, {counted(s.placements, 'placement')}{sweeps}",

@@ -48,7 +48,7 @@ def _locked(solution):
     """Report that redundant rows leave no degree of freedom."""
     redundant = len(redundant_rows(solution.packed))
     still = redundant and not solution.system.rheonomic[0]
-    if not (still and solution.q.shape[1] == len(solution.system.segments) - redundant):
+    if not (still and solution._last.shape[1] == len(solution.system.segments) - redundant):
         return ""
     return "The mechanism is immobile: the constraints, some of them redundant, leave no degree of freedom."
 
@@ -56,7 +56,7 @@ def _locked(solution):
 def _growth(solution):
     """Report that the motion is stiff, or that its velocities diverge."""
     said = "The motion is stiff: an implicit method, such as SDIRK54, may succeed. " if solution.stats.stiff else ""
-    first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (solution.qd[:1], solution._last[1]))
+    first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (solution[:1].qd, solution._last[1]))
     if last > BLOW_UP * (1.0 + first):
         said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion diverges."
     return said.strip()
@@ -66,7 +66,7 @@ def _suspect(solution, scene):
     """Name the nearly singular item at the last state."""
     if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
         return ""
-    if solution.q.shape[1] > MOST_SINGULAR:
+    if solution._last.shape[1] > MOST_SINGULAR:
         return _suspect_of_many(solution, scene)
     _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)
     rows, share = weakest_row(scene, Phi_q, len(redundant_rows(solution.packed)))

@@ -1,0 +1,78 @@
+"""The outputs of a run as arrays: in memory, or in a store from which they are read when they are asked for."""
+
+from __future__ import annotations
+
+import copy
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from ..errors import InvalidArgument
+from ..observables.kinematics import Anchor
+
+if TYPE_CHECKING:
+    from ..hints import Floats
+
+_COLUMNS = {"t": "time", "q": "q", "qd": "qd", "qdd": "qdd", "anchor": "remembered", "_remembers": "remembered"}
+
+
+class Outputs:
+    """Mixed into `Solution`: t (k,), q, qd, qdd (k, n), the turns of joint angles, what forces remember (k, slots)."""
+
+    t: Floats
+    q: Floats
+    qd: Floats
+    qdd: Floats
+    handles: Any
+
+    def _take(self, rows, n):
+        """Take the rows (k, 1 + 3 n + angles + slots) of a run, or its `StoredOutputs`."""
+        self._stored, self._slice = None, slice(None)
+        if not isinstance(rows, np.ndarray):
+            self._stored = rows
+            return
+        self.t = rows[:, 0].copy()
+        self.q, self.qd, self.qdd = rows[:, 1 : 1 + 3 * n].reshape(-1, 3, n).swapaxes(0, 1).copy()
+        self._set_remembered(rows[:, 1 + 3 * n :].copy())
+
+    def _set_remembered(self, rest):
+        angles = self.handles.count
+        self.anchor, self._remembers = Anchor(rest[:, :angles]), rest[:, angles:]
+
+    def __getattr__(self, name: str) -> Any:
+        stored = self.__dict__.get("_stored")
+        if stored is None or name not in _COLUMNS:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        found = stored.read(_COLUMNS[name], self._slice)
+        if _COLUMNS[name] != "remembered":
+            setattr(self, name, found)
+        else:
+            self._set_remembered(np.empty((self._length(), 0)) if found is None else found)
+        return self.__dict__[name]
+
+    def _length(self):
+        """How many outputs there are; of a store without a look at them."""
+        return self.t.size if self._stored is None else len(range(self._stored.count)[self._slice])
+
+    def __getitem__(self, part: slice) -> Self:
+        """Return a solution of some of the outputs, `solution[a:b]`; of a stored run nothing else is read.
+
+        Events, statistics and histories remain those of the whole run.
+        """
+        if not isinstance(part, slice) or (part.step or 1) < 1:
+            raise InvalidArgument(
+                f"outputs are taken by slices, such as solution[100:200] or solution[::10], got {part!r}."
+            )
+        other = copy.copy(self)
+        for name in [name for name in vars(other) if name in _COLUMNS or hasattr(type(self), name)]:
+            del vars(other)[name]  # what has been read, or derived from it
+        if self._stored is not None:
+            found = range(self._stored.count)[self._slice][part]
+            other._slice = slice(found.start, max(found.stop, found.start), found.step)
+            return other
+        for name in ("t", "q", "qd", "qdd", "_remembers"):
+            setattr(other, name, getattr(self, name)[part])
+        other.anchor = Anchor(self.anchor.angles[part])
+        return other
+
+    __iter__ = None  # by the old protocol __getitem__ would make one

@@ -1,0 +1,92 @@
+"""`resume`: go on with a run from its checkpoint."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .._version import __version__
+from ..calls import fitting
+from ..errors import InvalidArgument, StorageError
+from ..jit.cache import machine
+from ..jit.code_hash import platform_hash
+from .scene import Scene
+from .simulate import run_from
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..hints import Event, Place, Progress, Solution
+
+
+@fitting
+def resume(
+    path: Place,
+    scene: Scene | None = None,
+    events: Event | Sequence[Event] | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Solution:
+    """Go on with a run from its last checkpoint, to the end that it was asked for: to the bits of one never stopped.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        The store of a run that was made with `simulate(..., store=path, checkpoint=seconds)`.
+    scene : Scene, optional
+        Needed where the scene has functions, or classes, of your own: a file keeps no code. It must be the scene that
+        was run, to the bit, and its functions must have the source that they had.
+    events : callable or list of callables, optional
+        Those of the run, where it had any; their source must be what it was.
+    progress : bool or callable, optional
+        As of `simulate`.
+
+    Returns
+    -------
+    Solution
+        Of the whole run. A run that has ended is returned as it is; what was written after the last checkpoint is
+        computed again.
+
+    Raises
+    ------
+    StorageError
+        If there is no checkpoint, if it is damaged, or of another scene, version or machine.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import tsdyn as ts
+    >>> bob = (scene := ts.Scene(gravity=(0, 0, -10))).add_point_mass(mass=1.0, position=(1, 0, 0))
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground))
+    >>> path = tempfile.mkdtemp() + "/run.h5"
+    >>> first = ts.simulate(scene, (0, 2), store=path, checkpoint=60.0)
+    >>> ts.resume(path).reached
+    2.0
+    """
+    from ..storage import checkpoint, restricted_pickle
+
+    numbers, arrays = checkpoint.read(path)
+    _demand_same_place(path, numbers)
+    given = restricted_pickle.loads(arrays["arguments"].tobytes())
+    if scene is None:
+        if numbers["functions"] or "scene" not in arrays:
+            names = ", ".join(numbers["functions"]) or "classes of your own"
+            raise StorageError(f"the scene has functions or classes of yours ({names}): ts.resume(path, scene=scene).")
+        scene = restricted_pickle.loads(arrays["scene"].tobytes())
+    elif not isinstance(scene, Scene):
+        raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
+    given |= {"scene": scene, "events": events, "progress": progress, "store": path}
+    return run_from(given | {"checkpoint": numbers["interval"]}, numbers, arrays)
+
+
+def _demand_same_place(path, numbers):
+    """Raise StorageError unless version and machine are those of the run."""
+    if (numbers["version"], numbers["kernels"]) != (__version__, platform_hash()):
+        raise StorageError(
+            f"{path} was written by tsdyn {numbers['version']}, and other versions of it, NumPy or Numba are here: "
+            "the bits would differ. Go on there, or start anew from the last output: simulate(state=...)."
+        )
+    if numbers["machine"] != machine():
+        raise StorageError(
+            f"{path} was written on another machine ({', '.join(numbers['machine'][:3])}): the bits would differ. "
+            "Go on there, or start anew from the last output: simulate(state=...)."
+        )

@@ -1,0 +1,182 @@
+"""Runs with a store: its archive, what a checkpoint holds beside the state, how a run ends in it."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import os
+from pathlib import Path
+
+import numpy as np
+
+from .._version import __version__
+from ..errors import InvalidArgument, Status, StorageError
+from ..jit.cache import machine
+from ..jit.code_hash import platform_hash
+from ..model.packed import user_functions
+from ..runs.task import Outcome
+from ..validation import number
+
+PASSED_AGAIN = ("events", "progress")  # arguments that are functions
+OWN = ("scene", "store", "checkpoint", *PASSED_AGAIN)  # arguments that are kept apart
+
+
+def demand_storable(given):
+    """Raise InvalidArgument or StorageError unless a store can be made as the arguments of a run ask for."""
+    path, interval = given["store"], given["checkpoint"]
+    if path is None:
+        raise InvalidArgument("checkpoint needs a store, which it goes on with: simulate(..., store='run.h5').")
+    from ..storage.formats import demand_free, format_of
+
+    if not isinstance(path, (str, os.PathLike)):
+        raise InvalidArgument(f"store must be a path such as 'run.zarr' or 'run.h5', got {path!r}.")
+    format_of(path)
+    if given["dense_output"]:
+        raise InvalidArgument("a store keeps outputs, no interpolants: give t_eval in place of dense_output.")
+    if interval is not None and not 0.0 <= number(interval) < np.inf:
+        raise InvalidArgument(f"checkpoint must be a time in s, 0 or more, got {interval!r}.")
+    demand_free(path)
+
+
+def archive_of(given, kept, history, numbers, arrays):
+    """The `Archive` of a run, made or, with the numbers and arrays of a checkpoint, gone on with."""
+    from ..storage.archive import Archive, tables_of
+
+    facts = _facts(given, kept)
+    if numbers is not None:
+        _demand_same_run(given["store"], facts, numbers)
+    remembered = kept.handles.count + kept.packed.system.memory.size
+    tables = tables_of(kept.packed.bodies, remembered, history)
+    attributes = {"source": f"tsdyn {__version__}", "scene": facts["scene"]}
+    archive = Archive(Path(given["store"]), tables, attributes, facts["interval"], _request(given), facts)
+    if numbers is None:
+        archive.begin()
+    elif not numbers.get("ended"):
+        archive.go_on(numbers, arrays)
+    return archive
+
+
+def begin_again(archive, given):
+    """Let another method begin at the start; the archive."""
+    archive.begin_again(_request(given))
+    return archive
+
+
+def ended(archive, outcome, seconds):
+    """The `Outcome` of a run whose outputs are in an archive; the checkpoint says that it has ended."""
+    from ..storage.stored_outputs import StoredLog, StoredOutputs
+
+    if isinstance(outcome.rows, np.ndarray):  # of a driver of a user's
+        archive.add("outputs", outcome.rows)
+    try:
+        archive.flush()
+        if archive.has_checkpoints and outcome.status not in (Status.INTERRUPTED, Status.STORE_FAILED):
+            archive.checkpoint(*_ending(outcome, seconds))
+    except OSError as error:
+        outcome = outcome._replace(status=Status.STORE_FAILED, reason=f"{type(error).__name__}: {error}.")
+    outputs = StoredOutputs(archive.path, archive.columns)
+    return outcome._replace(rows=outputs, steps=StoredLog.of(outputs, "steps"), charts=StoredLog.of(outputs, "charts"))
+
+
+def _ending(outcome, seconds):
+    """The numbers and arrays of a checkpoint at the end of a run."""
+    numbers = {"ended": True, "t": outcome.reached, "status": outcome.status, "reason": outcome.reason}
+    arrays = {"last": outcome.last, "remembered": outcome.remembered}
+    if outcome.events is not None:
+        numbers["watched"] = len(outcome.events[0])
+        for name, found in zip(("t", "q", "qd"), outcome.events, strict=True):
+            arrays |= {f"event {i}.{name}": array for i, array in enumerate(found)}
+    return numbers | {"statistics": outcome.counts, "seconds": seconds}, arrays
+
+
+def ended_outcome(numbers, arrays, archive):
+    """The `Outcome` of a run that had ended when its checkpoint was written."""
+    from ..storage.stored_outputs import StoredLog, StoredOutputs
+
+    events = None
+    if "watched" in numbers:
+        events = tuple([arrays[f"event {i}.{name}"] for i in range(numbers["watched"])] for name in ("t", "q", "qd"))
+    outputs = StoredOutputs(archive.path, archive.columns)
+    return Outcome(
+        Status(numbers["status"]), numbers["reason"], outputs, StoredLog.of(outputs, "steps"),
+        StoredLog.of(outputs, "charts"), numbers["t"], arrays["last"], arrays["remembered"], numbers["statistics"],
+        None, events, 0.0,
+    )  # fmt: skip
+
+
+def _demand_same_run(path, facts, numbers):
+    """Raise StorageError unless the scene and the functions are those of the run that is gone on with."""
+    if facts["scene"] != numbers["scene"]:
+        raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
+    for kind in ("functions", "events"):
+        known, found = numbers[kind], facts[kind]
+        missing = [name for name in known if name not in found]
+        if missing:
+            raise StorageError(f"{path}: the run had {kind} that are missing here: {', '.join(missing)}.")
+        other = [name for name in found if name not in known]
+        if other:
+            raise StorageError(f"{path}: the run had no such {kind}: {', '.join(other)}.")
+        changed = [name for name, source in found.items() if source != known[name]]
+        if changed:
+            raise StorageError(f"{path}: the source of {', '.join(changed)} has changed since the run.")
+
+
+def _request(given):
+    """The arguments of a run and its scene as arrays of bytes; what holds code isn't kept."""
+    from ..storage.restricted_pickle import Foreign, dumps
+
+    rest = {name: value for name, value in given.items() if name not in OWN}
+    found = {}
+    for name, value in (("scene", given["scene"]), ("arguments", rest)):
+        try:
+            found[name] = np.frombuffer(dumps(value), np.uint8)
+        except Foreign as foreign:
+            if name == "arguments":
+                raise InvalidArgument(
+                    f"a run by a method of your own can't go on from a file, which keeps no code: {foreign}."
+                ) from None
+    return found
+
+
+def _facts(given, kept):
+    """What a checkpoint is compared by: version and machine, scene, functions."""
+    events = given["events"]
+    events = [] if events is None else [events] if callable(events) else list(events)
+    functions = [function for _, several in user_functions(kept.packed) for function in several]
+    functions += [load.force.function for load in kept.packed.loads if getattr(load.force, "period", None) is not None]
+    return {
+        "version": __version__,
+        "kernels": platform_hash(),
+        "machine": machine(),
+        "scene": _hash_of(kept.packed),
+        "functions": _sources(functions),
+        "events": _sources(events),
+        "interval": given["checkpoint"] if given["checkpoint"] is None else float(given["checkpoint"]),
+    }
+
+
+def _hash_of(packed):
+    """SHA-256 of the packed numbers, to the bit; without addresses."""
+    digest = hashlib.sha256(repr([(body.name, body.dimension) for body in packed.bodies]).encode())
+    for name, array in packed.system._asdict().items():
+        if not array.dtype.names:
+            digest.update(f"{name} {array.shape} {array.dtype}".encode())
+            digest.update(np.ascontiguousarray(array).tobytes())
+    digest.update(repr([type(item).__qualname__ for item in packed.constraints]).encode())
+    digest.update(repr([type(load.force).__qualname__ for load in packed.loads]).encode())
+    return digest.hexdigest()
+
+
+def _sources(functions):
+    """SHA-256 of the source of each function, by its name and place among the others."""
+    found = {}
+    for i, function in enumerate(functions):
+        name = getattr(function, "__qualname__", type(function).__qualname__)
+        plain = getattr(function, "py_func", function)
+        try:
+            text = inspect.getsource(plain if hasattr(plain, "__code__") else type(plain)).encode()
+        except (OSError, TypeError):  # typed at a prompt
+            code = getattr(plain, "__code__", None)
+            text = b"" if code is None else code.co_code + repr(code.co_consts).encode()
+        found[f"{name} ({i})"] = hashlib.sha256(text).hexdigest()
+    return found

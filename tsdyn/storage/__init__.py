@@ -1,0 +1,8 @@
+"""Files of long runs: the store that outputs stream to, and the checkpoint that a run goes on from.
+
+Imports observables and below. Loaded by runs with a store alone.
+
+Begin with archive.py, which a run writes to. hdf5.py and zarr.py are the formats, chosen by suffix in formats.py;
+checkpoint.py writes and reads checkpoints; restricted_pickle.py keeps the scene and the arguments of a run in them, and
+refuses code; stored_outputs.py reads outputs back, as a `Solution` asks for them.
+"""

@@ -1,0 +1,175 @@
+"""What a run with a store writes to: outputs and histories, buffered, and checkpoints when they are due."""
+
+import math
+import time
+
+import numpy as np
+
+from . import checkpoint
+from .formats import CHUNK, Column, Table, format_of
+
+READERS = 1.0  # s, after which readers see what has been written
+OUTPUTS, STEPS, CHARTS = "outputs", "steps", "charts"
+_COORDINATES = ("x", "y", "z", "e0", "e1", "e2", "e3")
+_LEVELS = {
+    "q": ("positions and Euler parameters", "m or 1"),
+    "qd": ("their first derivatives", "m/s or 1/s"),
+    "qdd": ("their second derivatives", "m/s^2 or 1/s^2"),
+}
+_STEPS = {"step_h": ("length of a step", "s"), "step_accepted": ("whether it was accepted", "1")}
+_CHARTS = {
+    "chart_reason": ("number of the reason for the chart", "1"),
+    "chart_condition": ("condition at its end", "1"),
+    "chart_contraction": ("contraction at its end", "1"),
+    "chart_steps": ("steps on it", "1"),
+}
+
+
+def tables_of(bodies, remembered, history):
+    """The tables of a store: outputs of these bodies, so many remembered numbers, histories."""
+    names = [f"{body.name}.{x}" for body in bodies for x in _COORDINATES[: body.dimension]]
+    labels, columns = {"coordinate": names}, [_times("time", "model time")]
+    columns += [Column(name, ("coordinate",), _attributes(*said)) for name, said in _LEVELS.items()]
+    if remembered:
+        labels["slot"] = [str(i) for i in range(remembered)]
+        columns.append(
+            Column("remembered", ("slot",), _attributes("joint angles, and what forces remember", "rad or 1"))
+        )
+    tables = {OUTPUTS: Table("time", tuple(columns), labels)}
+    for name, dimension, said in ((STEPS, "step_time", _STEPS), (CHARTS, "chart_time", _CHARTS)):
+        if history:
+            rest = [Column(column, (), _attributes(*words)) for column, words in said.items()]
+            tables[name] = Table(dimension, (_times(dimension, "start"), *rest), {})
+    return tables
+
+
+def _times(name, said):
+    return Column(name, (), _attributes(said, "s"))
+
+
+def _attributes(said, units):
+    return {"long_name": said, "units": units}
+
+
+class Archive:
+    """A store that a run writes to, and its checkpoint.
+
+    Parameters
+    ----------
+    path : Path
+    tables : dict
+        As `tables_of` makes them.
+    attributes : dict
+        Of the store as a whole.
+    interval : float, s
+        Between checkpoints; None for no checkpoints.
+    request : dict
+        Arrays that a checkpoint begins with: what the run was asked.
+    facts : dict
+        Numbers that it begins with.
+    """
+
+    def __init__(self, path, tables, attributes, interval, request, facts):
+        self.path, self._tables, self._attributes = path, tables, attributes
+        self._interval, self._request, self._facts = interval, request, facts
+        self._format = format_of(path)
+        self.shift, self.skips, self.passed = 0.0, False, []  # of positions; a first row; segments that have ended
+        self.resumed = None  # what a run that goes on begins with: numbers, arrays
+        self._store = None
+
+    def begin(self):
+        """Make the store."""
+        self._store = self._format.Store.create(self.path, self._tables, self._attributes)
+        self._set_counts(dict.fromkeys(self._tables, 0))
+
+    def go_on(self, numbers, arrays):
+        """Open the store where a checkpoint was written."""
+        self._store = self._format.Store.reopen(self.path, self._tables, self._attributes, numbers["counts"])
+        self._set_counts(numbers["counts"])
+        self.resumed, self.passed = (numbers, arrays), numbers["passed"]
+
+    def begin_again(self, request):
+        """Forget what has been written: another method begins at the start."""
+        self._request = request
+        checkpoint.remove(self.path)
+        self._store.close()
+        self._store = self._format.Store.reopen(
+            self.path, self._tables, self._attributes, dict.fromkeys(self._tables, 0)
+        )
+        self._set_counts(dict.fromkeys(self._tables, 0))
+        self.passed, self.resumed = [], None
+
+    def _set_counts(self, counts):
+        self.counts = dict(counts)
+        self._waiting, self._size = {name: [] for name in self._tables}, 0
+        self._flushed, self._written = time.perf_counter(), -math.inf  # the first checkpoint is due at once
+
+    @property
+    def columns(self):
+        """Names of the columns of each table."""
+        return {name: [column.name for column in table.columns] for name, table in self._tables.items()}
+
+    def add(self, name, rows):
+        """Add rows (k, columns) of a table; they are copied."""
+        if name not in self._tables:
+            return
+        if self.skips and name == OUTPUTS and len(rows):
+            rows, self.skips = rows[1:], False
+        if len(rows):
+            self._waiting[name].append(rows.copy())
+            self.counts[name] += len(rows)
+            self._size += rows.size
+
+    def look_up(self, state):
+        """Between slices: let readers see what is new, and write a checkpoint if one is due; `state()` makes it."""
+        now = time.perf_counter()
+        if self._interval is not None and now - self._written >= self._interval:
+            self.checkpoint(*state())
+        elif now - self._flushed >= READERS and self._size:
+            self.flush()
+        elif self._size > CHUNK:
+            self._write()
+
+    def checkpoint(self, numbers, arrays):
+        """Write a checkpoint of this state."""
+        self.flush()
+        facts = {**self._facts, "counts": self.counts, "passed": self.passed}
+        checkpoint.write(self.path, {**facts, **numbers}, {**self._request, **arrays})
+        self._written = time.perf_counter()
+
+    @property
+    def has_checkpoints(self):
+        """Whether checkpoints are asked for."""
+        return self._interval is not None
+
+    def flush(self):
+        """Bring everything to the disk."""
+        self._write()
+        self._store.flush()
+        self._flushed = time.perf_counter()
+
+    def close(self):
+        """Close the store."""
+        self._store.close()
+
+    def _write(self):
+        for name, parts in self._waiting.items():
+            if parts:
+                rows = np.concatenate(parts)
+                self._store.write(self.counts[name] - len(rows), self._columns(name, rows))
+                parts.clear()
+        self._size = 0
+
+    def _columns(self, name, rows):
+        """Rows of a table as arrays by column; the times last, for readers who count by them."""
+        if name != OUTPUTS:
+            columns = [column.name for column in self._tables[name].columns]
+            found = dict(zip(columns[1:], rows.T[1:], strict=True))
+            return found | {columns[0]: rows[:, 0]}
+        n = len(self._tables[OUTPUTS].labels["coordinate"])
+        found = {level: rows[:, 1 + i * n : 1 + (i + 1) * n] for i, level in enumerate(_LEVELS)}
+        if not np.isscalar(self.shift):
+            found["q"] = found["q"] + self.shift
+        if rows.shape[1] > 1 + 3 * n:
+            found["remembered"] = rows[:, 1 + 3 * n :]
+        return found | {"time": rows[:, 0]}

@@ -1,0 +1,72 @@
+"""The formats of a store, by suffix.
+
+A format is a module with a class `Store`, which has
+
+    create(path, tables, attributes)           a new store, of `Table`s by name
+    reopen(path, tables, attributes, counts)   one to go on with, its tables cut to so many rows
+    write(start, rows)                         rows (k, ...) of a table from `start` on, by column; what follows is cut
+    flush()                                    all of it to the disk, for readers and for a crash
+    close()
+
+and functions for stores that may still be written
+
+    read(path, column, part)                   a slice of a column
+    count(path, columns)                       rows that all of these columns have
+"""
+
+from importlib import import_module
+from pathlib import Path
+from typing import NamedTuple
+
+from ..errors import InvalidArgument, MissingDependency, StorageError
+
+CHUNK = 1 << 17  # floats of a chunk
+
+
+class Column(NamedTuple):
+    """An array of a table; its first dimension is the table's."""
+
+    name: str
+    dimensions: tuple  # names of the others
+    attributes: dict  # units, long_name
+
+
+class Table(NamedTuple):
+    """Arrays that grow together."""
+
+    dimension: str
+    columns: tuple  # of Column
+    labels: dict  # of the other dimensions: the names along each
+
+
+def chunk_rows(lengths):
+    """Rows of a chunk of a column whose rows have these lengths."""
+    size = 1
+    for length in lengths:
+        size *= max(length, 1)
+    return max(min(CHUNK // size, 1 << 14), 1)
+
+
+def format_of(path):
+    """The module of a path's format, by its suffix; raises InvalidArgument or MissingDependency."""
+    suffix = Path(path).suffix.lower()
+    if suffix in (".h5", ".hdf5", ".nc"):
+        module, library = "hdf5", "h5py"
+    elif suffix == ".zarr":
+        module, library = "zarr_folder", "zarr"
+    else:
+        raise InvalidArgument(f"store must end in .zarr, .h5, .hdf5 or .nc, which say its format, got {str(path)!r}.")
+    try:
+        import_module(library)
+    except ImportError as error:
+        raise MissingDependency(f"a store ending in {suffix} needs {library}: pip install 'tsdyn[data]'.") from error
+    return import_module(f".{module}", __package__)
+
+
+def demand_free(path):
+    """Raise StorageError where there is something already, or no folder to write to."""
+    path = Path(path)
+    if path.exists():
+        raise StorageError(f"{path} exists. Delete it, take another name, or go on with it: ts.resume({str(path)!r}).")
+    if not path.parent.is_dir():
+        raise StorageError(f"there is no folder {path.parent} to write {path.name} to.")

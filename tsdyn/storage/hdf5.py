@@ -1,0 +1,110 @@
+"""Stores in HDF5: written so that others can read meanwhile (SWMR), with the dimensions that netCDF and xarray know."""
+
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ..errors import StorageError
+from .formats import chunk_rows
+
+COPIED = 1 << 16  # rows at a time
+
+
+class Store:
+    """A file that is being written; see formats.py."""
+
+    def __init__(self, path, file):
+        self._path, self._file = path, file
+        self._arrays = dict(file.items())
+        file.swmr_mode = True
+
+    @classmethod
+    def create(cls, path, tables, attributes):
+        """As formats.py says."""
+        return cls(path, _laid_out(path, tables, attributes))
+
+    @classmethod
+    def reopen(cls, path, tables, attributes, counts):
+        """As formats.py says; a copy takes the place of the file, which a killed process may have left half-written."""
+        partial = Path(path).with_name(f"{Path(path).name}-partial")
+        partial.unlink(missing_ok=True)
+        file = _laid_out(partial, tables, attributes)
+        with _reading(path) as old:
+            for name, table in tables.items():
+                for column in table.columns:
+                    _copy(old[column.name], file[column.name], counts[name])
+        file.flush()
+        os.replace(partial, path)
+        return cls(path, file)
+
+    def write(self, start, rows):
+        """As formats.py says."""
+        for column, values in rows.items():
+            array, end = self._arrays[column], start + len(values)
+            array.resize(end, axis=0)
+            array[start:end] = values
+
+    def flush(self):
+        """As formats.py says."""
+        self._file.flush()
+        handle = os.open(self._path, os.O_RDWR)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+    def close(self):
+        """Close the file."""
+        self._file.close()
+
+
+def read(path, column, part):
+    """As formats.py says."""
+    with _reading(path) as file:
+        return file[column][part]
+
+
+def count(path, columns):
+    """As formats.py says."""
+    with _reading(path) as file:
+        return min(len(file[column]) for column in columns)
+
+
+def _reading(path):
+    try:
+        return h5py.File(path, "r", libver="latest", swmr=True, locking=False)
+    except OSError as error:
+        raise StorageError(f"{path} can't be read as HDF5: {error}.") from error
+
+
+def _laid_out(path, tables, attributes):
+    """A new file with empty arrays, and the scales of their dimensions."""
+    file = h5py.File(path, "x", libver="latest", locking=False)
+    file.attrs.update(attributes)
+    for table in tables.values():
+        for dimension, labels in table.labels.items():
+            if dimension not in file:
+                names = np.array(labels, dtype=h5py.string_dtype())
+                file.create_dataset(dimension, data=names).make_scale(dimension)
+        for column in table.columns:
+            lengths = tuple(len(table.labels[dimension]) for dimension in column.dimensions)
+            shape, chunk = {"shape": (0, *lengths), "maxshape": (None, *lengths)}, (chunk_rows(lengths), *lengths)
+            array = file.create_dataset(column.name, dtype=float, chunks=chunk, **shape)
+            array.attrs.update(column.attributes)
+            if column.name == table.dimension:
+                array.make_scale(table.dimension)
+                continue
+            for i, dimension in enumerate((table.dimension, *column.dimensions)):
+                array.dims[i].attach_scale(file[dimension])
+    return file
+
+
+def _copy(old, new, count):
+    """The first rows of an array."""
+    if len(old) < count:
+        raise StorageError(f"{old.file.filename}: {old.name} has {len(old)} rows of {count} that were written.")
+    new.resize(count, axis=0)
+    for at in range(0, count, COPIED):
+        new[at : at + COPIED] = old[at : min(at + COPIED, count)]

@@ -1,0 +1,89 @@
+"""Stores in Zarr: a folder with a file for each chunk, each written as a whole."""
+
+import os
+import warnings
+
+import numpy as np
+import zarr
+
+from ..errors import StorageError
+from .formats import chunk_rows
+
+
+class Store:
+    """A folder that is being written; see formats.py."""
+
+    def __init__(self, path, group, tables):
+        self._path, self._group = path, group
+        self._arrays = {column.name: group[column.name] for table in tables.values() for column in table.columns}
+
+    @classmethod
+    def create(cls, path, tables, attributes):
+        """As formats.py says."""
+        group = zarr.create_group(path, attributes=attributes)
+        for table in tables.values():
+            for dimension, labels in table.labels.items():
+                if dimension not in group:
+                    _add_labels(group, dimension, labels)
+            for column in table.columns:
+                lengths = tuple(len(table.labels[dimension]) for dimension in column.dimensions)
+                group.create_array(
+                    column.name, shape=(0, *lengths), chunks=(chunk_rows(lengths), *lengths), dtype=float,
+                    dimension_names=(table.dimension, *column.dimensions), fill_value=np.nan,
+                    attributes=column.attributes,
+                )  # fmt: skip
+        return cls(path, group, tables)
+
+    @classmethod
+    def reopen(cls, path, tables, attributes, counts):
+        """As formats.py says."""
+        store = cls(path, _group(path, "r+"), tables)
+        for name, table in tables.items():
+            for column in table.columns:
+                array = store._arrays[column.name]
+                if array.shape[0] < counts[name]:
+                    raise StorageError(
+                        f"{path}: {column.name} has {array.shape[0]} rows of {counts[name]} that were written."
+                    )
+                array.resize((counts[name], *array.shape[1:]))
+        return store
+
+    def write(self, start, rows):
+        """As formats.py says."""
+        for column, values in rows.items():
+            array, end = self._arrays[column], start + len(values)
+            array.resize((end, *array.shape[1:]))
+            array[start:end] = values
+
+    def flush(self):
+        """As formats.py says."""
+        if hasattr(os, "sync"):
+            os.sync()
+
+    def close(self):
+        """Do nothing: every chunk is a file of its own, closed already."""
+
+
+def read(path, column, part):
+    """As formats.py says."""
+    return _group(path, "r")[column][part]
+
+
+def count(path, columns):
+    """As formats.py says."""
+    group = _group(path, "r")
+    return min(group[column].shape[0] for column in columns)
+
+
+def _group(path, mode):
+    try:
+        return zarr.open_group(path, mode=mode)
+    except Exception as error:  # of many kinds
+        raise StorageError(f"{path} can't be read as Zarr: {error}.") from error
+
+
+def _add_labels(group, dimension, labels):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # strings have no place in the specification yet
+        array = group.create_array(dimension, shape=(len(labels),), dtype=str, dimension_names=(dimension,))
+        array[:] = np.array(labels, dtype=object)

@@ -23,7 +23,7 @@ from ..rows.interface import (
 )
 from .coefficients import begin, expand
 from .prescribed_series import expand_motions
-from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR
+from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, UNEQUAL
 from .workspace import load_series
 
 NOT_FINITE, SINGULAR = int(Status.NOT_FINITE), int(Status.SINGULAR)
@@ -141,7 +141,8 @@ def pass_singular(context, t, h):
 @kernel
 def is_singular(c, status):
     """Whether the state that `reach` has come to, or could not reach, is next to a singular configuration."""
-    return status == SINGULAR or (status == 0 and singularity_indicator(c.graph, c.tangent.rows) < NEXT_TO_SINGULAR)
+    limit = NEXT_TO_SINGULAR * min(1.0, c.tangent.indicator.largest / UNEQUAL)
+    return status == SINGULAR or (status == 0 and singularity_indicator(c.graph, c.tangent.rows) < limit)
 
 
 @kernel

@@ -43,7 +43,10 @@ def _stress(parsed):
 
     from ..stress import campaign, report
 
-    found, complete = campaign.run_gallery(indices, processes, _shower(len(indices), lambda figures: figures["case"]))
+    found, complete = [], True
+    if indices:
+        show = _shower(len(indices), lambda figures: figures["case"])
+        found, complete = campaign.run_gallery(indices, processes, show)
     if found and not parsed.json:
         print(report.gallery_text(found), flush=True)
     tally = None

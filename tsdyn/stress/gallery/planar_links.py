@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...constraints import Cylindrical, PlaneContact, Revolute, Spherical
+from ...constraints import Cylindrical, PlaneContact, Revolute, Spherical, Translational
 from ...simulation.scene import Scene
 
 AXIS = (0.0, 0.0, 1.0)
@@ -108,6 +108,5 @@ def slider_crank(rate=4.0):
     pin(scene, scene.ground, crank, np.zeros(3))
     pin(scene, crank, link, knee)
     pin(scene, link, slider, slide)
-    for axis in np.eye(3)[1:]:  # slides along x
-        scene.add(PlaneContact.at(slider, scene.ground, point=slide, normal=axis))
+    scene.add(Translational.at(slider, scene.ground, point=slide, axis=(1.0, 0.0, 0.0)))
     return scene

@@ -28,7 +28,7 @@ def _turned(angle, x, y):
 
 
 def squeezer():
-    """Andrews' squeezer at rest, on ten Revolutes: 20 rows too many in space."""
+    """Andrews' squeezer at rest, on ten Revolutes: nine rows too many in space."""
     scene = Scene(gravity=(0.0, 0.0, 0.0))
     a, b, c = (np.array([*point, 0.0]) for point in (A, B, C))
     knee = _turned(BETA, RR, 0.0)

@@ -26,7 +26,7 @@ def add_options(parser):
     parser.add_argument("--processes", type=int, metavar="N", help="worker processes (default: one a processor)")
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     parser.add_argument("--figure", metavar="PATH", help="where to draw the gallery; the suffix says how")
-    parser.add_argument("--markdown", metavar="PATH", help="where to write the table as Markdown")
+    parser.add_argument("--markdown", metavar="PATH", help="where to write the table as Markdown; in a page with marks, between them")
 
 
 def _stress(parsed):
@@ -60,7 +60,7 @@ def _stress(parsed):
     if parsed.json:
         print(json.dumps(report.as_data(found, tally, parsed.seed), indent=1))
     if parsed.markdown:
-        _write(parsed.markdown, report.as_markdown(found, tally))
+        _write(parsed.markdown, report.as_markdown(found, tally), report.MARKS)
     if parsed.figure:
         _draw(found, parsed.figure)
     failed = any(report.wrong(figures) for figures in found) or bool(tally and tally.faults)
@@ -142,9 +142,14 @@ def _progress(tally):
     return f"{counts}, {len(tally.faults)} faults"
 
 
-def _write(path, text):
+def _write(path, text, marks):
+    """Write the table, between the marks of a page that has them."""
+    path, (begin, end) = Path(path), marks
     try:
-        Path(path).write_text(text + "\n")
+        page = path.read_text() if path.exists() else ""
+        before, found, rest = page.partition(begin)
+        _, also_found, after = rest.partition(end)
+        path.write_text(f"{before}{begin}\n{text}\n{end}{after}" if found and also_found else text + "\n")
     except OSError as error:
         raise InvalidArgument(f"the table can't be written to {path}: {error.strerror}") from error
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from .gallery.cases import CASES
 
+MARKS = "<!-- tsdyn stress: begin -->", "<!-- tsdyn stress: end -->"  # of a page, around what is written anew
 LONGEST = 400  # characters of what a fault said
 NONE = "-"  # of a figure that a case doesn't have
 

@@ -23,6 +23,7 @@ class Draw:
         self.length, self.mass, self.time = (
             10.0 ** rng.uniform(-decades, decades) if other else 1.0 for decades in DECADES.values()
         )
+        self.is_si = not other
         self.scene = Scene(gravity=rng.normal(size=3) * 5.0 * self.length / self.time**2)
 
     def unit(self):

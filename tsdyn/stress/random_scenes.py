@@ -181,7 +181,7 @@ def generate(seed, least=None, most=None):
         options = {"integrator": d.fixed_step()}
     elif method != "taylor":
         options |= {"rtol": 1e-8, "atol": 1e-8 * min(d.length, 1.0)}
-    if rng.random() < 0.1 and len(d.scene.bodies) < 15 and method != "taylor":
+    if rng.random() < 0.1 and len(d.scene.bodies) < 15 and method != "taylor" and d.is_si:
         options["formulation"] = "null-space"
     span = 0.0, float(rng.uniform(0.02, 0.5)) * d.time
     return Case(f"{name}, {len(d.scene.bodies)} bodies, {method}", d.scene, span, options, d.assembled, d.length)

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.tolerances import CLOSE
+from tests.helpers.closed_loops import angles as angles_of
+from tests.helpers.tolerances import CLOSE, HELD
 from tsdyn.stress.gallery.cases import CASES
+from tsdyn.stress.gallery.planar_links import four_bars
 from tsdyn.stress.gallery.squeezer import angles, squeezer
 
 FREE = {  # degrees of freedom, redundant rows
@@ -38,3 +40,19 @@ def test_the_squeezer_ends_where_hairer_and_wanner_say():
 def test_large_cases_have_their_sizes():
     sizes = {case.name: len(case.build().bodies) for case in CASES if case.name.startswith(("hub", "net"))}
     assert sizes == {"hub of 500 bodies": 500, "net of 500 loops": 1045}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "integrator",
+    [ts.integrators.DOP853(1e-10, 1e-10), ts.integrators.RK45(1e-9, 1e-9), ts.integrators.Nystrom4(step=2e-3), None],
+    ids=lambda method: type(method).__name__,
+)
+def test_rows_of_sixty_loops_pass_their_flat_positions(integrator):
+    """1026 rows, 180 of them redundant: the selection next to the flat position is among all of them."""
+    solution = ts.simulate(four_bars(60), (0.0, 1.6), integrator=integrator).raise_if_failed()
+    turned = angles_of(solution)
+    assert turned[0][-1] - turned[0][0] < -1.5 * np.pi
+    assert max(np.abs(one - turned[0]).max() for one in turned) < CLOSE
+    assert np.ptp(solution.energy) < CLOSE * solution.kinetic_energy.max()
+    assert solution.constraint_error.position.max() < HELD

@@ -26,7 +26,9 @@ def add_options(parser):
     parser.add_argument("--processes", type=int, metavar="N", help="worker processes (default: one a processor)")
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     parser.add_argument("--figure", metavar="PATH", help="where to draw the gallery; the suffix says how")
-    parser.add_argument("--markdown", metavar="PATH", help="where to write the table as Markdown; in a page with marks, between them")
+    parser.add_argument(
+        "--markdown", metavar="PATH", help="where to write the table as Markdown; in a page with marks, between them"
+    )
 
 
 def _stress(parsed):

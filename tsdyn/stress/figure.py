@@ -4,6 +4,7 @@ import numpy as np
 
 from ..drawing import BLUE, GREEN, GREY, VERMILION, new_figure
 
+COLOURS = 10  # of matplotlib's cycle
 ZERO = 1e-17  # what an error of zero is drawn as
 LEVELS = (("position", BLUE, "o"), ("velocity", GREEN, "s"), ("acceleration", VERMILION, "^"))
 
@@ -27,9 +28,10 @@ def figure(found):
         errors.set_yticklabels(names)
         errors.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, fontsize="small")
         errors.grid(axis="y", color=GREY, alpha=0.2)
-        for figures in found:
+        for i, figures in enumerate(found):
             share, error = np.array(figures["growth"]).T
-            energies.plot(share, np.maximum(error, ZERO), linewidth=1.0, label=figures["case"])
+            style = "-" if i < COLOURS else "--"
+            energies.plot(share, np.maximum(error, ZERO), style, linewidth=1.0, label=figures["case"])
         energies.set(xscale="log", yscale="log", xlabel="share of the run", ylabel="relative error of energy")
         energies.legend(fontsize=6, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         for axes in (errors, energies):

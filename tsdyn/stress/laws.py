@@ -62,6 +62,8 @@ def constraints(solution):
     The terms of a row are Phi_q q, Phi_q qd and Phi_q qdd, coordinate by coordinate, and centripetal accelerations; its
     error is recomputed without Phi_q and gamma.
     """
+    if not solution.success:  # its message says what broke
+        return
     at = some(solution.t.size, OUTPUTS)
     q, qd, qdd = (array[at] for array in (solution.q, solution.qd, solution.qdd))
     memory = solution._memory[at]
@@ -73,8 +75,6 @@ def constraints(solution):
         return
     limit = ROW_SHARE + rounding_of_places(solution)
     for level, error, sums in zip(LEVELS, errors, terms.swapaxes(0, 1), strict=True):
-        if level != "position" and not solution.success:
-            return  # velocities may have exploded
         share = np.abs(error) / np.where(sums > 0.0, sums, 1.0)
         worst = np.unravel_index(share.argmax(), share.shape)
         where = f"t = {solution.t[at][worst[0]]:.9g} s, {_row_name(solution.packed, worst[1])}"

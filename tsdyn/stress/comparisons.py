@@ -108,10 +108,10 @@ def _agreeing(law, case, solution, run, options):
     if not other.success:
         return []
     error, limit = _distance(case, solution, other), MULTIPLE * _tolerance(case)
-    tighter = _tighter(case)
-    if error <= limit or tighter is None:
+    if error <= limit:
         return [Finding(law, error, limit)]
-    one = run(case, **tighter)
+    tighter = _tighter(case)
+    one = run(case, **tighter) if tighter else solution
     two = run(case, **options | _tolerances(case, options, TIGHTER) | {"max_steps": None})
     if not (one.success and two.success):
         return []

@@ -79,12 +79,10 @@ def _tolerance(case):
 
 
 def _tighter(case):
-    """Return options of a run that is more accurate, or None."""
+    """Return options of a run that is more accurate."""
     method = case.options.get("integrator")
     if isinstance(method, Nystrom4):
         return {"integrator": Nystrom4(step=method.step / 8.0), "max_steps": None}
-    if method == "taylor":
-        return None
     return {name: TIGHTER * case.options.get(name, DEFAULT) for name in ("rtol", "atol")} | {"max_steps": None}
 
 
@@ -93,10 +91,7 @@ def _converging(law, left, case, solution, run):
     error, limit = left(solution), MULTIPLE * _tolerance(case)
     if error <= limit:
         return [Finding(law, error, limit)]
-    tighter = _tighter(case)
-    if tighter is None:
-        return [Finding(law, error, limit)]
-    other = run(case, **tighter)
+    other = run(case, **_tighter(case))
     if not other.success:
         return []
     return [Finding(law, left(other), max(FALL * error, ROUNDED), f"{error:.1e} at the looser tolerance")]
@@ -110,8 +105,7 @@ def _agreeing(law, case, solution, run, options):
     error, limit = _distance(case, solution, other), MULTIPLE * _tolerance(case)
     if error <= limit:
         return [Finding(law, error, limit)]
-    tighter = _tighter(case)
-    one = run(case, **tighter) if tighter else solution
+    one = run(case, **_tighter(case))
     two = run(case, **options | _tolerances(case, options, TIGHTER) | {"max_steps": None})
     if not (one.success and two.success):
         return []

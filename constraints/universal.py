@@ -73,6 +73,8 @@ class Universal(Joint):
         axis = arguments.pop("axis_a", axis)
         joint = super().at(a, b, axis_a=axis, axis_b=axis if axis_b is None else axis_b, **arguments)
         if axis_b is None:
+            if arguments.get("point") is None:
+                raise InvalidConstraint(f"{joint.name}: axis_b follows from point and axis; give point, or axis_b.")
             body, marker = b if b.dimension else a, joint.markers[3]
             shaft = body.position - arguments["point"]
             arm = np.cross(axis, shaft)

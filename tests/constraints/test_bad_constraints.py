@@ -99,6 +99,13 @@ CONSTRAINTS = [
         for kind in ("Fixed",)
     ),
     case(
+        "Universal: neither point nor axis_b",
+        lambda w: C.Universal.at(w.rod, w.ground, axis=(0, 0, 1), point_a=(1, 0, 0), name="joint"),
+        ts.InvalidConstraint,
+        "joint",
+        "axis_b follows from point",
+    ),
+    case(
         "Translational: reference along the axis",
         made("Translational", reference_b=(1, 1e-9, 0)),
         ts.InvalidConstraint,

@@ -213,6 +213,7 @@ BAD = {
     "function": (lambda: wheel(function=3.0), "function of"),
     "object without period": (lambda: wheel(period=None), r"three arguments.*With period="),
     "which": (lambda: wheel(which=1), "which must be from 0 to 0"),
+    "which as an array": (lambda: wheel(which=np.zeros(3)), "which must be from 0 to 0"),
     "too many": (lambda: ts.simulate(wheel(period=1e-9)[0], (0.0, 1.0)), "as many as a run may have"),
 }
 

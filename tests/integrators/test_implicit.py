@@ -8,6 +8,7 @@ from benchmarks.stiff import hung, jointed
 from tests.helpers.driven_rod import driven
 from tests.helpers.reference import demand_on_the_manifold, load, run
 from tests.helpers.tolerances import CLOSE, EPS, HELD, LOOSE
+from tsdyn.stress.gallery.governor import governor
 
 pytestmark = pytest.mark.slow  # kernels of their own, which explicit methods don't need
 I = ts.integrators
@@ -240,25 +241,6 @@ def test_by_its_name_and_with_settings(method):
 def test_bad_arguments(method, setting, value):
     with pytest.raises(ts.InvalidArgument, match=f"{method.__name__}: {setting}"):
         method(**{setting: value})
-
-
-def governor():
-    """A flyball governor: shaft, sleeve on a damped spring, two balls."""
-    scene, angle, arm, rate = ts.Scene(gravity=(0.0, 0.0, -9.81)), 0.6, 0.5, 8.0
-    omega, low = (0.0, 0.0, rate), (0.0, 0.0, -2.0 * arm * np.cos(angle))
-    shaft = scene.add_body(2.0, (0.02, 0.02, 0.01), angular_velocity=omega, name="shaft")
-    sleeve = scene.add_body(1.0, (0.01, 0.01, 0.01), position=low, angular_velocity=omega, name="sleeve")
-    scene.add(ts.constraints.Revolute.at(scene.ground, shaft, point=(0, 0, 0), axis=(0, 0, 1)))
-    scene.add(ts.constraints.Translational.at(shaft, sleeve, point=low, axis=(0, 0, 1)))
-    for side in (1.0, -1.0):
-        x = side * arm * np.sin(angle)
-        ball = scene.add_body(
-            3.0, (0.05, 0.06, 0.04), (x, 0.0, low[2] / 2), velocity=(0.0, rate * x, 0.0), angular_velocity=omega
-        )
-        scene.add(ts.constraints.Revolute.at(shaft, ball, point=(0, 0, 0), axis=(0, 1, 0)))
-        scene.add(ts.constraints.Distance(ball, sleeve))
-    scene.add(ts.forces.Spring(shaft, sleeve, stiffness=300.0, damping=5.0))
-    return scene
 
 
 @pytest.mark.slow

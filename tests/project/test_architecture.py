@@ -50,6 +50,7 @@ ORDER = [
     "profiling",
     "plots",
     "testing",
+    "stress",
     "cli",
     "hints",
     "__init__",

@@ -6,7 +6,7 @@ from pathlib import Path
 TESTS = Path(__file__).parents[1]
 FILES = {file.relative_to(TESTS).as_posix(): file for file in sorted(TESTS.rglob("*.py"))}
 HOUSE = {file.stem for file in (TESTS.parent / "tsdyn").iterdir()} | {"constraints", "integrators"}
-BESIDE = {"helpers", "fuzz", "references", "project"}  # what tests share, and what is tested that is no package
+BESIDE = {"helpers", "references", "project"}  # what tests share, and what is tested that is no package
 LONGEST = 350  # lines
 POSIX = {"fcntl", "grp", "pwd", "resource", "termios"}
 

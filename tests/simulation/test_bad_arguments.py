@@ -189,3 +189,9 @@ def test_results_stay_what_they_were_when_the_scene_goes_on():
     np.testing.assert_array_equal(solution.multipliers, expected.multipliers)
     np.testing.assert_array_equal(solution.reaction(w.pivot), expected.reaction(twin.pivot))
     np.testing.assert_array_equal(solution.constraint_error, expected.constraint_error)
+
+
+def test_a_tolerance_may_be_an_array_of_no_dimension():
+    w = build()
+    given, expected = (ts.simulate(w.scene, (0.0, 0.1), rtol=tol, atol=tol) for tol in (np.array(1e-5), 1e-5))
+    np.testing.assert_array_equal(given.q, expected.q)

@@ -11,9 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
-from tests.fuzz.calls import fuzz
 from tests.helpers.tolerances import EXACT, HELD
 from tsdyn.calls import fitting
+from tsdyn.stress.random_calls import fuzz
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 CLASSES = [getattr(space, name) for space in (C, F, I) for name in dir(space) if name[0].isupper()]

@@ -1,4 +1,4 @@
-"""The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), the profile of a scene, compiling ahead."""
+"""The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), profiles, compiling ahead, hard cases."""
 
 import argparse
 import inspect
@@ -6,6 +6,7 @@ import sys
 import time
 
 from ..errors import MissingDependency, TsdynError
+from .stress import _stress, add_options
 
 DEFAULT_FIGURE = "tables.png"
 
@@ -51,6 +52,7 @@ def _parser():
     profile.add_argument("--figure", metavar="PATH", help="where to draw it; the suffix says how")
     kernels = _command(commands, _compile)
     kernels.add_argument("--all", action="store_true", help="of every method, formulation and result, too")
+    add_options(_command(commands, _stress))
     return parser
 
 

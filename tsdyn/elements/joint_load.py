@@ -54,7 +54,7 @@ class JointLoad:
         geometries = self.geometries(joint) if hasattr(joint, "joint_coordinates") else []
         if not geometries:
             raise InvalidForce(f"{name or kind}: joint must be one with {self.coordinate}, got {joint!r}.")
-        if which not in range(len(geometries)):
+        if not isinstance(which, (int, np.integer)) or which not in range(len(geometries)):
             raise InvalidForce(
                 f"{name or kind}: which must be from 0 to {len(geometries) - 1}, as {joint.name!r} has "
                 f"{len(geometries)} of {self.coordinate}; got {which!r}."

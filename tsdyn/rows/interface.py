@@ -19,7 +19,7 @@ Solve:
     solve_series            the same for one order of a Taylor series
 Ask:
     redundant_rows_hold, mark_redundant, self_stress          of redundant rows
-    singularity_indicator, is_near_singular                   of the distance to a singular configuration
+    singularity_indicator, is_near_singular, refinements      of the distance to a singular configuration
 
 Right-hand sides and multipliers are in the order of the graph; `ConstraintGraph.row` names the rows of Phi.
 """
@@ -65,6 +65,7 @@ from .singularity import (
     is_next_to_singular,
     is_singular_within_a_step,
     note_indicator,
+    refinements,
     singularity_indicator,
 )
 from .tolerances import MOST_ROWS
@@ -111,6 +112,7 @@ __all__ = [
     "redundancy",
     "redundant_of",
     "redundant_rows_hold",
+    "refinements",
     "reset_selection",
     "restore_selection",
     "return_to_selection",

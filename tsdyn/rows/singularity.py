@@ -6,7 +6,7 @@ in the run.
 
 from ..jit.kernels import kernel
 from .independent_rows import weakest
-from .tolerances import NEAR, NEXT_TO, WITHIN_A_STEP
+from .tolerances import ILL_CONDITIONED, NEAR, NEXT_TO, WITHIN_A_STEP, WORST_CONDITIONED
 
 
 @kernel
@@ -27,6 +27,12 @@ def note_indicator(graph, f, rows):
 def is_near_singular(f, share):
     """Return True if a configuration with this indicator is near a singular one."""
     return share < NEAR * f.indicator.largest
+
+
+@kernel
+def refinements(indicator):
+    """How often multipliers are refined for the condition of S."""
+    return 0 if indicator > ILL_CONDITIONED else 1 if indicator > WORST_CONDITIONED else 2
 
 
 @kernel

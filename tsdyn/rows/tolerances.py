@@ -22,10 +22,14 @@ WORSE = 0.1
 HELD = 1e6
 
 # Rows: scenes with more are searched for redundant rows within the blocks of the elimination order, not all at once
-# (docs/design-decisions.md, "Global pivoting up to 700 rows"); the dense matrix takes 4 MB at this size.
-MOST_ROWS = 700
+# (docs/design-decisions.md, "Global pivoting up to 1500 rows"); the dense matrix takes 18 MB at this size.
+MOST_ROWS = 1500
 
 # Singularity indicator over its largest value in the run, dimensionless; it falls as the square of the distance.
 NEAR = 0.02  # below, at 0.14 of the distance: multipliers are refined at each order, Taylor steps tightened
 NEXT_TO = 1e-3  # below, at 0.03: a step method hands over to series
 WITHIN_A_STEP = 0.2  # below, at 0.45: so does a fixed step that fails
+
+# The indicator itself: below these S loses so many digits, to unequal masses or to rows that nearly depend on others,
+# that multipliers are refined once, and twice. It is 1e-3 in a chain of a thousand links.
+ILL_CONDITIONED, WORST_CONDITIONED = 1e-4, 1e-8

@@ -17,9 +17,11 @@ from .tolerances import COST, LARGEST_PILOT, PILOT
 
 def explicit(prepared, rtol, atol, series):
     """Return the initial method; series: True if Taylor is admissible."""
+    kind = Taylor if series and not prepared.refusal else DOP853
     given, known = (rtol, atol, series), prepared.explicit
-    if not all(value is None or type(value) is float for value in given[:2]) or given not in known:
-        kind = Taylor if series and not prepared.refusal else DOP853
+    if not all(value is None or type(value) is float for value in given[:2]):  # the method checks them
+        return kind(**tolerances(rtol, atol))
+    if given not in known:
         known.clear()
         known[given] = kind(**tolerances(rtol, atol))
     return known[given]

@@ -158,9 +158,10 @@ def expand(graph, system, k, last, ahead, refine, x, f):
     On entry Z has the gyroscopic torques of order k, and A_{k+2} what (1) has without omega'_{k+1}; on exit both are
     of the next order, unless this is the last one. lam_k stays in b until then.
 
-    The first `refine` orders of lam are refined once. If more than lam_0, factors 1 / n are exact as well: their
-    rounding errors have the same sign in every step, and add up. With `ahead`, a constant, the next body's numbers are
-    prefetched: that pays where the series don't fit into the cache. x is an `Expansion`, f a `TangentWorkspace`.
+    The first `refine` orders of lam are refined, `order.sweeps` times each. If more than lam_0, factors 1 / n are exact
+    as well: their rounding errors have the same sign in every step, and add up. With `ahead`, a constant, the next
+    body's numbers are prefetched: that pays where the series don't fit into the cache. x is an `Expansion`, f a
+    `TangentWorkspace`.
     """
     bodies, Z, orders = x.bodies, f.Z, x.order.room
     nb, size = graph.bodies.shape[0], orders * BODY_ROW
@@ -182,10 +183,15 @@ def expand(graph, system, k, last, ahead, refine, x, f):
             _turn(bodies, at, k + 2, _product(four(Z, 8 * b + 4), h, h_low))
     refined = k < refine
     if refined:
-        _solve(graph, system, k, x, f, False)
-        copy(f.b, f.gamma)
-        for b in range(nb):
-            _change(graph, b, x, k, inverse, exact, Z)
+        for sweep in range(x.order.sweeps):
+            _solve(graph, system, k, x, f, sweep > 0)
+            if sweep == 0:
+                copy(f.b, f.gamma)
+            else:
+                for e in range(f.b.size):
+                    f.gamma[e] += f.b[e]
+            for b in range(nb):
+                _change(graph, b, x, k, inverse, exact, Z)
     _solve(graph, system, k, x, f, refined)
     if refined:
         for e in range(f.b.size):

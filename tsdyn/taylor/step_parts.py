@@ -15,6 +15,7 @@ from ..maths.dense_linalg import is_finite
 from ..model.equations import set_time
 from ..rows.interface import (
     is_near_singular,
+    refinements,
     return_to_selection,
     save_selection,
     select_rows,
@@ -22,7 +23,7 @@ from ..rows.interface import (
 )
 from .coefficients import begin, expand
 from .prescribed_series import expand_motions
-from .tolerances import GONE, NEXT_TO_SINGULAR
+from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, UNEQUAL
 from .workspace import load_series
 
 NOT_FINITE, SINGULAR = int(Status.NOT_FINITE), int(Status.SINGULAR)
@@ -50,7 +51,10 @@ def _expand(context, k, ahead):
         expand_motions(c.system, x)
         begin(c.graph, c.system, f.poses, orders, x.bodies, f.Z)
     near = is_near_singular(f, f.indicator.start)  # there rounding of lam grows from order to order
-    refine = orders if near else x.order.refined
+    refine, x.order.sweeps = orders if near else x.order.refined, 1
+    sweeps = refinements(f.indicator.start)
+    if sweeps > 0 and not near:
+        refine, x.order.sweeps = max(refine, ILL_ORDERS), sweeps
     expand(c.graph, c.system, k, k > 0 and k + 1 == x.order.top, ahead, refine, x, f)
     if k == 0:
         for b in range(c.graph.bodies.shape[0]):
@@ -137,7 +141,8 @@ def pass_singular(context, t, h):
 @kernel
 def is_singular(c, status):
     """Whether the state that `reach` has come to, or could not reach, is next to a singular configuration."""
-    return status == SINGULAR or (status == 0 and singularity_indicator(c.graph, c.tangent.rows) < NEXT_TO_SINGULAR)
+    limit = NEXT_TO_SINGULAR * min(1.0, c.tangent.indicator.largest / UNEQUAL)
+    return status == SINGULAR or (status == 0 and singularity_indicator(c.graph, c.tangent.rows) < limit)
 
 
 @kernel

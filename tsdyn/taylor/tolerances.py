@@ -30,6 +30,8 @@ SMALL, SMALL_STEPS = 0.02, 40
 # of the series are taken. Below GONE a row is left out of a projection: it would make more of what positions are off by
 # than the series is.
 NEXT_TO_SINGULAR, GONE = 1e-8, 1e-10
+# Largest pivot of a run below which masses are so unequal that no pivot is large: NEXT_TO_SINGULAR is relative to it.
+UNEQUAL = 1e-4
 
 # Share of a step's end, over that of its start, from which the step has come closer; is too close to go on from; is
 # too close even if it has passed. Measured on rows of parallelograms (tests/test_singular_passage.py).
@@ -53,6 +55,9 @@ WARY, SPARE = 0.06, 0.1
 # --- size ------------------------------------------------------------------------------------------------------------
 # Bodies from which lam is refined once in every run: errors of a solution by elimination grow with their number.
 MANY = 100
+
+# Orders of lam, from zero on, that are refined where S is ill-conditioned.
+ILL_ORDERS = 3
 
 # Orders of all bodies, about a hundred bytes each, from which series exceed the near caches (3 MB).
 FAR = 1 << 15

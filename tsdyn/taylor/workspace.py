@@ -21,6 +21,7 @@ class Orders(Record):
     lowest: int  # bounds of top
     highest: int
     refined: int  # how many orders of lam, from zero on, are refined
+    sweeps: int  # how often they are
 
 
 class Expansion(NamedTuple):

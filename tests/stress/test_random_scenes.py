@@ -1,0 +1,23 @@
+"""A small sample of the random scenes of `tsdyn stress --fuzz`: each runs within the laws, is refused, or says why."""
+
+import pytest
+
+from tsdyn.stress.judgement import judge_scene
+from tsdyn.stress.random_scenes import KINDS, generate
+
+
+def test_every_kind_is_drawn():
+    assert {generate(seed, 2, 6).name.partition(",")[0] for seed in range(80)} == set(KINDS)
+
+
+def test_a_seed_is_a_scene():
+    one, two = (generate(18) for _ in range(2))
+    assert (one.name, one.span, repr(one.options)) == (two.name, two.span, repr(two.options))
+    assert (one.scene.start[0] == two.scene.start[0]).all()
+
+
+@pytest.mark.slow_for("*")
+@pytest.mark.parametrize("seed", range(40))
+def test_a_random_scene(seed):
+    found = judge_scene(seed, 2, 12)
+    assert not found.fault, f"{found.name}: {found.word}: {found.said}"

@@ -1,0 +1,166 @@
+"""The command `tsdyn stress`: the gallery of hard cases, random scenes and random calls."""
+
+import json
+import os
+import sys
+from functools import partial
+from pathlib import Path
+
+from ..errors import InvalidArgument
+
+BESIDE = {"scenes": 200, "calls": 400}  # random ones beside the gallery
+ALONE = {"scenes": 1000, "calls": 4000}  # with --fuzz
+
+
+def add_options(parser):
+    """Add the options of `tsdyn stress` to its parser."""
+    parser.add_argument("case", nargs="*", metavar="CASE", help="cases of the gallery, by a part of their names")
+    parser.add_argument("--fuzz", action="store_true", help="random scenes and calls only")
+    for kind, count in BESIDE.items():
+        parser.add_argument(
+            f"--{kind}", type=int, metavar="N", help=f"random {kind} (default {count}; with --fuzz {ALONE[kind]})"
+        )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of the first random scene and calls (default 0)"
+    )
+    parser.add_argument("--processes", type=int, metavar="N", help="worker processes (default: one a processor)")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    parser.add_argument("--figure", metavar="PATH", help="where to draw the gallery; the suffix says how")
+    parser.add_argument(
+        "--markdown", metavar="PATH", help="where to write the table as Markdown; in a page with marks, between them"
+    )
+
+
+def _stress(parsed):
+    """Run the gallery of hard cases, random scenes and random calls, and judge every run.
+
+    Print the largest constraint errors, the energy error and its growth, the observed order, the agreement of two
+    methods, and the laws that a run breaks, for each case; then how random scenes and calls came out. A fault is
+    printed with the command that repeats it. Ctrl-C ends with the figures so far. The exit code is 0 only if all went
+    well.
+    """
+    counts, processes = _counts(parsed)
+    indices = [] if parsed.fuzz else _cases(parsed.case)
+    _demand_writable(parsed)
+
+    from ..stress import campaign, report
+
+    found, complete = [], True
+    if indices:
+        show = _shower(len(indices), lambda figures: figures["case"])
+        found, complete = campaign.run_gallery(indices, processes, show)
+    if found and not parsed.json:
+        print(report.gallery_text(found), flush=True)
+    tally = None
+    if complete and any(counts.values()):
+        plan = list(campaign.jobs(**counts, seed=parsed.seed))
+        show = _shower(len(plan), _progress)
+        tally = campaign.run(plan, processes, partial(_report, show=show, silent=parsed.json))
+        complete = not tally.interrupted
+        if not parsed.json:
+            print(report.tally_text(tally, parsed.seed))
+    if parsed.json:
+        print(json.dumps(report.as_data(found, tally, parsed.seed), indent=1))
+    if parsed.markdown:
+        _write(parsed.markdown, report.as_markdown(found, tally), report.MARKS)
+    if parsed.figure:
+        _draw(found, parsed.figure)
+    failed = any(report.wrong(figures) for figures in found) or bool(tally and tally.faults)
+    return 0 if complete and not failed else 1
+
+
+def _counts(parsed):
+    """Numbers of random scenes and calls, and of processes, checked."""
+    usual = ALONE if parsed.fuzz else BESIDE
+    if parsed.fuzz and parsed.case:
+        raise InvalidArgument(f"--fuzz runs no case of the gallery; leave out {' '.join(parsed.case)} or --fuzz.")
+    if parsed.fuzz and (parsed.figure or parsed.markdown):
+        raise InvalidArgument("--figure and --markdown show the gallery, which --fuzz doesn't run.")
+    counts = {kind: usual[kind] if getattr(parsed, kind) is None else getattr(parsed, kind) for kind in usual}
+    if parsed.case and parsed.scenes is None and parsed.calls is None:
+        counts = dict.fromkeys(counts, 0)
+    processes = (os.cpu_count() or 1) if parsed.processes is None else parsed.processes
+    for name, value, least in (*((f"--{kind}", count, 0) for kind, count in counts.items()),
+                               ("--seed", parsed.seed, 0), ("--processes", processes, 1)):  # fmt: skip
+        if value < least:
+            raise InvalidArgument(f"{name} must be a whole number from {least} on, got {value}.")
+    return counts, processes
+
+
+def _demand_writable(parsed):
+    """Refuse at once, not after minutes, what can't be written at the end."""
+    for name in ("figure", "markdown"):
+        path = getattr(parsed, name)
+        if path and not Path(path).resolve().parent.is_dir():
+            raise InvalidArgument(f"--{name}: there is no folder {Path(path).resolve().parent}.")
+    if parsed.figure:
+        from ..drawing import demand_matplotlib
+
+        demand_matplotlib()
+
+
+def _cases(words):
+    """Indices of the cases that contain one of the words; all without words."""
+    from ..stress.gallery.cases import CASES
+
+    names = [case.name for case in CASES]
+    chosen = set()
+    for word in words:
+        fitting = {i for i, name in enumerate(names) if word.lower() in name.lower()}
+        if not fitting:
+            raise InvalidArgument(f"no case of the gallery contains {word!r}; there are: {'; '.join(names)}.")
+        chosen |= fitting
+    return sorted(chosen) if words else list(range(len(names)))
+
+
+def _shower(total, text):
+    """A function that shows progress in a terminal, or None."""
+    if not sys.stderr.isatty():
+        return None
+    done = 0
+
+    def show(result):
+        nonlocal done
+        done += 1
+        end = "\n" if done == total else ""
+        print(f"\r\033[K{done} of {total}: {text(result)}", end=end, file=sys.stderr, flush=True)
+
+    return show
+
+
+def _report(tally, new, show, silent):
+    """Print faults as they come, and show progress."""
+    from ..stress.report import fault_text
+
+    for fault in new:
+        if not silent:
+            print(fault_text(*fault), flush=True)
+    if show:
+        show(tally)
+
+
+def _progress(tally):
+    counts = ", ".join(f"{tally.total(kind)} {kind}" for kind in tally.counts)
+    return f"{counts}, {len(tally.faults)} faults"
+
+
+def _write(path, text, marks):
+    """Write the table, between the marks of a page that has them."""
+    path, (begin, end) = Path(path), marks
+    try:
+        page = path.read_text() if path.exists() else ""
+        before, found, rest = page.partition(begin)
+        _, also_found, after = rest.partition(end)
+        path.write_text(f"{before}{begin}\n{text}\n{end}{after}" if found and also_found else text + "\n")
+    except OSError as error:
+        raise InvalidArgument(f"the table can't be written to {path}: {error.strerror}") from error
+
+
+def _draw(found, path):
+    from ..drawing import save
+    from ..stress.figure import figure
+
+    drawable = [figures for figures in found if "growth" in figures]
+    if not drawable:
+        raise InvalidArgument("no case has figures to draw.")
+    print(f"Figure: {save(figure(drawable), path)}", file=sys.stderr)

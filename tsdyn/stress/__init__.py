@@ -1,0 +1,6 @@
+"""`tsdyn stress`: the gallery of hard cases, random scenes and calls, and the laws that judge every run.
+
+Imports simulation and below; nothing imports it but the command. Begin with laws.py: what holds of any run, without a
+reference solution. gallery/ builds the hard cases, checks.py makes their figures; random_scenes.py and random_calls.py
+draw what campaign.py runs.
+"""

@@ -1,0 +1,130 @@
+"""Laws that compare runs of a random scene: a tighter tolerance, another method or form, the same run once more.
+
+An error that exceeds MULTIPLE tolerances is judged by its convergence: at tolerances TIGHTER by a thousand, or steps
+shorter by eight, less than FALL of it must be left.
+"""
+
+import numpy as np
+
+from ..integrators import Nystrom4
+from .laws import Finding, energy_left, momentum_left
+from .tolerances import EPS, FALL, MULTIPLE, ROUNDED, ROUNDINGS, SAME, TIGHTER
+
+DEFAULT = 1e-8  # rtol of a run without one
+
+
+def energy(case, solution, run):
+    """Energy less the work of loads, drivers and friction is constant, to the tolerance."""
+    roundings = ROUNDINGS * EPS * np.abs(solution.potential_energy).max(initial=0.0)
+
+    def left(one):
+        change, size = energy_left(one)
+        return max(change - roundings, 0.0) / (size or 1.0)
+
+    return _converging("energy less work", left, case, solution, run)
+
+
+def momenta(case, solution, run):
+    """Linear momentum, and angular momentum about the centroid, of a scene that nothing holds."""
+    scene = solution.scene
+    ends = {id(body) for item in (*scene.constraints, *scene.forces) for body in (item.a, item.b)}
+    if id(scene.ground) in ends:
+        return []
+    parts = enumerate(("linear momentum", "angular momentum"))
+    return [
+        found
+        for i, law in parts
+        for found in _converging(law, lambda one, i=i: momentum_left(one)[i], case, solution, run)
+    ]
+
+
+def another_method(case, solution, run):
+    """Two methods agree at the end of the run, to the tolerance."""
+    other = {"integrator": "rk45" if case.options.get("integrator") == "dop853" else "dop853"}
+    return _agreeing("agreement of two methods", case, solution, run, other)
+
+
+def another_form(case, solution, run):
+    """The tangent form and the null-space form agree."""
+    name = case.options.get("integrator")
+    if len(solution.scene.bodies) > 20 or name in (None, "taylor"):
+        return []
+    form = "tangent" if case.options.get("formulation") == "null-space" else "null-space"
+    return _agreeing("agreement of two forms", case, solution, run, {"formulation": form})
+
+
+def once_more(case, solution, run):
+    """The same run gives the same bits."""
+    again = run(case)
+    pairs = [(getattr(solution, name), getattr(again, name)) for name in ("t", "q", "qd", "qdd")]
+    same = all(np.array_equal(*pair) for pair in pairs)
+    return [Finding("same bits of the same run", 0.0 if same else 1.0, 0.0)]
+
+
+def output_times(case, solution, run):
+    """Output times change no step, and outputs there are those of dense output."""
+    t = np.unique(np.linspace(*case.span, 7))
+    other = run(case, t_eval=t)
+    steps = abs(other.stats.steps - solution.stats.steps)
+    size = 1.0 + np.abs(solution.q).max(initial=0.0)
+    off = np.abs(other.q - solution.at(t).q).max(initial=0.0) / size if other.success else np.inf
+    return [Finding("steps with output times", float(steps), 0.0), Finding("outputs within steps", float(off), SAME)]
+
+
+OTHERS = (None, None, None, another_method, another_form, once_more, output_times)
+
+
+def _tolerance(case):
+    return case.options.get("rtol", DEFAULT)
+
+
+def _tighter(case):
+    """Return options of a run that is more accurate."""
+    method = case.options.get("integrator")
+    if isinstance(method, Nystrom4):
+        return {"integrator": Nystrom4(step=method.step / 8.0), "max_steps": None}
+    return {name: TIGHTER * case.options.get(name, DEFAULT) for name in ("rtol", "atol")} | {"max_steps": None}
+
+
+def _converging(law, left, case, solution, run):
+    """Judge an error of a run, and where it is large, how it falls with the tolerance."""
+    error, limit = left(solution), MULTIPLE * _tolerance(case)
+    if error <= limit:
+        return [Finding(law, error, limit)]
+    other = run(case, **_tighter(case))
+    if not other.success:
+        return []
+    return [Finding(law, left(other), max(FALL * error, ROUNDED), f"{error:.1e} at the looser tolerance")]
+
+
+def _agreeing(law, case, solution, run, options):
+    """Judge the distance of the ends of two runs, and where it is large, how it falls with the tolerances."""
+    other = run(case, **options | _tolerances(case, options))
+    if not other.success:
+        return []
+    error, limit = _distance(case, solution, other), MULTIPLE * _tolerance(case)
+    if error <= limit:
+        return [Finding(law, error, limit)]
+    one = run(case, **_tighter(case))
+    two = run(case, **options | _tolerances(case, options, TIGHTER) | {"max_steps": None})
+    if not (one.success and two.success):
+        return []
+    return [Finding(law, _distance(case, one, two), max(FALL * error, ROUNDED), f"{error:.1e} at looser tolerances")]
+
+
+def _tolerances(case, options, factor=1.0):
+    """Tolerances beside the name of a method; fixed steps have none."""
+    if "integrator" not in options:
+        return _tighter(case) if factor < 1.0 else {}
+    return {name: factor * case.options.get(name, DEFAULT) for name in ("rtol", "atol")}
+
+
+def _distance(case, one, two):
+    """Largest distance of two runs' ends: positions in units of the scene's size, Euler parameters."""
+    scale = np.ones(one.q.shape[1])
+    lengths = (one.system.bodies[:, :1] + np.arange(3)).ravel()
+    scale[lengths] = max(np.abs(one.q[:, lengths] - one.q[0, lengths]).max(initial=0.0), case.length)
+    far = ROUNDINGS * EPS * np.abs(one.q[:, lengths]).max(initial=0.0)
+    left = np.abs(one.q[-1] - two.q[-1])
+    left[lengths] = np.maximum(left[lengths] - far, 0.0)
+    return float((left / scale).max(initial=0.0))

@@ -1,0 +1,69 @@
+"""Judgement of a random scene: it runs within the laws, is refused, or ends with a message; all else is a fault."""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import TsdynError
+from ..simulation.simulate import simulate
+from . import comparisons
+from .laws import findings
+from .random_scenes import generate
+
+MOST_STEPS = 3_000  # of a run
+FAULT = "FAULT"
+
+
+class Outcome(NamedTuple):
+    """How a scene or a block of calls came out; a fault's word begins with FAULT."""
+
+    seed: int
+    name: str
+    word: str
+    said: str = ""
+    seconds: float = 0.0
+
+    @property
+    def fault(self):
+        """True if it was none of those that are allowed."""
+        return self.word.startswith(FAULT)
+
+
+def judge_scene(seed, least=None, most=None):
+    """Return the `Outcome` of the scene of a seed."""
+    began = time.perf_counter()
+    case = generate(seed, least, most)
+    try:
+        word, said = judge(case, np.random.default_rng((seed, 1)))
+    except TsdynError as error:
+        word, said = type(error).__name__, str(error)
+        if not said.strip():
+            word, said = f"{FAULT} no message", word
+    except Exception as error:
+        word, said = f"{FAULT} {type(error).__name__}", str(error)
+    return Outcome(seed, case.name, word, said, time.perf_counter() - began)
+
+
+def judge(case, rng):
+    """Return the word for a case, and what was said; raises what the run raises."""
+    if case.assembled:
+        case.scene.assemble()
+    solution = run(case)
+    if not solution.success and not solution.message.strip():
+        return f"{FAULT} no message", str(solution.status)
+    found = findings(solution)
+    if solution.success:
+        found += comparisons.energy(case, solution, run) + comparisons.momenta(case, solution, run)
+        other = comparisons.OTHERS[rng.integers(len(comparisons.OTHERS))]
+        found += other(case, solution, run) if other else []
+    broken = [one for one in found if one.broken]
+    if broken:
+        return f"{FAULT} {broken[0].law}", "; ".join(map(str, broken[:3]))
+    return str(solution.status), solution.message
+
+
+def run(case, **more):
+    """Run a case, with other options in place of its own where they are given."""
+    options = {"dense_output": True, "max_steps": MOST_STEPS} | case.options | more
+    return simulate(case.scene, case.span, **options)

@@ -1,0 +1,256 @@
+"""Laws that hold of every run, whatever its scene: no reference solution is needed.
+
+Each law takes a `Solution` and yields what it found as `Finding`s: a size, and the limit that it must not exceed. LAWS
+lists those of a single run; agreement.py compares runs.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.bodies import rotation_matrix
+from ..elements.markers import POINT
+from ..model.sparse_jacobian import WIDTH, places, with_short_rows
+from ..observables.diagnostics import constraint_rows
+from ..observables.evaluate import constraint_arrays
+from .tolerances import BALANCE, BODIES, EPS, FLOOR, NEAR_SINGULAR, OUTPUTS, ROUNDINGS, ROW_SHARE, SAME
+
+LEVELS = ("position", "velocity", "acceleration")
+
+
+class Finding(NamedTuple):
+    """What a law found."""
+
+    law: str
+    size: float
+    limit: float
+    where: str = ""
+
+    @property
+    def broken(self):
+        """True if the size exceeds the limit, or is no number."""
+        return not self.size <= self.limit
+
+    def __str__(self):
+        where = f" ({self.where})" if self.where else ""
+        return f"{self.law}: {self.size:.2e}, at most {self.limit:.2e}{where}"
+
+
+def some(count, most):
+    """Return indices of the first, the last, and some between, `most` at most."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
+
+
+def finite(solution):
+    """No number of a run is infinite or NaN, but for multipliers of redundant rows."""
+    arrays = {name: getattr(solution, name) for name in ("t", "q", "qd", "qdd")}
+    if solution.success:
+        arrays["energy"] = solution.energy
+        lam = solution.multipliers
+        arrays["multipliers"] = np.where(np.isnan(lam).all(axis=0), 0.0, lam) if len(lam) else lam
+    for name, array in arrays.items():
+        bad = ~np.isfinite(array)
+        if name == "multipliers":
+            bad &= ~np.isnan(array)  # which rows are redundant may change
+        if bad.any():
+            yield Finding("finite numbers", float(bad.sum()), 0.0, name)
+
+
+def constraints(solution):
+    """Phi and its two time derivatives vanish, relative to the sum of the absolute terms of each row.
+
+    The terms of a row are Phi_q q, Phi_q qd and Phi_q qdd, coordinate by coordinate, and centripetal accelerations; its
+    error is recomputed without Phi_q and gamma.
+    """
+    if not solution.success:  # its message says what broke
+        return
+    at = some(solution.t.size, OUTPUTS)
+    q, qd, qdd = (array[at] for array in (solution.q, solution.qd, solution.qdd))
+    memory = solution._memory[at]
+    errors = constraint_rows(solution.packed, solution.t[at], q, qd, qdd, memory=memory)
+    floors = FLOOR / ROW_SHARE * _scales(solution)
+    states = zip(solution.t[at], q, qd, qdd, strict=True)
+    terms = np.array([row_terms(solution.packed, *state, floors) for state in states])
+    if not terms.size:
+        return
+    limit = ROW_SHARE + rounding_of_places(solution)
+    for level, error, sums in zip(LEVELS, errors, terms.swapaxes(0, 1), strict=True):
+        share = np.abs(error) / np.where(sums > 0.0, sums, 1.0)
+        worst = np.unravel_index(share.argmax(), share.shape)
+        where = f"t = {solution.t[at][worst[0]]:.9g} s, {_row_name(solution.packed, worst[1])}"
+        yield Finding(f"constraints, {level}", float(share[worst]), limit, where)
+
+
+def _scales(solution):
+    """Sizes of positions and of Euler parameters, of their rates and accelerations, in a run: (3, n).
+
+    What is at rest has the rates that gravity would give it within the run: those that remain are rounding of these.
+    """
+    starts, lengths = solution.system.bodies.T
+    r = (starts[:, None] + np.arange(3)).ravel()
+    p = (starts[lengths == 7, None] + np.arange(3, 7)).ravel()
+    T, size = np.ptp(solution.t), extent(solution) or 1.0
+    fall = float(np.linalg.norm(solution.scene.gravity))
+    scales = np.zeros((3, solution.q.shape[1]))
+    for kind, gain in ((r, fall), (p, fall / size)):
+        q, qd, qdd = (np.abs(x[:, kind]).max(initial=0.0) for x in (solution.q, solution.qd, solution.qdd))
+        scales[:, kind] = np.array([[q], [qd + (qdd + gain) * T], [qdd + gain]])
+    return scales
+
+
+def row_terms(packed, t, q, qd, qdd, floors=0.0):
+    """Sums of the absolute terms of Phi_q q, Phi_q qd and Phi_q qdd of each row, (3, m); floors (3, n) are added."""
+    rows = np.abs(constraint_arrays(with_short_rows(packed), q, qd, t, WIDTH)[1])
+    at, length = places(packed)
+    half = np.arange(WIDTH // 2)
+    index = np.where(half < length[:, :, None], at[:, :, None] + half, 0).reshape(len(at), WIDTH)
+    rows *= (half < length[:, :, None]).reshape(len(at), WIDTH)
+    rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, :1]
+    rate = np.abs(qd[rigid + np.arange(3, 7)]).max(initial=0.0)
+    levels = np.array((np.abs(q), np.abs(qd), np.abs(qdd) + rate * np.abs(qd))) + floors
+    return np.array([(rows * x[index]).sum(axis=1) for x in levels])
+
+
+def _row_name(packed, row):
+    for constraint in packed.constraints:
+        if row < constraint.rows:
+            return f"row {row + 1} of {constraint.name}" if constraint.rows > 1 else constraint.name
+        row -= constraint.rows
+    return ""
+
+
+def newton_euler(solution):
+    """Rates of linear and angular momentum of every body are its weight and the loads of all its neighbours."""
+    bodies = solution.scene.bodies
+    if not solution.success or not bodies:
+        return
+    around = _neighbours(solution.scene)
+    sums = [_loads(solution, bodies[i], around[id(bodies[i])]) for i in some(len(bodies), BODIES)]
+    largest, limit = max(one.size_of_force.max() for one in sums), BALANCE + rounding_of_places(solution)
+    for one in sums:
+        yield _balance("force balance", one.force, one.size_of_force, largest, limit, one.body)
+        if one.body.dimension == 7:
+            floor = max(one.size_of_torque.max(), largest * extent(solution))
+            yield _balance("torque balance", one.torque, one.size_of_torque, floor, limit, one.body)
+
+
+class Loads(NamedTuple):
+    """What acts on a body less the rate of its momentum, ground frame, and sums of absolute values."""
+
+    body: object
+    force: np.ndarray  # (k, 3), N
+    torque: np.ndarray  # (k, 3), N m, about the centroid
+    size_of_force: np.ndarray  # (k,)
+    size_of_torque: np.ndarray  # (k,)
+
+
+def _loads(solution, body, items):
+    weight, push = body.mass * np.asarray(solution.scene.gravity), body.mass * solution.acceleration(body)
+    force, size = weight - push, np.linalg.norm(weight) + np.linalg.norm(push, axis=1)
+    torque, turning = np.zeros_like(force), np.zeros(len(force))
+    if body.dimension == 7:
+        A, omega = rotation_matrix(solution.orientation(body)), solution.angular_velocity(body)
+        J = np.asarray(body.inertia)
+        gain, momentum = solution.angular_acceleration(body) @ J, omega @ J
+        torque = -np.einsum("kij,kj->ki", A, gain + np.cross(omega, momentum))
+        turning = np.linalg.norm(gain, axis=1) + np.linalg.norm(omega, axis=1) * np.linalg.norm(momentum, axis=1)
+    for item in items:
+        load, moment = solution.reaction(item, on=body)
+        arm = _first_point(solution, item, body)
+        amount = np.linalg.norm(load, axis=1)
+        force, size = force + load, size + amount
+        torque = torque + moment + np.cross(arm, load)
+        turning = turning + np.linalg.norm(moment, axis=1) + np.linalg.norm(arm, axis=1) * amount
+    return Loads(body, force, torque, size, turning)
+
+
+def _neighbours(scene):
+    """Constraints and forces of each body, by its id."""
+    around = {id(body): [] for body in scene.bodies}
+    for item in (*scene.constraints, *scene.forces):
+        for body in {id(body): body for body in (item.a, item.b)}.values():
+            around.get(id(body), []).append(item)
+    return around
+
+
+def extent(solution):
+    """Size of a scene, m: distances of the bodies from their middle at the start, and their radii of gyration."""
+    bodies = solution.scene.bodies
+    places = np.array([solution.position(body)[0] for body in bodies])
+    radii = [np.sqrt(np.trace(np.asarray(body.inertia)) / body.mass) for body in bodies if body.dimension == 7]
+    return float(np.linalg.norm(places - places.mean(axis=0), axis=1).max() + max(radii, default=0.0))
+
+
+def rounding_of_places(solution):
+    """Rounding of positions, relative to the size of the scene: large far from the origin."""
+    return ROUNDINGS * EPS * float(np.abs(solution.q).max(initial=0.0)) / (extent(solution) or 1.0)
+
+
+def _balance(law, left, sizes, largest, limit, body):
+    """Relative to the body's own terms; what is rounding of the largest terms in the scene doesn't count."""
+    share = np.linalg.norm(left, axis=1) / (sizes + (FLOOR / BALANCE * largest or 1.0))
+    return Finding(law, float(share.max(initial=0.0)), limit, body.name)
+
+
+def _first_point(solution, item, body):
+    """Return the first point of an item on a body, from the centroid, (k, 3), ground frame."""
+    letter = "a" if body is item.a else "b"
+    if body.dimension != 7:
+        return np.zeros((solution.t.size, 3))
+    pairs = zip(item.markers, item.coordinates, strict=True)
+    points = [s for marker, s in pairs if marker.body == letter and marker.code == POINT]
+    return solution.rotation(body) @ (points[0] if points else np.zeros(3))
+
+
+def dense_output(solution):
+    """Dense output at the outputs of a run gives the outputs."""
+    if solution._trajectory is None or not solution.success:
+        return
+    at = some(solution.t.size, OUTPUTS)
+    state = solution.at(solution.t[at])
+    for name in ("q", "qd"):
+        given = getattr(solution, name)[at]
+        size = 1.0 + np.abs(given).max(initial=0.0)
+        limit = SAME * (NEAR_SINGULAR if solution.stats.steps_near_singular else 1.0)
+        yield Finding(
+            f"dense output, {name}", float(np.abs(getattr(state, name) - given).max(initial=0.0) / size), limit
+        )
+
+
+LAWS = (finite, constraints, newton_euler, dense_output)
+
+
+def findings(solution, laws=LAWS):
+    """Return what every law found."""
+    if not len(solution.t):
+        return []
+    first = list(finite(solution))
+    return first or [found for law in laws if law is not finite for found in law(solution)]
+
+
+def energy_left(solution):
+    """Largest change of energy less work since the start, J, and the size of the energies, J; needs dense output."""
+    left = solution.energy - solution.work
+    size = solution.kinetic_energy.max(initial=0.0) + np.ptp(solution.potential_energy) + np.abs(solution.work).max()
+    return float(np.abs(left - left[0]).max(initial=0.0)), float(size)
+
+
+def momentum_left(solution):
+    """Largest change of momenta of a scene that touches the ground nowhere: linear, and angular about the centroid.
+
+    Both relative to the size of their parts.
+    """
+    masses = np.array([body.mass for body in solution.scene.bodies])
+    places = np.stack([solution.position(body) for body in solution.scene.bodies])
+    weight = masses.sum() * np.asarray(solution.scene.gravity)
+    P = solution.linear_momentum
+    centre = np.einsum("b,bki->ki", masses, places) / masses.sum()
+    L = solution.angular_momentum - np.cross(centre, P)
+    drift = P - P[0] - weight * (solution.t - solution.t[0])[:, None]
+    speeds = np.stack([np.linalg.norm(solution.velocity(body), axis=1) for body in solution.scene.bodies])
+    size = (masses @ speeds).max()
+    spread = np.linalg.norm(places - centre, axis=2)
+    turning = (masses @ (spread * speeds)).max() + np.abs(L).max()
+    rounding = ROUNDINGS * EPS * size * np.abs(places).max()  # of moments about the origin
+    turned = max(np.abs(L - L[0]).max() - rounding, 0.0)
+    return float(np.abs(drift).max() / (size or 1.0)), float(turned / (turning or 1.0))

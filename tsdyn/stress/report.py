@@ -1,0 +1,142 @@
+"""The report of `tsdyn stress` as text, as Markdown and as plain data."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .gallery.cases import CASES
+
+MARKS = "<!-- tsdyn stress: begin -->", "<!-- tsdyn stress: end -->"  # of a page, around what is written anew
+LONGEST = 400  # characters of what a fault said
+NONE = "-"  # of a figure that a case doesn't have
+
+
+class Column(NamedTuple):
+    """A column of the table: its head, the figure, and how that is written."""
+
+    head: str
+    figure: str
+    spec: str
+
+
+COLUMNS = (
+    Column("case", "case", ""),
+    Column("bodies", "bodies", "d"),
+    Column("rows", "rows", "d"),
+    Column("steps", "steps", "d"),
+    Column("time (s)", "seconds", ".2f"),
+    Column("Phi", "position", ".1e"),
+    Column("velocity", "velocity", ".1e"),
+    Column("acceleration", "acceleration", ".1e"),
+    Column("energy", "energy", ".1e"),
+    Column("exponent", "exponent", ".2f"),
+    Column("order", "order", ".2f"),
+    Column("methods", "agreement", ".1e"),
+    Column("same bits", "same", "yes"),
+    Column("laws", "broken", "kept"),
+)
+LEGEND = (
+    "Taylor at tolerance 1e-15. Phi, velocity, acceleration: largest constraint errors (m, m/s, m/s^2).",
+    "energy: error of energy less work, relative to the energies; exponent: of its growth with time, above rounding.",
+    "order: observed, of Nystrom4 (declared: 4). methods: largest relative distance of q from DOP853 at 1e-12.",
+)
+
+
+def cell(figures, column):
+    """Return an entry of the table."""
+    value = figures.get(column.figure)
+    if value is None or (isinstance(value, float) and np.isnan(value)):
+        return NONE
+    if column.spec == "yes":
+        return "yes" if value else "NO"
+    if column.spec == "kept":
+        return "kept" if not value else f"{len(value)} BROKEN"
+    return format(value, column.spec)
+
+
+def cells(found, columns=COLUMNS):
+    """Return the heads and all entries, as lists of strings."""
+    return [[column.head for column in columns], *([cell(figures, column) for column in columns] for figures in found)]
+
+
+def widths(table):
+    """Return the width of each column."""
+    return [max(map(len, column)) for column in zip(*table, strict=True)]
+
+
+def line(row, sizes):
+    """Return a row, aligned: the case on the left, figures on the right."""
+    first, *rest = (text.rjust(size) for text, size in zip(row, sizes, strict=True))
+    return "  ".join([row[0].ljust(len(first)), *rest])
+
+
+def wrong(figures):
+    """Return what is wrong with a case, one line each; nothing if all went well."""
+    said = [] if figures["success"] else [figures["message"]]
+    said += figures["broken"]
+    if not figures["same"]:
+        said.append("a second run gave other bits")
+    return [f"{figures['case']}: {text}" for text in said]
+
+
+def gallery_text(found):
+    """Return the table of the gallery, and what went wrong."""
+    table = cells(found)
+    sizes = widths(table)
+    lines = [line(row, sizes) for row in table]
+    return "\n".join([*lines, "", *LEGEND, *(text for figures in found for text in wrong(figures))])
+
+
+def fault_text(job, outcome):
+    """Return a fault, with the command that repeats it."""
+    return f"{outcome.word}: {outcome.name}: {outcome.said[:LONGEST]}\n  repeat it: {job.command}"
+
+
+def tally_text(tally, seed):
+    """Return the counts of the random scenes and calls."""
+    lines = []
+    for kind in ("scenes", "calls"):
+        counts = tally.counts[kind]
+        if counts:
+            lines.append(f"{tally.total(kind)} random {kind}:")
+            lines += [f"{count:9d}  {word}" for word, count in counts.most_common()]
+    if tally.slowest:
+        lines.append(f"The longest scene took {tally.slowest.seconds:.1f} s (seed {tally.slowest.seed}).")
+    end = "interrupted" if tally.interrupted else "done"
+    return "\n".join([*lines, f"{len(tally.faults)} faults; {end} after {tally.seconds:.0f} s, seed {seed}."])
+
+
+def as_data(found, tally, seed):
+    """Return everything as what JSON holds: NaN becomes None."""
+
+    def plain(value):
+        if isinstance(value, dict):
+            return {key: plain(item) for key, item in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [plain(item) for item in value]
+        value = value.item() if isinstance(value, np.generic) else value
+        return None if isinstance(value, float) and not np.isfinite(value) else value
+
+    data = {"seed": seed, "gallery": plain(found)}
+    if tally is not None:
+        faults = [{**outcome._asdict(), "command": job.command} for job, outcome in tally.faults]
+        data["fuzz"] = {
+            **{kind: dict(counts) for kind, counts in tally.counts.items()},
+            "faults": plain(faults), "seconds": tally.seconds, "interrupted": tally.interrupted,
+        }  # fmt: skip
+    return data
+
+
+def as_markdown(found, tally):
+    """Return the table and what makes each case hard, as Markdown."""
+    head, *rows = cells(found)
+    lines = ["| " + " | ".join(head) + " |", "|---" + "|---:" * (len(head) - 1) + "|"]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    lines += ["", *LEGEND, ""]
+    if tally is not None:
+        done = " and ".join(f"{tally.total(kind)} random {kind}" for kind in tally.counts)
+        lines += [f"With it: {done}, {len(tally.faults)} faults.", ""]
+    lines += ["| case | what makes it hard |", "|---|---|"]
+    shown = {figures["case"] for figures in found}
+    lines += [f"| {case.name} | {case.hard} |" for case in CASES if case.name in shown]
+    return "\n".join(lines)

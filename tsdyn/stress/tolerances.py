@@ -1,0 +1,25 @@
+"""Limits of the laws; shares of the largest terms unless a unit is named."""
+
+import numpy as np
+
+EPS = float(np.finfo(float).eps)
+
+# A constraint error above this share of the sum of the absolute terms of its row is a wrong result. Terms that are
+# themselves rounding count as FLOOR of the largest coordinates of their kind in the scene.
+ROW_SHARE, FLOOR = 1e-9, 1e-12
+# Forces and torques of a body against its momentum's rate: multipliers solve S to rounding times its condition, in the
+# null-space form to constraint_tol times it.
+BALANCE = 1e-7
+# Roundings of positions and of moments about the origin that are allowed: they are differences of large numbers.
+ROUNDINGS = 1e5
+# Energy less work, momenta, and two methods or forms: this multiple of the tolerance, relative to the motion's size;
+# beyond it a run at a TIGHTER tolerance must come closer by FALL at least, or be below the multiple of its own.
+MULTIPLE, TIGHTER, FALL = 1e3, 1e-3, 0.1
+# Below this change relative to the size nothing is judged by convergence: it is rounding, amplified.
+ROUNDED = 1e-10
+# Dense output at the ends of steps; output times beside steps.
+SAME = 1e-10
+# Next to a singular configuration rounding is amplified by so much.
+NEAR_SINGULAR = 1e2
+# Outputs of a run that are judged, and bodies whose balance is: the first, the last, and some between.
+OUTPUTS, BODIES = 25, 12

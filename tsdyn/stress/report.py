@@ -33,11 +33,13 @@ COLUMNS = (
     Column("order", "order", ".2f"),
     Column("methods", "agreement", ".1e"),
     Column("same bits", "same", "yes"),
+    Column("resumed", "resumed", "yes"),
     Column("laws", "broken", "kept"),
 )
 LEGEND = (
     "Taylor at tolerance 1e-15. Phi, velocity, acceleration: largest constraint errors (m, m/s, m/s^2).",
     "energy: error of energy less work, relative to the energies; exponent: of its growth with time, above rounding.",
+    "resumed: whether a run that was stopped and goes on from its checkpoint gives the same bits.",
     "order: observed, of Nystrom4 (declared: 4). methods: largest relative distance of q from DOP853 at 1e-12.",
 )
 
@@ -76,6 +78,8 @@ def wrong(figures):
     said += figures["broken"]
     if not figures["same"]:
         said.append("a second run gave other bits")
+    if figures["resumed"] is False:
+        said.append("a run that went on from a checkpoint gave other bits")
     return [f"{figures['case']}: {text}" for text in said]
 
 

@@ -105,7 +105,7 @@ class Slices:
                 self.status = Status.STIFF
             self.choose = None
         try:
-            task.report((run.clock.t - start) / (end - start))
+            task.report((run.clock.t - start) / (end - start), run.clock.t, run.numbers.steps)
         except Exception as error:  # what has been computed is worth more than a progress bar
             if self.status == Status.SLICE_DONE:
                 self.status = Status.INTERRUPTED

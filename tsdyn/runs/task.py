@@ -34,7 +34,7 @@ class Task(NamedTuple):
     constraint_tol: float
     max_steps: int  # or None
     interval: int  # steps between charts that are forced; 0 for none
-    report: object  # a function of the fraction done, None at the end
+    report: object  # a function of the fraction done (None at the end), the time, s, and the steps of the segment
     history: bool  # whether the histories of steps and charts are kept
     choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
     stops: np.ndarray = np.empty((0, 2))  # times at which a step ends, s, and whether a function is asked there

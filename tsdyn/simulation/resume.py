@@ -66,13 +66,18 @@ def resume(
 
     numbers, arrays = checkpoint.read(path)
     _demand_same_place(path, numbers)
-    given = restricted_pickle.loads(arrays["arguments"].tobytes())
-    if scene is None:
-        if numbers["functions"] or "scene" not in arrays:
-            names = ", ".join(numbers["functions"]) or "classes of your own"
-            raise StorageError(f"the scene has functions or classes of yours ({names}): ts.resume(path, scene=scene).")
-        scene = restricted_pickle.loads(arrays["scene"].tobytes())
-    elif not isinstance(scene, Scene):
+    try:
+        given = restricted_pickle.loads(arrays["arguments"].tobytes())
+        if scene is None:
+            if numbers["functions"] or "scene" not in arrays:
+                raise restricted_pickle.Foreign(", ".join(numbers["functions"]) or "classes of your own")
+            scene = restricted_pickle.loads(arrays["scene"].tobytes())
+    except restricted_pickle.Foreign as foreign:
+        raise StorageError(
+            f"{path}: the scene has functions or classes of yours ({foreign}), and a file keeps no code. Pass "
+            "the scene: ts.resume(path, scene=scene)."
+        ) from None
+    if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     given |= {"scene": scene, "events": events, "progress": progress, "store": path}
     return run_from(given | {"checkpoint": numbers["interval"]}, numbers, arrays)

@@ -41,7 +41,7 @@ def run_past(task, observe=None):
 
 def _until_its_end(report):
     """Return a progress report without the end: further segments may follow."""
-    return lambda fraction: None if fraction is None else report(fraction)
+    return lambda fraction, *more: None if fraction is None else report(fraction, *more)
 
 
 def _pass(task, relay, part):
@@ -118,15 +118,18 @@ def _rows(task, parts):
 def _rest(task, parts, series):
     """Return the remaining task, for the Taylor method or the method itself."""
     last, times, left = parts[-1], task.times, task.max_steps
+    done = sum(part.counts["steps"] for part in parts)
     if times.size:
         times = times[sum(len(part.rows) for part in parts) :]
         times = times if times.size else np.array([np.inf])  # an empty array would ask for every step
     if left is not None:
-        left = max(left - sum(part.counts["steps"] for part in parts), 0)
+        left = max(left - done, 0)
     (start, end), reached = task.span, last.reached
 
-    def report(fraction):
-        task.report((reached + fraction * (end - reached) - start) / (end - start))
+    done = sum(part.counts["steps"] for part in parts)
+
+    def report(fraction, t, steps):
+        task.report((reached + fraction * (end - reached) - start) / (end - start), t, done + steps)
 
     rest = task._replace(
         span=(reached, end), q=last.last[0], qd=last.last[1], remembered=last.remembered, times=times, max_steps=left,

@@ -84,7 +84,8 @@ class Archive:
 
     def go_on(self, numbers, arrays):
         """Open the store where a checkpoint was written."""
-        self._store = self._format.Store.reopen(self.path, self._tables, self._attributes, numbers["counts"])
+        given = self.path, self._tables, self._attributes, numbers["counts"], numbers["size"]
+        self._store = self._format.Store.reopen(*given)
         self._set_counts(numbers["counts"])
         self.resumed, self.passed = (numbers, arrays), numbers["passed"]
 
@@ -133,7 +134,7 @@ class Archive:
     def checkpoint(self, numbers, arrays):
         """Write a checkpoint of this state."""
         self.flush()
-        facts = {**self._facts, "counts": self.counts, "passed": self.passed}
+        facts = {**self._facts, "counts": self.counts, "passed": self.passed, "size": self._store.size}
         checkpoint.write(self.path, {**facts, **numbers}, {**self._request, **arrays})
         self._written = time.perf_counter()
 

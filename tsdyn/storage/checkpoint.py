@@ -41,7 +41,7 @@ def write(store, numbers, arrays):
             file.flush()
             os.fsync(file.fileno())
         if newest.exists():
-            os.replace(newest, before)
+            _keep(newest, before)
         os.replace(partial, newest)
         _sync(newest.parent)
     except OSError:
@@ -96,6 +96,18 @@ def _read(path):
     with np.load(io.BytesIO(payload), allow_pickle=False) as found:
         arrays = dict(found)
     return json.loads(arrays.pop(NUMBERS).tobytes()), arrays
+
+
+def _keep(path, before):
+    """Give a file a second name: at no moment is there none of the first."""
+    link = before.with_name(f"{before.name}-partial")
+    with contextlib.suppress(OSError):
+        link.unlink()
+    try:
+        os.link(path, link)
+        os.replace(link, before)
+    except OSError:  # a file system without links
+        os.replace(path, before)
 
 
 def _sync(folder):

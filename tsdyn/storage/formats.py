@@ -3,7 +3,8 @@
 A format is a module with a class `Store`, which has
 
     create(path, tables, attributes)           a new store, of `Table`s by name
-    reopen(path, tables, attributes, counts)   one to go on with, its tables cut to so many rows
+    reopen(path, tables, attributes, counts, size=0)
+                                               one to go on with, its tables cut to so many rows; its `size` was this
     write(start, rows)                         rows (k, ...) of a table from `start` on, by column; what follows is cut
     flush()                                    all of it to the disk, for readers and for a crash
     close()
@@ -20,7 +21,7 @@ from typing import NamedTuple
 
 from ..errors import InvalidArgument, MissingDependency, StorageError
 
-CHUNK = 1 << 17  # floats of a chunk
+CHUNK = 1 << 15  # floats of a chunk
 
 
 class Column(NamedTuple):

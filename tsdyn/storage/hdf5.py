@@ -1,15 +1,18 @@
 """Stores in HDF5: written so that others can read meanwhile (SWMR), with the dimensions that netCDF and xarray know."""
 
+import errno
 import os
+import shutil
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from ..errors import StorageError
-from .formats import chunk_rows
+from .formats import CHUNK, chunk_rows
 
 COPIED = 1 << 16  # rows at a time
+CACHE = 1 << 19  # bytes of each array that are kept in memory
 
 
 class Store:
@@ -25,9 +28,17 @@ class Store:
         """As formats.py says."""
         return cls(path, _laid_out(path, tables, attributes))
 
+    @property
+    def size(self):
+        """As formats.py says."""
+        return os.path.getsize(self._path)
+
     @classmethod
-    def reopen(cls, path, tables, attributes, counts):
+    def reopen(cls, path, tables, attributes, counts, size=0):
         """As formats.py says; a copy takes the place of the file, which a killed process may have left half-written."""
+        found = os.path.getsize(path) if os.path.exists(path) else 0
+        if found < size:  # HDF5 would wait for the missing part for ever
+            raise StorageError(f"{path} is damaged: it has {found} bytes of {size} that were written.")
         partial = Path(path).with_name(f"{Path(path).name}-partial")
         partial.unlink(missing_ok=True)
         file = _laid_out(partial, tables, attributes)
@@ -40,7 +51,10 @@ class Store:
         return cls(path, file)
 
     def write(self, start, rows):
-        """As formats.py says."""
+        """As formats.py says. HDF5 doesn't survive a full disk: there must be room for a chunk more of each column."""
+        needed = sum(values.nbytes for values in rows.values()) + 8 * CHUNK * (len(self._arrays) + 1)
+        if shutil.disk_usage(os.path.dirname(os.path.abspath(self._path))).free < needed:
+            raise OSError(errno.ENOSPC, f"{os.strerror(errno.ENOSPC)} for {needed} bytes more")
         for column, values in rows.items():
             array, end = self._arrays[column], start + len(values)
             array.resize(end, axis=0)
@@ -73,15 +87,18 @@ def count(path, columns):
 
 
 def _reading(path):
-    try:
-        return h5py.File(path, "r", libver="latest", swmr=True, locking=False)
-    except OSError as error:
-        raise StorageError(f"{path} can't be read as HDF5: {error}.") from error
+    """The file to read: as one that may be written meanwhile, or as another reader in this process has opened it."""
+    for options in ({"libver": "latest", "swmr": True, "locking": False}, {"locking": False}, {}):
+        try:
+            return h5py.File(path, "r", **options)
+        except OSError as error:
+            reason = error
+    raise StorageError(f"{path} can't be read as HDF5: {reason}.") from reason
 
 
 def _laid_out(path, tables, attributes):
     """A new file with empty arrays, and the scales of their dimensions."""
-    file = h5py.File(path, "x", libver="latest", locking=False)
+    file = h5py.File(path, "x", libver="latest", locking=False, rdcc_nbytes=CACHE)
     file.attrs.update(attributes)
     for table in tables.values():
         for dimension, labels in table.labels.items():

@@ -34,8 +34,10 @@ class Store:
                 )  # fmt: skip
         return cls(path, group, tables)
 
+    size = 0
+
     @classmethod
-    def reopen(cls, path, tables, attributes, counts):
+    def reopen(cls, path, tables, attributes, counts, size=0):
         """As formats.py says."""
         store = cls(path, _group(path, "r+"), tables)
         for name, table in tables.items():

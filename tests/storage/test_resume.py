@@ -1,0 +1,314 @@
+"""A run that was stopped, or killed, and goes on from its checkpoint gives the bits of one never stopped."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from examples import driven_pivot, four_bar, geared_pair, top
+from tests.helpers.refusals import refuse
+from tsdyn.runs import slices
+from tsdyn.storage import checkpoint
+
+I = ts.integrators
+OUTPUTS = ("t", "q", "qd", "qdd", "multipliers")
+
+
+class Stop:
+    """Ctrl-C after so many slices."""
+
+    def __init__(self, count):
+        self.left = count
+
+    def __call__(self, fraction):
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+@pytest.fixture
+def short_slices(monkeypatch):
+    """Slices of a few steps, so that a short run has many."""
+    monkeypatch.setattr(slices, "FIRST_SLICE", 4)
+
+
+def same(one, other):
+    for name in OUTPUTS:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+    for a, b in zip((*one.steps, *one.charts), (*other.steps, *other.charts), strict=True):
+        np.testing.assert_array_equal(a, b)
+    counts = [{**vars(each.stats), "seconds": None} for each in (one, other)]
+    assert counts[0] == counts[1]
+    assert (one.status, one.message) == (other.status, other.message)
+    np.testing.assert_array_equal(one.state.q, other.state.q)
+    for a, b in zip(one.t_events or [], other.t_events or [], strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def stop_and_go_on(build, end, path, again=None, **options):
+    """A whole run; one that is stopped twice and gone on with."""
+    whole = ts.simulate(build(), (0.0, end), history=True, **options)
+    stopped = ts.simulate(build(), (0.0, end), history=True, store=path, checkpoint=0.0, progress=Stop(2), **options)
+    given = {"scene": again, "events": options.get("events")}
+    ts.resume(path, **given, progress=Stop(2))
+    resumed = ts.resume(path, **given)
+    same(whole, resumed)
+    same(whole, ts.resume(path, **given))  # a finished run
+    return stopped
+
+
+EXPLICIT = {
+    "dop853": {"integrator": "dop853"},
+    "rk45": {"integrator": "rk45"},
+    "nystrom4": {"integrator": I.Nystrom4(1e-2)},
+    "taylor": {"integrator": I.Taylor(step=0.02)},
+}
+FORMS = ("tangent", "null-space", "maggi-kane")
+WAYS = {
+    **{f"{name}, {form}": {**way, "formulation": form} for name, way in EXPLICIT.items() for form in FORMS
+       if form == "tangent" or name != "taylor"},
+    "times": {"integrator": "dop853", "t_eval": np.linspace(0.0, 1.0, 33)},
+    "charts": {"integrator": "dop853", "chart_interval": 3},
+    "max_step": {"max_step": 0.01},
+    "sdirk54": {"integrator": "sdirk54"},
+    "sdirk54, null-space": {"integrator": "sdirk54", "formulation": "null-space"},
+    "trapezoid": {"integrator": I.ImplicitTrapezoid(1e-4, 1e-4)},
+}  # fmt: skip
+
+
+@pytest.mark.slow_for("sdirk54*", "trapezoid")
+@pytest.mark.usefixtures("short_slices")
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+def test_every_method(way, tmp_path):
+    stopped = stop_and_go_on(top.build, 1.0, tmp_path / "run.h5", **way)
+    assert stopped.status == ts.Status.INTERRUPTED
+    assert 0.0 < stopped.reached < 1.0
+
+
+@pytest.mark.usefixtures("short_slices")
+@pytest.mark.parametrize("method", [None, "dop853", I.Nystrom4(1e-2)], ids=["default", "dop853", "nystrom4"])
+@pytest.mark.parametrize("build", [four_bar.build, geared_pair.build], ids=["redundant", "turns"])
+def test_redundant_rows_and_counted_turns(build, method, tmp_path):
+    stop_and_go_on(build, 1.0, tmp_path / "run.zarr", integrator=method)
+
+
+@pytest.mark.usefixtures("short_slices")
+def test_events(tmp_path):
+    def low(t, state):
+        return state.q[2] - 0.9
+
+    stopped = stop_and_go_on(top.build, 1.0, tmp_path / "run.h5", integrator="dop853", events=low)
+    assert stopped.status == ts.Status.INTERRUPTED
+    refuse(lambda: ts.resume(tmp_path / "run.h5"), ts.StorageError, ("events", "low"))
+
+    def low(t, state):
+        return state.q[2] - 0.8
+
+    refuse(lambda: ts.resume(tmp_path / "run.h5", events=low), ts.StorageError, ("source", "low", "changed"))
+
+
+@pytest.mark.usefixtures("short_slices")
+def test_scenes_with_code_are_passed_again(tmp_path):
+    path, scene = tmp_path / "run.h5", driven_pivot.build()
+    stop_and_go_on(driven_pivot.build, 0.5, path, again=scene, integrator="dop853")
+    refuse(lambda: ts.resume(path), ts.StorageError, ("yours", "ts.resume(path, scene=scene)"))
+    scene.bodies[0].mass *= 1.0 + 2.0**-52
+    refuse(lambda: ts.resume(path, scene=scene), ts.StorageError, ("another one",))
+
+
+def folding():
+    """Links of one length, folded into a line, whose fold the motion passes."""
+    scene = ts.Scene(gravity=(0.0, 0.0, 0.0))
+    ends = [scene.add_point_mass(1.0, position=(x, 0.0, 1.0), velocity=(0.7, 0.0, 0.0)) for x in (0.0, 1.0)]
+    for x, end in enumerate(ends):
+        scene.add(ts.constraints.Distance(end, scene.ground, point_b=(float(x), 0.0, 0.0)))
+        scene.add(ts.constraints.PlaneContact(end, scene.ground, normal_b=(0.0, 1.0, 0.0)))
+    scene.add(ts.constraints.Distance(*ends))
+    return scene
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("short_slices")
+@pytest.mark.parametrize("method", [None, "dop853", I.Nystrom4(1e-2)], ids=["default", "dop853", "nystrom4"])
+@pytest.mark.parametrize("count", range(2, 14, 3))
+def test_singular_configurations(method, count, tmp_path):
+    path, options = tmp_path / "run.h5", {"integrator": method, "history": True}
+    whole = ts.simulate(folding(), (0.0, 6.0), **options)
+    ts.simulate(folding(), (0.0, 6.0), store=path, checkpoint=0.0, progress=Stop(count), **options)
+    same(whole, ts.resume(path))
+    assert method is None or "singular" in whole.message
+
+
+def stiff():
+    scene = ts.Scene()
+    bob = scene.add_point_mass(1.0, position=(1.0, 0.0, 0.0), name="bob")
+    scene.add(ts.forces.Spring(bob, scene.ground, stiffness=1e8, damping=2e5, free_length=0.9))
+    return scene
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("short_slices")
+def test_a_stiff_run_begins_again(tmp_path):
+    stop_and_go_on(stiff, 1.0, tmp_path / "run.h5")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("short_slices")
+@pytest.mark.parametrize("method", ["dop853", "sdirk54"])
+def test_friction_of_joints(method, tmp_path):
+    def build():
+        scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
+        rod = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
+        hinge = scene.add(ts.constraints.Revolute.at(rod, scene.ground, point=(0, 0, 0), axis=(0, 1, 0)))
+        scene.add(ts.forces.RevoluteFriction(hinge, kinetic=0.2, radius=0.05))
+        return scene
+
+    stop_and_go_on(build, 1.0, tmp_path / "run.h5", integrator=method)
+
+
+def controlled():
+    scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
+    rod = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
+    hinge = scene.add(ts.constraints.Revolute.at(rod, scene.ground, point=(0, 0, 0), axis=(0, 1, 0)))
+    scene.add(ts.forces.JointTorque(hinge, function=lambda t, angle, rate: -2.0 * rate, period=0.05))
+    return scene
+
+
+@pytest.mark.usefixtures("short_slices")
+def test_sampled_loads(tmp_path):
+    stop_and_go_on(controlled, 2.0, tmp_path / "run.h5", again=controlled(), integrator="dop853")
+
+
+@pytest.fixture
+def stopped(tmp_path, short_slices):
+    """The path of a run that was stopped."""
+    path = tmp_path / "run.h5"
+    ts.simulate(top.build(), (0.0, 3.0), integrator="dop853", store=path, checkpoint=0.0, progress=Stop(3))
+    return path
+
+
+def test_a_damaged_checkpoint_is_refused_and_the_one_before_it_offered(stopped):
+    newest, _ = checkpoint.place(stopped)
+    content = newest.read_bytes()
+    newest.write_bytes(content[:-100])
+    refuse(lambda: ts.resume(stopped), ts.StorageError, ("damaged", "one before it", "whole", "delete"))
+    newest.unlink()
+    whole = ts.simulate(top.build(), (0.0, 3.0), integrator="dop853")
+    np.testing.assert_array_equal(ts.resume(stopped).q, whole.q)
+
+
+def test_both_damaged(stopped):
+    for path in checkpoint.place(stopped):
+        path.write_bytes(b"\0" + path.read_bytes())
+    refuse(lambda: ts.resume(stopped), ts.StorageError, ("no checkpoint of this format",))
+
+
+@pytest.mark.parametrize(("fact", "word"), [("version", "0.0.0"), ("machine", ["abacus"])])
+def test_another_version_or_machine(fact, word, stopped):
+    numbers, arrays = checkpoint.read(stopped)
+    checkpoint.write(stopped, {**numbers, fact: word}, arrays)
+    refuse(lambda: ts.resume(stopped), ts.StorageError, ("the bits would differ",))
+
+
+def test_a_damaged_store(stopped):
+    stopped.write_bytes(stopped.read_bytes()[:300])
+    refuse(lambda: ts.resume(stopped), ts.StorageError, ("damaged", "300 bytes"))
+
+
+def test_no_checkpoint(tmp_path):
+    refuse(lambda: ts.resume(tmp_path / "run.h5"), ts.StorageError, ("doesn't exist",))
+
+
+def test_a_file_runs_no_code(stopped):
+    import pickle
+
+    numbers, arrays = checkpoint.read(stopped)
+    arrays["scene"] = np.frombuffer(pickle.dumps(os.getcwd), np.uint8)
+    checkpoint.write(stopped, numbers, arrays)
+    refuse(lambda: ts.resume(stopped), ts.StorageError, ("getcwd", "scene="))
+
+
+CHILD = """
+import sys
+import numpy as np
+import tsdyn as ts
+from examples import top
+path, steps = sys.argv[1], int(sys.argv[2])
+end = steps * 1e-3
+if sys.argv[3] == "begin":
+    times = np.append(np.arange(0, steps, 1000) * 1e-3, end)
+    method = ts.integrators.Nystrom4(1e-3)
+    ts.simulate(top.build(), (0, end), integrator=method, t_eval=times, store=path, checkpoint=0.05)
+else:
+    ts.resume(path)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", ["h5", "zarr"])
+def test_killed_at_any_moment(suffix, tmp_path, rng):
+    steps, path, kills = 10**7 if suffix == "h5" else 10**6, tmp_path / f"run.{suffix}", 0
+    newest, _ = checkpoint.place(path)
+    for attempt in range(21):
+        last = attempt == 20
+        what = "resume" if newest.exists() else "begin"
+        if what == "begin" and path.exists():
+            pytest.fail("killed before its first checkpoint")
+        began = newest.stat().st_mtime_ns if newest.exists() else 0
+        child = subprocess.Popen([sys.executable, "-c", CHILD, str(path), str(steps), what])
+        if last:
+            assert child.wait() == 0
+            break
+        while child.poll() is None and (not newest.exists() or newest.stat().st_mtime_ns == began):
+            time.sleep(0.01)
+        time.sleep(rng.uniform(0.0, 0.5))
+        child.send_signal(signal.SIGKILL)
+        kills += child.wait() != 0
+    solution, end = ts.resume(path), steps * 1e-3
+    times = np.append(np.arange(0, steps, 1000) * 1e-3, end)
+    whole = ts.simulate(top.build(), (0, end), integrator=I.Nystrom4(1e-3), t_eval=times, history=False)
+    np.testing.assert_array_equal(solution.t, times)
+    np.testing.assert_array_equal(solution.q, whole.q)
+    np.testing.assert_array_equal(solution.qdd, whole.qdd)
+    assert kills >= 5
+
+
+FULL = """
+import resource, signal, sys
+import tsdyn as ts
+from examples import top
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
+method = ts.integrators.Nystrom4(1e-3)
+solution = ts.simulate(top.build(), (0, 100), integrator=method, store=sys.argv[1], checkpoint=0.0)
+print(solution.status, solution.t.size)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
+def test_a_file_that_may_grow_no_more(tmp_path):
+    path = tmp_path / "run.zarr"
+    found = subprocess.run([sys.executable, "-c", FULL, str(path)], capture_output=True, text=True)
+    status, count = found.stdout.split()
+    assert status == "store_failed"
+    assert 0 < int(count) <= 100_001
+    whole = ts.simulate(top.build(), (0, 100), integrator=I.Nystrom4(1e-3))
+    np.testing.assert_array_equal(ts.resume(path).q, whole.q)
+
+
+def test_a_disk_without_room(tmp_path, monkeypatch, short_slices):
+    path, free = tmp_path / "run.h5", iter([1 << 30] * 3)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=next(free, 1 << 20)))
+    solution = ts.simulate(top.build(), (0.0, 3.0), integrator="dop853", store=path, checkpoint=0.0)
+    assert solution.status == ts.Status.STORE_FAILED
+    assert 0 < solution.t.size < 83
+    monkeypatch.undo()
+    np.testing.assert_array_equal(ts.resume(path).q, ts.simulate(top.build(), (0.0, 3.0), integrator="dop853").q)

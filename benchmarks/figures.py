@@ -20,7 +20,8 @@ def _look(name, others):
     return {"color": COLOURS[others % len(COLOURS)], "marker": MARKERS[others % 9], "markersize": 3, "linewidth": 1.2}
 
 
-def _sheet(panels, width, height, sharey=False):
+def sheet(panels, width, height, sharey=False):
+    """A figure, and so many axes with logarithmic scales."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -48,7 +49,7 @@ def work_precision(results, path):
     names = list(dict.fromkeys(name for one in results for name in one.contenders()))
     own = [name for name in names if name.startswith("tsdyn,")]
     rest = [name for name in names if not name.startswith(("tsdyn", "by hand"))]
-    drawn, axes = _sheet(len(results), 4.2, 3.6)
+    drawn, axes = sheet(len(results), 4.2, 3.6)
     for ax, one in zip(axes, results, strict=True):
         for name in one.contenders():
             points = sorted(
@@ -68,7 +69,7 @@ def work_precision(results, path):
 
 def scaling(sizes, path):
     """Microseconds an evaluation, and a whole run, against bodies."""
-    drawn, axes = _sheet(2, 4.6, 3.6)
+    drawn, axes = sheet(2, 4.6, 3.6)
     families = dict.fromkeys(size.family for size in sizes)
     for i, family in enumerate(families):
         mine = [size for size in sizes if size.family == family]

@@ -14,7 +14,7 @@ from ..plugins import Integrator, InvalidArgument, positive, whole
 LOWEST, HIGHEST = 4, 30
 TIGHT = 1e-12  # mean of rtol and atol: below it rounding counts
 FINE = 1e-16  # of a step, above TIGHT: less than rounding of a step makes no difference
-FINEST = 4e-18  # of a step: truncation of one sign that stays below the rounding of a million steps
+FINEST = 1e-20  # of a step: truncation of one sign that stays below the rounding of ten million steps
 REFINED = 3  # orders of the multipliers that are refined where rounding counts
 
 
@@ -28,7 +28,7 @@ class Taylor(Integrator):
     ----------
     tol : float
         Tolerance relative to 1 + size. A step's error is held to tol / 1000, below 1e-12 to less, since errors of one
-        sign add up. From 1e-13 down a run's error is rounding, which grows as the square root of the number of steps.
+        sign add up. At 1e-15 the error of a run is rounding, which grows as the square root of the number of steps.
     order : int, optional
         From 4 to 30; None lets every step have the order that gets furthest for its work.
     rtol, atol : float, optional

@@ -72,3 +72,17 @@ def test_far_away_only_digits_of_positions_are_lost():
     """A coordinate of 1e6 m has digits down to 1.2e-10 m."""
     far = positions("taylor", origin=(1e6, -7e5, 1.1e6))
     np.testing.assert_allclose(far, positions("taylor"), rtol=0.0, atol=2.0 * np.spacing(1.1e6))
+
+
+def test_small_mechanisms_are_held_as_closely_as_large_ones():
+    """Energy of links of a micrometre."""
+    metre = 1e-6
+    scene = ts.Scene(gravity=(0.0, 0.0, -9.81))
+    rods = [
+        scene.add_body(1e-9, np.array((1.0, 1.0, 0.1)) * 1e-9 * metre**2, position=((0.5 + i) * metre, 0.0, 0.0))
+        for i in range(3)
+    ]
+    for i, rod in enumerate(rods):
+        scene.add(C.Spherical.at(rod, rods[i - 1] if i else scene.ground, point=(i * metre, 0.0, 0.0)))
+    solution = ts.simulate(scene, (0.0, 1e-3), integrator=I.DOP853(1e-10, 1e-16)).raise_if_failed()
+    assert np.ptp(solution.energy) <= TIGHT * solution.kinetic_energy.max()

@@ -115,15 +115,18 @@ def released(loops, heavy=2.0, **scene):
 @pytest.mark.parametrize(
     ("loops", "options", "off"),
     [
-        (1, {"rtol": 1e-10, "atol": 1e-10}, 1e-8),
-        (2, {"rtol": 1e-10, "atol": 1e-10}, 1e-8),
+        (1, {"rtol": 1e-10, "atol": 1e-10}, 3e-8),
+        (2, {"rtol": 1e-10, "atol": 1e-10}, 3e-8),
         (40, {"rtol": 1e-10, "atol": 1e-10}, 1e-7),
         (1, {"integrator": I.Taylor(1e-13)}, 1e-9),
         (5, {"integrator": I.Taylor(1e-13)}, 3e-9),
     ],
 )
 def test_accuracy_is_kept_over_ten_turns(loops, options, off):
-    """And message and stats say what was kept."""
+    """And message and stats say what was kept.
+
+    Errors scatter between 1e-9 and 2e-8 as the tolerance is varied around 1e-10.
+    """
     scene, angle = released(loops, heavy=1.0 if loops == 5 else 2.0)
     t = np.linspace(0.0, 19.5, 301)
     solution = ts.simulate(scene, (0.0, t[-1]), t_eval=t, **options).raise_if_failed()

@@ -13,7 +13,7 @@ from ..sparse.constraint_graphs import graph_of, set_redundant
 from ..sparse.massless_axes import axis_of
 from ..workspaces.workspace import parts
 from .rank import check_rank
-from .start_kernels import evaluate_start, free_axis, go_near_by, land_start, select_redundant
+from .start_kernels import DOUBTFUL, NONE, evaluate_start, free_axis, go_near_by, land_start, select_redundant
 from .start_violations import demand_finite, demand_small, refuse_vanished
 from .tolerances import (
     DENSE_ENTRIES,
@@ -48,10 +48,10 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     dependent = start.check()
     if dependent >= 0 and not allowed:
         _refuse(scene, start, dependent)
-        dependent = -1
+        dependent = NONE
     start.demand_velocities()
     known = packed.derived.redundant
-    if dependent < 0:
+    if dependent == NONE or (dependent == DOUBTFUL and not allowed):
         if known is not None:  # an earlier start had redundant rows
             set_redundant(packed, None)
             start = start.again()
@@ -123,7 +123,7 @@ class _Start:
         return other
 
     def check(self):
-        """Refuse violated rows; return the first row of H that depends on those before it, or -1."""
+        """Refuse violated rows; return the first row of H that depends on those before it, NONE or DOUBTFUL."""
         scene, graph, tangent, q, qd = self.scene, self.graph, self.tangent, self.q, self.qd
         dependent = evaluate_start(self.context, q, qd, self.t, self.rates, 1)
         rows, real = graph.normals[graph.normals >= 0], graph.row >= 0
@@ -158,7 +158,7 @@ class _Start:
             if loose >= 0:
                 continue
             rows = redundant_of(self.tangent)
-            if self.hold_near_by(way.ravel()):
+            if not rows.size or self.hold_near_by(way.ravel()):
                 return rows
         self.refuse_axis(loose)
         chosen = self.chosen_of_all()

@@ -15,16 +15,21 @@ from ..rows.interface import (
     project,
     restore_selection,
     select_rows,
+    singularity_indicator,
 )
 from ..workspaces.workspace import load_parts
-from .tolerances import IMMOBILE, LEAST_SIZE
+from .tolerances import DOUBTFUL_SHARE, IMMOBILE, LEAST_SIZE
+
+# In place of a row that depends on others: there is none; rounding may hide one.
+NONE, DOUBTFUL = -1, -2
 
 
 @entry("pvvdvi")
 def evaluate_start(context, q, qd, t, velocity, every):
-    """f.b = Phi, velocity = Phi_q qd + Phi_t, H of the graph's rows; the first row that depends on others, or -1.
+    """f.b = Phi, velocity = Phi_q qd + Phi_t, H of the graph's rows; the first row that depends on others.
 
-    With every = 1 of every row, with 0 without the redundant ones.
+    With every = 1 of every row, with 0 without the redundant ones. Where no row depends on others, NONE; DOUBTFUL, with
+    every = 1, if a pivot is so small that the rounding errors it causes may hide a redundant row.
     """
     c = load_parts(context)
     graph, system, f = c.graph, c.system, c.tangent
@@ -41,6 +46,8 @@ def evaluate_start(context, q, qd, t, velocity, every):
     failed = factorise_selected_rows(graph, f, f.rows, METRIC)
     if every == 1:
         restore_selection(f, count)
+        if failed < 0 and singularity_indicator(graph, f.rows) < DOUBTFUL_SHARE:
+            return DOUBTFUL
     return failed
 
 

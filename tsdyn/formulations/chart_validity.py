@@ -10,7 +10,7 @@ neither on units nor on the scaling of constraint rows or lever arms:
 
 import math
 
-from ..elements.loops.body_poses import POSE, P, R, place_bodies
+from ..elements.loops.body_poses import POSE, P, R, largest_coordinate, place_bodies
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import copy
 from ..rows.interface import METRIC, evaluate_rows, factorise_rows, pivot_loss, selection_serves
@@ -54,11 +54,8 @@ def touch(graph, system, w, f, l, t):
         for c in range(4):
             l.base[o + 4 + c] = f.poses[at + P + c]
         l.d[4 * b + 3] = 0.0
-    size = 0.0
-    for i in range(w.q.size):
-        size = max(size, abs(w.q[i]))
     w.counters.charts += 1
-    w.control.floor = ROUNDING * (w.control.size + size)
+    w.control.floor = ROUNDING * (w.control.size + largest_coordinate(graph.bodies, w.q, w.control.size))
     w.control.contraction, w.control.condition = 0.0, 1.0
     l.state.time, l.state.factored, l.state.placement = t, 0, 0
     return regular

@@ -7,10 +7,9 @@ positions and velocities. It also serves the accelerations, unless positions hav
 import math
 
 from ..elements.loops.body_poses import OMEGA, POSE, RD, P, R, set_pose
-from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..errors import Status
 from ..jit.kernels import kernel, long_kernel
-from ..jit.simd import add, fma, four, put, splat
+from ..jit.simd import add, four, put
 from ..maths.dense_linalg import largest
 from ..rows.interface import (
     DYNAMICS,
@@ -25,7 +24,7 @@ from ..rows.interface import (
     redundant_rows_hold,
     singularity_indicator,
 )
-from .tolerances import LAND_SWEEPS, LEAST_MOVE, MOST_PARTS, ROUNDING_AT_MOST, STALLED
+from .tolerances import LAND_SWEEPS, LEAST_MOVE, ROUNDING_AT_MOST, STALLED
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
@@ -151,71 +150,3 @@ def land_velocities(graph, f, drifting):
     for b in range(graph.bodies.shape[0]):
         put(f.poses, b * POSE + RD, four(f.Z, 8 * b))
         put(f.poses, b * POSE + OMEGA, four(f.Z, 8 * b + 4))
-
-
-@kernel
-def sum_series(graph, bodies, orders, top, h, poses, p):
-    """The poses at h: A and r from coefficients up to top + 1, omega' up to top. A is made orthogonal by way of p."""
-    s = splat(h)
-    for b in range(graph.bodies.shape[0]):
-        first, at = b * orders * BODY_ROW, b * POSE
-        o = first + S_R * orders
-        r, rd = four(bodies, o + 4 * (top + 1)), splat(0.0)
-        for k in range(top, -1, -1):
-            rd = fma(rd, s, r)
-            r = fma(r, s, four(bodies, o + 4 * k))
-        put(poses, at + R, r)
-        put(poses, at + RD, rd)
-        if graph.bodies[b, 1] == 7:
-            w, o = splat(0.0), first + S_OMEGA * orders
-            for k in range(top, -1, -1):
-                w = fma(w, s, four(bodies, o + 4 * k))
-            put(poses, at + OMEGA, w)
-            fast = 0.0  # where it may turn far, p is followed on the way: it and -p are the same A
-            for i in range(3):
-                fast = max(fast, max(abs(bodies[o + i]), abs(poses[at + OMEGA + i])))
-            parts = int(min(fast * abs(h), MOST_PARTS)) + 1
-            for i in range(1, parts + 1):
-                _sum_rotation(bodies, first, top, h * i / parts, poses, at)
-                _parameters(poses, at, p)
-                for j in range(4):
-                    poses[at + P + j] = p[j]
-            set_pose(poses, at, p)
-
-
-@kernel
-def _sum_rotation(bodies, first, top, h, poses, at):
-    """A at h."""
-    s, c = splat(h), first + 12 * (top + 1)
-    x, y, z = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8)
-    for k in range(top, -1, -1):
-        c = first + 12 * k
-        x = fma(x, s, four(bodies, c))
-        y = fma(y, s, four(bodies, c + 4))
-        z = fma(z, s, four(bodies, c + 8))
-    put(poses, at, x)
-    put(poses, at + 4, y)
-    put(poses, at + 8, z)
-
-
-@kernel
-def _parameters(poses, at, p):
-    """Euler parameters of the matrix at poses[at], on the side of those there were; from the largest of the four."""
-    a, b, c = poses[at], poses[at + 5], poses[at + 10]  # the diagonal
-    x, y, z = poses[at + 6] - poses[at + 9], poses[at + 8] - poses[at + 2], poses[at + 1] - poses[at + 4]
-    u, v, w = poses[at + 9] + poses[at + 6], poses[at + 2] + poses[at + 8], poses[at + 4] + poses[at + 1]
-    e0, e1, e2, e3 = 1.0 + a + b + c, 1.0 + a - b - c, 1.0 - a + b - c, 1.0 - a - b + c
-    largest = max(max(e0, e1), max(e2, e3))
-    if largest == e0:
-        p[0], p[1], p[2], p[3] = e0, x, y, z
-    elif largest == e1:
-        p[0], p[1], p[2], p[3] = x, e1, w, v
-    elif largest == e2:
-        p[0], p[1], p[2], p[3] = y, w, e2, u
-    else:
-        p[0], p[1], p[2], p[3] = z, v, u, e3
-    normalise(p)
-    side = p[0] * poses[at + P] + p[1] * poses[at + P + 1] + p[2] * poses[at + P + 2] + p[3] * poses[at + P + 3]
-    if side < 0.0:
-        for i in range(4):
-            p[i] = -p[i]

@@ -72,8 +72,5 @@ RANK_LIMIT = 1e-14
 # Smallest over largest squared singular value of the rows that hold an orientation: less doesn't hold a body; 1e-6 rad.
 HOLDING = 1e-12
 
-# --- series
-MOST_PARTS = 100.0  # of a step on which p is followed, about one for each radian
-
 # Largest finite size: a sum above it is taken for an overflow.
 HUGE, TINY = 1e300, 1e-300

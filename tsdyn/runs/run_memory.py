@@ -67,8 +67,9 @@ class Memory:
         work.q[...], work.qd[...] = task.q, task.qd
         run.now[0], run.now[1] = task.q, task.qd
         control = work.control
-        control.u_tol = control.b_tol = task.constraint_tol
-        control.size = task.prepared.packed.size
+        control.size = size = task.prepared.packed.size
+        control.u_tol = task.constraint_tol * (size if 0.0 < size < 1.0 else 1.0)  # a small scene is held as closely
+        control.b_tol = task.constraint_tol
 
     def set_out(self, task, dense, may_pass):
         """The interval, the method's steps and tolerances, and what the run is to do."""

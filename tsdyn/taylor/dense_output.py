@@ -10,6 +10,7 @@ from ..rows.interface import allocate_tangent
 from ..runs.dense_output import put_state, recall
 from ..workspaces.run_state import B_DATA, B_START, lay_out, load_run
 from ..workspaces.workspace import plain_work
+from .step_end import keep_start
 from .step_parts import set_floor, state_within
 from .workspace import SeriesContext, Trial, load_series, no_series
 
@@ -27,7 +28,8 @@ def read_series(context, run, t, rows, blocks, charts, points, out):
         copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
         recall(c.system, block)
         set_floor(c, w.q)
-        place_bodies(c.graph.bodies, w.q, c.tangent.poses)  # which of p and -p is meant
+        place_bodies(c.graph.bodies, w.q, c.tangent.poses)
+        keep_start(c.graph, c.tangent.poses, x.start)
         status = state_within(context, c, r.kernels, t[i], t[i] - block[B_START])
         if status != 0:
             return status

@@ -19,7 +19,7 @@ from ..motions.signals import Signal
 from ..motions.tables import is_data
 from .tables import ConstraintSeries, ForceSeries, MotionSeries
 from .tolerances import FAR
-from .workspace import Expansion, Orders
+from .workspace import LOW, Expansion, Orders
 
 SHOWN = 5  # in a message
 
@@ -109,6 +109,9 @@ def allocate_expansion(graph, kinds, packed, highest):
     return Expansion(
         order=Orders(top=highest, room=orders, next=highest, lowest=highest, highest=highest),
         bodies=bodies,
+        low=zeros(nb * LOW),
+        low_end=zeros(nb * LOW),
+        start=zeros(4 * nb),
         constraints=constraints,
         places=places,
         forces=forces,

@@ -3,15 +3,15 @@
 Their argument is the address of a `SeriesContext`.
 """
 
-from ..elements.loops.body_poses import write_accelerations, write_positions, write_velocities
+from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..errors import Status
 from ..formulations.accelerations import accelerate_bodies
 from ..formulations.chart_validity import ROUNDING
-from ..formulations.projection import find_drift, land, land_velocities, sum_series
+from ..formulations.projection import find_drift, land
 from ..jit.kernels import callback, caller, kernel
 from ..jit.simd import fma, four, put, splat, times
-from ..maths.dense_linalg import is_finite
+from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import set_time
 from ..rows.interface import (
     is_near_singular,
@@ -23,6 +23,7 @@ from ..rows.interface import (
 )
 from .coefficients import begin, expand
 from .prescribed_series import expand_motions
+from .step_end import keep_start, project_rates, sum_series
 from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, UNEQUAL
 from .workspace import load_series
 
@@ -49,6 +50,7 @@ def _expand(context, k, ahead):
     orders = x.order.room
     if k == 0:
         expand_motions(c.system, x)
+        keep_start(c.graph, f.poses, x.start)
         begin(c.graph, c.system, f.poses, orders, x.bodies, f.Z)
     near = is_near_singular(f, f.indicator.start)  # there rounding of lam grows from order to order
     refine, x.order.sweeps = orders if near else x.order.refined, 1
@@ -76,7 +78,7 @@ def _land_rates(c, t):
     driven = is_driven(c.system)
     if driven:
         find_drift(c.graph, c.system, c.tangent, t)
-    land_velocities(c.graph, c.tangent, driven)
+    project_rates(c.graph, c.tangent, c.expansion.low_end, driven)
 
 
 @callback("pdd")
@@ -87,7 +89,9 @@ def reach(context, t, h):
     if is_driven(c.system) and not set_time(c.system, t):
         return NOT_FINITE
     if h >= 0.0:
-        sum_series(c.graph, x.bodies, x.order.room, x.order.top, h, f.poses, f.p)
+        sum_series(c.graph, x, h, f.poses, f.p)
+    else:
+        copy(x.low, x.low_end)
     status = land(c.graph, c.system, w, f, t)
     if status == 0:
         _land_rates(c, t)
@@ -116,10 +120,10 @@ def pass_singular(context, t, h):
     w, x, f, graph = c.work, c.expansion, c.tangent, c.graph
     orders, top = x.order.room, x.order.top
     save_selection(f)
-    sum_series(graph, x.bodies, orders, top, h, f.poses, f.p)
+    sum_series(graph, x, h, f.poses, f.p)
     status = land(graph, c.system, w, f, t)
     if status == SINGULAR or (status == 0 and singularity_indicator(graph, f.rows) < GONE):
-        sum_series(graph, x.bodies, orders, top, h, f.poses, f.p)
+        sum_series(graph, x, h, f.poses, f.p)
         if select_rows(graph, c.system, f, t, GONE) >= 0:
             status = land(graph, c.system, w, f, t)
     if status == 0:
@@ -157,7 +161,5 @@ def state_within(context, c, kernels, t, h):
 @kernel
 def set_floor(c, q):
     """The |Phi| that rounding of positions q leaves."""
-    largest = 0.0
-    for i in range(q.size):
-        largest = max(largest, abs(q[i]))
-    c.work.control.floor = ROUNDING * (c.work.control.size + largest)
+    control = c.work.control
+    control.floor = ROUNDING * (control.size + largest_coordinate(c.graph.bodies, q, control.size))

@@ -41,6 +41,7 @@ def _stand(context, c, r, log, t):
     indicator.start = indicator.end
     indicator.largest = max(indicator.start, indicator.largest)
     remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
+    copy(c.expansion.low_end, c.expansion.low)
     if c.trial.singular == 0:
         call_expand(r.kernels.expand, context, 0)
     if not is_finite(w.qdd):
@@ -58,6 +59,7 @@ def _enter(context, c, r, log):
     w, f, t = c.work, c.tangent, r.clock.t
     take_pieces(c.system, r, log)
     set_floor(c, w.q)
+    c.expansion.low[:] = 0.0
     w.control.condition = 1.0
     c.trial.singular = 0
     status = stand_at(context, c, r, t)

@@ -14,6 +14,12 @@ MISSED = 100.0
 # rad of the fastest body in a step where joint angles are counted by forces: two steps a turn would do.
 MOST_TURN = 1.0
 
+# Parts of a step in which Euler parameters are followed, one for each radian, at most.
+MOST_PARTS = 100.0
+
+# d0^2 of the rotation of a step, above which p follows from its increment: 2 rad.
+WIDE = 0.3
+
 # Factor of a step whose end was not reached.
 HALVED = 0.5
 

@@ -4,12 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..elements.loops.constraint_series import BODY_ROW
 from ..jit.kernels import Record, loader, records
 from ..model.packed import System
 from ..rows.interface import TangentWorkspace
 from ..sparse.constraint_graph import ConstraintGraph
 from ..workspaces.workspace import Work, plain_context
 from .tables import ConstraintSeries, ForceSeries, MotionSeries
+
+# floats of a body in Expansion.low, and where those of its parts begin
+LOW, L_R, L_RD, L_OMEGA, L_P = 16, 0, 4, 8, 12
 
 
 class Orders(Record):
@@ -29,6 +33,9 @@ class Expansion(NamedTuple):
 
     order: Orders
     bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
+    low: np.ndarray  # (b, 16)  what r, rd, omega' and p lack to rounding at the start of the step; step_end.py
+    low_end: np.ndarray  # (b, 16)  the same at the end of the step tried
+    start: np.ndarray  # (b, 4)  p at the start of the step
     constraints: np.ndarray  # each kind's instances; constraint_series.series
     places: np.ndarray  # (kinds,) of tables.ConstraintSeries
     forces: np.ndarray  # (kinds,) of tables.ForceSeries
@@ -70,8 +77,12 @@ class SeriesContext(NamedTuple):
 
 def no_series(orders, bodies):
     """An `Expansion` with the series of bodies alone, and room for so many orders."""
+    count = bodies.size // (orders * BODY_ROW)
+    low, start = np.zeros((2, LOW * count)), np.zeros(4 * count)
     none, kinds = np.zeros(0), (records(kind, []) for kind in (ConstraintSeries, ForceSeries))
-    return Expansion(Orders(room=orders), bodies, none, *kinds, np.zeros(0, np.int64), none, records(MotionSeries, []))
+    return Expansion(
+        Orders(room=orders), bodies, *low, start, none, *kinds, np.zeros(0, np.int64), none, records(MotionSeries, [])
+    )
 
 
 def _example():

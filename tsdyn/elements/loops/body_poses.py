@@ -19,6 +19,20 @@ STILL = 4  # in place of a body's length, 7 or 3: a rigid body that never turns
 
 
 @kernel
+def largest_coordinate(bodies, q, size):
+    """The largest coordinate of bodies, m: p counts as that of points at the distance `size`, of 1 m at most."""
+    largest, lever = 0.0, min(size, 1.0)
+    for b in range(bodies.shape[0]):
+        at = bodies[b, 0]
+        for i in range(at, at + 3):
+            largest = max(largest, abs(q[i]))
+        if bodies[b, 1] != 3:
+            for i in range(at + 3, at + 7):
+                largest = max(largest, lever * abs(q[i]))
+    return largest
+
+
+@kernel
 def set_pose(poses, at, p):
     """A(p) and p of the pose that begins at poses[at]; p (4,)."""
     orient(poses, at, p[0], p[1], p[2], p[3])

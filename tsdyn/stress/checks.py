@@ -101,10 +101,10 @@ def laws(run):
     return {"broken": [str(found) for found in findings(run.solution) if found.broken]}
 
 
-def repeated(run):
+def repeated(first):
     """Whether a second run gives the same bits."""
-    again = globals()["run"](run.case).solution
-    pairs = [(getattr(run.solution, name), getattr(again, name)) for name in ("t", "q", "qd", "qdd")]
+    again = run(first.case).solution
+    pairs = [(getattr(first.solution, name), getattr(again, name)) for name in ("t", "q", "qd", "qdd")]
     return {"same": all(np.array_equal(*pair) for pair in pairs)}
 
 

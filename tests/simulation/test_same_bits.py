@@ -26,7 +26,7 @@ print(sorted(found.items()))
 """
 
 
-@pytest.mark.slow_for("implicit")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "methods",
     [

@@ -83,7 +83,7 @@ WAYS = {
 }  # fmt: skip
 
 
-@pytest.mark.slow_for("sdirk54*", "trapezoid")
+@pytest.mark.slow_but("dop853, tangent", "nystrom4, null-space", "rk45, maggi-kane", "taylor, tangent", "times")
 @pytest.mark.usefixtures("short_slices")
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 def test_every_method(way, tmp_path):
@@ -92,6 +92,7 @@ def test_every_method(way, tmp_path):
     assert 0.0 < stopped.reached < 1.0
 
 
+@pytest.mark.slow_but("redundant-dop853", "turns-default")
 @pytest.mark.usefixtures("short_slices")
 @pytest.mark.parametrize("method", [None, "dop853", I.Nystrom4(1e-2)], ids=["default", "dop853", "nystrom4"])
 @pytest.mark.parametrize("build", [four_bar.build, geared_pair.build], ids=["redundant", "turns"])

@@ -48,7 +48,7 @@ def archive_of(given, kept, history, numbers, arrays):
     remembered = kept.handles.count + kept.packed.system.memory.size
     tables = tables_of(kept.packed.bodies, remembered, history)
     attributes = {"source": f"tsdyn {__version__}", "scene": facts["scene"]}
-    archive = Archive(Path(given["store"]), tables, attributes, facts["interval"], _request(given), facts)
+    archive = Archive(Path(given["store"]).absolute(), tables, attributes, facts["interval"], _request(given), facts)
     if numbers is None:
         archive.begin()
     elif not numbers.get("ended"):

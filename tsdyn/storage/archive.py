@@ -133,10 +133,11 @@ class Archive:
 
     def checkpoint(self, numbers, arrays):
         """Write a checkpoint of this state."""
-        self.flush()
+        self._write()
+        self._store.sync()
         facts = {**self._facts, "counts": self.counts, "passed": self.passed, "size": self._store.size}
         checkpoint.write(self.path, {**facts, **numbers}, {**self._request, **arrays})
-        self._written = time.perf_counter()
+        self._flushed = self._written = time.perf_counter()
 
     @property
     def has_checkpoints(self):
@@ -144,7 +145,7 @@ class Archive:
         return self._interval is not None
 
     def flush(self):
-        """Bring everything to the disk."""
+        """Let readers see everything."""
         self._write()
         self._store.flush()
         self._flushed = time.perf_counter()

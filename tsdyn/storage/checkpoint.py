@@ -62,7 +62,8 @@ def read(store):
     if not newest.exists():
         if not before.exists():
             raise StorageError(
-                f"{newest} doesn't exist: {store} was written without checkpoint=seconds, or has been moved without it."
+                f"{newest} doesn't exist: {store} was written without checkpoint=seconds, stopped before the "
+                "first one, or moved without it."
             )
         newest = before  # killed between two renames
     try:

@@ -6,7 +6,8 @@ A format is a module with a class `Store`, which has
     reopen(path, tables, attributes, counts, size=0)
                                                one to go on with, its tables cut to so many rows; its `size` was this
     write(start, rows)                         rows (k, ...) of a table from `start` on, by column; what follows is cut
-    flush()                                    all of it to the disk, for readers and for a crash
+    flush()                                    let readers see all of it
+    sync()                                     bring all of it to the disk, for a crash
     close()
 
 and functions for stores that may still be written

@@ -63,6 +63,10 @@ class Store:
     def flush(self):
         """As formats.py says."""
         self._file.flush()
+
+    def sync(self):
+        """As formats.py says."""
+        self.flush()
         handle = os.open(self._path, os.O_RDWR)
         try:
             os.fsync(handle)

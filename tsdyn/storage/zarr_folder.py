@@ -58,12 +58,15 @@ class Store:
             array[start:end] = values
 
     def flush(self):
+        """Do nothing: every chunk is a file of its own, written as a whole."""
+
+    def sync(self):
         """As formats.py says."""
         if hasattr(os, "sync"):
             os.sync()
 
     def close(self):
-        """Do nothing: every chunk is a file of its own, closed already."""
+        """Do nothing."""
 
 
 def read(path, column, part):

@@ -225,6 +225,7 @@ def test_a_damaged_store(stopped):
 
 def test_no_checkpoint(tmp_path):
     refuse(lambda: ts.resume(tmp_path / "run.h5"), ts.StorageError, ("doesn't exist",))
+    refuse(lambda: ts.resume(3), ts.InvalidArgument, ("path must be a path", "3"))
 
 
 def test_a_file_runs_no_code(stopped):

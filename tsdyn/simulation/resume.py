@@ -11,6 +11,7 @@ from ..jit.cache import machine
 from ..jit.code_hash import platform_hash
 from .scene import Scene
 from .simulate import run_from
+from .stored_runs import demand_path
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -64,6 +65,7 @@ def resume(
     """
     from ..storage import checkpoint, restricted_pickle
 
+    demand_path(path, "path")
     numbers, arrays = checkpoint.read(path)
     _demand_same_place(path, numbers)
     try:

@@ -28,14 +28,19 @@ def demand_storable(given):
         raise InvalidArgument("checkpoint needs a store, which it goes on with: simulate(..., store='run.h5').")
     from ..storage.formats import demand_free, format_of
 
-    if not isinstance(path, (str, os.PathLike)):
-        raise InvalidArgument(f"store must be a path such as 'run.zarr' or 'run.h5', got {path!r}.")
+    demand_path(path, "store")
     format_of(path)
     if given["dense_output"]:
         raise InvalidArgument("a store keeps outputs, no interpolants: give t_eval in place of dense_output.")
     if interval is not None and not 0.0 <= number(interval) < np.inf:
         raise InvalidArgument(f"checkpoint must be a time in s, 0 or more, got {interval!r}.")
     demand_free(path)
+
+
+def demand_path(path, name):
+    """Raise InvalidArgument unless a value is a path."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise InvalidArgument(f"{name} must be a path such as 'run.zarr' or 'run.h5', got {path!r}.")
 
 
 def archive_of(given, kept, history, numbers, arrays):

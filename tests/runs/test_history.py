@@ -45,7 +45,7 @@ def test_without_histories(method, dense_output):
     assert plain.stats.charts == plain.charts.t.size
     assert repr(without)
     for name in ("steps", "charts"):
-        with pytest.raises(ts.InvalidArgument, match="history=False"):
+        with pytest.raises(ts.InvalidArgument, match="history=True"):
             getattr(without, name)
     with pytest.raises(ts.InvalidArgument, match="history must"):
         ts.simulate(scene, (0.0, 0.5), history="no")

@@ -214,7 +214,7 @@ class Solution(Outputs, Balances, Kinematics["Floats"]):
     @staticmethod
     def _kept(log):
         if log is None:
-            raise InvalidArgument("the run kept no histories of steps and charts: simulate(..., history=True) keeps them.")
+            raise InvalidArgument("the run kept no histories of steps and charts; history=True keeps them.")
         return log
 
     @cached_property

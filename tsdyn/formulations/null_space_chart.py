@@ -9,12 +9,12 @@ I - U (Phi_q0 U)^-1 Phi_q0, L^T is V^T P0: L^T V = I, L^T U = 0.
 import math
 
 from ..jit.kernels import kernel
-from ..maths.dense_linalg import null_space
+from ..maths.dense_linalg import largest, null_space
 from .chart_validity import touch
 from .dense_products import add_product, add_transposed_product, clear_matrix, multiply
 from .dense_rows import evaluate_dense_rows, form_normal_matrix, invert_normal_matrix, take_selection
 from .newton_iterations import OK, SINGULAR, update_b
-from .tolerances import FIRST_RATE, RANK_LIMIT
+from .tolerances import FIRST_RATE, RANK_LIMIT, ROUNDING
 
 
 @kernel
@@ -22,6 +22,7 @@ def new_chart(graph, system, w, f, l, t):
     """Make a chart at the present q: q0, U, V by SVD, B, L; u = 0, v = 0. Status."""
     n, m, k = w.q.size, w.u.size, w.v.size
     regular = touch(graph, system, w, f, l, t)
+    w.control.floor = ROUNDING * (w.control.size + largest(w.q))  # Phi has the normalisations, too
     take_selection(graph, w, f)
     evaluate_dense_rows(system, w, t)
     kept = 0

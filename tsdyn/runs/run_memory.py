@@ -68,8 +68,9 @@ class Memory:
         run.now[0], run.now[1] = task.q, task.qd
         control = work.control
         control.size = size = task.prepared.packed.size
-        control.u_tol = task.constraint_tol * (size if 0.0 < size < 1.0 else 1.0)  # a small scene is held as closely
-        control.b_tol = task.constraint_tol
+        control.u_tol = control.b_tol = task.constraint_tol
+        if task.form.basis_free and 0.0 < size < 1.0:  # a small scene is held as closely; no Phi is a normalisation's
+            control.u_tol *= size
 
     def set_out(self, task, dense, may_pass):
         """The interval, the method's steps and tolerances, and what the run is to do."""

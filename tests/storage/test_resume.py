@@ -287,7 +287,7 @@ import resource, signal, sys
 import tsdyn as ts
 from examples import top
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 method = ts.integrators.Nystrom4(1e-3)
 solution = ts.simulate(top.build(), (0, 100), integrator=method, store=sys.argv[1], checkpoint=0.0)
 print(solution.status, solution.t.size)

@@ -12,8 +12,7 @@ import threading
 @contextlib.contextmanager
 def prompt_interrupts():
     """Turn a Ctrl-C during the block into KeyboardInterrupt: at once, or at the end where LLVM calls back."""
-    in_main = threading.current_thread() is threading.main_thread()
-    if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    if not _raises_here():
         yield
         return
     interrupted = False
@@ -39,8 +38,7 @@ def prompt_interrupts():
 @contextlib.contextmanager
 def deferred_interrupts():
     """Put a Ctrl-C during the block off to its end."""
-    in_main = threading.current_thread() is threading.main_thread()
-    if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    if not _raises_here():
         yield
         return
     interrupted = []
@@ -51,6 +49,12 @@ def deferred_interrupts():
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if interrupted:
         raise KeyboardInterrupt
+
+
+def _raises_here():
+    """Whether a Ctrl-C raises KeyboardInterrupt in this thread."""
+    in_main = threading.current_thread() is threading.main_thread()
+    return in_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def _in_callback(frame):

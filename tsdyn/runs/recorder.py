@@ -66,10 +66,7 @@ class Recorder:
 
     def chart_history(self, charts):
         """The history of charts, with those that are left at the end; or None."""
-        if self.archive is not None:
-            self.archive.add("charts", charts)
-        if self.passed is not None:
-            self.passed.add(charts, self.steps)
+        self._log_charts(charts)
         return self.passed
 
     def saved(self):
@@ -114,12 +111,15 @@ class Recorder:
         """Log the charts that have been left, and let the present one be the first."""
         run, charts, points = self.run.numbers, self.charts, self.points
         left = run.chart_rows
-        if self.archive is not None:
-            self.archive.add("charts", charts[:left])
-        if self.passed is not None:
-            self.passed.add(charts[:left], self.steps)
+        self._log_charts(charts[:left])
         charts[0], points[:1] = charts[left], points[left : left + 1]
         run.chart_rows = 0
+
+    def _log_charts(self, charts):
+        if self.archive is not None:
+            self.archive.add("charts", charts)
+        if self.passed is not None:
+            self.passed.add(charts, self.steps)
 
 
 def _doubled(rows):

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .._version import __version__
 from ..calls import fitting
 from ..errors import InvalidArgument, StorageError
-from ..jit.cache import machine
-from ..jit.code_hash import platform_hash
 from .scene import Scene
 from .simulate import run_from
-from .stored_runs import demand_path
+from .stored_runs import demand_path, demand_same_place
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -67,7 +64,7 @@ def resume(
 
     demand_path(path, "path")
     numbers, arrays = checkpoint.read(path)
-    _demand_same_place(path, numbers)
+    demand_same_place(path, numbers)
     try:
         given = restricted_pickle.loads(arrays["arguments"].tobytes())
         if scene is None:
@@ -83,17 +80,3 @@ def resume(
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     given |= {"scene": scene, "events": events, "progress": progress, "store": path}
     return run_from(given | {"checkpoint": numbers["interval"]}, numbers, arrays)
-
-
-def _demand_same_place(path, numbers):
-    """Raise StorageError unless version and machine are those of the run."""
-    if (numbers["version"], numbers["kernels"]) != (__version__, platform_hash()):
-        raise StorageError(
-            f"{path} was written by tsdyn {numbers['version']}, and other versions of it, NumPy or Numba are here: "
-            "the bits would differ. Go on there, or start anew from the last output: simulate(state=...)."
-        )
-    if numbers["machine"] != machine():
-        raise StorageError(
-            f"{path} was written on another machine ({', '.join(numbers['machine'][:3])}): the bits would differ. "
-            "Go on there, or start anew from the last output: simulate(state=...)."
-        )

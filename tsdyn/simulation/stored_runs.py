@@ -69,8 +69,6 @@ def begin_again(archive, given):
 
 def ended(archive, outcome, seconds):
     """The `Outcome` of a run whose outputs are in an archive; the checkpoint says that it has ended."""
-    from ..storage.stored_outputs import StoredLog, StoredOutputs
-
     if isinstance(outcome.rows, np.ndarray):  # of a driver of a user's
         archive.add("outputs", outcome.rows)
     try:
@@ -79,8 +77,16 @@ def ended(archive, outcome, seconds):
             archive.checkpoint(*_ending(outcome, seconds))
     except OSError as error:
         outcome = outcome._replace(status=Status.STORE_FAILED, reason=f"{type(error).__name__}: {error}.")
+    rows, steps, charts = _stored(archive)
+    return outcome._replace(rows=rows, steps=steps, charts=charts)
+
+
+def _stored(archive):
+    """Outputs, steps and charts of an archive."""
+    from ..storage.stored_outputs import StoredLog, StoredOutputs
+
     outputs = StoredOutputs(archive.path, archive.columns)
-    return outcome._replace(rows=outputs, steps=StoredLog.of(outputs, "steps"), charts=StoredLog.of(outputs, "charts"))
+    return outputs, StoredLog.of(outputs, "steps"), StoredLog.of(outputs, "charts")
 
 
 def _ending(outcome, seconds):
@@ -96,17 +102,33 @@ def _ending(outcome, seconds):
 
 def ended_outcome(numbers, arrays, archive):
     """The `Outcome` of a run that had ended when its checkpoint was written."""
-    from ..storage.stored_outputs import StoredLog, StoredOutputs
-
     events = None
     if "watched" in numbers:
         events = tuple([arrays[f"event {i}.{name}"] for i in range(numbers["watched"])] for name in ("t", "q", "qd"))
-    outputs = StoredOutputs(archive.path, archive.columns)
     return Outcome(
-        Status(numbers["status"]), numbers["reason"], outputs, StoredLog.of(outputs, "steps"),
-        StoredLog.of(outputs, "charts"), numbers["t"], arrays["last"], arrays["remembered"], numbers["statistics"],
-        None, events, 0.0,
+        Status(numbers["status"]), numbers["reason"], *_stored(archive), numbers["t"], arrays["last"],
+        arrays["remembered"], numbers["statistics"], None, events, 0.0,
     )  # fmt: skip
+
+
+def _here():
+    """What bits depend on beside the run: versions and machine."""
+    return {"version": __version__, "kernels": platform_hash(), "machine": machine()}
+
+
+def demand_same_place(path, numbers):
+    """Raise StorageError unless version and machine are those of the run."""
+    here = _here()
+    if any(numbers[name] != here[name] for name in ("version", "kernels")):
+        raise StorageError(
+            f"{path} was written by tsdyn {numbers['version']}, and other versions of it, NumPy or Numba are here: "
+            "the bits would differ. Go on there, or start anew from the last output: simulate(state=...)."
+        )
+    if numbers["machine"] != here["machine"]:
+        raise StorageError(
+            f"{path} was written on another machine ({', '.join(numbers['machine'][:3])}): the bits would differ. "
+            "Go on there, or start anew from the last output: simulate(state=...)."
+        )
 
 
 def _demand_same_run(path, facts, numbers):
@@ -150,9 +172,7 @@ def _facts(given, kept):
     functions = [function for _, several in user_functions(kept.packed) for function in several]
     functions += [load.force.function for load in kept.packed.loads if getattr(load.force, "period", None) is not None]
     return {
-        "version": __version__,
-        "kernels": platform_hash(),
-        "machine": machine(),
+        **_here(),
         "scene": _hash_of(kept.packed),
         "functions": _sources(functions),
         "events": _sources(events),

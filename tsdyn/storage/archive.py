@@ -80,13 +80,11 @@ class Archive:
     def begin(self):
         """Make the store."""
         self._store = self._format.Store.create(self.path, self._tables, self._attributes)
-        self._set_counts(dict.fromkeys(self._tables, 0))
+        self._set_counts(self._none())
 
     def go_on(self, numbers, arrays):
         """Open the store where a checkpoint was written."""
-        given = self.path, self._tables, self._attributes, numbers["counts"], numbers["size"]
-        self._store = self._format.Store.reopen(*given)
-        self._set_counts(numbers["counts"])
+        self._reopen(numbers["counts"], numbers["size"])
         self.resumed, self.passed = (numbers, arrays), numbers["passed"]
 
     def begin_again(self, request):
@@ -94,11 +92,15 @@ class Archive:
         self._request = request
         checkpoint.remove(self.path)
         self._store.close()
-        self._store = self._format.Store.reopen(
-            self.path, self._tables, self._attributes, dict.fromkeys(self._tables, 0)
-        )
-        self._set_counts(dict.fromkeys(self._tables, 0))
+        self._reopen(self._none(), 0)
         self.passed, self.resumed = [], None
+
+    def _none(self):
+        return dict.fromkeys(self._tables, 0)
+
+    def _reopen(self, counts, size):
+        self._store = self._format.Store.reopen(self.path, self._tables, self._attributes, counts, size)
+        self._set_counts(counts)
 
     def _set_counts(self, counts):
         self.counts = dict(counts)

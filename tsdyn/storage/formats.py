@@ -3,7 +3,7 @@
 A format is a module with a class `Store`, which has
 
     create(path, tables, attributes)           a new store, of `Table`s by name
-    reopen(path, tables, attributes, counts, size=0)
+    reopen(path, tables, attributes, counts, size)
                                                one to go on with, its tables cut to so many rows; its `size` was this
     write(start, rows)                         rows (k, ...) of a table from `start` on, by column; what follows is cut
     flush()                                    let readers see all of it
@@ -16,13 +16,14 @@ and functions for stores that may still be written
     count(path, columns)                       rows that all of these columns have
 """
 
+import math
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import InvalidArgument, MissingDependency, StorageError
 
-CHUNK = 1 << 15  # floats of a chunk
+CHUNK, LONGEST = 1 << 15, 1 << 14  # floats of a chunk, and rows at most
 
 
 class Column(NamedTuple):
@@ -40,13 +41,16 @@ class Table(NamedTuple):
     columns: tuple  # of Column
     labels: dict  # of the other dimensions: the names along each
 
+    def shapes(self, column):
+        """The shapes of a column without rows, and of its chunks."""
+        row = tuple(len(self.labels[dimension]) for dimension in column.dimensions)
+        return (0, *row), (max(min(CHUNK // max(math.prod(row), 1), LONGEST), 1), *row)
 
-def chunk_rows(lengths):
-    """Rows of a chunk of a column whose rows have these lengths."""
-    size = 1
-    for length in lengths:
-        size *= max(length, 1)
-    return max(min(CHUNK // size, 1 << 14), 1)
+
+def demand_rows(path, column, found, count):
+    """Raise StorageError if a column has fewer rows than were written."""
+    if found < count:
+        raise StorageError(f"{path}: {column} has {found} rows of {count} that were written.")
 
 
 def format_of(path):

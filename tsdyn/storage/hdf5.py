@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from ..errors import StorageError
-from .formats import CHUNK, chunk_rows
+from .formats import CHUNK, demand_rows
 
 COPIED = 1 << 16  # rows at a time
 CACHE = 1 << 19  # bytes of each array that are kept in memory
@@ -34,7 +34,7 @@ class Store:
         return os.path.getsize(self._path)
 
     @classmethod
-    def reopen(cls, path, tables, attributes, counts, size=0):
+    def reopen(cls, path, tables, attributes, counts, size):
         """As formats.py says; a copy takes the place of the file, which a killed process may have left half-written."""
         found = os.path.getsize(path) if os.path.exists(path) else 0
         if found < size:  # HDF5 would wait for the missing part for ever
@@ -110,9 +110,9 @@ def _laid_out(path, tables, attributes):
                 names = np.array(labels, dtype=h5py.string_dtype())
                 file.create_dataset(dimension, data=names).make_scale(dimension)
         for column in table.columns:
-            lengths = tuple(len(table.labels[dimension]) for dimension in column.dimensions)
-            shape, chunk = {"shape": (0, *lengths), "maxshape": (None, *lengths)}, (chunk_rows(lengths), *lengths)
-            array = file.create_dataset(column.name, dtype=float, chunks=chunk, **shape)
+            shape, chunks = table.shapes(column)
+            grown = {"maxshape": (None, *shape[1:]), "chunks": chunks}
+            array = file.create_dataset(column.name, shape, float, **grown)
             array.attrs.update(column.attributes)
             if column.name == table.dimension:
                 array.make_scale(table.dimension)
@@ -124,8 +124,7 @@ def _laid_out(path, tables, attributes):
 
 def _copy(old, new, count):
     """The first rows of an array."""
-    if len(old) < count:
-        raise StorageError(f"{old.file.filename}: {old.name} has {len(old)} rows of {count} that were written.")
+    demand_rows(old.file.filename, old.name, len(old), count)
     new.resize(count, axis=0)
     for at in range(0, count, COPIED):
         new[at : at + COPIED] = old[at : min(at + COPIED, count)]

@@ -7,7 +7,7 @@ import numpy as np
 import zarr
 
 from ..errors import StorageError
-from .formats import chunk_rows
+from .formats import demand_rows
 
 
 class Store:
@@ -26,9 +26,9 @@ class Store:
                 if dimension not in group:
                     _add_labels(group, dimension, labels)
             for column in table.columns:
-                lengths = tuple(len(table.labels[dimension]) for dimension in column.dimensions)
+                shape, chunks = table.shapes(column)
                 group.create_array(
-                    column.name, shape=(0, *lengths), chunks=(chunk_rows(lengths), *lengths), dtype=float,
+                    column.name, shape=shape, chunks=chunks, dtype=float,
                     dimension_names=(table.dimension, *column.dimensions), fill_value=np.nan,
                     attributes=column.attributes,
                 )  # fmt: skip
@@ -37,16 +37,13 @@ class Store:
     size = 0
 
     @classmethod
-    def reopen(cls, path, tables, attributes, counts, size=0):
+    def reopen(cls, path, tables, attributes, counts, size):
         """As formats.py says."""
         store = cls(path, _group(path, "r+"), tables)
         for name, table in tables.items():
             for column in table.columns:
                 array = store._arrays[column.name]
-                if array.shape[0] < counts[name]:
-                    raise StorageError(
-                        f"{path}: {column.name} has {array.shape[0]} rows of {counts[name]} that were written."
-                    )
+                demand_rows(path, column.name, array.shape[0], counts[name])
                 array.resize((counts[name], *array.shape[1:]))
         return store
 

@@ -10,7 +10,7 @@ neither on units nor on the scaling of constraint rows or lever arms:
 
 import math
 
-from ..elements.loops.body_poses import POSE, P, R, largest_coordinate, place_bodies
+from ..elements.loops.body_poses import POSE, P, R, place_bodies
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import copy
 from ..rows.interface import METRIC, evaluate_rows, factorise_rows, pivot_loss, selection_serves
@@ -31,8 +31,11 @@ REASONS = (
 
 
 @kernel
-def touch(graph, system, w, f, l, t):
-    """Make the chart at w.q: base, H0, Y0, factors of S0. True if the rows of H0 are independent."""
+def touch(graph, system, w, f, l, t, largest):
+    """Make the chart at w.q: base, H0, Y0, factors of S0. True if the rows of H0 are independent.
+
+    largest is the largest coordinate that enters Phi, m, as the form has it.
+    """
     regular = True
     same = l.state.placement > 0 and l.state.placement == w.counters.placements  # as the chart that was left last
     if same and graph.axes.rows.shape[0] == 0 and selection_serves(graph, f, f.rows):
@@ -55,7 +58,7 @@ def touch(graph, system, w, f, l, t):
             l.base[o + 4 + c] = f.poses[at + P + c]
         l.d[4 * b + 3] = 0.0
     w.counters.charts += 1
-    w.control.floor = ROUNDING * (w.control.size + largest_coordinate(graph.bodies, w.q, w.control.size))
+    w.control.floor = ROUNDING * (w.control.size + largest)
     w.control.contraction, w.control.condition = 0.0, 1.0
     l.state.time, l.state.factored, l.state.placement = t, 0, 0
     return regular

@@ -14,15 +14,14 @@ from .chart_validity import touch
 from .dense_products import add_product, add_transposed_product, clear_matrix, multiply
 from .dense_rows import evaluate_dense_rows, form_normal_matrix, invert_normal_matrix, take_selection
 from .newton_iterations import OK, SINGULAR, update_b
-from .tolerances import FIRST_RATE, RANK_LIMIT, ROUNDING
+from .tolerances import FIRST_RATE, RANK_LIMIT
 
 
 @kernel
 def new_chart(graph, system, w, f, l, t):
     """Make a chart at the present q: q0, U, V by SVD, B, L; u = 0, v = 0. Status."""
     n, m, k = w.q.size, w.u.size, w.v.size
-    regular = touch(graph, system, w, f, l, t)
-    w.control.floor = ROUNDING * (w.control.size + largest(w.q))  # Phi has the normalisations, too
+    regular = touch(graph, system, w, f, l, t, largest(w.q))  # of p, too: Phi has the normalisations
     take_selection(graph, w, f)
     evaluate_dense_rows(system, w, t)
     kept = 0

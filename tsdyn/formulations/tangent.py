@@ -13,7 +13,7 @@ Runge-Kutta steps are linear, so V^T x is the v of the null-space form.
 
 import math
 
-from ..elements.loops.body_poses import write_accelerations, write_positions, write_velocities
+from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
 from ..maths.dense_linalg import copy, is_finite, largest
@@ -260,7 +260,7 @@ def start_chart(context, t, x, y, yd, unused):
     system, w, f, l, graph = c.system, c.work, c.tangent, c.chart, c.graph
     if not set_time(system, t):
         return NOT_FINITE
-    regular = touch(graph, system, w, f, l, t)
+    regular = touch(graph, system, w, f, l, t, largest_coordinate(graph.bodies, w.q, w.control.size))
     x, y, yd = vector(x, l.x.size - 8), vector(y, l.x.size - 8), vector(yd, l.x.size - 8)
     for i in range(x.size):
         x[i] = 0.0

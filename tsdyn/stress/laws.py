@@ -183,7 +183,8 @@ def extent(solution):
 
 def rounding_of_places(solution):
     """Rounding of positions, relative to the size of the scene: large far from the origin."""
-    return ROUNDINGS * EPS * float(np.abs(solution.q).max(initial=0.0)) / (extent(solution) or 1.0)
+    places = [np.abs(solution.position(body)).max(initial=0.0) for body in solution.scene.bodies]
+    return ROUNDINGS * EPS * float(max(places, default=0.0)) / (extent(solution) or 1.0)
 
 
 def _balance(law, left, sizes, largest, limit, body):

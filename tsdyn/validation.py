@@ -76,6 +76,16 @@ def whole(value, what):
     return int(value)
 
 
+def sequence(value, what, error):
+    """Return the items of a sequence as a list, or raise `error`; text is no sequence."""
+    try:
+        if not isinstance(value, str):
+            return list(value)
+    except TypeError:
+        pass
+    raise error(f"{what}, got {value!r}.")
+
+
 def one_of(value, options, what, error=InvalidArgument):
     """Return one of some names, or raise `error`."""
     if not isinstance(value, str) or value not in options:

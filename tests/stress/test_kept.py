@@ -10,6 +10,8 @@ from tsdyn.stress.random_scenes import generate
 KEPT = {
     2002342: "fixed steps across a spin that diverges",
     2003177: "a flat start: dense output beside outputs",
+    2011212: "dense output of a scene of 1e-6 m",
+    2011079: "two methods past singular configurations, mass ratio 5e8",
     2002207: "far from the origin: balance of torques",
 }
 

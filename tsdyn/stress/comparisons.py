@@ -10,8 +10,8 @@ import numpy as np
 
 from ..integrators import Nystrom4
 from .interruption import resumed_is_same, same_bits
-from .laws import Finding, energy_left, momentum_left
-from .tolerances import EPS, FALL, MULTIPLE, ROUNDED, ROUNDINGS, SAME, SHORTER, TIGHTER
+from .laws import Finding, energy_left, is_near_singular, momentum_left
+from .tolerances import EPS, FALL, MULTIPLE, NEAR_SINGULAR_ENDS, ROUNDED, ROUNDINGS, SAME, SHORTER, TIGHTER
 
 DEFAULT = 1e-8  # rtol, and atol, of a run without one
 
@@ -118,11 +118,12 @@ def _agreeing(law, case, solution, run, options):
         one, two = run(case, **tighter), run(case, **tighter | options | _tolerances(case, options, TIGHTER))
         return _distance(case, one, two) if one.success and two.success else np.nan
 
-    return _falling(law, apart, _distance(case, solution, other), case, run)
+    rounded = NEAR_SINGULAR_ENDS if is_near_singular(solution) else ROUNDED
+    return _falling(law, apart, _distance(case, solution, other), case, run, rounded)
 
 
-def _falling(law, error_of, error, case, run):
-    """Judge an error, and where it is large, error_of(options), which is NaN for runs that fail."""
+def _falling(law, error_of, error, case, run, rounded=ROUNDED):
+    """Judge an error, and where it is large, error_of(options), NaN for runs that fail; below `rounded` it is none."""
     limit, first = MULTIPLE * _tolerance(case), error
     if error <= limit:
         return [Finding(law, error, limit)]
@@ -132,7 +133,7 @@ def _falling(law, error_of, error, case, run):
         before, error = error, error_of(options)
         if np.isnan(error):
             return []
-        found = Finding(law, error, max(FALL * before, ROUNDED), f"{first:.1e} at the looser tolerance")
+        found = Finding(law, error, max(FALL * before, rounded), f"{first:.1e} at the looser tolerance")
         if not found.broken:
             break
     return [found]

@@ -14,7 +14,19 @@ from ..elements.markers import POINT
 from ..model.sparse_jacobian import WIDTH, places, with_short_rows
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
-from .tolerances import BALANCE, BODIES, EPS, FLOOR, ILL_CONDITIONED, NEAR_SINGULAR, OUTPUTS, ROUNDINGS, ROW_SHARE, SAME
+from .tolerances import (
+    BALANCE,
+    BODIES,
+    EPS,
+    FLOOR,
+    HELD,
+    ILL_CONDITIONED,
+    NEAR_SINGULAR,
+    OUTPUTS,
+    ROUNDINGS,
+    ROW_SHARE,
+    SAME,
+)
 
 LEVELS = ("position", "velocity", "acceleration")
 
@@ -223,7 +235,7 @@ def dense_output(solution):
     for name in ("q", "qd"):
         given = getattr(solution, name)[at]
         size = 1.0 + np.abs(given).max(initial=0.0)
-        limit = SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0)
+        limit = SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + HELD / (extent(solution) or 1.0)
         yield Finding(
             f"dense output, {name}", float(np.abs(getattr(state, name) - given).max(initial=0.0) / size), limit
         )

@@ -17,8 +17,13 @@ ROUNDINGS = 1e5
 MULTIPLE, TIGHTER, SHORTER, FALL = 1e3, 1e-3, 8.0, 0.1
 # Below this change relative to the size nothing is judged by convergence: it is rounding, amplified.
 ROUNDED = 1e-10
+# Of the ends of two runs past singular configurations, which amplify rounding; the other branch is off by far more.
+NEAR_SINGULAR_ENDS = 1e-4
 # Dense output at the ends of steps; output times beside steps.
 SAME = 1e-10
+# m: positions are held to this where Phi has rows of axes, which are pure numbers; in small scenes angles are, over
+# their size.
+HELD = 1e-14
 # Next to a singular configuration, where a chart has a condition of ILL_CONDITIONED or more, rounding is amplified by
 # so much.
 NEAR_SINGULAR, ILL_CONDITIONED = 1e2, 1e8

@@ -26,7 +26,7 @@ from .tolerances import CUT_SHORT, HALVED, QUARTERED, SHRINK, TURN_GAIN
 
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
-JAMMED, PASSAGE = int(Status.JAMMED), int(Status.PASSAGE)
+JAMMED, PASSAGE, UNHELD = int(Status.JAMMED), int(Status.PASSAGE), int(Status.UNHELD)
 OFF_CHART = CHART_LOST, int(Status.NEWTON_FAILED), int(Status.SINGULAR)  # what a chart that reaches nowhere ends in
 
 call_check = caller("p")
@@ -56,7 +56,9 @@ def _enter(context, c, r, log):
         return status
     store_now(w, r)
     count_turns(r, w.q, w.qd, 0.0)
-    call_check(r.kernels.check, context)
+    status = -min(call_check(r.kernels.check, context), 0)
+    if status != 0:
+        return status
     record_end(w, r, log, t)
     r.numbers.begun = 1
     if r.numbers.adaptive == 1 and r.clock.h == 0.0:
@@ -103,7 +105,7 @@ def _propose(c, r, stop, driven):
         failed = r.numbers.failed
         if failed in OFF_CHART and r.numbers.may_pass == 1:
             return PASSAGE, t1, False, False
-        return failed if failed in (NOT_FINITE, JAMMED) else STEP_COLLAPSED, t1, False, False
+        return failed if failed in (NOT_FINITE, JAMMED, UNHELD) else STEP_COLLAPSED, t1, False, False
     if t1 + stretch(r.clock.h, r.clock.max_step) >= end:
         t1 = end
     return 0, t1, t1 == r.clock.t_end, False
@@ -154,6 +156,8 @@ def _attempt(context, run, c, r, t1, implicit):
 def _judge_chart(context, c, r, h, driven):
     """Whether the chart still holds at the end of a step: a Status, and the reason for a new one, 0 for none."""
     reason = call_check(r.kernels.check, context)
+    if reason < 0:
+        return -reason, reason
     lost = not c.work.control.contraction < CONTRACTION_LOST
     if lost or (driven and too_far(c.system.bodies, r.now, c.work.qd, h)):
         return CHART_LOST, reason
@@ -177,6 +181,7 @@ def _halve(c, r, h):
 def _change_chart(context, c, r, log, h, status, driven):
     """Reject a step that left the chart: back to its start, on a new chart if this one has been used. Status."""
     restore_now(c.work, r)
+    c.chart.state.placement = 0  # the poses are not those that the next chart begins at
     r.numbers.rejected += 1
     if r.numbers.in_chart == 0:
         if r.numbers.adaptive == 0:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from copy import copy
+from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 from ..calls import fitting
 from ..docstrings import complete_docstring
+from ..jit.code_hash import is_ours
 from ..validation import positive
 from .diagonally_implicit import implicit_step, memory_of
 from .explicit import embedded_error, nystrom_step, runge_kutta_step, second_embedded_error, second_order_step
@@ -240,6 +242,12 @@ class DiagonallyImplicit(Adaptive):
         """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
         return implicit_step, self.tableau.numbers, lambda nx, ny: memory_of(stages, nx)
+
+
+@cache
+def is_own(kind: type[Integrator]) -> bool:
+    """Whether a class is one of tsdyn's: its attributes are numbers, and say all that there is to know of a method."""
+    return is_ours(kind.__module__)
 
 
 def registered() -> Mapping[str, type[Integrator]]:

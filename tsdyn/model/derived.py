@@ -24,7 +24,9 @@ class Derived:
     loads: dict = None  # reactions.loads_of
     places_within: list = None  # of each primitive among those of its class: reactions.only
     coordinate_starts: dict = None  # diagnostics.starts
-    levers: object = None  # (bodies,), m: rounding_limit.within_rounding
+    engines: dict = field(default_factory=dict)  # scene_cache.Prepared.engine
+    levers: object = None  # (bodies,), m: rounding_limit.within_rounding, and the start last found near the origin:
+    near: object = None
     grounded: tuple = None  # local_origin.origin_of, and for the start last seen:
     origin: tuple = (None, None)
     local: tuple = None  # the scene from an origin of its own: local_origin
@@ -39,6 +41,7 @@ class Derived:
         """Other bodies turn."""
         self.locked = self.moving_graph = None
         self.moving_networks.clear()
+        self.engines = {}  # and not cleared: a run in another thread may be about to add one
 
     def __reduce__(self):
         """In another process: what doesn't depend on where things are in memory."""

@@ -34,6 +34,7 @@ class Memory:
     """
 
     reason = ""  # of the end of a run: told by its status
+    engine = None  # that it is laid out for
     advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
 
     def __init__(self, prepared, graph, context, run):
@@ -42,7 +43,8 @@ class Memory:
         self.settle(context)
         self._run, *self._keep_run = resident(run)
         records = work.control, work.counters, run.clock, run.numbers, run.kernels
-        self._written = [work.q.base, *map(words, records)]  # what the next run must not find
+        self._scratch = [work.q.base]  # what a run must not find: zero at its start,
+        self._laid_out, self._images = [*map(words, records)], []  # and what is so as the engine has laid it out
 
     def settle(self, context, header=()):
         """Let the kernels find this context, behind the integers of a header."""
@@ -54,13 +56,45 @@ class Memory:
         """Addresses of the context and of the run."""
         return self._context, self._run
 
-    def clear(self, task, system):
-        """As if it were new, for this task and a source of its system: what a run before has left behind is gone."""
-        own, work, run = self.context.system, self.work, self.run
-        for array in self._written:
+    def enter(self, engine, task, dense, may_pass):
+        """As if it were new, for an engine and a task: what a run before has left behind is gone."""
+        for array in self._scratch:
             array.fill(0)
+        if self.engine is engine:
+            for array, image in self._images:
+                array[...] = image
+        else:
+            self._lay_out(engine)
         reset_selection(self.graph, self.context.tangent)
-        own.reals[...] = system.reals  # motions, signals and what forces remember are written there
+        self._enter_start(task, engine.form)
+        self._set_out(task, dense, may_pass)
+
+    def _lay_out(self, engine):
+        """Enter what an engine says, and load the driver where this process has not called it yet."""
+        self.engine = None
+        for array in self._laid_out:
+            array.fill(0)
+        self._enter_method(engine.method)
+        engine.lay_out(self)
+        self.load()
+        self._images = [(array, array.copy()) for array in self._laid_out]
+        self.engine = engine
+
+    def _enter_method(self, method):
+        """Steps and tolerances."""
+        clock, numbers = self.run.clock, self.run.numbers
+        if method.step is None:
+            numbers.adaptive, numbers.steps_wanted = 1, UNLIMITED
+            clock.rtol, clock.atol = method.step_tolerances()
+            clock.max_step = method.max_step or math.inf
+            clock.h = min(method.first_step or 0.0, clock.max_step)  # 0: of the driver's own choice
+        else:
+            clock.h = method.step
+
+    def _enter_start(self, task, form):
+        """Positions, velocities, what is remembered, and how closely the constraints are held."""
+        own, work, run = self.context.system, self.work, self.run
+        own.reals[...] = self.reals  # motions, signals and what forces remember are written there
         enter_joints(run, task.prepared.handles, task.remembered)
         if own.memory.size:
             own.reals[own.memory] = task.remembered[len(run.joints) :]
@@ -69,21 +103,16 @@ class Memory:
         control = work.control
         control.size = size = task.prepared.packed.size
         control.u_tol = control.b_tol = task.constraint_tol
-        if task.form.basis_free and 0.0 < size < 1.0:  # a small scene is held as closely; no Phi is a normalisation's
+        if form.basis_free and 0.0 < size < 1.0:  # a small scene is held as closely; no Phi is a normalisation's
             control.u_tol *= size
 
-    def set_out(self, task, dense, may_pass):
-        """The interval, the method's steps and tolerances, and what the run is to do."""
+    def _set_out(self, task, dense, may_pass):
+        """The interval, and what the run is to do."""
         method, clock, numbers = task.method, self.run.clock, self.run.numbers
         clock.t = clock.t_origin = task.span[0]
         clock.t_end = task.span[1]
-        if method.step is None:
-            numbers.adaptive, numbers.steps_wanted = 1, UNLIMITED
-            clock.rtol, clock.atol = method.step_tolerances()
-            clock.max_step = method.max_step or math.inf
-            clock.h = min(method.first_step or 0.0, clock.max_step)  # 0: of the driver's own choice
-        else:
-            clock.h, numbers.steps_wanted = method.step, step_count(*task.span, method.step)
+        if method.step is not None:
+            numbers.steps_wanted = step_count(*task.span, method.step)
         numbers.dense, numbers.may_pass, numbers.chart_interval = dense, may_pass, task.interval
         numbers.leave_when_stiff = task.choose is not None
 

@@ -6,6 +6,7 @@ last one took.
 """
 
 import time
+from functools import cached_property
 
 from ..errors import InconsistentState, SingularConfiguration, Status
 from ..jit.interrupts import deferred_interrupts
@@ -58,11 +59,16 @@ class Slices:
 
     def __init__(self, memory, task, watch, recorder):
         self.memory, self.task, self.watch, self.recorder = memory, task, watch, recorder
-        self.run, self.choose, self.pace = memory.run, task.choose, Pace(task.span[0])
-        numbers = self.run.numbers
-        self.limit = numbers.steps_wanted + len(task.stops) if task.max_steps is None else task.max_steps
+        self.run, self.choose = memory.run, task.choose
+        wanted = self.run.numbers.steps_wanted
+        self.limit = wanted + len(task.stops) if task.max_steps is None else task.max_steps
         self.most = min(max(FIRST_WORK // memory.weight, 1), FIRST_SLICE)
         self.status, self.reason = Status.SLICE_DONE, ""
+
+    @cached_property
+    def pace(self):
+        """The `Pace` of the run."""
+        return Pace(self.task.span[0])
 
     def drive(self):
         """Advance until the end."""

@@ -1,7 +1,5 @@
 """Run workspace of the step driver."""
 
-import numpy as np
-
 from ..model.packed import System
 from ..rows.interface import redundancy
 from ..workspaces.run_state import lay_out
@@ -40,20 +38,25 @@ class StepMemory(Memory):
         angles, slots = prepared.handles.count, system.memory.size
         run = lay_out(n, *sizes, angles, slots, warm=warm_size(work), **lengths)
         linear = allocate_linear(system, n, m, implicit, kept, redundant)
-        written = [run.x.base, linear.K.base, linear.pivots]
-        written += [np.frombuffer(record, np.int64) for record in (linear.numbers, linear.kernels)]
         if implicit:
             linear = linear._replace(now=run.now, before=run.before)
         context = Context(system, work, linear, *basis_free_parts(graph, n, not basis_free))
         super().__init__(prepared, graph, context, run)
         self.weight = n if basis_free else n + n**3 // MATRICES
-        self._written += [*written, words(context.chart.state)]
-        self.nbytes = sum(array.nbytes for array in (*self._written, context.tangent.rows.S, context.tangent.poses))
+        self._scratch += [run.x.base, linear.K.base, linear.pivots]
+        self._laid_out += map(words, (linear.numbers, linear.kernels, context.chart.state))
+        rest = *self._laid_out, context.tangent.rows.S, context.tangent.poses
+        self.nbytes = sum(array.nbytes for array in (*self._scratch, *rest))
 
-    def clear(self, task, system):
-        """As of `Memory`; the system may be another one of the same shape."""
+    def enter(self, engine, task, dense, may_pass):
+        """As of `Memory`."""
+        super().enter(engine, task, dense, may_pass)
+        self.run.tableau[:] = engine.tableau
+
+    def take_system(self, system):
+        """Take the numbers of a system, which may be another one of the same shape."""
+        self.reals = system.reals
         if self.source is not system:
             self.source = system
             for own, new in zip(self.context.system, system, strict=True):
                 own[:] = new
-        super().clear(task, system)

@@ -295,9 +295,15 @@ class Scene:
     @property
     def start(self) -> tuple[Floats, Floats]:
         """Initial (q, qd) of the bodies, shapes (n,), (n,)."""
-        if self._start is None:
-            self._start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
-        return tuple(array.copy() for array in self._start)
+        return tuple(array.copy() for array in self._initial())
+
+    def _initial(self):
+        """The same, until the scene changes the same arrays, not to be written to."""
+        start = self._start
+        if start is None:
+            start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
+            self._start = start
+        return start
 
     def body(self, name: str) -> Body | Any:
         """Return the body of this name."""

@@ -89,8 +89,6 @@ class Solution(Outputs, Balances, Kinematics["Floats"]):
     """
 
     status: Status
-    message: str
-    stats: SimpleNamespace
     t_events: list[Floats] | Any  # None without events
     q_events: list[Floats] | Any
     qd_events: list[Floats] | Any
@@ -107,14 +105,28 @@ class Solution(Outputs, Balances, Kinematics["Floats"]):
         self._reached, self._last = outcome.reached, outcome.last
         self._angles, self._remembered = outcome.remembered[:angles], outcome.remembered[angles:]
         self._step_log, self._chart_log = outcome.steps, outcome.charts
-        self.stats = SimpleNamespace(**outcome.counts, seconds=seconds, energy_error=None)
-        if self.stats.steps_near_singular:
-            self.stats.energy_error = energy_error(self, task)
-        self.message = account(self, scene, outcome.reason)  # written now, since the scene may change
+        near = outcome.counts["steps_near_singular"]
+        self._counts, self._seconds = outcome.counts, seconds
+        self._energy_error = energy_error(self, task) if near else None
+        self._reason, self._message = outcome.reason, None
+        if near or not self.success or self.packed.derived.redundant is not None:
+            self._message = account(self, scene, self._reason)  # written now, since the scene may change
 
     def __setstate__(self, state):
         """Restore a pickled solution; the packed scene looks its kernels up."""
         self.__dict__.update(state, system=state["packed"].system)
+
+    @cached_property
+    def stats(self) -> SimpleNamespace:
+        """Counts of the run, see `Solution`."""
+        return SimpleNamespace(**self._counts, seconds=self._seconds, energy_error=self._energy_error)
+
+    @property
+    def message(self) -> str:
+        """What happened, where, and the remedy."""
+        if self._message is None:
+            self._message = account(self, self.scene, self._reason)
+        return self._message
 
     @property
     def success(self) -> bool:

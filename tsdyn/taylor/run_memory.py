@@ -4,7 +4,7 @@ from ..errors import InvalidArgument, Status
 from ..formulations.locked_orientations import moving_parts
 from ..model.packed import System
 from ..rows.interface import allocate_tangent
-from ..runs.run_memory import Memory
+from ..runs.run_memory import Memory, words
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import with_loops
 from ..workspaces.run_state import lay_out
@@ -60,6 +60,8 @@ class SeriesMemory(Memory):
         run = lay_out(n, 0, 0, prepared.handles.count, system.memory.size, block=block)
         context = SeriesContext(system, plain_work(n), graph, tangent, expansion, trial)
         super().__init__(prepared, graph, context, run)
+        self.reals = packed.system.reals
+        self._laid_out.append(words(expansion.order))
         self.nbytes = 8 * (expansion.bodies.size + expansion.constraints.size + tangent.rows.S.size + run.block.size)
 
     def advance(self, log, most):

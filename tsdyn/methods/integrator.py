@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 from ..calls import fitting
 from ..docstrings import complete_docstring
 from ..jit.code_hash import is_ours
-from ..validation import positive
+from ..validation import checked_once, positive
 from .diagonally_implicit import implicit_step, memory_of
 from .explicit import embedded_error, nystrom_step, runge_kutta_step, second_embedded_error, second_order_step
 from .interpolants import HERMITE, HERMITE_FIRST_ORDER, hermite_second
@@ -242,6 +242,22 @@ class DiagonallyImplicit(Adaptive):
         """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
         return implicit_step, self.tableau.numbers, lambda nx, ny: memory_of(stages, nx)
+
+
+def frozen(method: Integrator) -> Integrator:
+    """Return a method of tsdyn's as it is now, the same object as long as it has the same attributes.
+
+    A user's method, which may depend on anything, is returned itself.
+    """
+    known = vars(method)
+    return _frozen(type(method), (*known,), *known.values()) if is_own(type(method)) else method
+
+
+@checked_once
+def _frozen(kind, names, *values):
+    method = kind.__new__(kind)
+    vars(method).update(zip(names, values, strict=True))
+    return method
 
 
 @cache

@@ -113,7 +113,7 @@ class Recorder:
         """Log the charts that have been left, and let the present one be the first."""
         run, charts, points = self.run.numbers, self.charts, self.points
         left = run.chart_rows
-        self._log_charts(charts[:left])
+        self._log_charts(charts[:left].copy())
         charts[0], points[:1] = charts[left], points[left : left + 1]
         run.chart_rows = 0
 

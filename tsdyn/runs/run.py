@@ -17,7 +17,6 @@ the ends of steps; serves any number of runs (`Prepared.engine`), and has
 import time
 
 from ..errors import Status
-from ..workspaces.run_state import FILLED, STORED
 from .counts import Counts
 from .run_log import left_open
 from .sampling import Sampled
@@ -25,6 +24,8 @@ from .segments import Relay
 from .slices import drive
 from .task import Outcome
 from .trajectory import Trajectory
+
+NOT_FINITE = Status.NOT_FINITE
 
 
 def run(task, engine, observe=None, relay=None, past=None):
@@ -39,19 +40,24 @@ def run(task, engine, observe=None, relay=None, past=None):
     memory = None if observe else prepared.take(engine.kind)
     if memory is None or not engine.serves(memory):
         memory = engine.memory(prepared)
-    dense = STORED if task.dense_output else FILLED if task.events is not None else 0
-    memory.enter(engine, task, dense, relay is not None)
-    reading, again = engine.reading(memory, prepared, task.constraint_tol) if dense else (None, None)
+    memory.enter(engine, task, relay is not None)
+    readings = None, None
+    if memory.run.numbers.dense:
+        readings = engine.reading(memory, prepared, task.constraint_tol)
     if observe is not None:
         observe(memory)
-    relay = relay or Relay()
-    relay.enter(memory)
-    watch, began = relay.watching(task, reading), time.perf_counter()
+    watch = None
+    if relay is not None:
+        relay.enter(memory)
+    if task.events is not None:
+        watch = (relay or Relay()).watching(task, readings[0])
+    began = time.perf_counter()
     advanced = memory if task.sampling is None else Sampled(memory, task.sampling)
     driven = drive(advanced if past is None else past(advanced), task, watch)
-    relay.leave(memory)
-    outcome = _outcome(task, engine, memory, driven, (reading, again), watch, began)
-    if observe is None and outcome.status != Status.NOT_FINITE:  # NaN may be left in what a run takes as its own
+    if relay is not None:
+        relay.leave(memory)
+    outcome = _outcome(task, engine, memory, driven, readings, watch, began)
+    if observe is None and outcome.status is not NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give(engine.kind, memory)
     return outcome
 

@@ -41,6 +41,7 @@ class StepEngine:
         """Enter the system, and the numbers and kernels of the method."""
         method, form, run, nx = self.method, self.form, memory.run, self.sizes[0]
         memory.take_system(self.system)
+        run.tableau[:] = self.tableau
         given = method, form, self.step, self.interpolant
         _set(run.kernels, kernels_of(*given, adaptive=method.step is None, within=self.within))
         run.numbers.first_order = form.first_order

@@ -3,7 +3,7 @@
 from ..model.packed import System
 from ..rows.interface import redundancy
 from ..workspaces.run_state import lay_out
-from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
+from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts, divided
 from .dense_output import warm_size
 from .run_memory import Memory, words
 from .stepper import advance
@@ -43,15 +43,12 @@ class StepMemory(Memory):
         context = Context(system, work, linear, *basis_free_parts(graph, n, not basis_free))
         super().__init__(prepared, graph, context, run)
         self.weight = n if basis_free else n + n**3 // MATRICES
-        self._scratch += [run.x.base, linear.K.base, linear.pivots]
-        self._laid_out += map(words, (linear.numbers, linear.kernels, context.chart.state))
+        self._laid_out.append(words(context.chart.state))
+        head, rest = divided(linear.K.base, linear.kernels, linear.numbers)
+        self._laid_out.append(head)
+        self._scratch += [self._run_scratch, *((rest, linear.pivots) if implicit else ())]
         rest = *self._laid_out, context.tangent.rows.S, context.tangent.poses
         self.nbytes = sum(array.nbytes for array in (*self._scratch, *rest))
-
-    def enter(self, engine, task, dense, may_pass):
-        """As of `Memory`."""
-        super().enter(engine, task, dense, may_pass)
-        self.run.tableau[:] = engine.tableau
 
     def take_system(self, system):
         """Take the numbers of a system, which may be another one of the same shape."""

@@ -17,7 +17,7 @@ from .history import ChartLog, StepLog
 def between(times, span):
     """Whether there are times between the ends of a span."""
     start, end = span
-    return times.size > 2 or any([start < t < end for t in times.tolist()])  # a list: faster for two
+    return times.size > 0 and (times.size > 2 or any([start < t < end for t in times.tolist()]))  # a list: faster
 
 
 class Task(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..formulations.registry import formulation as find_formulation
-from ..methods.integrator import registered
+from ..methods.integrator import frozen, registered
 from ..runs.arguments import interval, method_of, output_times
 from ..runs.events import prepare
 from ..runs.task import between
@@ -96,7 +96,7 @@ def _method(integrator, rtol, atol, form):
     """Return the requested method, None for the default."""
     if integrator is None:
         return None
-    method = method_of(integrator, rtol, atol)
+    method = frozen(method_of(integrator, rtol, atol))
     if method.implicit and form.first_order:
         others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
         raise InvalidArgument(

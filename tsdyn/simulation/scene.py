@@ -80,6 +80,7 @@ class Scene:
         self.ground = Ground(self)
         self._bodies, self._added, self._forces, self._normalisations = [], [], [], {}
         self._waiting, self._titles = {}, None  # see membership.py
+        self._users = None  # of compiled functions; what holds them, see `user_functions`
         self._names = None  # of ground and bodies; None if a body may have been renamed
         self._twins = None  # handle of the scene that this one is a copy of -> handle here
         self.gravity = gravity

@@ -24,7 +24,8 @@ LARGEST = 1 << 24  # bytes of a memory that is kept, at most
 
 def prepared(scene):
     """Return the `Prepared` of the present scene."""
-    scene.refresh()
+    if scene._users:
+        scene.refresh()
     kept = scene._prepared
     if kept is None:
         kept = scene._prepared = Prepared(scene, scene.packed)
@@ -41,6 +42,7 @@ class Prepared:
         self.packed, self.motions = packed, scene.motions()
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
         self._start = (None, None), None
+        self.remembers = bool(packed.system.memory.size or handles_of(packed).count)
         every = scene.__dict__.setdefault("_spare", {})
         if len(every) >= KINDS:
             every.clear()
@@ -89,14 +91,13 @@ class Prepared:
         return stops_of(self.motions, instants_of(self.packed, t0, t1), t0, t1) if self._has_stops else NO_STOPS
 
     def engine(self, kind, method, form, within):
-        """The engine of a method in a form, as of runs/run.py.
+        """The engine of a method, as `frozen` returns it, in a form; see runs/run.py.
 
-        The same one serves again as long as the attributes of the method, if it is one of tsdyn's, and the rows and
-        bodies that take part in the equations are the same.
+        That of a method of tsdyn's serves again until other rows or bodies take part in the equations.
         """
         if not is_own(type(method)):
             return kind(self, method, form, within)
-        known, key = self.packed.derived.engines, (kind, type(method), form.name, within, *vars(method).items())
+        known, key = self.packed.derived.engines, (kind, method, form.name, within)
         engine = known.get(key)
         if engine is None:
             if len(known) >= KINDS:

@@ -11,6 +11,7 @@ from ..calls import fitting
 from ..configuration.holonomic import demand_holonomic
 from ..elements.membership import warn_of_waiting
 from ..errors import InvalidArgument, Status
+from ..methods.integrator import frozen
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
 from ..runs.run import run
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
     from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Span, State
 
+STIFF = Status.STIFF
 DRIVERS = {"steps": run_past, "series": partial(run, engine=SeriesEngine)}  # by Integrator.driver; see task.py
 
 
@@ -142,10 +144,11 @@ def simulate(  # many arguments, by name: each is an option of a run
     >>> bool(solution.constraint_error.position.max() < 1e-12)
     True
     """
-    given = {**locals()}
+    given = locals()
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
-    warn_of_waiting(scene, 3)
+    if scene._waiting:
+        warn_of_waiting(scene, 3)
     if store is not None or checkpoint is not None:
         stored_runs.demand_storable(given)
     return run_from(given)
@@ -163,7 +166,7 @@ def run_from(given, numbers=None, arrays=None, archive=None):
     if method is None:
         method = method_choice.explicit(kept, *default)
     if settings.max_step is not None:
-        method = method.bounded(settings.max_step)
+        method = frozen(method.bounded(settings.max_step))
 
     started = time.perf_counter()
     choose = None
@@ -174,7 +177,7 @@ def run_from(given, numbers=None, arrays=None, archive=None):
         return _run_stored(task, given, options, (numbers, arrays), archive)
     outcome = _run(task, scene, settings.initial_tol)
     ended = time.perf_counter()
-    if outcome.status == Status.STIFF:
+    if outcome.status is STIFF:
         return run_from(_stiff(given, method))
     return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
@@ -195,7 +198,7 @@ def _run_stored(task, given, options, found, archive):
     try:
         outcome = _run(task._replace(archive=archive), scene, options.settings.initial_tol)
         seconds = time.perf_counter() - started
-        if outcome.status == Status.STIFF:
+        if outcome.status is STIFF:
             given = _stiff(given, task.method)
             return run_from(given, archive=stored_runs.begin_again(archive, given))
         outcome = stored_runs.ended(archive, outcome, seconds)
@@ -229,6 +232,6 @@ def _run(task, scene, initial_tol):
         return run_near(driver, task, scene, origin, initial_tol)
     limited, said = within_rounding(task.method, packed, task.q)
     outcome = driver(task if limited is task.method else task._replace(method=limited))
-    if outcome.status != Status.STIFF and said:
+    if said and outcome.status is not STIFF:
         outcome = outcome._replace(reason=" ".join(part for part in (outcome.reason, said) if part))
     return outcome

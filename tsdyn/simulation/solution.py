@@ -12,6 +12,7 @@ import numpy as np
 from ..calls import fitting_methods
 from ..errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from ..formulations.chart_validity import REASONS
+from ..methods.integrator import is_own
 from ..model.packed import member_of
 from ..observables import diagnostics, reactions, uniqueness
 from ..observables.friction_reactions import with_normal_loads
@@ -25,6 +26,8 @@ from .termination import account
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Bools, ConstraintError, Floats, Integers, ItemLike, Scene
+
+SUCCESSES = Status.SUCCESS, Status.EVENT
 
 
 class Steps(NamedTuple):
@@ -95,7 +98,8 @@ class Solution(Outputs, Balances, Kinematics["Floats"]):
 
     def __init__(self, scene: Scene, task: Any, outcome: Any, seconds: dict[str, float]) -> None:
         self.scene, self.packed = scene, task.prepared.packed
-        self.method, self.formulation, self.span = repr(task.method), task.form.name, task.span
+        self.formulation, self.span = task.form.name, task.span
+        self._method = task.method if is_own(type(task.method)) else repr(task.method)
         self.system = self.packed.system
         self.status, self._trajectory = outcome.status, outcome.trajectory
         self.t_events, self.q_events, self.qd_events = outcome.events or (None, None, None)
@@ -116,6 +120,11 @@ class Solution(Outputs, Balances, Kinematics["Floats"]):
         """Restore a pickled solution; the packed scene looks its kernels up."""
         self.__dict__.update(state, system=state["packed"].system)
 
+    @property
+    def method(self) -> str:
+        """The method with its settings."""
+        return self._method if isinstance(self._method, str) else repr(self._method)
+
     @cached_property
     def stats(self) -> SimpleNamespace:
         """Counts of the run, see `Solution`."""
@@ -131,7 +140,7 @@ class Solution(Outputs, Balances, Kinematics["Floats"]):
     @property
     def success(self) -> bool:
         """True if the run reached the end of the interval, or a terminal event."""
-        return self.status in (Status.SUCCESS, Status.EVENT)
+        return self.status in SUCCESSES
 
     def raise_if_failed(self) -> Self:
         """Raise StepFailure, with this solution as `.solution`, if the run ended early; return self otherwise."""

@@ -14,6 +14,8 @@ from .step_parts import pass_singular
 from .stepper import advance_series
 from .workspace import SeriesContext, Trial
 
+PASSAGE = Status.PASSAGE
+
 
 class Series:
     """What the Taylor runs of a packed scene share: its graph, with the loops that they need.
@@ -67,7 +69,7 @@ class SeriesMemory(Memory):
     def advance(self, log, most):
         """As of `Memory`."""
         status = super().advance(log, most)
-        if status == Status.PASSAGE:  # the run ends next to a singular configuration
+        if status is PASSAGE:  # the run ends next to a singular configuration
             self.run.kernels.pass_singular = pass_singular.address
             status = super().advance(log, most)
         return status

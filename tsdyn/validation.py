@@ -12,7 +12,7 @@ EXACT = 2**53  # integers below it are floats
 
 
 def checked_once(function):
-    """Decorate a check: arguments equal in value and type to earlier ones have its result, unless one can't be hashed."""
+    """Decorate a check: arguments of the values and types of earlier ones have its result, if they can be hashed."""
     known = lru_cache(typed=True)(function)
 
     @wraps(function)

@@ -19,6 +19,7 @@ class Derived:
     moving_graph: tuple = None  # locked_orientations.moving_graph, and by the loops asked for:
     moving_networks: dict = field(default_factory=dict)
     examined: object = None  # a `Packed` without redundant rows so far: dependent_rows.dependent_rows
+    start_workspaces: list = field(default_factory=list)  # idle: start_workspace.taken
     aligned: tuple = None  # mirrored_branches.demand_aligned
     holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
     loads: dict = None  # reactions.loads_of

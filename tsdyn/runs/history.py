@@ -63,7 +63,7 @@ class ChartLog:
             self.chunks += part.chunks
 
     def add(self, rows, steps):
-        """Take rows (k, 5) as of `RunLog.charts`; instants that are the starts of the latest `steps` aren't kept twice."""
+        """Take rows (k, 5) as of `RunLog.charts`; instants that are the starts of the latest `steps` aren't copied."""
         if _few(rows, self.chunks):
             self.chunks.append(rows)
             return

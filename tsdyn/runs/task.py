@@ -17,7 +17,7 @@ from .history import ChartLog, StepLog
 def between(times, span):
     """Whether there are times between the ends of a span."""
     start, end = span
-    return times.size > 0 and (times.size > 2 or any([start < t < end for t in times.tolist()]))  # a list: faster
+    return times.size > 2 or any([start < t < end for t in times.tolist()])  # a list: faster for two
 
 
 class Task(NamedTuple):
@@ -51,7 +51,8 @@ class Task(NamedTuple):
     @property
     def within(self):
         """True if output between the ends of steps is requested."""
-        return self.dense_output or self.events is not None or between(self.times, self.span)
+        times = self.times
+        return self.dense_output or self.events is not None or (times.size > 0 and between(times, self.span))
 
 
 class Outcome(NamedTuple):

@@ -67,7 +67,7 @@ def checked(given):
         events,
         reporter(given["progress"]),
         given["store"] is None if settings.history is None else settings.history,
-        settings.dense_output or events is not None or between(times, span),
+        settings.dense_output or events is not None or (times.size > 0 and between(times, span)),
         settings,
     )
 

@@ -30,7 +30,7 @@ class Outputs:
         in_memory, self._slice = isinstance(rows, np.ndarray), slice(None)
         self._stored, self._rows = None if in_memory else rows, (rows, n) if in_memory else None
 
-    def _part(self, rows, n):
+    def _unpack(self, rows, n):
         """Make arrays of the rows of a run, when the first of them is asked for."""
         self.q, self.qd, self.qdd = rows[:, 1 : 1 + 3 * n].reshape(-1, 3, n).swapaxes(0, 1).copy()
         self._set_remembered(rows[:, 1 + 3 * n :].copy())
@@ -44,7 +44,7 @@ class Outputs:
     def __getattr__(self, name: str) -> Any:
         rows, stored = self.__dict__.get("_rows"), self.__dict__.get("_stored")
         if name in _COLUMNS and rows is not None:
-            self._part(*rows)
+            self._unpack(*rows)
         if name in _COLUMNS and name in self.__dict__:  # made now, or by another thread
             return self.__dict__[name]
         if stored is None or name not in _COLUMNS:

@@ -109,11 +109,10 @@ class Solution(Outputs, Balances, Kinematics["Floats"]):
         self._reached, self._last = outcome.reached, outcome.last
         self._angles, self._remembered = outcome.remembered[:angles], outcome.remembered[angles:]
         self._step_log, self._chart_log = outcome.steps, outcome.charts
-        near = outcome.counts["steps_near_singular"]
-        self._counts, self._seconds = outcome.counts, seconds
+        self._counts, self._seconds, near = outcome.counts, seconds, outcome.counts["steps_near_singular"]
         self._energy_error = energy_error(self, task) if near else None
         self._reason, self._message = outcome.reason, None
-        if near or not self.success or self.packed.derived.redundant is not None:
+        if near or outcome.status not in SUCCESSES or self.packed.derived.redundant is not None:
             self._message = account(self, scene, self._reason)  # written now, since the scene may change
 
     def __setstate__(self, state):

@@ -38,7 +38,6 @@ class Series:
         graph, self.kinds = moving_parts(packed)
         self.constant_columns = masks(graph, packed)
         self.graph = with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
-        self.packed = packed
 
 
 class SeriesMemory(Memory):

@@ -179,9 +179,7 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "E": (3 * bodies, k),
         "A": (k, k),
     }
-    work = Work(
-        **carve(shapes, control=Control, counters=Counters), redundant=np.zeros(redundant + 1, np.int64)
-    )
+    work = Work(**carve(shapes, control=Control, counters=Counters), redundant=np.zeros(redundant + 1, np.int64))
     work.control.u_tol = work.control.b_tol = constraint_tol
     work.control.size = size
     return work
@@ -206,9 +204,7 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
         "b": (k,),
     }
     shapes |= {"now": (3, n), "before": (3, n)}
-    return ImplicitWorkspace(
-        **carve(shapes, kernels=StageKernels, numbers=StageNumbers), pivots=np.zeros(k, np.int64)
-    )
+    return ImplicitWorkspace(**carve(shapes, kernels=StageKernels, numbers=StageNumbers), pivots=np.zeros(k, np.int64))
 
 
 def basis_free_parts(graph, n, basis):

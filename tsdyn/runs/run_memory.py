@@ -9,7 +9,7 @@ from ..errors import Status
 from ..jit.kernels import resident
 from ..rows.interface import reset_selection
 from ..workspaces.run_state import FILLED, STORED, enter_joints
-from ..workspaces.workspace import divided
+from ..workspaces.workspace import divided, hold
 from .arguments import step_count
 from .run_log import no_log
 
@@ -108,11 +108,7 @@ class Memory:
         work, run = self.work, self.run
         work.q[...], work.qd[...] = task.q, task.qd
         run.now[0], run.now[1] = task.q, task.qd
-        control = work.control
-        control.size = size = task.prepared.packed.size
-        control.u_tol = control.b_tol = task.constraint_tol
-        if self.engine.form.basis_free and 0.0 < size < 1.0:  # held as closely; no Phi is a normalisation's
-            control.u_tol *= size
+        hold(work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
 
     def _remember(self, task):
         """Angles of joints, and what forces remember."""

@@ -245,12 +245,9 @@ class DiagonallyImplicit(Adaptive):
 
 
 def frozen(method: Integrator) -> Integrator:
-    """Return a method of tsdyn's as it is now, the same object as long as it has the same attributes.
-
-    A user's method, which may depend on anything, is returned itself.
-    """
+    """Return a method as it is now, the same object as long as it has the same attributes; itself if it isn't plain."""
     known = vars(method)
-    return _frozen(type(method), (*known,), *known.values()) if is_own(type(method)) else method
+    return _frozen(type(method), (*known,), *known.values()) if is_plain(method) else method
 
 
 @checked_once
@@ -260,9 +257,14 @@ def _frozen(kind, names, *values):
     return method
 
 
+def is_plain(method: Integrator) -> bool:
+    """Whether a method is one of tsdyn's, with its own driver: numbers among its attributes say all about it."""
+    return is_own(type(method)) and "driver" not in vars(method)
+
+
 @cache
 def is_own(kind: type[Integrator]) -> bool:
-    """Whether a class is one of tsdyn's: its attributes are numbers, and say all that there is to know of a method."""
+    """Whether a class is one of tsdyn's."""
     return is_ours(kind.__module__)
 
 

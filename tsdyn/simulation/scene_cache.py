@@ -7,7 +7,7 @@ import numpy as np
 from ..configuration.initial_conditions import consistent
 from ..configuration.mirrored_branches import demand_aligned
 from ..formulations.locked_orientations import hold, still
-from ..methods.integrator import is_own
+from ..methods.integrator import is_plain
 from ..model.handles import handles_of
 from ..model.packed import with_curvatures
 from ..model.packed_forces import with_force_jacobians
@@ -93,9 +93,9 @@ class Prepared:
     def engine(self, kind, method, form, within):
         """The engine of a method, as `frozen` returns it, in a form; see runs/run.py.
 
-        That of a method of tsdyn's serves again until other rows or bodies take part in the equations.
+        That of a plain method serves again until other rows or bodies take part in the equations.
         """
-        if not is_own(type(method)):
+        if not is_plain(method):
             return kind(self, method, form, within)
         known, key = self.packed.derived.engines, (kind, method, form.name, within)
         engine = known.get(key)

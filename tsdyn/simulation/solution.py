@@ -12,7 +12,7 @@ import numpy as np
 from ..calls import fitting_methods
 from ..errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from ..formulations.chart_validity import REASONS
-from ..methods.integrator import is_own
+from ..methods.integrator import is_plain
 from ..model.packed import member_of
 from ..observables import diagnostics, reactions, uniqueness
 from ..observables.friction_reactions import with_normal_loads
@@ -99,7 +99,7 @@ class Solution(Outputs, Balances, Kinematics["Floats"]):
     def __init__(self, scene: Scene, task: Any, outcome: Any, seconds: dict[str, float]) -> None:
         self.scene, self.packed = scene, task.prepared.packed
         self.formulation, self.span = task.form.name, task.span
-        self._method = task.method if is_own(type(task.method)) else repr(task.method)
+        self._method = task.method if is_plain(task.method) else repr(task.method)
         self.system = self.packed.system
         self.status, self._trajectory = outcome.status, outcome.trajectory
         self.t_events, self.q_events, self.qd_events = outcome.events or (None, None, None)

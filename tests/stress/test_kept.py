@@ -10,6 +10,10 @@ from tsdyn.stress.random_scenes import generate
 KEPT = {
     2002342: "fixed steps across a spin that diverges",
     2003177: "a flat start: dense output beside outputs",
+    2000265: "rows that were redundant at the start become independent",
+    2010485: "the same by a step method",
+    2015426: "a redundant row at the limit",
+    2012861: "dense output of a row of four-bars of 1e-6 m",
     2011212: "dense output of a scene of 1e-6 m",
     2011079: "two methods past singular configurations, mass ratio 5e8",
     2002207: "far from the origin: balance of torques",

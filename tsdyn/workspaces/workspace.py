@@ -1,6 +1,8 @@
 """The workspace of a run: all arrays are laid out once, before the first step."""
 
+import ctypes
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -133,15 +135,27 @@ class Context(NamedTuple):
     chart: ChartWorkspace
 
 
-def carve(shapes):
-    """Arrays of zeros of these shapes, by name, cut from one block, which is the `base` of each."""
+def carve(shapes, **records):
+    """Records of these classes and arrays of these shapes, by name, all zero, cut in this order from one block.
+
+    The block is the `base` of each array.
+    """
     sizes = {name: math.prod(shape) for name, shape in shapes.items()}
-    block = np.zeros(sum(sizes.values()))
-    arrays, at = {}, 0
+    words = {name: ctypes.sizeof(kind) // 8 for name, kind in records.items()}
+    block, found, at = np.zeros(sum(words.values()) + sum(sizes.values())), {}, 0
+    for name, kind in records.items():
+        found[name] = kind.from_buffer(block, 8 * at)
+        at += words[name]
     for name, shape in shapes.items():
-        arrays[name] = block[at : at + sizes[name]].reshape(shape)
+        found[name] = block[at : at + sizes[name]].reshape(shape)
         at += sizes[name]
-    return arrays
+    return found
+
+
+def divided(block, *parts):
+    """A block in two: the records and arrays that it begins with, and the rest."""
+    at = sum(part.size if isinstance(part, np.ndarray) else ctypes.sizeof(part) // 8 for part in parts)
+    return block[:at], block[at:]
 
 
 def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=0):
@@ -165,7 +179,7 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "E": (3 * bodies, k),
         "A": (k, k),
     }
-    work = Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(redundant + 1, np.int64))
+    work = Work(**carve(shapes, control=Control, counters=Counters), redundant=np.zeros(redundant + 1, np.int64))
     hold(work.control, constraint_tol, size, joint_rows is not None)
     return work
 
@@ -197,9 +211,7 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
         "b": (k,),
     }
     shapes |= {"now": (3, n), "before": (3, n)}
-    return ImplicitWorkspace(
-        **carve(shapes), pivots=np.zeros(k, np.int64), kernels=StageKernels(), numbers=StageNumbers()
-    )
+    return ImplicitWorkspace(**carve(shapes, kernels=StageKernels, numbers=StageNumbers), pivots=np.zeros(k, np.int64))
 
 
 def basis_free_parts(graph, n, basis):
@@ -207,8 +219,9 @@ def basis_free_parts(graph, n, basis):
     return graph, allocate_tangent(graph, n, basis=basis), allocate_chart(graph)
 
 
+@cache
 def plain_context():
-    """A context of the right types."""
+    """A context of the right types, for these alone."""
     system = no_system()
     return Context(
         system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False), *basis_free_parts(no_graph(), 2, False)
@@ -223,7 +236,7 @@ def plain_work(n):
     others = ("control", "counters", "redundant")
     shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name not in others}
     shapes |= {"q": (n,), "qd": (n,), "qdd": (n,)}
-    return Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(1, np.int64))
+    return Work(**carve(shapes, control=Control, counters=Counters), redundant=np.zeros(1, np.int64))
 
 
 def parts(system, graph, n):

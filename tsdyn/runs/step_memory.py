@@ -21,6 +21,8 @@ class StepMemory(Memory):
     prepared : Prepared
     graph : ConstraintGraph
         Of the scene, as the form needs it.
+    saddle : SaddleGraph
+        Of an implicit method in a form without a basis; None for others.
     basis_free, implicit : bool
     sizes : tuple
         Of x and y.
@@ -30,7 +32,7 @@ class StepMemory(Memory):
 
     advance_kernel = staticmethod(advance)
 
-    def __init__(self, prepared, graph, basis_free, implicit, sizes, lengths):
+    def __init__(self, prepared, graph, saddle, basis_free, implicit, sizes, lengths):
         n, m, packed = prepared.n, prepared.m, prepared.packed
         self.implicit, self.basis_free = implicit, basis_free
         self.source, kept = prepared.system(implicit)
@@ -39,12 +41,13 @@ class StepMemory(Memory):
         work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant)
         angles, slots = prepared.handles.count, system.memory.size
         run = lay_out(n, *sizes, angles, slots, warm=warm_size(work), **lengths)
-        linear = allocate_linear(system, n, m, implicit, kept, redundant)
+        linear = allocate_linear(system, n, m, implicit and not basis_free, kept, redundant)
         written = [run.x.base, linear.K.base, linear.pivots]
         written += [np.frombuffer(record, np.int64) for record in (linear.numbers, linear.kernels)]
         if implicit:
             linear = linear._replace(now=run.now, before=run.before)
-        context = Context(system, work, linear, *basis_free_parts(graph, n, not basis_free))
+        context = Context(system, work, linear, *basis_free_parts(graph, n, not basis_free, saddle))
+        written.append(context.saddle.K.base)
         super().__init__(prepared, graph, context, run)
         self.weight = n if basis_free else n + n**3 // MATRICES
         self._written += [*written, words(context.chart.state)]

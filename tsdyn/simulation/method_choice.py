@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import Status, TsdynError
 from ..integrators import DOP853, SDIRK54, Taylor
 from ..runs.arguments import tolerances
-from .tolerances import COST, LARGEST_PILOT, PILOT
+from .tolerances import COST, PILOT
 
 
 def explicit(prepared, rtol, atol, series):
@@ -36,8 +36,6 @@ def chooser(simulate, scene, method, end, options):
     """Return the function that decides, when the motion is found stiff, whether to change to an implicit method."""
 
     def choose(run):
-        if run.now.shape[1] > LARGEST_PILOT:
-            return False
         start = float(run.clock.t)
         state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered[len(run.joints) :].copy())
         try:

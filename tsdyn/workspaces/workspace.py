@@ -1,6 +1,5 @@
 """The workspace of a run: all arrays are laid out once, before the first step."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +8,9 @@ from ..jit.kernels import Record, loader
 from ..model.packed import System, no_system
 from ..rows.interface import TangentWorkspace, allocate_tangent
 from ..sparse.constraint_graph import ConstraintGraph, no_graph
+from .carving import carve
 from .chart_workspace import ChartWorkspace, allocate_chart
+from .saddle_workspace import SaddleWorkspace, allocate_saddle
 from .stage_records import StageKernels, StageNumbers
 
 
@@ -131,17 +132,7 @@ class Context(NamedTuple):
     graph: ConstraintGraph
     tangent: TangentWorkspace
     chart: ChartWorkspace
-
-
-def carve(shapes):
-    """Arrays of zeros of these shapes, by name, cut from one block, which is the `base` of each."""
-    sizes = {name: math.prod(shape) for name, shape in shapes.items()}
-    block = np.zeros(sum(sizes.values()))
-    arrays, at = {}, 0
-    for name, shape in shapes.items():
-        arrays[name] = block[at : at + sizes[name]].reshape(shape)
-        at += sizes[name]
-    return arrays
+    saddle: SaddleWorkspace
 
 
 def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=0):
@@ -195,9 +186,9 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
     )
 
 
-def basis_free_parts(graph, n, basis):
-    """Graph and workspaces without matrices of a Context; their memory is small in every form."""
-    return graph, allocate_tangent(graph, n, basis=basis), allocate_chart(graph)
+def basis_free_parts(graph, n, basis, saddle=None):
+    """Graph and workspaces without dense matrices of a Context; saddle: a `SaddleGraph`, of implicit methods."""
+    return graph, allocate_tangent(graph, n, basis=basis), allocate_chart(graph), allocate_saddle(saddle)
 
 
 def plain_context():

@@ -8,7 +8,7 @@ from ..jit.compiled import DEBUG
 from ..methods.plug_in import called_for
 from ..motions import program
 from ..motions.signals import Signal
-from ..runs.arguments import tolerances
+from ..runs.arguments import adaptive
 from ..runs.stepper import advance
 from ..taylor import step_parts
 from ..taylor.layout import FAR, room
@@ -25,7 +25,7 @@ def prepare_first_run(scene, method, form, within, default):
     for between the steps.
     """
     key = type(method), form.name, within
-    if DEBUG or not scene.bodies or (scene._packed is not None and key in _known):
+    if (key in _known and scene._packed is not None) or DEBUG or not scene.bodies:
         return
     method = method or _default_method(scene, *default)
     far = isinstance(method, Taylor) and len(scene.bodies) * room(method.orders()[2]) > FAR
@@ -101,4 +101,4 @@ def _default_method(scene, rtol, atol, series):
     kinds = (kind.kernels for kind in _kinds(scene) if not kind.normalises)
     forces = (force.kernels for force in scene.forces)
     series = series and all("series" in kernels for kernels in (*kinds, *forces))
-    return (Taylor if series else DOP853)(**tolerances(rtol, atol))
+    return adaptive(Taylor if series else DOP853, rtol, atol)

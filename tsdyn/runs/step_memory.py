@@ -1,9 +1,8 @@
 """Run workspace of the step driver."""
 
-import numpy as np
-
 from ..model.packed import System
 from ..rows.interface import redundancy
+from ..workspaces.carving import divided
 from ..workspaces.run_state import lay_out
 from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
 from .dense_output import warm_size
@@ -40,23 +39,27 @@ class StepMemory(Memory):
         rows = len(graph.row) if basis_free else None
         work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant)
         angles, slots = prepared.handles.count, system.memory.size
-        run = lay_out(n, *sizes, angles, slots, warm=warm_size(work), **lengths)
+        parts = basis_free_parts(graph, n, not basis_free, saddle)
+        run = lay_out(n, *sizes, angles, slots, warm=warm_size(work, parts[1].friction), **lengths)
         linear = allocate_linear(system, n, m, implicit and not basis_free, kept, redundant)
-        written = [run.x.base, linear.K.base, linear.pivots]
-        written += [np.frombuffer(record, np.int64) for record in (linear.numbers, linear.kernels)]
         if implicit:
             linear = linear._replace(now=run.now, before=run.before)
-        context = Context(system, work, linear, *basis_free_parts(graph, n, not basis_free, saddle))
-        written.append(context.saddle.K.base)
+        context = Context(system, work, linear, *parts)
         super().__init__(prepared, graph, context, run)
         self.weight = n if basis_free else n + n**3 // MATRICES
-        self._written += [*written, words(context.chart.state)]
-        self.nbytes = sum(array.nbytes for array in (*self._written, context.tangent.rows.S, context.tangent.poses))
+        self._laid_out.append(words(context.chart.state))
+        head, rest = divided(linear.K.base, linear.kernels, linear.numbers)
+        self._laid_out.append(head)
+        self._scratch += [self._run_scratch, *((rest, linear.pivots) if implicit else ())]
+        if saddle is not None:
+            self._scratch.append(context.saddle.K.base)
+        rest = *self._laid_out, context.tangent.rows.S, context.tangent.poses
+        self.nbytes = sum(array.nbytes for array in (*self._scratch, *rest))
 
-    def clear(self, task, system):
-        """As of `Memory`; the system may be another one of the same shape."""
+    def take_system(self, system):
+        """Take the numbers of a system, which may be another one of the same shape."""
+        self.reals = system.reals
         if self.source is not system:
             self.source = system
             for own, new in zip(self.context.system, system, strict=True):
                 own[:] = new
-        super().clear(task, system)

@@ -11,20 +11,13 @@ import numpy as np
 
 from ..errors import Status, TsdynError
 from ..integrators import DOP853, SDIRK54, Taylor
-from ..runs.arguments import tolerances
+from ..runs.arguments import adaptive
 from .tolerances import COST, PILOT
 
 
 def explicit(prepared, rtol, atol, series):
     """Return the initial method; series: True if Taylor is admissible."""
-    kind = Taylor if series and not prepared.refusal else DOP853
-    given, known = (rtol, atol, series), prepared.explicit
-    if not all(value is None or type(value) is float for value in given[:2]):  # the method checks them
-        return kind(**tolerances(rtol, atol))
-    if given not in known:
-        known.clear()
-        known[given] = kind(**tolerances(rtol, atol))
-    return known[given]
+    return adaptive(Taylor if series and not prepared.refusal else DOP853, rtol, atol)
 
 
 def implicit(method):
@@ -32,22 +25,22 @@ def implicit(method):
     return SDIRK54(method.rtol, method.atol)
 
 
-def chooser(simulate, scene, method, end, options):
-    """Return the function that decides, when the motion is found stiff, whether to change to an implicit method."""
+def implicit_is_faster(simulate, given, method, end, run):
+    """Return True if a run by a method that is found stiff had better go on by an implicit one, until the end.
 
-    def choose(run):
-        start = float(run.clock.t)
-        state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered[len(run.joints) :].copy())
-        try:
-            pilot = simulate(scene, (start, end), integrator=implicit(method), max_steps=PILOT, state=state, **options)
-        except TsdynError:  # the run itself goes on
-            return False
-        if pilot.status == Status.INTERRUPTED:
-            raise KeyboardInterrupt
-        if pilot.status not in (Status.SUCCESS, Status.MAX_STEPS):
-            return False
-        h = pilot.steps.h[pilot.steps.accepted]
-        stages = COST * pilot.stats.evaluations / pilot.stats.steps
-        return stages / np.mean(h[h.size // 2 :]) < method.stages / run.clock.h
-
-    return choose
+    `given` are the arguments of the run, by name.
+    """
+    start, same = float(run.clock.t), {name: given[name] for name in ("constraint_tol", "initial_tol", "max_step")}
+    state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered[len(run.joints) :].copy())
+    pilot = {**same, "integrator": implicit(method), "max_steps": PILOT, "state": state}
+    try:
+        pilot = simulate(given["scene"], (start, end), **pilot)
+    except TsdynError:  # the run itself goes on
+        return False
+    if pilot.status == Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    if pilot.status not in (Status.SUCCESS, Status.MAX_STEPS):
+        return False
+    h = pilot.steps.h[pilot.steps.accepted]
+    stages = COST * pilot.stats.evaluations / pilot.stats.steps
+    return stages / np.mean(h[h.size // 2 :]) < method.stages / run.clock.h

@@ -1,5 +1,6 @@
 """The workspace of a run: all arrays are laid out once, before the first step."""
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -156,10 +157,17 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "E": (3 * bodies, k),
         "A": (k, k),
     }
-    work = Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(redundant + 1, np.int64))
-    work.control.u_tol = work.control.b_tol = constraint_tol
-    work.control.size = size
+    work = Work(**carve(shapes, control=Control, counters=Counters), redundant=np.zeros(redundant + 1, np.int64))
+    hold(work.control, constraint_tol, size, joint_rows is not None)
     return work
+
+
+def hold(control, constraint_tol, size, basis_free):
+    """Set the tolerances of the constraints; without normalisations in Phi, a small scene is held as closely."""
+    control.u_tol = control.b_tol = constraint_tol
+    control.size = size
+    if basis_free and 0.0 < size < 1.0:
+        control.u_tol *= size
 
 
 def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
@@ -181,9 +189,7 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
         "b": (k,),
     }
     shapes |= {"now": (3, n), "before": (3, n)}
-    return ImplicitWorkspace(
-        **carve(shapes), pivots=np.zeros(k, np.int64), kernels=StageKernels(), numbers=StageNumbers()
-    )
+    return ImplicitWorkspace(**carve(shapes, kernels=StageKernels, numbers=StageNumbers), pivots=np.zeros(k, np.int64))
 
 
 def basis_free_parts(graph, n, basis, saddle=None):
@@ -191,8 +197,9 @@ def basis_free_parts(graph, n, basis, saddle=None):
     return graph, allocate_tangent(graph, n, basis=basis), allocate_chart(graph), allocate_saddle(saddle)
 
 
+@cache
 def plain_context():
-    """A context of the right types."""
+    """A context of the right types, for these alone."""
     system = no_system()
     return Context(
         system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False), *basis_free_parts(no_graph(), 2, False)
@@ -207,7 +214,7 @@ def plain_work(n):
     others = ("control", "counters", "redundant")
     shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name not in others}
     shapes |= {"q": (n,), "qd": (n,), "qdd": (n,)}
-    return Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(1, np.int64))
+    return Work(**carve(shapes, control=Control, counters=Counters), redundant=np.zeros(1, np.int64))
 
 
 def parts(system, graph, n):

@@ -1,7 +1,7 @@
 """Which kernels a run needs, so that a first one can have them compiled at the same time."""
 
 from ..configuration import start_kernels
-from ..formulations import friction_basis, friction_solve, linearisation, null_space
+from ..formulations import friction_basis, friction_solve, null_space
 from ..formulations.registry import FORMULATIONS
 from ..integrators import DOP853, Taylor
 from ..jit.compiled import DEBUG
@@ -80,8 +80,7 @@ def of_method(method, form, within, far=False):
     if method.step is None:
         yield from method.errors
     if method.implicit:
-        names = ("linearise", "reduce", "factorise", "solve", "soften")
-        yield from (getattr(linearisation, name) for name in names)
+        yield from form.stages().values()
     if within:
         interpolant = method.interpolant(form.first_order)
         yield from (interpolant.fill, interpolant.value)

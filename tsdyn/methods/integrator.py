@@ -213,10 +213,10 @@ class ExplicitRungeKutta(Adaptive):
 
 
 class DiagonallyImplicit(Adaptive):
-    """A method that is an `ImplicitTableau`; it serves the tangent-space form.
+    """A method that is an `ImplicitTableau`; it serves the tangent form and the null-space form.
 
-    One stiffness and damping, exact, and one factorised iteration matrix are kept over iterations, stages, steps and
-    charts until the measured contraction says otherwise.
+    One stiffness and damping, and one factorised iteration matrix, sparse in the tangent form and dense in the
+    null-space form, are kept over iterations, stages, steps and charts until the measured contraction says otherwise.
 
     Examples
     --------

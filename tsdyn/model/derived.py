@@ -18,6 +18,7 @@ class Derived:
     locked: object = None  # a `Still`: locked_orientations.still
     moving_graph: tuple = None  # locked_orientations.moving_graph, and by the loops asked for:
     moving_networks: dict = field(default_factory=dict)
+    saddle: tuple = None  # a graph, a system, and their `SaddleGraph`: saddle_graph.saddle_of
     examined: object = None  # a `Packed` without redundant rows so far: dependent_rows.dependent_rows
     start_workspaces: list = field(default_factory=list)  # idle: start_workspace.taken
     aligned: tuple = None  # mirrored_branches.demand_aligned

@@ -8,8 +8,9 @@ import numpy as np
 from ..errors import Status
 from ..jit.kernels import resident
 from ..rows.interface import reset_selection
+from ..workspaces.carving import divided
 from ..workspaces.run_state import FILLED, STORED, enter_joints
-from ..workspaces.workspace import divided, hold
+from ..workspaces.workspace import hold
 from .arguments import step_count
 from .run_log import no_log
 

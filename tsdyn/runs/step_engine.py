@@ -4,6 +4,7 @@ from ..formulations.registry import formulation
 from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.plug_in import called_for
 from ..rows.interface import redundancy
+from ..sparse.saddle_graph import saddle_of
 from ..workspaces.run_state import lay_out
 from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
 from .dense_output import read, warm_size
@@ -24,14 +25,16 @@ class StepEngine:
         lengths = self.tableau.size, scratch(*self.sizes), self.interpolant.size(n, *self.sizes)
         self.lengths = dict(zip(("tableau", "memory", "block"), lengths, strict=True))
         self.system, kept = prepared.system(method.implicit)
+        self.saddle = saddle_of(packed, self.graph, self.system) if method.implicit and form.basis_free else None
         rows = len(self.graph.row) if form.basis_free else None
         self.kind = form.name, rows, method.implicit, kept, *self.sizes, *lengths
-        self.skipped = (prepared.spheres, prepared.still, 0) if form.basis_free else (0, 0, 0)
+        still = prepared.still if form.keeps_still else 0
+        self.skipped = (prepared.spheres, still, 0) if form.basis_free else (0, 0, 0)
 
     def memory(self, prepared):
         """A new `StepMemory`."""
         given = self.form.basis_free, self.method.implicit, self.sizes, self.lengths
-        return StepMemory(prepared, self.graph, *given)
+        return StepMemory(prepared, self.graph, self.saddle, *given)
 
     def serves(self, memory):
         """Whether the memory is not that of the scene before it was changed."""
@@ -52,7 +55,7 @@ class StepEngine:
                 run.clock.stability_limit = method.stability_limit
                 run.numbers.last_stage = 2 * len(method.tableau.c) * nx
         if method.implicit:
-            prepare_implicit(memory.context.linear, method, form.implicit())
+            prepare_implicit(memory.context.linear, method, form.implicit(), form.basis_free)
             run.numbers.stage_at = (2 * len(method.tableau.c) + 1) * nx
 
     def reading(self, memory, prepared, constraint_tol):

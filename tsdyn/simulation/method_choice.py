@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import Status, TsdynError
 from ..integrators import DOP853, SDIRK54, Taylor
 from ..runs.arguments import adaptive
-from .tolerances import COST, LARGEST_PILOT, PILOT
+from .tolerances import COST, PILOT
 
 
 def explicit(prepared, rtol, atol, series):
@@ -30,8 +30,6 @@ def implicit_is_faster(simulate, given, method, end, run):
 
     `given` are the arguments of the run, by name.
     """
-    if run.now.shape[1] > LARGEST_PILOT:
-        return False
     start, same = float(run.clock.t), {name: given[name] for name in ("constraint_tol", "initial_tol", "max_step")}
     state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered[len(run.joints) :].copy())
     pilot = {**same, "integrator": implicit(method), "max_steps": PILOT, "state": state}

@@ -76,8 +76,8 @@ def simulate(  # many arguments, by name: each is an option of a run
         tolerances; rtol or atol beside an instance is refused.
     formulation : {"tangent", "null-space", "maggi-kane"}
         "tangent": the tangent-space ODE without a basis, in O(N) for chains and trees; "null-space": Eq. 26, as in the
-        paper; "maggi-kane": Eqs. 17-18, the baseline that drifts off the constraints. Implicit methods solve Eq. 26 in
-        either of the first two.
+        paper; "maggi-kane": Eqs. 17-18, the baseline that drifts off the constraints. Implicit methods work in
+        either of the first two, with dense matrices in the second.
     constraint_tol : float
         u_tol and B_tol of Eqs. 28-29: bound on |Phi| (m) and on |Phi_q U B - I|.
     initial_tol : float

@@ -4,8 +4,6 @@
 # Steps of the pilot run of an implicit method, and the cost of an evaluation within an implicit stage, its share of the
 # matrices included, in evaluations of an explicit one: measured by benchmarks/stiff.py.
 PILOT, COST = 60, 1.5
-# Coordinates above which implicit methods, whose matrices are dense, cost more than they save.
-LARGEST_PILOT = 700
 
 # --- scenes far from the origin ---
 # Sizes of a scene: beyond that distance from the origin it gets an origin of its own.

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..jit.kernels import Record, loader
-from .workspace import carve
+from .carving import carve
 
 AGAIN = 2  # Numbers.rejected_last: by a failed stage
 FILLED, STORED = 1, 2  # Numbers.dense: every step's block is made, and kept

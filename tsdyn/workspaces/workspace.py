@@ -1,7 +1,5 @@
 """The workspace of a run: all arrays are laid out once, before the first step."""
 
-import ctypes
-import math
 from functools import cache
 from typing import NamedTuple
 
@@ -11,7 +9,9 @@ from ..jit.kernels import Record, loader
 from ..model.packed import System, no_system
 from ..rows.interface import TangentWorkspace, allocate_tangent
 from ..sparse.constraint_graph import ConstraintGraph, no_graph
+from .carving import carve
 from .chart_workspace import ChartWorkspace, allocate_chart
+from .saddle_workspace import SaddleWorkspace, allocate_saddle
 from .stage_records import StageKernels, StageNumbers
 
 
@@ -133,29 +133,7 @@ class Context(NamedTuple):
     graph: ConstraintGraph
     tangent: TangentWorkspace
     chart: ChartWorkspace
-
-
-def carve(shapes, **records):
-    """Records of these classes and arrays of these shapes, by name, all zero, cut in this order from one block.
-
-    The block is the `base` of each array.
-    """
-    sizes = {name: math.prod(shape) for name, shape in shapes.items()}
-    words = {name: ctypes.sizeof(kind) // 8 for name, kind in records.items()}
-    block, found, at = np.zeros(sum(words.values()) + sum(sizes.values())), {}, 0
-    for name, kind in records.items():
-        found[name] = kind.from_buffer(block, 8 * at)
-        at += words[name]
-    for name, shape in shapes.items():
-        found[name] = block[at : at + sizes[name]].reshape(shape)
-        at += sizes[name]
-    return found
-
-
-def divided(block, *parts):
-    """A block in two: the records and arrays that it begins with, and the rest."""
-    at = sum(part.size if isinstance(part, np.ndarray) else ctypes.sizeof(part) // 8 for part in parts)
-    return block[:at], block[at:]
+    saddle: SaddleWorkspace
 
 
 def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=0):
@@ -214,9 +192,9 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
     return ImplicitWorkspace(**carve(shapes, kernels=StageKernels, numbers=StageNumbers), pivots=np.zeros(k, np.int64))
 
 
-def basis_free_parts(graph, n, basis):
-    """Graph and workspaces without matrices of a Context; their memory is small in every form."""
-    return graph, allocate_tangent(graph, n, basis=basis), allocate_chart(graph)
+def basis_free_parts(graph, n, basis, saddle=None):
+    """Graph and workspaces without dense matrices of a Context; saddle: a `SaddleGraph`, of implicit methods."""
+    return graph, allocate_tangent(graph, n, basis=basis), allocate_chart(graph), allocate_saddle(saddle)
 
 
 @cache

@@ -5,6 +5,7 @@ constraints with a non-zero residual can conflict. Subsets of these are assemble
 many candidates, constraints are removed one at a time as long as the rest still fails.
 """
 
+import time
 from itertools import combinations
 
 import numpy as np
@@ -15,6 +16,7 @@ from .tolerances import LEFT_OVER
 
 FEW = 6  # constraints of which all sets are tried
 MOST = 60  # constraints among which a conflict is looked for
+LONGEST = 10.0  # s of search
 TRIAL_SHAKES = (0.1, 0.3, 0.6, 1.0)
 
 
@@ -28,7 +30,7 @@ def refuse(scene, metric, sketch, found, tol, held=()):
     suspects = [member for member, size in zip(members, sizes, strict=True) if size > LEFT_OVER * sizes.max()]
     trial = _Trial(metric, sketch, found.q, tol)
     told = False
-    while len(suspects) <= MOST and not told:
+    while len(suspects) <= MOST and not (told or trial.over):
         told = not trial.met(suspects)
         wider = suspects if told else _wider(suspects, members)
         if not told and len(wider) == len(suspects):
@@ -45,6 +47,8 @@ def refuse(scene, metric, sketch, found, tol, held=()):
         story = "This constraint is infeasible on its own"
     elif minimal:
         story = f"These {len(conflicting)} conflict; without any one of them, the others can be satisfied"
+    elif told:
+        story = f"These {len(conflicting)} conflict; whether fewer do was not found in {LONGEST:g} s"
     else:
         story = "These have non-zero residuals"
     where = f" with {', '.join(body.name for body in held)} held fixed" if len(held) else ""
@@ -71,6 +75,8 @@ def smallest(suspects, trial):
     if len(suspects) <= FEW:
         for size in range(1, len(suspects)):
             for chosen in combinations(suspects, size):
+                if trial.over:
+                    return list(suspects), False
                 if not trial.met(chosen):
                     return list(chosen), True
         return list(suspects), True
@@ -78,6 +84,8 @@ def smallest(suspects, trial):
     while True:
         at = 0
         while at < len(needed):
+            if trial.over:
+                return needed, False
             rest = needed[:at] + needed[at + chunk :]
             if rest and not trial.met(rest):
                 needed = rest
@@ -94,6 +102,12 @@ class _Trial:
 
     def __init__(self, metric, sketch, q, tol):
         self.metric, self.sketch, self.also, self.tol = metric, sketch, (q,), tol
+        self.until = time.monotonic() + LONGEST
+
+    @property
+    def over(self):
+        """Whether the search has taken long enough: with what has been found, a user gets on."""
+        return time.monotonic() > self.until
 
     def met(self, members):
         """Return True if the constraints can be satisfied together."""

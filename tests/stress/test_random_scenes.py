@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.helpers.drawn_numbers import DrawnNumbers
-from tsdyn.stress.judgement import judge_case, judge_scene
+from tsdyn.stress.judgement import comparison, judge_case, judge_scene
 from tsdyn.stress.random_scenes import KINDS, drawn, generate
 
 
@@ -32,5 +32,5 @@ def test_a_random_scene(seed):
 def test_a_scene_that_hypothesis_draws(data):
     numbers = DrawnNumbers(data)
     case = drawn(numbers, 2, 8)
-    found = judge_case(case, numbers)
+    found = judge_case(case, comparison(numbers))
     assert not found.fault, f"{found.name}: {found.word}: {found.said}"

@@ -12,6 +12,7 @@ from .laws import findings
 from .random_scenes import generate
 
 MOST_STEPS = 3_000  # of a run
+COMPARED = 0.7  # of the cases are run in another way, too
 FAULT = "FAULT"
 
 
@@ -32,14 +33,19 @@ class Outcome(NamedTuple):
 
 def judge_scene(seed, least=None, most=None):
     """Return the `Outcome` of the scene of a seed."""
-    return judge_case(generate(seed, least, most), np.random.default_rng((seed, 1)), seed)
+    return judge_case(generate(seed, least, most), comparison(np.random.default_rng((seed, 1))), seed)
 
 
-def judge_case(case, rng, seed=None):
-    """Return the `Outcome` of a case, of which rng draws how it is judged."""
+def comparison(rng):
+    """Return the comparison by which a case is judged besides the laws of its run, in a tuple, or none."""
+    return (comparisons.ALL[rng.integers(len(comparisons.ALL))],) if rng.random() < COMPARED else ()
+
+
+def judge_case(case, others, seed=None):
+    """Return the `Outcome` of a case, judged by the laws of its run and by comparisons with others."""
     began = time.perf_counter()
     try:
-        word, said = judge(case, rng)
+        word, said = judge(case, others)
     except TsdynError as error:
         word, said = type(error).__name__, str(error)
         if not said.strip():
@@ -49,7 +55,7 @@ def judge_case(case, rng, seed=None):
     return Outcome(seed, case.name, word, said, time.perf_counter() - began)
 
 
-def judge(case, rng):
+def judge(case, others):
     """Return the word for a case, and what was said; raises what the run raises."""
     if case.assembled:
         case.scene.assemble()
@@ -59,8 +65,7 @@ def judge(case, rng):
     found = findings(solution)
     if solution.success:
         found += comparisons.energy(case, solution, run) + comparisons.momenta(case, solution, run)
-        other = comparisons.OTHERS[rng.integers(len(comparisons.OTHERS))]
-        found += other(case, solution, run) if other else []
+        found += [one for other in others for one in other(case, solution, run)]
     broken = [one for one in found if one.broken]
     if broken:
         return f"{FAULT} {broken[0].law}", "; ".join(map(str, broken[:3]))

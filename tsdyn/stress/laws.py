@@ -232,13 +232,18 @@ def dense_output(solution):
         return
     at = some(solution.t.size, OUTPUTS)
     state = solution.at(solution.t[at])
+    limit = off_steps(solution)
     for name in ("q", "qd"):
         given = getattr(solution, name)[at]
         size = 1.0 + np.abs(given).max(initial=0.0)
-        limit = SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + HELD / (extent(solution) or 1.0)
         yield Finding(
             f"dense output, {name}", float(np.abs(getattr(state, name) - given).max(initial=0.0) / size), limit
         )
+
+
+def off_steps(solution):
+    """How far dense output may be off the ends of steps, relative to the coordinates."""
+    return SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + HELD / (extent(solution) or 1.0)
 
 
 def is_near_singular(solution):

@@ -156,7 +156,7 @@ def test_the_motion_is_that_of_the_null_space_form(make, end):
     np.testing.assert_allclose(one.q[-1], two.q[-1], rtol=0, atol=1e-7)
     demand_on_the_manifold(one, one)
     assert abs(one.stats.steps - two.stats.steps) <= 3 + 0.1 * two.stats.steps
-    assert one.stats.stage_iterations <= 1.2 * two.stats.stage_iterations
+    assert one.stats.stage_iterations <= 1.3 * two.stats.stage_iterations  # with matrices that are kept longer
 
 
 @pytest.mark.slow_but("SDIRK54")
@@ -178,3 +178,10 @@ def test_a_chart_that_turns_keeps_its_matrix():
     """A free body has no stiffness: one matrix serves every chart until the step changes."""
     stats = ts.simulate(free(), (0.0, 5.0), integrator=SDIRK54(1e-6, 1e-6)).raise_if_failed().stats
     assert stats.charts > 3 * stats.iteration_matrices
+
+
+@pytest.mark.slow
+def test_the_default_method_turns_to_implicit_stages_in_large_scenes():
+    solution = ts.simulate(chain(110), (0.0, 0.05), rtol=1e-3, atol=1e-3, t_eval=(0.0, 0.05)).raise_if_failed()
+    assert solution.method.startswith("SDIRK54")
+    assert solution.formulation == "tangent"

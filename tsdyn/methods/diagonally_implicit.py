@@ -23,6 +23,7 @@ from .tolerances import (
     APART,
     AT_FLOOR,
     DIVERGING,
+    EAGER_SPARSE,
     EAGER_STAGES,
     FIXED_TOL,
     GUESS,
@@ -33,6 +34,7 @@ from .tolerances import (
     RESIDUAL_FLOOR,
     SAME_G,
     SLOW,
+    SLOW_SPARSE,
     TOO_FAR,
 )
 
@@ -116,7 +118,8 @@ def _solve_stage(context, c, r, i, t, g):
     floor = RESIDUAL_FLOOR / (l.numbers.rtol + l.numbers.atol)
     before, theta, measured = math.inf, l.numbers.theta, False
     slow, apart, stuck, renewed = 0, 0, False, False
-    eager = l.numbers.eager > 0
+    eager, sparse = l.numbers.eager > 0, l.numbers.every_chart == 1
+    limit = SLOW_SPARSE if sparse else SLOW
     l.numbers.eager -= 1
     for _ in range(ITERATIONS):
         _set_stage(g, k, known, xs, ys)
@@ -126,13 +129,13 @@ def _solve_stage(context, c, r, i, t, g):
         if status != 0:
             return status
         w.counters.stage_iterations += 1
-        off_chart = l.numbers.every_chart == 0 and l.numbers.chart != w.counters.charts
+        off_chart = not sparse and l.numbers.chart != w.counters.charts
         stale = eager or off_chart or abs(g - l.numbers.g) > SAME_G * g
         eager = False
-        if stale or (measured and theta > SLOW):
+        if stale or (measured and theta > limit):
             if not stale:
                 if slow == 0 and not renewed:
-                    l.numbers.eager = EAGER_STAGES
+                    l.numbers.eager = EAGER_SPARSE if sparse else EAGER_STAGES
                 slow += 1
             renewed = True
             if _renew_matrix(context, c, t, g, f, slow == MATRICES) != 0:

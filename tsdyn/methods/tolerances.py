@@ -16,7 +16,9 @@ KAPPA = 1e-3
 
 # Contraction above which the iteration matrix is rebuilt: up to it three corrections reach KAPPA
 # (docs/design-decisions.md, one Jacobian for many steps; benchmarks/stiff.py counts matrices).
-SLOW = 0.1
+# The matrix of the tangent form costs as much as four iterations: kept up to SLOW_SPARSE, half as many matrices take a
+# tenth more iterations in stiff chains and joints.
+SLOW, SLOW_SPARSE = 0.1, 0.15
 
 # Contraction assumed where none has been measured, and the least that one measurement is trusted with: a stage that
 # converges by chance at once says nothing of the next one.
@@ -29,8 +31,9 @@ DIVERGING = 0.9
 # matrix, with which a stage is given up.
 MATRICES, APART = 3, 3
 
-# Stages that begin with a matrix of their own after an older one has failed: five steps of SDIRK54.
-EAGER_STAGES = 30
+# Stages that begin with a matrix of their own after an older one has failed: five steps of SDIRK54, one in the tangent
+# form.
+EAGER_STAGES, EAGER_SPARSE = 30, 6
 
 # Relative change of g = h a_ii up to which the factors of P are tried again: a damped stiff mode then contracts by
 # |1 - g / g_P| < 0.43. Measured contraction decides whether they are kept.

@@ -10,7 +10,16 @@ from .elements.bodies import Ground, PointMass, ground_point, rotation_matrix
 from .elements.element import in_frame
 from .elements.force import Force, load, vector_load
 from .elements.framed_joint import FramedJoint, beside, carried, turned_about
-from .elements.friction_laws import BodyFriction, act, along_and_across, coefficient, slip
+from .elements.friction_laws import (
+    BodyFriction,
+    act,
+    act_series,
+    along_and_across,
+    coefficient,
+    direction_series,
+    slip,
+    slip_series,
+)
 from .elements.joint import Joint, across
 from .elements.joint_coordinates import Angle, Displacement, angles, displacements
 from .elements.joint_friction import AXIS, JointFriction, optional
@@ -99,6 +108,7 @@ __all__ = [
     "Vector",
     "across",
     "act",
+    "act_series",
     "along_and_across",
     "angle",
     "angle_about",
@@ -111,6 +121,7 @@ __all__ = [
     "carried",
     "coefficient",
     "cross",
+    "direction_series",
     "displacements",
     "dot",
     "embedded_error",
@@ -143,6 +154,7 @@ __all__ = [
     "second_embedded_error",
     "sine_cosine",
     "slip",
+    "slip_series",
     "specialised",
     "square",
     "stack",

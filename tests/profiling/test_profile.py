@@ -183,7 +183,7 @@ def test_a_method_that_is_slower_than_the_default():
 @pytest.mark.slow
 def test_what_refuses_series_and_what_it_costs():
     said = advice(drive_train.build())
-    assert "Torque 'motor': its torque is a function of time; CoulombFriction 'brake'" in said
+    assert "Torque 'motor': its torque is a function of time" in said
     scene = drive_train.build()
     prepared(scene)
     assert len(scene.forces) == 4

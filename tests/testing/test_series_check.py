@@ -218,6 +218,10 @@ def follow(t, state):
     return state[0], 0.0, 0.0
 
 
+def rub(a, b, name):
+    return F.ContactFriction(a.scene.add(C.PlaneContact(a, b, normal_b=(0, 0, 1))), kinetic=0.1, name=name)
+
+
 REFUSED = {
     "a function of time": (
         lambda a, b: F.Spring(a, b, actuator=wave, name="left"),
@@ -226,7 +230,7 @@ REFUSED = {
     "a table": (lambda a, b: F.Torque(a, torque=ts.Table([0, 1], np.ones((2, 3))), name="t"), "its torque is a table"),
     "of state": (lambda a, b: F.PointForce(a, force=follow), r"PointForce\(body1\): it is a function of the state"),
     "user": (lambda a, b: F.UserForce(a, b, function=drag, name="u"), "UserForce 'u': it is a function of the state"),
-    "friction": (lambda a, b: F.CoulombFriction(a, b, force=1.0), r"CoulombFriction\(body1, body2\): its force"),
+    "friction": (lambda a, b: rub(a, b, "rub"), "ContactFriction 'rub': its magnitude depends on a reaction"),
     "plug-in force": (
         lambda a, b: NoForceSeries(a, name="f"),
         "NoForceSeries 'f': NoForceSeries has no kernel `series`",
@@ -244,7 +248,7 @@ def test_scenes_without_series_are_refused_by_name(make, message):
     said = refusal(scene.packed)
     assert re.search(message, said)
     assert "DOP853" in said
-    scene.add(F.CoulombFriction(b, scene.ground, force=1.0, name="brake"))
+    scene.add(rub(b, scene.ground, "brake"))
     assert len(without_series(scene.packed)) == 2
 
 

@@ -11,7 +11,7 @@ from ..motions.signals import Signal
 from ..runs.arguments import tolerances
 from ..runs.stepper import advance
 from ..taylor import step_parts
-from ..taylor.layout import FAR, room
+from ..taylor.layout import FAR, pays, room
 from ..taylor.stepper import advance_series
 from .workers import compile_ahead
 
@@ -38,6 +38,8 @@ def of_scene(scene, method, form, far):
     series, implicit = isinstance(method, Taylor), method.implicit
     for kind, moving in _kinds(scene).items():
         yield from of_constraint(kind, moving, series, far, implicit)
+    if series and any(force.sharp for force in scene.forces):
+        yield step_parts.check_laws
     for force in scene.forces:
         yield from of_force(force.kernels, series, implicit, form)
         if any(isinstance(value, Signal) and value.motions for value in vars(force).values()):
@@ -56,7 +58,14 @@ def of_constraint(kind, moving, series=True, far=False, implicit=False):
 
 def of_force(kernels, series=True, implicit=False, form=FORMULATIONS["tangent"]):
     """The loops over forces that have these kernels."""
-    names = ["force", "remember", "normal_load", "unit_friction", *["series"] * series, *["jacobian"] * implicit]
+    names = [
+        "force",
+        "remember",
+        "normal_load",
+        "unit_friction",
+        *["series", "check"] * series,
+        *["jacobian"] * implicit,
+    ]
     found = [kernels[name] for name in names if name in kernels]
     if "normal_load" in kernels:
         found.append((friction_solve if form.basis_free else friction_basis).rub)
@@ -102,4 +111,5 @@ def _default_method(scene, rtol, atol, series):
     kinds = (kind.kernels for kind in _kinds(scene) if not kind.normalises)
     forces = (force.kernels for force in scene.forces)
     series = series and all("series" in kernels for kernels in (*kinds, *forces))
+    series = series and pays(scene.primitives, scene.forces)
     return (Taylor if series else DOP853)(**tolerances(rtol, atol))

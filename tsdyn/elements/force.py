@@ -28,7 +28,7 @@ from ..errors import InvalidForce
 from ..jit.kernels import Callback, kernel, specialised
 from ..motions.signals import Signal
 from .element import Attachment, check_slots, inlined, layout, static_kernel
-from .loops import constraint_series, force_series, friction
+from .loops import constraint_series, force_series, friction, law_check
 from .loops import forces as loops
 from .loops.coordinate_rows import SIGNATURE
 from .markers import PARAMETERS, TURN, Marker, Point
@@ -59,6 +59,9 @@ class Force(Attachment):
         Rows of scratch memory that `series` uses.
     no_series : str
         Why there is none.
+    sharp : bool
+        Whether the law may change within less than its series shows, as |v| does at v = 0: steps by series are then
+        checked against the law.
     analytic : bool
         Whether `law` can be run on complex numbers.
     particles : bool
@@ -98,6 +101,7 @@ class Force(Attachment):
     memory = 0
     slots = 0
     no_series = ""
+    sharp = False
     analytic = True
     quantities: Mapping[str, Callable[..., Any]] = MappingProxyType({})
     loads: tuple[str, ...] = ()
@@ -192,9 +196,12 @@ def callbacks(cls, functions, owner=None):
         result["remember"] = Callback(specialised(loops.remembers, f"{label}.remember_loop", home, **names), SIGNATURE)
     if "series" in functions:
         home = getattr(functions["series"], "py_func", functions["series"])
-        names.update(kernel_series=inlined(functions["series"]), SLOTS=cls.slots)
+        names.update(kernel_series=inlined(functions["series"]), SLOTS=cls.slots, SHARP=cls.sharp)
         copy = specialised(force_series.series, f"{label}.series_loop", home, **names)
         result["series"] = Callback(copy, constraint_series.SIGNATURE)
+        if cls.sharp:
+            copy = specialised(law_check.check, f"{label}.check_loop", home, make, **names)
+            result["check"] = Callback(copy, law_check.SIGNATURE, allocates=owner is not None)
     if "normal_load" in functions:
         home = getattr(functions["normal_load"], "py_func", functions["normal_load"])
         names["kernel_normal_load"] = inlined(functions["normal_load"])

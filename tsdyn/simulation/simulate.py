@@ -174,14 +174,15 @@ def run_from(given, numbers=None, arrays=None, archive=None):
         return _run_stored(task, given, options, (numbers, arrays), archive)
     outcome = _run(task, scene, options.initial_tol)
     ended = time.perf_counter()
-    if outcome.status == Status.STIFF:
-        return run_from(_stiff(given, method))
+    other = method_choice.instead(task, outcome.status)
+    if other is not None:
+        return run_from(_again(given, other))
     return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
 
-def _stiff(given, method):
-    """Return the arguments of the run by an implicit method."""
-    return {**given, "integrator": method_choice.implicit(method), "rtol": None, "atol": None}
+def _again(given, method):
+    """Return the arguments of the run by another method."""
+    return {**given, "integrator": method, "rtol": None, "atol": None}
 
 
 def _run_stored(task, given, options, found, archive):
@@ -195,8 +196,9 @@ def _run_stored(task, given, options, found, archive):
     try:
         outcome = _run(task._replace(archive=archive), scene, options.initial_tol)
         seconds = time.perf_counter() - started
-        if outcome.status == Status.STIFF:
-            given = _stiff(given, task.method)
+        other = method_choice.instead(task, outcome.status)
+        if other is not None:
+            given = _again(given, other)
             return run_from(given, archive=stored_runs.begin_again(archive, given))
         outcome = stored_runs.ended(archive, outcome, seconds)
     finally:

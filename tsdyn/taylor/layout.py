@@ -64,6 +64,11 @@ def lacking(packed):
     return found
 
 
+def pays(constraints, forces):
+    """Whether series are quicker than stages: not where sharp forces cut steps that solve for no reactions."""
+    return not any(force.sharp for force in forces) or any(not constraint.normalises for constraint in constraints)
+
+
 def _label(item):
     return item.name if item.name.startswith(item._kind()) else f"{item._kind()} {item.name!r}"
 
@@ -149,8 +154,10 @@ def _forces(packed, orders):
         members = members_of(row, packed.loads)
         kind = members[0].force
         series = address(kind.kernels, "series", kind.name, InvalidForce)
-        width = force_series.instance_width(len(kind.markers), kind.slots, orders)
-        rows.append([series, total, width, len(members), row.stride, len(table), row.reals])
+        check = address(kind.kernels, "check", kind.name, InvalidForce) if kind.sharp else 0
+        kept = 2 * sum(marker.size for marker in kind.markers) * kind.sharp
+        width = force_series.instance_width(len(kind.markers), kind.slots + kept, orders)
+        rows.append([series, total, width, len(members), row.stride, len(table), row.reals, check])
         total += len(members) * width
         for load in members:
             pair = [index.get(id(body), nb) for body in (load.force.a, load.force.b)]

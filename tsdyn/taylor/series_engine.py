@@ -5,7 +5,7 @@ from ..runs.reader import Reading
 from .dense_output import read_series, reading_workspace
 from .layout import is_far, refusal, room
 from .run_memory import Series, SeriesMemory
-from .step_parts import accelerate_here, expand_far_series, expand_series, pass_singular, reach
+from .step_parts import accelerate_here, check_laws, expand_far_series, expand_series, pass_singular, reach
 from .tolerances import MANY
 
 
@@ -42,6 +42,8 @@ class SeriesEngine:
         if method.step is not None:  # the order follows from tolerances even so
             memory.run.clock.rtol, memory.run.clock.atol = method.step_tolerances()
         _set_kernels(memory.run, is_far(graph, self.highest), task.within)
+        if memory.context.expansion.forces["check"].any():
+            memory.context.trial.check = check_laws.address
 
     def reading(self, memory):
         """A `Reading` of the steps; a function and its arguments that make it in another process."""

@@ -16,7 +16,7 @@ from ..runs.breakpoints import fixed_end
 from ..runs.run_log import note_try
 from ..runs.step_control import gets_on, stretch
 from .step_length import is_near, longest, loosest, step_length
-from .step_parts import call_expand, call_reach, is_singular
+from .step_parts import call_expand, call_laws, call_reach, is_singular
 from .tolerances import (
     AVOID,
     AVOIDING,
@@ -28,6 +28,8 @@ from .tolerances import (
     MOST_TURN,
     NO_SPEED,
     PASSED,
+    PLACES,
+    RATES,
     TIGHTER,
     TIGHTEST,
 )
@@ -76,6 +78,8 @@ def _propose(c, r, tol):
     if is_near_singular(c.tangent, c.tangent.indicator.start):
         s.tol = max(TIGHTER * tol, min(tol, TIGHTEST))
         s.h = longest(c, r, s.tol, s.highest)
+    if s.check != 0:
+        s.h *= min(1.0, RATES * s.h / (order.top + 2)) ** (1.0 / (order.top + 2))
     s.limit = r.clock.max_step
     if c.system.memory.size > 0:  # what counts turns must see each of them
         s.limit = min(s.limit, MOST_TURN / max(_fastest(c), NO_SPEED))
@@ -151,6 +155,25 @@ def _choose_next(c, r, landed, tol):
 
 
 @kernel
+def _follows_laws(context, c, r):
+    """Whether the forces' series are those of their laws all along the step tried; else it is shortened."""
+    s, h = c.trial, c.trial.t1 - r.clock.t
+    call_laws(s.check, context, r.clock.t, h, r.clock.atol, r.clock.rtol)
+    if s.good == 1.0:
+        return True
+    s.h = max(s.good, 0.5 / PLACES) * h
+    s.limit, s.own_h = min(s.limit, s.h), min(s.own_h, s.h)
+    return False
+
+
+@kernel
+def _reject(r, log):
+    r.numbers.rejected += 1
+    if r.numbers.history + 1 < log.history.shape[0]:
+        r.numbers.history += 1
+
+
+@kernel
 def make_step(context, c, r, log, stop):
     """Reach the end of the next step, t1 of the trial, by a series that has been expanded. Status."""
     f, s, tol = c.tangent, c.trial, r.clock.atol + r.clock.rtol
@@ -160,6 +183,9 @@ def make_step(context, c, r, log, stop):
         if not _end(s, r, stop):
             return STEP_COLLAPSED
         note_try(r, log, r.clock.t, s.t1 - r.clock.t)
+        if adaptive and s.check != 0 and not _follows_laws(context, c, r):
+            _reject(r, log)
+            continue
         status = _attempt(context, c, r)
         if status == PASSAGE:  # back to where the run is
             status = stand_at(context, c, r, r.clock.t)
@@ -173,6 +199,4 @@ def make_step(context, c, r, log, stop):
         if _is_taken(c, landed) or not _choose_next(c, r, landed, tol):
             return 0
         go_to_start(c, r)
-        r.numbers.rejected += 1
-        if r.numbers.history + 1 < log.history.shape[0]:
-            r.numbers.history += 1
+        _reject(r, log)

@@ -22,7 +22,7 @@ from .breakpoints import cross_stop, lower_order
 from .step_length import radius, weights
 from .step_parts import call_expand, call_reach, set_floor, state_within
 from .step_trials import go_to_start, make_step, stand_at
-from .tolerances import SMALL, SMALL_STEPS, SPARE, TIGHTEST, WARY
+from .tolerances import SHARP_STEPS, SMALL, SMALL_STEPS, SPARE, TIGHTEST, WARY
 from .workspace import load_series
 
 SLICE_DONE, NOT_FINITE = int(Status.SLICE_DONE), int(Status.NOT_FINITE)
@@ -105,7 +105,7 @@ def _watch_stiffness(c, r, h):
                 r.numbers.at_limit = 0
                 return False
     r.numbers.at_limit += 1
-    if r.numbers.at_limit == SMALL_STEPS:
+    if r.numbers.at_limit == (SMALL_STEPS if c.trial.check == 0 else SHARP_STEPS):
         r.numbers.stiff = 1
         return r.numbers.leave_when_stiff == 1
     return False

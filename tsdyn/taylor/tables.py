@@ -21,6 +21,7 @@ class ForceSeries(Record):
     stride: int  # reals of each
     table: int  # where the entries of the first begin in Expansion.table
     reals: int  # and in System.reals
+    check: int  # address of law_check.check; 0 where the law is not sharp
 
 
 class MotionSeries(Record):

@@ -62,6 +62,8 @@ class Trial(Record):
     last: int  # whether that is the run's
     cut: int  # whether a stop cuts a fixed step
     singular: int  # whether it ends in a singular configuration
+    check: int  # address of step_parts.check_laws; 0 where no force is sharp
+    good: float  # share of the step up to which the series of forces are those of their laws
 
 
 class SeriesContext(NamedTuple):

@@ -11,7 +11,8 @@ Order k of the law needs x and xd up to k, hence x up to k + 1:
 
 The series of an instance holds p and the forces (4 floats a marker and order each, p of Parameters only), then its own
 scratch, then for each marker the last order at which its force is not zero: (3) ends there, at order zero for a
-constant force. Series that a law doesn't use aren't stored, so the compiler removes their evaluation.
+constant force. Series that a law doesn't use aren't stored, so the compiler removes their evaluation. Those of a sharp
+law are: x and xd follow the last orders, for `law_check`.
 """
 
 from ...jit.kernels import ANY, data_of, integers, kernel, matrix, stack, vector
@@ -19,14 +20,14 @@ from ...jit.simd import add, cross, fma, four, lanes, put, splat, times
 from ..markers import PARAMETERS, POINT, TURN
 from .body_poses import POSE, P, turned
 from .constraint_series import BODY_ROW, S_OMEGA, S_R, torque
-from .template import CODES, MARKERS, OWNERS, ROOM, SIZE, SLOTS, STARTS, kernel_series
+from .template import CODES, MARKERS, OWNERS, ROOM, SHARP, SIZE, SLOTS, STARTS, kernel_series
 
 BODY, MASK, INTS = 0, 2, 3  # of the table: the two bodies, and which of them are the ground
 
 
-def instance_width(markers, slots, orders):
-    """Floats of an instance."""
-    return 8 * markers * orders + 4 * ((slots * orders + markers + 3) // 4)
+def instance_width(markers, rows, orders):
+    """Floats of an instance; rows: those of its scratch, and of x and xd where the law is sharp."""
+    return 8 * markers * orders + 4 * ((rows * orders + markers + 3) // 4)
 
 
 @kernel
@@ -106,6 +107,11 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, p
             f[c] = 0.0
         scratch = matrix(data_of(values[first + own_scratch :]), SLOTS, orders)
         kernel_series(x, xd, real[3 * MARKERS :], k, scratch, f)
+        if SHARP:
+            kept = first + own_scratch + SLOTS * orders + MARKERS + k
+            for c in range(SIZE):
+                values[kept + c * orders] = x[c]
+                values[kept + (SIZE + c) * orders] = xd[c]
         for j in range(MARKERS):
             if own[MASK] >> OWNERS[j] & 1:
                 continue

@@ -17,6 +17,7 @@ CODES = OWNERS = STARTS = FIRST = (
 SLOTS = 1  # rows of scratch memory of `series`
 AHEAD = False  # whether each instance has the next one's numbers brought into the cache
 DRIVEN = False  # whether the series depend on time
+SHARP = False  # whether the series of a force are checked against its law
 KEPT = 1  # floats of a force's derivatives kept from step to step
 ALONG = -1  # where in x the direction ends that a force's frame follows, or -1: the frame of a body
 kernel_phi = kernel_value = kernel_jacobian = kernel_gamma = kernel_series = kernel_series_t = None

@@ -1,0 +1,81 @@
+"""Series of forces against their laws, at a place of a Taylor step.
+
+A law may change within less than a series shows: the series of v / sqrt(v^2 + v_0^2) at v >> v_0 knows nothing of the
+reversal at v = 0, that of |v| at v > 0 is v, and a pulse is zero to any order long before. The law itself is therefore
+evaluated at x(tau) and xd(tau), and must be f(tau). What f lacks may be as large as
+
+    OFF (atol + rtol |xd|) / (w h)      w: what the force accelerates by, so that w f h is a velocity
+    a small part of the terms of f      rounding
+"""
+
+from ...jit.kernels import ANY, caller, integers, kernel, part, stack, vector
+from ..markers import PARAMETERS, POINT, TURN
+from ..tolerances import LAW_NOISE, LAW_TOLERANCE, OFF
+from .force_series import BODY, INTS, MASK
+from .template import CODES, MARKERS, OWNERS, ROOM, SIZE, SLOTS, STARTS, kernel_law
+
+# count, reals and floats per instance, orders, how many are known, limits, table, reals, values, inverse
+SIGNATURE = "iiiiippppp"
+TAU, TIME, LENGTH, ATOL, RTOL, LIMITS = range(6)  # numbers of `limits`: place and length of the step, tolerances
+call_check = caller(SIGNATURE)
+
+
+@kernel
+def _sum(values, at, step, known, tau):
+    """The series values[at + k step] at tau."""
+    total = 0.0
+    for k in range(known - 1, -1, -1):
+        total = total * tau + values[at + k * step]
+    return total
+
+
+@part
+def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
+    """Whether the series of a marker's force, at values[forces], is not the law's f."""
+    c, w, tau = STARTS[j], 16 * own[BODY + OWNERS[j]], limits[TAU]
+    turning = inverse[w + 4] + inverse[w + 9] + inverse[w + 14]
+    if CODES[j] == TURN:
+        weight = turning
+    elif CODES[j] == PARAMETERS:
+        weight = 0.5 * turning
+    else:
+        weight = (s[0] * s[0] + s[1] * s[1] + s[2] * s[2]) * turning + (inverse[w] if CODES[j] == POINT else 0.0)
+    size = 4 if CODES[j] == PARAMETERS else 3
+    off, terms, speed = 0.0, 0.0, 0.0
+    for i in range(size):
+        power, total = 1.0, 0.0
+        for k in range(known):
+            term = power * values[forces + 4 * k + i]
+            power *= tau
+            total += term
+            terms = max(terms, abs(term))
+        gap = abs(total - f[c + i])
+        if not gap <= off:  # or not a number
+            off = gap
+        speed = max(speed, abs(xd[c + i]))
+    if off <= max(LAW_NOISE, limits[ATOL] + limits[RTOL]) * terms:
+        return False
+    return not weight * off * limits[LENGTH] <= max(OFF * (limits[ATOL] + limits[RTOL] * speed), LAW_TOLERANCE)
+
+
+def check(count, stride, size, orders, known, limits, table, reals, values, inverse):
+    """1 if the series of an instance is not what its law is at a place of the step, else 0; time has been set."""
+    table, reals, values = integers(table, ANY), vector(reals, ANY), vector(values, ANY)
+    limits, inverse = vector(limits, LIMITS), vector(inverse, ANY)
+    x, xd, f, wide = stack(ROOM), stack(ROOM), stack(ROOM), 4 * orders
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        first = i * size
+        kept = first + 2 * MARKERS * wide + SLOTS * orders + MARKERS
+        for c in range(SIZE):
+            x[c] = _sum(values, kept + c * orders, 1, known, limits[TAU])
+            xd[c] = _sum(values, kept + (SIZE + c) * orders, 1, known, limits[TAU])
+            f[c] = 0.0
+        kernel_law(x, xd, real[3 * MARKERS :], limits[TIME], f)
+        for j in range(MARKERS):
+            forces = first + (MARKERS + j) * wide
+            if own[MASK] >> OWNERS[j] & 1:
+                continue
+            if _is_off(j, own, real[3 * j : 3 * j + 3], f, xd, limits, known, values, forces, inverse):
+                return 1
+    return 0

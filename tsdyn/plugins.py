@@ -5,7 +5,7 @@ integrators/ import from here, too. docs/plug-ins.md shows how.
 """
 
 from .calls import Placing, fitting
-from .elements.applied_load import Given, GivenByState, GivenInBody
+from .elements.applied_load import Given, GivenByState, GivenInBody, given_series
 from .elements.bodies import Ground, PointMass, ground_point, rotation_matrix
 from .elements.element import in_frame
 from .elements.force import Force, load, vector_load
@@ -27,11 +27,19 @@ from .elements.joint_load import JointLoad
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
 from .elements.tolerances import PARALLEL
-from .elements.user_functions import ByState, arguments_of, fill_state, load_at, state_load
+from .elements.user_functions import (
+    STATE,
+    ByState,
+    arguments_of,
+    fill_state,
+    fill_state_series,
+    load_at,
+    state_load,
+)
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
 from .maths import vectors
-from .maths.angles import angle_about, angle_near
+from .maths.angles import angle_about, angle_near, angle_series
 from .maths.recurrences import (
     angle,
     cross,
@@ -72,6 +80,7 @@ __all__ = [
     "AXIS",
     "DOP853_INTERPOLANT",
     "PARALLEL",
+    "STATE",
     "Adaptive",
     "Angle",
     "BodyFriction",
@@ -113,6 +122,7 @@ __all__ = [
     "angle",
     "angle_about",
     "angle_near",
+    "angle_series",
     "angles",
     "arguments_of",
     "beside",
@@ -128,9 +138,11 @@ __all__ = [
     "error_kernel",
     "exponential",
     "fill_state",
+    "fill_state_series",
     "finite",
     "fitting",
     "floats",
+    "given_series",
     "ground_point",
     "in_frame",
     "inverse_root",

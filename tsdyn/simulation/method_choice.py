@@ -1,5 +1,8 @@
 """Choice of the default method: Taylor; DOP853 where a part of the scene has no series; SDIRK54 where it is stiff.
 
+Taylor steps with sharp forces are shorter, and no quicker than those of DOP853 in scenes without constraints. Where
+series fail, the run begins again with DOP853.
+
 The two explicit methods monitor stiffness: DOP853 by its stability limit, Taylor by the number of steps in which the
 motion is negligible. When stiffness is detected, a pilot run of SDIRK54 continues from that state, and the numbers of
 evaluations per second of simulated time are compared.

@@ -68,8 +68,8 @@ def simulate(  # many arguments, by name: each is an option of a run
         Start and end, start < end.
     integrator : Integrator or str, optional
         A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor; DOP853 if a part of the
-        scene has no series; SDIRK54, restarted from t_span[0], if the motion is found stiff and SDIRK54 needs fewer
-        evaluations.
+        scene has no series, or series fail where a law is not analytic; SDIRK54, restarted from t_span[0], if the
+        motion is found stiff and SDIRK54 needs fewer evaluations.
     rtol, atol : float, optional
         Tolerances of the default method, or of an adaptive method given by name; default 1e-8. An instance has its own
         tolerances; rtol or atol beside an instance is refused.

@@ -71,7 +71,7 @@ def _expand(context, k, ahead):
 
 @kernel
 def is_driven(system):
-    """Whether a scene that Taylor serves depends on time."""
+    """Whether a constraint of a scene that Taylor serves depends on time."""
     return system.motions.shape[0] > 0
 
 
@@ -88,7 +88,8 @@ def reach(context, t, h):
     """The state at t, h after the series' origin, on the manifold, but for qdd; h < 0 takes the poses. Status."""
     c = load_series(context)
     w, x, f = c.work, c.expansion, c.tangent
-    if is_driven(c.system) and not set_time(c.system, t):
+    x.order.time = t
+    if not set_time(c.system, t):
         return NOT_FINITE
     if h >= 0.0:
         sum_series(c.graph, x, h, f.poses, f.p)
@@ -119,7 +120,7 @@ def check_laws(context, t, h, atol, rtol):
             kind = x.forces[i]
             if kind.check != 0:
                 off = call_check(
-                    kind.check, kind.count, kind.stride, kind.width, x.order.room, x.order.top, limits,
+                    kind.check, kind.run, kind.count, kind.stride, kind.width, x.order.room, x.order.top, limits,
                     x.table[kind.table :], c.system.reals[kind.reals :], x.loads[kind.values :], c.graph.inverse,
                 )  # fmt: skip
                 if off != 0:

@@ -23,6 +23,7 @@ from .tolerances import (
     CLOSE,
     CLOSER,
     HALVED,
+    LEAST_STEPS,
     LOOSER,
     MISSED,
     MOST_TURN,
@@ -78,9 +79,10 @@ def _propose(c, r, tol):
     if is_near_singular(c.tangent, c.tangent.indicator.start):
         s.tol = max(TIGHTER * tol, min(tol, TIGHTEST))
         s.h = longest(c, r, s.tol, s.highest)
+    s.limit = r.clock.max_step
     if s.check != 0:
         s.h *= min(1.0, RATES * s.h / (order.top + 2)) ** (1.0 / (order.top + 2))
-    s.limit = r.clock.max_step
+        s.limit = min(s.limit, (r.clock.t_end - r.clock.t_origin) / LEAST_STEPS)
     if c.system.memory.size > 0:  # what counts turns must see each of them
         s.limit = min(s.limit, MOST_TURN / max(_fastest(c), NO_SPEED))
     if r.numbers.steps == 0 and r.clock.h > 0.0:

@@ -17,6 +17,7 @@ from ..runs.breakpoints import is_sampled, next_stop, take_pieces
 from ..runs.outputs import record, store_now
 from ..runs.run_log import close_chart, is_full, no_log, note_accepted, open_chart
 from ..runs.step_outputs import head_block, is_wanted_before, record_end, store_block
+from ..runs.tolerances import TRIES
 from ..workspaces.run_state import B_DATA, load_run
 from .breakpoints import cross_stop, lower_order
 from .step_length import radius, weights
@@ -171,7 +172,7 @@ def advance_series(context, run, log, most):
         r.numbers.waiting = 0
         status = cross_stop(context, c, r, log)
     for _ in range(most):
-        if status != 0 or is_full(r, log):
+        if status != 0 or is_full(r, log) or r.numbers.history + TRIES > log.history.shape[0]:
             break
         t0, stop = r.clock.t, next_stop(r, log)
         if t0 >= r.clock.t_end:

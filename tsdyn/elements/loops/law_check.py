@@ -1,21 +1,25 @@
 """Series of forces against their laws, at a place of a Taylor step.
 
 A law may change within less than a series shows: the series of v / sqrt(v^2 + v_0^2) at v >> v_0 knows nothing of the
-reversal at v = 0, that of |v| at v > 0 is v, and a pulse is zero to any order long before. The law itself is therefore
-evaluated at x(tau) and xd(tau), and must be f(tau). What f lacks may be as large as
+reversal at v = 0, that of |v| at v > 0 is v, and a pulse is zero to any order long before. The law itself, or the
+program of a traced function, is therefore evaluated at x(tau) and xd(tau), and must be f(tau). What f lacks may be as
+large as
 
     OFF (atol + rtol |xd|) / (w h)      w: what the force accelerates by, so that w f h is a velocity
     a small part of the terms of f      rounding
 """
 
-from ...jit.kernels import ANY, caller, integers, kernel, part, stack, vector
+from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, vector
+from ...motions.state_program import LENGTH as PROGRAM_LENGTH
+from ...motions.state_program import T
 from ..markers import PARAMETERS, POINT, TURN
 from ..tolerances import LAW_NOISE, LAW_TOLERANCE, OFF
-from .force_series import BODY, INTS, MASK
-from .template import CODES, MARKERS, OWNERS, ROOM, SIZE, SLOTS, STARTS, kernel_law
+from .force_series import BODY, INTS, MASK, run_traced, scratch_rows
+from .template import CODES, MARKERS, OWNERS, ROOM, SIZE, STARTS, TRACED, kernel_law, kernel_series
 
-# count, reals and floats per instance, orders, how many are known, limits, table, reals, values, inverse
-SIGNATURE = "iiiiippppp"
+# what runs a program, count, reals and floats per instance, orders, how many are known, limits, table, reals, values,
+# inverse
+SIGNATURE = "iiiiiippppp"
 TAU, TIME, LENGTH, ATOL, RTOL, LIMITS = range(6)  # numbers of `limits`: place and length of the step, tolerances
 call_check = caller(SIGNATURE)
 
@@ -58,20 +62,28 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
     return not weight * off * limits[LENGTH] <= max(OFF * (limits[ATOL] + limits[RTOL] * speed), LAW_TOLERANCE)
 
 
-def check(count, stride, size, orders, known, limits, table, reals, values, inverse):
+def check(run, count, stride, size, orders, known, limits, table, reals, values, inverse):
     """1 if the series of an instance is not what its law is at a place of the step, else 0; time has been set."""
     table, reals, values = integers(table, ANY), vector(reals, ANY), vector(values, ANY)
     limits, inverse = vector(limits, LIMITS), vector(inverse, ANY)
     x, xd, f, wide = stack(ROOM), stack(ROOM), stack(ROOM), 4 * orders
+    rows, program = scratch_rows(stride, values), int(values[PROGRAM_LENGTH]) if TRACED else 0
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        first = i * size
-        kept = first + 2 * MARKERS * wide + SLOTS * orders + MARKERS
+        first = program + i * size
+        kept = first + 2 * MARKERS * wide + rows * orders + MARKERS
         for c in range(SIZE):
             x[c] = _sum(values, kept + c * orders, 1, known, limits[TAU])
             xd[c] = _sum(values, kept + (SIZE + c) * orders, 1, known, limits[TAU])
             f[c] = 0.0
-        kernel_law(x, xd, real[3 * MARKERS :], limits[TIME], f)
+        par = real[3 * MARKERS : stride]
+        if TRACED:
+            own_scratch = values[kept + 2 * SIZE * orders :]
+            values[T] = limits[TIME]
+            run_traced(run, values, x, xd, par, 0, rows, 1, own_scratch)
+            kernel_series(x, xd, par, 0, matrix(data_of(own_scratch), rows, 1), f)
+        else:
+            kernel_law(x, xd, par, limits[TIME], f)
         for j in range(MARKERS):
             forces = first + (MARKERS + j) * wide
             if own[MASK] >> OWNERS[j] & 1:

@@ -7,6 +7,8 @@ import numpy as np
 
 from .errors import InvalidArgument, UnknownAttribute
 
+FARTHEST = 1e150  # component of a vector, whose square must not overflow
+
 
 def floats(value):
     """Return real numbers as an array of floats; an empty one for text, booleans, complex or ragged input."""
@@ -52,6 +54,8 @@ def vector3(value, what, error):
     array = floats(value)
     if array.shape != (3,) or not np.isfinite(array).all():
         raise error(f"{what} must be three finite numbers, got {value!r}.")
+    if not np.abs(array).max() < FARTHEST:
+        raise error(f"{what} must be three numbers below {FARTHEST:g}: squares of {value!r} overflow.")
     return array
 
 
@@ -70,6 +74,16 @@ def whole(value, what):
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value < 2**63:
         raise InvalidArgument(f"{what} must be a positive whole number, got {value!r}.")
     return int(value)
+
+
+def sequence(value, what, error):
+    """Return the items of a sequence as a list, or raise `error`; text is no sequence."""
+    try:
+        if not isinstance(value, str):
+            return list(value)
+    except TypeError:
+        pass
+    raise error(f"{what}, got {value!r}.")
 
 
 def one_of(value, options, what, error=InvalidArgument):

@@ -166,6 +166,12 @@ def test_all_fixed():
     assert_same(poses, [parts[::2] for parts in snapshot(scene)])
 
 
+@pytest.mark.parametrize("fixed", ["base", 3, np.array(2.0)], ids=repr)
+def test_what_is_fixed_is_a_sequence(fixed):
+    with pytest.raises(ts.InvalidBody, match="must be a sequence of bodies"):
+        motorised(0.0).assemble(fixed=fixed)
+
+
 def motorised(angle):
     """An arm on a hinge, turned by 1 rad/s from zero at t = 0; drawn at an angle."""
     scene, half = ts.Scene(), 0.5 * angle

@@ -261,6 +261,10 @@ BAD = {
         "jumps from 1 to 0",
     ),
     "no data": (lambda: M.Piecewise(lambda t: t), "source must be a ts.Table"),
+    "ragged": (
+        lambda: ts.Table((0, 1), [[1, 2], [3]]),
+        r"2 vectors of three, one for each time, got \[\[1, 2\], \[3\]\]",
+    ),
     "three in one": (lambda: M.Piecewise(ts.Table(X, np.ones((3, 3)))), "one value a time, it has 3"),
 }
 

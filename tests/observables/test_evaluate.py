@@ -240,3 +240,10 @@ def test_redundant_rows_of_scenes_of_any_size(scene, redundant):
     tumbling = np.random.default_rng(1).normal(size=found.qdd.size)
     with pytest.raises(ts.SingularConfiguration, match="not unique"):
         scene.evaluate(qd=tumbling)  # what redundant rows ask for contradicts the others
+
+
+def test_loads_that_overflow_are_refused():
+    scene = ts.Scene(gravity=(0.0, 0.0, -1e149))
+    scene.add_point_mass(mass=1e200)
+    with pytest.raises(ts.InconsistentState, match="Q_A is not finite"):
+        scene.evaluate()

@@ -185,6 +185,40 @@ def test_constraints_that_contradict_each_other_later():
     assert solution.t[-1] < 0.1
 
 
+@pytest.mark.parametrize(
+    "method", [*(m for m in METHODS if m != "sdirk54"), pytest.param("sdirk54", marks=pytest.mark.slow)]
+)
+def test_no_output_is_off_a_row_that_was_redundant_at_the_start(method):
+    """Its rate and acceleration are off before its length is: by 4e-8 and 1e-5 where that is off by 1e-10."""
+    scene = ts.Scene()
+    bob = scene.add_body(1.0, (0.1, 0.1, 0.1), (1.0, 0.0, 0.0))
+    growing = ts.motions.Polynomial([1.0, 0.0, 0.0, 0.0, 1e-2])
+    for length in (1.0, growing):
+        scene.add(C.Distance(scene.ground, bob, length=length))
+    solution = ts.simulate(scene, (0.0, 0.01), **METHODS[method])
+    assert solution.status == ts.Status.UNHELD
+    assert solution.t[-1] < 1e-3
+    error = solution.constraint_error
+    assert error.velocity.max() < 1e-9 * max(np.abs(solution.qd).max(), 1e-3)
+    assert error.acceleration.max() < 1e-8
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e-6])
+def test_a_flat_start_is_refused_in_any_unit_of_length(size):
+    """A parallelogram with links in line: rows that depend on others here alone."""
+    scene = ts.Scene(gravity=(0.0, 0.0, 0.0))
+    ends = {"crank": (0.0, 1.0), "coupler": (1.0, 3.0), "rocker": (2.0, 3.0)}
+    inertia = size**2 * np.array((0.01, 0.1, 0.1))
+    crank, coupler, rocker = (
+        scene.add_body(1.0, inertia, (0.5 * (a + b) * size, 0.0, 0.0), name=name) for name, (a, b) in ends.items()
+    )
+    joints = (scene.ground, crank, 0.0), (crank, coupler, 1.0), (coupler, rocker, 3.0), (rocker, scene.ground, 2.0)
+    for a, b, x in joints:
+        scene.add(C.Revolute.at(a, b, point=(x * size, 0.0, 0.0), axis=(0.0, 0.0, 1.0)))
+    with pytest.raises(ts.SingularConfiguration, match="Branches of the motion meet"):
+        ts.simulate(scene, (0.0, 1.0))
+
+
 def test_a_start_that_breaks_a_redundant_row_is_refused_by_name():
     scene = door.build()
     crooked = C.Revolute(

@@ -1,9 +1,12 @@
 """A small sample of the random scenes of `tsdyn stress --fuzz`: each runs within the laws, is refused, or says why."""
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from tsdyn.stress.judgement import judge_scene
-from tsdyn.stress.random_scenes import KINDS, generate
+from tests.helpers.drawn_numbers import DrawnNumbers
+from tsdyn.stress.judgement import judge_case, judge_scene
+from tsdyn.stress.random_scenes import KINDS, drawn, generate
 
 
 def test_every_kind_is_drawn():
@@ -20,4 +23,14 @@ def test_a_seed_is_a_scene():
 @pytest.mark.parametrize("seed", range(40))
 def test_a_random_scene(seed):
     found = judge_scene(seed, 2, 12)
+    assert not found.fault, f"{found.name}: {found.word}: {found.said}"
+
+
+@pytest.mark.slow
+@settings(max_examples=100)
+@given(st.data())
+def test_a_scene_that_hypothesis_draws(data):
+    numbers = DrawnNumbers(data)
+    case = drawn(numbers, 2, 8)
+    found = judge_case(case, numbers)
     assert not found.fault, f"{found.name}: {found.word}: {found.said}"

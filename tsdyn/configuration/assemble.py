@@ -11,7 +11,7 @@ from ..calls import fitting
 from ..elements.names import named
 from ..errors import InconsistentState, InvalidArgument, InvalidBody
 from ..maths.row_rank import row_lengths
-from ..validation import number, one_of, positive
+from ..validation import number, one_of, positive, sequence
 from .continuation import Found, Kept, close, nearest, relax, settle, stuck
 from .infeasible_subset import refuse
 from .kinetic_metric import Metric, least_step
@@ -146,11 +146,9 @@ def assemble(
 
 def _held(scene, fixed):
     """Return True for each coordinate that is held, (n,)."""
-    if isinstance(fixed, str) or not hasattr(fixed, "__iter__"):
-        raise InvalidBody(f"fixed must be a sequence of bodies, such as (body,), got {fixed!r}.")
     bodies = scene.system.bodies
     held = np.zeros(int(bodies[:, 1].sum()), bool)
-    for body in fixed:
+    for body in sequence(fixed, "fixed must be a sequence of bodies, such as (body,)", InvalidBody):
         body = named(scene.bodies, body, "body to be fixed", InvalidBody) if isinstance(body, str) else body
         if not any(body is known for known in scene.bodies):
             raise InvalidBody(f"fixed: {body!r} is not a body of this scene.")

@@ -21,7 +21,7 @@ from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
 from ..model import joint_motion
 from ..model.handles import handles_of
 from ..motions.elementary import Polynomial
-from ..validation import floats, number
+from ..validation import floats, number, sequence
 from .assemble import assemble
 from .rigid_shift import RigidShift
 from .tolerances import DRIVE_LEAST, DRIVE_SHARE, DRIVE_TURN, LEAST_DIVISOR
@@ -111,8 +111,7 @@ def set_joint(  # by name: a value and a rate of each coordinate
     >>> print(bar.position.round(4) + 0.0, bar.angular_velocity.round(4) + 0.0)
     [ 0.4388  0.     -0.2397] [0. 2. 0.]
     """
-    if isinstance(keep, str) or not hasattr(keep, "__iter__"):
-        raise InvalidArgument(f"set: keep must be a sequence of joints or names, such as (joint,), got {keep!r}.")
+    keep = sequence(keep, "set: keep must be a sequence of joints or names, such as (joint,)", InvalidArgument)
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"set: t must be a finite time in s, got {t!r}.")
     handles = handles_of(scene.packed)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InvalidBody
 from ..validation import demand_known, floats, positive, vector3
-from .tolerances import INERTIA_ROUNDING, TRIANGLE, UNIT_LENGTH
+from .tolerances import INERTIA_ROUNDING, LEAST_MASS, TRIANGLE, UNIT_LENGTH
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,7 +65,10 @@ class Attribute(Generic[Given, Kept]):
 
 
 def _mass(value, body):
-    return np.float64(positive(value, f"{body.name}: mass (kg)", InvalidBody))
+    mass = np.float64(positive(value, f"{body.name}: mass (kg)", InvalidBody))
+    if mass < LEAST_MASS:
+        raise InvalidBody(f"{body.name}: mass (kg) must be at least {LEAST_MASS:g}, got {value!r}: 1 / mass overflows.")
+    return mass
 
 
 def _inertia(value, body):

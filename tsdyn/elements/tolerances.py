@@ -1,5 +1,8 @@
 """Limits of bodies, markers and compiled loops, each with its unit and where it comes from."""
 
+# kg: the reciprocal of a mass must be a number.
+LEAST_MASS = 1e-300
+
 # Inertia, relative to its largest entry. A tensor turned to other axes is symmetric, and its principal moments are
 # right, to some 10 roundings; sums of hundreds of parts to 1000. The triangle inequality is a limit that a flat body
 # reaches, and tables of masses have nine digits.

@@ -9,7 +9,7 @@ from ..elements.loops.body_poses import OMEGA, POSE, P, add_torque, write_accele
 from ..jit.kernels import kernel
 from ..jit.simd import cross, fma, four, put, splat, sub, times
 from ..model.equations import applied_forces
-from ..rows.interface import constrain_accelerations, evaluate_bias, weigh_bodies
+from ..rows.interface import constrain_accelerations, evaluate_bias, note_loads, weigh_bodies
 
 
 @kernel
@@ -52,6 +52,7 @@ def solve_accelerations(graph, system, w, f, t):
     """Solve for accelerations and multipliers, without qdd; w.q and w.qd are read if there are forces."""
     body_forces(graph, system, w, f, t)
     weigh_bodies(graph, f.Z)
+    note_loads(f)
     if f.b.size == 0:
         return
     evaluate_bias(graph, system, f, t)

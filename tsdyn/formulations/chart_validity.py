@@ -13,7 +13,17 @@ import math
 from ..elements.loops.body_poses import POSE, P, R, place_bodies
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import copy
-from ..rows.interface import METRIC, evaluate_rows, factorise_rows, pivot_loss, selection_serves
+from ..rows.interface import (
+    METRIC,
+    accelerations_hold,
+    evaluate_rows,
+    factorise_rows,
+    has_redundant_rows,
+    pivot_loss,
+    rates_hold,
+    redundant_rows_hold,
+    selection_serves,
+)
 from .chart_coordinates import factorise_normal, turned_most
 from .tolerances import CONTRACTION_LIMIT, ROUNDING, SAME, TINY, TURN_LIMIT, TURN_SHARE
 
@@ -92,3 +102,14 @@ def turning(graph, w, f, l):
     if not contraction < CONTRACTION_LIMIT:
         return BY_CONTRACTION
     return STAY if turn < TURN_LIMIT else BY_TURN
+
+
+@kernel
+def every_level_holds(c):
+    """Return True if the redundant rows hold at q, qd and qdd, where all rows have been evaluated."""
+    w, f, graph = c.work, c.tangent, c.graph
+    if not has_redundant_rows(f):
+        return True
+    size = w.control.size
+    held = redundant_rows_hold(graph, f, w.control.floor) and rates_hold(graph, f, w.q, w.qd, size)
+    return held and accelerations_hold(graph, f, w.q, w.qd, w.qdd, size)

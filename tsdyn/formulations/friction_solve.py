@@ -27,6 +27,7 @@ from ..rows.interface import (
     evaluate_bias,
     factorise_product,
     inner,
+    note_loads,
     solve_product,
     weigh,
     weigh_bodies,
@@ -158,6 +159,7 @@ def rub(context, t, unused):
     forget_loads(system)
     body_forces(graph, system, w, f, t)
     weigh_bodies(graph, f.Z)
+    note_loads(f)
     evaluate_bias(graph, system, f, t)
     found = find_reactions(graph, system, f, w.q, w.qd, t)
     for i in range(system.normals.size):

@@ -11,15 +11,15 @@ per vd; Q_v = 8 Gd^T J' Gd p on p (S in the paper).
 
 import math
 
-from ..elements.loops.body_poses import place_bodies
+from ..elements.loops.body_poses import move_bodies, place_bodies
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
 from ..maths.dense_linalg import cholesky, cholesky_solve, is_finite, transposed_times
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import applied_forces, is_rheonomic, set_time
-from ..rows.interface import evaluate_rows, redundant_rows_hold
+from ..rows.interface import evaluate_bias, evaluate_drift, evaluate_rows, has_redundant_rows, redundant_rows_hold
 from ..workspaces.workspace import load
-from .chart_validity import measure_turns, turning
+from .chart_validity import every_level_holds, measure_turns, turning
 from .dense_rows import correct, evaluate_dense_bias, evaluate_dense_drift, multiply_dense_row
 from .friction_loads import call_rub, forget_loads
 from .newton_iterations import NOT_FINITE, OK, solve_positions
@@ -208,8 +208,18 @@ def complete(context, vdd):
 
 @callback("p")
 def check(context):
-    """Return the reason to abandon the chart, or zero."""
-    return look(load(context))
+    """Return the reason to abandon the chart, or zero; negative, a Status, where the state can't be taken."""
+    c = load(context)
+    w, f, graph = c.work, c.tangent, c.graph
+    reason = look(c)
+    if has_redundant_rows(f):
+        move_bodies(graph.bodies, w.q, w.qd, f.poses)
+        evaluate_bias(graph, c.system, f, c.chart.state.time)
+        if is_rheonomic(c.system):
+            evaluate_drift(graph, c.system, f, c.chart.state.time, c.chart.drift)
+        if not every_level_holds(c):
+            return -UNHELD
+    return reason
 
 
 @kernel
@@ -258,7 +268,7 @@ def start_chart(context, t, v, vd, vdd, unused):
     for j in range(k):
         v[j] = 0.0
     project(w, vector(vd, k), vector(vdd, k))
-    return UNHELD if status == OK and not redundant_rows_hold(c.tangent, w.control.floor) else status
+    return UNHELD if status == OK and not redundant_rows_hold(c.graph, c.tangent, w.control.floor) else status
 
 
 @kernel

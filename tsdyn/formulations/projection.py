@@ -79,7 +79,7 @@ def _settle(graph, f, floor):
 
     A residual of Phi there displaces bodies by the residual over the distance.
     """
-    if not redundant_rows_hold(f, floor):
+    if not redundant_rows_hold(graph, f, floor):
         return UNHELD
     if is_near_singular(f, singularity_indicator(graph, f.rows)):
         _displace(graph, f)

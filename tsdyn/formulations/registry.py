@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 
 from ..rows.interface import redundancy
-from ..sparse.constraint_graph import REDUCED
-from ..sparse.constraint_graphs import graph_of
+from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED
+from ..sparse.constraint_graphs import graph_of, redundant_rows
 from ..validation import unknown_name
 from . import friction_basis, friction_solve, linearisation, maggi_kane, null_space, tangent
 from .locked_orientations import moving_graph
@@ -28,7 +28,10 @@ class Formulation:
 
     def graph(self, packed):
         """The scene's graph with the loops that the kernels call; that of the forms with a basis has every row."""
-        graph = moving_graph(packed, *self.kernels.COLUMNS) if self.basis_free else graph_of(packed, REDUCED)
+        if self.basis_free:
+            graph = moving_graph(packed, *self.kernels.COLUMNS)
+        else:  # redundant rows are judged by sparse rows at every level
+            graph = graph_of(packed, REDUCED, *((BIAS, DRIFT) if len(redundant_rows(packed)) else ()))
         if graph.frictions.size and graph.rub[0] == 0:
             graph.rub[0] = (friction_solve if self.basis_free else friction_basis).rub.address
         return graph

@@ -46,7 +46,7 @@ from .chart_coordinates import (
     turn_rates,
     write_back,
 )
-from .chart_validity import BY_FAILURE, touch, turning
+from .chart_validity import every_level_holds, touch, turning
 from .friction_loads import call_rub
 from .tangent_error import error_norm
 from .tolerances import (
@@ -243,14 +243,12 @@ def complete(context, yd):
 
 @callback("p")
 def check(context):
-    """Return the reason to abandon the chart, or zero."""
+    """Return the reason to abandon the chart, or zero; negative, a Status, where the state can't be taken."""
     c = load(context)
     w, f, l = c.work, c.tangent, c.chart
     reason = turning(c.graph, w, f, l)
     l.state.placement = w.counters.placements if w.control.contraction < CONTRACTION_LOST else 0
-    if not redundant_rows_hold(f, w.control.floor):
-        return BY_FAILURE  # the next chart can't be made, and says why
-    return reason
+    return reason if every_level_holds(c) else -UNHELD
 
 
 @callback("pdpppp")
@@ -276,7 +274,7 @@ def start_chart(context, t, x, y, yd, unused):
             _spin(w.q, w.qdd, i + 3, yd, o + 4)
     if not regular:
         return SINGULAR
-    return OK if redundant_rows_hold(f, w.control.floor) else UNHELD
+    return OK if redundant_rows_hold(graph, f, w.control.floor) else UNHELD
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import reprlib
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -53,8 +54,8 @@ class Table:
             raise InvalidArgument("Table: times must be two or more finite times in s, each after the one before.")
         if self.values.shape not in ((k,), (k, 3)) or not np.isfinite(self.values).all():
             raise InvalidArgument(
-                f"Table: values must be {k} finite numbers or {k} vectors of three, one for each time; their shape is "
-                f"{np.shape(values)}."
+                f"Table: values must be {k} finite numbers or {k} vectors of three, one for each time, got "
+                f"{reprlib.repr(values)}."
             )
         from scipy.interpolate import CubicSpline  # slow to import
 

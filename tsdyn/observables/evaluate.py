@@ -8,7 +8,7 @@ import numpy as np
 
 from ..calls import fitting
 from ..elements.bodies import transform_g
-from ..errors import InvalidArgument, SingularConfiguration
+from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
 from ..formulations.dependent_rows import dependent_rows
 from ..maths.row_rank import dependent, farthest_first
 from ..maths.tolerances import RANK_TOL
@@ -62,6 +62,8 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
     ------
     InvalidArgument
         If q or qd is not n finite numbers, or t is not finite.
+    InconsistentState
+        If a result is not finite.
     SingularConfiguration
         If the accelerations are not unique, or dependent rows are incompatible.
 
@@ -78,17 +80,31 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
     >>> print(at_start.Phi_q, at_start.M.diagonal(), at_start.multipliers)
     [[0. 0. 1.]] [2. 2. 2.] [-19.62]
     """
-    system = scene.system
     start = scene.start
     q = finite_vector(start[0] if q is None else q, start[0].size, "q")
     qd = finite_vector(start[1] if qd is None else qd, start[0].size, "qd")
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
-    if q.size > LARGE:
-        return _evaluate_sparse(scene.packed, q, qd, float(t))
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = (_evaluate_sparse if q.size > LARGE else _evaluate_dense)(scene.packed, q, qd, float(t))
+    _demand_finite(accelerations=found.qdd)
+    return found
+
+
+def _demand_finite(**arrays):
+    for name, array in arrays.items():
+        if not np.isfinite(array).all():
+            raise InconsistentState(
+                f"evaluate: {name} is not finite at this state. Look at the masses, loads and motions of the scene."
+            )
+
+
+def _evaluate_dense(packed, q, qd, t):
+    system = packed.system
     Phi, Phi_q, Phi_t, gamma = constraint_arrays(system, q, qd, t)
     M, Q_v = mass_matrix(system, q), velocity_forces(system, q[None], qd[None])[0]
-    Q_A = applied_loads(system, np.array([float(t)]), q[None], qd[None])[0]
+    Q_A = applied_loads(system, np.array([t]), q[None], qd[None])[0]
+    _demand_finite(Phi=Phi, Phi_q=Phi_q, Phi_t=Phi_t, gamma=gamma, M=M, Q_A=Q_A, Q_v=Q_v)
     m, n = Phi_q.shape
     kkt = np.block([[M, Phi_q.T], [Phi_q, np.zeros((m, m))]])
 
@@ -98,7 +114,7 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
         except np.linalg.LinAlgError:
             return _of_independent_rows(M, Phi_q, Q_A + Q_v + friction, gamma)
 
-    friction, solution = _with_friction(scene.packed, t, q, qd, Phi_q, solve)
+    friction, solution = _with_friction(packed, t, q, qd, Phi_q, solve)
     return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, Q_v, solution[n:], solution[:n])
 
 
@@ -143,6 +159,7 @@ def _evaluate_sparse(packed, q, qd, t):
     Phi_q, M = as_csr(packed, rows), mass_matrix_sparse(system, q)
     Q_v = velocity_forces(system, q[None], qd[None])[0]
     Q_A = applied_loads(system, np.array([t]), q[None], qd[None])[0]
+    _demand_finite(Phi=Phi, Phi_q=rows, Phi_t=Phi_t, gamma=gamma, Q_A=Q_A, Q_v=Q_v)
     regular = _sparse_solver(M, Phi_q)
 
     def solve(friction):

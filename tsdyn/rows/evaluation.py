@@ -3,7 +3,7 @@
 from ..elements.loops.constraint_rows import call_body_loop
 from ..jit.kernels import kernel, long_kernel
 from .axis_rows import clear_axes
-from .redundant_rows import clear_redundant, keep_every_row, leave_redundant_rows, restore_selection
+from .redundant_rows import clear_redundant, keep_every_row, keep_redundant, leave_redundant_rows, restore_selection
 
 
 @kernel
@@ -38,7 +38,7 @@ def _evaluate(graph, reals, f, rows, t):
         _run_loop(graph, reals, f, t, kind, kind.reduced, f.b, rows.H)
     _clear_other_rows(graph, f.b)
     if f.dropped[0] > 0:
-        leave_redundant_rows(f, f.b, rows.H)
+        leave_redundant_rows(graph, f, f.b, rows.H)
 
 
 @kernel
@@ -78,7 +78,7 @@ def evaluate_bias(graph, system, f, t):
         kind = graph.kinds[i]
         _run_loop(graph, system.reals, f, t, kind, kind.bias, f.gamma, f.rows.H)
     _clear_other_rows(graph, f.gamma)
-    clear_redundant(f, f.gamma)
+    keep_redundant(f, f.gamma, f.left.gamma)
 
 
 @kernel
@@ -89,4 +89,4 @@ def evaluate_drift(graph, system, f, t, out):
     for i in range(graph.kinds.shape[0]):
         kind = graph.kinds[i]
         _run_loop(graph, system.reals, f, t, kind, kind.drift, out, f.rows.H)
-    clear_redundant(f, out)
+    keep_redundant(f, out, f.left.drift)

@@ -18,7 +18,8 @@ Solve:
     balance_loads           lam = S^-1 H W F, F <- F - H^T lam
     solve_series            the same for one order of a Taylor series
 Ask:
-    redundant_rows_hold, mark_redundant, self_stress          of redundant rows
+    redundant_rows_hold, rates_hold, accelerations_hold       of redundant rows
+    mark_redundant, self_stress                               of redundant rows
     singularity_indicator, is_near_singular, refinements      of the distance to a singular configuration
 
 Right-hand sides and multipliers are in the order of the graph; `ConstraintGraph.row` names the rows of Phi.
@@ -27,12 +28,12 @@ Right-hand sides and multipliers are in the order of the graph; `ConstraintGraph
 from .axis_rows import add_axis_multipliers, is_axis
 from .chart_matrix import factorise_chart_matrix, factorise_product, pivot_loss, rotate_rate, solve_product
 from .evaluation import evaluate_bias, evaluate_drift, evaluate_every_row, evaluate_residuals, evaluate_rows
+from .held_rows import accelerations_hold, has_redundant_rows, note_loads, rates_hold, redundant_rows_hold
 from .redundant_rows import (
     clear_redundant,
     keep_every_row,
     list_redundant,
     mark_redundant,
-    redundant_rows_hold,
     restore_selection,
     return_to_selection,
     save_selection,
@@ -77,6 +78,7 @@ __all__ = [
     "Rows",
     "TangentWorkspace",
     "acceleration_residuals",
+    "accelerations_hold",
     "add_axis_multipliers",
     "allocate_rows",
     "allocate_tangent",
@@ -96,6 +98,7 @@ __all__ = [
     "factorise_rows",
     "factorise_selected_rows",
     "find_correction",
+    "has_redundant_rows",
     "inner",
     "is_axis",
     "is_near_singular",
@@ -107,8 +110,10 @@ __all__ = [
     "multiply_rates",
     "multiply_rows",
     "note_indicator",
+    "note_loads",
     "pivot_loss",
     "project",
+    "rates_hold",
     "redundancy",
     "redundant_of",
     "redundant_rows_hold",

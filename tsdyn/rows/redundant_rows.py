@@ -4,8 +4,11 @@ It is dropped: its row of H and its right-hand sides are zero and its diagonal e
 multiplier is zero and every sparsity pattern is unchanged.
 """
 
+import math
+
+from ..elements.loops.body_poses import POSE, R
 from ..jit.kernels import kernel
-from ..jit.simd import put, splat
+from ..jit.simd import four, put, splat
 from .tolerances import HELD
 
 
@@ -17,25 +20,46 @@ def clear_redundant(f, b):
 
 
 @kernel
-def clear_redundant_rows(f, Phi, H):
-    """Zero the redundant rows of Phi and H."""
+def keep_redundant(f, b, kept):
+    """Zero the right-hand sides of redundant rows, after keeping them; kept is one of `Left`."""
+    if kept.size > 0:
+        for i in range(f.dropped[0]):
+            kept[i] = b[f.dropped[1 + i]]
+    clear_redundant(f, b)
+
+
+@kernel
+def leave_redundant_rows(graph, f, Phi, H):
+    """Zero the redundant rows of Phi and H, after keeping these rows of H and how well the residuals hold."""
+    worst = -math.inf
     for i in range(f.dropped[0]):
-        at = 16 * f.dropped[1 + i]
+        row = f.dropped[1 + i]
+        over = abs(Phi[row]) - HELD * _position_terms(graph, f, H, row)
+        if not over <= worst:
+            worst = over
         for c in range(0, 16, 4):
-            put(H, at + c, splat(0.0))
+            if f.left.H.size > 0:
+                put(f.left.H, 16 * i + c, four(H, 16 * row + c))
+            put(H, 16 * row + c, splat(0.0))
+    f.selection.unheld = worst
     clear_redundant(f, Phi)
 
 
 @kernel
-def leave_redundant_rows(f, Phi, H):
-    """Zero the redundant rows of Phi and H, after recording the largest |Phi| of these."""
-    worst = 0.0
-    for i in range(f.dropped[0]):
-        size = abs(Phi[f.dropped[1 + i]])
-        if not size <= worst:
-            worst = size
-    f.selection.unheld = worst
-    clear_redundant_rows(f, Phi, H)
+def _position_terms(graph, f, H, row):
+    """Size of the terms of a row at the poses: |H_r| |r| + |H_pi'|."""
+    terms = 0.0
+    for side in range(2):
+        b, at = graph.sides[row, side], 16 * row + 8 * side
+        if b < graph.bodies.shape[0]:
+            terms += length(H, at) * length(f.poses, b * POSE + R) + length(H, at + 4)
+    return terms
+
+
+@kernel
+def length(x, i):
+    """|x[i : i + 3]|."""
+    return math.sqrt(x[i] * x[i] + x[i + 1] * x[i + 1] + x[i + 2] * x[i + 2])
 
 
 @kernel
@@ -71,12 +95,6 @@ def return_to_selection(f):
     """Return to the saved selection of redundant rows."""
     for i in range(f.saved[0] + 1):
         f.dropped[i] = f.saved[i]
-
-
-@kernel
-def redundant_rows_hold(f, floor):
-    """Return True if the redundant rows hold on the manifold, by the residuals of the last evaluation."""
-    return f.dropped[0] == 0 or f.selection.unheld <= HELD * floor
 
 
 @kernel

@@ -8,7 +8,7 @@ from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader
 from ..sparse.constraint_graph import ConstraintGraph, no_graph
 from .evaluation import evaluate_all, evaluate_every_row
 from .independent_rows import select, weakest
-from .redundant_rows import clear_redundant_rows, keep_every_row
+from .redundant_rows import keep_every_row, leave_redundant_rows
 from .row_workspace import Rows, TangentWorkspace, no_tangent_workspace
 from .schur_complement import factorise_selected_rows
 from .tolerances import WORSE, ZERO_PIVOT
@@ -44,7 +44,7 @@ def _choose(graph, reals, f, rows, t, metric):
     """Renew the selection of rows; f.b, H, Y and the factors of S follow it. True if S is nonsingular."""
     evaluate_all(graph, reals, f, rows, t)
     found = select(graph, f, rows, f.dropped[0], ZERO_PIVOT)
-    clear_redundant_rows(f, f.b, rows.H)
+    leave_redundant_rows(graph, f, f.b, rows.H)
     regular = factorise_selected_rows(graph, f, rows, metric) < 0
     if found and regular:
         f.selection.weakest = weakest(graph, rows.S)
@@ -102,5 +102,5 @@ def select_rows(graph, system, f, t, least):
     evaluate_every_row(graph, system, f, f.rows, t)
     keep_every_row(f)
     found = select(graph, f, f.rows, -1, least)
-    clear_redundant_rows(f, f.b, f.rows.H)
+    leave_redundant_rows(graph, f, f.b, f.rows.H)
     return f.dropped[0] if found else -1

@@ -5,7 +5,7 @@ import numpy as np
 from ..elements.loops.body_poses import POSE
 from ..jit.aligned_arrays import zeros
 from .reselection import choosing_anew
-from .row_workspace import Friction, Indicator, Landing, Rows, Selection, TangentWorkspace
+from .row_workspace import Friction, Indicator, Landing, Left, Rows, Selection, TangentWorkspace
 from .tolerances import MOST_ROWS
 
 
@@ -16,17 +16,19 @@ def allocate_tangent(graph, n, redundant=False, basis=False):
     basis needs room for its frictions, too.
     """
     nb, m = len(graph.bodies), len(graph.row)
-    choosing = (redundant or graph.dropped.size > 0) and m <= MOST_ROWS
+    redundant = redundant or graph.dropped.size > 0
+    choosing, left = redundant and m <= MOST_ROWS, m if redundant else 0
     widest = int(np.diff(graph.pattern.starts).max(initial=0))
     poses = zeros((nb + 1) * POSE)
     poses.reshape(-1, POSE)[:, [0, 5, 10, 24]] = 1.0
     tangent = TangentWorkspace(
         poses, allocate_rows(graph), zeros(m), zeros(m), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n),
-        zeros(4), Landing(), Selection(), Indicator(), *(np.zeros(size, np.int64) for size in (m + 1, m + 1, m + 1, m)),
+        zeros(4), Landing(), Selection(), Indicator(), Left(*(zeros(k * left) for k in (16, 1, 1))),
+        *(np.zeros(size, np.int64) for size in (m + 1, m + 1, m + 1, m)),
         zeros(max(widest, m if choosing else 0) ** 2), _allocate_friction(graph, n, basis), np.zeros(2, np.int64),
     )  # fmt: skip
     reset_selection(graph, tangent)
-    return choosing_anew(graph, tangent) if redundant or graph.dropped.size else tangent
+    return choosing_anew(graph, tangent) if redundant else tangent
 
 
 def allocate_rows(graph):
@@ -50,7 +52,9 @@ def reset_selection(graph, tangent):
     tangent.friction.lam.fill(0.0)
     tangent.friction.load.fill(0.0)
     set_selection(tangent, graph.dropped)
-    tangent.selection.weakest = 1.0
+    tangent.selection.weakest, tangent.selection.push, tangent.selection.twist = 1.0, 0.0, 0.0
+    for array in tangent.left:
+        array.fill(0.0)
     tangent.indicator.clear()
 
 

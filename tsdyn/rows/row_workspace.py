@@ -34,6 +34,14 @@ class Friction(NamedTuple):
     numbers: np.ndarray  # (2 (rows of Phi + n + k),)  multipliers without and with friction, scratch; friction_basis
 
 
+class Left(NamedTuple):
+    """The redundant rows, in the order of `TangentWorkspace.dropped`; of no size where none may be redundant."""
+
+    H: np.ndarray  # (m * 16,)  as in `Rows`, at the last evaluation
+    drift: np.ndarray  # (m,)  Phi_t
+    gamma: np.ndarray  # (m,)  acceleration bias
+
+
 class Landing(Record):
     """The last projection of positions onto the manifold."""
 
@@ -44,8 +52,10 @@ class Landing(Record):
 class Selection(Record):
     """Quality of the selection of redundant rows."""
 
-    unheld: float  # the largest |Phi| of the redundant rows
+    unheld: float  # by how much |Phi| of the redundant rows exceeds HELD of its terms, at most
     weakest: float  # the smallest relative pivot of the others: its largest value since the selection
+    push: float  # the largest |W F| of a body, m/s^2
+    twist: float  # and rad/s^2
 
 
 class Indicator(Record):
@@ -70,6 +80,7 @@ class TangentWorkspace(NamedTuple):
     landing: Landing
     selection: Selection
     indicator: Indicator
+    left: Left
     dropped: np.ndarray  # int64 (m + 1,)  how many rows are redundant, and which; independent_rows.select
     saved: np.ndarray  # int64 (m + 1,)  the same before a passing selection; redundant_rows.save_selection
     chosen: np.ndarray  # int64 (m + 1,)  scratch of independent_rows.select, as the next two
@@ -83,5 +94,5 @@ def no_tangent_workspace():
     """The `TangentWorkspace` of nothing, for its type."""
     none, whole, square = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
     friction = Friction(*[none] * 7, square, square, whole, none)
-    rows, records = Rows(none, none, none), (Landing(), Selection(), Indicator())
+    rows, records = Rows(none, none, none), (Landing(), Selection(), Indicator(), Left(none, none, none))
     return TangentWorkspace(none, rows, *[none] * 6, *records, whole, whole, whole, whole, none, friction, whole)

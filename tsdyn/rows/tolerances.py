@@ -17,9 +17,14 @@ FIRST_SHARE, FEWER = 1e-3, 1e-2
 # loses no more than one digit to an old selection.
 WORSE = 0.1
 
-# |Phi| of redundant rows over the rounding of Phi: above it they don't hold. Relative to the size of the scene 1e-9, as
-# at the start (docs/theory.md).
-HELD = 1e6
+# Residual of a redundant row, its rate or its acceleration over the sum of its absolute terms: above it the row doesn't
+# hold (docs/theory.md). Points and axes that are typed with ten digits hold.
+HELD = 5e-10
+# Terms that are themselves rounding: a row's are taken for this share of the largest in the scene at least.
+FAINT = 1e-3
+# Velocities of a scene at rest, over those of a fall through its extent under its loads, and over that extent (1/s, or
+# 1/s^2 for accelerations): less is rounding of rounding.
+RESTING, NO_RATE = 1e-9, 1e-20
 
 # Rows: scenes with more are searched for redundant rows within the blocks of the elimination order, not all at once
 # (docs/design-decisions.md, "Global pivoting up to 1500 rows"); the dense matrix takes 18 MB at this size.

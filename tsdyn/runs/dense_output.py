@@ -50,21 +50,21 @@ def between(context, w, r, t, block):
 
 
 @kernel
-def keep(w, store):
+def keep(c, store):
     """Copy what the Newton solvers start from."""
-    _warm(w, store, True)
+    _warm(c, store, True)
 
 
 @kernel
-def bring_back(w, store):
+def bring_back(c, store):
     """Put it back."""
-    _warm(w, store, False)
+    _warm(c, store, False)
 
 
 @kernel
-def _warm(w, store, out):
-    i = 0
-    for part in (w.u, w.v):
+def _warm(c, store, out):
+    w, friction, i = c.work, c.tangent.friction, 0
+    for part in (w.u, w.v, friction.lam, friction.load):
         for j in range(part.size):
             if out:
                 store[i] = part[j]
@@ -85,9 +85,9 @@ def _warm(w, store, out):
         w.control.rate = store[i]
 
 
-def warm_size(work):
+def warm_size(work, friction):
     """Floats that `keep` stores."""
-    return work.u.size + work.v.size + work.B.size + work.T.size + 1
+    return sum(part.size for part in (work.u, work.v, friction.lam, friction.load, work.B, work.T)) + 1
 
 
 @kernel
@@ -117,14 +117,16 @@ def read(context, run, t, rows, blocks, charts, points, out):
     for i in range(t.size):
         block = blocks[rows[i]]
         if int(block[B_CHART]) == chart:
-            bring_back(w, r.warm)
+            bring_back(c, r.warm)
         else:
             chart = int(block[B_CHART])
             copy(points[chart], w.q)
+            c.tangent.friction.lam[:] = 0.0
+            c.tangent.friction.load[:] = 0.0
             status = call_chart(r.kernels.start_chart, context, charts[chart, 0], r.xs, r.ys, r.yds, r.dx)
             if status != 0:
                 return status
-            keep(w, r.warm)
+            keep(c, r.warm)
         recall(c.system, block)
         status = between(context, w, r, t[i], block)
         if status != 0:

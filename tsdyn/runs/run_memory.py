@@ -8,6 +8,7 @@ from ..errors import Status
 from ..jit.kernels import resident
 from ..rows.interface import reset_selection
 from ..workspaces.run_state import enter_joints
+from ..workspaces.workspace import hold
 from .arguments import step_count
 from .run_log import no_log
 
@@ -66,11 +67,7 @@ class Memory:
             own.reals[own.memory] = task.remembered[len(run.joints) :]
         work.q[...], work.qd[...] = task.q, task.qd
         run.now[0], run.now[1] = task.q, task.qd
-        control = work.control
-        control.size = size = task.prepared.packed.size
-        control.u_tol = control.b_tol = task.constraint_tol
-        if task.form.basis_free and 0.0 < size < 1.0:  # a small scene is held as closely; no Phi is a normalisation's
-            control.u_tol *= size
+        hold(work.control, task.constraint_tol, task.prepared.packed.size, task.form.basis_free)
 
     def set_out(self, task, dense, may_pass):
         """The interval, the method's steps and tolerances, and what the run is to do."""

@@ -38,13 +38,14 @@ class StepMemory(Memory):
         rows = len(graph.row) if basis_free else None
         work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant)
         angles, slots = prepared.handles.count, system.memory.size
-        run = lay_out(n, *sizes, angles, slots, warm=warm_size(work), **lengths)
+        parts = basis_free_parts(graph, n, not basis_free)
+        run = lay_out(n, *sizes, angles, slots, warm=warm_size(work, parts[1].friction), **lengths)
         linear = allocate_linear(system, n, m, implicit, kept, redundant)
         written = [run.x.base, linear.K.base, linear.pivots]
         written += [np.frombuffer(record, np.int64) for record in (linear.numbers, linear.kernels)]
         if implicit:
             linear = linear._replace(now=run.now, before=run.before)
-        context = Context(system, work, linear, *basis_free_parts(graph, n, not basis_free))
+        context = Context(system, work, linear, *parts)
         super().__init__(prepared, graph, context, run)
         self.weight = n if basis_free else n + n**3 // MATRICES
         self._written += [*written, words(context.chart.state)]

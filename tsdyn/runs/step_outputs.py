@@ -42,15 +42,16 @@ def store_block(r, log):
 
 
 @kernel
-def record_step(context, run, w, r, log, t0, t1):
+def record_step(context, run, c, r, log, t0, t1):
     """Record what t_eval asks for in (t0, t1], or the step's end where it asks for nothing. Status."""
+    w = c.work
     within = r.numbers.dense != 0 or is_wanted_before(r, log, t1)
     if not within:
         record_end(w, r, log, t1)
         return 0
     if log.t_eval.size == 0:
         record(r, log, t1, w.q, w.qd, w.qdd)
-    keep(w, r.warm)
+    keep(c, r.warm)
     head_block(r, t0, t1)
     status = call_fill(r.kernels.fill, context, run)
     if status != 0:
@@ -66,6 +67,6 @@ def record_step(context, run, w, r, log, t0, t1):
         if status != 0:
             return status
         record(r, log, t, w.q, w.qd, w.qdd)
-    bring_back(w, r.warm)
+    bring_back(c, r.warm)
     restore_now(w, r)
     return 0

@@ -22,11 +22,11 @@ from .rotation_limit import longest_step, too_far
 from .run_log import is_full, no_log, note_accepted, note_try
 from .step_control import accept, first_step, gets_on, stretch, watch_stiffness
 from .step_outputs import record_end, record_step
-from .tolerances import CUT_SHORT, HALVED, QUARTERED, TURN_GAIN
+from .tolerances import CUT_SHORT, HALVED, QUARTERED, SHRINK, TURN_GAIN
 
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
-JAMMED, PASSAGE = int(Status.JAMMED), int(Status.PASSAGE)
+JAMMED, PASSAGE, UNHELD = int(Status.JAMMED), int(Status.PASSAGE), int(Status.UNHELD)
 OFF_CHART = CHART_LOST, int(Status.NEWTON_FAILED), int(Status.SINGULAR)  # what a chart that reaches nowhere ends in
 
 call_check = caller("p")
@@ -56,7 +56,9 @@ def _enter(context, c, r, log):
         return status
     store_now(w, r)
     count_turns(r, w.q, w.qd, 0.0)
-    call_check(r.kernels.check, context)
+    status = -min(call_check(r.kernels.check, context), 0)
+    if status != 0:
+        return status
     record_end(w, r, log, t)
     r.numbers.begun = 1
     if r.numbers.adaptive == 1 and r.clock.h == 0.0:
@@ -103,20 +105,20 @@ def _propose(c, r, stop, driven):
         failed = r.numbers.failed
         if failed in OFF_CHART and r.numbers.may_pass == 1:
             return PASSAGE, t1, False, False
-        return failed if failed in (NOT_FINITE, JAMMED) else STEP_COLLAPSED, t1, False, False
+        return failed if failed in (NOT_FINITE, JAMMED, UNHELD) else STEP_COLLAPSED, t1, False, False
     if t1 + stretch(r.clock.h, r.clock.max_step) >= end:
         t1 = end
     return 0, t1, t1 == r.clock.t_end, False
 
 
 @kernel
-def _keep_start(w, r, implicit):
+def _keep_start(c, r, implicit):
     """Keep what the start of the step has, for dense output and to go back to."""
     copy(r.x, r.x_old)
     copy(r.y, r.y_old)
     copy(r.yd, r.yd_old)
     if implicit:
-        keep(w, r.warm)  # a stage that fails may leave u far away
+        keep(c, r.warm)  # a stage that fails may leave u far away
     if r.numbers.adaptive == 1:
         copy(r.xd, r.xd_old)
         copy(r.x_low, r.x_low_old)
@@ -135,15 +137,15 @@ def _go_back(r):
 
 
 @kernel
-def _attempt(context, run, w, r, t1, implicit):
+def _attempt(context, run, c, r, t1, implicit):
     """x, y and the accelerations at t1; what the start of the step had is kept. Status."""
     t0 = r.clock.t
-    _keep_start(w, r, implicit)
+    _keep_start(c, r, implicit)
     status = call_step(r.kernels.step, context, run, t0, t1 - t0)
     if status == 0:
         _add(r.x, r.x_low, r.dx)
         _add(r.y, r.y_low, r.dy)
-        status = evaluate(context, w, r, t1, r.x, r.y, r.yd, r.xd)
+        status = evaluate(context, c.work, r, t1, r.x, r.y, r.yd, r.xd)
         if implicit:  # the last stage's own accelerations: f would amplify what its iteration has left
             copy(r.memory[r.numbers.stage_at :][: r.y.size], r.yd)
             call_complete(r.kernels.complete, context, r.yd)
@@ -154,6 +156,8 @@ def _attempt(context, run, w, r, t1, implicit):
 def _judge_chart(context, c, r, h, driven):
     """Whether the chart still holds at the end of a step: a Status, and the reason for a new one, 0 for none."""
     reason = call_check(r.kernels.check, context)
+    if reason < 0:
+        return -reason, reason
     lost = not c.work.control.contraction < CONTRACTION_LOST
     if lost or (driven and too_far(c.system.bodies, r.now, c.work.qd, h)):
         return CHART_LOST, reason
@@ -164,7 +168,7 @@ def _judge_chart(context, c, r, h, driven):
 def _halve(c, r, h):
     """Reject a step with a stage that was not solved: the next one is half as long."""
     r.numbers.failed = STAGE_FAILED
-    bring_back(c.work, r.warm)
+    bring_back(c, r.warm)
     restore_now(c.work, r)
     r.numbers.rejected += 1
     if r.numbers.rejected_last == AGAIN:
@@ -177,6 +181,7 @@ def _halve(c, r, h):
 def _change_chart(context, c, r, log, h, status, driven):
     """Reject a step that left the chart: back to its start, on a new chart if this one has been used. Status."""
     restore_now(c.work, r)
+    c.chart.state.placement = 0  # the poses are not those that the next chart begins at
     r.numbers.rejected += 1
     if r.numbers.in_chart == 0:
         if r.numbers.adaptive == 0:
@@ -213,7 +218,7 @@ def _finish(context, run, c, r, log, t0, last, reason):
     """After an accepted step from t0: its outputs, and a new chart if there is a reason for one. Status."""
     if reason == 0 and r.numbers.chart_interval > 0 and r.numbers.in_chart >= r.numbers.chart_interval:
         reason = BY_INTERVAL
-    status = record_step(context, run, c.work, r, log, t0, r.clock.t)
+    status = record_step(context, run, c, r, log, t0, r.clock.t)
     if status == 0 and reason != 0 and not last:
         restore_now(c.work, r)
         status = begin_chart(context, c, r, log, reason)
@@ -228,7 +233,7 @@ def advance(context, run, log, most):
     most = 0, begins the run; with most = -1 it does no more.
     """
     c, r = load(context), load_run(run)
-    w, status = c.work, 0
+    status = 0
     adaptive, implicit, driven = r.numbers.adaptive == 1, r.numbers.stage_at > 0, is_rheonomic(c.system)
     if r.numbers.begun == 0 and most != 0:
         status = _enter(context, c, r, log)
@@ -247,7 +252,7 @@ def advance(context, run, log, most):
         h = t1 - t0
         note_try(r, log, t0, h)
         r.numbers.history += 1
-        status, reason = _attempt(context, run, w, r, t1, implicit), 0
+        status, reason = _attempt(context, run, c, r, t1, implicit), 0
         if adaptive and status == STAGE_FAILED:
             _halve(c, r, h)
             status = 0
@@ -259,6 +264,8 @@ def advance(context, run, log, most):
             continue
         if adaptive and not accept(context, c.linear, r, h):
             r.numbers.rejected += 1
+            if t0 + r.clock.h >= t1:  # rounding would propose the same step for ever
+                r.clock.h = SHRINK * h
             _go_back(r)
             continue
         note_accepted(r, log)

@@ -4,26 +4,23 @@ A check takes a `Run` and returns figures by name. A figure that a case doesn't 
 """
 
 import time
-from importlib.util import find_spec
 from itertools import pairwise
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import TsdynError
 from ..integrators import DOP853, Nystrom4, Taylor
-from ..simulation.resume import resume
 from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
 from .gallery.cases import Case
+from .interruption import resumed_is_same, same_bits
 from .laws import energy_left, findings
 from .tolerances import EPS
 
 TOLERANCE = 1e-15, 1e-12  # of Taylor, and of the other method
 OUTPUTS = 129  # output times of a run
 PARTS = 5  # doublings of time, over which the growth of the energy error is fitted
-SELDOM = 1e9  # s between checkpoints: the first, after a slice, is the only one
 SEEN = 2.0 * EPS  # energy errors below this are rounding: their growth is not fitted
 
 
@@ -103,35 +100,13 @@ def laws(run):
 
 def repeated(first):
     """Whether a second run gives the same bits."""
-    again = run(first.case).solution
-    pairs = [(getattr(first.solution, name), getattr(again, name)) for name in ("t", "q", "qd", "qdd")]
-    return {"same": all(np.array_equal(*pair) for pair in pairs)}
-
-
-class _Stop:
-    """Ctrl-C after the first slice."""
-
-    def __init__(self):
-        self.seen = 0
-
-    def __call__(self, fraction):
-        self.seen += 1
-        if self.seen == 2:
-            raise KeyboardInterrupt
+    return {"same": same_bits(first.solution, run(first.case).solution)}
 
 
 def resumed(run):
     """Whether a run that was stopped, and goes on from its checkpoint, gives the same bits; None without h5py."""
-    if find_spec("h5py") is None:
-        return {"resumed": None}
-    case, t = run.case, run.solution.t
-    with TemporaryDirectory() as folder:
-        path = f"{folder}/run.h5"
-        options = {"integrator": Taylor(TOLERANCE[0]), "t_eval": t, "store": path, "checkpoint": SELDOM}
-        simulate(case.build(), (0.0, case.end), progress=_Stop(), **options)
-        other = resume(path, scene=case.build())
-        pairs = [(getattr(run.solution, name), getattr(other, name)) for name in ("t", "q", "qd", "qdd")]
-        return {"resumed": all(np.array_equal(*pair) for pair in pairs)}
+    case, options = run.case, {"integrator": Taylor(TOLERANCE[0]), "t_eval": run.solution.t}
+    return {"resumed": resumed_is_same(case.build(), (0.0, case.end), run.solution, **options)}
 
 
 CHECKS = (size, ending, constraint_errors, energy, order, agreement, laws, repeated, resumed)

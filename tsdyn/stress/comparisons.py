@@ -1,16 +1,19 @@
 """Laws that compare runs of a random scene: a tighter tolerance, another method or form, the same run once more.
 
-An error that exceeds MULTIPLE tolerances is judged by its convergence: at tolerances TIGHTER by a thousand, or steps
-shorter by eight, less than FALL of it must be left.
+An error that exceeds MULTIPLE tolerances is judged by its convergence: at tolerances TIGHTER by a thousand less than
+FALL of it must be left. Fixed steps have no tolerance, and may be too long for the motion: of their errors less than
+FALL must be left by steps shorter by SHORTER, or from those to steps shorter still, where an adaptive run comes to the
+end.
 """
 
 import numpy as np
 
 from ..integrators import Nystrom4
-from .laws import Finding, energy_left, momentum_left
-from .tolerances import EPS, FALL, MULTIPLE, ROUNDED, ROUNDINGS, SAME, TIGHTER
+from .interruption import resumed_is_same, same_bits
+from .laws import Finding, energy_left, is_near_singular, momentum_left
+from .tolerances import EPS, FALL, MULTIPLE, NEAR_SINGULAR_ENDS, ROUNDED, ROUNDINGS, SAME, SHORTER, TIGHTER
 
-DEFAULT = 1e-8  # rtol of a run without one
+DEFAULT = 1e-8  # rtol, and atol, of a run without one
 
 
 def energy(case, solution, run):
@@ -45,9 +48,9 @@ def another_method(case, solution, run):
 
 
 def another_form(case, solution, run):
-    """The tangent form and the null-space form agree."""
+    """The tangent form and the null-space form, which is dense and for SI units, agree."""
     name = case.options.get("integrator")
-    if len(solution.scene.bodies) > 20 or name in (None, "taylor"):
+    if len(solution.scene.bodies) > 20 or name in (None, "taylor") or case.length != 1.0:
         return []
     form = "tangent" if case.options.get("formulation") == "null-space" else "null-space"
     return _agreeing("agreement of two forms", case, solution, run, {"formulation": form})
@@ -55,10 +58,13 @@ def another_form(case, solution, run):
 
 def once_more(case, solution, run):
     """The same run gives the same bits."""
-    again = run(case)
-    pairs = [(getattr(solution, name), getattr(again, name)) for name in ("t", "q", "qd", "qdd")]
-    same = all(np.array_equal(*pair) for pair in pairs)
-    return [Finding("same bits of the same run", 0.0 if same else 1.0, 0.0)]
+    return [Finding("same bits of the same run", 0.0 if same_bits(solution, run(case)) else 1.0, 0.0)]
+
+
+def stopped(case, solution, run):
+    """A run that is stopped, and goes on from its checkpoint, gives the same bits."""
+    same = resumed_is_same(case.scene, case.span, solution, **case.options)
+    return [] if same is None else [Finding("same bits after a stop", 0.0 if same else 1.0, 0.0)]
 
 
 def output_times(case, solution, run):
@@ -71,7 +77,7 @@ def output_times(case, solution, run):
     return [Finding("steps with output times", float(steps), 0.0), Finding("outputs within steps", float(off), SAME)]
 
 
-OTHERS = (None, None, None, another_method, another_form, once_more, output_times)
+OTHERS = (None, None, None, another_method, another_form, once_more, stopped, output_times)
 
 
 def _tolerance(case):
@@ -79,22 +85,27 @@ def _tolerance(case):
 
 
 def _tighter(case):
-    """Return options of a run that is more accurate."""
+    """Return options of runs, each of which is more accurate than the one before."""
     method = case.options.get("integrator")
     if isinstance(method, Nystrom4):
-        return {"integrator": Nystrom4(step=method.step / 8.0), "max_steps": None}
-    return {name: TIGHTER * case.options.get(name, DEFAULT) for name in ("rtol", "atol")} | {"max_steps": None}
+        return [{"integrator": Nystrom4(step=method.step / SHORTER**k), "max_steps": None} for k in (1, 2)]
+    return [{name: TIGHTER * case.options.get(name, DEFAULT) for name in ("rtol", "atol")} | {"max_steps": None}]
+
+
+def _is_resolved(case, run):
+    """Whether the motion is one that a method of fixed steps can follow to the end: an adaptive one does."""
+    fixed = isinstance(case.options.get("integrator"), Nystrom4)
+    return not fixed or run(case, integrator="dop853", rtol=DEFAULT, atol=DEFAULT * min(case.length, 1.0)).success
 
 
 def _converging(law, left, case, solution, run):
     """Judge an error of a run, and where it is large, how it falls with the tolerance."""
-    error, limit = left(solution), MULTIPLE * _tolerance(case)
-    if error <= limit:
-        return [Finding(law, error, limit)]
-    other = run(case, **_tighter(case))
-    if not other.success:
-        return []
-    return [Finding(law, left(other), max(FALL * error, ROUNDED), f"{error:.1e} at the looser tolerance")]
+
+    def error_of(options):
+        other = run(case, **options)
+        return left(other) if other.success else np.nan
+
+    return _falling(law, error_of, left(solution), case, run)
 
 
 def _agreeing(law, case, solution, run, options):
@@ -102,20 +113,36 @@ def _agreeing(law, case, solution, run, options):
     other = run(case, **options | _tolerances(case, options))
     if not other.success:
         return []
-    error, limit = _distance(case, solution, other), MULTIPLE * _tolerance(case)
+
+    def apart(tighter):
+        one, two = run(case, **tighter), run(case, **tighter | options | _tolerances(case, options, TIGHTER))
+        return _distance(case, one, two) if one.success and two.success else np.nan
+
+    rounded = NEAR_SINGULAR_ENDS if is_near_singular(solution) else ROUNDED
+    return _falling(law, apart, _distance(case, solution, other), case, run, rounded)
+
+
+def _falling(law, error_of, error, case, run, rounded=ROUNDED):
+    """Judge an error, and where it is large, error_of(options), NaN for runs that fail; below `rounded` it is none."""
+    limit, first = MULTIPLE * _tolerance(case), error
     if error <= limit:
         return [Finding(law, error, limit)]
-    one = run(case, **_tighter(case))
-    two = run(case, **options | _tolerances(case, options, TIGHTER) | {"max_steps": None})
-    if not (one.success and two.success):
+    if not _is_resolved(case, run):
         return []
-    return [Finding(law, _distance(case, one, two), max(FALL * error, ROUNDED), f"{error:.1e} at looser tolerances")]
+    for options in _tighter(case):
+        before, error = error, error_of(options)
+        if np.isnan(error):
+            return []
+        found = Finding(law, error, max(FALL * before, rounded), f"{first:.1e} at the looser tolerance")
+        if not found.broken:
+            break
+    return [found]
 
 
 def _tolerances(case, options, factor=1.0):
-    """Tolerances beside the name of a method; fixed steps have none."""
+    """Tolerances beside the name of a method; a form alone keeps those of the case, fixed steps have none."""
     if "integrator" not in options:
-        return _tighter(case) if factor < 1.0 else {}
+        return {}
     return {name: factor * case.options.get(name, DEFAULT) for name in ("rtol", "atol")}
 
 

@@ -32,10 +32,14 @@ class Outcome(NamedTuple):
 
 def judge_scene(seed, least=None, most=None):
     """Return the `Outcome` of the scene of a seed."""
+    return judge_case(generate(seed, least, most), np.random.default_rng((seed, 1)), seed)
+
+
+def judge_case(case, rng, seed=None):
+    """Return the `Outcome` of a case, of which rng draws how it is judged."""
     began = time.perf_counter()
-    case = generate(seed, least, most)
     try:
-        word, said = judge(case, np.random.default_rng((seed, 1)))
+        word, said = judge(case, rng)
     except TsdynError as error:
         word, said = type(error).__name__, str(error)
         if not said.strip():

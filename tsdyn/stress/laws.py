@@ -7,13 +7,26 @@ lists those of a single run; agreement.py compares runs.
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..elements.bodies import rotation_matrix
 from ..elements.markers import POINT
 from ..model.sparse_jacobian import WIDTH, places, with_short_rows
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
-from .tolerances import BALANCE, BODIES, EPS, FLOOR, NEAR_SINGULAR, OUTPUTS, ROUNDINGS, ROW_SHARE, SAME
+from .tolerances import (
+    BALANCE,
+    BODIES,
+    EPS,
+    FLOOR,
+    HELD,
+    ILL_CONDITIONED,
+    NEAR_SINGULAR,
+    OUTPUTS,
+    ROUNDINGS,
+    ROW_SHARE,
+    SAME,
+)
 
 LEVELS = ("position", "velocity", "acceleration")
 
@@ -177,13 +190,24 @@ def extent(solution):
     """Size of a scene, m: distances of the bodies from their middle at the start, and their radii of gyration."""
     bodies = solution.scene.bodies
     places = np.array([solution.position(body)[0] for body in bodies])
-    radii = [np.sqrt(np.trace(np.asarray(body.inertia)) / body.mass) for body in bodies if body.dimension == 7]
+    radii = [_radius_of_gyration(body) for body in bodies]
     return float(np.linalg.norm(places - places.mean(axis=0), axis=1).max() + max(radii, default=0.0))
 
 
+def _radius_of_gyration(body):
+    return np.sqrt(np.trace(np.asarray(body.inertia)) / body.mass) if body.dimension == 7 else 0.0
+
+
 def rounding_of_places(solution):
-    """Rounding of positions, relative to the size of the scene: large far from the origin."""
-    return ROUNDINGS * EPS * float(np.abs(solution.q).max(initial=0.0)) / (extent(solution) or 1.0)
+    """Rounding of positions, relative to the distance of neighbours: large far from the origin."""
+    bodies = solution.scene.bodies
+    if not bodies:
+        return 0.0
+    places = np.array([solution.position(body)[0] for body in bodies])
+    radii = np.array([_radius_of_gyration(body) for body in bodies])
+    nearest = cKDTree(places).query(places, k=[min(2, len(bodies))])[0][:, 0]
+    farthest = max(np.abs(solution.position(body)).max() for body in bodies)
+    return ROUNDINGS * EPS * float(farthest / (np.median(np.maximum(nearest, radii)) or 1.0))
 
 
 def _balance(law, left, sizes, largest, limit, body):
@@ -211,10 +235,16 @@ def dense_output(solution):
     for name in ("q", "qd"):
         given = getattr(solution, name)[at]
         size = 1.0 + np.abs(given).max(initial=0.0)
-        limit = SAME * (NEAR_SINGULAR if solution.stats.steps_near_singular else 1.0)
+        limit = SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + HELD / (extent(solution) or 1.0)
         yield Finding(
             f"dense output, {name}", float(np.abs(getattr(state, name) - given).max(initial=0.0) / size), limit
         )
+
+
+def is_near_singular(solution):
+    """Whether a run passes, or begins at, a singular configuration."""
+    condition = solution.charts.condition
+    return solution.stats.steps_near_singular > 0 or not np.nanmax(condition, initial=0.0) < ILL_CONDITIONED
 
 
 LAWS = (finite, constraints, newton_euler, dense_output)

@@ -164,7 +164,11 @@ KINDS = {
 
 def generate(seed, least=None, most=None):
     """Return the `Case` of a seed; of so many bodies, about, where that is given."""
-    rng = np.random.default_rng(seed)
+    return drawn(np.random.default_rng(seed), least, most)
+
+
+def drawn(rng, least=None, most=None):
+    """Return the `Case` that a generator of random numbers draws."""
     share = rng.random()
     if least is None:
         least, most = next(sizes for limit, *sizes in SIZES if share < limit)

@@ -13,13 +13,19 @@ BALANCE = 1e-7
 # Roundings of positions and of moments about the origin that are allowed: they are differences of large numbers.
 ROUNDINGS = 1e5
 # Energy less work, momenta, and two methods or forms: this multiple of the tolerance, relative to the motion's size;
-# beyond it a run at a TIGHTER tolerance must come closer by FALL at least, or be below the multiple of its own.
-MULTIPLE, TIGHTER, FALL = 1e3, 1e-3, 0.1
+# beyond it a run at a TIGHTER tolerance, or of SHORTER fixed steps, must come closer by FALL at least.
+MULTIPLE, TIGHTER, SHORTER, FALL = 1e3, 1e-3, 8.0, 0.1
 # Below this change relative to the size nothing is judged by convergence: it is rounding, amplified.
 ROUNDED = 1e-10
+# Of the ends of two runs past singular configurations, which amplify rounding; the other branch is off by far more.
+NEAR_SINGULAR_ENDS = 1e-4
 # Dense output at the ends of steps; output times beside steps.
 SAME = 1e-10
-# Next to a singular configuration rounding is amplified by so much.
-NEAR_SINGULAR = 1e2
+# m: positions are held to this where Phi has rows of axes, which are pure numbers; in small scenes angles are, over
+# their size.
+HELD = 1e-14
+# Next to a singular configuration, where a chart has a condition of ILL_CONDITIONED or more, rounding is amplified by
+# so much.
+NEAR_SINGULAR, ILL_CONDITIONED = 1e2, 1e8
 # Outputs of a run that are judged, and bodies whose balance is: the first, the last, and some between.
 OUTPUTS, BODIES = 25, 12

@@ -18,7 +18,7 @@ from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OM
 from ..jit.kernels import kernel
 from ..jit.simd import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times
 from ..maths.dense_linalg import copy
-from ..rows.interface import solve_series, weigh
+from ..rows.interface import note_loads, solve_series, weigh
 
 MOST_ORDERS = 64
 
@@ -183,6 +183,8 @@ def expand(graph, system, k, last, ahead, refine, x, f):
         if graph.bodies[b, 1] == 7:
             _put_product(bodies, at + S_OMEGA * orders + 4 * (k + 1), four(Z, 8 * b + 4), g, g_low, exact)
             _turn(bodies, at, k + 2, _product(four(Z, 8 * b + 4), h, h_low))
+    if k == 0:
+        note_loads(f)
     refined = k < refine
     if refined:
         for sweep in range(x.order.sweeps):

@@ -15,7 +15,11 @@ from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import set_time
 from ..rows.interface import (
+    accelerations_hold,
+    evaluate_bias,
+    has_redundant_rows,
     is_near_singular,
+    rates_hold,
     refinements,
     return_to_selection,
     save_selection,
@@ -28,7 +32,7 @@ from .step_end import keep_start, project_rates, sum_series
 from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, UNEQUAL
 from .workspace import load_series
 
-NOT_FINITE, SINGULAR = int(Status.NOT_FINITE), int(Status.SINGULAR)
+NOT_FINITE, SINGULAR, UNHELD = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.UNHELD)
 LAWS = "pdddd"
 call_expand, call_reach, call_laws = caller("pi"), caller("pdd"), caller(LAWS)
 
@@ -102,6 +106,8 @@ def reach(context, t, h):
         write_velocities(c.graph.bodies, f.poses, w.qd)
         if not (is_finite(w.q) and is_finite(w.qd)):
             return NOT_FINITE
+        if not rates_hold(c.graph, f, w.q, w.qd, w.control.size):
+            return UNHELD
     return status
 
 
@@ -135,6 +141,16 @@ def accelerate_here(context, t, h):
     c = load_series(context)
     accelerate_bodies(c.graph, c.system, c.work, c.tangent, t)
     return 0
+
+
+@kernel
+def hold_accelerations(c, t):
+    """Whether the redundant rows hold for qdd of the series. Status."""
+    w, f = c.work, c.tangent
+    if not has_redundant_rows(f):
+        return 0
+    evaluate_bias(c.graph, c.system, f, t)
+    return 0 if accelerations_hold(c.graph, f, w.q, w.qd, w.qdd, w.control.size) else UNHELD
 
 
 @callback("pdd")

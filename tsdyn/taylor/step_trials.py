@@ -35,7 +35,7 @@ from .tolerances import (
     TIGHTEST,
 )
 
-STEP_COLLAPSED, PASSAGE = int(Status.STEP_COLLAPSED), int(Status.PASSAGE)
+STEP_COLLAPSED, PASSAGE, UNHELD = int(Status.STEP_COLLAPSED), int(Status.PASSAGE), int(Status.UNHELD)
 
 
 @kernel
@@ -71,6 +71,7 @@ def _fastest(c):
 def _propose(c, r, tol):
     """The first step to try."""
     s, order = c.trial, c.expansion.order
+    s.failed = 0
     s.shorter, s.share, s.serves, s.looser, s.tol, s.highest = 0, math.inf, 0, r.numbers.adaptive, tol, order.top
     s.h = step_length(c, r)
     if r.numbers.adaptive == 0:
@@ -183,12 +184,12 @@ def make_step(context, c, r, log, stop):
     _propose(c, r, tol)
     while True:
         if not _end(s, r, stop):
-            return STEP_COLLAPSED
+            return UNHELD if s.failed == UNHELD else STEP_COLLAPSED
         note_try(r, log, r.clock.t, s.t1 - r.clock.t)
         if adaptive and s.check != 0 and not _follows_laws(context, c, r):
             _reject(r, log)
             continue
-        status = _attempt(context, c, r)
+        s.failed = status = _attempt(context, c, r)
         if status == PASSAGE:  # back to where the run is
             status = stand_at(context, c, r, r.clock.t)
             call_expand(r.kernels.expand, context, 0)

@@ -21,7 +21,7 @@ from ..runs.tolerances import TRIES
 from ..workspaces.run_state import B_DATA, load_run
 from .breakpoints import cross_stop, lower_order
 from .step_length import radius, weights
-from .step_parts import call_expand, call_reach, set_floor, state_within
+from .step_parts import call_expand, call_reach, hold_accelerations, set_floor, state_within
 from .step_trials import go_to_start, make_step, stand_at
 from .tolerances import SHARP_STEPS, SMALL, SMALL_STEPS, SPARE, TIGHTEST, WARY
 from .workspace import load_series
@@ -43,10 +43,14 @@ def _stand(context, c, r, log, t):
     indicator.largest = max(indicator.start, indicator.largest)
     remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
     copy(c.expansion.low_end, c.expansion.low)
+    status = 0
     if c.trial.singular == 0:
         call_expand(r.kernels.expand, context, 0)
+        status = hold_accelerations(c, t)
     if not is_finite(w.qdd):
         return NOT_FINITE
+    if status != 0:
+        return status
     count_turns(r, w.q, w.qd, t - r.clock.t)
     store_now(w, r)
     r.clock.t = t

@@ -59,6 +59,7 @@ class Trial(Record):
     share: float  # singularity indicator at the end of the try before; inf for none
     looser: int  # whether longer steps at looser tolerances are tried
     serves: int  # whether the own step is a good one
+    failed: int  # Status of the try before
     shorter: int  # times that it was shortened, not to end near a singular configuration
     t1: float  # its end
     last: int  # whether that is the run's

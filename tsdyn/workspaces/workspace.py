@@ -166,9 +166,16 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "A": (k, k),
     }
     work = Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(redundant + 1, np.int64))
-    work.control.u_tol = work.control.b_tol = constraint_tol
-    work.control.size = size
+    hold(work.control, constraint_tol, size, joint_rows is not None)
     return work
+
+
+def hold(control, constraint_tol, size, basis_free):
+    """Set the tolerances of the constraints; without normalisations in Phi, a small scene is held as closely."""
+    control.u_tol = control.b_tol = constraint_tol
+    control.size = size
+    if basis_free and 0.0 < size < 1.0:
+        control.u_tol *= size
 
 
 def allocate_linear(system, n, m, wanted, kept=0, redundant=0):

@@ -1,0 +1,51 @@
+"""Faults that random scenes have shown, each by its seed; all are mended."""
+
+import numpy as np
+import pytest
+
+from tsdyn.errors import Status
+from tsdyn.stress.judgement import judge_scene, run
+from tsdyn.stress.random_scenes import generate
+
+KEPT = {
+    2002342: "fixed steps across a spin that diverges",
+    2003177: "a flat start: dense output beside outputs",
+    2000265: "rows that were redundant at the start become independent",
+    2010485: "the same by a step method",
+    2015426: "a redundant row at the limit",
+    2012861: "dense output of a row of four-bars of 1e-6 m",
+    2011212: "dense output of a scene of 1e-6 m",
+    2011079: "two methods past singular configurations, mass ratio 5e8",
+    2002207: "far from the origin: balance of torques",
+}
+
+
+def made(seed):
+    case = generate(seed)
+    if case.assembled:
+        case.scene.assemble()
+    return case
+
+
+def test_joint_friction_starts_from_the_same_loads_with_output_times():
+    """Loads of friction at output times are not where the next step starts from."""
+    case = made(2000326)
+    one, two = run(case), run(case, t_eval=np.linspace(*case.span, 7))
+    np.testing.assert_array_equal(one.steps.h, two.steps.h)
+    np.testing.assert_array_equal(one.q[-1], two.q[-1])
+
+
+def test_a_step_that_rounding_repeats_ends_the_run():
+    """The end of the shortest step is rounded to where the rejected step before it had ended."""
+    case = made(2001057)
+    solution = run(case)
+    assert solution.status == Status.STEP_COLLAPSED
+    assert solution.stats.rejected < 1000
+    assert "diverges" in solution.message
+
+
+@pytest.mark.slow_for("*")
+@pytest.mark.parametrize("seed", KEPT, ids=KEPT.values())
+def test_a_kept_scene(seed):
+    found = judge_scene(seed)
+    assert not found.fault, f"{found.name}: {found.word}: {found.said}"

@@ -1,0 +1,131 @@
+"""Whether redundant rows hold: their residuals at three levels, relative to the sizes of their terms.
+
+    position        |Phi|               |H_r| |r| + |H_pi'|
+    velocity        |H y + Phi_t|       |H_r| |rd| + |H_pi'| |omega'| + |Phi_t|
+    acceleration    |H yd + gamma|      |H_r| |rdd| + |H_pi'| |2 pdd| + |gamma|
+
+|2 pd| is |omega'|, and |2 pdd| has centripetal accelerations, which cancel in gamma.
+
+A row that depends on others wherever these hold is held by them. One that depends on them in places, or nearly, is left
+by the motion, however well the other rows hold.
+"""
+
+import math
+
+from ..elements.loops.body_poses import POSE, R
+from ..jit.kernels import kernel
+from .redundant_rows import length
+from .singularity import is_near_singular
+from .tolerances import FAINT, HELD, NO_RATE, RESTING
+
+
+@kernel
+def has_redundant_rows(f):
+    """Return True if rows are dropped."""
+    return f.dropped[0] > 0
+
+
+@kernel
+def redundant_rows_hold(graph, f, floor):
+    """Return True if the redundant rows hold on the manifold, by the residuals of the last evaluation."""
+    return f.dropped[0] == 0 or f.selection.unheld <= floor + HELD * FAINT * _extent(graph, f)
+
+
+@kernel
+def rates_hold(graph, f, q, qd, size):
+    """Return True if they hold for velocities, by H and Phi_t of the last evaluation; size that of the scene, m."""
+    if f.dropped[0] == 0 or f.left.H.size == 0:
+        return True
+    speed, spin = _largest(graph, qd)
+    far = _reach(graph, f, size)
+    speed = max(speed, RESTING * math.sqrt(f.selection.push * far) + NO_RATE * far)
+    return _hold(graph, f, f.left.drift, q, qd, speed + far * spin, spin + speed / far)
+
+
+@kernel
+def accelerations_hold(graph, f, q, qd, qdd, size):
+    """Return True if they hold for accelerations, as `rates_hold`, by gamma of the last evaluation.
+
+    Next to a singular configuration accelerations have lost digits that say nothing of the redundant rows.
+    """
+    if f.dropped[0] == 0 or f.left.H.size == 0 or is_near_singular(f, f.indicator.start):
+        return True
+    push, twist = _largest(graph, qdd)
+    speed, spin = _largest(graph, qd)
+    far = _reach(graph, f, size)
+    push = max(push, f.selection.push) + spin * (speed + far * spin) + NO_RATE * far
+    twist = max(twist, f.selection.twist) + spin * spin
+    return _hold(graph, f, f.left.gamma, q, qdd, push + far * twist, twist + push / far)
+
+
+@kernel
+def note_loads(f):
+    """Record the largest |W F| of a body, in Z; only redundant rows are judged by it."""
+    if f.dropped[0] == 0:
+        return
+    push = twist = 0.0
+    for i in range(0, f.Z.size, 8):
+        push, twist = max(push, length(f.Z, i)), max(twist, length(f.Z, i + 4))
+    f.selection.push, f.selection.twist = push, twist
+
+
+@kernel
+def _extent(graph, f):
+    """The largest distance of a body from the first one, m."""
+    square = 0.0
+    for b in range(1, graph.bodies.shape[0]):
+        at, distance = b * POSE + R, 0.0
+        for c in range(3):
+            distance += (f.poses[at + c] - f.poses[R + c]) ** 2
+        square = max(square, distance)
+    return math.sqrt(square)
+
+
+@kernel
+def _reach(graph, f, size):
+    """The same, or else the size of the numbers in the constraints, or one: what rates are made comparable by."""
+    far = _extent(graph, f)
+    if far > 0.0:
+        return far
+    return size if size > 0.0 else 1.0
+
+
+@kernel
+def _largest(graph, rates):
+    """The largest |rd| and |omega'| of a body, or |rdd| and 2 |pdd|."""
+    speed = spin = 0.0
+    for b in range(graph.bodies.shape[0]):
+        i = graph.bodies[b, 0]
+        speed = max(speed, length(rates, i))
+        if graph.bodies[b, 1] == 7:
+            spin = max(spin, 2.0 * math.hypot(rates[i + 3], length(rates, i + 4)))
+    return speed, spin
+
+
+@kernel
+def _hold(graph, f, known, q, rates, most, fastest):
+    """Return True if H (rd, omega') + known of all redundant rows is small; `rates` are qd, or qdd.
+
+    A body whose rates are below FAINT of the largest, `most` and `fastest`, counts as one with these.
+    """
+    H = f.left.H
+    for i in range(f.dropped[0]):
+        residual, terms = known[i], abs(known[i])
+        for side in range(2):
+            b, at = graph.sides[f.dropped[1 + i], side], 16 * i + 8 * side
+            if b == graph.bodies.shape[0]:
+                continue
+            k = graph.bodies[b, 0]
+            residual += H[at] * rates[k] + H[at + 1] * rates[k + 1] + H[at + 2] * rates[k + 2]
+            terms += length(H, at) * (length(rates, k) + FAINT * most)
+            if graph.bodies[b, 1] == 7:
+                e0, e1, e2, e3 = q[k + 3], q[k + 4], q[k + 5], q[k + 6]
+                d0, d1, d2, d3 = rates[k + 3], rates[k + 4], rates[k + 5], rates[k + 6]
+                x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3  # 2 (x, y, z) = omega'
+                y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
+                z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
+                residual += 2.0 * (H[at + 4] * x + H[at + 5] * y + H[at + 6] * z)
+                terms += length(H, at + 4) * (2.0 * math.hypot(d0, length(rates, k + 4)) + FAINT * fastest)
+        if not abs(residual) <= HELD * terms:
+            return False
+    return True

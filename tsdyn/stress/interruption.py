@@ -1,0 +1,39 @@
+"""A run that is stopped after its first slice and goes on from its checkpoint."""
+
+from importlib.util import find_spec
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from ..simulation.resume import resume
+from ..simulation.simulate import simulate
+
+SELDOM = 1e9  # s between checkpoints: the first, after a slice, is the only one
+
+
+class _Stop:
+    """Ctrl-C after the first slice."""
+
+    def __init__(self):
+        self.seen = 0
+
+    def __call__(self, fraction):
+        self.seen += 1
+        if self.seen == 2:
+            raise KeyboardInterrupt
+
+
+def resumed_is_same(scene, span, solution, **options):
+    """Whether such a run has the bits of `solution`, which was never stopped; None without h5py."""
+    if find_spec("h5py") is None:
+        return None
+    with TemporaryDirectory() as folder:
+        path = f"{folder}/run.h5"
+        simulate(scene, span, progress=_Stop(), store=path, checkpoint=SELDOM, **options)
+        return same_bits(solution, resume(path, scene=scene))
+
+
+def same_bits(one, two):
+    """Whether two solutions have the same outputs to the bit."""
+    pairs = [(getattr(one, name), getattr(two, name)) for name in ("t", "q", "qd", "qdd")]
+    return all(np.array_equal(*pair) for pair in pairs)

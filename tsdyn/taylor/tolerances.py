@@ -29,7 +29,7 @@ RATES = 10.0
 
 # Places of a step, equally far apart, at which series of sharp forces are compared with their laws; steps of a run at
 # least, since a pulse between two places is missed.
-PLACES, LEAST_STEPS = 8, 8
+PLACES, LEAST_STEPS = 4, 8
 
 # Angular velocity (rad/s) that counts as none.
 NO_SPEED = 1e-300

@@ -146,10 +146,10 @@ def series(run, k, orders, count, stride, size, table, reals, bodies, values, po
             run_traced(run, values, x, xd, real[3 * MARKERS :], k, rows, orders, values[first + own_scratch :])
         kernel_series(x, xd, real[3 * MARKERS :], k, scratch, f)
         if SHARP:
-            kept = first + own_scratch + rows * orders + MARKERS + k
+            kept = first + own_scratch + rows * orders + MARKERS + 2 * SIZE * k
             for c in range(SIZE):
-                values[kept + c * orders] = x[c]
-                values[kept + (SIZE + c) * orders] = xd[c]
+                values[kept + c] = x[c]
+                values[kept + SIZE + c] = xd[c]
         for j in range(MARKERS):
             if own[MASK] >> OWNERS[j] & 1:
                 continue

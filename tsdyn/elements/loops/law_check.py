@@ -9,7 +9,8 @@ large as
     a small part of the terms of f      rounding
 """
 
-from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, vector
+from ...jit.kernels import ANY, caller, data_of, integers, matrix, part, stack, vector
+from ...jit.simd import fma, four, put, splat
 from ...motions.state_program import LENGTH as PROGRAM_LENGTH
 from ...motions.state_program import T
 from ..markers import PARAMETERS, POINT, TURN
@@ -22,15 +23,6 @@ from .template import CODES, MARKERS, OWNERS, ROOM, SIZE, STARTS, TRACED, kernel
 SIGNATURE = "iiiiiippppp"
 TAU, TIME, LENGTH, ATOL, RTOL, LIMITS = range(6)  # numbers of `limits`: place and length of the step, tolerances
 call_check = caller(SIGNATURE)
-
-
-@kernel
-def _sum(values, at, step, known, tau):
-    """The series values[at + k step] at tau."""
-    total = 0.0
-    for k in range(known - 1, -1, -1):
-        total = total * tau + values[at + k * step]
-    return total
 
 
 @part
@@ -46,20 +38,25 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
         weight = (s[0] * s[0] + s[1] * s[1] + s[2] * s[2]) * turning + (inverse[w] if CODES[j] == POINT else 0.0)
     size = 4 if CODES[j] == PARAMETERS else 3
     off, terms, speed = 0.0, 0.0, 0.0
+    total = splat(0.0)
+    for k in range(known - 1, -1, -1):
+        total = fma(total, splat(tau), four(values, forces + 4 * k))
+    series = stack(4)
+    put(series, 0, total)
     for i in range(size):
-        power, total = 1.0, 0.0
-        for k in range(known):
-            term = power * values[forces + 4 * k + i]
-            power *= tau
-            total += term
-            terms = max(terms, abs(term))
-        gap = abs(total - f[c + i])
+        gap = abs(series[i] - f[c + i])
         if not gap <= off:  # or not a number
             off = gap
         speed = max(speed, abs(xd[c + i]))
-    if off <= max(LAW_NOISE, limits[ATOL] + limits[RTOL]) * terms:
+    tol = limits[ATOL] + limits[RTOL] * speed
+    if weight * off * limits[LENGTH] <= max(OFF * tol, LAW_TOLERANCE):
         return False
-    return not weight * off * limits[LENGTH] <= max(OFF * (limits[ATOL] + limits[RTOL] * speed), LAW_TOLERANCE)
+    for i in range(size):
+        power = 1.0
+        for k in range(known):
+            terms = max(terms, abs(power * values[forces + 4 * k + i]))
+            power *= tau
+    return not off <= max(LAW_NOISE, limits[ATOL] + limits[RTOL]) * terms
 
 
 def check(run, count, stride, size, orders, known, limits, table, reals, values, inverse):
@@ -73,9 +70,12 @@ def check(run, count, stride, size, orders, known, limits, table, reals, values,
         first = program + i * size
         kept = first + 2 * MARKERS * wide + rows * orders + MARKERS
         for c in range(SIZE):
-            x[c] = _sum(values, kept + c * orders, 1, known, limits[TAU])
-            xd[c] = _sum(values, kept + (SIZE + c) * orders, 1, known, limits[TAU])
-            f[c] = 0.0
+            x[c], xd[c], f[c] = 0.0, 0.0, 0.0
+        for k in range(known - 1, -1, -1):
+            at = kept + 2 * SIZE * k
+            for c in range(SIZE):
+                x[c] = x[c] * limits[TAU] + values[at + c]
+                xd[c] = xd[c] * limits[TAU] + values[at + SIZE + c]
         par = real[3 * MARKERS : stride]
         if TRACED:
             own_scratch = values[kept + 2 * SIZE * orders :]

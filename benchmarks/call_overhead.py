@@ -52,15 +52,21 @@ def edited(scene):
 
 def contenders():
     """The calls to be timed, by name."""
-    top, chain, driven = SCENES["sliding top"].build(), SCENES["chain of 4"].build(), driven_pivot.build()
-    step = ts.integrators.Nystrom4(step=SPAN[1])
+    top, pendulum, chain = (SCENES[name].build() for name in ("sliding top", "two-body pendulum", "chain of 4"))
+    driven, step = driven_pivot.build(), ts.integrators.Nystrom4(step=SPAN[1])
+    adaptive = ts.integrators.DOP853(**TOLERANCES)
+    times = np.linspace(*SPAN, 11)
     return {
         "sliding top, outputs at both ends": lambda: ts.simulate(top, SPAN, t_eval=SPAN, **TOLERANCES),
         "  every step": lambda: ts.simulate(top, SPAN, **TOLERANCES),
+        "  at 11 times": lambda: ts.simulate(top, SPAN, t_eval=times, **TOLERANCES),
         "  dense output": lambda: ts.simulate(top, SPAN, dense_output=True, **TOLERANCES),
         "  Nystrom4, one step": lambda: ts.simulate(top, SPAN, t_eval=SPAN, integrator=step),
+        "  DOP853": lambda: ts.simulate(top, SPAN, t_eval=SPAN, integrator=adaptive),
+        "  DOP853 by its name": lambda: ts.simulate(top, SPAN, t_eval=SPAN, integrator="dop853", **TOLERANCES),
         "  from other states": from_states(top),
         "  of other masses": edited(SCENES["sliding top"].build()),
+        "pendulum, outputs at both ends": lambda: ts.simulate(pendulum, SPAN, t_eval=SPAN, **TOLERANCES),
         "chain of 4, outputs at both ends": lambda: ts.simulate(chain, SPAN, t_eval=SPAN, **TOLERANCES),
         "  from other states ": from_states(chain),
         "driven pivot, outputs at both ends": lambda: ts.simulate(driven, SPAN, t_eval=SPAN, **TOLERANCES),

@@ -38,10 +38,12 @@ def fitting(function: Function, then: Callable[[Any], None] | None = None) -> Fu
     @wraps(function)
     def call(*arguments, **keywords):
         try:
-            result = function(*arguments, **keywords)
-            if then is not None and type(arguments[0]).__init__ is call:
+            if then is None:
+                return function(*arguments, **keywords)
+            function(*arguments, **keywords)
+            if type(arguments[0]).__init__ is call:
                 then(arguments[0])
-            return result
+            return None
         except TypeError as error:
             if isinstance(error, InvalidCall):
                 raise

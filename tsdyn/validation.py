@@ -2,12 +2,27 @@
 
 import difflib
 import math
+from functools import lru_cache, wraps
 
 import numpy as np
 
 from .errors import InvalidArgument, UnknownAttribute
 
-FARTHEST = 1e150  # component of a vector, whose square must not overflow
+EXACT = 2**53  # integers below it are floats
+
+
+def checked_once(function):
+    """Decorate a check: arguments of the values and types of earlier ones have its result, if they can be hashed."""
+    known = lru_cache(typed=True)(function)
+
+    @wraps(function)
+    def check(*arguments):
+        try:
+            return known(*arguments)
+        except TypeError:
+            return function(*arguments)
+
+    return check
 
 
 def floats(value):
@@ -23,6 +38,8 @@ def number(value):
     """Return one real number as a float, NaN for anything else."""
     if type(value) is float:
         return value
+    if type(value) is int and -EXACT < value < EXACT:
+        return float(value)
     array = floats(value)
     return float(array) if array.shape == () else math.nan
 
@@ -54,8 +71,6 @@ def vector3(value, what, error):
     array = floats(value)
     if array.shape != (3,) or not np.isfinite(array).all():
         raise error(f"{what} must be three finite numbers, got {value!r}.")
-    if not np.abs(array).max() < FARTHEST:
-        raise error(f"{what} must be three numbers below {FARTHEST:g}: squares of {value!r} overflow.")
     return array
 
 

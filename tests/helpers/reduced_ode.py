@@ -4,6 +4,7 @@ import numpy as np
 
 from tsdyn.formulations.registry import formulation
 from tsdyn.jit.kernels import caller, entry, resident
+from tsdyn.methods.diagonally_implicit import call_linearise
 from tsdyn.methods.explicit import call_accelerate, call_place
 from tsdyn.model.equations import constraint_curvature, set_time
 from tsdyn.model.packed import with_curvatures
@@ -32,23 +33,25 @@ def _accelerations(context, at, t, v, vd, vdd):
 
 
 @entry
-def _linearise(context, at, t, anew):
+def _linearise(context, at, t, anew, vdd):
     status = 0
     if anew:
-        status = _call_number(at[5], context, t)
+        status = call_linearise(at[5], context, t, vdd)
     return _call_number(at[6], context, t) if status == 0 else status
 
 
 @entry
-def _solve(context, at, g, rho):
-    status = _call_number(at[7], context, g)
-    return _call_vector(at[8], context, rho) if status == 0 else status
+def solve(context, at, g, rho):
+    """P^-1 A rho; at: addresses of factorise, solve and soften."""
+    status = _call_number(at[0], context, g)
+    return _call_vector(at[1], context, rho) if status == 0 else status
 
 
 @entry
-def _soften(context, at, ex, g, ey):
-    status = _call_number(at[7], context, g)
-    return _call_soften(at[9], context, ex, g, ey) if status == 0 else status
+def soften(context, at, ex, g, ey):
+    """(I - g J)^-1 (ex, ey)."""
+    status = _call_number(at[0], context, g)
+    return _call_soften(at[2], context, ex, g, ey) if status == 0 else status
 
 
 @entry
@@ -82,11 +85,12 @@ class Tangent:
         """Accelerations vdd; the place is taken."""
         vdd = np.zeros(self.k)
         assert _accelerations(self.address, self.at, t, v, vd, vdd) == 0
+        self.vdd = vdd
         return vdd
 
     def jacobians(self, t, anew=True):
         """(f_v, f_vd) at the place last taken; without anew, from the stiffness and damping kept."""
-        assert _linearise(self.address, self.at, t, int(anew)) == 0
+        assert _linearise(self.address, self.at, t, int(anew), self.vdd) == 0
         work, linear = self.context.work, self.context.linear
         A = work.D.T @ mass_matrix(self.context.system, work.q) @ work.D
         return np.linalg.solve(A, -linear.K_hat), np.linalg.solve(A, linear.C_hat)
@@ -94,13 +98,13 @@ class Tangent:
     def solved(self, g, rho):
         """P^-1 A rho, of the linearisation last made."""
         rho = rho.copy()
-        assert _solve(self.address, self.at, g, rho) == 0
+        assert solve(self.address, self.at[7:], g, rho) == 0
         return rho
 
     def softened(self, ex, g, ey):
         """(I - g J)^-1 (ex, ey)."""
         ex, ey = ex.copy(), ey.copy()
-        assert _soften(self.address, self.at, ex, g, ey) == 0
+        assert soften(self.address, self.at[7:], ex, g, ey) == 0
         return np.concatenate((ex, ey))
 
 

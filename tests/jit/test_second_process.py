@@ -73,12 +73,12 @@ def test_forces_are_cached_and_only_those_used_are_loaded(warm):
 IMPLICIT = (
     REPORT
     + """
-from tsdyn.formulations import linearisation as linearise
+from tsdyn.formulations import saddle_point
 from benchmarks.stiff import hung, jointed
 def loaded(scene):
     kinds = {type(c): c.kernels["curvature"] for c in scene.constraints}.values()
     forces = [force.kernels["jacobian"] for force in scene.forces]
-    own = [getattr(linearise, name) for name in ("linearise", "reduce", "factorise", "solve", "soften")]
+    own = [getattr(saddle_point, name) for name in ("linearise", "reduce", "factorise", "solve", "soften")]
     return [sum(kernel._address is not None for kernel in kernels) for kernels in (kinds, forces, own)]
 scene = jointed()
 for method in ("nystrom4", "rk45", "dop853"):

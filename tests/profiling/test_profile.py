@@ -87,7 +87,7 @@ def test_calls_of_stages_are_those_counted(by_stages):
     assert calls(by_stages, "stage equations", "Jacobians") == stats.jacobians
     assert calls(by_stages, "stage equations", "iteration matrices") == stats.iteration_matrices
     assert calls(by_stages, "stage equations", "solves") == stats.stage_iterations
-    assert calls(by_stages, "accelerations", "D^T M D and its factors") == stats.placements
+    assert calls(by_stages, "accelerations", "factors of Phi_q W Phi_q^T") == stats.placements
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """Calls one after the other, side by side and one inside another: the memory that they share shows in no result."""
 
 import gc
+import pickle
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 
@@ -11,8 +12,12 @@ import tsdyn as ts
 from examples import driven_pivot, top
 from tests.helpers.scenes import build as build_scene
 from tests.helpers.scenes import random_chain
+from tsdyn.configuration.start_workspace import StartWorkspace
 from tsdyn.runs import recorder
+from tsdyn.runs.run_memory import Memory
+from tsdyn.runs.step_engine import StepEngine
 from tsdyn.simulation import scene_cache as prepare
+from tsdyn.taylor.series_engine import SeriesEngine
 
 I = ts.integrators
 SPAN = (0.0, 0.3)
@@ -68,13 +73,14 @@ def test_a_run_is_the_same_whatever_ran_before(make, ways, rng):
 @pytest.mark.slow
 def test_a_result_is_not_at_the_mercy_of_later_runs():
     scene = top.build()
-    one = run(scene, "dense")
-    kept = {name: value.copy() for name, value in vars(one).items() if isinstance(value, np.ndarray)}
+    one, other = run(scene, "dense"), run(scene, "dense")  # the arrays of the other are not asked for until the end
+    kept = {name: getattr(one, name).copy() for name in PARTS}
     before = one.at(0.2)
     for way in WAYS:
         run(scene, way)
     for name, value in kept.items():
         np.testing.assert_array_equal(getattr(one, name), value, err_msg=name)
+    same(other, one)
     for a, b in zip(before, one.at(0.2), strict=True):
         np.testing.assert_array_equal(a, b)
 
@@ -85,6 +91,72 @@ def test_a_result_may_be_written_to():
     for array in (spoilt.t, spoilt.q, spoilt.qd, spoilt.qdd, *spoilt.steps[:2], *spoilt.state[1:]):
         array[:] = np.nan
     same(run(scene, "outputs"), expected)
+
+
+def test_arguments_are_checked_once_by_value_and_type():
+    scene = top.build()
+    good = {"dense_output": True, "max_steps": 1, "rtol": 1e-6, "constraint_tol": 1e-12}
+    ts.simulate(scene, SPAN, **good)
+    for wrong in ({"dense_output": 1}, {"max_steps": True}, {"max_steps": 1.0}, {"rtol": [1e-6]}, {"redundancy": []}):
+        for _ in range(2):
+            with pytest.raises(ts.InvalidArgument, match=next(iter(wrong))):
+                ts.simulate(scene, SPAN, **{**good, **wrong})
+    assert ts.simulate(scene, SPAN, **good).stats.steps == 1
+
+
+def test_a_method_is_taken_as_it_is_now():
+    scene, method = top.build(), I.RK45(rtol=1e-4, atol=1e-4)
+    for name, value in (("rtol", 1e-9), ("atol", 1e-9), ("max_step", 1e-3), ("step", 2e-3), ("step", None)):
+        loose = ts.simulate(scene, SPAN, integrator=method)
+        setattr(method, name, value)
+        found = ts.simulate(scene, SPAN, integrator=method)
+        same(found, ts.simulate(top.build(), SPAN, integrator=method))
+        assert found.stats.steps != loose.stats.steps or name == "rtol"
+        assert found.method == repr(method)
+
+
+def test_a_method_of_a_user_is_asked_anew():
+    class Own(ts.ExplicitRungeKutta):
+        order, tableau = 4, I.RK45.tableau
+        margins = None
+
+        def step_tolerances(self):
+            return self.rtol * self.margins[0], self.atol * self.margins[0]
+
+    scene, method = top.build(), Own(rtol=1e-6, atol=1e-6)
+    method.margins = [1.0]
+    loose = ts.simulate(scene, SPAN, integrator=method).stats.steps
+    method.margins[0] = 1e-4
+    assert ts.simulate(scene, SPAN, integrator=method).stats.steps > 2 * loose
+
+
+def test_a_repeated_call_lays_nothing_out(monkeypatch):
+    scene, made, ways = top.build(), [], ("default", "outputs", "fixed")
+    first = [run(scene, way) for way in ways]
+    states = [each.state for each in first]
+    again = [ts.simulate(scene, SPAN, state=state) for state in states]
+    for kind in (SeriesEngine, StepEngine, StartWorkspace, Memory):
+        monkeypatch.setattr(kind, "__init__", lambda self, *a, init=kind.__init__: made.append(self) or init(self, *a))
+    for way, each in zip(ways, first, strict=True):
+        same(run(scene, way), each)
+    for state, each in zip(states, again, strict=True):
+        same(ts.simulate(scene, SPAN, state=state), each)
+    assert not made
+
+
+def test_a_result_is_complete_when_it_is_pickled():
+    one = run(top.build(), "outputs")
+    same(pickle.loads(pickle.dumps(one)), one)
+
+
+def test_what_a_run_said_does_not_follow_the_scene():
+    scene = top.build()
+    short, whole = run(scene, "fails"), run(scene, "default")
+    expected = run(top.build(), "fails").message, run(top.build(), "default").message
+    scene.bodies[0].mass = 1.0
+    scene.add_point_mass(1.0)
+    assert (short.message, whole.message) == expected
+    assert (short[:1].message, whole[:1].message) == expected
 
 
 def test_runs_inside_a_run():

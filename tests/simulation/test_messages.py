@@ -281,3 +281,10 @@ def test_directions_of_any_length():
     for length in (1e-300, 1e308):
         given = C.Dot1(body, body.scene.ground, axis_a=(length, 0, 0), axis_b=(0, length, 0))
         np.testing.assert_array_equal((given.axis_a, given.axis_b), np.eye(3)[:2])
+
+
+def test_a_point_whose_square_overflows_is_refused():
+    scene = ts.Scene()
+    body = scene.add_body(1.0, (1, 1, 1))
+    with pytest.raises(ts.InvalidConstraint, match=r"point_a must be within 1e\+150 m"):
+        C.Distance(scene.ground, body, point_a=(1e308, 0, 0))

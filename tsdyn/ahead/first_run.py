@@ -1,14 +1,14 @@
 """Which kernels a run needs, so that a first one can have them compiled at the same time."""
 
 from ..configuration import start_kernels
-from ..formulations import friction_basis, friction_solve, linearisation, null_space
+from ..formulations import friction_basis, friction_solve, null_space
 from ..formulations.registry import FORMULATIONS
 from ..integrators import DOP853, Taylor
 from ..jit.compiled import DEBUG
 from ..methods.plug_in import called_for
 from ..motions import program, state_program
 from ..motions.signals import Signal
-from ..runs.arguments import tolerances
+from ..runs.arguments import adaptive
 from ..runs.stepper import advance
 from ..taylor import step_parts
 from ..taylor.layout import FAR, no_series, pays, room
@@ -25,7 +25,7 @@ def prepare_first_run(scene, method, form, within, default):
     for between the steps.
     """
     key = type(method), form.name, within
-    if DEBUG or not scene.bodies or (scene._packed is not None and key in _known):
+    if (key in _known and scene._packed is not None) or DEBUG or not scene.bodies:
         return
     method = method or _default_method(scene, *default)
     far = isinstance(method, Taylor) and len(scene.bodies) * room(method.orders()[2]) > FAR
@@ -86,8 +86,7 @@ def of_method(method, form, within, far=False):
     if method.step is None:
         yield from method.errors
     if method.implicit:
-        names = ("linearise", "reduce", "factorise", "solve", "soften")
-        yield from (getattr(linearisation, name) for name in names)
+        yield from form.stages().values()
     if within:
         interpolant = method.interpolant(form.first_order)
         yield from (interpolant.fill, interpolant.value)
@@ -113,4 +112,4 @@ def _default_method(scene, rtol, atol, series):
     kinds = (kind.kernels for kind in _kinds(scene) if not kind.normalises)
     series = series and all("series" in kernels for kernels in kinds) and pays(scene.primitives, scene.forces)
     series = series and not any(no_series(force, force.parameters()) for force in scene.forces)
-    return (Taylor if series else DOP853)(**tolerances(rtol, atol))
+    return adaptive(Taylor if series else DOP853, rtol, atol)

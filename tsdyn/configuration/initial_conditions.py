@@ -4,17 +4,16 @@ import numpy as np
 
 from ..errors import RedundantConstraints, SingularConfiguration, Status
 from ..formulations.locked_orientations import keep_turning, settle, still
-from ..jit.kernels import resident
 from ..maths.row_rank import dependent
 from ..observables.evaluate import constraint_arrays
-from ..rows.interface import allocate_tangent, redundant_of, set_selection
+from ..rows.interface import redundant_of, set_selection
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of, set_redundant
 from ..sparse.massless_axes import axis_of
-from ..workspaces.workspace import parts
 from .rank import check_rank
 from .start_kernels import DOUBTFUL, NONE, evaluate_start, free_axis, go_near_by, land_start, select_redundant
 from .start_violations import demand_finite, demand_small, refuse_vanished
+from .start_workspace import give, taken
 from .tolerances import (
     DENSE_ENTRIES,
     LEAST_NEIGHBOURHOOD,
@@ -57,7 +56,9 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
             start = start.again()
         start.demand_inertia()
         settle(packed, start.graph, start.tangent.rows.H)
-        return start.landed()
+        landed = start.landed()
+        give(packed, start.workspace)
+        return landed
     if known is None:
         set_redundant(packed, np.zeros(0, np.int64))
         start = start.again()
@@ -77,20 +78,12 @@ class _Start:
     def __init__(self, scene, system, q, qd, t, tol):
         self.given = scene, system, q, qd, t, tol
         self.scene, self.packed, self.q, self.qd, self.t, self.tol = scene, scene.packed, q, qd, t, tol
-        self.graph = graph_of(self.packed, REDUCED, VALUES, BIAS, DRIFT)
-        system = system._replace(reals=system.reals.copy())
-        self.m = len(system.segments)
-        whole = parts(system, self.graph, q.size)
-        if self.packed.derived.redundant is not None:
-            whole = whole._replace(tangent=allocate_tangent(self.graph, q.size, redundant=True))
-        self.tangent, self.work, self.rates = whole.tangent, whole.work, np.zeros(len(self.graph.row))
-        self.context, *self._keep = resident(whole)
-        rigid = self.graph.bodies[self.graph.bodies[:, 1] == 7, 0]
-        self.at = rigid[:, None] + np.arange(3, 7)
+        self.graph, self.m = graph_of(self.packed, REDUCED, VALUES, BIAS, DRIFT), len(system.segments)
+        self.workspace = workspace = taken(self.packed, self.graph, q.size)
+        workspace.enter(system.reals, self.packed.size, q, tol)
+        self.tangent, self.work, self.rates = workspace.tangent, workspace.work, workspace.rates
+        self.context, self.at = workspace.address, workspace.at
         self.far = self.fast = False
-        work = self.work
-        work.control.u_tol, work.control.size = tol, self.packed.size
-        work.control.floor = ROUNDING * (self.packed.size + np.abs(q).max())
 
     def demand_velocities(self):
         """Refuse velocities that violate the constraints."""

@@ -94,3 +94,7 @@ LEAST_DIVISOR = 1e-300
 SMALL_ANGLE = 1e-3
 # Sine below which a rotation has no axis.
 NO_AXIS = 1e-12
+
+# --- memory ---
+# Floats of rows and factors up to which the workspace of a start is kept for the next one (8 MB): a thousand bodies.
+KEPT_FLOATS = 1 << 20

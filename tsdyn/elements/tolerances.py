@@ -1,5 +1,8 @@
 """Limits of bodies, markers and compiled loops, each with its unit and where it comes from."""
 
+# m: squares of a point's coordinates must be numbers.
+FARTHEST = 1e150
+
 # kg: the reciprocal of a mass must be a number.
 LEAST_MASS = 1e-300
 

@@ -19,6 +19,7 @@ from ..model.equations import applied_forces, constraint_curvature, force_jacobi
 from ..workspaces.workspace import load
 from .dense_products import add_product, add_transposed_product, clear_matrix, multiply
 from .newton_iterations import NOT_FINITE, OK, SINGULAR
+from .null_space import find_accelerations
 from .tolerances import HUGE
 
 
@@ -158,11 +159,12 @@ def _to_body_frames(system, q, X, scratch, out):
             to += 3
 
 
-@callback("pd")
-def linearise(context, t):
-    """Set K_body and C_body at the last completed state. Status."""
+@callback("pdp")
+def linearise(context, t, vdd):
+    """Set K_body and C_body at the last accelerations vdd. Status."""
     c = load(context)
     system, w, linear = c.system, c.work, c.linear
+    find_accelerations(system, w, vector(vdd, w.v.size))
     n = w.q.size
     clear_matrix(linear.K)
     clear_matrix(linear.C)
@@ -275,6 +277,16 @@ def _times_mass(w, linear, rho):
         for j in range(i):
             x += w.A[i, j] * linear.b[j]
         rho[i] = x
+
+
+@callback("ppp")
+def recall(context, vd, vdd):
+    """vd and vdd in this chart at the point before: v = L^T (q - q0) wherever q is."""
+    c = load(context)
+    w, before = c.work, c.linear.before
+    transposed_times(w.L, before[1], vector(vd, w.v.size))
+    transposed_times(w.L, before[2], vector(vdd, w.v.size))
+    return OK
 
 
 @callback("pp")

@@ -186,10 +186,15 @@ def accelerate(context, t, vd, vdd, unused):
 
 @callback("pp")
 def complete(context, vdd):
-    """Accelerations qdd = D vdd - U B gamma, Eq. 24, after `accelerate`, refined once by Phi_q qdd + gamma."""
+    """Accelerations qdd after `accelerate`."""
     c = load(context)
-    system, w = c.system, c.work
-    vdd = vector(vdd, w.v.size)
+    find_accelerations(c.system, c.work, vector(vdd, c.work.v.size))
+    return OK
+
+
+@kernel
+def find_accelerations(system, w, vdd):
+    """Accelerations qdd = D vdd - U B gamma, Eq. 24, refined once by Phi_q qdd + gamma."""
     for i in range(w.q.size):
         x = w.h[i]
         for j in range(vdd.size):
@@ -203,7 +208,6 @@ def complete(context, vdd):
                 x += w.Phi_q[i, j] * w.qdd[j]
         w.Phi[i] = x
     correct(w, w.Phi, w.qdd)
-    return OK
 
 
 @callback("p")

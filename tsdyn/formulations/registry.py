@@ -7,7 +7,7 @@ from ..rows.interface import redundancy
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED
 from ..sparse.constraint_graphs import graph_of, redundant_rows
 from ..validation import unknown_name
-from . import friction_basis, friction_solve, linearisation, maggi_kane, null_space, tangent
+from . import friction_basis, friction_solve, implicit_tangent, linearisation, maggi_kane, null_space, tangent
 from .locked_orientations import moving_graph
 
 
@@ -21,15 +21,18 @@ class Formulation:
     basis_free: bool = False
 
     def serving(self, method):
-        """The form that a method runs a scene in: implicit methods need a basis."""
-        if self.basis_free and method.implicit:
-            return replace(self, kernels=null_space, basis_free=False)
-        return self
+        """The form that a method runs a scene in."""
+        return replace(self, kernels=implicit_tangent) if self.basis_free and method.implicit else self
+
+    @property
+    def keeps_still(self):
+        """Whether rotations of bodies with locked orientation are left out."""
+        return self.basis_free and self.kernels is not implicit_tangent
 
     def graph(self, packed):
-        """The scene's graph with the loops that the kernels call; that of the forms with a basis has every row."""
+        """The scene's graph with the loops that the kernels call; all but explicit basis-free forms have every row."""
         if self.basis_free:
-            graph = moving_graph(packed, *self.kernels.COLUMNS)
+            graph = (moving_graph if self.keeps_still else graph_of)(packed, *self.kernels.COLUMNS)
         else:  # redundant rows are judged by sparse rows at every level
             graph = graph_of(packed, REDUCED, *((BIAS, DRIFT) if len(redundant_rows(packed)) else ()))
         if graph.frictions.size and graph.rub[0] == 0:
@@ -53,10 +56,13 @@ class Formulation:
 
     def implicit(self):
         """Addresses that implicit methods need, by their names in `StageKernels`."""
-        names = ("linearise", "reduce", "factorise", "solve", "soften")
-        kernels = {name: getattr(linearisation, name) for name in names}
-        kernels |= {"complete": null_space.complete, "error_norm": self.kernels.error_norm}
-        return {name: kernel.address for name, kernel in kernels.items()}
+        return {kernel_name: kernel.address for kernel_name, kernel in self.stages().items()}
+
+    def stages(self):
+        """The kernels that implicit methods need, by their names in `StageKernels`."""
+        module = self.kernels if self.basis_free else linearisation
+        names = ("linearise", "reduce", "factorise", "solve", "soften", "recall")
+        return {name: getattr(module, name) for name in names} | {"error_norm": self.kernels.error_norm}
 
 
 FORMULATIONS = {

@@ -15,7 +15,7 @@ import math
 
 from ..errors import Status
 from ..jit.kernels import ANY, callback, caller, kernel, vector
-from ..maths.dense_linalg import copy, transposed_times
+from ..maths.dense_linalg import copy
 from ..workspaces.run_state import load_run
 from ..workspaces.workspace import load
 from .explicit import ERROR, STEP, call_accelerate, call_norm, call_place, combine
@@ -41,9 +41,11 @@ SCRATCH = 6  # vectors of it, and a number
 # f(v_i, vd_i), the correction of v_i, v_i; v and vd of the step before in this chart, h before, then the predicted k_i
 F, DX, XS, Y_BEFORE, K_BEFORE, H_BEFORE = range(6)
 
-call_linearise = caller("pd")
+call_linearise = caller("pdp")
+call_reduce = caller("pd")
 call_solve = caller("pp")
 call_soften = caller("ppdp")
+call_recall = caller("ppp")
 
 
 def memory_of(stages, n):
@@ -62,12 +64,11 @@ def _renew_matrix(context, c, t, g, f, anew):
     """P at the place last taken, f being the accelerations there; with anew, from new stiffness and damping. Status."""
     l, status = c.linear, 0
     if anew or l.numbers.known == 0:
-        call_solve(l.kernels.complete, context, f)
-        status = call_linearise(l.kernels.linearise, context, t)
+        status = call_linearise(l.kernels.linearise, context, t, f)
         l.numbers.known = 1 if status == 0 else 0
     if status == 0:
-        call_linearise(l.kernels.reduce, context, t)
-        status = call_linearise(l.kernels.factorise, context, g)
+        call_reduce(l.kernels.reduce, context, t)
+        status = call_reduce(l.kernels.factorise, context, g)
     l.numbers.g = g if status == 0 else 0.0
     l.numbers.chart = c.work.counters.charts
     return status
@@ -125,7 +126,8 @@ def _solve_stage(context, c, r, i, t, g):
         if status != 0:
             return status
         w.counters.stage_iterations += 1
-        stale = eager or l.numbers.chart != w.counters.charts or abs(g - l.numbers.g) > SAME_G * g
+        off_chart = l.numbers.every_chart == 0 and l.numbers.chart != w.counters.charts
+        stale = eager or off_chart or abs(g - l.numbers.g) > SAME_G * g
         eager = False
         if stale or (measured and theta > SLOW):
             if not stale:
@@ -154,14 +156,12 @@ def _solve_stage(context, c, r, i, t, g):
 
 
 @kernel
-def _see_step_before(c, t, n, scratch):
-    """h of the step before, 0 where there is none, and its start in this chart: v = L^T (q - q0) wherever q is."""
-    l = c.linear
+def _see_step_before(context, l, t, n, scratch):
+    """h of the step before, 0 where there is none, and its start in this chart."""
     h_before = t - l.numbers.t_before if l.numbers.t_before > -math.inf else 0.0
     scratch[H_BEFORE * n] = h_before
     if h_before > 0.0:
-        transposed_times(c.work.L, l.before[1], scratch[Y_BEFORE * n :][:n])
-        transposed_times(c.work.L, l.before[2], scratch[K_BEFORE * n :][:n])
+        call_recall(l.kernels.recall, context, scratch[Y_BEFORE * n :], scratch[K_BEFORE * n :])
     return h_before
 
 
@@ -174,7 +174,7 @@ def implicit_step(context, run, t, h):
     width = 2 + stages
     predictor = tableau[1 + stages * width + stages + stages + 1 :]
     x, y, k_before = memory[:n], memory[n : 2 * n], scratch[K_BEFORE * n :]
-    h_before = _see_step_before(c, t, n, scratch)
+    h_before = _see_step_before(context, c.linear, t, n, scratch)
     copy(r.y, memory[2 * n : 3 * n])
     copy(r.yd, memory[3 * n : 4 * n])
     for i in range(1, stages):
@@ -219,9 +219,10 @@ def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):  # nine: as plug
     return 0
 
 
-def prepare_implicit(linear, method, addresses):
-    """Give the step kernel its tolerances and the addresses that it calls, by name."""
+def prepare_implicit(linear, method, addresses, every_chart):
+    """Give the step kernel its tolerances and the addresses that it calls, by name; whether P serves every chart."""
     numbers = linear.numbers
+    numbers.every_chart = int(every_chart)
     numbers.rtol, numbers.atol = (FIXED_TOL, FIXED_TOL) if method.step else method.step_tolerances()
     numbers.theta, numbers.t_before = GUESS, -math.inf
     for name, address in addresses.items():

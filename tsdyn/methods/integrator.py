@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from copy import copy
+from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 from ..calls import fitting
 from ..docstrings import complete_docstring
-from ..validation import positive
+from ..jit.code_hash import is_ours
+from ..validation import checked_once, positive
 from .diagonally_implicit import implicit_step, memory_of
 from .explicit import embedded_error, nystrom_step, runge_kutta_step, second_embedded_error, second_order_step
 from .interpolants import HERMITE, HERMITE_FIRST_ORDER, hermite_second
@@ -211,10 +213,10 @@ class ExplicitRungeKutta(Adaptive):
 
 
 class DiagonallyImplicit(Adaptive):
-    """A method that is an `ImplicitTableau`; it serves the tangent-space form.
+    """A method that is an `ImplicitTableau`; it serves the tangent form and the null-space form.
 
-    One stiffness and damping, exact, and one factorised iteration matrix are kept over iterations, stages, steps and
-    charts until the measured contraction says otherwise.
+    One stiffness and damping, and one factorised iteration matrix, sparse in the tangent form and dense in the
+    null-space form, are kept over iterations, stages, steps and charts until the measured contraction says otherwise.
 
     Examples
     --------
@@ -240,6 +242,30 @@ class DiagonallyImplicit(Adaptive):
         """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
         return implicit_step, self.tableau.numbers, lambda nx, ny: memory_of(stages, nx)
+
+
+def frozen(method: Integrator) -> Integrator:
+    """Return a method as it is now, the same object as long as it has the same attributes; itself if it isn't plain."""
+    known = vars(method)
+    return _frozen(type(method), (*known,), *known.values()) if is_plain(method) else method
+
+
+@checked_once
+def _frozen(kind, names, *values):
+    method = kind.__new__(kind)
+    vars(method).update(zip(names, values, strict=True))
+    return method
+
+
+def is_plain(method: Integrator) -> bool:
+    """Whether a method is one of tsdyn's, with its own driver: numbers among its attributes say all about it."""
+    return is_own(type(method)) and "driver" not in vars(method)
+
+
+@cache
+def is_own(kind: type[Integrator]) -> bool:
+    """Whether a class is one of tsdyn's."""
+    return is_ours(kind.__module__)
 
 
 def registered() -> Mapping[str, type[Integrator]]:

@@ -18,13 +18,17 @@ class Derived:
     locked: object = None  # a `Still`: locked_orientations.still
     moving_graph: tuple = None  # locked_orientations.moving_graph, and by the loops asked for:
     moving_networks: dict = field(default_factory=dict)
+    saddle: tuple = None  # a graph, a system, and their `SaddleGraph`: saddle_graph.saddle_of
     examined: object = None  # a `Packed` without redundant rows so far: dependent_rows.dependent_rows
+    start_workspaces: list = field(default_factory=list)  # idle: start_workspace.taken
     aligned: tuple = None  # mirrored_branches.demand_aligned
     holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
     loads: dict = None  # reactions.loads_of
     places_within: list = None  # of each primitive among those of its class: reactions.only
     coordinate_starts: dict = None  # diagnostics.starts
-    levers: object = None  # (bodies,), m: rounding_limit.within_rounding
+    engines: dict = field(default_factory=dict)  # scene_cache.Prepared.engine
+    levers: object = None  # (bodies,), m: rounding_limit.within_rounding, and the start last found near the origin:
+    near: object = None
     grounded: tuple = None  # local_origin.origin_of, and for the start last seen:
     origin: tuple = (None, None)
     local: tuple = None  # the scene from an origin of its own: local_origin
@@ -39,6 +43,7 @@ class Derived:
         """Other bodies turn."""
         self.locked = self.moving_graph = None
         self.moving_networks.clear()
+        self.engines = {}  # and not cleared: a run in another thread may be about to add one
 
     def __reduce__(self):
         """In another process: what doesn't depend on where things are in memory."""

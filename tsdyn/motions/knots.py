@@ -5,6 +5,8 @@ import numpy as np
 from ..errors import InvalidConstraint
 from .tolerances import JUMP, LEAST_SPAN, ROUNDING, TOGETHER
 
+NO_STOPS = np.empty((0, 2))
+
 
 def demand_covered(motion, t0, t1, what, error):
     """Refuse a run beyond the times for which a motion has values."""
@@ -53,7 +55,7 @@ def stops_of(parameters, instants, t0, t1):
     """
     found = [joints(motion, t0, t1) for given in parameters for motion in given.motions if motion.pieces]
     if not (instants.size or found):
-        return np.empty((0, 2))
+        return NO_STOPS
     times = np.concatenate([instants, *found])
     order = np.argsort(times, kind="stable")
     times, asked = times[order], np.where(order < instants.size, 1.0, 0.0)
@@ -63,6 +65,6 @@ def stops_of(parameters, instants, t0, t1):
     kept = times - t0 > near
     times, asked = times[kept], asked[kept]
     if not times.size:
-        return np.empty((0, 2))
+        return NO_STOPS
     ends = np.flatnonzero(np.append(np.diff(times) > near, True))  # of each group
     return np.column_stack((times[ends], np.maximum.reduceat(asked, np.append(0, ends[:-1] + 1))))

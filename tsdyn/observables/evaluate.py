@@ -80,13 +80,13 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
     >>> print(at_start.Phi_q, at_start.M.diagonal(), at_start.multipliers)
     [[0. 0. 1.]] [2. 2. 2.] [-19.62]
     """
-    start = scene.start
+    packed, start = scene.packed, scene.start
     q = finite_vector(start[0] if q is None else q, start[0].size, "q")
     qd = finite_vector(start[1] if qd is None else qd, start[0].size, "qd")
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     with np.errstate(over="ignore", invalid="ignore"):
-        found = (_evaluate_sparse if q.size > LARGE else _evaluate_dense)(scene.packed, q, qd, float(t))
+        found = (_evaluate_sparse if q.size > LARGE else _evaluate_dense)(packed, q, qd, float(t))
     _demand_finite(accelerations=found.qdd)
     return found
 

@@ -12,6 +12,8 @@ from .kinematics import Kinematics
 if TYPE_CHECKING:
     from ..hints import Floats, Handles
 
+NOTHING = np.empty(0)
+
 
 class _Arrays(NamedTuple):
     t: float
@@ -90,9 +92,9 @@ class RememberingState(State):
 
 def remembered(state, prepared, t, q):
     """Return the memory with which a run from a state (or None) begins: joint angles, then memory of forces."""
+    if state is None and not prepared.remembers:
+        return NOTHING
     slots, memory = prepared.packed.system.memory.size, getattr(state, "memory", None)
-    if state is None and not (slots or prepared.handles.count):
-        return np.empty(0)
     if memory is None and state is not None and slots:
         raise InvalidArgument(
             "parts of the scene count turns or hold a load, and this state doesn't say how many: give solution.state, "

@@ -14,7 +14,6 @@ import numpy as np
 from ..benchmarking.reference_solution import poses
 from ..errors import Status, TsdynError
 from ..integrators import SDIRK54, Taylor
-from ..simulation.method_choice import LARGEST_PILOT
 from ..simulation.scene_cache import prepared
 from ..taylor.layout import lacking, without_series
 from .phases import duration
@@ -144,7 +143,7 @@ def _alternatives(profile, run, plain, options, limit):
         found = attempt(integrator=None, **tolerances)
         if found and found.method != solution.method:
             yield f"The default method, {found.method} at {given}, is {_quicker(found, limit)}."
-    if solution.stats.stiff and not method.implicit and adaptive and solution.q.shape[1] <= LARGEST_PILOT:
+    if solution.stats.stiff and not method.implicit and adaptive:
         found = attempt(integrator=SDIRK54(method.rtol, method.atol))
         if found:
             yield f"The motion is stiff: {found.method} is {_quicker(found, limit)}."

@@ -202,11 +202,11 @@ def _once(scene, method, options, start):
         kept.system(method.implicit)
     seconds["order of elimination"] = clock() - began
     state = options.get("state")
-    q, qd = scene.start if state is None else state_arrays(state, kept.n)
+    given = scene.start if state is None else state_arrays(state, kept.n)
     began = clock()
-    memory = remembered(state, kept, start, q)
+    memory = remembered(state, kept, start, given[0])
     kept.start(
-        scene, q, qd, start, options.get("initial_tol", 1e-9), memory, options.get("redundancy", "drop") == "drop"
+        scene, given, start, options.get("initial_tol", 1e-9), memory, options.get("redundancy", "drop") == "drop"
     )
     seconds["check of the start"] = clock() - began
     return seconds

@@ -31,7 +31,7 @@ from ..jit.kernels import (
     specialised,
     vector,
 )
-from ..methods.diagonally_implicit import call_linearise, call_soften
+from ..methods.diagonally_implicit import call_reduce, call_soften
 from ..methods.explicit import ACCELERATE as ACCELERATE_SIGNATURE
 from ..methods.explicit import NORM as NORM_SIGNATURE
 from ..methods.explicit import PLACE as PLACE_SIGNATURE
@@ -62,7 +62,6 @@ OF_STAGES = {
     "factorise": FACTORISE,
     "solve": SOLVE,
     "soften": SOFTEN,
-    "complete": COMPLETE,
     "error_norm": NORM,
 }
 # the notes: the clock where the processor has none, what it is given first, what it writes, the factor of its first
@@ -179,7 +178,7 @@ def _norm(context, ex, ey, old, rtol, atol):
 def _number(context, x):
     notes = integers(_before(context), ANY)
     _enter(notes, ROLE * ROLES, ROLE)
-    status = call_linearise(notes[TARGETS + ROLE], context, x)
+    status = call_reduce(notes[TARGETS + ROLE], context, x)
     _leave(notes)
     return status
 
@@ -250,7 +249,7 @@ TIMERS = {
     CHART: _timer(_chart, "pdpppp", "chart", ROLE=CHART),
     STEP: _timer(_step, STEP_SIGNATURE, "step", ROLE=STEP),
     NORM: _timer(_norm, NORM_SIGNATURE, "norm", "d", ROLE=NORM),
-    LINEARISE: _timer(_number, "pd", "linearise", ROLE=LINEARISE),
+    LINEARISE: _timer(_place, PLACE_SIGNATURE, "linearise", ROLE=LINEARISE),
     REDUCE: _timer(_number, "pd", "reduce", ROLE=REDUCE),
     FACTORISE: _timer(_number, "pd", "factorise", ROLE=FACTORISE),
     SOLVE: _timer(_vector, "pp", "solve", ROLE=SOLVE),

@@ -14,7 +14,7 @@ import math
 
 from ..elements.loops.body_poses import POSE, R
 from ..jit.kernels import kernel
-from .redundant_rows import length
+from .redundant_rows import length, square
 from .singularity import is_near_singular
 from .tolerances import FAINT, HELD, NO_RATE, RESTING
 
@@ -63,22 +63,22 @@ def note_loads(f):
     """Record the largest |W F| of a body, in Z; only redundant rows are judged by it."""
     if f.dropped[0] == 0:
         return
-    push = twist = 0.0
+    push = twist = 0.0  # squares
     for i in range(0, f.Z.size, 8):
-        push, twist = max(push, length(f.Z, i)), max(twist, length(f.Z, i + 4))
-    f.selection.push, f.selection.twist = push, twist
+        push, twist = max(push, square(f.Z, i)), max(twist, square(f.Z, i + 4))
+    f.selection.push, f.selection.twist = math.sqrt(push), math.sqrt(twist)
 
 
 @kernel
 def _extent(graph, f):
     """The largest distance of a body from the first one, m."""
-    square = 0.0
+    most = 0.0
     for b in range(1, graph.bodies.shape[0]):
         at, distance = b * POSE + R, 0.0
         for c in range(3):
             distance += (f.poses[at + c] - f.poses[R + c]) ** 2
-        square = max(square, distance)
-    return math.sqrt(square)
+        most = max(most, distance)
+    return math.sqrt(most)
 
 
 @kernel
@@ -93,13 +93,13 @@ def _reach(graph, f, size):
 @kernel
 def _largest(graph, rates):
     """The largest |rd| and |omega'| of a body, or |rdd| and 2 |pdd|."""
-    speed = spin = 0.0
+    speed = spin = 0.0  # squares
     for b in range(graph.bodies.shape[0]):
         i = graph.bodies[b, 0]
-        speed = max(speed, length(rates, i))
+        speed = max(speed, square(rates, i))
         if graph.bodies[b, 1] == 7:
-            spin = max(spin, 2.0 * math.hypot(rates[i + 3], length(rates, i + 4)))
-    return speed, spin
+            spin = max(spin, rates[i + 3] ** 2 + square(rates, i + 4))
+    return math.sqrt(speed), 2.0 * math.sqrt(spin)
 
 
 @kernel
@@ -125,7 +125,8 @@ def _hold(graph, f, known, q, rates, most, fastest):
                 y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
                 z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
                 residual += 2.0 * (H[at + 4] * x + H[at + 5] * y + H[at + 6] * z)
-                terms += length(H, at + 4) * (2.0 * math.hypot(d0, length(rates, k + 4)) + FAINT * fastest)
+                spin = 2.0 * math.sqrt(d0 * d0 + square(rates, k + 4))
+                terms += length(H, at + 4) * (spin + FAINT * fastest)
         if not abs(residual) <= HELD * terms:
             return False
     return True

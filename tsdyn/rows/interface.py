@@ -8,6 +8,7 @@ Evaluate, at the poses of f, t and the velocities:
 Factorise:
     factorise_rows          Y, S = L D L^T          factorise_chart_matrix  N = H C Y0 = L D U
     factorise_product       H X^T = L D U
+    write_saddle_rows, factorise_saddle, solve_saddle         of the saddle-point matrix of implicit methods
 Solve:
     solve_rows              b <- S^-1 b             solve_product           b <- N^-1 b
     multiply_rows           out = H Z               apply_multipliers       Z <- Z - Y^T lam
@@ -41,6 +42,7 @@ from .redundant_rows import (
 from .reselection import factorise_rows, select_rows, selection_serves
 from .row_memory import allocate_rows, allocate_tangent, redundancy, redundant_of, reset_selection, set_selection
 from .row_workspace import Rows, TangentWorkspace
+from .saddle_matrix import factorise_saddle, solve_saddle, write_saddle_rows
 from .schur_complement import (
     DYNAMICS,
     METRIC,
@@ -52,6 +54,7 @@ from .schur_complement import (
     factorise_selected_rows,
     find_correction,
     inner,
+    more,
     multiply_rates,
     multiply_rows,
     project,
@@ -96,6 +99,7 @@ __all__ = [
     "factorise_chart_matrix",
     "factorise_product",
     "factorise_rows",
+    "factorise_saddle",
     "factorise_selected_rows",
     "find_correction",
     "has_redundant_rows",
@@ -107,6 +111,7 @@ __all__ = [
     "keep_every_row",
     "list_redundant",
     "mark_redundant",
+    "more",
     "multiply_rates",
     "multiply_rows",
     "note_indicator",
@@ -130,7 +135,9 @@ __all__ = [
     "singularity_indicator",
     "solve_product",
     "solve_rows",
+    "solve_saddle",
     "solve_series",
     "weigh",
     "weigh_bodies",
+    "write_saddle_rows",
 ]

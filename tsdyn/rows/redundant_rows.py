@@ -52,14 +52,20 @@ def _position_terms(graph, f, H, row):
     for side in range(2):
         b, at = graph.sides[row, side], 16 * row + 8 * side
         if b < graph.bodies.shape[0]:
-            terms += length(H, at) * length(f.poses, b * POSE + R) + length(H, at + 4)
+            terms += math.sqrt(square(H, at) * square(f.poses, b * POSE + R)) + length(H, at + 4)
     return terms
+
+
+@kernel
+def square(x, i):
+    """|x[i : i + 3]|^2."""
+    return x[i] * x[i] + x[i + 1] * x[i + 1] + x[i + 2] * x[i + 2]
 
 
 @kernel
 def length(x, i):
     """|x[i : i + 3]|."""
-    return math.sqrt(x[i] * x[i] + x[i + 1] * x[i + 1] + x[i + 2] * x[i + 2])
+    return math.sqrt(square(x, i))
 
 
 @kernel

@@ -49,19 +49,24 @@ def _allocate_friction(graph, n, basis):
 
 def reset_selection(graph, tangent):
     """Select the rows of the scene's first start again, and forget multipliers and singularity indicators."""
-    tangent.friction.lam.fill(0.0)
-    tangent.friction.load.fill(0.0)
+    friction, indicator = tangent.friction, tangent.indicator
+    if friction.load.size:
+        friction.lam.fill(0.0)
+        friction.load.fill(0.0)
     set_selection(tangent, graph.dropped)
-    tangent.selection.weakest, tangent.selection.push, tangent.selection.twist = 1.0, 0.0, 0.0
-    for array in tangent.left:
-        array.fill(0.0)
-    tangent.indicator.clear()
+    selection = tangent.selection
+    selection.weakest, selection.push, selection.twist = 1.0, 0.0, 0.0
+    if tangent.left[0].size:
+        for array in tangent.left:
+            array.fill(0.0)
+    indicator.start = indicator.end = indicator.largest = 0.0
 
 
 def set_selection(tangent, redundant):
     """Drop these rows, int64 (k,), in the order of the graph."""
-    tangent.dropped[0] = len(redundant)
-    tangent.dropped[1 : 1 + len(redundant)] = redundant
+    tangent.dropped[0] = count = len(redundant)
+    if count:
+        tangent.dropped[1 : 1 + count] = redundant
 
 
 def redundant_of(tangent):

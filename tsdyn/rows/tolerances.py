@@ -8,6 +8,10 @@ makes with them.
 # Share: below it the pivot counts as zero. The angle is 3e-7 rad.
 ZERO_PIVOT = 1e-13
 
+# Pivot of the saddle-point matrix over the diagonal entry, of bodies: below it the matrix is singular. A hundred
+# roundings.
+SADDLE_PIVOT = 1e-14
+
 # Share: below it rows are dropped where a given number must be dropped; while too many fall below it, it is multiplied
 # by FEWER. The first share, an angle of 0.03 rad, parts redundant rows from others unless the configuration is nearly
 # singular.

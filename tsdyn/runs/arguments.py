@@ -6,18 +6,22 @@ from operator import lt
 import numpy as np
 
 from ..errors import InvalidArgument
-from ..methods.integrator import Integrator, registered
-from ..validation import finite_vector, floats, unknown_name
+from ..methods.integrator import Integrator, is_own, registered
+from ..validation import checked_once, finite_vector, floats, number, unknown_name
 from .tolerances import SAME_COUNT
 
 TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
 FEW = 50  # times that a list serves faster than an array: 0.4 us instead of 2
+NO_TIMES = np.empty(0)
 
 
 def interval(t_span):
     """Start and end of the interval, s."""
-    span = floats(t_span)
-    t0, t1 = span.tolist() if span.shape == (2,) else (math.nan, math.nan)
+    if type(t_span) is tuple and len(t_span) == 2:
+        t0, t1 = number(t_span[0]), number(t_span[1])
+    else:
+        span = floats(t_span)
+        t0, t1 = span.tolist() if span.shape == (2,) else (math.nan, math.nan)
     if not (math.isfinite(t0) and math.isfinite(t1)):
         raise InvalidArgument(f"t_span must be two finite times in s, (start, end), got {t_span!r}.")
     if not t1 > t0:
@@ -30,7 +34,7 @@ def interval(t_span):
 def output_times(t_eval, t0, t1):
     """The times of t_eval (k,), s, none for None."""
     if t_eval is None:
-        return np.empty(0)
+        return NO_TIMES
     times = floats(t_eval)
     increasing = times.ndim == 1 and _increase(times)
     if increasing and times.size and t0 <= times[0] and times[-1] <= t1:
@@ -69,17 +73,23 @@ def state_arrays(state, n):
     return finite_vector(state.q, n, "state.q"), finite_vector(state.qd, n, "state.qd")
 
 
-def tolerances(rtol, atol):
-    """Rtol and atol by name, TOLERANCE for None."""
-    return {"rtol": TOLERANCE if rtol is None else rtol, "atol": TOLERANCE if atol is None else atol}
+def adaptive(kind, rtol, atol):
+    """A method of a class with these tolerances, TOLERANCE for None; one of tsdyn's own is made once."""
+    make = _own if is_own(kind) else _own.__wrapped__
+    return make(kind, TOLERANCE if rtol is None else rtol, TOLERANCE if atol is None else atol)
+
+
+@checked_once
+def _own(kind, rtol, atol):
+    return kind(rtol=rtol, atol=atol)
 
 
 def method_of(integrator, rtol, atol):
     """The method that is given as an instance, a class or a name; tolerances are for a name."""
     known = registered()
     given = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
-    adaptive = isinstance(integrator, str) and getattr(known.get(_key(integrator)), "embedded_order", 0) > 0
-    if given and not adaptive:
+    adapts = isinstance(integrator, str) and getattr(known.get(_key(integrator)), "embedded_order", 0) > 0
+    if given and not adapts:
         raise InvalidArgument(
             f"{' and '.join(given)} set the tolerances of an adaptive method given by its name, such as "
             f"integrator='rk45', not of {integrator!r}; give an instance its own, such as RK45(rtol=1e-8)."
@@ -88,7 +98,7 @@ def method_of(integrator, rtol, atol):
         if _key(integrator) not in known:
             raise unknown_name("integrator", integrator, known)
         kind = known[_key(integrator)]
-        return kind(**tolerances(rtol, atol)) if adaptive else kind()
+        return adaptive(kind, rtol, atol) if adapts else kind()
     if isinstance(integrator, type) and integrator in known.values():
         return integrator()
     if not isinstance(integrator, Integrator):

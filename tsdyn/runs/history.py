@@ -12,7 +12,9 @@ class StepLog:
     """Steps tried, in order: of those accepted the start, as each ends where the next one begins."""
 
     def __init__(self, parts=()):
-        self.chunks = [chunk for part in parts for chunk in part.chunks]
+        self.chunks = []
+        for part in parts:
+            self.chunks += part.chunks
 
     def add(self, rows):
         """Add rows (k, 3): start and length, s, and whether the step was accepted."""
@@ -56,12 +58,14 @@ class ChartLog:
     """Charts, in order: column by column, a constant one as a number."""
 
     def __init__(self, parts=()):
-        self.chunks = [chunk for part in parts for chunk in part.chunks]
+        self.chunks = []
+        for part in parts:
+            self.chunks += part.chunks
 
     def add(self, rows, steps):
-        """Add rows (k, 5) as of `RunLog.charts`; instants that are the starts of the latest `steps` are not copied."""
+        """Take rows (k, 5) as of `RunLog.charts`; instants that are the starts of the latest `steps` aren't copied."""
         if _few(rows, self.chunks):
-            self.chunks.append(rows.copy())
+            self.chunks.append(rows)
             return
         if not len(rows):
             return

@@ -10,6 +10,7 @@ from .tolerances import TRIES
 CHART_ROOM = 64  # charts of a slice at first, half of what there is room for
 LARGEST_SLICE = 1 << 17  # steps, and charts that are kept in one piece
 BLOCK_ROOM = 1 << 22  # floats of a slice's blocks
+NO_ROWS = np.empty((0, 1))
 
 
 class Recorder:
@@ -35,9 +36,10 @@ class Recorder:
         self.steps, self.passed = (StepLog(), ChartLog()) if task.history and not self.archive else (None, None)
         self.most = max(BLOCK_ROOM // run.block.size, 1) if self.dense else LARGEST_SLICE
         n, rooms = run.now.shape[1], 2 * CHART_ROOM
-        self.charts, self.points = np.empty((rooms, 5)), np.empty((rooms if run.numbers.dense else 0, n))
-        self.out = np.empty((task.times.size, 1 + 3 * n + run.remembered.size))
-        self.blocks, self.log = np.empty((0, run.block.size)), None
+        self.charts, self.points = np.empty((rooms, 5)), np.empty((rooms, n)) if run.numbers.dense else NO_ROWS
+        self._width = 1 + 3 * n + run.remembered.size
+        self.out = NO_ROWS if self.per_step else np.empty((task.times.size, self._width))
+        self.blocks, self.log = NO_ROWS, None
         self._parts, self._count = ([], []), 0  # of out and blocks; outputs in the archive
 
     def begin_slice(self, rows):
@@ -46,9 +48,9 @@ class Recorder:
             self.collect()
             self._make_room_for_charts()
         if self.per_step:
-            self.out = np.empty((rows + 1, self.out.shape[1]))
+            self.out = np.empty((rows + 1, self._width))
         if self.dense:
-            self.blocks = np.empty((rows, self.blocks.shape[1]))
+            self.blocks = np.empty((rows, self.run.block.size))
         history = np.empty((rows + 2 * TRIES, 3))
         self.log = RunLog(self.times, self.stops, self.out, history, self.charts, self.points, self.blocks)
 
@@ -61,9 +63,9 @@ class Recorder:
             return
         if not self.dense and run.chart_rows > CHART_ROOM:  # fewer are logged with the last one
             self._pass_charts()
-        self.out = _joined(self.out, self._parts[0]) if self.per_step else self.out[: run.rows]
+        self.out = _joined(self._parts[0], self._width) if self.per_step else self.out[: run.rows]
         if self.dense:
-            self.blocks = _joined(self.blocks, self._parts[1])
+            self.blocks = _joined(self._parts[1], self.run.block.size)
 
     def chart_history(self, charts):
         """The history of charts, with those that are left at the end; or None."""
@@ -112,7 +114,7 @@ class Recorder:
         """Log the charts that have been left, and let the present one be the first."""
         run, charts, points = self.run.numbers, self.charts, self.points
         left = run.chart_rows
-        self._log_charts(charts[:left])
+        self._log_charts(charts[:left].copy())
         charts[0], points[:1] = charts[left], points[left : left + 1]
         run.chart_rows = 0
 
@@ -127,6 +129,6 @@ def _doubled(rows):
     return np.concatenate((rows, np.empty_like(rows)))
 
 
-def _joined(rows, parts):
+def _joined(parts, width):
     """The parts in one array, which is none of theirs."""
-    return parts[0].copy() if len(parts) == 1 else np.concatenate((rows[:0], *parts))
+    return parts[0].copy() if len(parts) == 1 else np.concatenate((np.empty((0, width)), *parts))

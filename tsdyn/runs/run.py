@@ -1,27 +1,31 @@
 """The front end of every driver: memory, driver loop, outcome.
 
 An engine is what differs from driver to driver: `StepEngine` for methods with a step kernel, `SeriesEngine` of
-tsdyn.taylor for series. It is made of a `Task` and has
+tsdyn.taylor for series. It is made of a scene's `Prepared`, a method, a form, and whether anything is asked for between
+the ends of steps; serves any number of runs (`Prepared.engine`), and has
 
-    task            the task as the driver runs it
+    method, form    the form is the one that the driver runs
     kind            of the memory: one of the same kind serves another run
-    memory()        a new `Memory`
-    serves(memory)  whether a memory that was made before is that of the scene as it is now
-    enter(memory)   clear it, and enter the task
-    reading(memory) a `Reading` of the steps, and a picklable function with its arguments that makes it anew
+    memory(prepared)            a new `Memory`
+    serves(memory)              whether a memory that was made before is that of the scene as it is now
+    lay_out(memory)             enter the system, and the numbers and kernels of the method
+    reading(memory, prepared, constraint_tol)
+                                a `Reading` of the steps, and a picklable function with its arguments that makes it anew
     skipped         bodies without gyroscopic torque, bodies that never turn, constant columns of series
 """
 
 import time
 
 from ..errors import Status
-from ..workspaces.run_state import FILLED, STORED
+from .counts import Counts
 from .run_log import left_open
 from .sampling import Sampled
 from .segments import Relay
 from .slices import drive
 from .task import Outcome
 from .trajectory import Trajectory
+
+NOT_FINITE = Status.NOT_FINITE
 
 
 def run(task, engine, observe=None, relay=None, past=None):
@@ -31,33 +35,37 @@ def run(task, engine, observe=None, relay=None, past=None):
     with Status.PASSAGE next to a singular configuration that there is a way past. `past(memory)` makes what is advanced
     in place of the memory.
     """
-    engine = engine(task)
-    task, prepared = engine.task, engine.task.prepared
-    memory = None if observe else prepared.take(engine.kind, engine.memory)
+    prepared = task.prepared
+    engine = prepared.engine(engine, task.method, task.form, task.within)
+    memory = None if observe else prepared.take(engine.kind)
     if memory is None or not engine.serves(memory):
-        memory = engine.memory()
-    engine.enter(memory)
-    memory.set_out(task, STORED if task.dense_output else FILLED if task.events is not None else 0, relay is not None)
-    memory.load()
-    reading, again = engine.reading(memory) if memory.run.numbers.dense else (None, None)
+        memory = engine.memory(prepared)
+    memory.enter(engine, task, relay is not None)
+    readings = None, None
+    if memory.run.numbers.dense:
+        readings = engine.reading(memory, prepared, task.constraint_tol)
     if observe is not None:
         observe(memory)
-    relay = relay or Relay()
-    relay.enter(memory)
-    watch, began = relay.watching(task, reading), time.perf_counter()
+    watch = None
+    if relay is not None:
+        relay.enter(memory)
+    if task.events is not None:
+        watch = (relay or Relay()).watching(task, readings[0])
+    began = time.perf_counter()
     advanced = memory if task.sampling is None else Sampled(memory, task.sampling)
     driven = drive(advanced if past is None else past(advanced), task, watch)
-    relay.leave(memory)
-    outcome = _outcome(engine, memory, driven, (reading, again), watch, began)
-    if observe is None and outcome.status != Status.NOT_FINITE:  # NaN may be left in what a run takes as its own
+    if relay is not None:
+        relay.leave(memory)
+    outcome = _outcome(task, engine, memory, driven, readings, watch, began)
+    if observe is None and outcome.status is not NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give(engine.kind, memory)
     return outcome
 
 
-def _outcome(engine, memory, driven, readings, watch, began):
+def _outcome(task, engine, memory, driven, readings, watch, began):
     """The `Outcome` of a run that has been driven."""
     status, reason, recorder = driven
-    task, run, control = engine.task, memory.run, memory.work.control
+    run, control = memory.run, memory.work.control
     charts, last = left_open(run, recorder.charts, control.condition, control.contraction), run.now.copy()
     trajectory = None
     if task.dense_output:
@@ -66,37 +74,5 @@ def _outcome(engine, memory, driven, readings, watch, began):
     found = None if watch is None else watch.found(task.prepared.n)
     return Outcome(
         status, reason, recorder.out, recorder.steps, recorder.chart_history(charts), run.clock.t,
-        last, run.remembered.copy(), counts(memory, *engine.skipped), trajectory, found, began,
+        last, run.remembered.copy(), Counts(memory, engine.skipped), trajectory, found, began,
     )  # fmt: skip
-
-
-def counts(memory, no_spin, no_turn, constant_columns):
-    """What `Solution.stats` counts.
-
-    Of what each evaluation skips: the torques of no_spin bodies, the rotations of no_turn, so many columns of markers.
-    """
-    numbers, counters = memory.run.numbers, memory.work.counters
-    evaluations = counters.evaluations
-    return {
-        "steps": numbers.steps,
-        "rejected": numbers.rejected,
-        "evaluations": evaluations,
-        "placements": counters.placements,
-        "newton_iterations": counters.newton,
-        "b_iterations": counters.b_iterations,
-        "charts": counters.charts,
-        "factorizations": counters.factorizations,
-        "stiff": bool(numbers.stiff),
-        "steps_near_singular": numbers.near_steps,
-        "largest_landing": memory.run.clock.largest_landing,
-        "jacobians": counters.jacobians,
-        "iteration_matrices": counters.iteration_matrices,
-        "stage_iterations": counters.stage_iterations,
-        "solves_skipped": counters.at_rounding,
-        "checks_skipped": counters.unverified,
-        "factorizations_skipped": counters.kept + counters.stage_iterations - counters.iteration_matrices,
-        "gyroscopic_skipped": no_spin * evaluations,
-        "rotations_skipped": no_turn * evaluations,
-        "columns_skipped": constant_columns * evaluations,
-        "forces_skipped": 0 if memory.packed.loads else evaluations,
-    }

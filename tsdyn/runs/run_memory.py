@@ -1,18 +1,21 @@
 """Run workspace of a driver, allocated once and reused by successive runs."""
 
 import math
+from operator import is_
 
 import numpy as np
 
 from ..errors import Status
 from ..jit.kernels import resident
 from ..rows.interface import reset_selection
-from ..workspaces.run_state import enter_joints
+from ..workspaces.carving import divided
+from ..workspaces.run_state import FILLED, STORED, enter_joints
 from ..workspaces.workspace import hold
 from .arguments import step_count
 from .run_log import no_log
 
 UNLIMITED = 2**62  # steps wanted of an adaptive run
+STATUSES = {int(status): status for status in Status}
 
 
 def words(record):
@@ -35,15 +38,20 @@ class Memory:
     """
 
     reason = ""  # of the end of a run: told by its status
+    engine = None  # that it is laid out for
     advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
 
     def __init__(self, prepared, graph, context, run):
         self.packed, self.weight, self.graph, self.run = prepared.packed, prepared.n, graph, run
-        self.work = work = context.work
+        self.work = context.work
         self.settle(context)
         self._run, *self._keep_run = resident(run)
-        records = work.control, work.counters, run.clock, run.numbers, run.kernels
-        self._written = [work.q.base, *map(words, records)]  # what the next run must not find
+        work, tables = context.work, (run.now, run.before, run.remembered, run.frames, run.tableau)
+        state, rest = divided(work.q.base, work.control, work.counters, work.q, work.qd, work.qdd)
+        run_state, self._run_scratch = divided(run.now.base, run.clock, run.numbers, run.kernels, *tables)
+        self._laid_out = [run_state, state]  # what a run finds as it was laid out,
+        self._scratch = [rest] if rest.size else []  # and what it finds zero
+        self._images, self._start = [], ()
 
     def settle(self, context, header=()):
         """Let the kernels find this context, behind the integers of a header."""
@@ -55,33 +63,70 @@ class Memory:
         """Addresses of the context and of the run."""
         return self._context, self._run
 
-    def clear(self, task, system):
-        """As if it were new, for this task and a source of its system: what a run before has left behind is gone."""
-        own, work, run = self.context.system, self.work, self.run
-        for array in self._written:
+    def enter(self, engine, task, may_pass):
+        """As if it were new, for an engine and a task: what a run before has left behind is gone."""
+        for array in self._scratch:
             array.fill(0)
+        start = task.q, task.qd, task.constraint_tol
+        if self.engine is not engine:
+            self._lay_out(engine, task)
+            self._images, self._start = [(array, array.copy()) for array in self._laid_out], start
+        else:
+            for array, image in self._images:
+                array[...] = image
+            if not all(map(is_, start, self._start)):
+                self._enter_start(task)
+        self.context.system.reals[...] = self.reals  # motions, signals and what forces remember are written there
+        if task.remembered.size:
+            self._remember(task)
         reset_selection(self.graph, self.context.tangent)
-        own.reals[...] = system.reals  # motions, signals and what forces remember are written there
-        enter_joints(run, task.prepared.handles, task.remembered)
-        if own.memory.size:
-            own.reals[own.memory] = task.remembered[len(run.joints) :]
-        work.q[...], work.qd[...] = task.q, task.qd
-        run.now[0], run.now[1] = task.q, task.qd
-        hold(work.control, task.constraint_tol, task.prepared.packed.size, task.form.basis_free)
+        self._set_out(task, may_pass)
 
-    def set_out(self, task, dense, may_pass):
-        """The interval, the method's steps and tolerances, and what the run is to do."""
-        method, clock, numbers = task.method, self.run.clock, self.run.numbers
-        clock.t = clock.t_origin = task.span[0]
-        clock.t_end = task.span[1]
+    def _lay_out(self, engine, task):
+        """Enter what engine and task say, and load the driver where this process has not called it yet."""
+        self.engine = None
+        for array in self._laid_out:
+            array.fill(0)
+        self._enter_method(engine.method)
+        engine.lay_out(self)
+        self.engine = engine
+        self._enter_start(task)
+        self.load()
+
+    def _enter_method(self, method):
+        """Steps and tolerances."""
+        clock, numbers = self.run.clock, self.run.numbers
         if method.step is None:
             numbers.adaptive, numbers.steps_wanted = 1, UNLIMITED
             clock.rtol, clock.atol = method.step_tolerances()
             clock.max_step = method.max_step or math.inf
             clock.h = min(method.first_step or 0.0, clock.max_step)  # 0: of the driver's own choice
         else:
-            clock.h, numbers.steps_wanted = method.step, step_count(*task.span, method.step)
-        numbers.dense, numbers.may_pass, numbers.chart_interval = dense, may_pass, task.interval
+            clock.h = method.step
+
+    def _enter_start(self, task):
+        """Positions, velocities, and how closely the constraints are held."""
+        work, run = self.work, self.run
+        work.q[...], work.qd[...] = task.q, task.qd
+        run.now[0], run.now[1] = task.q, task.qd
+        hold(work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
+
+    def _remember(self, task):
+        """Angles of joints, and what forces remember."""
+        own, run = self.context.system, self.run
+        enter_joints(run, task.prepared.handles, task.remembered)
+        if own.memory.size:
+            own.reals[own.memory] = task.remembered[len(run.joints) :]
+
+    def _set_out(self, task, may_pass):
+        """The interval, and what the run is to do."""
+        method, clock, numbers = task.method, self.run.clock, self.run.numbers
+        clock.t = clock.t_origin = task.span[0]
+        clock.t_end = task.span[1]
+        if method.step is not None:
+            numbers.steps_wanted = step_count(*task.span, method.step)
+        numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
+        numbers.may_pass, numbers.chart_interval = may_pass, task.interval
         numbers.leave_when_stiff = task.choose is not None
 
     def saved(self):
@@ -98,4 +143,4 @@ class Memory:
 
     def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver."""
-        return Status(self.advance_kernel(self._context, self._run, log, most))
+        return STATUSES[self.advance_kernel(self._context, self._run, log, most)]

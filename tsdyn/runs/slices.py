@@ -6,6 +6,7 @@ last one took.
 """
 
 import time
+from functools import cached_property
 
 from ..errors import InconsistentState, SingularConfiguration, Status
 from ..jit.interrupts import deferred_interrupts
@@ -13,6 +14,7 @@ from . import snapshot
 from .recorder import Recorder
 from .tolerances import GETTING_ON, HOPELESS, PACED, SLICE_SECONDS
 
+SLICE_DONE = Status.SLICE_DONE  # which takes longer to look up than to compare
 FIRST_SLICE, FIRST_WORK = 1024, 1 << 17  # steps; coordinates stepped on, unless that is less than a step
 
 
@@ -32,11 +34,11 @@ class Pace:
         """Status, and what there is to say: of a run that is at t after so many more tries."""
         self.tries += tries
         if self.tries < PACED:
-            return Status.SLICE_DONE, ""
+            return SLICE_DONE, ""
         before, now = self.before, (t - self.t) / self.tries
         self.t, self.tries, self.before = t, 0, now
         if now > 0.0 and (end - t <= HOPELESS * now or now > GETTING_ON * before):
-            return Status.SLICE_DONE, ""
+            return SLICE_DONE, ""
         left = f"{(end - t) / now:.0e} more" if now > 0.0 else "infinitely many more"
         return Status.STEP_COLLAPSED, (
             f"At the pace of the last {PACED} steps the rest would take {left}; give max_steps to continue."
@@ -58,22 +60,28 @@ class Slices:
 
     def __init__(self, memory, task, watch, recorder):
         self.memory, self.task, self.watch, self.recorder = memory, task, watch, recorder
-        self.run, self.choose, self.pace = memory.run, task.choose, Pace(task.span[0])
-        numbers = self.run.numbers
-        self.limit = numbers.steps_wanted + len(task.stops) if task.max_steps is None else task.max_steps
+        self.run, self.choose = memory.run, task.choose
+        wanted = self.run.numbers.steps_wanted
+        self.limit = wanted + len(task.stops) if task.max_steps is None else task.max_steps
         self.most = min(max(FIRST_WORK // memory.weight, 1), FIRST_SLICE)
-        self.status, self.reason = Status.SLICE_DONE, ""
+        self.status, self.reason = SLICE_DONE, ""
+
+    @cached_property
+    def pace(self):
+        """The `Pace` of the run."""
+        return Pace(self.task.span[0])
 
     def drive(self):
         """Advance until the end."""
         rows = min(self.most, self.limit - self.run.numbers.steps)
-        while self.status == Status.SLICE_DONE:
+        while self.status is SLICE_DONE:
             self.recorder.begin_slice(rows)
             self._adapt(rows, self._advance(rows))
             self._look_up()
-            rows = min(self.most, self.limit - self.run.numbers.steps)
-            if self.status == Status.SLICE_DONE and rows <= 0:
-                self.status = Status.MAX_STEPS
+            if self.status is SLICE_DONE:
+                rows = min(self.most, self.limit - self.run.numbers.steps)
+                if rows <= 0:
+                    self.status = Status.MAX_STEPS
 
     def _advance(self, rows):
         """One slice; the seconds that it has taken."""
@@ -100,19 +108,22 @@ class Slices:
     def _look_up(self):
         """Between slices: whether another method takes over, the progress bar, the pace."""
         run, task, (start, end) = self.run, self.task, self.task.span
-        if self.choose is not None and run.numbers.stiff and self.status == Status.SLICE_DONE:
+        if self.choose is not None and self.status is SLICE_DONE and run.numbers.stiff:
             if self.choose(run):
                 self.status = Status.STIFF
             self.choose = None
         try:
-            task.report((run.clock.t - start) / (end - start), run.clock.t, run.numbers.steps)
+            t = run.clock.t
+            task.report((t - start) / (end - start), t, run.numbers.steps)
         except Exception as error:  # what has been computed is worth more than a progress bar
-            if self.status == Status.SLICE_DONE:
+            if self.status is SLICE_DONE:
                 self.status = Status.INTERRUPTED
                 self.reason = f"progress raised {type(error).__name__}: {error}."
-        if self.status == Status.SLICE_DONE and task.max_steps is None and run.numbers.adaptive:
+        if self.status is not SLICE_DONE:
+            return
+        if task.max_steps is None and run.numbers.adaptive:
             self.status, self.reason = self.pace.judge(run.clock.t, run.numbers.history, end)
-        if task.archive is not None and self.status == Status.SLICE_DONE:
+        if task.archive is not None and self.status is SLICE_DONE:
             with deferred_interrupts():
                 self.recorder.collect()
                 task.archive.look_up(self.saved)
@@ -164,7 +175,7 @@ def drive(memory, task, watch):
             watch.go_back(memory.run, recorder.log)
         if memory.run.clock.t >= task.span[1]:
             slices.status = Status.SUCCESS
-        elif slices.status == Status.SLICE_DONE:
+        elif slices.status is SLICE_DONE:
             slices.status = Status.INTERRUPTED
     finally:
         task.report(None)

@@ -4,6 +4,7 @@ from ..formulations.registry import formulation
 from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.plug_in import called_for
 from ..rows.interface import redundancy
+from ..sparse.saddle_graph import saddle_of
 from ..workspaces.run_state import lay_out
 from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
 from .dense_output import read, warm_size
@@ -14,9 +15,8 @@ from .step_memory import StepMemory
 class StepEngine:
     """A run by a method with a step kernel, in a formulation."""
 
-    def __init__(self, task):
-        prepared, method, form = task.prepared, task.method, task.form.serving(task.method)
-        self.task = task if form is task.form else task._replace(form=form)
+    def __init__(self, prepared, method, form, within):
+        self.method, self.form, self.within = method, (form := form.serving(method)), within
         n, m, packed = prepared.n, prepared.m, prepared.packed
         self.graph = form.graph(packed)
         self.sizes = form.sizes(n, m, self.graph)
@@ -25,43 +25,43 @@ class StepEngine:
         lengths = self.tableau.size, scratch(*self.sizes), self.interpolant.size(n, *self.sizes)
         self.lengths = dict(zip(("tableau", "memory", "block"), lengths, strict=True))
         self.system, kept = prepared.system(method.implicit)
+        self.saddle = saddle_of(packed, self.graph, self.system) if method.implicit and form.basis_free else None
         rows = len(self.graph.row) if form.basis_free else None
         self.kind = form.name, rows, method.implicit, kept, *self.sizes, *lengths
-        self.skipped = (prepared.spheres, prepared.still, 0) if form.basis_free else (0, 0, 0)
+        still = prepared.still if form.keeps_still else 0
+        self.skipped = (prepared.spheres, still, 0) if form.basis_free else (0, 0, 0)
 
-    def memory(self):
+    def memory(self, prepared):
         """A new `StepMemory`."""
-        task = self.task
-        given = task.form.basis_free, task.method.implicit, self.sizes, self.lengths
-        return StepMemory(task.prepared, self.graph, *given)
+        given = self.form.basis_free, self.method.implicit, self.sizes, self.lengths
+        return StepMemory(prepared, self.graph, self.saddle, *given)
 
     def serves(self, memory):
         """Whether the memory is not that of the scene before it was changed."""
         return memory.graph is self.graph
 
-    def enter(self, memory):
-        """Clear the memory, and enter the task and the numbers of the method."""
-        task, method, run, nx = self.task, self.task.method, memory.run, self.sizes[0]
-        memory.clear(task, self.system)
+    def lay_out(self, memory):
+        """Enter the system, and the numbers and kernels of the method."""
+        method, form, run, nx = self.method, self.form, memory.run, self.sizes[0]
+        memory.take_system(self.system)
         run.tableau[:] = self.tableau
-        given = method, task.form, self.step, self.interpolant
-        _set(run.kernels, kernels_of(*given, adaptive=method.step is None, within=task.within))
-        run.numbers.first_order = task.form.first_order
+        given = method, form, self.step, self.interpolant
+        _set(run.kernels, kernels_of(*given, adaptive=method.step is None, within=self.within))
+        run.numbers.first_order = form.first_order
         if method.step is None:
             run.clock.turn_share = run.clock.error_before = 1.0
             run.clock.exponent = 1.0 / (method.embedded_order + 1)
-            if method.stability_limit and not task.form.first_order:
+            if method.stability_limit and not form.first_order:
                 run.clock.stability_limit = method.stability_limit
                 run.numbers.last_stage = 2 * len(method.tableau.c) * nx
         if method.implicit:
-            prepare_implicit(memory.context.linear, method, task.form.implicit())
+            prepare_implicit(memory.context.linear, method, form.implicit(), form.basis_free)
             run.numbers.stage_at = (2 * len(method.tableau.c) + 1) * nx
 
-    def reading(self, memory):
+    def reading(self, memory, prepared, constraint_tol):
         """A `Reading` of the steps; a function and its arguments that make it in another process."""
-        task, kernels = self.task, memory.run.kernels.as_dict()
-        packed, again = task.prepared.packed, (task.method, task.form.name, task.constraint_tol)
-        return _reading(packed, task.form, task.constraint_tol, kernels), (read_again, packed, *again)
+        kernels, again = memory.run.kernels.as_dict(), (self.method, self.form.name, constraint_tol)
+        return _reading(prepared.packed, self.form, constraint_tol, kernels), (read_again, prepared.packed, *again)
 
 
 def read_again(packed, method, name, constraint_tol):

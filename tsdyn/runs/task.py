@@ -4,11 +4,13 @@ The attribute `driver` of a method is a name in simulate.DRIVERS, or a driver fu
 an `Outcome`.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import Status
+from ..motions.knots import NO_STOPS
 from .history import ChartLog, StepLog
 
 
@@ -37,7 +39,7 @@ class Task(NamedTuple):
     report: object  # a function of the fraction done (None at the end), the time, s, and the steps of the segment
     history: bool  # whether the histories of steps and charts are kept
     choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
-    stops: np.ndarray = np.empty((0, 2))  # times at which a step ends, s, and whether a function is asked there
+    stops: np.ndarray = NO_STOPS  # times at which a step ends, s, and whether a function is asked there
     sampling: object = None  # a `sampling.Sampling`, or None
     archive: object = None  # a `storage.archive.Archive` that outputs and histories go to, or None
 
@@ -49,7 +51,8 @@ class Task(NamedTuple):
     @property
     def within(self):
         """True if output between the ends of steps is requested."""
-        return self.dense_output or self.events is not None or between(self.times, self.span)
+        times = self.times
+        return self.dense_output or self.events is not None or (times.size > 0 and between(times, self.span))
 
 
 class Outcome(NamedTuple):
@@ -63,7 +66,7 @@ class Outcome(NamedTuple):
     reached: float  # s
     last: np.ndarray  # (3, n)  q, qd, qdd there
     remembered: np.ndarray  # (angles + slots,)  there
-    counts: dict  # of `Solution.stats`
+    counts: Mapping  # of `Solution.stats`
     trajectory: object  # a `trajectory.Trajectory`, or None
     events: tuple  # times, positions, velocities of each event; or None
     began: float  # time.perf_counter() when the driver began, prepared

@@ -79,7 +79,7 @@ def run_near(driver, task, scene, origin, tol):
         row_names=scene.row_names,
     )  # fmt: skip
     memory = task.remembered[task.prepared.handles.count :]
-    q, qd = local.start(stand_in, q, task.qd, task.span[0], tol, memory, True)
+    q, qd = local.start(stand_in, (q, task.qd), task.span[0], tol, memory, True)
     if task.archive is not None:
         task.archive.shift = shift
     watched = task.events and [each._replace(function=_away(each.function, packed, shift)) for each in task.events]

@@ -14,20 +14,13 @@ import numpy as np
 
 from ..errors import Status, TsdynError
 from ..integrators import DOP853, SDIRK54, Taylor
-from ..runs.arguments import tolerances
-from .tolerances import COST, LARGEST_PILOT, PILOT, SHARP_COST
+from ..runs.arguments import adaptive
+from .tolerances import COST, PILOT, SHARP_COST
 
 
 def explicit(prepared, rtol, atol, series):
     """Return the initial method; series: True if Taylor is admissible."""
-    kind = Taylor if series and not prepared.refusal and prepared.pays else DOP853
-    given, known = (rtol, atol, series), prepared.explicit
-    if not all(value is None or type(value) is float for value in given[:2]):  # the method checks them
-        return kind(**tolerances(rtol, atol))
-    if given not in known:
-        known.clear()
-        known[given] = kind(**tolerances(rtol, atol))
-    return known[given]
+    return adaptive(Taylor if series and not prepared.refusal and prepared.pays else DOP853, rtol, atol)
 
 
 def implicit(method):
@@ -40,7 +33,9 @@ def instead(task, status):
 
     A law that is not analytic somewhere, as |v| at rest, may end series where stages go on.
     """
-    if status == Status.STIFF:
+    if status is Status.SUCCESS:
+        return None
+    if status is Status.STIFF:
         return implicit(task.method)
     failed = status in (Status.STEP_COLLAPSED, Status.NOT_FINITE)
     if failed and task.choose is not None and isinstance(task.method, Taylor) and task.prepared.sharp:
@@ -48,25 +43,23 @@ def instead(task, status):
     return None
 
 
-def chooser(simulate, scene, method, end, options):
-    """Return the function that decides, when the motion is found stiff, whether to change to an implicit method."""
-    share = SHARP_COST if isinstance(method, Taylor) and any(force.sharp for force in scene.forces) else 1.0
+def implicit_is_faster(simulate, given, method, end, run):
+    """Return True if a run by a method that is found stiff had better go on by an implicit one, until the end.
 
-    def choose(run):
-        if run.now.shape[1] > LARGEST_PILOT:
-            return False
-        start = float(run.clock.t)
-        state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered[len(run.joints) :].copy())
-        try:
-            pilot = simulate(scene, (start, end), integrator=implicit(method), max_steps=PILOT, state=state, **options)
-        except TsdynError:  # the run itself goes on
-            return False
-        if pilot.status == Status.INTERRUPTED:
-            raise KeyboardInterrupt
-        if pilot.status not in (Status.SUCCESS, Status.MAX_STEPS):
-            return False
-        h = pilot.steps.h[pilot.steps.accepted]
-        stages = COST * pilot.stats.evaluations / pilot.stats.steps
-        return stages / np.mean(h[h.size // 2 :]) < share * method.stages / run.clock.h
-
-    return choose
+    `given` are the arguments of the run, by name.
+    """
+    start, same = float(run.clock.t), {name: given[name] for name in ("constraint_tol", "initial_tol", "max_step")}
+    state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered[len(run.joints) :].copy())
+    pilot = {**same, "integrator": implicit(method), "max_steps": PILOT, "state": state}
+    try:
+        pilot = simulate(given["scene"], (start, end), **pilot)
+    except TsdynError:  # the run itself goes on
+        return False
+    if pilot.status == Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    if pilot.status not in (Status.SUCCESS, Status.MAX_STEPS):
+        return False
+    sharp = isinstance(method, Taylor) and any(force.sharp for force in given["scene"].forces)
+    h = pilot.steps.h[pilot.steps.accepted]
+    stages = COST * pilot.stats.evaluations / pilot.stats.steps
+    return stages / np.mean(h[h.size // 2 :]) < (SHARP_COST if sharp else 1.0) * method.stages / run.clock.h

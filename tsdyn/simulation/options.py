@@ -3,69 +3,92 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidArgument
 from ..formulations.registry import formulation as find_formulation
-from ..methods.integrator import registered
+from ..methods.integrator import frozen, registered
 from ..runs.arguments import interval, method_of, output_times
 from ..runs.events import prepare
 from ..runs.task import between
-from ..validation import one_of, positive, whole
+from ..validation import checked_once, one_of, positive, whole
 from .progress import reporter
 
 
-class Options(NamedTuple):
-    """Options of a run; None where the scene decides."""
+class Settings(NamedTuple):
+    """Options that are numbers, names and flags; None where the scene decides."""
 
-    span: tuple  # start and end, s
-    method: Any  # Integrator, or None
-    default: tuple  # rtol, atol of the default method, and whether it may be Taylor
     form: Any
     constraint_tol: float
     initial_tol: float
     drop: bool  # redundant rows
-    times: np.ndarray  # output times, s; empty for every step
     dense_output: bool
-    events: Any  # as prepared, or None
     max_steps: int | None
     max_step: float | None  # s
-    history: bool
-    report: Callable[..., Any]
+    history: bool | None
     chart_interval: int | None
 
+
+class Options(NamedTuple):
+    """Options of a run."""
+
+    span: tuple  # start and end, s
+    method: Any  # Integrator, or None
+    times: np.ndarray  # output times, s; empty for every step
+    events: Any  # as prepared, or None
+    report: Callable[..., Any]
+    history: bool
+    within: bool  # whether output between the ends of steps is requested
+    settings: Settings
+
     @property
-    def within(self):
-        """True if output between the ends of steps is requested."""
-        return self.dense_output or self.events is not None or between(self.times, self.span)
+    def series(self):
+        """True if the default method may be Taylor."""
+        return self.settings.form.name == "tangent" and self.settings.chart_interval is None
+
+
+_of_settings = itemgetter(
+    "formulation", "constraint_tol", "initial_tol", "redundancy", "dense_output", "max_steps", "max_step", "history",
+    "chart_interval",
+)  # fmt: skip
 
 
 def checked(given):
     """The `Options` of the arguments of `simulate`, by name; raises InvalidArgument."""
-    span, form = interval(given["t_span"]), find_formulation(given["formulation"])
-    history = given["store"] is None if given["history"] is None else given["history"]
-    for name, value in (("dense_output", given["dense_output"]), ("history", history)):
-        if not isinstance(value, (bool, np.bool_)):
-            raise InvalidArgument(f"{name} must be True or False, got {value!r}.")
-    chart_interval, longest = whole(given["chart_interval"], "chart_interval"), given["max_step"]
+    span, settings = interval(given["t_span"]), _settings(*_of_settings(given))
+    times, events = output_times(given["t_eval"], *span), prepare(given["events"])
     return Options(
-        span=span,
-        method=_method(given["integrator"], given["rtol"], given["atol"], form),
-        default=(given["rtol"], given["atol"], form.name == "tangent" and chart_interval is None),
-        form=form,
-        constraint_tol=positive(given["constraint_tol"], "constraint_tol"),
-        initial_tol=positive(given["initial_tol"], "initial_tol"),
-        drop=one_of(given["redundancy"], ("drop", "refuse"), "redundancy") == "drop",
-        times=output_times(given["t_eval"], *span),
-        dense_output=bool(given["dense_output"]),
-        events=prepare(given["events"]),
-        max_steps=whole(given["max_steps"], "max_steps"),
-        max_step=None if longest is None else positive(longest, "max_step (s)"),
-        history=bool(history),
-        report=reporter(given["progress"]),
-        chart_interval=chart_interval,
+        span,
+        _method(given["integrator"], given["rtol"], given["atol"], settings.form),
+        times,
+        events,
+        reporter(given["progress"]),
+        given["store"] is None if settings.history is None else settings.history,
+        settings.dense_output or events is not None or (times.size > 0 and between(times, span)),
+        settings,
+    )
+
+
+@checked_once
+def _settings(  # nine: each is an argument of `simulate`
+    formulation, constraint_tol, initial_tol, redundancy, dense_output, max_steps, max_step, history, chart_interval
+):
+    for name, value in (("dense_output", dense_output), ("history", history)):
+        if not (isinstance(value, (bool, np.bool_)) or (value is None and name == "history")):
+            raise InvalidArgument(f"{name} must be True or False, got {value!r}.")
+    return Settings(
+        form=find_formulation(formulation),
+        constraint_tol=positive(constraint_tol, "constraint_tol"),
+        initial_tol=positive(initial_tol, "initial_tol"),
+        drop=one_of(redundancy, ("drop", "refuse"), "redundancy") == "drop",
+        dense_output=bool(dense_output),
+        max_steps=whole(max_steps, "max_steps"),
+        max_step=None if max_step is None else positive(max_step, "max_step (s)"),
+        history=None if history is None else bool(history),
+        chart_interval=whole(chart_interval, "chart_interval"),
     )
 
 
@@ -73,7 +96,7 @@ def _method(integrator, rtol, atol, form):
     """Return the requested method, None for the default."""
     if integrator is None:
         return None
-    method = method_of(integrator, rtol, atol)
+    method = frozen(method_of(integrator, rtol, atol))
     if method.implicit and form.first_order:
         others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
         raise InvalidArgument(

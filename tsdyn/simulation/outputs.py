@@ -27,20 +27,26 @@ class Outputs:
 
     def _take(self, rows, n):
         """Take the rows (k, 1 + 3 n + angles + slots) of a run, or its `StoredOutputs`."""
-        self._stored, self._slice = None, slice(None)
-        if not isinstance(rows, np.ndarray):
-            self._stored = rows
-            return
-        self.t = rows[:, 0].copy()
+        in_memory, self._slice = isinstance(rows, np.ndarray), slice(None)
+        self._stored, self._rows = None if in_memory else rows, (rows, n) if in_memory else None
+
+    def _unpack(self, rows, n):
+        """Make arrays of the rows of a run, when the first of them is asked for."""
         self.q, self.qd, self.qdd = rows[:, 1 : 1 + 3 * n].reshape(-1, 3, n).swapaxes(0, 1).copy()
         self._set_remembered(rows[:, 1 + 3 * n :].copy())
+        self.t = rows[:, 0].copy()
+        self._rows = None
 
     def _set_remembered(self, rest):
         angles = self.handles.count
         self.anchor, self._remembers = Anchor(rest[:, :angles]), rest[:, angles:]
 
     def __getattr__(self, name: str) -> Any:
-        stored = self.__dict__.get("_stored")
+        rows, stored = self.__dict__.get("_rows"), self.__dict__.get("_stored")
+        if name in _COLUMNS and rows is not None:
+            self._unpack(*rows)
+        if name in _COLUMNS and name in self.__dict__:  # made now, or by another thread
+            return self.__dict__[name]
         if stored is None or name not in _COLUMNS:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         found = stored.read(_COLUMNS[name], self._slice)
@@ -63,6 +69,7 @@ class Outputs:
             raise InvalidArgument(
                 f"outputs are taken by slices, such as solution[100:200] or solution[::10], got {part!r}."
             )
+        self._length()
         other = copy.copy(self)
         for name in [name for name in vars(other) if name in _COLUMNS or hasattr(type(self), name)]:
             del vars(other)[name]  # what has been read, or derived from it

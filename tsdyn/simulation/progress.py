@@ -6,10 +6,14 @@ import time
 from ..errors import InvalidArgument, MissingDependency
 
 
+def _silent(fraction, *more):
+    """Report nothing."""
+
+
 def reporter(progress):
     """Return a function that receives the fraction done (None at the end), the time reached, s, and the steps."""
     if progress is None or progress is False:
-        return lambda fraction, *more: None
+        return _silent
     if callable(progress):
         return lambda fraction, *more: None if fraction is None else progress(min(max(float(fraction), 0.0), 1.0))
     if progress is not True:

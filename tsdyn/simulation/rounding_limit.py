@@ -18,10 +18,13 @@ def within_rounding(method, packed, q):
     """
     if method.step is not None or method.driver != "steps":
         return method, ""
+    if packed.derived.near is q:
+        return method, ""
     if packed.derived.levers is None:
         packed.derived.levers = levers(packed)
     arms = packed.derived.levers
     if np.abs(q).max() < FAR_LEVER * arms.min(where=arms > 0.0, initial=np.inf):
+        packed.derived.near = q
         return method, ""
     far = np.abs(q[packed.system.bodies[:, :1] + np.arange(3)]).max(axis=1)
     ratios = np.where(arms > 0.0, far / np.where(arms > 0.0, arms, 1.0), 0.0)

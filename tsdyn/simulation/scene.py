@@ -80,6 +80,7 @@ class Scene:
         self.ground = Ground(self)
         self._bodies, self._added, self._forces, self._normalisations = [], [], [], {}
         self._waiting, self._titles = {}, None  # see membership.py
+        self._users = None  # of compiled functions; what holds them, see `user_functions`
         self._names = None  # of ground and bodies; None if a body may have been renamed
         self._twins = None  # handle of the scene that this one is a copy of -> handle here
         self.gravity = gravity
@@ -295,9 +296,15 @@ class Scene:
     @property
     def start(self) -> tuple[Floats, Floats]:
         """Initial (q, qd) of the bodies, shapes (n,), (n,)."""
-        if self._start is None:
-            self._start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
-        return tuple(array.copy() for array in self._start)
+        return tuple(array.copy() for array in self._initial())
+
+    def _initial(self):
+        """The same, until the scene changes the same arrays, not to be written to."""
+        start = self._start
+        if start is None:
+            start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
+            self._start = start
+        return start
 
     def body(self, name: str) -> Body | Any:
         """Return the body of this name."""

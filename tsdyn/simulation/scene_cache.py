@@ -7,10 +7,13 @@ import numpy as np
 from ..configuration.initial_conditions import consistent
 from ..configuration.mirrored_branches import demand_aligned
 from ..formulations.locked_orientations import hold, still
+from ..methods.integrator import is_plain
 from ..model.handles import handles_of
 from ..model.packed import with_curvatures
 from ..model.packed_forces import with_force_jacobians
+from ..motions.knots import NO_STOPS, stops_of
 from ..observables.friction_unique import demand_unique
+from ..runs.sampling import instants_of, sampled
 from ..taylor.layout import pays, refusal
 from ..taylor.run_memory import Series
 
@@ -21,10 +24,11 @@ LARGEST = 1 << 24  # bytes of a memory that is kept, at most
 
 def prepared(scene):
     """Return the `Prepared` of the present scene."""
-    scene.refresh()
-    packed, kept = scene.packed, scene._prepared
-    if kept is None or kept.packed is not packed:
-        kept = scene._prepared = Prepared(scene, packed)
+    if scene._users:
+        scene.refresh()
+    kept = scene._prepared
+    if kept is None:
+        kept = scene._prepared = Prepared(scene, scene.packed)
     return kept
 
 
@@ -37,7 +41,8 @@ class Prepared:
     def __init__(self, scene, packed):
         self.packed, self.motions = packed, scene.motions()
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
-        self._start, self.explicit = (None, None), {}  # `explicit`: the method last chosen, see method_choice.py
+        self._start = (None, None), None
+        self.remembers = bool(packed.system.memory.size or handles_of(packed).count)
         every = scene.__dict__.setdefault("_spare", {})
         if len(every) >= KINDS:
             every.clear()
@@ -80,36 +85,72 @@ class Prepared:
         """Data shared by Taylor runs, a `Series`."""
         return Series(self.packed, self.refusal)
 
+    @cached_property
+    def sampled(self):
+        """The loads whose functions are sampled."""
+        return sampled(self.packed)
+
+    @cached_property
+    def _has_stops(self):
+        return bool(self.sampled) or any(each.pieces for given in self.motions for each in given.motions)
+
+    def stops(self, t0, t1):
+        """The stops of a run from t0 to t1, as of `stops_of`; refuses a motion that the run can't follow."""
+        for motion in self.motions:
+            motion.check(t0, t1)
+        return stops_of(self.motions, instants_of(self.packed, t0, t1), t0, t1) if self._has_stops else NO_STOPS
+
+    def engine(self, kind, method, form, within):
+        """The engine of a method, as `frozen` returns it, in a form; see runs/run.py.
+
+        That of a plain method serves again until other rows or bodies take part in the equations.
+        """
+        if not is_plain(method):
+            return kind(self, method, form, within)
+        known, key = self.packed.derived.engines, (kind, method, form.name, within)
+        engine = known.get(key)
+        if engine is None:
+            if len(known) >= KINDS:
+                known.clear()
+            engine = known[key] = kind(self, method, form, within)
+        return engine
+
     def system(self, implicit):
         """Return the system for a method, and its number of floats for forces."""
         return self.implicit if implicit else (self.packed.system, 0)
 
-    def start(self, scene, q, qd, t, tol, remembered, redundant_allowed):
-        """Return (q, qd) checked and projected; the same numbers are checked once."""
-        given = q.tobytes(), qd.tobytes(), t, tol, remembered.tobytes(), redundant_allowed
-        known, start = self._start
-        if known != given:
-            system, before = self.packed.system, still(self.packed)
-            redundant = self.packed.derived.redundant
-            if system.memory.size:
-                system = system._replace(reals=system.reals.copy())
-                system.reals[system.memory] = remembered[self.handles.count :]
-            start = consistent(scene, system, q, qd, t, tol, redundant_allowed)
-            if self.packed.derived.redundant is not redundant or still(self.packed) is not before:
-                self.__dict__.pop("series", None)  # its graph has other redundant rows
-                self._spare.clear()
-            demand_aligned(self.packed, start[0], t)
-            demand_unique(self.packed, start[0], t)
-            start = hold(self.packed, *start)
-            self._start = given, start
+    def start(self, scene, given, t, tol, remembered, redundant_allowed):
+        """Return given positions and velocities (q, qd) checked and projected, not to be written to.
+
+        The same ones are checked once.
+        """
+        options = t, tol, remembered.tobytes(), redundant_allowed
+        (checked, with_options), start = self._start
+        if options != with_options or not _same(given, checked):
+            start = self._projected(scene, *given, t, tol, remembered, redundant_allowed)
+            self._start = (given, options), start
         return start
 
-    def take(self, kind, make):
-        """Return a memory of a kind for one run: an idle one, or make()."""
+    def _projected(self, scene, q, qd, t, tol, remembered, redundant_allowed):
+        system, before = self.packed.system, still(self.packed)
+        redundant = self.packed.derived.redundant
+        if system.memory.size:
+            system = system._replace(reals=system.reals.copy())
+            system.reals[system.memory] = remembered[self.handles.count :]
+        start = consistent(scene, system, q, qd, t, tol, redundant_allowed)
+        if self.packed.derived.redundant is not redundant or still(self.packed) is not before:
+            self.__dict__.pop("series", None)  # its graph has other redundant rows
+            self._spare.clear()
+        demand_aligned(self.packed, start[0], t)
+        demand_unique(self.packed, start[0], t)
+        return hold(self.packed, *start)
+
+    def take(self, kind):
+        """Return an idle memory of a kind, for one run; None if there is none."""
         try:
             return self._spare[kind].pop()
         except (KeyError, IndexError):
-            return make()
+            return None
 
     def give(self, kind, memory):
         """Take back a memory that is no longer in use."""
@@ -120,3 +161,8 @@ class Prepared:
         spare = self._spare.setdefault(kind, [])
         if len(spare) < SPARE:
             spare.append(memory)
+
+
+def _same(one, other):
+    """Return True if tuples of arrays are the same, or have the same bits."""
+    return one is other or [each.tobytes() for each in one] == [each.tobytes() for each in other]

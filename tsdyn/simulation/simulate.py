@@ -11,11 +11,11 @@ from ..calls import fitting
 from ..configuration.holonomic import demand_holonomic
 from ..elements.membership import warn_of_waiting
 from ..errors import InvalidArgument, Status
-from ..motions.knots import stops_of
+from ..methods.integrator import frozen
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
 from ..runs.run import run
-from ..runs.sampling import Sampling, instants_of, sampled
+from ..runs.sampling import Sampling
 from ..runs.task import Task
 from ..taylor.series_engine import SeriesEngine
 from . import method_choice, stored_runs
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Span, State
 
+STIFF = Status.STIFF
 DRIVERS = {"steps": run_past, "series": partial(run, engine=SeriesEngine)}  # by Integrator.driver; see task.py
 
 
@@ -75,8 +76,8 @@ def simulate(  # many arguments, by name: each is an option of a run
         tolerances; rtol or atol beside an instance is refused.
     formulation : {"tangent", "null-space", "maggi-kane"}
         "tangent": the tangent-space ODE without a basis, in O(N) for chains and trees; "null-space": Eq. 26, as in the
-        paper; "maggi-kane": Eqs. 17-18, the baseline that drifts off the constraints. Implicit methods solve Eq. 26 in
-        either of the first two.
+        paper; "maggi-kane": Eqs. 17-18, the baseline that drifts off the constraints. Implicit methods work in
+        either of the first two, with dense matrices in the second.
     constraint_tol : float
         u_tol and B_tol of Eqs. 28-29: bound on |Phi| (m) and on |Phi_q U B - I|.
     initial_tol : float
@@ -143,10 +144,11 @@ def simulate(  # many arguments, by name: each is an option of a run
     >>> bool(solution.constraint_error.position.max() < 1e-12)
     True
     """
-    given = {**locals()}
+    given = locals()
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
-    warn_of_waiting(scene, 3)
+    if scene._waiting:
+        warn_of_waiting(scene, 3)
     if store is not None or checkpoint is not None:
         stored_runs.demand_storable(given)
     return run_from(given)
@@ -158,21 +160,22 @@ def run_from(given, numbers=None, arrays=None, archive=None):
     An archive is that of a run which begins again by another method.
     """
     scene, options = given["scene"], checked(given)
-    prepare_first_run(scene, options.method, options.form, options.within, options.default)
+    method, settings, default = options.method, options.settings, (given["rtol"], given["atol"], options.series)
+    prepare_first_run(scene, method, settings.form, options.within, default)
     kept = prepared(scene)
-    method = options.method or method_choice.explicit(kept, *options.default)
-    if options.max_step is not None:
-        method = method.bounded(options.max_step)
+    if method is None:
+        method = method_choice.explicit(kept, *default)
+    if settings.max_step is not None:
+        method = frozen(method.bounded(settings.max_step))
 
     started = time.perf_counter()
     choose = None
     if given["integrator"] is None:
-        same = {name: given[name] for name in ("constraint_tol", "initial_tol", "max_step")}
-        choose = method_choice.chooser(simulate, scene, method, options.span[1], same)
+        choose = partial(method_choice.implicit_is_faster, simulate, given, method, options.span[1])
     task = _request(scene, kept, method, options, given["state"], choose)
     if given["store"] is not None:
         return _run_stored(task, given, options, (numbers, arrays), archive)
-    outcome = _run(task, scene, options.initial_tol)
+    outcome = _run(task, scene, settings.initial_tol)
     ended = time.perf_counter()
     other = method_choice.instead(task, outcome.status)
     if other is not None:
@@ -194,7 +197,7 @@ def _run_stored(task, given, options, found, archive):
         outcome = stored_runs.ended_outcome(numbers, arrays, archive)
         return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
     try:
-        outcome = _run(task._replace(archive=archive), scene, options.initial_tol)
+        outcome = _run(task._replace(archive=archive), scene, options.settings.initial_tol)
         seconds = time.perf_counter() - started
         other = method_choice.instead(task, outcome.status)
         if other is not None:
@@ -208,19 +211,17 @@ def _run_stored(task, given, options, found, archive):
 
 def _request(scene, kept, method, options, state, choose):
     """Return the run request, with a start that is consistent with the constraints."""
-    span, form = options.span, options.form
-    for motion in kept.motions:
-        motion.check(*span)
-    q, qd = scene.start if state is None else state_arrays(state, kept.n)
-    memory = remembered(state, kept, span[0], q)
-    q, qd = kept.start(scene, q, qd, span[0], options.initial_tol, memory, options.drop)
-    if not form.serving(method).basis_free:
+    span, settings, form = options.span, options.settings, options.settings.form
+    stops = kept.stops(*span)
+    start = scene._initial() if state is None else state_arrays(state, kept.n)
+    memory = remembered(state, kept, span[0], start[0])
+    q, qd = kept.start(scene, start, span[0], settings.initial_tol, memory, settings.drop)
+    if not form.basis_free or method.implicit:
         demand_holonomic(kept.packed, q, span[0], form.name)
-    stops = stops_of(kept.motions, instants_of(kept.packed, *span), *span)
-    sampling = Sampling(kept, state is not None) if sampled(kept.packed) else None
+    sampling = Sampling(kept, state is not None) if kept.sampled else None
     return Task(
-        kept, method, form, span, q, qd, memory, options.times, options.dense_output,
-        options.events, options.constraint_tol, options.max_steps, options.chart_interval or 0, options.report,
+        kept, method, form, span, q, qd, memory, options.times, settings.dense_output,
+        options.events, settings.constraint_tol, settings.max_steps, settings.chart_interval or 0, options.report,
         options.history, choose if sampling is None else None, stops, sampling,  # a sampled controller can't be rerun
     )  # fmt: skip
 
@@ -233,6 +234,6 @@ def _run(task, scene, initial_tol):
         return run_near(driver, task, scene, origin, initial_tol)
     limited, said = within_rounding(task.method, packed, task.q)
     outcome = driver(task if limited is task.method else task._replace(method=limited))
-    if outcome.status != Status.STIFF and said:
+    if said and outcome.status is not STIFF:
         outcome = outcome._replace(reason=" ".join(part for part in (outcome.reason, said) if part))
     return outcome

@@ -47,7 +47,7 @@ def _until_its_end(report):
 def _pass(task, relay, part):
     """Let the archive know that a segment has ended; per-step outputs begin with the row that it ends with."""
     if task.archive is not None:
-        numbers = {"status": part.status, "reached": part.reached, "counts": part.counts, "rows": len(part.rows)}
+        numbers = {"status": part.status, "reached": part.reached, "counts": dict(part.counts), "rows": len(part.rows)}
         arrays = {"last": part.last.tolist(), "remembered": part.remembered.tolist()}
         task.archive.passed.append({**numbers, **arrays, "relay": [relay.share, relay.largest]})
         task.archive.skips = task.times.size == 0

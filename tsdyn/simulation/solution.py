@@ -12,6 +12,7 @@ import numpy as np
 from ..calls import fitting_methods
 from ..errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
 from ..formulations.chart_validity import REASONS
+from ..methods.integrator import is_plain
 from ..model.packed import member_of
 from ..observables import diagnostics, reactions, uniqueness
 from ..observables.friction_reactions import with_normal_loads
@@ -25,6 +26,8 @@ from .termination import account
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Bools, ConstraintError, Floats, Integers, ItemLike, Scene
+
+SUCCESSES = Status.SUCCESS, Status.EVENT
 
 
 class Steps(NamedTuple):
@@ -89,15 +92,14 @@ class Solution(Outputs, Balances, Kinematics["Floats"]):
     """
 
     status: Status
-    message: str
-    stats: SimpleNamespace
     t_events: list[Floats] | Any  # None without events
     q_events: list[Floats] | Any
     qd_events: list[Floats] | Any
 
     def __init__(self, scene: Scene, task: Any, outcome: Any, seconds: dict[str, float]) -> None:
         self.scene, self.packed = scene, task.prepared.packed
-        self.method, self.formulation, self.span = repr(task.method), task.form.name, task.span
+        self.formulation, self.span = task.form.name, task.span
+        self._method = task.method if is_plain(task.method) else repr(task.method)
         self.system = self.packed.system
         self.status, self._trajectory = outcome.status, outcome.trajectory
         self.t_events, self.q_events, self.qd_events = outcome.events or (None, None, None)
@@ -107,19 +109,37 @@ class Solution(Outputs, Balances, Kinematics["Floats"]):
         self._reached, self._last = outcome.reached, outcome.last
         self._angles, self._remembered = outcome.remembered[:angles], outcome.remembered[angles:]
         self._step_log, self._chart_log = outcome.steps, outcome.charts
-        self.stats = SimpleNamespace(**outcome.counts, seconds=seconds, energy_error=None)
-        if self.stats.steps_near_singular:
-            self.stats.energy_error = energy_error(self, task)
-        self.message = account(self, scene, outcome.reason)  # written now, since the scene may change
+        self._counts, self._seconds, near = outcome.counts, seconds, outcome.counts["steps_near_singular"]
+        self._energy_error = energy_error(self, task) if near else None
+        self._reason, self._message = outcome.reason, None
+        if near or outcome.status not in SUCCESSES or self.packed.derived.redundant is not None:
+            self._message = account(self, scene, self._reason)  # written now, since the scene may change
 
     def __setstate__(self, state):
         """Restore a pickled solution; the packed scene looks its kernels up."""
         self.__dict__.update(state, system=state["packed"].system)
 
     @property
+    def method(self) -> str:
+        """The method with its settings."""
+        return self._method if isinstance(self._method, str) else repr(self._method)
+
+    @cached_property
+    def stats(self) -> SimpleNamespace:
+        """Counts of the run, see `Solution`."""
+        return SimpleNamespace(**self._counts, seconds=self._seconds, energy_error=self._energy_error)
+
+    @property
+    def message(self) -> str:
+        """What happened, where, and the remedy."""
+        if self._message is None:
+            self._message = account(self, self.scene, self._reason)
+        return self._message
+
+    @property
     def success(self) -> bool:
         """True if the run reached the end of the interval, or a terminal event."""
-        return self.status in (Status.SUCCESS, Status.EVENT)
+        return self.status in SUCCESSES
 
     def raise_if_failed(self) -> Self:
         """Raise StepFailure, with this solution as `.solution`, if the run ended early; return self otherwise."""

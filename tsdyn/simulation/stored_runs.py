@@ -97,7 +97,7 @@ def _ending(outcome, seconds):
         numbers["watched"] = len(outcome.events[0])
         for name, found in zip(("t", "q", "qd"), outcome.events, strict=True):
             arrays |= {f"event {i}.{name}": array for i, array in enumerate(found)}
-    return numbers | {"statistics": outcome.counts, "seconds": seconds}, arrays
+    return numbers | {"statistics": dict(outcome.counts), "seconds": seconds}, arrays
 
 
 def ended_outcome(numbers, arrays, archive):

@@ -7,8 +7,6 @@ PILOT, COST = 60, 1.5
 # Cost of an order of a series in scenes with sharp forces, where steps are as short as they are for a while only, over
 # that of an evaluation: chains of four with friction, slip velocities of 1e-3 to 1e-1.
 SHARP_COST = 0.1
-# Coordinates above which implicit methods, whose matrices are dense, cost more than they save.
-LARGEST_PILOT = 700
 
 # --- scenes far from the origin ---
 # Sizes of a scene: beyond that distance from the origin it gets an origin of its own.

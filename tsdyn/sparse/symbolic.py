@@ -54,12 +54,19 @@ def analyse(sizes, cliques, late=0):
     cliques = [{int(i) for i in clique if sizes[i]} for clique in cliques]
     early = len(sizes) - late
     others = [{i for i in clique if i < early} for clique in cliques] if late else cliques
-    order = _order(sizes[:early], [clique for clique in others if len(clique) > 1])
+    order = fill_reducing_order(sizes[:early], [clique for clique in others if len(clique) > 1])
     order = _with_late(order, cliques, early) if late else order
-    groups = _amalgamate(sizes, order, *_tree(sizes, order, cliques))
-    rows, pattern, where = lay_out(sizes, cliques, groups)
+    rows, pattern, where = lay_out_in_order(sizes, cliques, order)
     negative = [row for i in range(early, len(sizes)) for row in range(rows[i], rows[i] + sizes[i])]
     return rows, pattern._replace(negative=np.array(negative, np.int64)), where
+
+
+def lay_out_in_order(sizes, cliques, order):
+    """Group nodes, eliminated in a given order, into blocks; what `analyse` returns, without late nodes.
+
+    cliques are sets without nodes of size zero.
+    """
+    return lay_out(sizes, cliques, _amalgamate(sizes, order, *_tree(sizes, order, cliques)))
 
 
 def _with_late(order, cliques, early):
@@ -74,7 +81,7 @@ def _with_late(order, cliques, early):
     return alone + [i for at, node in enumerate(order) for i in (node, *behind.get(at, ()))]
 
 
-def _order(sizes, cliques):
+def fill_reducing_order(sizes, cliques):
     """Order of elimination: nodes in one clique only cost no fill and go first; then by minimum degree."""
     graph = _QuotientGraph(sizes, cliques)
     graph.peel()

@@ -4,15 +4,17 @@ from ..errors import InvalidArgument, Status
 from ..formulations.locked_orientations import moving_parts
 from ..model.packed import System
 from ..rows.interface import allocate_tangent
-from ..runs.run_memory import Memory
+from ..runs.run_memory import Memory, words
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import with_loops
 from ..workspaces.run_state import lay_out
 from ..workspaces.workspace import plain_work
 from .layout import allocate_expansion, masks
-from .step_parts import pass_singular
+from .step_parts import check_laws, pass_singular
 from .stepper import advance_series
 from .workspace import SeriesContext, Trial
+
+PASSAGE = Status.PASSAGE
 
 
 class Series:
@@ -36,7 +38,6 @@ class Series:
         graph, self.kinds = moving_parts(packed)
         self.constant_columns = masks(graph, packed)
         self.graph = with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
-        self.packed = packed
 
 
 class SeriesMemory(Memory):
@@ -56,16 +57,20 @@ class SeriesMemory(Memory):
         graph, system = self.series.graph, System(*(array.copy() for array in packed.system))
         expansion = allocate_expansion(graph, self.series.kinds, packed, highest)
         tangent, trial = allocate_tangent(graph, n), Trial()
+        if expansion.forces["check"].any():
+            trial.check = check_laws.address
         block = 1 + n + expansion.bodies.size
         run = lay_out(n, 0, 0, prepared.handles.count, system.memory.size, block=block)
         context = SeriesContext(system, plain_work(n), graph, tangent, expansion, trial)
         super().__init__(prepared, graph, context, run)
+        self.reals = packed.system.reals
+        self._laid_out.append(words(expansion.order))
         self.nbytes = 8 * (expansion.bodies.size + expansion.constraints.size + tangent.rows.S.size + run.block.size)
 
     def advance(self, log, most):
         """As of `Memory`."""
         status = super().advance(log, most)
-        if status == Status.PASSAGE:  # the run ends next to a singular configuration
+        if status is PASSAGE:  # the run ends next to a singular configuration
             self.run.kernels.pass_singular = pass_singular.address
             status = super().advance(log, most)
         return status

@@ -5,49 +5,47 @@ from ..runs.reader import Reading
 from .dense_output import read_series, reading_workspace
 from .layout import is_far, refusal, room
 from .run_memory import Series, SeriesMemory
-from .step_parts import accelerate_here, check_laws, expand_far_series, expand_series, pass_singular, reach
+from .step_parts import accelerate_here, expand_far_series, expand_series, pass_singular, reach
 from .tolerances import MANY
 
 
 class SeriesEngine:
     """A run by Taylor series, in the tangent form."""
 
-    def __init__(self, task):
-        if task.form.name != "tangent":
+    def __init__(self, prepared, method, form, within):
+        if form.name != "tangent":
             raise InvalidArgument(
                 "Taylor series are of the motion itself and need no other form than 'tangent'; formulation="
-                f"{task.form.name!r} is served by 'dop853', 'rk45' and 'nystrom4'."
+                f"{form.name!r} is served by 'dop853', 'rk45' and 'nystrom4'."
             )
-        self.task, self.series, self.orders = task, task.prepared.series, task.method.orders()
+        self.method, self.form, self.within = method, form, within
+        self.series, self.orders = prepared.series, method.orders()
         self.highest = self.orders[2]
         self.kind = "taylor", self.highest
-        self.skipped = task.prepared.spheres, task.prepared.still, self.series.constant_columns
+        self.skipped = prepared.spheres, prepared.still, self.series.constant_columns
 
-    def memory(self):
+    def memory(self, prepared):
         """A new `SeriesMemory`."""
-        return SeriesMemory(self.task.prepared, self.highest)
+        return SeriesMemory(prepared, self.highest)
 
     def serves(self, memory):
         """Whether the memory is not that of the scene before it was changed."""
         return memory.series is self.series
 
-    def enter(self, memory):
-        """Clear the memory, and enter the orders of the method and the kernels."""
-        task, method, graph = self.task, self.task.method, self.series.graph
-        memory.clear(task, task.prepared.packed.system)
+    def lay_out(self, memory):
+        """Enter the orders of the method and the kernels."""
+        method, graph = self.method, self.series.graph
         order = memory.context.expansion.order
-        order.top, order.lowest, order.highest = self.orders
+        order.room, (order.top, order.lowest, order.highest) = room(self.highest), self.orders
         order.next = order.top
         order.refined = max(method.refined, int(len(graph.bodies) > MANY))
         if method.step is not None:  # the order follows from tolerances even so
             memory.run.clock.rtol, memory.run.clock.atol = method.step_tolerances()
-        _set_kernels(memory.run, is_far(graph, self.highest), task.within)
-        if memory.context.expansion.forces["check"].any():
-            memory.context.trial.check = check_laws.address
+        _set_kernels(memory.run, is_far(graph, self.highest), self.within)
 
-    def reading(self, memory):
+    def reading(self, memory, prepared, constraint_tol):
         """A `Reading` of the steps; a function and its arguments that make it in another process."""
-        packed, graph = self.task.prepared.packed, self.series.graph
+        packed, graph = prepared.packed, self.series.graph
         return _reading(packed, graph, self.highest), (read_again, packed, self.highest)
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..jit.kernels import Record, loader
-from .workspace import carve
+from .carving import carve
 
 AGAIN = 2  # Numbers.rejected_last: by a failed stage
 FILLED, STORED = 1, 2  # Numbers.dense: every step's block is made, and kept
@@ -120,8 +120,7 @@ class Run(NamedTuple):
 
 def enter_joints(run, handles, remembered):
     """Let a run count the angles of a scene's joints from those remembered on."""
-    if remembered.size:
-        run.joints[:], run.frames[:], run.remembered[:] = handles.joints, handles.frames, remembered
+    run.joints[:], run.frames[:], run.remembered[:] = handles.joints, handles.frames, remembered
 
 
 def lay_out(n, nx, ny, angles, slots, tableau=0, memory=0, warm=0, block=0):  # nine: lengths, each with its name
@@ -130,18 +129,18 @@ def lay_out(n, nx, ny, angles, slots, tableau=0, memory=0, warm=0, block=0):  # 
     The other lengths are those of its arrays; a block is longer than its interpolant's data, which is what is given.
     """
     shapes = {
-        **dict.fromkeys(("x", "xd", "xd_old", "dx", "x_low", "x_low_old", "x_old", "xs"), (nx,)),
-        **dict.fromkeys(("y", "yd", "dy", "y_low", "y_low_old", "y_old", "yd_old", "ys", "yds"), (ny,)),
         **dict.fromkeys(("now", "before"), (3, n)),
-        "warm": (warm,),
         "remembered": (angles + slots,),
         "frames": (angles, 9),
         "tableau": (tableau,),
+        **dict.fromkeys(("x", "xd", "xd_old", "dx", "x_low", "x_low_old", "x_old", "xs"), (nx,)),
+        **dict.fromkeys(("y", "yd", "dy", "y_low", "y_low_old", "y_old", "yd_old", "ys", "yds"), (ny,)),
+        "warm": (warm,),
         "memory": (memory,),
         "block": (B_DATA + block + angles + slots,),
     }
     joints = np.zeros((angles, 4), np.int64)
-    return Run(**carve(shapes), joints=joints, clock=Clock(), numbers=Numbers(), kernels=Kernels())
+    return Run(**carve(shapes, clock=Clock, numbers=Numbers, kernels=Kernels), joints=joints)
 
 
 load_run = loader(lay_out(1, 1, 1, 1, 1))

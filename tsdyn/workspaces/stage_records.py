@@ -9,20 +9,22 @@ class StageNumbers(Record):
     rtol: float
     atol: float
     g: float  # h a_ii of the factors in P; 0 where there are none
-    chart: int  # counter of charts when P was made
+    chart: int  # counter of charts when P was made, for a form whose P serves one chart only
+    every_chart: int  # 1 for one whose P serves every chart
     known: int  # whether there are stiffness and damping
     theta: float  # contraction that the last stage measured
     t_before: float  # s, start of the last step; -inf for the first one
     eager: int  # stages that are still to be begun with a matrix of their own
+    fresh: int  # 1 if the derivatives of the forces' laws are to be taken by saddle_point.reduce
 
 
 class StageKernels(Record):
-    """Addresses of the kernels in formulations/linearisation.py, of `complete` and of the error norm."""
+    """Addresses of the kernels in formulations/linearisation.py or saddle_point.py, of `recall`, of the error norm."""
 
     linearise: int
     reduce: int
     factorise: int
     solve: int
     soften: int
-    complete: int
+    recall: int
     error_norm: int

@@ -1,6 +1,6 @@
 """The workspace of a run: all arrays are laid out once, before the first step."""
 
-import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +9,9 @@ from ..jit.kernels import Record, loader
 from ..model.packed import System, no_system
 from ..rows.interface import TangentWorkspace, allocate_tangent
 from ..sparse.constraint_graph import ConstraintGraph, no_graph
+from .carving import carve
 from .chart_workspace import ChartWorkspace, allocate_chart
+from .saddle_workspace import SaddleWorkspace, allocate_saddle
 from .stage_records import StageKernels, StageNumbers
 
 
@@ -131,17 +133,7 @@ class Context(NamedTuple):
     graph: ConstraintGraph
     tangent: TangentWorkspace
     chart: ChartWorkspace
-
-
-def carve(shapes):
-    """Arrays of zeros of these shapes, by name, cut from one block, which is the `base` of each."""
-    sizes = {name: math.prod(shape) for name, shape in shapes.items()}
-    block = np.zeros(sum(sizes.values()))
-    arrays, at = {}, 0
-    for name, shape in shapes.items():
-        arrays[name] = block[at : at + sizes[name]].reshape(shape)
-        at += sizes[name]
-    return arrays
+    saddle: SaddleWorkspace
 
 
 def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=0):
@@ -165,7 +157,7 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "E": (3 * bodies, k),
         "A": (k, k),
     }
-    work = Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(redundant + 1, np.int64))
+    work = Work(**carve(shapes, control=Control, counters=Counters), redundant=np.zeros(redundant + 1, np.int64))
     hold(work.control, constraint_tol, size, joint_rows is not None)
     return work
 
@@ -197,18 +189,17 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
         "b": (k,),
     }
     shapes |= {"now": (3, n), "before": (3, n)}
-    return ImplicitWorkspace(
-        **carve(shapes), pivots=np.zeros(k, np.int64), kernels=StageKernels(), numbers=StageNumbers()
-    )
+    return ImplicitWorkspace(**carve(shapes, kernels=StageKernels, numbers=StageNumbers), pivots=np.zeros(k, np.int64))
 
 
-def basis_free_parts(graph, n, basis):
-    """Graph and workspaces without matrices of a Context; their memory is small in every form."""
-    return graph, allocate_tangent(graph, n, basis=basis), allocate_chart(graph)
+def basis_free_parts(graph, n, basis, saddle=None):
+    """Graph and workspaces without dense matrices of a Context; saddle: a `SaddleGraph`, of implicit methods."""
+    return graph, allocate_tangent(graph, n, basis=basis), allocate_chart(graph), allocate_saddle(saddle)
 
 
+@cache
 def plain_context():
-    """A context of the right types."""
+    """A context of the right types, for these alone."""
     system = no_system()
     return Context(
         system, allocate(2, 1, 1, 1.0), allocate_linear(system, 2, 1, False), *basis_free_parts(no_graph(), 2, False)
@@ -223,7 +214,7 @@ def plain_work(n):
     others = ("control", "counters", "redundant")
     shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name not in others}
     shapes |= {"q": (n,), "qd": (n,), "qdd": (n,)}
-    return Work(**carve(shapes), control=Control(), counters=Counters(), redundant=np.zeros(1, np.int64))
+    return Work(**carve(shapes, control=Control, counters=Counters), redundant=np.zeros(1, np.int64))
 
 
 def parts(system, graph, n):

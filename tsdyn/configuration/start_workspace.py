@@ -1,0 +1,58 @@
+"""The workspace in which a start is checked; one that is idle serves the next start of the scene."""
+
+import numpy as np
+
+from ..jit.kernels import resident
+from ..rows.interface import allocate_tangent, reset_selection
+from ..workspaces.workspace import parts
+from .tolerances import KEPT_FLOATS, ROUNDING
+
+
+class StartWorkspace:
+    """System, scratch memory and address of what the kernels of a start use; one start at a time.
+
+    Parameters
+    ----------
+    packed : Packed
+    graph : ConstraintGraph
+    n : int
+        Coordinates.
+    """
+
+    def __init__(self, packed, graph, n):
+        self.graph = graph
+        own = packed.system._replace(reals=packed.system.reals.copy())
+        whole = parts(own, graph, n)
+        if packed.derived.redundant is not None:
+            whole = whole._replace(tangent=allocate_tangent(graph, n, redundant=True))
+        self.reals, self.tangent, self.work, self.rates = own.reals, whole.tangent, whole.work, np.zeros(len(graph.row))
+        self.address, *self._keep = resident(whole)
+        rigid = graph.bodies[graph.bodies[:, 1] == 7, 0]
+        self.at = rigid[:, None] + np.arange(3, 7)  # Euler parameters
+
+    def enter(self, reals, size, q, tol):
+        """As if it were new, for the numbers and size of a system and a start that is checked to a tolerance."""
+        tangent, control = self.tangent, self.work.control
+        for array in (self.work.q.base, tangent.b, tangent.gamma, tangent.Z, tangent.a):
+            array.fill(0.0)
+        tangent.landing.clear()
+        reset_selection(self.graph, tangent)
+        self.reals[...] = reals
+        control.u_tol, control.size = tol, size
+        control.floor = ROUNDING * (size + np.abs(q).max())
+
+
+def taken(packed, graph, n):
+    """Return a `StartWorkspace` of a packed scene: an idle one of this graph, or a new one."""
+    try:
+        found = packed.derived.start_workspaces.pop()
+    except IndexError:
+        found = None
+    return found if found is not None and found.graph is graph else StartWorkspace(packed, graph, n)
+
+
+def give(packed, workspace):
+    """Take back a workspace that is no longer in use, unless it is large."""
+    small = workspace.tangent.rows.S.size + workspace.tangent.rows.H.size < KEPT_FLOATS
+    if small and packed.derived.redundant is None and not packed.derived.start_workspaces:
+        packed.derived.start_workspaces.append(workspace)

@@ -1,0 +1,79 @@
+"""The tangent form for implicit methods: accelerations that a stage gives, and rates of other places, in a chart.
+
+The matrices of its stages are those of saddle_point.py.
+"""
+
+from ..elements.loops.body_poses import OMEGA, POSE, write_accelerations, write_positions, write_velocities
+from ..errors import Status
+from ..jit.kernels import callback, vector
+from ..jit.simd import add, cross, fma, four, lanes, put, splat, times, total
+from ..maths.vectors import spin
+from ..rows.interface import constrain, rotate_rate
+from ..workspaces.workspace import load
+from .chart_validity import measure_turns
+from .saddle_point import factorise, linearise, reduce, soften, solve
+from .tangent import COLUMNS, accelerate, check, error_norm, place, start_chart
+
+__all__ = [  # parts of the form
+    "COLUMNS",
+    "accelerate",
+    "check",
+    "error_norm",
+    "factorise",
+    "linearise",
+    "place",
+    "reduce",
+    "soften",
+    "solve",
+    "start_chart",
+]
+OK = int(Status.SUCCESS)
+
+
+@callback("pp")
+def complete(context, yd):
+    """Write q, qd and qdd at the place and velocities of the last `accelerate`, yd being accelerations of the chart.
+
+    omega'd = C (etadd + |omega'|^2 d / 2), projected onto H (rdd, omega'd) + gamma = 0.
+    """
+    c = load(context)
+    w, f, l, graph = c.work, c.tangent, c.chart, c.graph
+    yd = vector(yd, l.x.size - 8)
+    for b in range(graph.bodies.shape[0]):
+        o, at = 8 * b, b * POSE + OMEGA
+        put(f.Z, o, four(yd, o))
+        if graph.bodies[b, 1] == 7:
+            omega = four(f.poses, at)
+            d = lanes(l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2])
+            put(f.Z, o + 4, rotate_rate(l, b, fma(d, splat(0.5 * total(times(omega, omega))), four(yd, o + 4))))
+    if f.b.size > 0:
+        constrain(graph, f.rows, f.gamma, f.Z, f.b)
+    write_positions(graph.bodies, f.poses, w.q)
+    write_velocities(graph.bodies, f.poses, w.qd)
+    write_accelerations(graph.bodies, f.poses, f.Z, w.qdd)
+    return OK
+
+
+@callback("ppp")
+def recall(context, y, yd):
+    """Rates and accelerations of chart coordinates (8 b,) at the point before, in this chart; moves l.d."""
+    c = load(context)
+    l, graph, before = c.chart, c.graph, c.linear.before
+    y, yd = vector(y, l.x.size - 8), vector(yd, l.x.size - 8)
+    measure_turns(graph, l, before[0])
+    for b in range(graph.bodies.shape[0]):
+        i, o = graph.bodies[b, 0], 8 * b
+        put(y, o, lanes(before[1, i], before[1, i + 1], before[1, i + 2]))
+        put(yd, o, lanes(before[2, i], before[2, i + 1], before[2, i + 2]))
+        put(y, o + 4, splat(0.0))
+        put(yd, o + 4, splat(0.0))
+        if graph.bodies[b, 1] == 7:
+            p, d = before[0, i + 3 : i + 7], lanes(l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2])
+            wx, wy, wz = spin(p, before[1, i + 3 : i + 7])
+            omega, d0 = lanes(wx, wy, wz), splat(1.0 + l.d[4 * b + 3])
+            wx, wy, wz = spin(p, before[2, i + 3 : i + 7])
+            change = lanes(wx, wy, wz)
+            put(y, o + 4, fma(omega, d0, cross(d, omega)))
+            square = splat(-0.5 * total(times(omega, omega)))
+            put(yd, o + 4, add(fma(change, d0, cross(d, change)), times(d, square)))
+    return OK

@@ -1,0 +1,55 @@
+"""The workspace of the saddle-point matrix: blocks of stiffness and damping, factors, derivatives of one instance."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..sparse.saddle_graph import BLOCK, SaddleGraph, no_saddle
+from .carving import carve
+
+LOCAL = 14  # coordinates of two bodies
+
+
+class SaddleWorkspace(NamedTuple):
+    """nb bodies, s unknowns, r rows of the longest constraint; of no size for other methods than implicit ones."""
+
+    graph: SaddleGraph
+    K: np.ndarray  # (blocks * 36,)  stiffness, body by body: (r, pi'); body_stiffness.py
+    C: np.ndarray  # (blocks * 36,)  damping
+    B: np.ndarray  # (nb * 9,)  omega' by pi' at constant rates of chart coordinates; body_stiffness.py
+    lower: np.ndarray  # factors; saddle_point.factorise
+    upper: np.ndarray
+    multipliers: np.ndarray  # (m,)  what the last Newton correction led to; saddle_point.solve
+    a: np.ndarray  # ((nb + 1) * 8,)  accelerations of bodies, the same
+    x: np.ndarray  # (s,)  right-hand side and solution, in order of elimination
+    r: np.ndarray  # ((nb + 1) * 8,)  tangent part of a vector of chart coordinates
+    e: np.ndarray  # ((nb + 1) * 8,)  the same of an error of positions
+    q: np.ndarray  # (14,)  coordinates of an instance's two bodies
+    qd: np.ndarray  # (14,)
+    zero: np.ndarray  # (14,)  accelerations that its derivatives don't depend on
+    R: np.ndarray  # (14,)  generalised forces
+    lam: np.ndarray  # (r,)  its multipliers
+    X: np.ndarray  # (14, 14)  its derivatives in these coordinates
+    Xd: np.ndarray  # (14, 14)
+    rows: np.ndarray  # (3 r, 14)  its rows of Phi_q, and what constraint_hessians.loop writes besides
+    own: np.ndarray  # int64 (8,)  its table, as if there were no other bodies: coordinate_rows.py
+
+
+def allocate_saddle(graph=None):
+    """Lay it out for a `SaddleGraph`."""
+    wanted, graph = graph is not None, graph or no_saddle()
+    nb, s, size = len(graph.body_at), int(graph.pattern.shape[0]), int(graph.pattern.shape[2])
+    local, most = LOCAL * wanted, int(graph.constraints["rows"].max(initial=0))
+    shapes = {
+        **dict.fromkeys(("K", "C"), (BLOCK * len(graph.blocks),)),
+        "B": (9 * nb,),
+        **dict.fromkeys(("lower", "upper"), (size,)),
+        "x": (s,),
+        "multipliers": (len(graph.row_at),),
+        **dict.fromkeys(("a", "r", "e"), (8 * (nb + 1) * wanted,)),
+        **dict.fromkeys(("q", "qd", "zero", "R"), (local,)),
+        "lam": (most,),
+        **dict.fromkeys(("X", "Xd"), (local, local)),
+        "rows": (3 * most, local),
+    }
+    return SaddleWorkspace(graph, **carve(shapes), own=np.array([0, 7, 0, 0, 0, 7, 0, LOCAL], np.int64))

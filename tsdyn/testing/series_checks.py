@@ -130,7 +130,7 @@ def check_force_series(scene, force, name, rng):
     (load,), kind = packed.loads, type(force)
     if no_series(force, load.parameters):
         return
-    q, t = random_motion(scene, rng), _time(rng)
+    q, t = random_motion(scene, rng), _time(rng, 0.8)
     x, xd = along(scene, force, load.coordinates, q)
     par = [number for value in load.parameters for number in _numbers(value, t)]
     par += [*rng.normal(scale=10.0, size=force.memory)]
@@ -303,8 +303,8 @@ def _series(value):
     return value if isinstance(value, Truncated) else Truncated([value, *[0.0] * (ORDER + 1)])
 
 
-def _time(rng):
-    return Truncated([rng.uniform(0.1, 2.0), 1.0, *[0.0] * ORDER])
+def _time(rng, last=2.0):
+    return Truncated([rng.uniform(0.1, last), 1.0, *[0.0] * ORDER])
 
 
 def _zeros(shape):

@@ -5,12 +5,21 @@ integrators/ import from here, too. docs/plug-ins.md shows how.
 """
 
 from .calls import Placing, fitting
-from .elements.applied_load import Given, GivenByState, GivenInBody
+from .elements.applied_load import Given, GivenByState, GivenInBody, given_series
 from .elements.bodies import Ground, PointMass, ground_point, rotation_matrix
 from .elements.element import in_frame
 from .elements.force import Force, load, vector_load
 from .elements.framed_joint import FramedJoint, beside, carried, turned_about
-from .elements.friction_laws import BodyFriction, act, along_and_across, coefficient, slip
+from .elements.friction_laws import (
+    BodyFriction,
+    act,
+    act_series,
+    along_and_across,
+    coefficient,
+    direction_series,
+    slip,
+    slip_series,
+)
 from .elements.joint import Joint, across
 from .elements.joint_coordinates import Angle, Displacement, angles, displacements
 from .elements.joint_friction import AXIS, JointFriction, optional
@@ -18,11 +27,19 @@ from .elements.joint_load import JointLoad
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
 from .elements.tolerances import PARALLEL
-from .elements.user_functions import ByState, arguments_of, fill_state, load_at, state_load
+from .elements.user_functions import (
+    STATE,
+    ByState,
+    arguments_of,
+    fill_state,
+    fill_state_series,
+    load_at,
+    state_load,
+)
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
 from .maths import vectors
-from .maths.angles import angle_about, angle_near
+from .maths.angles import angle_about, angle_near, angle_series
 from .maths.recurrences import (
     angle,
     cross,
@@ -63,6 +80,7 @@ __all__ = [
     "AXIS",
     "DOP853_INTERPOLANT",
     "PARALLEL",
+    "STATE",
     "Adaptive",
     "Angle",
     "BodyFriction",
@@ -99,10 +117,12 @@ __all__ = [
     "Vector",
     "across",
     "act",
+    "act_series",
     "along_and_across",
     "angle",
     "angle_about",
     "angle_near",
+    "angle_series",
     "angles",
     "arguments_of",
     "beside",
@@ -111,15 +131,18 @@ __all__ = [
     "carried",
     "coefficient",
     "cross",
+    "direction_series",
     "displacements",
     "dot",
     "embedded_error",
     "error_kernel",
     "exponential",
     "fill_state",
+    "fill_state_series",
     "finite",
     "fitting",
     "floats",
+    "given_series",
     "ground_point",
     "in_frame",
     "inverse_root",
@@ -143,6 +166,7 @@ __all__ = [
     "second_embedded_error",
     "sine_cosine",
     "slip",
+    "slip_series",
     "specialised",
     "square",
     "stack",

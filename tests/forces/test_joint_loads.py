@@ -149,7 +149,7 @@ def test_a_continuous_load(make):
     """By more than a turn: it is that of a spring, a damper and an actuator."""
     scene, joint, _ = make(function=spring_and_damper, period=None)
     solution = ts.simulate(scene, (0.0, 3.0), rtol=1e-10, atol=1e-10, dense_output=True).raise_if_failed()
-    assert solution.method.startswith("DOP853")
+    assert solution.method.startswith("Taylor")
     x = solution.angle(joint) if make is wheel else solution.displacement(joint)
     from scipy.integrate import solve_ivp
 
@@ -160,8 +160,6 @@ def test_a_continuous_load(make):
     np.testing.assert_allclose(x, expected, atol=NEAR)
     assert x.max() > 2.0 * np.pi
     np.testing.assert_allclose(solution.energy, solution.work, atol=ROUGH)
-    with pytest.raises(ts.InvalidArgument, match=r"with period= it has"):
-        ts.simulate(scene, (0.0, 1.0), integrator="taylor")
 
 
 @pytest.mark.parametrize("name", ["taylor", "dop853"])

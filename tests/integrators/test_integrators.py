@@ -39,7 +39,7 @@ def test_built_in(kind):
     findings = ts.testing.check_integrator((lambda **given: I.Taylor(order=6, **given)) if series else kind)
     forms = {finding.formulation for finding in findings}
     assert forms == ({"tangent"} if kind.implicit or series else {"tangent", "maggi-kane"})
-    assert len(findings) == (2 if series else 3) * len(forms)  # a driven length has no series
+    assert len(findings) == 3 * len(forms)
     assert all(len(finding.errors) == (3 if kind.embedded_order else 0) for finding in findings)
 
 

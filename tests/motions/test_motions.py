@@ -129,7 +129,6 @@ def raising(x):
 
 UNDERIVED = {
     "branch": branching,
-    "math in a helper": helped,
     "raising": raising,
     "abs": lambda x: 1.0 + np.abs(x),
     "text": lambda x: "abc",
@@ -156,7 +155,11 @@ def test_functions_of_math_are_known():
         assert value == pytest.approx(imported(time), rel=ROUNDING)
         c = motion.smooth(Truncated([time, 1.0, 0.0])).c
         assert (rate, gain) == (pytest.approx(c[1], rel=HELD), pytest.approx(2.0 * c[2], rel=HELD))
-    assert not motion.has_series
+    assert motion.has_series
+
+
+def test_functions_in_functions_are_known():
+    assert ts.Motion(helped).value(0.3)[1] == pytest.approx(math.cos(0.3), rel=ROUNDING)
     assert ts.Motion(t).has_series
 
 

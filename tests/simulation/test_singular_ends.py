@@ -33,7 +33,7 @@ def chain():
     first, second = links
     scene.add(C.Spherical(scene.ground, first, point_b=(-half, 0.0, 0.0), name="pivot"))
     scene.add(C.Spherical(first, second, point_a=(half, 0.0, 0.0), point_b=(-half, 0.0, 0.0), name="knee"))
-    length = (lambda t: 1.7320508075688772 + 0.2 * t * t, lambda t: 0.4 * t, lambda t: 0.4)
+    length = (lambda t: 1.7320508075688772 + 0.2 * t * t if t < 9.0 else 0.0, lambda t: 0.4 * t, lambda t: 0.4)
     scene.add(C.Distance(second, scene.ground, point_a=(half, 0.0, 0.0), length=length, name="string"))
     return scene
 
@@ -42,7 +42,7 @@ def two_strings():
     """A bead on two strings that are wound in until they are one straight line."""
     scene = ts.Scene(gravity=(0.0, 0.0, 0.0))
     bead = scene.add_point_mass(1.0, position=(0.0, 0.0, math.sqrt(1.25)), name="bead")
-    length = (lambda t: 1.5 - 0.5 * t * t, lambda t: -t, lambda t: -1.0)
+    length = (lambda t: 1.5 - 0.5 * t * t if t < 9.0 else 0.0, lambda t: -t, lambda t: -1.0)
     for x in (1.0, -1.0):
         scene.add(C.Distance(bead, scene.ground, point_b=(x, 0.0, 0.0), length=length, name=f"string at {x:g}"))
     return scene
@@ -57,7 +57,7 @@ def parallelogram():
         scene.add(C.Dot2(scene.ground, pin, axis_a=(0, 0, 1), name=f"plane of {pin.name}"))
         scene.add(C.Distance(pin, scene.ground, point_b=(x, 0.0, 0.0), name=f"crank of {pin.name}"))
     scene.add(C.Distance(*pins, name="coupler"))
-    scene.add(ts.forces.PointForce(pins[0], force=lambda t: (0.0, 0.0, 0.0)))  # it has no series to pass that place by
+    scene.add(ts.forces.PointForce(pins[0], force=lambda t: (0.0 if t < 9.0 else 1.0, 0.0, 0.0)))  # without a series
     return scene
 
 
@@ -68,7 +68,7 @@ def turntable():
     body = scene.add_body(
         1.0, (1, 1, 1), orientation=(math.cos(turn / 2), 0, 0, math.sin(turn / 2)), angular_velocity=(0, 0, rate)
     )
-    cosine = (lambda t: 0.5 + 0.4 * t, lambda t: 0.4, zero)
+    cosine = (lambda t: 0.5 + 0.4 * t if t < 9.0 else 0.0, lambda t: 0.4, zero)
     scene.add(C.Dot1(body, scene.ground, axis_a=(1, 0, 0), axis_b=(1, 0, 0), value=cosine, name="turn"))
     scene.add(C.Dot1(body, scene.ground, axis_a=(1, 0, 0), axis_b=(0, 0, 1), name="level"))
     return scene

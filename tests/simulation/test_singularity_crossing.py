@@ -267,7 +267,9 @@ def test_a_run_may_end_at_the_flat_place(method, off):
 
 def test_a_scene_without_series_stops_and_says_why():
     scene = closed_loops.parallelogram(planar=True)
-    scene.add(ts.forces.PointForce(scene.body("crank 0"), force=lambda t: (0.0, 0.0, 0.0), name="breeze"))
+    scene.add(
+        ts.forces.PointForce(scene.body("crank 0"), force=lambda t: (0.0 if t < 9.0 else 1.0, 0.0, 0.0), name="breeze")
+    )
     solution = ts.simulate(scene, (0.0, 1.0), integrator="dop853")
     assert not solution.success
     assert "near to losing rank" in solution.message

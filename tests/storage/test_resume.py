@@ -187,6 +187,25 @@ def test_sampled_loads(tmp_path):
     stop_and_go_on(controlled, 2.0, tmp_path / "run.h5", again=controlled(), integrator="dop853")
 
 
+def loaded():
+    """Every sort of load that has a series: of state, of time, data, friction."""
+    scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
+    rod = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
+    scene.add(ts.constraints.Revolute.at(rod, scene.ground, point=(0, 0, 0), axis=(0, 1, 0)))
+    scene.add(ts.forces.PointForce(rod, force=lambda t, state: (-state[7], 0.0, np.sin(t))))
+    scene.add(ts.forces.Torque(rod, torque=lambda t: (0.0, np.cos(3.0 * t), 0.0)))
+    table = ts.Table((0.0, 0.4, 1.1, 2.0), (0.0, 1.0, -1.0, 0.5))
+    scene.add(ts.forces.Spring(rod, scene.ground, point_b=(0, 0, 2), stiffness=3.0, actuator=table))
+    scene.add(ts.forces.CoulombFriction(rod, scene.ground, torque=0.3, slip_rate=0.1))
+    return scene
+
+
+@pytest.mark.usefixtures("short_slices")
+def test_series_of_loads(tmp_path):
+    stopped = stop_and_go_on(loaded, 2.0, tmp_path / "run.h5", again=loaded())
+    assert stopped.method.startswith("Taylor")
+
+
 @pytest.fixture
 def stopped(tmp_path, short_slices):
     """The path of a run that was stopped."""

@@ -195,11 +195,11 @@ def test_wrong_classes_are_refused(base, members, message):
 # scenes that have none
 
 
-def wave(t):
-    return 1.0 + 0.1 * np.sin(t)
+def switched(t):
+    return 1.0 if t < 0.5 else 2.0
 
 
-WAVE = (wave, lambda t: 0.1 * np.cos(t), lambda t: -0.1 * np.sin(t))
+WAVE = (switched, lambda t: 0.0, lambda t: 0.0)
 
 
 class NoSeries(Rod):
@@ -211,22 +211,26 @@ class NoForceSeries(Soft):
 
 
 def drag(t, a, b, par, out):
-    out[0] = -a[7]
+    if a[7] > 0.0:
+        out[0] = -a[7]
 
 
 def follow(t, state):
-    return state[0], 0.0, 0.0
+    return abs(state[0]), 0.0, 0.0
+
+
+def rub(a, b, name):
+    return F.ContactFriction(a.scene.add(C.PlaneContact(a, b, normal_b=(0, 0, 1))), kinetic=0.1, name=name)
 
 
 REFUSED = {
     "a function of time": (
-        lambda a, b: F.Spring(a, b, actuator=wave, name="left"),
-        "Spring 'left': its actuator is a function",
+        lambda a, b: F.Spring(a, b, actuator=switched, name="left"),
+        "Spring 'left': its actuator is a function of time that can't be traced, it compares values",
     ),
-    "a table": (lambda a, b: F.Torque(a, torque=ts.Table([0, 1], np.ones((2, 3))), name="t"), "its torque is a table"),
-    "of state": (lambda a, b: F.PointForce(a, force=follow), r"PointForce\(body1\): it is a function of the state"),
-    "user": (lambda a, b: F.UserForce(a, b, function=drag, name="u"), "UserForce 'u': it is a function of the state"),
-    "friction": (lambda a, b: F.CoulombFriction(a, b, force=1.0), r"CoulombFriction\(body1, body2\): its force"),
+    "of state": (lambda a, b: F.PointForce(a, force=follow), r"PointForce\(body1\): its force is .* absolute value"),
+    "user": (lambda a, b: F.UserForce(a, b, function=drag, name="u"), "UserForce 'u': its function .* compares values"),
+    "friction": (lambda a, b: rub(a, b, "rub"), "ContactFriction 'rub': its magnitude depends on a reaction"),
     "plug-in force": (
         lambda a, b: NoForceSeries(a, name="f"),
         "NoForceSeries 'f': NoForceSeries has no kernel `series`",
@@ -244,13 +248,13 @@ def test_scenes_without_series_are_refused_by_name(make, message):
     said = refusal(scene.packed)
     assert re.search(message, said)
     assert "DOP853" in said
-    scene.add(F.CoulombFriction(b, scene.ground, force=1.0, name="brake"))
+    scene.add(rub(b, scene.ground, "brake"))
     assert len(without_series(scene.packed)) == 2
 
 
 def test_taylor_refuses_and_the_default_method_does_without():
     scene, a, b, _ = pair()
-    scene.add(F.Spring(a, b, actuator=wave, name="left"))
+    scene.add(F.Spring(a, b, actuator=switched, name="left"))
     with pytest.raises(ts.InvalidArgument, match="Spring 'left': its actuator is a function of time"):
         ts.simulate(scene, (0.0, 0.1), integrator=ts.integrators.Taylor())
     assert ts.simulate(scene, (0.0, 0.1)).success

@@ -6,12 +6,12 @@ from ..formulations.registry import FORMULATIONS
 from ..integrators import DOP853, Taylor
 from ..jit.compiled import DEBUG
 from ..methods.plug_in import called_for
-from ..motions import program
+from ..motions import program, state_program
 from ..motions.signals import Signal
 from ..runs.arguments import adaptive
 from ..runs.stepper import advance
 from ..taylor import step_parts
-from ..taylor.layout import FAR, room
+from ..taylor.layout import FAR, no_series, pays, room
 from ..taylor.stepper import advance_series
 from .workers import compile_ahead
 
@@ -38,9 +38,14 @@ def of_scene(scene, method, form, far):
     series, implicit = isinstance(method, Taylor), method.implicit
     for kind, moving in _kinds(scene).items():
         yield from of_constraint(kind, moving, series, far, implicit)
+    if series and any(force.sharp or _moves(force) for force in scene.forces):
+        yield step_parts.check_laws
     for force in scene.forces:
-        yield from of_force(force.kernels, series, implicit, form)
-        if any(isinstance(value, Signal) and value.motions for value in vars(force).values()):
+        signals = [value for value in vars(force).values() if isinstance(value, Signal)]
+        yield from of_force(force.kernels, series, implicit, form, "driven_" * bool(signals))
+        if series and hasattr(force.kernels, "program"):
+            yield state_program.run_order
+        if signals and (series or any(signal.motions for signal in signals)):
             yield program.run_program
 
 
@@ -54,9 +59,10 @@ def of_constraint(kind, moving, series=True, far=False, implicit=False):
     return [kind.kernels[name] for name in names if name in kind.kernels]
 
 
-def of_force(kernels, series=True, implicit=False, form=FORMULATIONS["tangent"]):
-    """The loops over forces that have these kernels."""
-    names = ["force", "remember", "normal_load", "unit_friction", *["series"] * series, *["jacobian"] * implicit]
+def of_force(kernels, series=True, implicit=False, form=FORMULATIONS["tangent"], driven=""):
+    """The loops over forces that have these kernels; driven: "driven_" for the series of those with loads of time."""
+    names = ["force", "remember", "normal_load", "unit_friction", *["jacobian"] * implicit]
+    names += [driven + "series", driven + "check"] * series
     found = [kernels[name] for name in names if name in kernels]
     if "normal_load" in kernels:
         found.append((friction_solve if form.basis_free else friction_basis).rub)
@@ -87,6 +93,11 @@ def of_method(method, form, within, far=False):
         yield from (method.second,) if method.implicit else ()
 
 
+def _moves(force):
+    """Whether a load of a force is a function of time whose series are checked."""
+    return any(isinstance(value, Signal) and not value.entire for value in vars(force).values())
+
+
 def _kinds(scene):
     """{class of constraint: whether one of them moves}."""
     kinds = {}
@@ -99,6 +110,6 @@ def _kinds(scene):
 def _default_method(scene, rtol, atol, series):
     """The default method, as `choice.explicit` will find it."""
     kinds = (kind.kernels for kind in _kinds(scene) if not kind.normalises)
-    forces = (force.kernels for force in scene.forces)
-    series = series and all("series" in kernels for kernels in (*kinds, *forces))
+    series = series and all("series" in kernels for kernels in kinds) and pays(scene.primitives, scene.forces)
+    series = series and not any(no_series(force, force.parameters()) for force in scene.forces)
     return adaptive(Taylor if series else DOP853, rtol, atol)

@@ -6,12 +6,12 @@ import math
 from typing import Any, Self
 
 from ..errors import InvalidForce
-from ..jit.kernels import specialised, stack
+from ..jit.kernels import kernel, specialised, stack
 from ..maths.euler_parameters import rotate
-from ..maths.recurrences import rotation
+from ..maths.recurrences import rotated, rotation
 from ..motions.signals import Signal
 from ..validation import one_of
-from .user_functions import ByState, arguments_of, fill_state, variant
+from .user_functions import STATE, ByState, arguments_of, fill_state, fill_state_series, variant
 
 function = None  # filled in by `GivenByState`
 FIRST = 0
@@ -73,6 +73,12 @@ class Given:
             for i in range(3):
                 out[i] = par[i]
 
+    @staticmethod
+    def driven_series(x, xd, par, k, s, out):
+        """The vector's."""
+        for i in range(3):
+            out[i] = s[i, k]
+
 
 class GivenInBody:
     """Mixed in before `Given`, with the markers' Parameters second: in axes of the body."""
@@ -95,6 +101,25 @@ class GivenInBody:
         for i in range(3):
             out[i] = s[4 + i, k] * par[0] + s[7 + i, k] * par[1] + s[10 + i, k] * par[2]
 
+    @staticmethod
+    def driven_series(x, xd, par, k, s, out):
+        """Of A(p) times the vector, in rows 13 to 15."""
+        for i in range(4):
+            s[i, k] = x[3 + i]
+        rotation(s, 0, 4, k)
+        out[0], out[1], out[2] = rotated(s, 4, 13, k)
+
+
+@kernel
+def given_series(x, par, k, s):
+    """Coefficient k, a tuple of three, of the vector in rows 0 to 2 of s, turned where par says so; p is x[3:7]."""
+    if par[0] == 0.0:
+        return s[0, k], s[1, k], s[2, k]
+    for i in range(4):
+        s[3 + i, k] = x[3 + i]
+    rotation(s, 3, 7, k)
+    return rotated(s, 7, 0, k)
+
 
 class GivenByState(ByState):
     """Mixed in before `Given`, with the markers Point, Parameters, Turn: a function of time and state.
@@ -103,16 +128,32 @@ class GivenByState(ByState):
     """
 
     first = 0
-    series = None  # nothing is known of a function
+    arguments, given_numbers, slots = (1, STATE), 3, 16
+
+    @staticmethod
+    def results(function, t, state):
+        """Three numbers."""
+        return function(t[0], state)
+
+    @staticmethod
+    def inputs(x, xd, par, k, first, s):
+        """The state."""
+        fill_state_series(x, xd, 0, k, first, s)
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """The vector in rows 0 to 2, a force; rows of p, then of A."""
+        out[0], out[1], out[2] = given_series(x, par, k, s)
 
     def parameters(self):
         """One flag: the vector is given in the body frame."""
         return (float(self.frame == "body"),)
 
     @classmethod
-    def _wrap(cls, inner, owner):
-        """The kernel of a user's function."""
-        return specialised(_law, f"{owner.__qualname__}.{cls.given}", owner, function=inner, FIRST=cls.first)
+    def _wrap(cls, inner, owner, **others):
+        """The kernel of a user's function; others: as of `specialised`."""
+        name = f"{owner.__qualname__}.{cls.given}"
+        return specialised(_law, name, owner, function=inner, FIRST=cls.first, **others)
 
 
 def _law(x, xd, par, t, out):

@@ -7,6 +7,7 @@ A force works on marker coordinates x and their rates xd (ground frame) and neve
     dissipation(x, xd, par, t)     optional; the power that dampers or friction take, W, >= 0
     remember(x, xd, par, t)        optional, with memory = 1: what par[-1] is after each accepted step
     series(x, xd, par, k, s, out)  optional; out[len(x)]  coefficient k of the law's Taylor series, see recurrences.py
+    driven_series                  optional; the same with the series of par in the rows of s from `slots` on
     normal_load(x, f, par)         optional, of friction: what par[-1] is, from a reaction f, see joint_friction.py
 
 x is the concatenation of the force's markers, par the floats that `parameters()` returns, functions of time among them
@@ -28,7 +29,7 @@ from ..errors import InvalidForce
 from ..jit.kernels import Callback, kernel, specialised
 from ..motions.signals import Signal
 from .element import Attachment, check_slots, inlined, layout, static_kernel
-from .loops import constraint_series, force_series, friction
+from .loops import constraint_series, force_series, friction, law_check
 from .loops import forces as loops
 from .loops.coordinate_rows import SIGNATURE
 from .markers import PARAMETERS, TURN, Marker, Point
@@ -40,7 +41,8 @@ if TYPE_CHECKING:
 
 _registry = {}
 _KERNELS = {"law": 5}  # and their numbers of arguments
-_OPTIONAL = {"potential": 3, "dissipation": 4, "remember": 4, "series": 6, "normal_load": 3}
+_OPTIONAL = {"potential": 3, "dissipation": 4, "remember": 4, "normal_load": 3}
+_SERIES = {"series": 6, "driven_series": 6, "inputs": 6}
 
 
 class Force(Attachment):
@@ -59,6 +61,9 @@ class Force(Attachment):
         Rows of scratch memory that `series` uses.
     no_series : str
         Why there is none.
+    sharp : bool
+        Whether the law may change within less than its series shows, as |v| does at v = 0: steps by series are then
+        checked against the law.
     analytic : bool
         Whether `law` can be run on complex numbers.
     particles : bool
@@ -98,6 +103,7 @@ class Force(Attachment):
     memory = 0
     slots = 0
     no_series = ""
+    sharp = False
     analytic = True
     quantities: Mapping[str, Callable[..., Any]] = MappingProxyType({})
     loads: tuple[str, ...] = ()
@@ -117,8 +123,8 @@ class Force(Attachment):
             raise InvalidForce(f"{where}: memory = 1 needs a kernel remember, and remember needs memory = 1.")
         check_slots(cls, where, InvalidForce)
         functions = {}
-        for name, arguments in {**_KERNELS, **_OPTIONAL}.items():
-            if name in _OPTIONAL and getattr(cls, name, None) is None:
+        for name, arguments in {**_KERNELS, **_OPTIONAL, **_SERIES}.items():
+            if name not in _KERNELS and getattr(cls, name, None) is None:
                 continue
             functions[name] = static_kernel(cls, name, arguments, where, InvalidForce)
         try:
@@ -190,11 +196,8 @@ def callbacks(cls, functions, owner=None):
         home = getattr(functions["remember"], "py_func", functions["remember"])
         names["kernel_remember"] = inlined(functions["remember"])
         result["remember"] = Callback(specialised(loops.remembers, f"{label}.remember_loop", home, **names), SIGNATURE)
-    if "series" in functions:
-        home = getattr(functions["series"], "py_func", functions["series"])
-        names.update(kernel_series=inlined(functions["series"]), SLOTS=cls.slots)
-        copy = specialised(force_series.series, f"{label}.series_loop", home, **names)
-        result["series"] = Callback(copy, constraint_series.SIGNATURE)
+    if owner is None:
+        result |= _series_callbacks(cls, label, names, functions)
     if "normal_load" in functions:
         home = getattr(functions["normal_load"], "py_func", functions["normal_load"])
         names["kernel_normal_load"] = inlined(functions["normal_load"])
@@ -202,3 +205,24 @@ def callbacks(cls, functions, owner=None):
             copy = specialised(getattr(friction, name), f"{label}.{name}_loop", home, **names)
             result[name] = Callback(copy, getattr(friction, name.upper()))
     return MappingProxyType(result)
+
+
+def _series_callbacks(cls, label, names, functions):
+    """The loops of `series` and of `driven_series`, those of laws that are checked with the check."""
+    result = {}
+    traced = "inputs" in functions
+    if traced:
+        names |= {"kernel_inputs": inlined(functions["inputs"])}
+    for before, driven in (("", False), ("driven_", True)):
+        if before + "series" not in functions:
+            continue
+        function, sharp = functions[before + "series"], cls.sharp or driven
+        own = {**names, "kernel_series": inlined(function), "SLOTS": cls.slots, "SHARP": sharp}
+        own |= {"DRIVEN": driven, "TRACED": traced}
+        home = getattr(function, "py_func", function)
+        copy = specialised(force_series.series, f"{label}.{before}series_loop", home, **own)
+        result[before + "series"] = Callback(copy, constraint_series.SIGNATURE)
+        if sharp:
+            copy = specialised(law_check.check, f"{label}.{before}check_loop", home, **own)
+            result[before + "check"] = Callback(copy, law_check.SIGNATURE)
+    return result

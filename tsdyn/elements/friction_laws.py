@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..jit.kernels import kernel
+from ..maths.recurrences import cross, dot, inverse_root, scaled
 from .markers import Point, Turn
 
 if TYPE_CHECKING:
@@ -45,6 +46,38 @@ def act(x, F0, F1, F2, N0, N1, N2, out):
     out[9] = -N0 - (d1 * F2 - d2 * F1)
     out[10] = -N1 - (d2 * F0 - d0 * F2)
     out[11] = -N2 - (d0 * F1 - d1 * F0)
+
+
+@kernel
+def slip_series(x, xd, k, s):
+    """Coefficient k of x_a - x_b, omega_b and the slip velocity, in rows 0 to 8 of s."""
+    for i in range(3):
+        s[i, k] = x[i] - x[6 + i]
+        s[3 + i, k] = xd[9 + i]
+    w0, w1, w2 = cross(s, 3, 0, k)
+    s[6, k] = -(w0 - xd[0] + xd[6])
+    s[7, k] = -(w1 - xd[1] + xd[7])
+    s[8, k] = -(w2 - xd[2] + xd[8])
+
+
+@kernel
+def direction_series(s, v, first, v_0, k):
+    """Coefficient k, a tuple of three, of v / sqrt(v.v + v_0^2); v in rows v to v + 2 of s, two rows are its own."""
+    s[first, k] = dot(s, v, v, k) + (v_0 * v_0 if k == 0 else 0.0)
+    s[first + 1, k] = inverse_root(s[first], s[first + 1], k)
+    return scaled(s, v, first + 1, k)
+
+
+@kernel
+def act_series(s, f, k, out):
+    """Coefficient k of what the force F in rows f to f + 2 of s is to a and b; x_a - x_b is in rows 0 to 2."""
+    n0, n1, n2 = cross(s, 0, f, k)
+    for i in range(3):
+        out[i] = s[f + i, k]
+        out[6 + i] = -s[f + i, k]
+    out[9] -= n0
+    out[10] -= n1
+    out[11] -= n2
 
 
 @kernel

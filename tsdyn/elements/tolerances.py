@@ -29,3 +29,8 @@ CONSTRAINT_STEP = 1e-100
 FORCE_STEP = 1e-40
 # Of central differences of fourth order, relative to x: the fifth root of the rounding error, their optimum.
 FORCE_QUOTIENT = 7e-4
+
+# Series of forces against their laws (loops/law_check.py). What they are off by at most, as a velocity over the
+# tolerance of a step; least of it, m/s or rad/s, below which terms that cancel within a law count. Rounding of a law,
+# relative to the terms of its series.
+OFF, LAW_TOLERANCE, LAW_NOISE = 1000.0, 1e-12, 1e-13

@@ -9,6 +9,8 @@ from typing import Any
 
 from ..jit.compiled_once import compiled_once
 from ..jit.kernels import kernel, part, specialised
+from ..motions.state_program import Writer
+from ..motions.tracing import Untraceable, demand_same, retold, traced
 from .force import callbacks
 
 STATE = 13  # position, Euler parameters, velocity, angular velocity
@@ -21,13 +23,42 @@ class Kernels(dict):
         functions = {"law": kind._wrap(kernel(function, allocates=True), function)}
         if kind.memory:
             functions["remember"] = kind.remember
-        super().__init__(callbacks(kind, functions, function))
-        self.made_of = kind, function
+        series = {name: kind.own_kernels[name] for name in ("series", "check")}
+        super().__init__({**callbacks(kind, functions, function), **series})
+        self.made_of, self.programs = (kind, function), {}
+
+    def program(self, numbers):
+        """The program of the function, a list of floats, for forces with so many parameters.
+
+        Raises
+        ------
+        Untraceable
+            If the function can't be traced.
+        """
+        if numbers not in self.programs:
+            try:
+                self.programs[numbers] = _program(*self.made_of, numbers)
+            except Untraceable as reason:
+                self.programs[numbers] = reason
+        if isinstance(self.programs[numbers], Untraceable):
+            raise self.programs[numbers]
+        return self.programs[numbers]
 
     __hash__ = object.__hash__
 
     def __reduce__(self):
         return kernels_of, self.made_of
+
+
+def _program(kind, function, numbers):
+    """What `Kernels.program` gives."""
+    counts = (*kind.arguments, numbers) if kind.has_numbers else kind.arguments
+    first = sum(kind.arguments)
+    twin = retold(function)
+    results = traced(partial(kind.results, twin), counts, kind.given_numbers)
+    demand_same(results, partial(kind.results, getattr(function, "py_func", function)), counts)
+    fixed = range(first, sum(counts))
+    return Writer(results, sum(counts), fixed, kind.slots, kind.place).numbers()
 
 
 def kernels_of(kind, function):
@@ -40,6 +71,16 @@ def arguments_of(function):
     """The number of arguments of a plain Python function; 0 for anything else."""
     plain = getattr(function, "py_func", function)
     return plain.__code__.co_argcount if isinstance(plain, FunctionType) else 0
+
+
+@kernel
+def fill_state_series(x, xd, first, k, row, s):
+    """Coefficient k of `fill_state`, into rows from `row` on."""
+    for i in range(7):
+        s[row + i, k] = x[first + i]
+    for i in range(3):
+        s[row + 7 + i, k] = xd[first + i]
+        s[row + 10 + i, k] = xd[first + 7 + i]
 
 
 @kernel
@@ -80,16 +121,29 @@ def load_at(t, coordinate, rate):
 
 
 class ByState:
-    """Mixed into forces that are given by a user's function, which the attribute named by `given` holds."""
+    """Mixed into forces that are given by a user's function, which the attribute named by `given` holds.
+
+    Where the function can be traced, the series are those of its program: the kernel `inputs(x, xd, par, k, first, s)`
+    writes coefficient k of the arguments but t into rows from `first` on, and `series` makes the law of the results, in
+    rows from `place` on.
+    """
 
     analytic = False
-    no_series = "it is a function of the state, of which only values are known"
+    sharp = True
     template: Any = None  # the law, with the name `function` to be filled in
+    arguments: tuple[int, ...] = ()  # how many numbers each has, t first
+    has_numbers = False  # whether par is one more
+    given_numbers, place = 1, 0  # results, and their first row
+
+    @staticmethod
+    def results(function, *arguments):
+        """What a function makes of its arguments, each an array: `given_numbers` values."""
+        return [function(*(each[0] for each in arguments))]
 
     @classmethod
-    def _wrap(cls, inner, owner):
-        """Return the law with a user's function, compiled with the file of the function."""
-        return specialised(cls.template, f"{owner.__qualname__}.{cls.__name__}", owner, function=inner)
+    def _wrap(cls, inner, owner, **others):
+        """Return the law with a user's function, compiled with its file; others: as of `specialised`."""
+        return specialised(cls.template, f"{owner.__qualname__}.{cls.__name__}", owner, function=inner, **others)
 
     @staticmethod
     def law(x, xd, par, t, out):

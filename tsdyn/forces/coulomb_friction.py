@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import BodyFriction, Force, act, not_negative, positive, slip
+from ..plugins import BodyFriction, Force, act, act_series, direction_series, not_negative, positive, slip, slip_series
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
@@ -49,7 +49,7 @@ class CoulombFriction(BodyFriction, Force):
     """
 
     sources = ("force", "torque")
-    no_series = "its force reverses within slip_velocity, too sharply for a series"
+    slots, sharp = 19, True  # at rest
     quantities = MappingProxyType(
         {"force": not_negative, "torque": not_negative, "slip_velocity": positive, "slip_rate": positive}
     )
@@ -75,6 +75,21 @@ class CoulombFriction(BodyFriction, Force):
         f = -par[0] / np.sqrt(v0 * v0 + v1 * v1 + v2 * v2 + par[2] * par[2])
         n = -par[1] / np.sqrt(w0 * w0 + w1 * w1 + w2 * w2 + par[3] * par[3])
         act(x, f * v0, f * v1, f * v2, n * w0, n * w1, n * w2, out)
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eqs. (1), (2); rows of x_a - x_b, omega_b, v, F, w, then two for each root."""
+        if par[1] != 0.0:
+            for i in range(3):
+                s[12 + i, k] = xd[3 + i] - xd[9 + i]
+            n0, n1, n2 = direction_series(s, 12, 15, par[3], k)
+            out[3], out[4], out[5] = -par[1] * n0, -par[1] * n1, -par[1] * n2
+            out[9], out[10], out[11] = par[1] * n0, par[1] * n1, par[1] * n2
+        if par[0] != 0.0:
+            slip_series(x, xd, k, s)
+            f0, f1, f2 = direction_series(s, 6, 17, par[2], k)
+            s[9, k], s[10, k], s[11, k] = -par[0] * f0, -par[0] * f1, -par[0] * f2
+            act_series(s, 9, k, out)
 
     @staticmethod
     def dissipation(x, xd, par, t):

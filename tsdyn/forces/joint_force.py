@@ -9,7 +9,7 @@ The power of (1) is F sd for any motion of the bodies.
 """
 
 from ..constraints.translational import Translational
-from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements, load_at
+from ..plugins import ByState, Force, JointLoad, Point, Vector, displacements, dot, load_at, scaled
 
 
 class JointForce(JointLoad, Force):
@@ -89,6 +89,22 @@ class _ContinuousForce(ByState, JointForce):
 
     given = "function"
     template = staticmethod(_law)
-    memory, remember, series = 0, None, None
-    no_series = "it is a function of the joint's displacement, of which only values are known; with period= it has one"
+    memory, remember = 0, None
+    arguments, slots, place = (1, 1, 1), 13, 12
     check = JointLoad.check
+
+    @staticmethod
+    def inputs(x, xd, par, k, first, s):
+        """Displacement and rate; rows of e, x_b - x_a, and of their rates."""
+        for i in range(3):
+            s[i, k], s[3 + i, k] = x[i], x[6 + i] - x[3 + i]
+            s[6 + i, k], s[9 + i, k] = xd[i], xd[6 + i] - xd[3 + i]
+        s[first, k] = dot(s, 0, 3, k)
+        s[first + 1, k] = dot(s, 0, 9, k) + dot(s, 6, 3, k)
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eq. (1), F in row 12."""
+        out[0], out[1], out[2] = scaled(s, 3, 12, k)
+        out[6], out[7], out[8] = scaled(s, 0, 12, k)
+        out[3], out[4], out[5] = -out[6], -out[7], -out[8]

@@ -10,7 +10,19 @@ The power of (1) is T times the rate of the angle if the joint holds the axis.
 import numpy as np
 
 from ..constraints.revolute import Revolute
-from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angles, load_at
+from ..plugins import (
+    ByState,
+    Force,
+    JointLoad,
+    Turn,
+    Vector,
+    angle_about,
+    angle_series,
+    angles,
+    dot,
+    load_at,
+    scaled,
+)
 
 
 class JointTorque(JointLoad, Force):
@@ -103,14 +115,30 @@ class _ContinuousTorque(ByState, JointTorque):
     markers = (Vector("a", "axis"), Vector("a", "reference"), Vector("b", "direction"), Turn("a"), Turn("b"))
     given = "function"
     template = staticmethod(_law)
-    series = None
-    no_series = "it is a function of the joint's angle, of which only values are known; with period= it has a series"
+    arguments, slots, place = (1, 1, 1), 20, 19
     check = JointLoad.check
 
     @staticmethod
     def directions(geometry):
         """The axis, and the two directions that enclose the angle."""
         return np.cross(geometry.f, geometry.g), geometry.f, geometry.h
+
+    @staticmethod
+    def inputs(x, xd, par, k, first, s):
+        """Angle and rate; rows of u, f, g, those of `angle_series`, and of the omegas' difference."""
+        for i in range(9):
+            s[i, k] = x[i]
+        for i in range(3):
+            s[12 + i, k] = xd[12 + i] - xd[9 + i]
+        angle_series(par[0], k, s)
+        s[first, k] = s[18, k]
+        s[first + 1, k] = dot(s, 0, 12, k)
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eq. (1), T in row 19."""
+        out[12], out[13], out[14] = scaled(s, 0, 19, k)
+        out[9], out[10], out[11] = -out[12], -out[13], -out[14]
 
     @staticmethod
     def remember(x, xd, par, t):

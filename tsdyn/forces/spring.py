@@ -16,10 +16,45 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import Force, Point, Signal, dot, ground_point, inverse_root, load, not_negative, product, scaled, square
+from ..plugins import (
+    Force,
+    Point,
+    Signal,
+    dot,
+    ground_point,
+    inverse_root,
+    kernel,
+    load,
+    not_negative,
+    product,
+    scaled,
+    square,
+)
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Load
+
+
+@kernel
+def spread(x, k, s):
+    """Coefficient k of d, d.d and 1 / l, in rows 0 to 4."""
+    for i in range(3):
+        s[i, k] = x[i] - x[3 + i]
+    s[3, k] = dot(s, 0, 0, k)
+    s[4, k] = inverse_root(s[3], s[4], k)
+
+
+@kernel
+def pull(xd, par, k, s, out):
+    """The law, from what is in row 5 without damping."""
+    if par[1] != 0.0:
+        for i in range(3):
+            s[6 + i, k] = xd[i] - xd[3 + i]
+        s[9, k] = dot(s, 0, 6, k)
+        s[10, k] = square(s[4], k)
+        s[5, k] += par[1] * product(s[9], s[10], k)
+    out[3], out[4], out[5] = scaled(s, 0, 5, k)
+    out[0], out[1], out[2] = -out[3], -out[4], -out[5]
 
 
 class Spring(Force):
@@ -100,19 +135,16 @@ class Spring(Force):
     @staticmethod
     def series(x, xd, par, k, s, out):
         """Of Eq. (2), as (k + (actuator - k l0) / l + c d.dd / l^2) d."""
-        for i in range(3):
-            s[i, k] = x[i] - x[3 + i]
-        s[3, k] = dot(s, 0, 0, k)
-        s[4, k] = inverse_root(s[3], s[4], k)
+        spread(x, k, s)
         s[5, k] = (par[3] - par[0] * par[2]) * s[4, k] + (par[0] if k == 0 else 0.0)
-        if par[1] != 0.0:
-            for i in range(3):
-                s[6 + i, k] = xd[i] - xd[3 + i]
-            s[9, k] = dot(s, 0, 6, k)
-            s[10, k] = square(s[4], k)
-            s[5, k] += par[1] * product(s[9], s[10], k)
-        out[3], out[4], out[5] = scaled(s, 0, 5, k)
-        out[0], out[1], out[2] = -out[3], -out[4], -out[5]
+        pull(xd, par, k, s, out)
+
+    @staticmethod
+    def driven_series(x, xd, par, k, s, out):
+        """The same; the actuator is in row 14."""
+        spread(x, k, s)
+        s[5, k] = product(s[14], s[4], k) - par[0] * par[2] * s[4, k] + (par[0] if k == 0 else 0.0)
+        pull(xd, par, k, s, out)
 
     @staticmethod
     def potential(x, par, t):

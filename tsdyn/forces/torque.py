@@ -9,7 +9,18 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from ..plugins import Force, Given, GivenByState, GivenInBody, Parameters, Point, Turn, state_load, vector_load
+from ..plugins import (
+    Force,
+    Given,
+    GivenByState,
+    GivenInBody,
+    Parameters,
+    Point,
+    Turn,
+    given_series,
+    state_load,
+    vector_load,
+)
 
 if TYPE_CHECKING:
     from ..hints import Body, Frame, VectorLoad
@@ -67,4 +78,10 @@ class _StateTorque(GivenByState, Torque):
 
     markers = (Point("a"), Parameters("a"), Turn("a"))
     first = 7
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """The vector in rows 0 to 2, a torque."""
+        out[7], out[8], out[9] = given_series(x, par, k, s)
+
     quantities = MappingProxyType({"torque": state_load})

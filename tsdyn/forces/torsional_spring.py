@@ -27,23 +27,37 @@ from ..plugins import (
     Turn,
     Vector,
     across,
-    angle,
     angle_about,
-    angle_near,
-    cross,
+    angle_series,
     dot,
     finite,
     in_frame,
+    kernel,
     load,
     not_negative,
     rotation_matrix,
     scaled,
-    square,
     vector3,
 )
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Floats, Load
+
+
+@kernel
+def twist(x, xd, par, k, s, out):
+    """Coefficient k of the law, from what is in row 19 without spring and damper."""
+    for i in range(9):
+        s[i, k] = x[i]
+    if par[0] != 0.0:
+        angle_series(par[4], k, s)
+        s[19, k] -= par[0] * s[18, k]
+    if par[1] != 0.0:
+        for i in range(3):
+            s[12 + i, k] = xd[12 + i] - xd[9 + i]
+        s[19, k] -= par[1] * dot(s, 0, 12, k)
+    out[12], out[13], out[14] = scaled(s, 0, 19, k)
+    out[9], out[10], out[11] = -out[12], -out[13], -out[14]
 
 
 class TorsionalSpring(Force):
@@ -205,25 +219,14 @@ class TorsionalSpring(Force):
     @staticmethod
     def series(x, xd, par, k, s, out):
         """Of Eqs. (1), (2); rows of u, f_a, f_b, u x f_a, the omegas' difference, then of numbers."""
-        for i in range(9):
-            s[i, k] = x[i]
         s[19, k] = par[3] + par[0] * par[2] if k == 0 else 0.0
-        if par[0] != 0.0:
-            s[9, k], s[10, k], s[11, k] = cross(s, 0, 3, k)
-            s[15, k] = dot(s, 6, 9, k)
-            s[16, k] = dot(s, 6, 3, k)
-            s[17, k] = square(s[15], k) + square(s[16], k)
-            if k == 0:
-                s[18, 0] = angle_near(s[15, 0], s[16, 0], par[4])
-            else:
-                s[18, k] = angle(s[15], s[16], s[17], s[18], k)
-            s[19, k] -= par[0] * s[18, k]
-        if par[1] != 0.0:
-            for i in range(3):
-                s[12 + i, k] = xd[12 + i] - xd[9 + i]
-            s[19, k] -= par[1] * dot(s, 0, 12, k)
-        out[12], out[13], out[14] = scaled(s, 0, 19, k)
-        out[9], out[10], out[11] = -out[12], -out[13], -out[14]
+        twist(x, xd, par, k, s, out)
+
+    @staticmethod
+    def driven_series(x, xd, par, k, s, out):
+        """The same; the actuator is in row 23."""
+        s[19, k] = s[23, k] + (par[0] * par[2] if k == 0 else 0.0)
+        twist(x, xd, par, k, s, out)
 
     @staticmethod
     def remember(x, xd, par, t):

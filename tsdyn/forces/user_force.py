@@ -15,7 +15,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import ByState, Force, Parameters, Point, Turn, arguments_of, fill_state, floats, stack
+from ..plugins import (
+    STATE,
+    ByState,
+    Force,
+    Parameters,
+    Point,
+    Turn,
+    arguments_of,
+    cross,
+    fill_state,
+    fill_state_series,
+    floats,
+    stack,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -101,6 +114,7 @@ class UserForce(ByState, Force):
     loads = ("function",)
     given = "function"
     template = staticmethod(_law)
+    arguments, has_numbers, given_numbers, slots = (1, STATE, STATE), True, 6, 9
     quantities = MappingProxyType({"values": _numbers})
 
     def __init__(
@@ -130,6 +144,31 @@ class UserForce(ByState, Force):
     def parameters(self):
         """The numbers par."""
         return tuple(self.values)
+
+    @staticmethod
+    def results(function, t, a, b, par):
+        """Six numbers."""
+        out = np.zeros(6, a.dtype)
+        function(t[0], a, b, par, out)
+        return out
+
+    @staticmethod
+    def inputs(x, xd, par, k, first, s):
+        """Both states, and par."""
+        fill_state_series(x, xd, 0, k, first, s)
+        fill_state_series(x, xd, 10, k, first + 13, s)
+        for i in range(par.size):
+            s[first + 26 + i, k] = par[i] if k == 0 else 0.0
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eq. (1); rows of F, T and x_a - x_b."""
+        for i in range(3):
+            s[6 + i, k] = x[i] - x[10 + i]
+        n = cross(s, 6, 0, k)
+        for i in range(3):
+            out[i], out[7 + i], out[10 + i] = s[i, k], s[3 + i, k], -s[i, k]
+            out[17 + i] = -s[3 + i, k] - n[i]
 
     @classmethod
     def example(cls, rng, a, b):

@@ -12,7 +12,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import BodyFriction, Force, act, cross, not_negative, slip
+from ..plugins import BodyFriction, Force, act, act_series, not_negative, slip, slip_series
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
@@ -55,25 +55,15 @@ class ViscousFriction(BodyFriction, Force):
 
     @staticmethod
     def series(x, xd, par, k, s, out):
-        """Of Eqs. (1), (2); rows of x_a - x_b, omega_b and F."""
+        """Of Eqs. (1), (2); rows of x_a - x_b, omega_b and, in place of v, F."""
         for i in range(3):
             out[3 + i] = -par[1] * (xd[3 + i] - xd[9 + i])
             out[9 + i] = -out[3 + i]
         if par[0] != 0.0:
+            slip_series(x, xd, k, s)
             for i in range(3):
-                s[i, k] = x[i] - x[6 + i]
-                s[3 + i, k] = xd[9 + i]
-            w0, w1, w2 = cross(s, 3, 0, k)
-            s[6, k] = par[0] * (w0 - xd[0] + xd[6])
-            s[7, k] = par[0] * (w1 - xd[1] + xd[7])
-            s[8, k] = par[0] * (w2 - xd[2] + xd[8])
-            n0, n1, n2 = cross(s, 0, 6, k)
-            for i in range(3):
-                out[i] = s[6 + i, k]
-                out[6 + i] = -s[6 + i, k]
-            out[9] -= n0
-            out[10] -= n1
-            out[11] -= n2
+                s[6 + i, k] *= -par[0]
+            act_series(s, 6, k, out)
 
     @staticmethod
     def dissipation(x, xd, par, t):

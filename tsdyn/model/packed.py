@@ -215,11 +215,11 @@ def _append_programs(motions, reals):
     """Append the programs of `ts.motions`, one for all that move alike, and say in the rows where they begin."""
     begins = {}
     for row, motion in motions:
-        if motion.smooth is not None:
-            if id(motion.smooth) not in begins:
-                begins[id(motion.smooth)] = len(reals)
-                reals += motion.smooth.program()
-            row[-1] = begins[id(motion.smooth)]
+        if motion.series is not None:
+            if id(motion.series) not in begins:
+                begins[id(motion.series)] = len(reals)
+                reals += motion.series.program()
+            row[-1] = begins[id(motion.series)]
 
 
 def _members(constraints):

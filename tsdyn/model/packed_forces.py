@@ -10,6 +10,7 @@ from ..elements.loops.template import AT, DIMENSION
 from ..errors import InvalidForce
 from ..jit.kernels import records
 from ..motions.signals import Signal
+from ..motions.tracing import Untraceable
 from .tables import ForceKind, SignalPlace
 
 
@@ -22,6 +23,7 @@ class Load(NamedTuple):
     alone: np.ndarray  # (1,) of tables.ForceKind: a System.forces that has this instance alone
     slot: int  # of System.memory; -1 for none
     normal: int  # of System.normals; -1 for none
+    programs: tuple  # for each number of par: where in System.reals the program of its series begins; -1 for none
 
 
 def pack_forces(forces, where, table, reals):
@@ -36,7 +38,7 @@ def pack_forces(forces, where, table, reals):
     for force in forces:
         groups.setdefault(id(force.kernels), []).append(force)  # user functions have kernels of their own
     rows, signals, memory, normals, loads = [], [], [], [], {}
-    programs = []
+    programs, expanded = [], {}
     for members in groups.values():
         kernels = members[0].kernels
         force_address = _address(members[0], "force")
@@ -72,16 +74,30 @@ def pack_forces(forces, where, table, reals):
             alone = records(ForceKind, [[force_address, 0, remember, 1, stride, *begin, 0]])
             slot = len(memory) - 1 if force.memory else -1
             normal = len(normals) - 1 if "normal_load" in kernels else -1
-            loads[id(force)] = Load(force, parameters, force.coordinates, alone, slot, normal)
+            loads[id(force)] = Load(force, parameters, force.coordinates, alone, slot, normal, ())
+            expanded[id(force)] = [motion for value in parameters for motion in _series(value)]
         rows.append([force_address, 0, remember, len(members), stride, *first, 0])
-    begins = {}
-    for signal, motion in programs:
+    begins = {id(None): -1}
+    for motion in (*(motion for _, motion in programs), *(motion for each in expanded.values() for motion in each)):
         if id(motion) not in begins:  # one program for all that are given the same
             begins[id(motion)] = len(reals)
             reals += motion.program()
+    for signal, motion in programs:
         signal[-1] = begins[id(motion)]
+    for force, motions in expanded.items():
+        loads[force] = loads[force]._replace(programs=tuple(begins[id(motion)] for motion in motions))
     rows, signals = records(ForceKind, rows), records(SignalPlace, signals)
     return rows, signals, memory, normals, tuple(loads[id(force)] for force in forces)
+
+
+def _series(value):
+    """A parameter's numbers as motions; None for what is constant, or has no series."""
+    if not isinstance(value, Signal):
+        return (None,)
+    try:
+        return value.smooth
+    except Untraceable:
+        return (None,) * value.width
 
 
 def with_force_jacobians(packed):

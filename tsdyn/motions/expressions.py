@@ -48,7 +48,7 @@ def _horner(t, c):
     return total
 
 
-_OPERATIONS = {
+OPERATIONS = {
     "polynomial": Operation(code.POLYNOMIAL, 1, 0, _horner),
     "piecewise": Operation(code.PIECEWISE, 1, 0, None),
     "add": Operation(code.ADD, 1, 0, operator.add),
@@ -124,7 +124,7 @@ class Smooth:
         """The value for time of any numeric type; left: at a knot, of the piece that ends there."""
         found = {}
         for node in self._order():
-            operation = _OPERATIONS[node._operation]
+            operation = OPERATIONS[node._operation]
             if node._operation == "piecewise":
                 found[id(node)] = node._numbers.value(t, left)
                 continue
@@ -136,25 +136,13 @@ class Smooth:
         return found[id(self)]
 
     def _order(self):
-        """All nodes, operands first, each once."""
-        done, ready, waiting = set(), [], [(self, False)]
-        while waiting:
-            node, open_ = waiting.pop()
-            if id(node) in done:
-                continue
-            if open_:
-                done.add(id(node))
-                ready.append(node)
-            else:
-                waiting.append((node, True))
-                waiting += [(operand, False) for operand in node._operands]
-        return ready
+        return ordered([self])
 
     def program(self) -> list[float]:
         """The numbers that `motion_program` interprets, with space for its rows."""
         row, constants, instructions, rows = {}, [], [], 0
         for node in self._order():
-            operation = _OPERATIONS[node._operation]
+            operation = OPERATIONS[node._operation]
             operands = [row[id(operand)] for operand in node._operands]
             if node._numbers:
                 operands.append(len(constants))
@@ -205,6 +193,37 @@ class Smooth:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self(0.0):g} at t = 0>"
+
+
+def ordered(results: list[Smooth]) -> list[Smooth]:
+    """All nodes of some graphs, operands first, each once."""
+    done, ready, waiting = set(), [], [(node, False) for node in reversed(results)]
+    while waiting:
+        node, open_ = waiting.pop()
+        if id(node) in done:
+            continue
+        if open_:
+            done.add(id(node))
+            ready.append(node)
+        else:
+            waiting.append((node, True))
+            waiting += [(operand, False) for operand in node._operands]
+    return ready
+
+
+def evaluate(results: list[Smooth], inputs: Any) -> list[Any]:
+    """The values of graphs of inputs, of any numeric type."""
+    found: dict[int, Any] = {}
+    for node in ordered(results):
+        given = [found[id(operand)] for operand in node._operands]
+        if node._operation == "input":
+            found[id(node)] = inputs[int(node._numbers[0])]
+        elif node._operation == "polynomial":
+            found[id(node)] = node._numbers[0]
+        else:
+            numbers = (node._numbers,) if node._numbers else ()
+            found[id(node)] = OPERATIONS[node._operation].apply(*given, *numbers)
+    return [found[id(node)] for node in results]
 
 
 def constant(value: float) -> Smooth:

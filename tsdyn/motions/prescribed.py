@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import cached_property, partial
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,8 @@ from .expressions import FUNCTIONS, Smooth
 from .knots import demand_covered, demand_followed
 from .program import run_program
 from .tables import is_data
-from .tolerances import QUOTIENT_ERROR, QUOTIENT_NOISE, QUOTIENT_STEPS
+from .tolerances import QUOTIENT_ERROR, QUOTIENT_NOISE, QUOTIENT_STEPS, SAME_VALUE, TIMES
+from .tracing import Untraceable, of_time, retold
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -81,10 +82,25 @@ class Motion:
         smooth = self.smooth
         return self.given if smooth is None else (smooth, smooth.rate, smooth.acceleration)
 
+    @cached_property
+    def series(self) -> Smooth | None:
+        """The motion as one of `ts.motions`; None for functions that can't be traced, or have other derivatives."""
+        if self.smooth is not None:
+            return self.smooth
+        try:
+            (found,) = of_time(self.given[0], 1)
+        except Untraceable:
+            return None
+        for t in TIMES:
+            for value, rate in zip((found.rate(t), found.acceleration(t)), self.given[1:], strict=True):
+                if not abs(value - rate(t)) <= SAME_VALUE * (1.0 + abs(value)):
+                    return None
+        return found
+
     @property
     def has_series(self) -> bool:
-        """True for one of `ts.motions`; a user's function has no series."""
-        return not self.given
+        """Whether there is a Taylor series."""
+        return self.series is not None
 
     @property
     def motions(self) -> tuple[Smooth, ...]:
@@ -208,6 +224,7 @@ class Motion:
     def forget(self) -> None:
         """Drop compiled and derived functions; they are made again on demand."""
         self._callbacks = None
+        self.__dict__.pop("series", None)
         if self.given and self.smooth is not None:
             self.smooth = _derived(self.given[0], self.what)
 
@@ -240,12 +257,9 @@ def _plain_function(function, what):
 
 
 def _derived(f, what):
-    """Return a user's function as a `Smooth`, by evaluation on time as a motion; `math` is replaced by NumPy."""
-    plain = getattr(f, "py_func", f)
-    known = {name: _of_motions(value) for name, value in plain.__globals__.items()}
-    twin = FunctionType(plain.__code__, known, plain.__name__, plain.__defaults__, plain.__closure__)
+    """Return a user's function as a `Smooth`, by evaluation on time as a motion."""
     try:
-        result = twin(time)
+        result = retold(f)(time)
     except Exception as error:
         raise InvalidConstraint(
             f"{what}: its derivatives can't be derived from f alone ({type(error).__name__}: {error}). Give three "
@@ -257,25 +271,6 @@ def _derived(f, what):
     if not math.isfinite(number(result)):
         raise InvalidConstraint(f"{what}: the function must return a number, it gave {result!r} of the time.")
     return Constant(number(result))
-
-
-def _of_motions(value):
-    """Return the replacement of a global of a user's function evaluated on a motion."""
-    if value is math:
-        return _Math
-    name = getattr(value, "__name__", "")
-    return getattr(np, _NUMPY.get(name, name), value) if value is getattr(math, name, _Math) else value
-
-
-_NUMPY = {"atan": "arctan", "fabs": "abs", "pow": "power"}
-
-
-class _Math:
-    """The module `math` with NumPy's functions, which accept motions."""
-
-    pi, e, tau = math.pi, math.e, math.tau
-    sin, cos, tan, exp, log, sqrt = np.sin, np.cos, np.tan, np.exp, np.log, np.sqrt
-    sinh, cosh, tanh, atan, pow = np.sinh, np.cosh, np.tanh, np.arctan, np.power
 
 
 def _guarded(t):

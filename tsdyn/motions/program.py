@@ -95,6 +95,38 @@ def _hold(p, t):
             c[HELD] = 1.0
 
 
+@kernel
+def operate(p, at, constants, s, t, k):
+    """Coefficient k of the operation that p has from `at` on; s are the rows."""
+    what, y, a, b = int(p[at]), int(p[at + 1]), int(p[at + 2]), int(p[at + 3])
+    if what == POLYNOMIAL:
+        s[y, k] = _polynomial(p[constants + a :], b, t, k)
+    elif what == PIECEWISE:
+        s[y, k] = _piecewise(p[constants + a :], t, k)
+    elif what == ADD:
+        s[y, k] = s[a, k] + s[b, k]
+    elif what == SUBTRACT:
+        s[y, k] = s[a, k] - s[b, k]
+    elif what == MULTIPLY:
+        s[y, k] = product(s[a], s[b], k)
+    elif what == DIVIDE:
+        s[y, k] = quotient(s[a], s[b], s[y], k)
+    elif what == POWER:
+        s[y, k] = power(s[a], s[y], p[constants + b], k)
+    elif what == SINE:
+        s[y, k], s[y + 1, k] = sine_cosine(s[a], s[y], s[y + 1], k)
+    elif what == EXP:
+        s[y, k] = exponential(s[a], s[y], k)
+    elif what == LOG:
+        s[y, k] = np.log(s[a, 0]) if k == 0 else _slope_over(s[a], s[a], s[y], k)
+    elif what == TANH:
+        s[y, k] = _hyperbolic(s[a], s[y], s[y + 1], k)
+        s[y + 1, k] = (1.0 if k == 0 else 0.0) - square(s[y], k)
+    else:
+        s[y + 1, k] = (1.0 if k == 0 else 0.0) + square(s[a], k)
+        s[y, k] = np.arctan(s[a, 0]) if k == 0 else _slope_over(s[a], s[y + 1], s[y], k)
+
+
 @callback(SIGNATURE)
 def run_program(program, t, count, out):
     """out (count,): the motion's series about t; t is left in the program's first place. HOLD writes nothing."""
@@ -106,35 +138,8 @@ def run_program(program, t, count, out):
     constants, result = int(p[2]), int(p[5])
     s = matrix(data_of(p[int(p[3]) :]), int(p[4]), WIDTH)
     for i in range(int(p[1])):
-        at = HEAD + STEP * i
-        what, y, a, b = int(p[at]), int(p[at + 1]), int(p[at + 2]), int(p[at + 3])
         for k in range(count):
-            if what == POLYNOMIAL:
-                s[y, k] = _polynomial(p[constants + a :], b, t, k)
-            elif what == PIECEWISE:
-                s[y, k] = _piecewise(p[constants + a :], t, k)
-            elif what == ADD:
-                s[y, k] = s[a, k] + s[b, k]
-            elif what == SUBTRACT:
-                s[y, k] = s[a, k] - s[b, k]
-            elif what == MULTIPLY:
-                s[y, k] = product(s[a], s[b], k)
-            elif what == DIVIDE:
-                s[y, k] = quotient(s[a], s[b], s[y], k)
-            elif what == POWER:
-                s[y, k] = power(s[a], s[y], p[constants + b], k)
-            elif what == SINE:
-                s[y, k], s[y + 1, k] = sine_cosine(s[a], s[y], s[y + 1], k)
-            elif what == EXP:
-                s[y, k] = exponential(s[a], s[y], k)
-            elif what == LOG:
-                s[y, k] = np.log(s[a, 0]) if k == 0 else _slope_over(s[a], s[a], s[y], k)
-            elif what == TANH:
-                s[y, k] = _hyperbolic(s[a], s[y], s[y + 1], k)
-                s[y + 1, k] = (1.0 if k == 0 else 0.0) - square(s[y], k)
-            else:
-                s[y + 1, k] = (1.0 if k == 0 else 0.0) + square(s[a], k)
-                s[y, k] = np.arctan(s[a, 0]) if k == 0 else _slope_over(s[a], s[y + 1], s[y], k)
+            operate(p, HEAD + STEP * i, constants, s, t, k)
     for k in range(count):
         out[k] = s[result, k]
     return 0

@@ -11,11 +11,12 @@ from ..errors import InvalidArgument
 from ..jit.compiled_once import compiled_once
 from ..jit.kernels import Callback, caller, kernel, specialised, vector
 from ..validation import floats, number
-from .elementary import Constant, Piecewise
+from .elementary import Constant, Piecewise, Polynomial
 from .expressions import Smooth
 from .knots import demand_covered
 from .program import run_program
 from .tables import is_data
+from .tracing import Untraceable, of_time
 
 SIGNATURE = "dp"  # t, where the values go
 call_signal = caller(SIGNATURE)
@@ -39,7 +40,7 @@ class Signal:
 
     def __init__(self, source, width, what, error):
         self.source, self.width, self.what, self.error = source, width, what, error
-        self._callback = None
+        self._callback, self._smooth = None, None
         self.motions = source if isinstance(source, tuple) and isinstance(source[0], Smooth) else ()
         if is_data(source):
             try:
@@ -113,6 +114,31 @@ class Signal:
             raise self.error(f"{self.what}: the function is not finite at t = {t:g}: {result}.")
         return result
 
+    @property
+    def smooth(self):
+        """The values as motions, (width,), of which there are Taylor series; of a user's function, by tracing it.
+
+        Raises
+        ------
+        Untraceable
+            If the function can't be traced.
+        """
+        if self.motions:
+            return self.motions
+        if self._smooth is None:
+            try:
+                self._smooth = of_time(self.source, self.width)
+            except Untraceable as reason:
+                self._smooth = reason
+        if isinstance(self._smooth, Untraceable):
+            raise self._smooth
+        return self._smooth
+
+    @property
+    def entire(self):
+        """Whether the values are piecewise polynomials of time, which a series can't be short of."""
+        return bool(self.motions) and all(isinstance(motion, (Piecewise, Polynomial)) for motion in self.motions)
+
     def over(self, t):
         """The values at times t (k,): `width` arrays (k,)."""
         if self.motions:
@@ -127,8 +153,8 @@ class Signal:
             demand_covered(motion, t0, t1, self.what, self.error)
 
     def forget(self):
-        """Drop the compiled function; it is made again on demand."""
-        self._callback = None
+        """Drop the compiled function and what it was traced to; both are made again on demand."""
+        self._callback = self._smooth = None
 
     @property
     def address(self):

@@ -13,3 +13,8 @@ ROUNDING = 1e-12
 QUOTIENT_STEPS = (1e-2, 1e-3, 1e-4, 1e-5)
 QUOTIENT_NOISE = 1e-9
 QUOTIENT_ERROR = 1e-3
+
+# A traced function's values are those of the function but for rounding, relative to 1 + size; times (s) at which one of
+# time is compared.
+SAME_VALUE = 1e-9
+TIMES = (0.37, 1.3, 11.0)

@@ -5,6 +5,7 @@ import numpy as np
 from ..workspaces.run_state import STORED
 from .history import ChartLog, StepLog
 from .run_log import RunLog
+from .tolerances import TRIES
 
 CHART_ROOM = 64  # charts of a slice at first, half of what there is room for
 LARGEST_SLICE = 1 << 17  # steps, and charts that are kept in one piece
@@ -50,7 +51,7 @@ class Recorder:
             self.out = np.empty((rows + 1, self._width))
         if self.dense:
             self.blocks = np.empty((rows, self.run.block.size))
-        history = np.empty((rows, 3))
+        history = np.empty((rows + 2 * TRIES, 3))
         self.log = RunLog(self.times, self.stops, self.out, history, self.charts, self.points, self.blocks)
 
     def close(self):

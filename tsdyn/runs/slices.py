@@ -102,7 +102,7 @@ class Slices:
         """The length of the next slice, from the time of this one."""
         if seconds > 2 * SLICE_SECONDS:
             self.most = max(int(rows * SLICE_SECONDS / seconds), 1)
-        elif seconds < SLICE_SECONDS / 2 and self.run.numbers.history == rows:
+        elif seconds < SLICE_SECONDS / 2 and self.run.numbers.history >= rows:
             self.most = min(2 * self.most, self.recorder.most)
 
     def _look_up(self):

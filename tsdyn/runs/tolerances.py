@@ -89,3 +89,6 @@ GETTING_ON = 2.0
 
 # Relative rounding error of (t1 - t0) / step that counts no step more.
 SAME_COUNT = 1e-12
+
+# Tries of a Taylor step, at most, that are kept in the history of a slice beyond one for each of its steps.
+TRIES = 32

@@ -14,7 +14,7 @@ from ..model.packed_forces import with_force_jacobians
 from ..motions.knots import NO_STOPS, stops_of
 from ..observables.friction_unique import demand_unique
 from ..runs.sampling import instants_of, sampled
-from ..taylor.layout import refusal
+from ..taylor.layout import pays, refusal
 from ..taylor.run_memory import Series
 
 SPARE = 8  # idle memories of a kind that are kept: as many runs at once allocate nothing
@@ -69,6 +69,16 @@ class Prepared:
     def refusal(self):
         """The reason why the scene has no Taylor series; empty if it has."""
         return refusal(self.packed)
+
+    @cached_property
+    def pays(self):
+        """Whether Taylor series are quicker than a Runge-Kutta method."""
+        return pays(self.packed.constraints, [load.force for load in self.packed.loads])
+
+    @cached_property
+    def sharp(self):
+        """Whether a force changes within less than its series shows."""
+        return any(load.force.sharp for load in self.packed.loads)
 
     @cached_property
     def series(self):

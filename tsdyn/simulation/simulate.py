@@ -69,8 +69,8 @@ def simulate(  # many arguments, by name: each is an option of a run
         Start and end, start < end.
     integrator : Integrator or str, optional
         A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor; DOP853 if a part of the
-        scene has no series; SDIRK54, restarted from t_span[0], if the motion is found stiff and SDIRK54 needs fewer
-        evaluations.
+        scene has no series, or series fail where a law is not analytic; SDIRK54, restarted from t_span[0], if the
+        motion is found stiff and SDIRK54 needs fewer evaluations.
     rtol, atol : float, optional
         Tolerances of the default method, or of an adaptive method given by name; default 1e-8. An instance has its own
         tolerances; rtol or atol beside an instance is refused.
@@ -177,14 +177,15 @@ def run_from(given, numbers=None, arrays=None, archive=None):
         return _run_stored(task, given, options, (numbers, arrays), archive)
     outcome = _run(task, scene, settings.initial_tol)
     ended = time.perf_counter()
-    if outcome.status is STIFF:
-        return run_from(_stiff(given, method))
+    other = method_choice.instead(task, outcome.status)
+    if other is not None:
+        return run_from(_again(given, other))
     return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
 
-def _stiff(given, method):
-    """Return the arguments of the run by an implicit method."""
-    return {**given, "integrator": method_choice.implicit(method), "rtol": None, "atol": None}
+def _again(given, method):
+    """Return the arguments of the run by another method."""
+    return {**given, "integrator": method, "rtol": None, "atol": None}
 
 
 def _run_stored(task, given, options, found, archive):
@@ -198,8 +199,9 @@ def _run_stored(task, given, options, found, archive):
     try:
         outcome = _run(task._replace(archive=archive), scene, options.settings.initial_tol)
         seconds = time.perf_counter() - started
-        if outcome.status is STIFF:
-            given = _stiff(given, task.method)
+        other = method_choice.instead(task, outcome.status)
+        if other is not None:
+            given = _again(given, other)
             return run_from(given, archive=stored_runs.begin_again(archive, given))
         outcome = stored_runs.ended(archive, outcome, seconds)
     finally:

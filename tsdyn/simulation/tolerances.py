@@ -4,6 +4,9 @@
 # Steps of the pilot run of an implicit method, and the cost of an evaluation within an implicit stage, its share of the
 # matrices included, in evaluations of an explicit one: measured by benchmarks/stiff.py.
 PILOT, COST = 60, 1.5
+# Cost of an order of a series in scenes with sharp forces, where steps are as short as they are for a while only, over
+# that of an evaluation: chains of four with friction, slip velocities of 1e-3 to 1e-1.
+SHARP_COST = 0.1
 
 # --- scenes far from the origin ---
 # Sizes of a scene: beyond that distance from the origin it gets an origin of its own.

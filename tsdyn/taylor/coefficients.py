@@ -145,8 +145,10 @@ def run_forces(reals, x, k, f):
     """Order k of all forces, onto Z; at k = 0 the poses are those of order zero."""
     for i in range(x.forces.shape[0]):
         kind = x.forces[i]
+        if kind.run != 0:
+            x.loads[kind.values] = x.order.time
         call_series(
-            kind.loop, 0, k, x.order.room, kind.count, kind.stride, kind.width,
+            kind.loop, kind.run, k, x.order.room, kind.count, kind.stride, kind.width,
             x.table[kind.table :], reals[kind.reals :], x.bodies, x.loads[kind.values :], f.poses, f.Z,
         )  # fmt: skip
 

@@ -4,20 +4,21 @@ import numpy as np
 
 from ..elements.bodies import Ground
 from ..elements.element import address
-from ..elements.loops import force_series
 from ..elements.loops.body_poses import STILL
 from ..elements.loops.constraint_rows import BODY, INTS, MASK
 from ..elements.loops.constraint_series import BODY_ROW, GROUND, UNTURNED, instance_width, scratch_at
 from ..elements.markers import POINT
-from ..errors import InvalidConstraint, InvalidForce
+from ..errors import InvalidConstraint
 from ..formulations.locked_orientations import instances
 from ..jit.aligned_arrays import zeros
 from ..jit.kernels import records, twin
-from ..model.packed_forces import members_of
 from ..motions.prescribed import Motion
+from ..motions.program import run_program
 from ..motions.signals import Signal
 from ..motions.tables import is_data
-from .tables import ConstraintSeries, ForceSeries, MotionSeries
+from ..motions.tracing import Untraceable
+from .force_layout import lay_out_forces
+from .tables import ConstraintSeries, MotionSeries
 from .tolerances import FAR
 from .workspace import LOW, Expansion, Orders
 
@@ -33,7 +34,8 @@ def refusal(packed):
     return (
         f"Taylor needs the series of every constraint and force, and these have none: {'; '.join(shown)}. All other "
         "methods serve: DOP853 is the nearest to it, SDIRK54 is for stiff scenes. A plug-in may be given a kernel "
-        "`series` (docs/plug-ins.md); a length, value or angle has one where it is one of ts.motions."
+        "`series` (docs/plug-ins.md); a function of time or state has one if it is arithmetic and functions of NumPy, "
+        "without branches."
     )
 
 
@@ -57,11 +59,31 @@ def lacking(packed):
         elif "series" not in constraint.kernels:
             found.append((constraint, f"{constraint._kind()} has no kernel `series`"))
     for load in packed.loads:
-        if any(isinstance(value, Signal) for value in load.parameters):
-            found.append((load.force, _given_by(load.force, Signal)))
-        elif "series" not in load.force.kernels:
-            found.append((load.force, load.force.no_series or f"{load.force._kind()} has no kernel `series`"))
+        why = no_series(load.force, load.parameters)
+        if why:
+            found.append((load.force, why))
     return found
+
+
+def no_series(force, parameters):
+    """Why a force has no series; empty where it has one."""
+    kind, signals = force._kind(), [value for value in parameters if isinstance(value, Signal)]
+    try:
+        for signal in signals:
+            _ = signal.smooth
+        if hasattr(force.kernels, "program"):
+            force.kernels.program(len(parameters))
+    except Untraceable as reason:
+        what = _given_by(force, Signal) if signals else f"its {force.given} is a function of the state"
+        return f"{what} that can't be traced, {reason}"
+    if signals and "driven_series" not in force.kernels:
+        return f"{_given_by(force, Signal)}, and {kind} has no kernel `driven_series`"
+    return "" if "series" in force.kernels else force.no_series or f"{kind} has no kernel `series`"
+
+
+def pays(constraints, forces):
+    """Whether series are quicker than stages: not where sharp forces cut steps that solve for no reactions."""
+    return not any(force.sharp for force in forces) or any(not constraint.normalises for constraint in constraints)
 
 
 def _label(item):
@@ -104,7 +126,6 @@ def allocate_expansion(graph, kinds, packed, highest):
         rows.append([address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint), total, width])
         total += count * width
     places = records(ConstraintSeries, rows)
-    forces, table, loads = _forces(packed, orders)
     constraints = zeros(total + 4)
     return Expansion(
         order=Orders(top=highest, room=orders, next=highest, lowest=highest, highest=highest),
@@ -114,10 +135,8 @@ def allocate_expansion(graph, kinds, packed, highest):
         start=zeros(4 * nb),
         constraints=constraints,
         places=places,
-        forces=forces,
-        table=table,
-        loads=loads,
         motions=_motions(graph, packed, orders, places, constraints),
+        **lay_out_forces(packed, orders)._asdict(),
     )
 
 
@@ -133,29 +152,11 @@ def _motions(graph, packed, orders, places, constraints):
                 moves = isinstance(given[entry], Motion)
                 if moves:
                     motion = next(motions)
-                    rows.append([motion.value, motion.program, row])
+                    rows.append([run_program.address, motion.program, row])
                 else:
                     constraints[row] = given[entry]
                 entry += 1 if moves else 3
     return records(MotionSeries, rows)
-
-
-def _forces(packed, orders):
-    """Expansion.forces, .table and .loads."""
-    nb = len(packed.bodies)
-    index = {id(body): i for i, body in enumerate(packed.bodies)}
-    rows, table, total = [], [], 0
-    for row in packed.system.forces:
-        members = members_of(row, packed.loads)
-        kind = members[0].force
-        series = address(kind.kernels, "series", kind.name, InvalidForce)
-        width = force_series.instance_width(len(kind.markers), kind.slots, orders)
-        rows.append([series, total, width, len(members), row.stride, len(table), row.reals])
-        total += len(members) * width
-        for load in members:
-            pair = [index.get(id(body), nb) for body in (load.force.a, load.force.b)]
-            table += [*pair, (pair[0] == nb) | (pair[1] == nb) << 1]
-    return records(ForceSeries, rows), np.array(table, np.int64), zeros(total + 4)
 
 
 def masks(graph, packed):

@@ -1,13 +1,19 @@
-"""Taylor series of prescribed motions, for Taylor runs of driven scenes."""
+"""Taylor series of prescribed motions and of loads, for Taylor runs of driven scenes."""
 
 from ..jit.kernels import kernel
 from ..motions.program import call_smooth
 
 
 @kernel
+def _expand(system, x, rows, values):
+    """The series of some motions, onto values."""
+    for i in range(rows.shape[0]):
+        row = rows[i]
+        call_smooth(row.run, system.reals[row.program :], x.order.time, x.order.room, values[row.values :])
+
+
+@kernel
 def expand_motions(system, x):
-    """The series of all motions about the time that was set last, for the constraints that they drive."""
-    for i in range(x.motions.shape[0]):
-        motion = x.motions[i]
-        program = system.reals[motion.program :]
-        call_smooth(motion.run, program, program[0], x.order.room, x.constraints[motion.values :])
+    """The series of all motions and loads about the time of the expansion."""
+    _expand(system, x, x.motions, x.constraints)
+    _expand(system, x, x.drives, x.loads)

@@ -10,7 +10,7 @@ from ..sparse.constraint_graphs import with_loops
 from ..workspaces.run_state import lay_out
 from ..workspaces.workspace import plain_work
 from .layout import allocate_expansion, masks
-from .step_parts import pass_singular
+from .step_parts import check_laws, pass_singular
 from .stepper import advance_series
 from .workspace import SeriesContext, Trial
 
@@ -57,6 +57,8 @@ class SeriesMemory(Memory):
         graph, system = self.series.graph, System(*(array.copy() for array in packed.system))
         expansion = allocate_expansion(graph, self.series.kinds, packed, highest)
         tangent, trial = allocate_tangent(graph, n), Trial()
+        if expansion.forces["check"].any():
+            trial.check = check_laws.address
         block = 1 + n + expansion.bodies.size
         run = lay_out(n, 0, 0, prepared.handles.count, system.memory.size, block=block)
         context = SeriesContext(system, plain_work(n), graph, tangent, expansion, trial)

@@ -5,11 +5,12 @@ Their argument is the address of a `SeriesContext`.
 
 from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
+from ..elements.loops.law_check import ATOL, LENGTH, LIMITS, RTOL, TAU, TIME, call_check
 from ..errors import Status
 from ..formulations.accelerations import accelerate_bodies
 from ..formulations.chart_validity import ROUNDING
 from ..formulations.projection import find_drift, land
-from ..jit.kernels import callback, caller, kernel
+from ..jit.kernels import callback, caller, kernel, stack
 from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import set_time
@@ -28,11 +29,12 @@ from ..rows.interface import (
 from .coefficients import begin, expand
 from .prescribed_series import expand_motions
 from .step_end import keep_start, project_rates, sum_series
-from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, UNEQUAL
+from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, UNEQUAL
 from .workspace import load_series
 
 NOT_FINITE, SINGULAR, UNHELD = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.UNHELD)
-call_expand, call_reach = caller("pi"), caller("pdd")
+LAWS = "pdddd"
+call_expand, call_reach, call_laws = caller("pi"), caller("pdd"), caller(LAWS)
 
 
 @callback("pi")
@@ -73,7 +75,7 @@ def _expand(context, k, ahead):
 
 @kernel
 def is_driven(system):
-    """Whether a scene that Taylor serves depends on time."""
+    """Whether a constraint of a scene that Taylor serves depends on time."""
     return system.motions.shape[0] > 0
 
 
@@ -90,7 +92,8 @@ def reach(context, t, h):
     """The state at t, h after the series' origin, on the manifold, but for qdd; h < 0 takes the poses. Status."""
     c = load_series(context)
     w, x, f = c.work, c.expansion, c.tangent
-    if is_driven(c.system) and not set_time(c.system, t):
+    x.order.time = t
+    if not set_time(c.system, t):
         return NOT_FINITE
     if h >= 0.0:
         sum_series(c.graph, x, h, f.poses, f.p)
@@ -106,6 +109,30 @@ def reach(context, t, h):
         if not rates_hold(c.graph, f, w.q, w.qd, w.control.size):
             return UNHELD
     return status
+
+
+@callback(LAWS)
+def check_laws(context, t, h, atol, rtol):
+    """Compare the series of sharp forces with their laws at places of a step from t to t + h; sets `Trial.good`."""
+    c = load_series(context)
+    x, limits = c.expansion, stack(LIMITS)
+    limits[LENGTH], limits[ATOL], limits[RTOL] = h, atol, rtol
+    for j in range(PLACES):
+        limits[TAU] = h * (j + 1) / PLACES
+        limits[TIME] = t + limits[TAU]
+        set_time(c.system, limits[TIME])
+        c.trial.good = j / PLACES
+        for i in range(x.forces.shape[0]):
+            kind = x.forces[i]
+            if kind.check != 0:
+                off = call_check(
+                    kind.check, kind.run, kind.count, kind.stride, kind.width, x.order.room, x.order.top, limits,
+                    x.table[kind.table :], c.system.reals[kind.reals :], x.loads[kind.values :], c.graph.inverse,
+                )  # fmt: skip
+                if off != 0:
+                    return 1
+    c.trial.good = 1.0
+    return 0
 
 
 @callback("pdd")

@@ -16,18 +16,21 @@ from ..runs.breakpoints import fixed_end
 from ..runs.run_log import note_try
 from ..runs.step_control import gets_on, stretch
 from .step_length import is_near, longest, loosest, step_length
-from .step_parts import call_expand, call_reach, is_singular
+from .step_parts import call_expand, call_laws, call_reach, is_singular
 from .tolerances import (
     AVOID,
     AVOIDING,
     CLOSE,
     CLOSER,
     HALVED,
+    LEAST_STEPS,
     LOOSER,
     MISSED,
     MOST_TURN,
     NO_SPEED,
     PASSED,
+    PLACES,
+    RATES,
     TIGHTER,
     TIGHTEST,
 )
@@ -78,6 +81,9 @@ def _propose(c, r, tol):
         s.tol = max(TIGHTER * tol, min(tol, TIGHTEST))
         s.h = longest(c, r, s.tol, s.highest)
     s.limit = r.clock.max_step
+    if s.check != 0:
+        s.h *= min(1.0, RATES * s.h / (order.top + 2)) ** (1.0 / (order.top + 2))
+        s.limit = min(s.limit, (r.clock.t_end - r.clock.t_origin) / LEAST_STEPS)
     if c.system.memory.size > 0:  # what counts turns must see each of them
         s.limit = min(s.limit, MOST_TURN / max(_fastest(c), NO_SPEED))
     if r.numbers.steps == 0 and r.clock.h > 0.0:
@@ -152,6 +158,25 @@ def _choose_next(c, r, landed, tol):
 
 
 @kernel
+def _follows_laws(context, c, r):
+    """Whether the forces' series are those of their laws all along the step tried; else it is shortened."""
+    s, h = c.trial, c.trial.t1 - r.clock.t
+    call_laws(s.check, context, r.clock.t, h, r.clock.atol, r.clock.rtol)
+    if s.good == 1.0:
+        return True
+    s.h = max(s.good, 0.5 / PLACES) * h
+    s.limit, s.own_h = min(s.limit, s.h), min(s.own_h, s.h)
+    return False
+
+
+@kernel
+def _reject(r, log):
+    r.numbers.rejected += 1
+    if r.numbers.history + 1 < log.history.shape[0]:
+        r.numbers.history += 1
+
+
+@kernel
 def make_step(context, c, r, log, stop):
     """Reach the end of the next step, t1 of the trial, by a series that has been expanded. Status."""
     f, s, tol = c.tangent, c.trial, r.clock.atol + r.clock.rtol
@@ -161,6 +186,9 @@ def make_step(context, c, r, log, stop):
         if not _end(s, r, stop):
             return UNHELD if s.failed == UNHELD else STEP_COLLAPSED
         note_try(r, log, r.clock.t, s.t1 - r.clock.t)
+        if adaptive and s.check != 0 and not _follows_laws(context, c, r):
+            _reject(r, log)
+            continue
         s.failed = status = _attempt(context, c, r)
         if status == PASSAGE:  # back to where the run is
             status = stand_at(context, c, r, r.clock.t)
@@ -174,6 +202,4 @@ def make_step(context, c, r, log, stop):
         if _is_taken(c, landed) or not _choose_next(c, r, landed, tol):
             return 0
         go_to_start(c, r)
-        r.numbers.rejected += 1
-        if r.numbers.history + 1 < log.history.shape[0]:
-            r.numbers.history += 1
+        _reject(r, log)

@@ -17,12 +17,13 @@ from ..runs.breakpoints import is_sampled, next_stop, take_pieces
 from ..runs.outputs import record, store_now
 from ..runs.run_log import close_chart, is_full, no_log, note_accepted, open_chart
 from ..runs.step_outputs import head_block, is_wanted_before, record_end, store_block
+from ..runs.tolerances import TRIES
 from ..workspaces.run_state import B_DATA, load_run
 from .breakpoints import cross_stop, lower_order
 from .step_length import radius, weights
 from .step_parts import call_expand, call_reach, hold_accelerations, set_floor, state_within
 from .step_trials import go_to_start, make_step, stand_at
-from .tolerances import SMALL, SMALL_STEPS, SPARE, TIGHTEST, WARY
+from .tolerances import SHARP_STEPS, SMALL, SMALL_STEPS, SPARE, TIGHTEST, WARY
 from .workspace import load_series
 
 SLICE_DONE, NOT_FINITE = int(Status.SLICE_DONE), int(Status.NOT_FINITE)
@@ -109,7 +110,7 @@ def _watch_stiffness(c, r, h):
                 r.numbers.at_limit = 0
                 return False
     r.numbers.at_limit += 1
-    if r.numbers.at_limit == SMALL_STEPS:
+    if r.numbers.at_limit == (SMALL_STEPS if c.trial.check == 0 else SHARP_STEPS):
         r.numbers.stiff = 1
         return r.numbers.leave_when_stiff == 1
     return False
@@ -175,7 +176,7 @@ def advance_series(context, run, log, most):
         r.numbers.waiting = 0
         status = cross_stop(context, c, r, log)
     for _ in range(most):
-        if status != 0 or is_full(r, log):
+        if status != 0 or is_full(r, log) or r.numbers.history + TRIES > log.history.shape[0]:
             break
         t0, stop = r.clock.t, next_stop(r, log)
         if t0 >= r.clock.t_end:

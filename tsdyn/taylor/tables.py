@@ -21,11 +21,13 @@ class ForceSeries(Record):
     stride: int  # reals of each
     table: int  # where the entries of the first begin in Expansion.table
     reals: int  # and in System.reals
+    check: int  # address of law_check.check; 0 where the law is not sharp
+    run: int  # address of what runs the program of a traced function; 0 for none
 
 
 class MotionSeries(Record):
-    """A prescribed motion."""
+    """A prescribed motion, or a number of a load."""
 
     run: int  # address of what runs its program
     program: int  # where the program begins in System.reals
-    values: int  # where its series begins in Expansion.constraints
+    values: int  # where its series begins in Expansion.constraints or, of a load, in Expansion.loads

@@ -23,6 +23,14 @@ WIDE = 0.3
 # Factor of a step whose end was not reached.
 HALVED = 0.5
 
+# Error of rates, 1/s, over that of places, up to which only the latter limits steps of sharp forces. Their steps can be
+# very short, and an error of places divided by the step is one of rates.
+RATES = 10.0
+
+# Places of a step, equally far apart, at which series of sharp forces are compared with their laws; steps of a run at
+# least, since a pulse between two places is missed.
+PLACES, LEAST_STEPS = 4, 8
+
 # Angular velocity (rad/s) that counts as none.
 NO_SPEED = 1e-300
 
@@ -30,6 +38,8 @@ NO_SPEED = 1e-300
 # rad, and part of the scene's size: a step that turns and moves everything by less is limited by something that can't
 # be seen. So many of them in a row, and the motion may be stiff (docs/design-decisions.md).
 SMALL, SMALL_STEPS = 0.02, 40
+# The same in scenes with sharp forces, which need some ten short steps wherever a velocity reverses.
+SHARP_STEPS = 400
 
 # --- singular configurations -----------------------------------------------------------------------------------------
 # Pivot of S, over its diagonal entry, below which accelerations by elimination have lost as many digits, so that those

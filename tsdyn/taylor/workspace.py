@@ -17,7 +17,7 @@ LOW, L_R, L_RD, L_OMEGA, L_P = 16, 0, 4, 8, 12
 
 
 class Orders(Record):
-    """Orders of the series: those of omega' are one less than those of r and A."""
+    """Orders of the series: those of omega' are one less than those of r and A; and the time that they are about."""
 
     top: int  # of omega', in this step
     room: int  # for so many, from zero on
@@ -26,6 +26,7 @@ class Orders(Record):
     highest: int
     refined: int  # how many orders of lam, from zero on, are refined
     sweeps: int  # how often they are
+    time: float  # about which the series are, s
 
 
 class Expansion(NamedTuple):
@@ -42,6 +43,7 @@ class Expansion(NamedTuple):
     table: np.ndarray  # int64: the bodies of each force
     loads: np.ndarray  # each kind of force's instances
     motions: np.ndarray  # (motions,) of tables.MotionSeries
+    drives: np.ndarray  # (numbers of loads,) of tables.MotionSeries
 
 
 class Trial(Record):
@@ -63,6 +65,8 @@ class Trial(Record):
     last: int  # whether that is the run's
     cut: int  # whether a stop cuts a fixed step
     singular: int  # whether it ends in a singular configuration
+    check: int  # address of step_parts.check_laws; 0 where no force is sharp
+    good: float  # share of the step up to which the series of forces are those of their laws
 
 
 class SeriesContext(NamedTuple):
@@ -82,8 +86,9 @@ def no_series(orders, bodies):
     low, start = np.zeros((2, LOW * count)), np.zeros(4 * count)
     none, kinds = np.zeros(0), (records(kind, []) for kind in (ConstraintSeries, ForceSeries))
     return Expansion(
-        Orders(room=orders), bodies, *low, start, none, *kinds, np.zeros(0, np.int64), none, records(MotionSeries, [])
-    )
+        Orders(room=orders), bodies, *low, start, none, *kinds, np.zeros(0, np.int64), none,
+        records(MotionSeries, []), records(MotionSeries, []),
+    )  # fmt: skip
 
 
 def _example():

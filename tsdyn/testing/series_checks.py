@@ -17,11 +17,12 @@ from ..maths.power_series import Truncated
 from ..model.equations import set_time
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
+from ..motions.tracing import retold
 from ..observables.diagnostics import starts_of
 from ..rows.interface import allocate_tangent
 from ..sparse.graph_builder import build
 from ..taylor.coefficients import run_forces, run_loops
-from ..taylor.layout import allocate_expansion, masks
+from ..taylor.layout import allocate_expansion, masks, no_series
 from ..taylor.prescribed_series import expand_motions
 from ..taylor.workspace import SeriesContext, Trial, load_series
 from ..workspaces.workspace import plain_work
@@ -45,6 +46,7 @@ def begin_motions(context, t):
     """The series of all motions about t."""
     c = load_series(context)
     set_time(c.system, t)
+    c.expansion.order.time = t
     expand_motions(c.system, c.expansion)
 
 
@@ -126,27 +128,48 @@ def check_force_series(scene, force, name, rng):
     """Check a force's `series`, if it has one that a run would use."""
     packed = scene.packed
     (load,), kind = packed.loads, type(force)
-    if "series" not in force.kernels or any(isinstance(p, Signal) for p in load.parameters):
+    if no_series(force, load.parameters):
         return
-    q = random_motion(scene, rng)
+    q, t = random_motion(scene, rng), _time(rng, 0.8)
     x, xd = along(scene, force, load.coordinates, q)
-    par = [*load.parameters, *rng.normal(scale=10.0, size=force.memory)]
+    par = [number for value in load.parameters for number in _numbers(value, t)]
+    par += [*rng.normal(scale=10.0, size=force.memory)]
     f = _zeros(len(x))
-    _run(kind, "law", name, x, xd, par, _time(rng), f)
-    labels = [f"out[{j}] (conjugate to {c})" for j, c in enumerate(_labels(kind))]
-    for k, out, _ in _coefficients(kind, name, (x, xd), par, (len(x),)):
-        _compare(name, k, labels, out, f)
+    if hasattr(force.kernels, "program"):
+        _law_of(force)(x, xd, par, t, f)
+    else:
+        _run(kind, "law", name, x, xd, par, t, f)
+        numbers = [_series(number).c[0] for number in par]
+        driven = any(isinstance(value, Signal) for value in load.parameters)
+        rows, what = ([_series(number).c for number in par], "driven_series") if driven else ((), "series")
+        labels = [f"out[{j}] (conjugate to {c})" for j, c in enumerate(_labels(kind))]
+        for k, out, _ in _coefficients(kind, name, (x, xd), numbers, (len(x),), rows, what):
+            _compare(name, k, labels, out, f)
 
     graph, kinds = build(packed)
     context, (where, *_keep) = series_context(packed, graph, kinds)
     context.tangent.poses[:] = write_bodies(scene, q, context.expansion).ravel()
-    context.system.reals[packed.system.memory] = par[len(load.parameters) :]
+    context.system.reals[packed.system.memory] = par[len(par) - force.memory :]
+    begin_motions(where, t.c[0])
     expected = _carried_back(scene, load, q, f)
     labels = [f"{what} {axis} of {b.name}" for b in scene.bodies for what in ("force", "body torque") for axis in _AXES]
     for k in range(ORDER):
         force_coefficients(where, k)
         got = context.tangent.Z.reshape(-1, 2, 4)[:-1, :, :3].ravel()
         _compare(name, k, [f"compiled {label}" for label in labels], got, expected)
+
+
+def _numbers(value, t):
+    """A parameter as the law has it: of a Signal its series."""
+    return [t.of(motion(t)) for motion in value.smooth] if isinstance(value, Signal) else (value,)
+
+
+def _law_of(force):
+    """The law of a force that is given by a user's function, for any numbers."""
+    function = force.function_of_state
+    plain = getattr(function, "py_func", function)
+    others = {"make": lambda f: f, "stack": _zeros, "float": lambda number: number}
+    return twin(force._wrap(retold(plain), plain, **others))
 
 
 def random_motion(scene, rng):
@@ -234,9 +257,9 @@ def _carried_back(scene, load, q, f):
     return total.ravel()
 
 
-def _coefficients(kind, name, coordinates, par, shape, rows=()):
+def _coefficients(kind, name, coordinates, par, shape, rows=(), what="series"):
     """Yield k, what the Python `series` writes, and its scratch, which holds nothing yet but the rows prescribed."""
-    scratch, series = np.full((kind.slots + len(rows), ORDER + 2), np.nan), twin(kind.series)
+    scratch, series = np.full((kind.slots + len(rows), ORDER + 2), np.nan), twin(getattr(kind, what))
     for i, row in enumerate(rows):
         scratch[kind.slots + i] = row
     for k in range(ORDER + 1):
@@ -280,8 +303,8 @@ def _series(value):
     return value if isinstance(value, Truncated) else Truncated([value, *[0.0] * (ORDER + 1)])
 
 
-def _time(rng):
-    return Truncated([rng.uniform(0.1, 2.0), 1.0, *[0.0] * ORDER])
+def _time(rng, last=2.0):
+    return Truncated([rng.uniform(0.1, last), 1.0, *[0.0] * ORDER])
 
 
 def _zeros(shape):

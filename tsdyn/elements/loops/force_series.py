@@ -11,22 +11,41 @@ Order k of the law needs x and xd up to k, hence x up to k + 1:
 
 The series of an instance holds p and the forces (4 floats a marker and order each, p of Parameters only), then its own
 scratch, then for each marker the last order at which its force is not zero: (3) ends there, at order zero for a
-constant force. Series that a law doesn't use aren't stored, so the compiler removes their evaluation.
+constant force. Series that a law doesn't use aren't stored, so the compiler removes their evaluation. Those of a sharp
+law are: x and xd follow the last orders, for `law_check`.
+
+Of a force driven by loads, the rows of its scratch from SLOTS on are the series of par, written at the start of a step.
+Of a traced function they are those of its arguments, t first, and then the program's own; the program, one for all
+instances, stands before the first of them.
 """
 
-from ...jit.kernels import ANY, data_of, integers, kernel, matrix, stack, vector
+from ...jit.kernels import ANY, data_of, integers, kernel, matrix, part, stack, vector
 from ...jit.simd import add, cross, fma, four, lanes, put, splat, times
+from ...motions.state_program import LENGTH, ROWS, T, call_order
 from ..markers import PARAMETERS, POINT, TURN
 from .body_poses import POSE, P, turned
 from .constraint_series import BODY_ROW, S_OMEGA, S_R, torque
-from .template import CODES, MARKERS, OWNERS, ROOM, SIZE, SLOTS, STARTS, kernel_series
+from .template import (
+    CODES,
+    DRIVEN,
+    MARKERS,
+    OWNERS,
+    ROOM,
+    SHARP,
+    SIZE,
+    SLOTS,
+    STARTS,
+    TRACED,
+    kernel_inputs,
+    kernel_series,
+)
 
 BODY, MASK, INTS = 0, 2, 3  # of the table: the two bodies, and which of them are the ground
 
 
-def instance_width(markers, slots, orders):
-    """Floats of an instance."""
-    return 8 * markers * orders + 4 * ((slots * orders + markers + 3) // 4)
+def instance_width(markers, rows, orders):
+    """Floats of an instance; rows: those of its scratch, and of x and xd where the law is sharp."""
+    return 8 * markers * orders + 4 * ((rows * orders + markers + 3) // 4)
 
 
 @kernel
@@ -77,16 +96,34 @@ def _parameters_torque(values, p, f, k, last):
     return lanes(0.5 * x, 0.5 * y, 0.5 * z)
 
 
-def series(mode, k, orders, count, stride, size, table, reals, bodies, values, poses, Z):
+@part
+def scratch_rows(stride, values):
+    """Rows of an instance's scratch; the values of its kind."""
+    if TRACED:
+        return int(values[ROWS])
+    return SLOTS + (stride - 3 * MARKERS if DRIVEN else 0)
+
+
+@part
+def run_traced(run, program, x, xd, par, k, rows, orders, scratch):
+    """Order k of the arguments and of the results of a traced function; `run` runs its program."""
+    s = matrix(data_of(scratch), rows, orders)
+    s[SLOTS, k] = program[T] if k == 0 else (1.0 if k == 1 else 0.0)
+    kernel_inputs(x, xd, par, k, SLOTS + 1, s)
+    call_order(run, program, scratch, rows, orders, k)
+
+
+def series(run, k, orders, count, stride, size, table, reals, bodies, values, poses, Z):
     """Order k of the forces, onto the bodies' Z; p_0 from the poses."""
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
     values, poses, Z = vector(values, ANY), vector(poses, ANY), vector(Z, ANY)
     x, xd, f = stack(ROOM), stack(ROOM), stack(ROOM)
     wide, body_size = 4 * orders, BODY_ROW * orders
-    own_scratch = 2 * MARKERS * wide
+    own_scratch, rows = 2 * MARKERS * wide, scratch_rows(stride, values)
+    program = int(values[LENGTH]) if TRACED else 0
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        first = i * size
+        first = program + i * size
         for j in range(MARKERS):
             at, s, c = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3], STARTS[j]
             if CODES[j] == PARAMETERS:
@@ -104,14 +141,21 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, p
                 put(xd, c, times(_place(CODES[j], bodies, at, orders, k + 1, s), splat(k + 1.0)))
         for c in range(SIZE):
             f[c] = 0.0
-        scratch = matrix(data_of(values[first + own_scratch :]), SLOTS, orders)
+        scratch = matrix(data_of(values[first + own_scratch :]), rows, orders)
+        if TRACED:
+            run_traced(run, values, x, xd, real[3 * MARKERS :], k, rows, orders, values[first + own_scratch :])
         kernel_series(x, xd, real[3 * MARKERS :], k, scratch, f)
+        if SHARP:
+            kept = first + own_scratch + rows * orders + MARKERS + 2 * SIZE * k
+            for c in range(SIZE):
+                values[kept + c] = x[c]
+                values[kept + SIZE + c] = xd[c]
         for j in range(MARKERS):
             if own[MASK] >> OWNERS[j] & 1:
                 continue
             c, s, z = STARTS[j], real[3 * j : 3 * j + 3], 8 * own[OWNERS[j]]
             at, forces = own[OWNERS[j]] * body_size, first + (MARKERS + j) * wide
-            ends = first + own_scratch + SLOTS * orders + j
+            ends = first + own_scratch + rows * orders + j
             wider = CODES[j] == PARAMETERS
             some = f[c] != 0.0 or f[c + 1] != 0.0 or f[c + 2] != 0.0 or (wider and f[c + 3] != 0.0)
             if some or k == 0:

@@ -1,0 +1,93 @@
+"""Series of forces against their laws, at a place of a Taylor step.
+
+A law may change within less than a series shows: the series of v / sqrt(v^2 + v_0^2) at v >> v_0 knows nothing of the
+reversal at v = 0, that of |v| at v > 0 is v, and a pulse is zero to any order long before. The law itself, or the
+program of a traced function, is therefore evaluated at x(tau) and xd(tau), and must be f(tau). What f lacks may be as
+large as
+
+    OFF (atol + rtol |xd|) / (w h)      w: what the force accelerates by, so that w f h is a velocity
+    a small part of the terms of f      rounding
+"""
+
+from ...jit.kernels import ANY, caller, data_of, integers, matrix, part, stack, vector
+from ...jit.simd import fma, four, put, splat
+from ...motions.state_program import LENGTH as PROGRAM_LENGTH
+from ...motions.state_program import T
+from ..markers import PARAMETERS, POINT, TURN
+from ..tolerances import LAW_NOISE, LAW_TOLERANCE, OFF
+from .force_series import BODY, INTS, MASK, run_traced, scratch_rows
+from .template import CODES, MARKERS, OWNERS, ROOM, SIZE, STARTS, TRACED, kernel_law, kernel_series
+
+# what runs a program, count, reals and floats per instance, orders, how many are known, limits, table, reals, values,
+# inverse
+SIGNATURE = "iiiiiippppp"
+TAU, TIME, LENGTH, ATOL, RTOL, LIMITS = range(6)  # numbers of `limits`: place and length of the step, tolerances
+call_check = caller(SIGNATURE)
+
+
+@part
+def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
+    """Whether the series of a marker's force, at values[forces], is not the law's f."""
+    c, w, tau = STARTS[j], 16 * own[BODY + OWNERS[j]], limits[TAU]
+    turning = inverse[w + 4] + inverse[w + 9] + inverse[w + 14]
+    if CODES[j] == TURN:
+        weight = turning
+    elif CODES[j] == PARAMETERS:
+        weight = 0.5 * turning
+    else:
+        weight = (s[0] * s[0] + s[1] * s[1] + s[2] * s[2]) * turning + (inverse[w] if CODES[j] == POINT else 0.0)
+    size = 4 if CODES[j] == PARAMETERS else 3
+    off, terms, speed = 0.0, 0.0, 0.0
+    total = splat(0.0)
+    for k in range(known - 1, -1, -1):
+        total = fma(total, splat(tau), four(values, forces + 4 * k))
+    series = stack(4)
+    put(series, 0, total)
+    for i in range(size):
+        gap = abs(series[i] - f[c + i])
+        if not gap <= off:  # or not a number
+            off = gap
+        speed = max(speed, abs(xd[c + i]))
+    tol = limits[ATOL] + limits[RTOL] * speed
+    if weight * off * limits[LENGTH] <= max(OFF * tol, LAW_TOLERANCE):
+        return False
+    for i in range(size):
+        power = 1.0
+        for k in range(known):
+            terms = max(terms, abs(power * values[forces + 4 * k + i]))
+            power *= tau
+    return not off <= max(LAW_NOISE, limits[ATOL] + limits[RTOL]) * terms
+
+
+def check(run, count, stride, size, orders, known, limits, table, reals, values, inverse):
+    """1 if the series of an instance is not what its law is at a place of the step, else 0; time has been set."""
+    table, reals, values = integers(table, ANY), vector(reals, ANY), vector(values, ANY)
+    limits, inverse = vector(limits, LIMITS), vector(inverse, ANY)
+    x, xd, f, wide = stack(ROOM), stack(ROOM), stack(ROOM), 4 * orders
+    rows, program = scratch_rows(stride, values), int(values[PROGRAM_LENGTH]) if TRACED else 0
+    for i in range(count):
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        first = program + i * size
+        kept = first + 2 * MARKERS * wide + rows * orders + MARKERS
+        for c in range(SIZE):
+            x[c], xd[c], f[c] = 0.0, 0.0, 0.0
+        for k in range(known - 1, -1, -1):
+            at = kept + 2 * SIZE * k
+            for c in range(SIZE):
+                x[c] = x[c] * limits[TAU] + values[at + c]
+                xd[c] = xd[c] * limits[TAU] + values[at + SIZE + c]
+        par = real[3 * MARKERS : stride]
+        if TRACED:
+            own_scratch = values[kept + 2 * SIZE * orders :]
+            values[T] = limits[TIME]
+            run_traced(run, values, x, xd, par, 0, rows, 1, own_scratch)
+            kernel_series(x, xd, par, 0, matrix(data_of(own_scratch), rows, 1), f)
+        else:
+            kernel_law(x, xd, par, limits[TIME], f)
+        for j in range(MARKERS):
+            forces = first + (MARKERS + j) * wide
+            if own[MASK] >> OWNERS[j] & 1:
+                continue
+            if _is_off(j, own, real[3 * j : 3 * j + 3], f, xd, limits, known, values, forces, inverse):
+                return 1
+    return 0

@@ -1,10 +1,10 @@
 """Whether redundant rows hold: their residuals at three levels, relative to the sizes of their terms.
 
     position        |Phi|               |H_r| |r| + |H_pi'|
-    velocity        |H y + Phi_t|       |H_r| |rd| + |H_pi'| |omega'| + |Phi_t|
-    acceleration    |H yd + gamma|      |H_r| |rdd| + |H_pi'| |2 pdd| + |gamma|
+    velocity        |H y + Phi_t|       sum_i |H_i y_i| + |Phi_t|
+    acceleration    |H yd + gamma|      sum_i |H_i yd_i| + |H_pi'| |2 p.pdd| + |gamma|
 
-|2 pd| is |omega'|, and |2 pdd| has centripetal accelerations, which cancel in gamma.
+2 p.pdd is the centripetal part of 2 pdd, which cancels in gamma.
 
 A row that depends on others wherever these hold is held by them. One that depends on them in places, or nearly, is left
 by the motion, however well the other rows hold.
@@ -103,6 +103,12 @@ def _largest(graph, rates):
 
 
 @kernel
+def _terms(H, at, x, y, z):
+    """Sum of the absolute terms of a row of H times a vector."""
+    return abs(H[at] * x) + abs(H[at + 1] * y) + abs(H[at + 2] * z)
+
+
+@kernel
 def _hold(graph, f, known, q, rates, most, fastest):
     """Return True if H (rd, omega') + known of all redundant rows is small; `rates` are qd, or qdd.
 
@@ -117,7 +123,7 @@ def _hold(graph, f, known, q, rates, most, fastest):
                 continue
             k = graph.bodies[b, 0]
             residual += H[at] * rates[k] + H[at + 1] * rates[k + 1] + H[at + 2] * rates[k + 2]
-            terms += length(H, at) * (length(rates, k) + FAINT * most)
+            terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + FAINT * most * length(H, at)
             if graph.bodies[b, 1] == 7:
                 e0, e1, e2, e3 = q[k + 3], q[k + 4], q[k + 5], q[k + 6]
                 d0, d1, d2, d3 = rates[k + 3], rates[k + 4], rates[k + 5], rates[k + 6]

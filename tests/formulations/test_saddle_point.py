@@ -70,7 +70,7 @@ def demand_corrections(stages, y, g, rng, share):
     np.testing.assert_allclose(found, right, rtol=0, atol=(share * g + CLOSE) * np.abs(right).max())
 
 
-@pytest.mark.slow_but("*joint")
+@pytest.mark.slow_but("joint-*")
 @pytest.mark.parametrize("g", [1e-3, 1e-2])
 @pytest.mark.parametrize("name", ["joint", "chain"])
 def test_newton_corrections(name, g, rng):

@@ -61,13 +61,18 @@ def evaluate_curvature(s, q, qd, qdd, t, lam, K, G1, G2):
     constraint_curvature(s, q, qd, qdd, t, lam, K, G1, G2)
 
 
+def with_derivatives(scene):
+    """The packed scene, a system of its own with what implicit methods derive, and how much they keep of the forces."""
+    packed = scene.packed
+    system, kept = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
+    return packed, system._replace(reals=system.reals.copy()), kept
+
+
 class Tangent:
     """The reduced ODE of a scene in the chart of its start."""
 
     def __init__(self, scene, t=0.0):
-        packed = scene.packed
-        system, kept = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
-        system = system._replace(reals=system.reals.copy())
+        packed, system, kept = with_derivatives(scene)
         q, qd = scene.start
         n, m = q.size, system.segments.shape[0]
         work = allocate(n, m, len(scene.bodies), 1e-14, packed.size)

@@ -3,15 +3,13 @@
 import numpy as np
 
 import tsdyn as ts
-from tests.helpers.reduced_ode import soften, solve
+from tests.helpers.reduced_ode import soften, solve, with_derivatives
 from tsdyn.formulations.body_stiffness import add_constraints, add_forces
 from tsdyn.formulations.registry import formulation
 from tsdyn.jit.kernels import caller, entry, resident
 from tsdyn.methods.diagonally_implicit import call_linearise, call_reduce
 from tsdyn.methods.explicit import call_accelerate, call_place
 from tsdyn.model.equations import applied_forces, evaluate_constraints, set_time
-from tsdyn.model.packed import with_curvatures
-from tsdyn.model.packed_forces import with_force_jacobians
 from tsdyn.sparse.saddle_graph import BLOCK, saddle_of
 from tsdyn.workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
 from tsdyn.workspaces.workspace import load as load_context
@@ -62,9 +60,7 @@ class Stages:
     """The tangent form of implicit methods in the chart of a scene's start."""
 
     def __init__(self, scene, t=0.0):
-        packed = scene.packed
-        system, kept = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
-        system = system._replace(reals=system.reals.copy())
+        packed, system, kept = with_derivatives(scene)
         q, qd = scene.start
         n, m = q.size, system.segments.shape[0]
         form = formulation("tangent").serving(ts.integrators.SDIRK54())

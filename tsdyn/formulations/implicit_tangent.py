@@ -3,16 +3,16 @@
 The matrices of its stages are those of saddle_point.py.
 """
 
-from ..elements.loops.body_poses import OMEGA, POSE, write_accelerations, write_positions, write_velocities
+from ..elements.loops.body_poses import OMEGA, POSE
 from ..errors import Status
 from ..jit.kernels import callback, vector
 from ..jit.simd import add, cross, fma, four, lanes, put, splat, times, total
 from ..maths.vectors import spin
-from ..rows.interface import constrain, rotate_rate
+from ..rows.interface import rotate_rate
 from ..workspaces.workspace import load
 from .chart_validity import measure_turns
 from .saddle_point import factorise, linearise, reduce, soften, solve
-from .tangent import COLUMNS, accelerate, check, error_norm, place, start_chart
+from .tangent import COLUMNS, accelerate, check, error_norm, place, start_chart, write_state
 
 __all__ = [  # parts of the form
     "COLUMNS",
@@ -37,7 +37,7 @@ def complete(context, yd):
     omega'd = C (etadd + |omega'|^2 d / 2), projected onto H (rdd, omega'd) + gamma = 0.
     """
     c = load(context)
-    w, f, l, graph = c.work, c.tangent, c.chart, c.graph
+    f, l, graph = c.tangent, c.chart, c.graph
     yd = vector(yd, l.x.size - 8)
     for b in range(graph.bodies.shape[0]):
         o, at = 8 * b, b * POSE + OMEGA
@@ -46,11 +46,7 @@ def complete(context, yd):
             omega = four(f.poses, at)
             d = lanes(l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2])
             put(f.Z, o + 4, rotate_rate(l, b, fma(d, splat(0.5 * total(times(omega, omega))), four(yd, o + 4))))
-    if f.b.size > 0:
-        constrain(graph, f.rows, f.gamma, f.Z, f.b)
-    write_positions(graph.bodies, f.poses, w.q)
-    write_velocities(graph.bodies, f.poses, w.qd)
-    write_accelerations(graph.bodies, f.poses, f.Z, w.qdd)
+    write_state(graph, c.work, f)
     return OK
 
 

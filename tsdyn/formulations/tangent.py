@@ -232,13 +232,18 @@ def accelerate(context, t, y, yd, unused):
 def complete(context, yd):
     """Write q, qd and qdd after `accelerate`, the accelerations refined once by H (rdd, omega'd) + gamma."""
     c = load(context)
-    w, f, graph = c.work, c.tangent, c.graph
+    write_state(c.graph, c.work, c.tangent)
+    return OK
+
+
+@kernel
+def write_state(graph, w, f):
+    """Write q, qd and qdd of the poses and of accelerations Z, projected onto H (rdd, omega'd) + gamma = 0."""
     if f.b.size > 0:
         constrain(graph, f.rows, f.gamma, f.Z, f.b)
     write_positions(graph.bodies, f.poses, w.q)
     write_velocities(graph.bodies, f.poses, w.qd)
     write_accelerations(graph.bodies, f.poses, f.Z, w.qdd)
-    return OK
 
 
 @callback("p")

@@ -19,7 +19,6 @@ from .tolerances import (
     BODIES,
     EPS,
     FLOOR,
-    HELD,
     ILL_CONDITIONED,
     NEAR_SINGULAR,
     OUTPUTS,
@@ -243,7 +242,7 @@ def dense_output(solution):
 
 def off_steps(solution):
     """How far dense output may be off the ends of steps, relative to the coordinates."""
-    return SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + HELD / (extent(solution) or 1.0)
+    return SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0)
 
 
 def is_near_singular(solution):

@@ -139,7 +139,7 @@ def newton_euler(solution):
         return
     around = _neighbours(solution.scene)
     sums = [_loads(solution, bodies[i], around[id(bodies[i])]) for i in some(len(bodies), BODIES)]
-    largest, limit = max(one.size_of_force.max() for one in sums), BALANCE + rounding_of_places(solution)
+    largest, limit = max(one.size_of_force.max() for one in sums), _balance_limit(solution)
     for one in sums:
         yield _balance("force balance", one.force, one.size_of_force, largest, limit, one.body)
         if one.body.dimension == 7:
@@ -208,6 +208,11 @@ def rounding_of_places(solution):
     nearest = cKDTree(places).query(places, k=[min(2, len(bodies))])[0][:, 0]
     farthest = max(np.abs(solution.position(body)).max() for body in bodies)
     return ROUNDINGS * EPS * float(farthest / (np.median(np.maximum(nearest, radii)) or 1.0))
+
+
+def _balance_limit(solution):
+    """Share of the terms of a balance that may be left."""
+    return BALANCE * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + rounding_of_places(solution)
 
 
 def _balance(law, left, sizes, largest, limit, body):

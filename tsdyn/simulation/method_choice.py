@@ -44,7 +44,7 @@ def instead(task, status):
 def implicit_is_faster(simulate, given, method, end, run):
     """Return True if a run by a method that is found stiff had better go on by an implicit one, until the end.
 
-    `given` are the arguments of the run, by name. A short pilot settles clear cases, a longer one the others; neither is
+    `given` are the arguments of the run, by name. A short pilot settles clear cases, a longer one the others. None is
     made where the rest of the run costs no more.
     """
     start, sharp = float(run.clock.t), any(force.sharp for force in given["scene"].forces)

@@ -13,12 +13,11 @@ from ..maths.row_rank import row_lengths
 from ..maths.sparse_lu import sparse_lu
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
-from ..observables.tolerances import LARGE
-from .tolerances import IMMOBILE, LEAST_DIVISOR, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
+from .tolerances import DENSE, IMMOBILE, LEAST_DIVISOR, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
 
 
 class Metric:
-    """Constraints of a packed scene at time t as rows (m', x), dense or (above 1000 coordinates) sparse.
+    """Constraints of a packed scene at time t as rows (m', x), dense or, of more than DENSE coordinates, sparse.
 
     held (n,) marks coordinates that are fixed.
     """
@@ -27,7 +26,7 @@ class Metric:
         system = packed.system
         rigid = system.bodies[:, 1] == 7
         self.packed, self.t, self.n = packed, t, int(system.bodies[:, 1].sum())
-        self.sparse = self.n > LARGE
+        self.sparse = self.n > DENSE
         self.system = with_short_rows(packed) if self.sparse else system
         starts = np.cumsum([0, *np.where(rigid, 6, 3)])
         self.size = int(starts[-1])

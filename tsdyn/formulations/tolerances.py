@@ -45,6 +45,9 @@ LOAD_SWEEPS, DAMPED, DAMPED_SHARE = 40, 12, 0.5
 # leaves rounding; two digits less are asked for, since the matrix is that of the multipliers before.
 NEWTON_DONE = 1e-10
 
+# Normal parts of a stage's correction over what its iteration may leave: below it they change no load.
+NEGLIGIBLE = 0.1
+
 # 1 / m: what Newton's method leaves of an error, over its square, until it is measured. One over a metre: links of
 # usual size.
 CURVATURE = 1.0

@@ -48,6 +48,8 @@ call_reduce = caller("pd")
 call_solve = caller("pp")
 call_soften = caller("ppdp")
 call_recall = caller("ppp")
+call_residual = caller("pdppp")
+call_correct = caller("pdppdd", "d")
 
 
 def memory_of(stages, n):
@@ -86,25 +88,47 @@ def _set_stage(g, k, known, xs, ys):
 
 
 @kernel
-def _correct(context, l, g, k, f, dx):
+def _is_direct(c):
+    """Whether the form solves a stage's equations for positions, velocities and reactions at the same time."""
+    return c.linear.kernels.residual != 0 and c.graph.frictions.shape[0] == 0
+
+
+@kernel
+def _evaluate(context, c, r, t, xs, ys, k, f):
+    """Evaluate the equations of a stage at (t, xs, ys) and k; f = the accelerations there, if it needs them. Status."""
+    if _is_direct(c):
+        return call_residual(c.linear.kernels.residual, context, t, xs, ys, k)
+    status = call_place(r.kernels.place, context, t, xs)
+    if status == 0:
+        status = call_accelerate(r.kernels.accelerate, context, t, ys, f, f)
+    return status
+
+
+@kernel
+def _correct(context, c, g, k, f, dx):
     """k += P^-1 A (f - k); the size of g times it, and of g^2 times it, in the error norm."""
-    for c in range(k.size):
-        f[c] -= k[c]
+    l = c.linear
+    if _is_direct(c):
+        return call_correct(l.kernels.correct, context, g, k, l.now, l.numbers.rtol, l.numbers.atol)
+    for i in range(k.size):
+        f[i] -= k[i]
     call_solve(l.kernels.solve, context, f)
-    for c in range(k.size):
-        k[c] += f[c]
-        f[c] *= g
-        dx[c] = g * f[c]
+    for i in range(k.size):
+        k[i] += f[i]
+        f[i] *= g
+        dx[i] = g * f[i]
     return call_norm(l.kernels.error_norm, context, dx, f, l.now, l.numbers.rtol, l.numbers.atol)
 
 
 @kernel
-def _is_near(context, l, g, k, guess, f, dx):
+def _is_near(context, c, g, k, guess, f, dx):
     """Return True if the positions of a solution are near to those of its prediction: another one may be far."""
-    for c in range(k.size):
-        f[c] = 0.0  # of velocities a stiff transient may change any amount
-        dx[c] = g * g * (k[c] - guess[c])
-    return call_norm(l.kernels.error_norm, context, dx, f, l.now, 1.0, 1.0) < TOO_FAR
+    l = c.linear
+    for i in range(k.size):
+        f[i] = 0.0  # of velocities a stiff transient may change any amount
+        dx[i] = g * g * (k[i] - guess[i])
+    norm = l.kernels.distance if _is_direct(c) else l.kernels.error_norm
+    return call_norm(norm, context, dx, f, l.now, 1.0, 1.0) < TOO_FAR
 
 
 @kernel
@@ -123,9 +147,7 @@ def _solve_stage(context, c, r, i, t, g):
     l.numbers.eager -= 1
     for _ in range(ITERATIONS):
         _set_stage(g, k, known, xs, ys)
-        status = call_place(r.kernels.place, context, t, xs)
-        if status == 0:
-            status = call_accelerate(r.kernels.accelerate, context, t, ys, f, f)
+        status = _evaluate(context, c, r, t, xs, ys, k, f)
         if status != 0:
             return status
         w.counters.stage_iterations += 1
@@ -141,7 +163,7 @@ def _solve_stage(context, c, r, i, t, g):
             if _renew_matrix(context, c, t, g, f, slow == MATRICES) != 0:
                 return STAGE_FAILED
             before, theta, measured = math.inf, GUESS, False
-        size = _correct(context, l, g, k, f, dx)
+        size = _correct(context, c, g, k, f, dx)
         if not size < math.inf:
             return STAGE_FAILED
         if before < math.inf:
@@ -153,7 +175,7 @@ def _solve_stage(context, c, r, i, t, g):
         if size <= floor or stuck or (theta < 1.0 and size * theta <= KAPPA * (1.0 - theta)):
             l.numbers.theta = min(max(theta, LEAST), GUESS)
             _set_stage(g, k, known, xs, ys)
-            return 0 if _is_near(context, l, g, k, guess, f, dx) else STAGE_FAILED
+            return 0 if _is_near(context, c, g, k, guess, f, dx) else STAGE_FAILED
         before = size
     return STAGE_FAILED
 
@@ -196,6 +218,7 @@ def implicit_step(context, run, t, h):
                 k[j] += ratio * (r.yd[j] - k_before[j])
         status = _solve_stage(context, c, r, i, t + h * row[1], h * row[2 + i])
         if status != 0:
+            c.linear.numbers.rates_of = 0
             return status
     combine(tableau[1 + stages * width :], stages, h, 2 * n, memory, memory)
     copy(x, r.dx)

@@ -22,19 +22,18 @@ import math
 from ..elements.loops.body_poses import write_positions, write_velocities
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
-from ..jit.simd import put
+from ..jit.simd import add, fma, four, lanes, put, splat
 from ..maths.dense_linalg import copy, largest
 from ..methods.explicit import NORM
 from ..methods.tolerances import KAPPA
 from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
     apply_multipliers,
+    correct_levels,
     evaluate_bias,
     evaluate_drift,
     evaluate_rows,
-    multiply_rates,
-    multiply_rows,
-    solve_product,
+    level_residuals,
     solve_saddle,
     take_reactions,
 )
@@ -69,6 +68,7 @@ def residual(context, t, x, y, k):
     if not displace(graph, l, f.poses):
         return CHART_LOST
     turn_rates(graph, l, l.y, f.poses)
+    turn_accelerations(graph, l, f.poses, vector(k, n), s.a)
     if f.b.size > 0:
         _evaluate_levels(graph, system, f, l, s, t)
     if system.forces.shape[0] > 0:
@@ -76,21 +76,17 @@ def residual(context, t, x, y, k):
         write_velocities(graph.bodies, f.poses, w.qd)
     body_forces(graph, system, w, f, t)
     copy(f.Z, s.loads)
-    turn_accelerations(graph, l, f.poses, vector(k, n), s.a)
-    return OK if largest(s.Phi) + largest(s.rates) + largest(s.loads) < math.inf else NOT_FINITE
+    return OK if largest(s.levels) + largest(s.loads) < math.inf else NOT_FINITE
 
 
 @kernel
 def _evaluate_levels(graph, system, f, l, s, t):
-    """s.Phi = Phi, H, s.rates = H (rd, omega') + Phi_t and gamma at the poses."""
+    """H, gamma and the residuals of the rows at the poses and the accelerations s.a."""
     evaluate_rows(graph, system, f, f.rows, t)
-    copy(f.b, s.Phi)
-    multiply_rates(graph, f.rows, f.poses, s.rates)
     if is_rheonomic(system):
         evaluate_drift(graph, system, f, t, l.drift)
-        for e in range(s.rates.size):
-            s.rates[e] += l.drift[e]
     evaluate_bias(graph, system, f, t)
+    level_residuals(graph, f, s.a, l.drift, s.levels)
 
 
 @callback("pdppdd", "d")
@@ -98,61 +94,57 @@ def correct(context, g, k, old, rtol, atol):
     """Correct k (8 b,), u, z and the multipliers; the size of the change in the error norm, as `distance`."""
     c = load(context)
     w, f, l, s, graph = c.work, c.tangent, c.chart, c.saddle, c.graph
-    k, old, n = vector(k, l.x.size - 8), vector(old, 3 * w.q.size), w.q.size
+    k, old, n, step = vector(k, l.x.size - 8), vector(old, 3 * w.q.size), w.q.size, l.x.size
+    p, v = s.motions[:step], s.motions[step : 2 * step]
     turn_accelerations(graph, l, f.poses, k, s.a)
-    for i in range(s.p.size):
-        s.p[i] = s.w[i] = s.r[i] = 0.0
+    for i in range(s.motions.size):
+        s.motions[i] = 0.0
     normal = 0.0
     if f.b.size > 0:
-        far = _find_normal_parts(graph, w, f, l, s, g)
-        rates = weighted_square(graph, l, s.p, w.qd, old, n, rtol, atol) / (g * g) if far else 0.0  # what p may change
-        square = weighted_square(graph, l, s.p, w.q, old, 0, rtol, atol)
-        normal = square + rates + weighted_square(graph, l, s.w, w.qd, old, n, rtol, atol)
+        far = _find_normal_parts(graph, w, l, s, g)
+        rates = weighted_square(graph, l, p, w.qd, old, n, rtol, atol) / (g * g) if far else 0.0  # what p may change
+        normal = rates + weighted_square(graph, l, p, w.q, old, 0, rtol, atol)
+        normal += weighted_square(graph, l, v, w.qd, old, n, rtol, atol)
     _balance(graph, f, l, s)
     if normal > (NEGLIGIBLE * KAPPA) ** 2 * (2 * n):
-        to_bodies(graph, l, s.p, f.Z)
+        to_bodies(graph, l, p, f.Z)
         add_blocks(graph, s, s.K, 1.0, f.Z)
-        to_bodies(graph, l, s.w, f.Z)
+        to_bodies(graph, l, v, f.Z)
         add_blocks(graph, s, s.C, 1.0, f.Z)
     solve_saddle(s)
     take_solution(graph, s)
     _move(graph, l, s, g, k)
-    size = weighted_square(graph, l, s.p, w.q, old, 0, rtol, atol)
-    size += weighted_square(graph, l, s.w, w.qd, old, n, rtol, atol)
+    size = weighted_square(graph, l, p, w.q, old, 0, rtol, atol)
+    size += weighted_square(graph, l, v, w.qd, old, n, rtol, atol)
     return math.sqrt(max(size, normal) / (2 * n))
 
 
 @kernel
-def _find_normal_parts(graph, w, f, l, s, g):
-    """s.p, s.w and s.r, normal parts of corrections in chart coordinates, and u and z; True if Phi is no rounding.
+def _find_normal_parts(graph, w, l, s, g):
+    """Normal parts of the corrections s.motions, and u and z; True if Phi is more than rounding.
 
-    A change n of the accelerations moves x and xd by g^2 n and g n: u and z take them off again.
+    A change of the accelerations by n moves x and xd by g^2 n and g n, which u and z take off again.
     """
+    worst = 0.0
+    for i in range(0, s.levels.size, 4):
+        worst = max(worst, abs(s.levels[i]))
+    if worst <= w.control.floor:
+        for i in range(0, s.levels.size, 4):
+            s.levels[i] = 0.0
     made = l.state.made == w.counters.charts
     lower, upper = l.lower if made else l.rows0.S, l.upper if made else l.rows0.S
-    worst = largest(s.Phi)
-    if worst > w.control.floor:
-        solve_product(graph, lower, upper, s.Phi)
-        apply_multipliers(graph, l.rows0, s.Phi, s.p)
-        for e in range(f.b.size):
-            w.u[e] += s.Phi[e]
-    solve_product(graph, lower, upper, s.rates)
-    apply_multipliers(graph, l.rows0, s.rates, s.w)
-    multiply_rows(graph, f.rows, s.a, f.b)
-    for e in range(f.b.size):
-        f.b[e] += f.gamma[e]
-    solve_product(graph, lower, upper, f.b)
-    apply_multipliers(graph, l.rows0, f.b, s.r)
-    for e in range(f.b.size):
-        w.u[e] -= g * g * f.b[e]
-        s.z[e] += s.rates[e] - g * f.b[e]
+    correct_levels(graph, l.rows0, lower, upper, s.levels, s.motions)
+    for e in range(s.z.size):
+        i = 4 * e
+        w.u[e] += s.levels[i] - g * g * s.levels[i + 2]
+        s.z[e] += s.levels[i + 1] - g * s.levels[i + 2]
     return worst > ROUNDING_AT_MOST * w.control.floor
 
 
 @kernel
 def _balance(graph, f, l, s):
     """s.x = F - M (a + C n) - H^T lam, and zero for the rows."""
-    to_bodies(graph, l, s.r, f.Z)
+    to_bodies(graph, l, s.motions[2 * l.x.size :], f.Z)
     for i in range(s.a.size):
         f.Z[i] += s.a[i]
     weigh_motion(graph, s, f.Z)
@@ -166,22 +158,19 @@ def _balance(graph, f, l, s):
 
 @kernel
 def _move(graph, l, s, g, k):
-    """k += e + n; s.p and s.w, the changes of positions and velocities."""
+    """k += e + n; e is added to the corrections of positions and velocities, too."""
     for b in range(graph.bodies.shape[0]):
         at, o = s.graph.body_at[b], 8 * b
-        for c in range(3):
-            _shift(s, g, k, o + c, s.x[at + c])
+        _shift(s, l.x.size, g, k, o, lanes(s.x[at], s.x[at + 1], s.x[at + 2]))
         if graph.bodies[b, 1] == 7:
-            put(s.e, o + 4, turned_back(l, b, s, at + 3))
-            for c in range(3):
-                _shift(s, g, k, o + 4 + c, s.e[o + 4 + c])
+            _shift(s, l.x.size, g, k, o + 4, turned_back(l, b, s, at + 3))
 
 
 @kernel
-def _shift(s, g, k, i, e):
-    k[i] += e + s.r[i]
-    s.w[i] += g * e
-    s.p[i] += g * g * e
+def _shift(s, step, g, k, i, e):
+    put(k, i, add(four(k, i), add(e, four(s.motions, 2 * step + i))))
+    put(s.motions, step + i, fma(e, splat(g), four(s.motions, step + i)))
+    put(s.motions, i, fma(e, splat(g * g), four(s.motions, i)))
 
 
 @callback(NORM, "d")

@@ -1,20 +1,18 @@
-"""Newton's method for a stage of an implicit method in the tangent form: the equations of all levels at once.
+"""Newton's method for a stage of an implicit method in the tangent form, without factors of S.
 
     Phi(q) = 0                         q  at x - Y0 u
     H C (xd - Y0 z) + Phi_t = 0        qd at xd - Y0 z
     H a + gamma = 0                    a = (rdd, omega'd), the accelerations k of chart coordinates
     M a + H^T lam = F
 
-x and xd are those of k. An iteration evaluates the rows and the loads once and corrects u, z, k and lam. With N of an
-older place, p = -Y0 N^-1 Phi, w = -Y0 N^-1 (H C (xd - Y0 z) + Phi_t) and n = -Y0 N^-1 (H a + gamma) are the normal
-parts of the corrections of positions, velocities and accelerations; the tangent part e follows from the saddle-point
-matrix (saddle_point.py), as bodies move by C p and C w:
+x and xd are those of k. `residual` solves the first two for u and z, as exactly as the stage needs it, and evaluates
+the others. `correct` takes n = -Y0 N^-1 (H a + gamma) for the normal part of the correction of k; the tangent part e
+follows with the multipliers from the saddle-point matrix (saddle_point.py):
 
-    [ M - g C_b - g^2 K_b    H^T ] [ C e  ]     [ F - M (a + C n) - H^T lam + K_b C p + C_b C w ]
-    [ H                      0   ] [ dlam ]  =  [ 0                                             ]
+    [ M - g C_b - g^2 K_b    H^T ] [ C e  ]     [ F - M (a + C n) - H^T lam ]
+    [ H                      0   ] [ dlam ]  =  [ 0                         ]
 
-Neither factors of S nor, at every place, those of N are needed. What the iteration leaves of Phi is of the size of its
-tolerance; the position solve at the end of a step removes it.
+The factors of N are those of an older place as long as they contract.
 """
 
 import math
@@ -22,155 +20,275 @@ import math
 from ..elements.loops.body_poses import write_positions, write_velocities
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
-from ..jit.simd import add, fma, four, lanes, put, splat
+from ..jit.simd import add, four, lanes, put, splat
 from ..maths.dense_linalg import copy, largest
 from ..methods.explicit import NORM
 from ..methods.tolerances import KAPPA
 from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
     apply_multipliers,
-    correct_levels,
     evaluate_bias,
     evaluate_drift,
     evaluate_rows,
-    level_residuals,
+    multiply_rates,
+    multiply_rows,
+    solve_product,
     solve_saddle,
     take_reactions,
+    weigh,
+    weigh_bodies,
 )
 from ..workspaces.workspace import load
 from .accelerations import body_forces
-from .chart_coordinates import displace, to_bodies, turn_accelerations, turn_rates
-from .saddle_point import add_blocks, degrees, take_solution, turned_back, weigh_motion
+from .chart_coordinates import displace, factorise_normal, largest_rates, to_bodies, turn_accelerations, turn_rates
+from .saddle_point import degrees, take_solution, turned_back
 from .tangent_error import weighted_square
-from .tolerances import NEGLIGIBLE, ROUNDING_AT_MOST
+from .tolerances import (
+    LAG,
+    LEAST_LAG,
+    LEFT,
+    REACTION_SWEEPS,
+    REACTIONS_LEFT,
+    ROUNDING_AT_MOST,
+    SLOW,
+    SPEED_ROUNDING,
+    STALLED,
+    SWEEPS,
+)
 
-OK, NOT_FINITE, CHART_LOST = int(Status.SUCCESS), int(Status.NOT_FINITE), int(Status.CHART_LOST)
+OK, NOT_FINITE, SINGULAR = int(Status.SUCCESS), int(Status.NOT_FINITE), int(Status.SINGULAR)
+CHART_LOST, NEWTON_FAILED = int(Status.CHART_LOST), int(Status.NEWTON_FAILED)
 
 
-@callback("pdppp")
-def residual(context, t, x, y, k):
-    """Evaluate rows and loads at chart coordinates x and rates y, and the accelerations of bodies that k is. Status."""
+@callback("pddppp")
+def residual(context, t, g, x, y, k):
+    """Place the stage at chart coordinates x and rates y; rows, loads and the accelerations of bodies there. Status."""
     c = load(context)
     system, w, f, l, s, graph = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph
-    n = l.x.size - 8
+    numbers, n = c.linear.numbers, l.x.size - 8
     l.state.time = t
     w.counters.evaluations += 1
     if not set_time(system, t):
         return NOT_FINITE
-    if c.linear.numbers.rates_of != w.counters.charts:
-        c.linear.numbers.rates_of = w.counters.charts
+    if numbers.rates_of != w.counters.charts:
+        numbers.rates_of, numbers.lag = w.counters.charts, LAG
         for e in range(s.z.size):
             s.z[e] = 0.0
     copy(vector(x, n), l.x)
     copy(vector(y, n), l.y)
     apply_multipliers(graph, l.rows0, w.u, l.x)
     apply_multipliers(graph, l.rows0, s.z, l.y)
-    if not displace(graph, l, f.poses):
-        return CHART_LOST
-    turn_rates(graph, l, l.y, f.poses)
-    turn_accelerations(graph, l, f.poses, vector(k, n), s.a)
-    if f.b.size > 0:
-        _evaluate_levels(graph, system, f, l, s, t)
+    status = _solve_positions(c, t, g)
+    if status == OK:
+        status = _solve_rates(c, t)
+    if status != OK:
+        return status
     if system.forces.shape[0] > 0:
         write_positions(graph.bodies, f.poses, w.q)
         write_velocities(graph.bodies, f.poses, w.qd)
+    if f.b.size > 0:
+        evaluate_bias(graph, system, f, t)
     body_forces(graph, system, w, f, t)
     copy(f.Z, s.loads)
-    return OK if largest(s.levels) + largest(s.loads) < math.inf else NOT_FINITE
+    turn_accelerations(graph, l, f.poses, vector(k, n), s.a)
+    return OK if largest(s.loads) < math.inf else NOT_FINITE
 
 
 @kernel
-def _evaluate_levels(graph, system, f, l, s, t):
-    """H, gamma and the residuals of the rows at the poses and the accelerations s.a."""
-    evaluate_rows(graph, system, f, f.rows, t)
-    if is_rheonomic(system):
+def _renew_normal(c):
+    """Factors of N at the present place; False if it is singular."""
+    c.linear.numbers.lag = LEAST_LAG
+    return factorise_normal(c.graph, c.work, c.tangent, c.chart)
+
+
+@kernel
+def _add(x, out):
+    """Add x to out."""
+    for i in range(x.size):
+        out[i] += x[i]
+
+
+@kernel
+def _solve_normal(c):
+    """f.b <- N^-1 f.b, by factors that may be of an older place, such as q0 of the chart."""
+    l = c.chart
+    made = l.state.made == c.work.counters.charts
+    solve_product(c.graph, l.lower if made else l.rows0.S, l.upper if made else l.rows0.S, c.tangent.b)
+
+
+@kernel
+def _take_off(c, x):
+    """f.b <- N^-1 f.b and x -= Y0 f.b; s.r is the change of x."""
+    f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
+    _solve_normal(c)
+    for i in range(s.r.size):
+        s.r[i] = 0.0
+    apply_multipliers(graph, l.rows0, f.b, s.r)
+    for i in range(x.size):
+        x[i] += s.r[i]
+
+
+@kernel
+def _rate_size(c, x):
+    """The error norm of a change x of rates in chart coordinates."""
+    numbers, n = c.linear.numbers, c.work.q.size
+    square = weighted_square(c.graph, c.chart, x, c.work.qd, c.linear.now[1], 0, numbers.rtol, numbers.atol)
+    return math.sqrt(square / (2 * n))
+
+
+@kernel
+def _solve_positions(c, t, g):
+    """Newton's method for u: poses and H. Status.
+
+    What it leaves of a position, over g, is to be no velocity that the stage would notice.
+    """
+    system, w, f, l, s, graph, numbers = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
+    floor, before, renewed = w.control.floor, math.inf, False
+    for _ in range(SWEEPS):
+        if not displace(graph, l, f.poses):
+            return CHART_LOST
+        if f.b.size == 0:
+            return OK
+        evaluate_rows(graph, system, f, f.rows, t)
+        worst = largest(f.b)
+        if not worst < math.inf:
+            return NOT_FINITE
+        if worst <= floor or (worst > SLOW * before and worst <= ROUNDING_AT_MOST * floor):
+            return OK
+        if before < math.inf:
+            numbers.lag = max(worst / before, LEAST_LAG)
+            if numbers.lag > SLOW and renewed:
+                return NEWTON_FAILED
+            if not renewed:  # one correction was not enough
+                if not _renew_normal(c):
+                    return SINGULAR
+                renewed = True
+        _take_off(c, l.x)
+        _add(f.b, w.u)
+        w.counters.newton += 1
+        if numbers.lag * _rate_size(c, s.r) <= g * LEFT * KAPPA:
+            return OK if displace(graph, l, f.poses) else CHART_LOST
+        before = worst
+    return NEWTON_FAILED
+
+
+@kernel
+def _solve_rates(c, t):
+    """rd and omega' of the poses from the rates l.y, tangent as far as the stage notices. Status."""
+    system, w, f, l, s, graph, numbers = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
+    rheonomic, floor, before, renewed = is_rheonomic(system), 0.0, math.inf, False
+    if rheonomic:
         evaluate_drift(graph, system, f, t, l.drift)
-    evaluate_bias(graph, system, f, t)
-    level_residuals(graph, f, s.a, l.drift, s.levels)
+    for sweep in range(SWEEPS):
+        turn_rates(graph, l, l.y, f.poses)
+        if f.b.size == 0:
+            return OK
+        if sweep == 0:
+            speed, spin = largest_rates(graph, f.poses)
+            floor = SPEED_ROUNDING * (speed + w.control.size * spin)
+        multiply_rates(graph, f.rows, f.poses, f.b)
+        if rheonomic:
+            _add(l.drift, f.b)
+        worst = largest(f.b)
+        if not worst < math.inf:
+            return NOT_FINITE
+        if worst <= floor or (worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):
+            return OK
+        if worst > SLOW * before:
+            if renewed:
+                return NEWTON_FAILED
+            if not _renew_normal(c):
+                return SINGULAR
+            renewed = True
+        _take_off(c, l.y)
+        _add(f.b, s.z)
+        if numbers.lag * _rate_size(c, s.r) <= LEFT * KAPPA:
+            turn_rates(graph, l, l.y, f.poses)
+            return OK
+        before = worst
+    return NEWTON_FAILED
 
 
-@callback("pdppdd", "d")
-def correct(context, g, k, old, rtol, atol):
-    """Correct k (8 b,), u, z and the multipliers; the size of the change in the error norm, as `distance`."""
+@callback("pdp", "d")
+def correct(context, g, k):
+    """Correct k (8 b,) and the multipliers; the size of the change of positions and velocities in the error norm."""
     c = load(context)
-    w, f, l, s, graph = c.work, c.tangent, c.chart, c.saddle, c.graph
-    k, old, n, step = vector(k, l.x.size - 8), vector(old, 3 * w.q.size), w.q.size, l.x.size
-    p, v = s.motions[:step], s.motions[step : 2 * step]
+    w, f, l, s, graph, numbers = c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
+    k, n = vector(k, l.x.size - 8), w.q.size
     turn_accelerations(graph, l, f.poses, k, s.a)
-    for i in range(s.motions.size):
-        s.motions[i] = 0.0
-    normal = 0.0
-    if f.b.size > 0:
-        far = _find_normal_parts(graph, w, l, s, g)
-        rates = weighted_square(graph, l, p, w.qd, old, n, rtol, atol) / (g * g) if far else 0.0  # what p may change
-        normal = rates + weighted_square(graph, l, p, w.q, old, 0, rtol, atol)
-        normal += weighted_square(graph, l, v, w.qd, old, n, rtol, atol)
-    _balance(graph, f, l, s)
-    if normal > (NEGLIGIBLE * KAPPA) ** 2 * (2 * n):
-        to_bodies(graph, l, p, f.Z)
-        add_blocks(graph, s, s.K, 1.0, f.Z)
-        to_bodies(graph, l, v, f.Z)
-        add_blocks(graph, s, s.C, 1.0, f.Z)
+    _correct_normal_part(c, g, k)
+    _balance(c)
     solve_saddle(s)
     take_solution(graph, s)
-    _move(graph, l, s, g, k)
-    size = weighted_square(graph, l, p, w.q, old, 0, rtol, atol)
-    size += weighted_square(graph, l, v, w.qd, old, n, rtol, atol)
-    return math.sqrt(max(size, normal) / (2 * n))
+    for b in range(graph.bodies.shape[0]):
+        at, o = s.graph.body_at[b], 8 * b
+        put(s.r, o, lanes(s.x[at], s.x[at + 1], s.x[at + 2]))
+        put(k, o, add(four(k, o), four(s.r, o)))
+        if graph.bodies[b, 1] == 7:
+            put(s.r, o + 4, turned_back(l, b, s, at + 3))
+            put(k, o + 4, add(four(k, o + 4), four(s.r, o + 4)))
+    square = weighted_square(graph, l, s.r, w.q, c.linear.now[0], 0, numbers.rtol, numbers.atol)
+    return g * math.sqrt(square * g * g / (2 * n) + _rate_size(c, s.r) ** 2)
 
 
 @kernel
-def _find_normal_parts(graph, w, l, s, g):
-    """Normal parts of the corrections s.motions, and u and z; True if Phi is more than rounding.
-
-    A change of the accelerations by n moves x and xd by g^2 n and g n, which u and z take off again.
-    """
-    worst = 0.0
-    for i in range(0, s.levels.size, 4):
-        worst = max(worst, abs(s.levels[i]))
-    if worst <= w.control.floor:
-        for i in range(0, s.levels.size, 4):
-            s.levels[i] = 0.0
-    made = l.state.made == w.counters.charts
-    lower, upper = l.lower if made else l.rows0.S, l.upper if made else l.rows0.S
-    correct_levels(graph, l.rows0, lower, upper, s.levels, s.motions)
-    for e in range(s.z.size):
-        i = 4 * e
-        w.u[e] += s.levels[i] - g * g * s.levels[i + 2]
-        s.z[e] += s.levels[i + 1] - g * s.levels[i + 2]
-    return worst > ROUNDING_AT_MOST * w.control.floor
+def _correct_normal_part(c, g, k):
+    """k += n; s.r = n. A change n moves x and xd by g^2 n and g n, which u and z take off again."""
+    w, f, s = c.work, c.tangent, c.saddle
+    if f.b.size == 0:
+        for i in range(s.r.size):
+            s.r[i] = 0.0
+        return
+    multiply_rows(c.graph, f.rows, s.a, f.b)
+    _add(f.gamma, f.b)
+    _take_off(c, k)
+    for e in range(f.b.size):
+        w.u[e] -= g * g * f.b[e]
+        s.z[e] -= g * f.b[e]
 
 
 @kernel
-def _balance(graph, f, l, s):
-    """s.x = F - M (a + C n) - H^T lam, and zero for the rows."""
-    to_bodies(graph, l, s.motions[2 * l.x.size :], f.Z)
-    for i in range(s.a.size):
-        f.Z[i] += s.a[i]
-    weigh_motion(graph, s, f.Z)
-    copy(s.loads, s.e)
+def _balance(c):
+    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for the rows."""
+    f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
+    to_bodies(graph, l, s.r, f.Z)
+    _add(s.a, f.Z)
+    for b in range(graph.bodies.shape[0]):
+        weigh(graph.mass, b, f.Z, 8 * b, f.Z, 8 * b)
+    for i in range(s.e.size):
+        s.e[i] = s.loads[i] - f.Z[i]
     take_reactions(graph, f.rows, s.multipliers, s.e)
+    if f.b.size > 0:
+        _settle_reactions(c)
+    for i in range(s.x.size):
+        s.x[i] = 0.0
     for b in range(graph.bodies.shape[0]):
         at, o = s.graph.body_at[b], 8 * b
         for i in range(degrees(graph, b)):
-            s.x[at + i] = s.e[o + i + i // 3] - s.x[at + i]
+            s.x[at + i] = s.e[o + i + i // 3]
 
 
 @kernel
-def _move(graph, l, s, g, k):
-    """k += e + n; e is added to the corrections of positions and velocities, too."""
-    for b in range(graph.bodies.shape[0]):
-        at, o = s.graph.body_at[b], 8 * b
-        _shift(s, l.x.size, g, k, o, lanes(s.x[at], s.x[at + 1], s.x[at + 2]))
-        if graph.bodies[b, 1] == 7:
-            _shift(s, l.x.size, g, k, o + 4, turned_back(l, b, s, at + 3))
+def _settle_reactions(c):
+    """Correct lam by N^-1 H W e until H W e, e = F - M (a + C n) - H^T lam, is small; s.e = e.
 
-
-@kernel
-def _shift(s, step, g, k, i, e):
-    put(k, i, add(four(k, i), add(e, four(s.motions, 2 * step + i))))
-    put(s.motions, step + i, fma(e, splat(g), four(s.motions, step + i)))
-    put(s.motions, i, fma(e, splat(g * g), four(s.motions, i)))
+    H of the saddle-point matrix may be that of an older place: it would take a part of what is left for a load.
+    """
+    f, s, graph, least = c.tangent, c.saddle, c.graph, 0.0
+    for sweep in range(REACTION_SWEEPS):
+        copy(s.e, f.Z)
+        put(f.Z, 8 * graph.bodies.shape[0], splat(0.0))  # the ground
+        put(f.Z, 8 * graph.bodies.shape[0] + 4, splat(0.0))
+        weigh_bodies(graph, f.Z)
+        multiply_rows(graph, f.rows, f.Z, f.b)
+        worst = largest(f.b)
+        if sweep == 0:
+            least = REACTIONS_LEFT * worst
+        if worst <= least:
+            return
+        _solve_normal(c)
+        _add(f.b, s.multipliers)
+        take_reactions(graph, f.rows, f.b, s.e)
 
 
 @callback(NORM, "d")

@@ -45,8 +45,15 @@ LOAD_SWEEPS, DAMPED, DAMPED_SHARE = 40, 12, 0.5
 # leaves rounding; two digits less are asked for, since the matrix is that of the multipliers before.
 NEWTON_DONE = 1e-10
 
-# Normal parts of a stage's correction over what its iteration may leave: below it they change no load.
-NEGLIGIBLE = 0.1
+# What a stage's iteration may leave (KAPPA), as a share of it: what the solves for u and z leave at each place.
+LEFT = 0.1
+
+# Contraction of corrections by factors of N of an older place: assumed in a new chart, and the least that is trusted.
+LAG, LEAST_LAG = 0.1, 0.01
+
+# Corrections of the multipliers by these factors in an iteration of a stage, and what may be left of the unbalanced
+# loads along the rows, relative: a change of H since the iteration matrix was made acts on that.
+REACTION_SWEEPS, REACTIONS_LEFT = 5, 1e-4
 
 # 1 / m: what Newton's method leaves of an error, over its square, until it is measured. One over a metre: links of
 # usual size.

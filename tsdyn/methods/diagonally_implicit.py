@@ -48,8 +48,8 @@ call_reduce = caller("pd")
 call_solve = caller("pp")
 call_soften = caller("ppdp")
 call_recall = caller("ppp")
-call_residual = caller("pdppp")
-call_correct = caller("pdppdd", "d")
+call_residual = caller("pddppp")
+call_correct = caller("pdp", "d")
 
 
 def memory_of(stages, n):
@@ -94,10 +94,10 @@ def _is_direct(c):
 
 
 @kernel
-def _evaluate(context, c, r, t, xs, ys, k, f):
+def _evaluate(context, c, r, t, g, xs, ys, k, f):  # nine: a stage and its equations
     """Evaluate the equations of a stage at (t, xs, ys) and k; f = the accelerations there, if it needs them. Status."""
     if _is_direct(c):
-        return call_residual(c.linear.kernels.residual, context, t, xs, ys, k)
+        return call_residual(c.linear.kernels.residual, context, t, g, xs, ys, k)
     status = call_place(r.kernels.place, context, t, xs)
     if status == 0:
         status = call_accelerate(r.kernels.accelerate, context, t, ys, f, f)
@@ -109,7 +109,7 @@ def _correct(context, c, g, k, f, dx):
     """k += P^-1 A (f - k); the size of g times it, and of g^2 times it, in the error norm."""
     l = c.linear
     if _is_direct(c):
-        return call_correct(l.kernels.correct, context, g, k, l.now, l.numbers.rtol, l.numbers.atol)
+        return call_correct(l.kernels.correct, context, g, k)
     for i in range(k.size):
         f[i] -= k[i]
     call_solve(l.kernels.solve, context, f)
@@ -147,7 +147,7 @@ def _solve_stage(context, c, r, i, t, g):
     l.numbers.eager -= 1
     for _ in range(ITERATIONS):
         _set_stage(g, k, known, xs, ys)
-        status = _evaluate(context, c, r, t, xs, ys, k, f)
+        status = _evaluate(context, c, r, t, g, xs, ys, k, f)
         if status != 0:
             return status
         w.counters.stage_iterations += 1

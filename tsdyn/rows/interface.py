@@ -5,7 +5,6 @@
 Evaluate, at the poses of f, t and the velocities:
     evaluate_rows           f.b = Phi, H            evaluate_residuals      f.b = Phi
     evaluate_bias           f.gamma = gamma         evaluate_drift          out = Phi_t
-    level_residuals         Phi, H (rd, omega') + Phi_t, H a + gamma
 Factorise:
     factorise_rows          Y, S = L D L^T          factorise_chart_matrix  N = H C Y0 = L D U
     factorise_product       H X^T = L D U
@@ -13,7 +12,6 @@ Factorise:
 Solve:
     solve_rows              b <- S^-1 b             solve_product           b <- N^-1 b
     multiply_rows           out = H Z               apply_multipliers       Z <- Z - Y^T lam
-    correct_levels          residuals of the three levels <- N^-1 residuals, and their motions
     find_correction         lam = S^-1 b, Z = -Y^T lam
     project                 lam = S^-1 H Z, Z <- Z - Y^T lam
     constrain               lam = S^-1 (H Z + c), Z <- Z - Y^T lam
@@ -33,7 +31,6 @@ from .axis_rows import add_axis_multipliers, is_axis
 from .chart_matrix import factorise_chart_matrix, factorise_product, pivot_loss, rotate_rate, solve_product
 from .evaluation import evaluate_bias, evaluate_drift, evaluate_every_row, evaluate_residuals, evaluate_rows
 from .held_rows import accelerations_hold, has_redundant_rows, note_loads, rates_hold, redundant_rows_hold
-from .level_residuals import correct_levels, level_residuals
 from .redundant_rows import (
     clear_redundant,
     keep_every_row,
@@ -95,7 +92,6 @@ __all__ = [
     "clear_redundant",
     "constrain",
     "constrain_accelerations",
-    "correct_levels",
     "count_self_stresses",
     "evaluate_bias",
     "evaluate_drift",
@@ -115,7 +111,6 @@ __all__ = [
     "is_next_to_singular",
     "is_singular_within_a_step",
     "keep_every_row",
-    "level_residuals",
     "list_redundant",
     "mark_redundant",
     "more",

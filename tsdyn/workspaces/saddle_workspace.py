@@ -24,10 +24,8 @@ class SaddleWorkspace(NamedTuple):
     x: np.ndarray  # (s,)  right-hand side and solution, in order of elimination
     r: np.ndarray  # ((nb + 1) * 8,)  tangent part of a vector of chart coordinates
     e: np.ndarray  # ((nb + 1) * 8,)  the same of an error of positions
-    loads: np.ndarray  # ((nb + 1) * 8,)  forces on bodies at a stage; stage_equations.py, as the next three
-    motions: np.ndarray  # (3 (nb + 1) * 8,)  corrections of positions, velocities and accelerations
-    z: np.ndarray  # (m,)  normal part of the velocities: xd - Y0 z
-    levels: np.ndarray  # (4 m,)  residuals of the rows at the three levels; rows/level_residuals.py
+    loads: np.ndarray  # ((nb + 1) * 8,)  forces on bodies at a stage; stage_equations.py
+    z: np.ndarray  # (m,)  normal part of the velocities: xd - Y0 z; stage_equations.py
     q: np.ndarray  # (14,)  coordinates of an instance's two bodies
     qd: np.ndarray  # (14,)
     zero: np.ndarray  # (14,)  accelerations that its derivatives don't depend on
@@ -50,9 +48,7 @@ def allocate_saddle(graph=None):
         **dict.fromkeys(("lower", "upper"), (size,)),
         "x": (s,),
         **dict.fromkeys(("multipliers", "z"), (len(graph.row_at),)),
-        "levels": (4 * len(graph.row_at),),
         **dict.fromkeys(("a", "r", "e", "loads"), (8 * (nb + 1) * wanted,)),
-        "motions": (24 * (nb + 1) * wanted,),
         **dict.fromkeys(("q", "qd", "zero", "R"), (local,)),
         "lam": (most,),
         **dict.fromkeys(("X", "Xd"), (local, local)),

@@ -16,6 +16,7 @@ class StageNumbers(Record):
     t_before: float  # s, start of the last step; -inf for the first one
     eager: int  # stages that are still to be begun with a matrix of their own
     rates_of: int  # counter of charts when z of the stages was last set; 0 where it is unknown
+    lag: float  # contraction of corrections by factors of N of an older place, as last measured
     fresh: int  # 1 if the derivatives of the forces' laws are to be taken by saddle_point.reduce
 
 

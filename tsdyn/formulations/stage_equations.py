@@ -44,6 +44,7 @@ from .chart_coordinates import displace, factorise_normal, largest_rates, to_bod
 from .saddle_point import degrees, take_solution, turned_back
 from .tangent_error import weighted_square
 from .tolerances import (
+    FARTHEST_AHEAD,
     LAG,
     LEAST_LAG,
     LEFT,
@@ -70,10 +71,7 @@ def residual(context, t, g, x, y, k):
     w.counters.evaluations += 1
     if not set_time(system, t):
         return NOT_FINITE
-    if numbers.rates_of != w.counters.charts:
-        numbers.rates_of, numbers.lag = w.counters.charts, LAG
-        for e in range(s.z.size):
-            s.z[e] = 0.0
+    _begin(numbers, s, w.counters.charts, t)
     copy(vector(x, n), l.x)
     copy(vector(y, n), l.y)
     apply_multipliers(graph, l.rows0, w.u, l.x)
@@ -92,6 +90,29 @@ def residual(context, t, g, x, y, k):
     copy(f.Z, s.loads)
     turn_accelerations(graph, l, f.poses, vector(k, n), s.a)
     return OK if largest(s.loads) < math.inf else NOT_FINITE
+
+
+@kernel
+def _begin(numbers, s, charts, t):
+    """In a new stage, multipliers along the line through the last two; z and lag in a new chart."""
+    if numbers.rates_of == 0:  # at the start, and where a stage has failed
+        numbers.time = numbers.time_before = -math.inf
+        for e in range(s.multipliers.size):
+            s.multipliers[e] = 0.0
+    if numbers.rates_of != charts:
+        numbers.rates_of, numbers.lag = charts, LAG
+        for e in range(s.z.size):
+            s.z[e] = 0.0
+    if t == numbers.time:
+        return
+    span, ratio = numbers.time - numbers.time_before, 0.0
+    if 0.0 < abs(span) < math.inf:
+        ratio = min(max((t - numbers.time) / span, -FARTHEST_AHEAD), FARTHEST_AHEAD)
+    for e in range(s.multipliers.size):
+        last = s.multipliers[e]
+        s.multipliers[e] += ratio * (last - s.before[e])
+        s.before[e] = last
+    numbers.time_before, numbers.time = numbers.time, t
 
 
 @kernel

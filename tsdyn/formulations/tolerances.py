@@ -51,6 +51,9 @@ LEFT = 0.1
 # Contraction of corrections by factors of N of an older place: assumed in a new chart, and the least that is trusted.
 LAG, LEAST_LAG = 0.1, 0.01
 
+# Distance in time of a stage from the last one, over that of the last two, up to which multipliers are extrapolated.
+FARTHEST_AHEAD = 2.0
+
 # Corrections of the multipliers by these factors in an iteration of a stage, and what may be left of the unbalanced
 # loads along the rows, relative: a change of H since the iteration matrix was made acts on that.
 REACTION_SWEEPS, REACTIONS_LEFT = 5, 1e-4

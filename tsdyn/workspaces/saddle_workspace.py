@@ -20,6 +20,7 @@ class SaddleWorkspace(NamedTuple):
     lower: np.ndarray  # factors; saddle_point.factorise
     upper: np.ndarray
     multipliers: np.ndarray  # (m,)  what the last Newton correction led to; saddle_point.solve
+    before: np.ndarray  # (m,)  those of the stage before; stage_equations.py
     a: np.ndarray  # ((nb + 1) * 8,)  accelerations of bodies, the same
     x: np.ndarray  # (s,)  right-hand side and solution, in order of elimination
     r: np.ndarray  # ((nb + 1) * 8,)  tangent part of a vector of chart coordinates
@@ -47,7 +48,7 @@ def allocate_saddle(graph=None):
         "B": (9 * nb,),
         **dict.fromkeys(("lower", "upper"), (size,)),
         "x": (s,),
-        **dict.fromkeys(("multipliers", "z"), (len(graph.row_at),)),
+        **dict.fromkeys(("multipliers", "before", "z"), (len(graph.row_at),)),
         **dict.fromkeys(("a", "r", "e", "loads"), (8 * (nb + 1) * wanted,)),
         **dict.fromkeys(("q", "qd", "zero", "R"), (local,)),
         "lam": (most,),

@@ -15,7 +15,9 @@ class StageNumbers(Record):
     theta: float  # contraction that the last stage measured
     t_before: float  # s, start of the last step; -inf for the first one
     eager: int  # stages that are still to be begun with a matrix of their own
-    rates_of: int  # counter of charts when z of the stages was last set; 0 where it is unknown
+    rates_of: int  # counter of charts when z of the stages was last set; 0 where z and multipliers are unknown
+    time: float  # s, of the last stage, and of the one before; -inf where they are unknown
+    time_before: float
     lag: float  # contraction of corrections by factors of N of an older place, as last measured
     fresh: int  # 1 if the derivatives of the forces' laws are to be taken by saddle_point.reduce
 

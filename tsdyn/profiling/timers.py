@@ -31,7 +31,7 @@ from ..jit.kernels import (
     specialised,
     vector,
 )
-from ..methods.diagonally_implicit import call_reduce, call_soften
+from ..methods.diagonally_implicit import call_correct, call_reduce, call_residual, call_soften
 from ..methods.explicit import ACCELERATE as ACCELERATE_SIGNATURE
 from ..methods.explicit import NORM as NORM_SIGNATURE
 from ..methods.explicit import PLACE as PLACE_SIGNATURE
@@ -43,7 +43,8 @@ from ..taylor.step_parts import call_expand, call_reach
 
 # roles: the driver, and the kernels called by address; ROWS is any loop over constraints or forces
 DRIVER, PLACE, ACCELERATE, COMPLETE, CHECK, CHART, STEP, NORM = range(8)
-LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, EXPAND, REACH, ROWS, ROLES = range(8, 17)
+LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, EXPAND, REACH = range(8, 15)
+RESIDUAL, CORRECT, DISTANCE, ROWS, ROLES = range(15, 20)
 # roles of the kernels whose addresses drivers are given, by their names in `Kernels` and `StageKernels`
 OF_DRIVERS = {
     "place": PLACE,
@@ -63,6 +64,9 @@ OF_STAGES = {
     "solve": SOLVE,
     "soften": SOFTEN,
     "error_norm": NORM,
+    "residual": RESIDUAL,
+    "correct": CORRECT,
+    "distance": DISTANCE,
 }
 # the notes: the clock where the processor has none, what it is given first, what it writes, the factor of its first
 # number; the time last read; the slot and role of what runs in what; addresses that timers stand for; then the slots:
@@ -191,6 +195,22 @@ def _soften(context, x, g, y):
     return status
 
 
+def _residual(context, t, g, x, y, k):
+    notes = integers(_before(context), ANY)
+    _enter(notes, ROLE * ROLES, ROLE)
+    status = call_residual(notes[TARGETS + ROLE], context, t, g, x, y, k)
+    _leave(notes)
+    return status
+
+
+def _correct(context, g, k):
+    notes = integers(_before(context), ANY)
+    _enter(notes, ROLE * ROLES, ROLE)
+    size = call_correct(notes[TARGETS + ROLE], context, g, k)
+    _leave(notes)
+    return size
+
+
 def _expand(context, k):
     notes = integers(_before(context), ANY)
     _enter(notes, FIRST_ORDER + min(k, ORDERS - 1), ROLE)
@@ -254,6 +274,9 @@ TIMERS = {
     FACTORISE: _timer(_number, "pd", "factorise", ROLE=FACTORISE),
     SOLVE: _timer(_vector, "pp", "solve", ROLE=SOLVE),
     SOFTEN: _timer(_soften, "ppdp", "soften", ROLE=SOFTEN),
+    RESIDUAL: _timer(_residual, "pddppp", "residual", ROLE=RESIDUAL),
+    CORRECT: _timer(_correct, "pdp", "correct", "d", ROLE=CORRECT),
+    DISTANCE: _timer(_norm, NORM_SIGNATURE, "distance", "d", ROLE=DISTANCE),
     EXPAND: _timer(_expand, "pi", "expand", ROLE=EXPAND),
     REACH: _timer(_reach, "pdd", "reach", ROLE=REACH),
 }

@@ -23,7 +23,6 @@ from ..jit.kernels import callback, kernel, vector
 from ..jit.simd import add, four, lanes, put, splat
 from ..maths.dense_linalg import copy, largest
 from ..methods.explicit import NORM
-from ..methods.tolerances import KAPPA
 from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
     apply_multipliers,
@@ -187,7 +186,7 @@ def _solve_positions(c, t, g):
         _take_off(c, l.x)
         _add(f.b, w.u)
         w.counters.newton += 1
-        if numbers.lag * _rate_size(c, s.r) <= g * LEFT * KAPPA:
+        if numbers.lag * _rate_size(c, s.r) <= g * LEFT:
             return OK if displace(graph, l, f.poses) else CHART_LOST
         before = worst
     return NEWTON_FAILED
@@ -223,7 +222,7 @@ def _solve_rates(c, t):
             renewed = True
         _take_off(c, l.y)
         _add(f.b, s.z)
-        if numbers.lag * _rate_size(c, s.r) <= LEFT * KAPPA:
+        if numbers.lag * _rate_size(c, s.r) <= LEFT:
             turn_rates(graph, l, l.y, f.poses)
             return OK
         before = worst

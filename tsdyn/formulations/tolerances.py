@@ -45,8 +45,8 @@ LOAD_SWEEPS, DAMPED, DAMPED_SHARE = 40, 12, 0.5
 # leaves rounding; two digits less are asked for, since the matrix is that of the multipliers before.
 NEWTON_DONE = 1e-10
 
-# What a stage's iteration may leave (KAPPA), as a share of it: what the solves for u and z leave at each place.
-LEFT = 0.1
+# Error norm that the solves for u and z may leave at each place of a stage: less than the stage's iteration (KAPPA).
+LEFT = 1e-4
 
 # Contraction of corrections by factors of N of an older place: assumed in a new chart, and the least that is trusted.
 LAG, LEAST_LAG = 0.1, 0.01

@@ -29,6 +29,7 @@ from .tolerances import (
     GUESS,
     ITERATIONS,
     KAPPA,
+    KAPPA_SPARSE,
     LEAST,
     MATRICES,
     RESIDUAL_FLOOR,
@@ -64,14 +65,18 @@ def _scratch_at(r):
 
 
 @kernel
-def _renew_matrix(context, c, t, g, f, anew):
-    """P at the place last taken, f being the accelerations there; with anew, from new stiffness and damping. Status."""
+def _renew_matrix(context, c, t, g, f, anew, here):
+    """P at the place last taken, f being the accelerations there; with anew, from new stiffness and damping. Status.
+
+    Without here, from the matrices of stiffness and damping that the last P was made from.
+    """
     l, status = c.linear, 0
     if anew or l.numbers.known == 0:
         status = call_linearise(l.kernels.linearise, context, t, f)
         l.numbers.known = 1 if status == 0 else 0
     if status == 0:
-        call_reduce(l.kernels.reduce, context, t)
+        if here or anew:
+            call_reduce(l.kernels.reduce, context, t)
         status = call_reduce(l.kernels.factorise, context, g)
     l.numbers.g = g if status == 0 else 0.0
     l.numbers.chart = c.work.counters.charts
@@ -143,7 +148,8 @@ def _solve_stage(context, c, r, i, t, g):
     before, theta, measured = math.inf, l.numbers.theta, False
     slow, apart, stuck, renewed = 0, 0, False, False
     eager, sparse = l.numbers.eager > 0, l.numbers.every_chart == 1
-    limit = SLOW_SPARSE if sparse else SLOW
+    limit, kappa = (SLOW_SPARSE, KAPPA_SPARSE) if sparse else (SLOW, KAPPA)
+    kappa = kappa if r.numbers.adaptive == 1 else KAPPA  # residuals of thousands of steps add up
     l.numbers.eager -= 1
     for _ in range(ITERATIONS):
         _set_stage(g, k, known, xs, ys)
@@ -152,15 +158,17 @@ def _solve_stage(context, c, r, i, t, g):
             return status
         w.counters.stage_iterations += 1
         off_chart = not sparse and l.numbers.chart != w.counters.charts
+        slow_now = measured and theta > limit
         stale = eager or off_chart or abs(g - l.numbers.g) > SAME_G * g
+        here = eager or slow_now or not sparse or l.numbers.g == 0.0 or l.numbers.known == 0
         eager = False
-        if stale or (measured and theta > limit):
+        if stale or slow_now:
             if not stale:
                 if slow == 0 and not renewed:
                     l.numbers.eager = EAGER_SPARSE if sparse else EAGER_STAGES
                 slow += 1
             renewed = True
-            if _renew_matrix(context, c, t, g, f, slow == MATRICES) != 0:
+            if _renew_matrix(context, c, t, g, f, slow == MATRICES, here) != 0:
                 return STAGE_FAILED
             before, theta, measured = math.inf, GUESS, False
         size = _correct(context, c, g, k, f, dx)
@@ -172,7 +180,7 @@ def _solve_stage(context, c, r, i, t, g):
             apart += 1 if renewed and theta > DIVERGING else 0
             if apart == APART:
                 return STAGE_FAILED
-        if size <= floor or stuck or (theta < 1.0 and size * theta <= KAPPA * (1.0 - theta)):
+        if size <= floor or stuck or (theta < 1.0 and size * theta <= kappa * (1.0 - theta)):
             l.numbers.theta = min(max(theta, LEAST), GUESS)
             _set_stage(g, k, known, xs, ys)
             return 0 if _is_near(context, c, g, k, guess, f, dx) else STAGE_FAILED

@@ -1,7 +1,10 @@
 """For every test: a seeded random generator, hypothesis without clocks or a data base, kernels compiled ahead."""
 
+import os
 import zlib
 from fnmatch import fnmatchcase
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: the processes of pytest-xdist share the processors
 
 import hypothesis
 import numpy as np

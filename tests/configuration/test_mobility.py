@@ -140,7 +140,7 @@ def test_at_other_positions_and_of_free_bodies(rng):
 def test_sparse_matrices_say_the_same(name, monkeypatch, rng):
     scene = MECHANISMS[name](rng).scene
     dense = scene.mobility()
-    monkeypatch.setattr(kinetic, "LARGE", 0)
+    monkeypatch.setattr(kinetic, "DENSE", 0)
     sparse = scene.mobility()
     assert str(sparse) == str(dense)
 

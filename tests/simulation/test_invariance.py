@@ -17,8 +17,14 @@ FRAMES = {
     "another order": {"order": (2, 0, 1)},
     "another sign": {"sign": -1.0},
 }
-ERRORS = {"taylor": ALGEBRA, "dop853": TIGHT}  # fixed steps differ by rounding, steps by tolerances by these
-METHODS = {"taylor": lambda second: I.Taylor(step=0.02 * second), "dop853": lambda second: I.DOP853(1e-12, 1e-12)}
+METHODS = {
+    "taylor": lambda second: I.Taylor(step=0.02 * second),
+    "dop853": lambda second: I.DOP853(1e-12, 1e-12),
+    "nystrom4": lambda second: I.Nystrom4(step=5e-3 * second),
+    "sdirk54": lambda second: I.SDIRK54(step=0.01 * second),
+    "implicit_trapezoid": lambda second: I.ImplicitTrapezoid(step=0.01 * second),
+}
+ERRORS = dict.fromkeys(METHODS, ALGEBRA) | {"dop853": TIGHT}  # fixed steps differ by rounding, tolerances by these
 
 
 def build(metre=1.0, kilogram=1.0, second=1.0, origin=(0.0, 0.0, 0.0), pose=None, order=(0, 1, 2), sign=1.0):
@@ -58,6 +64,7 @@ def positions(method, second=1.0, metre=1.0, origin=(0.0, 0.0, 0.0), pose=None, 
     return np.array(found)
 
 
+@pytest.mark.slow_for("*sdirk54", "*implicit*")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("frame", FRAMES.values(), ids=FRAMES)
 def test_the_motion_is_the_same(frame, method):

@@ -273,9 +273,9 @@ def moved(scene, rng):
 def test_assembly_with_sparse_matrices(rng, monkeypatch):
     scene = moved(mechanisms.build(mechanisms.loop(12)), rng)
     before, fixed, found = scene.start, scene.bodies[3:4], []
-    for large in (kinetic.LARGE, 0):
+    for large in (kinetic.DENSE, 0):
         scene.place(*before)
-        monkeypatch.setattr(kinetic, "LARGE", large)
+        monkeypatch.setattr(kinetic, "DENSE", large)
         report = scene.assemble(fixed=fixed)
         found.append((*scene.start, report.moved, report.residual, report.velocity_residual))
     for dense, sparse in zip(*found, strict=True):

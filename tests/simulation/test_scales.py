@@ -99,8 +99,8 @@ def test_a_run_that_would_never_end_is_ended():
     assert ts.simulate(scene, (0.0, 1e6), integrator=I.DOP853(), max_steps=5000).status == ts.Status.MAX_STEPS
 
 
-def four_bar(size):
-    """Rods on balls, of density 1000 and of this size in m."""
+def four_bar(size, revolute=False):
+    """Rods on balls or revolute joints, of density 1000 and of this size in m."""
     scene, corners = ts.Scene(), size * np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.5, 0.0, 1.5), (2.0, 0.0, 0.0)])
     mass = 1e3 * size**3
     bodies = [
@@ -108,8 +108,11 @@ def four_bar(size):
     ]
     around = [scene.ground, *bodies, scene.ground]
     for i, point in enumerate(corners):
-        scene.add(C.Spherical.at(around[i], around[i + 1], point=point))
-    for body in bodies:
+        if revolute:
+            scene.add(C.Revolute.at(around[i], around[i + 1], point=point, axis=(0.0, 1.0, 0.0)))
+        else:
+            scene.add(C.Spherical.at(around[i], around[i + 1], point=point))
+    for body in [] if revolute else bodies:
         scene.add(C.Dot1.at(scene.ground, body, axis_a=(0.0, 1.0, 0.0), axis_b=(1.0, 0.0, 0.0)))
     return scene
 
@@ -124,3 +127,20 @@ def test_a_four_bar_of_nanometres(method):
         assert solution.success, solution.message
         runs.append(solution.orientation(solution.scene.bodies[1])[-1])
     np.testing.assert_allclose(runs[1], runs[0], rtol=0.0, atol=CLOSE)
+
+
+@pytest.mark.slow_for("*implicit*", "nystrom4")
+@pytest.mark.parametrize("method", ["default", "dop853", "nystrom4", "implicit_trapezoid"])
+def test_revolute_joints_of_micrometres_don_t_come_apart(method):
+    """Rows of axes are pure numbers: their rounding is not that of the lengths beside them."""
+    size = 1e-6
+    step = {"nystrom4": I.Nystrom4(step=1e-5), "implicit_trapezoid": I.ImplicitTrapezoid(step=1e-5)}
+    options = {} if method == "default" else {"integrator": step.get(method, method)}
+    solution = ts.simulate(four_bar(size, revolute=True), (0.0, 2e-3), t_eval=np.linspace(0.0, 2e-3, 41), **options)
+    assert solution.success, solution.message
+    for joint in [each for each in solution.scene.constraints if isinstance(each, C.Revolute)]:
+        ends = [
+            s if body is joint.scene.ground else solution.position(body, s)
+            for body, s in zip((joint.a, joint.b), joint.coordinates, strict=False)
+        ]
+        assert np.linalg.norm(ends[0] - ends[1], axis=-1).max() < ROUNDING * size

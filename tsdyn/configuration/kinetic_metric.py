@@ -10,14 +10,14 @@ import numpy as np
 
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
 from ..maths.row_rank import row_lengths
+from ..maths.sparse_lu import sparse_lu
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
-from ..observables.tolerances import LARGE
-from .tolerances import IMMOBILE, LEAST_DIVISOR, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
+from .tolerances import DENSE, IMMOBILE, LEAST_DIVISOR, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
 
 
 class Metric:
-    """Constraints of a packed scene at time t as rows (m', x), dense or (above 1000 coordinates) sparse.
+    """Constraints of a packed scene at time t as rows (m', x), dense or, of more than DENSE coordinates, sparse.
 
     held (n,) marks coordinates that are fixed.
     """
@@ -26,7 +26,7 @@ class Metric:
         system = packed.system
         rigid = system.bodies[:, 1] == 7
         self.packed, self.t, self.n = packed, t, int(system.bodies[:, 1].sum())
-        self.sparse = self.n > LARGE
+        self.sparse = self.n > DENSE
         self.system = with_short_rows(packed) if self.sparse else system
         starts = np.cumsum([0, *np.where(rigid, 6, 3)])
         self.size = int(starts[-1])
@@ -173,10 +173,9 @@ def soft_step(A, residual, wish, softness):
         K.flat[:: len(K) + 1] += softness
         return wish - A.T @ np.linalg.solve(K, residual + A @ wish)
     from scipy.sparse import block_array, diags_array
-    from scipy.sparse.linalg import splu
 
     matrix = block_array([[diags_array(np.ones(wish.size)), A.T], [A, -diags_array(softness)]], format="csc")
-    return splu(matrix).solve(np.concatenate((wish, -residual)))[: wish.size]
+    return sparse_lu(matrix).solve(np.concatenate((wish, -residual)))[: wish.size]
 
 
 def least_step(A, residual, rcond=SOLVED):

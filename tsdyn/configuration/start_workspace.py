@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..jit.kernels import resident
+from ..model.lengths import is_small
 from ..rows.interface import allocate_tangent, reset_selection
 from ..workspaces.workspace import parts
 from .tolerances import KEPT_FLOATS, ROUNDING
@@ -39,7 +40,10 @@ class StartWorkspace:
         reset_selection(self.graph, tangent)
         self.reals[...] = reals
         control.u_tol, control.size = tol, size
-        control.floor = ROUNDING * (size + np.abs(q).max())
+        far = np.abs(q)
+        if is_small(size):
+            far[self.at] *= size
+        control.floor = ROUNDING * (size + far.max())
 
 
 def taken(packed, graph, n):

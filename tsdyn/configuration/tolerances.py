@@ -50,6 +50,8 @@ SOFT = 1e-13
 THIN = 1e-6
 
 # --- the way from a sketch ---
+# Coordinates up to which matrices are dense: with 30 bodies both ways take the same time, and dense ones know the rank.
+DENSE = 200
 # (softness of the constraints' springs, steps at most) from stage to stage; the last is stiff enough for Gauss-Newton.
 STAGES = ((1.0, 4), (0.3, 4), (0.1, 4), (0.03, 4), (0.01, 4), (1e-3, 5), (1e-4, 5), (1e-6, 5), (1e-8, 40))
 # A sketch that is off by less (share of the scene's reach) takes the last stage only.

@@ -10,7 +10,7 @@ from ..elements.loops.body_poses import OMEGA, POSE, RD, P, R, set_pose
 from ..errors import Status
 from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import add, four, put
-from ..maths.dense_linalg import largest
+from ..maths.dense_linalg import largest, largest_of
 from ..rows.interface import (
     DYNAMICS,
     constrain,
@@ -24,11 +24,23 @@ from ..rows.interface import (
     redundant_rows_hold,
     singularity_indicator,
 )
-from .tolerances import LAND_SWEEPS, LEAST_MOVE, ROUNDING_AT_MOST, STALLED
+from .tolerances import LAND_SWEEPS, LEAST_MOVE, ROUNDING, ROUNDING_AT_MOST, STALLED
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
 UNHELD = int(Status.UNHELD)
+
+
+@kernel
+def lever(w):
+    """The arm of rotations in a small scene, m: the size of its numbers, which the floor of Phi is of."""
+    return min(w.control.floor / ROUNDING, 1.0)
+
+
+@kernel
+def largest_residual(graph, w, f):
+    """The largest |f.b|, m; infinity if an entry is not finite. In small scenes pure numbers count times the lever."""
+    return largest(f.b) if graph.turns.size == 0 else largest_of(f.b, graph.turns, lever(w))
 
 
 @long_kernel
@@ -54,7 +66,7 @@ def land(graph, system, w, f, t):
             renew = False
         else:
             evaluate_residuals(graph, system, f, t)
-        worst = largest(f.b)
+        worst = largest_residual(graph, w, f)
         f.landing.residual = max(f.landing.residual, worst)
         if not worst < math.inf:
             return NOT_FINITE

@@ -16,7 +16,7 @@ import math
 from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
-from ..maths.dense_linalg import copy, is_finite, largest
+from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import ACCELERATE, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
@@ -48,6 +48,7 @@ from .chart_coordinates import (
 )
 from .chart_validity import every_level_holds, touch, turning
 from .friction_loads import call_rub
+from .projection import largest_residual, lever
 from .tangent_error import error_norm
 from .tolerances import (
     CONTRACTION_LOST,
@@ -121,7 +122,7 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
             evaluate_rows(graph, system, f, f.rows, t)
         else:
             evaluate_residuals(graph, system, f, t)
-        worst = largest(f.b)
+        worst = largest_residual(graph, w, f)
         if not worst < math.inf:
             return NOT_FINITE
         slow = worst > SLOW * before
@@ -183,12 +184,13 @@ def solve_velocities(graph, system, w, f, l, t):
             return True
         if sweep == 0:
             speed, spin = largest_rates(graph, f.poses)
-            floor = SPEED_ROUNDING * (speed + w.control.size * spin)
+            arm = w.control.size if graph.turns.size == 0 else lever(w)
+            floor = SPEED_ROUNDING * (speed + arm * spin)
         multiply_rates(graph, f.rows, f.poses, f.b)
         if rheonomic:
             for e in range(f.b.size):
                 f.b[e] += l.drift[e]
-        worst = largest(f.b)
+        worst = largest_residual(graph, w, f)
         if not worst < math.inf:
             return False
         if worst <= floor or (factored and worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):

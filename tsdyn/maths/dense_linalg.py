@@ -226,6 +226,18 @@ def lu_solve(A, pivots, b, n):
 
 
 @kernel
+def largest_of(values, marked, weight):
+    """As `largest`, where those that are marked with one count times a weight."""
+    worst = 0.0
+    for i in range(values.size):
+        size = abs(values[i]) * (weight if marked[i] == 1.0 else 1.0)
+        if not size < math.inf:
+            return math.inf
+        worst = max(worst, size)
+    return worst
+
+
+@kernel
 def largest(values):
     """Return the largest magnitude; infinity if an entry is not finite."""
     worst = 0.0

@@ -13,6 +13,7 @@ from ..jit.kernels import records, row_of
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from .derived import Derived
+from .lengths import size_of
 from .packed_forces import find_forces, pack_forces
 from .tables import ConstraintKind, ForceKind, MotionPlace, SignalPlace
 
@@ -74,7 +75,7 @@ class Packed(NamedTuple):
     constraints: tuple  # primitives, in the order of their rows
     parameters: tuple  # of each constraint: floats and Motions
     coordinates: tuple  # of each constraint: where its markers are, (3,) each
-    size: float  # largest number among the coordinates
+    size: float  # largest number among the coordinates; of small scenes the largest length, m
     loads: tuple  # a packed_forces.Load for each force, in the order added
     members: tuple  # a Member for each constraint of the scene, in the order of their rows
     slots: tuple  # of System.memory, for each constraint; -1 for none
@@ -143,12 +144,12 @@ def pack(scene):
         normals=np.array(normals, np.int64),
     )
     coordinates = tuple(constraint.coordinates for constraint in primitives)
-    size = max((np.abs(s).max() for each in coordinates for s in each), default=0.0)
+    size = size_of(scene.bodies, primitives)
     members = tuple(_members(scene.constraints))
     order = {constraint: len(memory) + i for i, constraint in enumerate(kept)}
     slots = tuple(order.get(constraint, -1) for constraint in primitives)
     given = tuple(parameters.values())
-    return Packed(system, scene.bodies, primitives, given, coordinates, float(size), loads, members, slots, Derived())
+    return Packed(system, scene.bodies, primitives, given, coordinates, size, loads, members, slots, Derived())
 
 
 def _segments(primitives, where):

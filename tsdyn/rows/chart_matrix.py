@@ -19,7 +19,7 @@ from ..sparse.factorisation import factor_lu, solve_lu
 from .axis_rows import leave_axes_out, multiply_axes_both
 from .redundant_rows import set_redundant_diagonal
 from .schur_complement import inner, inner_both, more
-from .tolerances import ZERO_PIVOT
+from .tolerances import COMPENSATED, ZERO_PIVOT
 
 
 @kernel
@@ -93,14 +93,29 @@ def solve_product(graph, lower, upper, b):
 
 @kernel
 def pivot_loss(graph, l):
-    """Return max |1 - n / s|, with n and s the pivots of N and of S0."""
-    pattern, worst = graph.pattern, 0.0
-    for j in range(pattern.heads.size):
-        at, step = pattern.heads[j], pattern.widths[j] + 1
-        for _ in range(pattern.starts[j + 1] - pattern.starts[j]):
-            worst = max(worst, abs(1.0 - get(l.rows0.S, at) / get(l.upper, at)))
-            at += step
+    """Return max |1 - n / s|, with n and s the products of the pivots of a primitive's rows in N and in S0.
+
+    Single pivots of a spherical joint depend on the axes of the ground frame; their product does not.
+    """
+    worst, axes = 0.0, graph.axes.rows
+    for i in range(graph.products.shape[0]):
+        if graph.products[i].same == 0:
+            break  # those of a primitive with itself come first
+        worst = max(worst, _loss(graph, l, graph.products[i].left // 16, graph.products[i].rows))
+    for i in range(0, graph.welds.shape[0], 3):  # three displacements, three rotations
+        worst = max(worst, _loss(graph, l, graph.welds[i, 0], 3))
+    for i in range(axes.shape[0]):
+        worst = max(worst, _loss(graph, l, axes[i].row, 1))
     return worst
+
+
+@kernel
+def _loss(graph, l, e, rows):
+    """|1 - n / s| of successive rows."""
+    share = 1.0
+    for r in range(e, e + rows):
+        share *= get(l.rows0.S, graph.diagonal[r]) / get(l.upper, graph.diagonal[r])  # reciprocals of s and n
+    return abs(1.0 - share) * (COMPENSATED if rows > 1 else 1.0)
 
 
 @kernel

@@ -13,6 +13,7 @@ import numpy as np
 from ..elements.loops.body_poses import STILL
 from ..elements.loops.constraint_rows import BODY, INTS, MASK, ROW
 from ..jit.kernels import records, row_of
+from ..model.lengths import has_lengths, is_small
 from ..model.packed_friction import frictions_of
 from .body_splitting import cut
 from .constraint_graph import (
@@ -254,6 +255,13 @@ class _Builder:
             weights[rigid, W_ROTATION:] = np.pad(matrices, ((0, 0), (0, 0), (0, 1))).reshape(-1, 12)
         return inverse.ravel(), mass.ravel(), spins
 
+    def _turns(self):
+        """ConstraintGraph.turns."""
+        turns = np.zeros(len(self.places))
+        for (constraint, _, _), first in zip(self.joints, self.firsts, strict=True):
+            turns[first : first + constraint.rows] = not has_lengths(constraint)
+        return turns if is_small(self.packed.size) and turns.any() else np.zeros(0)
+
     def _dropped(self):
         if self.still is not None:
             return np.flatnonzero(np.isin(self.places, self.still.redundant))
@@ -284,6 +292,7 @@ class _Builder:
             mass=mass,
             spins=spins,
             pattern=self.pattern,
+            turns=self._turns(),
             normals=self.normals,
             parts=parts,
             scales=scales,

@@ -5,6 +5,7 @@ as they come; closing the generator, as Ctrl-C does, ends the processes.
 """
 
 import multiprocessing
+import os
 import signal
 import threading
 import time
@@ -22,6 +23,7 @@ from .random_calls import judge_calls
 LIMIT = 300.0  # s, of a job: also of those that compile kernels
 GALLERY_LIMIT = 1200.0  # s, of a case
 BLOCK = 40  # calls of a job
+BLAS_THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
 
 
 class Job(NamedTuple):
@@ -133,7 +135,7 @@ class Worker:
         context = multiprocessing.get_context("spawn")
         self.connection, other = context.Pipe()
         self.process = context.Process(target=serve, args=(other,), daemon=True)
-        with ignoring_interrupts():
+        with ignoring_interrupts(), _one_blas_thread():
             self.process.start()
         other.close()
         self.alive, self.job, self.until = True, None, 0.0
@@ -176,6 +178,21 @@ def ignoring_interrupts():
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _one_blas_thread():
+    """Let processes that begin meanwhile use one thread each for dense matrices: more would wait for each other."""
+    before = {name: os.environ.get(name) for name in BLAS_THREADS}
+    os.environ.update(dict.fromkeys(BLAS_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def serve(connection):

@@ -19,13 +19,13 @@ from .tolerances import (
     BODIES,
     EPS,
     FLOOR,
-    HELD,
     ILL_CONDITIONED,
     NEAR_SINGULAR,
     OUTPUTS,
     ROUNDINGS,
     ROW_SHARE,
     SAME,
+    TIME,
 )
 
 LEVELS = ("position", "velocity", "acceleration")
@@ -139,7 +139,7 @@ def newton_euler(solution):
         return
     around = _neighbours(solution.scene)
     sums = [_loads(solution, bodies[i], around[id(bodies[i])]) for i in some(len(bodies), BODIES)]
-    largest, limit = max(one.size_of_force.max() for one in sums), BALANCE + rounding_of_places(solution)
+    largest, limit = max(one.size_of_force.max() for one in sums), _balance_limit(solution)
     for one in sums:
         yield _balance("force balance", one.force, one.size_of_force, largest, limit, one.body)
         if one.body.dimension == 7:
@@ -210,6 +210,11 @@ def rounding_of_places(solution):
     return ROUNDINGS * EPS * float(farthest / (np.median(np.maximum(nearest, radii)) or 1.0))
 
 
+def _balance_limit(solution):
+    """Share of the terms of a balance that may be left."""
+    return BALANCE * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + rounding_of_places(solution)
+
+
 def _balance(law, left, sizes, largest, limit, body):
     """Relative to the body's own terms; what is rounding of the largest terms in the scene doesn't count."""
     share = np.linalg.norm(left, axis=1) / (sizes + (FLOOR / BALANCE * largest or 1.0))
@@ -233,17 +238,17 @@ def dense_output(solution):
     at = some(solution.t.size, OUTPUTS)
     state = solution.at(solution.t[at])
     limit = off_steps(solution)
-    for name in ("q", "qd"):
-        given = getattr(solution, name)[at]
+    rounding = TIME * EPS * np.abs(solution.t).max()  # of an instant
+    for name, rate in (("q", "qd"), ("qd", "qdd")):
+        given, change = getattr(solution, name)[at], rounding * np.abs(getattr(solution, rate)[at])
+        off = np.abs(getattr(state, name) - given) - change
         size = 1.0 + np.abs(given).max(initial=0.0)
-        yield Finding(
-            f"dense output, {name}", float(np.abs(getattr(state, name) - given).max(initial=0.0) / size), limit
-        )
+        yield Finding(f"dense output, {name}", float(off.max(initial=0.0) / size), limit)
 
 
 def off_steps(solution):
     """How far dense output may be off the ends of steps, relative to the coordinates."""
-    return SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + HELD / (extent(solution) or 1.0)
+    return SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0)
 
 
 def is_near_singular(solution):

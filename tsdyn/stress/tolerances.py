@@ -21,9 +21,9 @@ ROUNDED = 1e-10
 NEAR_SINGULAR_ENDS = 1e-4
 # Dense output at the ends of steps; output times beside steps.
 SAME = 1e-10
-# m: positions are held to this where Phi has rows of axes, which are pure numbers; in small scenes angles are, over
-# their size.
-HELD = 1e-14
+# Roundings of an instant, and of places that are passed within as many: what is interpolated there changes by its rate
+# times these.
+TIME = 1e2
 # Next to a singular configuration, where a chart has a condition of ILL_CONDITIONED or more, rounding is amplified by
 # so much.
 NEAR_SINGULAR, ILL_CONDITIONED = 1e2, 1e8

@@ -54,7 +54,7 @@ def turn_rates(graph, l, rates, poses):
 def factorise_normal(graph, w, f, l):
     """Factorise N = H C Y0 at the present H; False if N is singular."""
     w.counters.factorizations += 1
-    l.state.made = w.counters.charts
+    l.state.made = 1
     return factorise_chart_matrix(graph, f, l)
 
 

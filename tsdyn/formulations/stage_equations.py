@@ -132,8 +132,8 @@ def _add(x, out):
 def _solve_normal(c):
     """f.b <- N^-1 f.b, by factors that may be of an older place, such as q0 of the chart."""
     l = c.chart
-    made = l.state.made == c.work.counters.charts
-    solve_product(c.graph, l.lower if made else l.rows0.S, l.upper if made else l.rows0.S, c.tangent.b)
+    lower, upper = (l.lower, l.upper) if l.state.made == 1 else (l.rows0.S, l.rows0.S)
+    solve_product(c.graph, lower, upper, c.tangent.b)
 
 
 @kernel

@@ -37,12 +37,12 @@ def run(task, engine, observe=None, relay=None, past=None):
     in place of the memory.
     """
     prepared = task.prepared
-    with CollectionsDeferred():
-        engine = prepared.engine(engine, task.method, task.form, task.within)
-        memory = None if observe else prepared.take(engine.kind)
-        if memory is None or not engine.serves(memory):
+    engine = prepared.engine(engine, task.method, task.form, task.within)
+    memory = None if observe else prepared.take(engine.kind)
+    if memory is None or not engine.serves(memory):
+        with CollectionsDeferred():
             memory = engine.memory(prepared)
-        memory.enter(engine, task, relay is not None)
+    memory.enter(engine, task, relay is not None)
     readings = None, None
     if memory.run.numbers.dense:
         readings = engine.reading(memory, prepared, task.constraint_tol)

@@ -11,7 +11,6 @@ from ..calls import fitting
 from ..configuration.holonomic import demand_holonomic
 from ..elements.membership import warn_of_waiting
 from ..errors import InvalidArgument, Status
-from ..jit.interrupts import CollectionsDeferred
 from ..methods.integrator import frozen
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
@@ -163,10 +162,9 @@ def run_from(given, numbers=None, arrays=None, archive=None):
     scene, options = given["scene"], checked(given)
     method, settings, default = options.method, options.settings, (given["rtol"], given["atol"], options.series)
     prepare_first_run(scene, method, settings.form, options.within, default)
-    with CollectionsDeferred():
-        kept = prepared(scene)
-        if method is None:
-            method = method_choice.explicit(kept, *default)
+    kept = prepared(scene)
+    if method is None:
+        method = method_choice.explicit(kept, *default)
     if settings.max_step is not None:
         method = frozen(method.bounded(settings.max_step))
 
@@ -174,8 +172,7 @@ def run_from(given, numbers=None, arrays=None, archive=None):
     choose = None
     if given["integrator"] is None:
         choose = partial(method_choice.implicit_is_faster, simulate, given, method, options.span[1])
-    with CollectionsDeferred():
-        task = _request(scene, kept, method, options, given["state"], choose)
+    task = _request(scene, kept, method, options, given["state"], choose)
     if given["store"] is not None:
         return _run_stored(task, given, options, (numbers, arrays), archive)
     outcome = _run(task, scene, settings.initial_tol)

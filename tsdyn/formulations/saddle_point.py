@@ -208,7 +208,7 @@ def _take_tangent_part(graph, f, l, x, factored, out):
 
 
 @kernel
-def weigh_motion(graph, s, Z):
+def _weigh(graph, s, Z):
     """s.x = M Z, and zero for the rows."""
     for i in range(s.x.size):
         s.x[i] = 0.0
@@ -223,8 +223,8 @@ def weigh_motion(graph, s, Z):
 
 
 @kernel
-def add_blocks(graph, s, blocks, g, Z):
-    """s.x += g K Z, or g C Z, by the blocks of K or C."""
+def _add_stiffness(graph, s, g, Z):
+    """s.x += g K Z."""
     for i in range(s.graph.blocks.shape[0]):
         block, o = s.graph.blocks[i], BLOCK * i
         at, z = s.graph.body_at[block.row], 8 * block.column
@@ -232,7 +232,7 @@ def add_blocks(graph, s, blocks, g, Z):
         for r in range(degrees(graph, block.row)):
             x = 0.0
             for c in range(columns):
-                x += blocks[o + 6 * r + c] * Z[z + c + c // 3]
+                x += s.K[o + 6 * r + c] * Z[z + c + c // 3]
             s.x[at + r] += g * x
 
 
@@ -280,7 +280,7 @@ def solve(context, x):
     for i in range(s.a.size):
         s.a[i] = f.Z[i] - s.e[i]
     _take_tangent_part(graph, f, l, x, l.state.factored == 1, s.r)
-    weigh_motion(graph, s, f.Z)
+    _weigh(graph, s, f.Z)
     _correct(graph, l, s, x, s.r)
     take_solution(graph, s)
     return OK
@@ -296,9 +296,9 @@ def soften(context, ex, g, ey):
     f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     ex, ey = vector(ex, l.x.size - 8), vector(ey, l.x.size - 8)
     _take_tangent_part(graph, f, l, ey, True, s.r)  # N is that of the chart's check
-    weigh_motion(graph, s, f.Z)
+    _weigh(graph, s, f.Z)
     _take_tangent_part(graph, f, l, ex, True, s.e)
-    add_blocks(graph, s, s.K, g, f.Z)
+    _add_stiffness(graph, s, g, f.Z)
     _correct(graph, l, s, ey, s.r)
     for i in range(ex.size):
         ex[i] += g * ey[i]

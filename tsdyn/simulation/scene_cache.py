@@ -7,6 +7,7 @@ import numpy as np
 from ..configuration.initial_conditions import consistent
 from ..configuration.mirrored_branches import demand_aligned
 from ..formulations.locked_orientations import hold, still
+from ..jit.interrupts import CollectionsDeferred
 from ..methods.integrator import is_plain
 from ..model.handles import handles_of
 from ..model.packed import with_curvatures
@@ -38,6 +39,7 @@ class Prepared:
     The memory belongs to the scene; after a change of numbers alone it is used again.
     """
 
+    @CollectionsDeferred()
     def __init__(self, scene, packed):
         self.packed, self.motions = packed, scene.motions()
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
@@ -112,7 +114,8 @@ class Prepared:
         if engine is None:
             if len(known) >= KINDS:
                 known.clear()
-            engine = known[key] = kind(self, method, form, within)
+            with CollectionsDeferred():
+                engine = known[key] = kind(self, method, form, within)
         return engine
 
     def system(self, implicit):
@@ -131,6 +134,7 @@ class Prepared:
             self._start = (given, options), start
         return start
 
+    @CollectionsDeferred()
     def _projected(self, scene, q, qd, t, tol, remembered, redundant_allowed):
         system, before = self.packed.system, still(self.packed)
         redundant = self.packed.derived.redundant

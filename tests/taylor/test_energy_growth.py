@@ -27,12 +27,15 @@ def test_errors_of_energy_and_momenta_stay_below_one_rounding_a_step(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["top", "chain"])
-def test_errors_of_many_starts_are_a_random_walk(name):
-    """The mean of the energy error is small against its scatter; constraint errors don't grow."""
+@pytest.mark.parametrize(("name", "mean"), [("top", 0.3), ("chain", 0.15)])
+def test_errors_of_many_starts_are_a_random_walk(name, mean):
+    """The mean of the energy error is small against its scatter; constraint errors don't grow.
+
+    With gravity rounded to the last place of larger accelerations the mean of the chain is 0.26.
+    """
     one = grow(name, 5e4, 16)
     end = one.energy[:, -1]
-    assert abs(end.mean()) < 1.5 * EPS * np.sqrt(one.steps[-1] / end.size)
+    assert abs(end.mean()) < mean * EPS * np.sqrt(one.steps[-1] / end.size)
     assert one.rms[-1] < 0.25 * EPS * np.sqrt(one.steps[-1])
     assert one.constraints < 2.0
 

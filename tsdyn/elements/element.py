@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from ..hints import AnyBody, ArrayLike, BodyLike, Floats, Function, Scene, TsdynError
     from .joint_coordinates import Angle, Displacement
 
+# Part of a vector's largest component: below it a component is what a rotation into a body frame leaves of zero. Series
+# would lose it from positions, but not from torques, with the same sign in every step.
+ROTATED = 1e-15
+
 ENTRIES = (  # of docstrings
     "a, b : Body or ground\n    Two different bodies of one scene.",
     "a : Body\n    A body of the scene.",
@@ -262,7 +266,10 @@ def in_frame(body, marker, value):
         return value  # to be refused where it is placed
     if marker.code == POINT:
         x = x - body.position
-    return x if body.dimension != 7 else rotation_matrix(body.orientation).T @ x
+    if body.dimension != 7:
+        return x
+    x = rotation_matrix(body.orientation).T @ x
+    return np.where(np.abs(x) <= ROTATED * np.abs(x).max(), 0.0, x)
 
 
 def layout(markers):

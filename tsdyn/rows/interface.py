@@ -12,6 +12,7 @@ Factorise:
 Solve:
     solve_rows              b <- S^-1 b             solve_product           b <- N^-1 b
     multiply_rows           out = H Z               apply_multipliers       Z <- Z - Y^T lam
+    add_products            out <- out + H Z
     find_correction         lam = S^-1 b, Z = -Y^T lam
     project                 lam = S^-1 H Z, Z <- Z - Y^T lam
     constrain               lam = S^-1 (H Z + c), Z <- Z - Y^T lam
@@ -48,6 +49,7 @@ from .schur_complement import (
     DYNAMICS,
     METRIC,
     acceleration_residuals,
+    add_products,
     apply_multipliers,
     balance_loads,
     constrain,
@@ -85,6 +87,7 @@ __all__ = [
     "acceleration_residuals",
     "accelerations_hold",
     "add_axis_multipliers",
+    "add_products",
     "allocate_rows",
     "allocate_tangent",
     "apply_multipliers",

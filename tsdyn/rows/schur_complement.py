@@ -171,6 +171,14 @@ def multiply_rows(graph, rows, Z, out):
 
 
 @kernel
+def add_products(graph, rows, Z, out):
+    """out += H Z."""
+    for e in range(graph.sides.shape[0]):
+        at = 16 * e
+        out[e] += inner(rows.H, at, Z, 8 * graph.sides[e, 0]) + inner(rows.H, at + 8, Z, 8 * graph.sides[e, 1])
+
+
+@kernel
 def multiply_rates(graph, rows, poses, out):
     """out = H (rd, omega') of the poses."""
     H = rows.H

@@ -18,7 +18,8 @@ from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OM
 from ..jit.kernels import kernel
 from ..jit.simd import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times
 from ..maths.dense_linalg import copy
-from ..rows.interface import note_loads, solve_series, weigh
+from ..rows.interface import add_products, note_loads, solve_series, weigh
+from .compensation import put_sum
 
 MOST_ORDERS = 64
 
@@ -160,6 +161,9 @@ def expand(graph, system, k, last, ahead, refine, x, f):
     On entry Z has the gyroscopic torques of order k, and A_{k+2} what (1) has without omega'_{k+1}; on exit both are
     of the next order, unless this is the last one. lam_k stays in b until then.
 
+    low_r2 is what r_2 loses to rounding where factors are exact: gravity is rounded to the last place of a larger
+    acceleration, which has the same sign for many steps.
+
     The first `refine` orders of lam are refined, `order.sweeps` times each. If more than lam_0, factors 1 / n are exact
     as well: their rounding errors have the same sign in every step, and add up. With `ahead`, a constant, the next
     body's numbers are prefetched: that pays where the series don't fit into the cache. x is an `Expansion`, f a
@@ -184,11 +188,12 @@ def expand(graph, system, k, last, ahead, refine, x, f):
             _put_product(bodies, at + S_OMEGA * orders + 4 * (k + 1), four(Z, 8 * b + 4), g, g_low, exact)
             _turn(bodies, at, k + 2, _product(four(Z, 8 * b + 4), h, h_low))
     if k == 0:
+        x.low_r2[:] = 0.0
         note_loads(f)
     refined = k < refine
     if refined:
         for sweep in range(x.order.sweeps):
-            _solve(graph, system, k, x, f, sweep > 0)
+            _solve(graph, system, k, x, f, sweep > 0, exact)
             if sweep == 0:
                 copy(f.b, f.gamma)
             else:
@@ -196,7 +201,7 @@ def expand(graph, system, k, last, ahead, refine, x, f):
                     f.gamma[e] += f.b[e]
             for b in range(nb):
                 _change(graph, b, x, k, inverse, exact, Z)
-    _solve(graph, system, k, x, f, refined)
+    _solve(graph, system, k, x, f, refined, exact)
     if refined:
         for e in range(f.b.size):
             f.b[e] += f.gamma[e]
@@ -214,10 +219,18 @@ def expand(graph, system, k, last, ahead, refine, x, f):
 
 
 @kernel
-def _solve(graph, system, k, x, f, refined):
-    """b = lam_k, or what it lacks to gamma where it is `refined`, and with it Z = -W H^T lam_k."""
+def _solve(graph, system, k, x, f, refined, exact):
+    """b = lam_k, or what it lacks to gamma where it is `refined`, and with it Z = -W H^T lam_k.
+
+    With `exact`, low_r2 counts in what lam_0 lacks.
+    """
     orders = x.order.room
     run_loops(graph, system.reals, RESIDUAL, k, x, f)
+    if k == 0 and refined and exact:
+        for b in range(graph.bodies.shape[0]):
+            put(f.Z, 8 * b, times(four(x.low_r2, 4 * b), splat(2.0)))
+            put(f.Z, 8 * b + 4, splat(0.0))
+        add_products(graph, f.rows, f.Z, f.b)
     solve_series(graph, f, x.bodies, S_OMEGA * orders + 4 * (k + 1), BODY_ROW * orders, k, refined)
 
 
@@ -231,7 +244,11 @@ def _change(graph, b, x, k, inverse, exact, Z):
     bodies, orders = x.bodies, x.order.room
     at = b * orders * BODY_ROW
     push, o = four(Z, 8 * b), at + S_R * orders + 4 * (k + 2)
-    if exact:
+    if exact and k == 0:
+        low = four(x.low_r2, 4 * b)
+        put_sum(bodies, o, four(bodies, o), times(push, h), x.low_r2, 4 * b)
+        put(x.low_r2, 4 * b, add(four(x.low_r2, 4 * b), low))
+    elif exact:
         put(bodies, o, add(four(bodies, o), _product(push, h, h_low)))
     else:
         put(bodies, o, fma(push, h, four(bodies, o)))

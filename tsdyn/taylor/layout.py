@@ -133,6 +133,7 @@ def allocate_expansion(graph, kinds, packed, highest):
         low=zeros(nb * LOW),
         low_end=zeros(nb * LOW),
         start=zeros(4 * nb),
+        low_r2=zeros(4 * nb),
         constraints=constraints,
         places=places,
         motions=_motions(graph, packed, orders, places, constraints),

@@ -17,17 +17,9 @@ from ..formulations.projection import normalise
 from ..jit.kernels import kernel
 from ..jit.simd import add, fma, four, put, splat, sub, times, total
 from ..rows.interface import find_correction, multiply_rates
+from .compensation import put_sum
 from .tolerances import MOST_PARTS, WIDE
 from .workspace import L_OMEGA, L_P, L_R, L_RD, LOW
-
-
-@kernel
-def _put_sum(poses, at, high, change, low, i):
-    """poses[at : at + 4] = high + change, rounded; low[i : i + 4] is the rounding error (two-sum)."""
-    rounded = add(high, change)
-    taken = sub(rounded, high)
-    put(poses, at, rounded)
-    put(low, i, add(sub(high, sub(rounded, taken)), sub(change, taken)))
 
 
 @kernel
@@ -51,16 +43,17 @@ def sum_series(graph, x, h, poses, p):
         for k in range(top, 1, -1):  # r = r_0 + h (v + h f),  rd = v + h (2 f + h fd)
             fd = fma(fd, s, f)
             f = fma(f, s, four(bodies, o + 4 * k))
-        change = times(add(v, fma(f, s, four(low, l + L_RD))), s)
-        _put_sum(poses, at + R, four(bodies, o), add(change, four(low, l + L_R)), x.low_end, l + L_R)
+        rest = fma(four(x.low_r2, 4 * b), s, four(low, l + L_RD))
+        change = times(add(v, fma(f, s, rest)), s)
+        put_sum(poses, at + R, four(bodies, o), add(change, four(low, l + L_R)), x.low_end, l + L_R)
         change = times(fma(fd, s, add(f, f)), s)
-        _put_sum(poses, at + RD, v, add(change, four(low, l + L_RD)), x.low_end, l + L_RD)
+        put_sum(poses, at + RD, v, add(change, fma(four(x.low_r2, 4 * b), s, rest)), x.low_end, l + L_RD)
         if graph.bodies[b, 1] == 7:
             w, o = splat(0.0), first + S_OMEGA * orders
             for k in range(top, 0, -1):
                 w = fma(w, s, four(bodies, o + 4 * k))
             change = fma(w, s, four(low, l + L_OMEGA))
-            _put_sum(poses, at + OMEGA, four(bodies, o), change, x.low_end, l + L_OMEGA)
+            put_sum(poses, at + OMEGA, four(bodies, o), change, x.low_end, l + L_OMEGA)
             fast = 0.0  # where it may turn far, p is followed on the way: it and -p are the same A
             for i in range(3):
                 fast = max(fast, max(abs(bodies[o + i]), abs(poses[at + OMEGA + i])))
@@ -91,9 +84,9 @@ def project_rates(graph, f, low, drifting):
         for b in range(graph.bodies.shape[0]):
             at, l, z = b * POSE, LOW * b, 8 * b
             change = add(four(f.Z, z), four(low, l + L_RD))
-            _put_sum(f.poses, at + RD, four(f.poses, at + RD), change, low, l + L_RD)
+            put_sum(f.poses, at + RD, four(f.poses, at + RD), change, low, l + L_RD)
             change = add(four(f.Z, z + 4), four(low, l + L_OMEGA))
-            _put_sum(f.poses, at + OMEGA, four(f.poses, at + OMEGA), change, low, l + L_OMEGA)
+            put_sum(f.poses, at + OMEGA, four(f.poses, at + OMEGA), change, low, l + L_OMEGA)
 
 
 @kernel
@@ -137,12 +130,12 @@ def _rotate(bodies, first, top, h, poses, at, x, b, p):  # nine: the series, the
     p[2] = e2 * d0 + e3 * d1 + e0 * d2 - e1 * d3
     p[3] = e3 * d0 - e2 * d1 + e1 * d2 + e0 * d3
     l = LOW * b + L_P
-    _put_sum(poses, at + P, four(x.start, 4 * b), add(four(p, 0), four(x.low, l)), x.low_end, l)
+    put_sum(poses, at + P, four(x.start, 4 * b), add(four(p, 0), four(x.low, l)), x.low_end, l)
     off = 1.0
     for n in range(4):
         off -= poses[at + P + n] * poses[at + P + n]
     change = fma(four(poses, at + P), splat(0.5 * off), four(x.low_end, l))
-    _put_sum(poses, at + P, four(poses, at + P), change, x.low_end, l)
+    put_sum(poses, at + P, four(poses, at + P), change, x.low_end, l)
     orient(poses, at, poses[at + P], poses[at + P + 1], poses[at + P + 2], poses[at + P + 3])
     return True
 

@@ -37,6 +37,7 @@ class Expansion(NamedTuple):
     low: np.ndarray  # (b, 16)  what r, rd, omega' and p lack to rounding at the start of the step; step_end.py
     low_end: np.ndarray  # (b, 16)  the same at the end of the step tried
     start: np.ndarray  # (b, 4)  p at the start of the step
+    low_r2: np.ndarray  # (b, 4)  what r_2 lacks to rounding; coefficients.py
     constraints: np.ndarray  # each kind's instances; constraint_series.series
     places: np.ndarray  # (kinds,) of tables.ConstraintSeries
     forces: np.ndarray  # (kinds,) of tables.ForceSeries
@@ -83,10 +84,10 @@ class SeriesContext(NamedTuple):
 def no_series(orders, bodies):
     """An `Expansion` with the series of bodies alone, and room for so many orders."""
     count = bodies.size // (orders * BODY_ROW)
-    low, start = np.zeros((2, LOW * count)), np.zeros(4 * count)
+    low, start, low_r2 = np.zeros((2, LOW * count)), *np.zeros((2, 4 * count))
     none, kinds = np.zeros(0), (records(kind, []) for kind in (ConstraintSeries, ForceSeries))
     return Expansion(
-        Orders(room=orders), bodies, *low, start, none, *kinds, np.zeros(0, np.int64), none,
+        Orders(room=orders), bodies, *low, start, low_r2, none, *kinds, np.zeros(0, np.int64), none,
         records(MotionSeries, []), records(MotionSeries, []),
     )  # fmt: skip
 

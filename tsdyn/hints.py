@@ -33,6 +33,7 @@ from .profiling.phases import Phase
 from .profiling.report import Profile
 from .simulation.scene import Scene
 from .simulation.solution import Charts, Solution, Steps
+from .statics.linearise import Linearisation
 
 
 class Rotation(Protocol):
@@ -159,6 +160,7 @@ __all__ = [
     "JointLaw",
     "JointLoads",
     "Kinematics",
+    "Linearisation",
     "Load",
     "Matrix",
     "Method",

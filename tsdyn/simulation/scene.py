@@ -29,6 +29,7 @@ from ..validation import counted, demand_known, label, vector3
 from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
 from .editing import remove as _remove
+from .statics import linearise as _linearise
 
 if TYPE_CHECKING:
     from ..hints import AnyBody, ArrayLike, Floats, Item, Orientation, Packed, System
@@ -341,6 +342,7 @@ class Scene:
     evaluate = _evaluate
     assemble = _assemble
     mobility = _mobility
+    linearise = _linearise
     set = set_joint
     remove = _remove
     copy = _copy

@@ -167,3 +167,13 @@ def test_a_pendulum_keeps_its_energy(make, method):
     scene, quarter = make()
     solution = ts.simulate(scene, (0.0, 80.0 * quarter), integrator=method)
     assert np.abs(solution.energy - solution.energy[0]).max() < 10.0 * method.rtol * np.ptp(solution.kinetic_energy)
+
+
+@pytest.mark.parametrize(
+    ("tol", "end", "method"), [(1e-3, 1.0, I.SDIRK54), (1e-3, 0.02, I.Taylor), (1e-10, 0.1, I.Taylor)]
+)
+def test_the_default_method_is_implicit_where_that_costs_less(tol, end, method):
+    """Not for the little that is left of a run, nor at tolerances at which implicit steps are short, too."""
+    solution = ts.simulate(jointed(), (0.0, end), rtol=tol, atol=tol).raise_if_failed()
+    assert solution.method.startswith(method.__name__)
+    assert solution.stats.stiff == (method is I.Taylor)  # the implicit run doesn't look for stiffness

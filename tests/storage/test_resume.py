@@ -1,12 +1,6 @@
 """A run that was stopped, or killed, and goes on from its checkpoint gives the bits of one never stopped."""
 
 import os
-import shutil
-import signal
-import subprocess
-import sys
-import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -242,6 +236,34 @@ def test_a_damaged_store(stopped):
     refuse(lambda: ts.resume(stopped), ts.StorageError, ("damaged", "300 bytes"))
 
 
+@pytest.mark.parametrize("part", ["c/0/0", "zarr.json"])
+def test_truncated_files_of_zarr(part, tmp_path, short_slices):
+    path = tmp_path / "run.zarr"
+    solution = ts.simulate(
+        top.build(), (0.0, 3.0), integrator="dop853", store=path, checkpoint=0.0, progress=Stop(3)
+    )  # fmt: skip
+    file = path / "qd" / part
+    file.write_bytes(file.read_bytes()[:-100])
+    for read in (lambda: ts.resume(path), lambda: solution.qd):
+        refuse(read, ts.StorageError, ("run.zarr", "damaged"))
+
+
+def test_a_chunk_of_zarr_that_is_gone(tmp_path, short_slices):
+    path = tmp_path / "run.zarr"
+    ts.simulate(top.build(), (0.0, 3.0), integrator="dop853", store=path, checkpoint=0.0, progress=Stop(3))
+    (path / "qd" / "c" / "0" / "0").unlink()
+    refuse(lambda: ts.resume(path), ts.StorageError, ("damaged", "qd lacks chunks"))
+
+
+@pytest.mark.parametrize("suffix", ["h5", "zarr"])
+def test_stopped_again_before_the_first_checkpoint(suffix, tmp_path, short_slices):
+    path, method = tmp_path / f"run.{suffix}", I.Nystrom4(1e-3)
+    ts.simulate(top.build(), (0.0, 1.0), integrator=method, store=path, checkpoint=0.0, progress=Stop(6))
+    for _ in range(3):
+        ts.resume(path, progress=Stop(1))
+    np.testing.assert_array_equal(ts.resume(path).q, ts.simulate(top.build(), (0.0, 1.0), integrator=method).q)
+
+
 def test_no_checkpoint(tmp_path):
     refuse(lambda: ts.resume(tmp_path / "run.h5"), ts.StorageError, ("doesn't exist",))
     refuse(lambda: ts.resume(3), ts.InvalidArgument, ("path must be a path", "3"))
@@ -254,82 +276,3 @@ def test_a_file_runs_no_code(stopped):
     arrays["scene"] = np.frombuffer(pickle.dumps(os.getcwd), np.uint8)
     checkpoint.write(stopped, numbers, arrays)
     refuse(lambda: ts.resume(stopped), ts.StorageError, ("getcwd", "scene="))
-
-
-CHILD = """
-import sys
-import numpy as np
-import tsdyn as ts
-from examples import top
-path, steps = sys.argv[1], int(sys.argv[2])
-end = steps * 1e-3
-if sys.argv[3] == "begin":
-    times = np.append(np.arange(0, steps, 1000) * 1e-3, end)
-    method = ts.integrators.Nystrom4(1e-3)
-    ts.simulate(top.build(), (0, end), integrator=method, t_eval=times, store=path, checkpoint=0.05)
-else:
-    ts.resume(path)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("suffix", ["h5", "zarr"])
-def test_killed_at_any_moment(suffix, tmp_path, rng):
-    steps, path, kills = 10**7 if suffix == "h5" else 10**6, tmp_path / f"run.{suffix}", 0
-    newest, _ = checkpoint.place(path)
-    for attempt in range(21):
-        last = attempt == 20
-        what = "resume" if newest.exists() else "begin"
-        if what == "begin" and path.exists():
-            pytest.fail("killed before its first checkpoint")
-        began = newest.stat().st_mtime_ns if newest.exists() else 0
-        child = subprocess.Popen([sys.executable, "-c", CHILD, str(path), str(steps), what])
-        if last:
-            assert child.wait() == 0
-            break
-        while child.poll() is None and (not newest.exists() or newest.stat().st_mtime_ns == began):
-            time.sleep(0.01)
-        time.sleep(rng.uniform(0.0, 0.5))
-        child.send_signal(signal.SIGKILL)
-        kills += child.wait() != 0
-    solution, end = ts.resume(path), steps * 1e-3
-    times = np.append(np.arange(0, steps, 1000) * 1e-3, end)
-    whole = ts.simulate(top.build(), (0, end), integrator=I.Nystrom4(1e-3), t_eval=times, history=False)
-    np.testing.assert_array_equal(solution.t, times)
-    np.testing.assert_array_equal(solution.q, whole.q)
-    np.testing.assert_array_equal(solution.qdd, whole.qdd)
-    assert kills >= 5
-
-
-FULL = """
-import resource, signal, sys
-import tsdyn as ts
-from examples import top
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
-method = ts.integrators.Nystrom4(1e-3)
-solution = ts.simulate(top.build(), (0, 100), integrator=method, store=sys.argv[1], checkpoint=0.0)
-print(solution.status, solution.t.size)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
-def test_a_file_that_may_grow_no_more(tmp_path):
-    path = tmp_path / "run.zarr"
-    found = subprocess.run([sys.executable, "-c", FULL, str(path)], capture_output=True, text=True)
-    status, count = found.stdout.split()
-    assert status == "store_failed"
-    assert 0 < int(count) <= 100_001
-    whole = ts.simulate(top.build(), (0, 100), integrator=I.Nystrom4(1e-3))
-    np.testing.assert_array_equal(ts.resume(path).q, whole.q)
-
-
-def test_a_disk_without_room(tmp_path, monkeypatch, short_slices):
-    path, free = tmp_path / "run.h5", iter([1 << 30] * 3)
-    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=next(free, 1 << 20)))
-    solution = ts.simulate(top.build(), (0.0, 3.0), integrator="dop853", store=path, checkpoint=0.0)
-    assert solution.status == ts.Status.STORE_FAILED
-    assert 0 < solution.t.size < 83
-    monkeypatch.undo()
-    np.testing.assert_array_equal(ts.resume(path).q, ts.simulate(top.build(), (0.0, 3.0), integrator="dop853").q)

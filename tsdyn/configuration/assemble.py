@@ -10,6 +10,7 @@ import numpy as np
 from ..calls import fitting
 from ..elements.names import named
 from ..errors import InconsistentState, InvalidArgument, InvalidBody
+from ..jit.interrupts import CollectionsDeferred
 from ..maths.row_rank import row_lengths
 from ..validation import number, one_of, positive, sequence
 from .continuation import Found, Kept, close, nearest, relax, settle, stuck
@@ -55,6 +56,7 @@ class AssemblyReport:
 
 
 @fitting
+@CollectionsDeferred()
 def assemble(
     scene: Scene,
     tol: float = 1e-12,

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
 from ..maths.row_rank import row_lengths
+from ..maths.sparse_lu import sparse_lu
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
 from .tolerances import DENSE, IMMOBILE, LEAST_DIVISOR, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
@@ -172,10 +173,9 @@ def soft_step(A, residual, wish, softness):
         K.flat[:: len(K) + 1] += softness
         return wish - A.T @ np.linalg.solve(K, residual + A @ wish)
     from scipy.sparse import block_array, diags_array
-    from scipy.sparse.linalg import splu
 
     matrix = block_array([[diags_array(np.ones(wish.size)), A.T], [A, -diags_array(softness)]], format="csc")
-    return splu(matrix).solve(np.concatenate((wish, -residual)))[: wish.size]
+    return sparse_lu(matrix).solve(np.concatenate((wish, -residual)))[: wish.size]
 
 
 def least_step(A, residual, rcond=SOLVED):

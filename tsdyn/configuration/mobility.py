@@ -11,6 +11,7 @@ import numpy as np
 
 from ..calls import fitting
 from ..errors import InvalidArgument
+from ..jit.interrupts import CollectionsDeferred
 from ..maths.row_rank import rank_of
 from ..validation import counted, finite_vector, number
 from .continuation import close
@@ -114,6 +115,7 @@ class Mobility:
 
 
 @fitting
+@CollectionsDeferred()
 def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobility:
     """Count degrees of freedom, and name the rows that are redundant.
 

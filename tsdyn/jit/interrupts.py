@@ -1,12 +1,19 @@
-"""Ctrl-C while a kernel compiles, or while files are written.
+"""Ctrl-C while a kernel compiles, while files are written, and within a long call of compiled code.
 
 LLVM calls back into Python. An exception raised in such a callback is printed and lost, and Numba then finds no machine
 code. Signals that arrive in a callback are therefore deferred to the end of the compilation.
+
+Python runs signal handlers between two of its own instructions, in the main thread alone. A long call of compiled code
+is therefore made in another thread, for which the main thread waits; a garbage collection of many objects is put off.
 """
 
 import contextlib
+import gc
 import signal
 import threading
+from concurrent.futures import Future, wait
+
+LOOK = 0.05  # s between two looks of a waiting thread, which Windows doesn't wake for Ctrl-C
 
 
 @contextlib.contextmanager
@@ -49,6 +56,57 @@ def deferred_interrupts():
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if interrupted:
         raise KeyboardInterrupt
+
+
+def interruptible(call, stop=None):
+    """Return call(), which releases the GIL, and run Python's signal handlers meanwhile, in the main thread.
+
+    What a handler raises is raised here: after `stop()`, which lets the call end soon, and its end; without `stop` at
+    once, the call being one that changes nothing.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return call()
+    future = Future()
+    try:
+        threading.Thread(target=_work, args=(future, call), daemon=True).start()
+        while not future.done():
+            wait([future], LOOK)
+    except BaseException:
+        if not future.cancel() and stop is not None:
+            stop()
+            _end(future)
+        raise
+    return future.result()
+
+
+def _work(future, call):
+    if future.set_running_or_notify_cancel():
+        try:
+            future.set_result(call())
+        except BaseException as error:
+            future.set_exception(error)
+
+
+def _end(future):
+    """Wait for a call, even if Ctrl-C is pressed again."""
+    while not future.done():
+        with contextlib.suppress(KeyboardInterrupt):
+            wait([future], LOOK)
+
+
+class CollectionsDeferred(contextlib.ContextDecorator):
+    """Put garbage collections during a block, or a call, off to its end; one of a million objects takes seconds."""
+
+    def __enter__(self):
+        self.enabled = gc.isenabled()
+        gc.disable()
+
+    def __exit__(self, *error):
+        if self.enabled:
+            gc.enable()
+
+    def _recreate_cm(self):
+        return CollectionsDeferred()
 
 
 def _raises_here():

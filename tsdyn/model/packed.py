@@ -9,6 +9,7 @@ from ..elements.element import address, checked_parameters
 from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE
 from ..elements.loops.template import AT, DIMENSION
 from ..errors import InvalidConstraint
+from ..jit.interrupts import CollectionsDeferred
 from ..jit.kernels import records, row_of
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
@@ -110,6 +111,7 @@ def _found_again(process, *parts):
     return packed._replace(loads=find_forces(system, packed.loads))
 
 
+@CollectionsDeferred()
 def pack(scene):
     """Pack a scene; loads (at the very first use compiles) the kernels of the kinds it uses.
 

@@ -10,7 +10,9 @@ from ..calls import fitting
 from ..elements.bodies import transform_g
 from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
 from ..formulations.dependent_rows import dependent_rows
+from ..jit.interrupts import CollectionsDeferred
 from ..maths.row_rank import dependent, farthest_first
+from ..maths.sparse_lu import sparse_lu
 from ..maths.tolerances import RANK_TOL
 from ..model.equations import evaluate_constraints
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
@@ -43,6 +45,7 @@ class Evaluation(NamedTuple):
 
 
 @fitting
+@CollectionsDeferred()
 def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = None, t: float = 0.0) -> Evaluation:
     """Evaluate constraints, masses, forces, multipliers and accelerations at one state.
 
@@ -216,13 +219,12 @@ def _independent(rows, solve, still):
 def _sparse_solver(M, Phi_q, lost=LOST):
     """Return the solver (load, gamma) -> (qdd, lam) by a sparse factorisation; None if it is numerically singular."""
     from scipy.sparse import block_array, diags_array
-    from scipy.sparse.linalg import splu
 
     kkt = block_array([[M, Phi_q.T], [Phi_q, None]], format="csc")
     scale = 1.0 / np.sqrt(np.maximum(abs(kkt).max(axis=1).toarray().ravel(), LEAST_DIVISOR))
     weights = diags_array(scale)
     try:
-        factors = splu((weights @ kkt @ weights).tocsc())
+        factors = sparse_lu((weights @ kkt @ weights).tocsc())
     except RuntimeError:
         return None
     pivots = np.abs(factors.U.diagonal())

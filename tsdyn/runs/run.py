@@ -17,6 +17,7 @@ the ends of steps; serves any number of runs (`Prepared.engine`), and has
 import time
 
 from ..errors import Status
+from ..jit.interrupts import CollectionsDeferred
 from .counts import Counts
 from .run_log import left_open
 from .sampling import Sampled
@@ -39,7 +40,8 @@ def run(task, engine, observe=None, relay=None, past=None):
     engine = prepared.engine(engine, task.method, task.form, task.within)
     memory = None if observe else prepared.take(engine.kind)
     if memory is None or not engine.serves(memory):
-        memory = engine.memory(prepared)
+        with CollectionsDeferred():
+            memory = engine.memory(prepared)
     memory.enter(engine, task, relay is not None)
     readings = None, None
     if memory.run.numbers.dense:

@@ -3,8 +3,6 @@
 import math
 from operator import is_
 
-import numpy as np
-
 from ..errors import Status
 from ..jit.kernels import resident
 from ..rows.interface import reset_selection
@@ -12,15 +10,12 @@ from ..workspaces.carving import divided
 from ..workspaces.run_state import FILLED, STORED, enter_joints
 from ..workspaces.workspace import hold
 from .arguments import step_count
+from .interrupted import advance
 from .run_log import no_log
+from .tolerances import LONG_STEPS
 
 UNLIMITED = 2**62  # steps wanted of an adaptive run
 STATUSES = {int(status): status for status in Status}
-
-
-def words(record):
-    """The numbers of a record as an array of words, which is cleared in less time."""
-    return np.frombuffer(record, np.int64)
 
 
 class Memory:
@@ -143,4 +138,16 @@ class Memory:
 
     def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver."""
-        return STATUSES[self.advance_kernel(self._context, self._run, log, most)]
+        arguments = self._context, self._run, log, most
+        if self.weight < LONG_STEPS:
+            return STATUSES[self.advance_kernel(*arguments)]
+        if not self.run.numbers.begun and most > 0:
+            status = self.advance(log, -1)
+            if not self.run.numbers.begun:
+                return status
+        return STATUSES[advance(self.advance_kernel, arguments, self.run, self.called)]
+
+    @property
+    def called(self):
+        """The records of addresses that the driver calls."""
+        return (self.run.kernels,)

@@ -15,7 +15,7 @@ from .recorder import Recorder
 from .tolerances import GETTING_ON, HOPELESS, PACED, SLICE_SECONDS
 
 SLICE_DONE = Status.SLICE_DONE  # which takes longer to look up than to compare
-FIRST_SLICE, FIRST_WORK = 1024, 1 << 17  # steps; coordinates stepped on, unless that is less than a step
+FIRST_SLICE, FIRST_WORK = 1024, 1 << 15  # steps; coordinates stepped on, unless that is less than a step
 
 
 class Pace:
@@ -171,6 +171,8 @@ def drive(memory, task, watch):
             raise
         slices.status, slices.reason = Status.STORE_FAILED, f"{type(error).__name__}: {error}."
     except KeyboardInterrupt:
+        if not memory.run.numbers.begun:  # there is nothing to return
+            raise
         if watch is not None:
             watch.go_back(memory.run, recorder.log)
         if memory.run.clock.t >= task.span[1]:

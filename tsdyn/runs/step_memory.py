@@ -2,11 +2,11 @@
 
 from ..model.packed import System
 from ..rows.interface import redundancy
-from ..workspaces.carving import divided
+from ..workspaces.carving import divided, words
 from ..workspaces.run_state import lay_out
 from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
 from .dense_output import warm_size
-from .run_memory import Memory, words
+from .run_memory import Memory
 from .stepper import advance
 
 MATRICES = 500  # matrices of n coordinates cost as much a step as O(N) kernels do with n^3 / MATRICES more of them
@@ -55,6 +55,11 @@ class StepMemory(Memory):
             self._scratch.append(context.saddle.K.base)
         rest = *self._laid_out, context.tangent.rows.S, context.tangent.poses
         self.nbytes = sum(array.nbytes for array in (*self._scratch, *rest))
+
+    @property
+    def called(self):
+        """As of `Memory`."""
+        return self.run.kernels, self.context.linear.kernels
 
     def take_system(self, system):
         """Take the numbers of a system, which may be another one of the same shape."""

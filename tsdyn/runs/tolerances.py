@@ -79,7 +79,11 @@ ROOT = 4.0 * EPS
 
 # --- slices ----------------------------------------------------------------------------------------------------------
 # s between returns to Python: progress bars and Ctrl-C answer at once, at a cost of 0.1 ms a slice.
-SLICE_SECONDS = 0.2
+SLICE_SECONDS = 0.1
+
+# Coordinates, more where a step is not O(N), from which a step may take longer than that, so that Ctrl-C is answered
+# within it: they take 5 ms (Nystrom4) to 60 ms (SDIRK54) a step, the thread of a slice 0.1 ms.
+LONG_STEPS = 1 << 13
 
 # Steps tried over which the pace of a run is taken; a run with HOPELESS as many to go would take days.
 PACED, HOPELESS = 1000, 1e10

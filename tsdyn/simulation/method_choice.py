@@ -10,12 +10,10 @@ evaluations per second of simulated time are compared.
 
 from types import SimpleNamespace
 
-import numpy as np
-
 from ..errors import Status, TsdynError
 from ..integrators import DOP853, SDIRK54, Taylor
 from ..runs.arguments import adaptive
-from .tolerances import COST, PILOT, SHARP_COST
+from .tolerances import COST, PILOTS, SERIES_COST, SHARP_COST, STEP_EVALUATIONS
 
 
 def explicit(prepared, rtol, atol, series):
@@ -46,20 +44,37 @@ def instead(task, status):
 def implicit_is_faster(simulate, given, method, end, run):
     """Return True if a run by a method that is found stiff had better go on by an implicit one, until the end.
 
-    `given` are the arguments of the run, by name.
+    `given` are the arguments of the run, by name. A short pilot settles clear cases, a longer one the others. None is
+    made where the rest of the run costs no more.
     """
-    start, same = float(run.clock.t), {name: given[name] for name in ("constraint_tol", "initial_tol", "max_step")}
+    start, sharp = float(run.clock.t), any(force.sharp for force in given["scene"].forces)
+    series = isinstance(method, Taylor)
+    cost = SERIES_COST if series else COST
+    ours = (SHARP_COST if series and sharp else 1.0) * method.stages / run.clock.h  # a second of the motion
+    for steps, gain in PILOTS:
+        if ours * (end - start) < cost * steps * STEP_EVALUATIONS:
+            return False
+        pilot = _pilot(simulate, given, implicit(method), end, run, steps)
+        if pilot is None:
+            return False
+        h = pilot.steps.h[pilot.steps.accepted]
+        theirs = cost * pilot.stats.evaluations / pilot.stats.steps / h[h.size * 3 // 4 :].max()  # steps grow
+        if theirs * gain < ours:
+            return True
+        if pilot.status == Status.SUCCESS:
+            return theirs < ours
+    return False
+
+
+def _pilot(simulate, given, method, end, run, steps):
+    """A run of so many steps from where a run is, or None where it fails."""
+    same = {name: given[name] for name in ("constraint_tol", "initial_tol", "max_step")}
     state = SimpleNamespace(q=run.now[0], qd=run.now[1], memory=run.remembered[len(run.joints) :].copy())
-    pilot = {**same, "integrator": implicit(method), "max_steps": PILOT, "state": state}
+    span = float(run.clock.t), end
     try:
-        pilot = simulate(given["scene"], (start, end), **pilot)
+        pilot = simulate(given["scene"], span, **same, integrator=method, max_steps=steps, state=state)
     except TsdynError:  # the run itself goes on
-        return False
+        return None
     if pilot.status == Status.INTERRUPTED:
         raise KeyboardInterrupt
-    if pilot.status not in (Status.SUCCESS, Status.MAX_STEPS):
-        return False
-    sharp = isinstance(method, Taylor) and any(force.sharp for force in given["scene"].forces)
-    h = pilot.steps.h[pilot.steps.accepted]
-    stages = COST * pilot.stats.evaluations / pilot.stats.steps
-    return stages / np.mean(h[h.size // 2 :]) < (SHARP_COST if sharp else 1.0) * method.stages / run.clock.h
+    return pilot if pilot.status in (Status.SUCCESS, Status.MAX_STEPS) else None

@@ -7,6 +7,7 @@ import numpy as np
 from ..configuration.initial_conditions import consistent
 from ..configuration.mirrored_branches import demand_aligned
 from ..formulations.locked_orientations import hold, still
+from ..jit.interrupts import CollectionsDeferred
 from ..methods.integrator import is_plain
 from ..model.handles import handles_of
 from ..model.packed import with_curvatures
@@ -112,7 +113,8 @@ class Prepared:
         if engine is None:
             if len(known) >= KINDS:
                 known.clear()
-            engine = known[key] = kind(self, method, form, within)
+            with CollectionsDeferred():
+                engine = known[key] = kind(self, method, form, within)
         return engine
 
     def system(self, implicit):
@@ -131,6 +133,7 @@ class Prepared:
             self._start = (given, options), start
         return start
 
+    @CollectionsDeferred()
     def _projected(self, scene, q, qd, t, tol, remembered, redundant_allowed):
         system, before = self.packed.system, still(self.packed)
         redundant = self.packed.derived.redundant

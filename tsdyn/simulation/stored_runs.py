@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import inspect
 import os
@@ -54,16 +55,30 @@ def archive_of(given, kept, history, numbers, arrays):
     tables = tables_of(kept.packed.bodies, remembered, history)
     attributes = {"source": f"tsdyn {__version__}", "scene": facts["scene"]}
     archive = Archive(Path(given["store"]).absolute(), tables, attributes, facts["interval"], _request(given), facts)
-    if numbers is None:
-        archive.begin()
-    elif not numbers.get("ended"):
-        archive.go_on(numbers, arrays)
+    with _writing(archive.path):
+        if numbers is None:
+            archive.begin()
+        elif not numbers.get("ended"):
+            archive.go_on(numbers, arrays)
     return archive
+
+
+@contextlib.contextmanager
+def _writing(path):
+    """A block in which an OSError is the store's."""
+    try:
+        yield
+    except StorageError:
+        raise
+    except OSError as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise StorageError(f"{path} can't be written: {reason}. Free space there, or take another path.") from error
 
 
 def begin_again(archive, given):
     """Let another method begin at the start; the archive."""
-    archive.begin_again(_request(given))
+    with _writing(archive.path):
+        archive.begin_again(_request(given))
     return archive
 
 

@@ -1,9 +1,13 @@
 """Limits of the preparation and assessment of runs; dimensionless unless a unit is named."""
 
 # --- choice of the method ---
-# Steps of the pilot run of an implicit method, and the cost of an evaluation within an implicit stage, its share of the
-# matrices included, in evaluations of an explicit one: measured by benchmarks/stiff.py.
-PILOT, COST = 60, 1.5
+# Steps of the pilot runs of an implicit method, and how many times less it must cost to be chosen after so many: steps
+# are short at first.
+PILOTS = (20, 2.0), (60, 1.0)
+# The cost of an evaluation within an implicit stage, its share of the matrices included, in evaluations of an explicit
+# one and in orders of a series: stiff chains of 1 to 64 links take 1.5 to 3, and 2 to 13.
+COST, SERIES_COST = 2.3, 8.0
+STEP_EVALUATIONS = 16  # of a step of SDIRK54, about
 # Cost of an order of a series in scenes with sharp forces, where steps are as short as they are for a while only, over
 # that of an evaluation: chains of four with friction, slip velocities of 1e-3 to 1e-1.
 SHARP_COST = 0.1

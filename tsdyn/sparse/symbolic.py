@@ -10,6 +10,7 @@ from collections import deque
 
 import numpy as np
 
+from ..maths.sparse_lu import sparse_lu
 from .panels import lay_out
 from .tolerances import (
     LINK_COST,
@@ -172,7 +173,6 @@ class _QuotientGraph:
 def _minimum_degree(core, cliques):
     """Order many nodes in loops by SuperLU's multiple minimum degree."""
     import scipy.sparse
-    import scipy.sparse.linalg
 
     at = {i: place for place, i in enumerate(core)}
     rows, columns = [], []
@@ -183,7 +183,7 @@ def _minimum_degree(core, cliques):
     n = len(core)
     graph = scipy.sparse.csc_matrix((np.full(len(rows), -1.0), (rows, columns)), (n, n))
     heavy = 1.0 - 2.0 * np.asarray(graph.sum(axis=0)).ravel()
-    factors = scipy.sparse.linalg.splu(
+    factors = sparse_lu(
         (graph + scipy.sparse.diags(heavy)).tocsc(),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,

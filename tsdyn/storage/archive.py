@@ -1,14 +1,16 @@
 """What a run with a store writes to: outputs and histories, buffered, and checkpoints when they are due."""
 
 import math
+import shutil
 import time
 
 import numpy as np
 
 from . import checkpoint
-from .formats import CHUNK, Column, Table, format_of
+from .formats import Column, Table, format_of
 
-READERS = 1.0  # s, after which readers see what has been written
+READERS = 1.0  # s, after which readers see what has been written; later in proportion where that takes longer than
+BRIEF = 0.01  # s
 OUTPUTS, STEPS, CHARTS = "outputs", "steps", "charts"
 _COORDINATES = ("x", "y", "z", "e0", "e1", "e2", "e3")
 _LEVELS = {
@@ -78,8 +80,13 @@ class Archive:
         self._store = None
 
     def begin(self):
-        """Make the store."""
-        self._store = self._format.Store.create(self.path, self._tables, self._attributes)
+        """Make the store; nothing is left where that fails."""
+        try:
+            self._store = self._format.Store.create(self.path, self._tables, self._attributes)
+        except OSError:
+            shutil.rmtree(self.path, ignore_errors=True)
+            self.path.unlink(missing_ok=True)
+            raise
         self._set_counts(self._none())
 
     def go_on(self, numbers, arrays):
@@ -105,7 +112,7 @@ class Archive:
     def _set_counts(self, counts):
         self.counts = dict(counts)
         self._waiting, self._size = {name: [] for name in self._tables}, 0
-        self._flushed, self._written = time.perf_counter(), -math.inf  # the first checkpoint is due at once
+        self._due, self._written = time.perf_counter() + READERS, -math.inf  # the first checkpoint is due at once
 
     @property
     def columns(self):
@@ -128,9 +135,11 @@ class Archive:
         now = time.perf_counter()
         if self._interval is not None and now - self._written >= self._interval:
             self.checkpoint(*state())
-        elif now - self._flushed >= READERS and self._size:
+        elif now >= self._due and self._size:
             self.flush()
-        elif self._size > CHUNK:
+            ended = time.perf_counter()
+            self._due = ended + READERS * max((ended - now) / BRIEF, 1.0)
+        elif self._size > self._format.BUFFER:
             self._write()
 
     def checkpoint(self, numbers, arrays):
@@ -139,7 +148,8 @@ class Archive:
         self._store.sync()
         facts = {**self._facts, "counts": self.counts, "passed": self.passed, "size": self._store.size}
         checkpoint.write(self.path, {**facts, **numbers}, {**self._request, **arrays})
-        self._flushed = self._written = time.perf_counter()
+        self._written = time.perf_counter()
+        self._due = self._written + READERS
 
     @property
     def has_checkpoints(self):
@@ -150,7 +160,6 @@ class Archive:
         """Let readers see everything."""
         self._write()
         self._store.flush()
-        self._flushed = time.perf_counter()
 
     def close(self):
         """Close the store."""

@@ -88,7 +88,10 @@ def remove(store):
 
 
 def _read(path):
-    content = path.read_bytes()
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise StorageError(f"{path} can't be read: {error}.") from error
     head, checksum, payload = content[: len(FORMAT)], content[len(FORMAT) :][:64], content[len(FORMAT) + 65 :]
     if head != FORMAT:
         raise StorageError(f"{path} is no checkpoint of this format, {FORMAT.decode().strip()!r}.")

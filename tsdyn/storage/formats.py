@@ -10,12 +10,13 @@ A format is a module with a class `Store`, which has
     sync()                                     bring all of it to the disk, for a crash
     close()
 
-and functions for stores that may still be written
+BUFFER, how many floats are gathered before they are written, and functions for stores that may still be written
 
     read(path, column, part)                   a slice of a column
     count(path, columns)                       rows that all of these columns have
 """
 
+import contextlib
 import math
 from importlib import import_module
 from pathlib import Path
@@ -51,6 +52,17 @@ def demand_rows(path, column, found, count):
     """Raise StorageError if a column has fewer rows than were written."""
     if found < count:
         raise StorageError(f"{path}: {column} has {found} rows of {count} that were written.")
+
+
+@contextlib.contextmanager
+def reading(path):
+    """A block in which what can't be read is damaged: StorageError in place of a library's errors of many kinds."""
+    try:
+        yield
+    except StorageError:
+        raise
+    except Exception as error:
+        raise StorageError(f"{path} is damaged, or gone: {type(error).__name__}: {error}.") from error
 
 
 def format_of(path):

@@ -1,5 +1,10 @@
-"""Stores in HDF5: written so that others can read meanwhile (SWMR), with the dimensions that netCDF and xarray know."""
+"""Stores in HDF5: written so that others can read meanwhile (SWMR), with the dimensions that netCDF and xarray know.
 
+HDF5 doesn't survive a write that fails: closing the file fails, too, and the process may crash at its end. There must
+be room before anything is written. Where a write fails all the same (a quota), what HDF5 still writes goes nowhere.
+"""
+
+import contextlib
 import errno
 import os
 import shutil
@@ -9,8 +14,9 @@ import h5py
 import numpy as np
 
 from ..errors import StorageError
-from .formats import CHUNK, demand_rows
+from .formats import CHUNK, demand_rows, reading
 
+BUFFER = CHUNK
 COPIED = 1 << 16  # rows at a time
 CACHE = 1 << 19  # bytes of each array that are kept in memory
 
@@ -18,15 +24,16 @@ CACHE = 1 << 19  # bytes of each array that are kept in memory
 class Store:
     """A file that is being written; see formats.py."""
 
-    def __init__(self, path, file):
+    def __init__(self, path, file, tables):
         self._path, self._file = path, file
-        self._arrays = dict(file.items())
+        self._arrays, self._room = dict(file.items()), _room_of(tables)
         file.swmr_mode = True
 
     @classmethod
     def create(cls, path, tables, attributes):
         """As formats.py says."""
-        return cls(path, _laid_out(path, tables, attributes))
+        _demand_room(path, _room_of(tables))
+        return cls(path, _laid_out(path, tables, attributes), tables)
 
     @property
     def size(self):
@@ -41,56 +48,88 @@ class Store:
             raise StorageError(f"{path} is damaged: it has {found} bytes of {size} that were written.")
         partial = Path(path).with_name(f"{Path(path).name}-partial")
         partial.unlink(missing_ok=True)
+        _demand_room(partial, found + _room_of(tables))
         file = _laid_out(partial, tables, attributes)
-        with _reading(path) as old:
+        with _opened(path) as old:
             for name, table in tables.items():
                 for column in table.columns:
                     _copy(old[column.name], file[column.name], counts[name])
         file.flush()
+        if os.path.getsize(partial) < size:  # of the checkpoint, from which another process may have to go on
+            os.truncate(partial, size)
+        _sync(partial)
         os.replace(partial, path)
-        return cls(path, file)
+        return cls(path, file, tables)
 
     def write(self, start, rows):
-        """As formats.py says. HDF5 doesn't survive a full disk: there must be room for a chunk more of each column."""
-        needed = sum(values.nbytes for values in rows.values()) + 8 * CHUNK * (len(self._arrays) + 1)
-        if shutil.disk_usage(os.path.dirname(os.path.abspath(self._path))).free < needed:
-            raise OSError(errno.ENOSPC, f"{os.strerror(errno.ENOSPC)} for {needed} bytes more")
-        for column, values in rows.items():
-            array, end = self._arrays[column], start + len(values)
-            array.resize(end, axis=0)
-            array[start:end] = values
+        """As formats.py says."""
+        _demand_room(self._path, sum(values.nbytes for values in rows.values()) + self._room)
+        with self._failing():
+            for column, values in rows.items():
+                array, end = self._arrays[column], start + len(values)
+                array.resize(end, axis=0)
+                array[start:end] = values
 
     def flush(self):
         """As formats.py says."""
-        self._file.flush()
+        with self._failing():
+            self._file.flush()
 
     def sync(self):
         """As formats.py says."""
         self.flush()
-        handle = os.open(self._path, os.O_RDWR)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        _sync(self._path)
 
     def close(self):
         """Close the file."""
-        self._file.close()
+        with self._failing():
+            self._file.close()
+
+    @contextlib.contextmanager
+    def _failing(self):
+        """A block in which a write may fail: OSError, and what HDF5 writes from then on goes nowhere."""
+        try:
+            yield
+        except (OSError, RuntimeError) as error:  # h5py raises both
+            if os.name == "posix":
+                with open(os.devnull, "r+b") as nowhere:
+                    os.dup2(nowhere.fileno(), self._file.id.get_vfd_handle())
+            raise OSError(str(error)) from error
+
+
+def _room_of(tables):
+    """Bytes of a chunk more of each column, and of HDF5's own tables."""
+    return 8 * CHUNK * (1 + sum(len(table.columns) + len(table.labels) for table in tables.values()))
+
+
+def _demand_room(path, needed):
+    """Raise OSError unless a file may grow by so many bytes."""
+    folder = os.path.dirname(os.path.abspath(path))
+    if shutil.disk_usage(folder).free < needed:
+        raise OSError(errno.ENOSPC, f"{os.strerror(errno.ENOSPC)} for {needed} bytes more")
+
+
+def _sync(path):
+    handle = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def read(path, column, part):
     """As formats.py says."""
-    with _reading(path) as file:
+    with reading(path), _opened(path) as file:
         return file[column][part]
 
 
 def count(path, columns):
     """As formats.py says."""
-    with _reading(path) as file:
+    with reading(path), _opened(path) as file:
         return min(len(file[column]) for column in columns)
 
 
-def _reading(path):
+def _opened(path):
     """The file to read: as one that may be written meanwhile, or as another reader in this process has opened it."""
     for options in ({"libver": "latest", "swmr": True, "locking": False}, {"locking": False}, {}):
         try:
@@ -127,4 +166,6 @@ def _copy(old, new, count):
     demand_rows(old.file.filename, old.name, len(old), count)
     new.resize(count, axis=0)
     for at in range(0, count, COPIED):
-        new[at : at + COPIED] = old[at : min(at + COPIED, count)]
+        with reading(old.file.filename):
+            rows = old[at : min(at + COPIED, count)]
+        new[at : at + COPIED] = rows

@@ -5,9 +5,13 @@ import warnings
 
 import numpy as np
 import zarr
+from zarr.codecs import BloscCodec
 
 from ..errors import StorageError
-from .formats import demand_rows
+from .formats import CHUNK, demand_rows, reading
+
+FAST = BloscCodec(typesize=8, cname="lz4", clevel=1, shuffle="shuffle")
+BUFFER = 8 * CHUNK  # a write takes 20 ms, of however many rows
 
 
 class Store:
@@ -30,7 +34,7 @@ class Store:
                 group.create_array(
                     column.name, shape=shape, chunks=chunks, dtype=float,
                     dimension_names=(table.dimension, *column.dimensions), fill_value=np.nan,
-                    attributes=column.attributes,
+                    attributes=column.attributes, compressors=FAST,
                 )  # fmt: skip
         return cls(path, group, tables)
 
@@ -39,12 +43,14 @@ class Store:
     @classmethod
     def reopen(cls, path, tables, attributes, counts, size):
         """As formats.py says."""
-        store = cls(path, _group(path, "r+"), tables)
+        with reading(path):
+            store = cls(path, _group(path, "r+"), tables)
         for name, table in tables.items():
             for column in table.columns:
                 array = store._arrays[column.name]
                 demand_rows(path, column.name, array.shape[0], counts[name])
                 array.resize((counts[name], *array.shape[1:]))
+                _demand_chunks(path, array)
         return store
 
     def write(self, start, rows):
@@ -68,13 +74,24 @@ class Store:
 
 def read(path, column, part):
     """As formats.py says."""
-    return _group(path, "r")[column][part]
+    with reading(path):
+        return _group(path, "r")[column][part]
 
 
 def count(path, columns):
     """As formats.py says."""
-    group = _group(path, "r")
-    return min(group[column].shape[0] for column in columns)
+    with reading(path):
+        group = _group(path, "r")
+        return min(group[column].shape[0] for column in columns)
+
+
+def _demand_chunks(path, array):
+    """Raise StorageError unless all chunks are there, and whole."""
+    with reading(path):
+        if array.nchunks_initialized < array.nchunks:
+            raise StorageError(f"{path} is damaged: {array.name} lacks chunks.")
+        for at in range(0, array.shape[0], array.chunks[0]):
+            _ = array[at : at + array.chunks[0]]
 
 
 def _group(path, mode):

@@ -4,9 +4,10 @@ from ..errors import InvalidArgument, Status
 from ..formulations.locked_orientations import moving_parts
 from ..model.packed import System
 from ..rows.interface import allocate_tangent
-from ..runs.run_memory import Memory, words
+from ..runs.run_memory import Memory
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import with_loops
+from ..workspaces.carving import words
 from ..workspaces.run_state import lay_out
 from ..workspaces.workspace import plain_work
 from .layout import allocate_expansion, masks

@@ -27,3 +27,8 @@ def divided(block, *parts):
     """A block in two: the records and arrays that it begins with, and the rest."""
     at = sum(part.size if isinstance(part, np.ndarray) else ctypes.sizeof(part) // 8 for part in parts)
     return block[:at], block[at:]
+
+
+def words(record):
+    """The numbers of a record as an array of words, which is copied and cleared in less time."""
+    return np.frombuffer(record, np.int64)

@@ -1,0 +1,139 @@
+"""A ts.Scene in Exudyn: bodies with Euler parameters, joints by multipliers, generalised-alpha of index 3 or trapezoid.
+
+It takes the constraints and forces of the gallery of hard cases and of stiff chains.
+"""
+
+import time
+
+import numpy as np
+
+from tsdyn.elements.bodies import rotation_matrix
+
+LOCKED = {  # displacements along and rotations about the axes of a joint, the last of which is its own
+    "Revolute": (1, 1, 1, 1, 1, 0),
+    "Translational": (1, 1, 0, 1, 1, 1),
+    "PlaneContact": (0, 0, 1, 0, 0, 0),
+}
+OUTPUTS = 200
+MANY = 100  # bodies from which on the sparse solver is the faster one
+
+
+def frame(z, x=None):
+    """A rotation matrix with columns x, z x x, z; any x across z where it isn't given."""
+    z = np.asarray(z, float) / np.linalg.norm(z)
+    x = np.cross(np.eye(3)[np.abs(z).argmin()], z) if x is None else np.asarray(x, float)
+    x = x / np.linalg.norm(x)
+    return np.stack((x, np.cross(z, x), z), axis=1)
+
+
+class ExudynScene:
+    """The scene; `run` begins at its start."""
+
+    def __init__(self, scene):
+        import exudyn as exu
+        from exudyn import utilities as ex
+
+        self.exu, self.ex, self.scene = exu, ex, scene
+        self.container = exu.SystemContainer()
+        self.mbs = self.container.AddSystem()
+        self.bodies = {scene.ground: self.mbs.AddObject(ex.ObjectGround())}
+        for body in scene.bodies:
+            A = rotation_matrix(np.asarray(body.orientation))
+            self.bodies[body] = self.mbs.CreateRigidBody(
+                inertia=ex.RigidBodyInertia(body.mass, np.asarray(body.inertia)), gravity=list(scene.gravity),
+                referencePosition=list(body.position), referenceRotationMatrix=A,
+                initialVelocity=list(body.velocity), initialAngularVelocity=list(A @ body.angular_velocity),
+                nodeType=exu.NodeType.RotationEulerParameters,
+            )  # fmt: skip
+        for item in (*scene.constraints, *scene.forces):
+            getattr(self, f"_{type(item).__name__.lower()}", self._joint)(item)
+        output = exu.OutputVariableType
+        self.sensors = [
+            [self._sensor(body, kind) for body in scene.bodies]
+            for kind in (output.Position, output.RotationMatrix, output.Velocity, output.AngularVelocityLocal)
+        ]
+        self.mbs.Assemble()
+
+    def _marker(self, body, place, turn=None):
+        at = self.exu.HT(rotation=np.eye(3) if turn is None else turn, translation=list(place))
+        return self.mbs.AddMarker(self.ex.MarkerBodyRigid(bodyNumber=self.bodies[body], localHT=at))
+
+    def _sensor(self, body, kind):
+        return self.mbs.AddSensor(
+            self.ex.SensorBody(bodyNumber=self.bodies[body], storeInternal=True, outputVariableType=kind)
+        )
+
+    def _eulernormalization(self, _):
+        """Exudyn has its own."""
+
+    def _joint(self, joint):
+        """Planes are normal to the second axis, which the others share."""
+        point_a, point_b, *axes = joint.coordinates
+        turns = [frame(axes[-1])] * 2 if len(axes) == 1 else [frame(z, *x) for z, *x in (axes[::2], axes[1::2])]
+        pair = [self._marker(joint.a, point_a, turns[0]), self._marker(joint.b, point_b, turns[1])]
+        if type(joint).__name__ == "PlaneContact":
+            pair = pair[::-1]  # the plane is of the first
+        locked = list(LOCKED[type(joint).__name__])
+        self.mbs.AddObject(self.ex.ObjectJointGeneric(markerNumbers=pair, constrainedAxes=locked))
+
+    def _spherical(self, joint):
+        pair = [self._marker(body, place) for body, place in zip((joint.a, joint.b), joint.coordinates, strict=True)]
+        self.mbs.AddObject(self.ex.ObjectJointSpherical(markerNumbers=pair))
+
+    def _distance(self, rod):
+        pair = [self._marker(body, place) for body, place in zip((rod.a, rod.b), rod.coordinates, strict=True)]
+        self.mbs.AddObject(self.ex.ObjectConnectorDistance(markerNumbers=pair, distance=rod.length))
+
+    def _spring(self, spring):
+        pair = [self._marker(body, place) for body, place in zip((spring.a, spring.b), spring.coordinates, strict=True)]
+        self.mbs.AddObject(
+            self.ex.ObjectConnectorSpringDamper(
+                markerNumbers=pair, referenceLength=spring.free_length, stiffness=spring.stiffness,
+                damping=spring.damping,
+            )
+        )  # fmt: skip
+
+    def _torsionalspring(self, spring):
+        axis, *references = spring.coordinates[:3]
+        A, B = (rotation_matrix(np.asarray(body.orientation)) for body in (spring.a, spring.b))
+        turns = [frame(z, x) for z, x in zip((axis, B.T @ A @ axis), references, strict=True)]
+        pair = [self._marker(b, (0.0, 0.0, 0.0), A) for b, A in zip((spring.a, spring.b), turns, strict=True)]
+        self.mbs.AddObject(
+            self.ex.ObjectConnectorTorsionalSpringDamper(
+                markerNumbers=pair, stiffness=spring.stiffness, damping=spring.damping
+            )
+        )
+
+    def _torque(self, motor):
+        one = self._marker(motor.a, (0.0, 0.0, 0.0))
+        self.mbs.AddLoad(self.ex.LoadTorqueVector(markerNumber=one, loadVector=list(motor.torque)))
+
+    def run(self, end, step, outputs=OUTPUTS, dependent=False, solver=None):
+        """((r, A, v, omega) at the outputs, seconds); None where the solver gave up.
+
+        With dependent rows by a dense solver that allows for these. solver: the name of a DynamicSolverType.
+        """
+        settings = self.exu.SimulationSettings()
+        settings.solution.file.write = False
+        settings.solution.sensors.writePeriod = max(end / outputs, step)
+        times = settings.timeIntegration
+        times.numberOfSteps, times.endTime, times.verboseMode = round(end / step), end, 0
+        if dependent:
+            settings.linearSolver.solverType = self.exu.LinearSolverType.EigenDense
+            settings.linearSolver.ignoreSingularJacobian = True
+        elif len(self.scene.bodies) >= MANY:
+            settings.linearSolver.solverType = self.exu.LinearSolverType.EigenSparse
+        begun = time.perf_counter()
+        try:
+            kind = getattr(self.exu.DynamicSolverType, solver or "GeneralizedAlpha")
+            done = self.mbs.SolveDynamic(settings, solverType=kind)
+        except ValueError:
+            return None
+        seconds = time.perf_counter() - begun
+        if not done:
+            return None
+        r, A, v, omega = (
+            np.stack([np.asarray(self.mbs.GetSensorStoredData(one))[:, 1:] for one in row], axis=1)
+            for row in self.sensors
+        )
+        return (r, A.reshape(*A.shape[:2], 3, 3), v, omega), seconds

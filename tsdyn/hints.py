@@ -33,6 +33,7 @@ from .profiling.phases import Phase
 from .profiling.report import Profile
 from .simulation.scene import Scene
 from .simulation.solution import Charts, Solution, Steps
+from .statics.equilibrium import Equilibrium
 from .statics.linearise import Linearisation
 
 
@@ -142,6 +143,7 @@ __all__ = [
     "Class",
     "ConstraintError",
     "Data",
+    "Equilibrium",
     "Evaluation",
     "Event",
     "Floats",

@@ -3,20 +3,18 @@
 import numpy as np
 import pytest
 from scipy.linalg import eig, eigh
-from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tests.helpers import minimal_coordinates as minimal
 from tests.helpers.closed_loops import four_bar, parallelogram
 from tests.helpers.every_force import everything
+from tests.helpers.hanging_chains import DOWN, G, pendulum_matrices, pendulums
 from tests.helpers.tolerances import CLOSE, FINE, HELD
 from tsdyn.elements.bodies import transform_g
 from tsdyn.statics.motion import Motion
 from tsdyn.statics.variations import Variations, stacked
 
 C, F = ts.constraints, ts.forces
-G = 9.81
-DOWN = np.array([0.0, 0.0, -G])
 
 
 def differences(f, x, h=2e-3):
@@ -26,28 +24,6 @@ def differences(f, x, h=2e-3):
     for e in np.eye(len(x)):
         columns.append(sum(c * (f(x + i * h * e) - f(x - i * h * e)) for i, c in weights.items()) / (60.0 * h))
     return np.array(columns).T
-
-
-def pendulums(angles, length=0.7, mass=1.3, inertia=0.02):
-    """A chain of equal planar pendulums at absolute angles from the vertical, about y."""
-    scene, top, before = ts.Scene(gravity=DOWN), np.zeros(3), None
-    for i, angle in enumerate(angles):
-        rotation = Rotation.from_rotvec([0.0, angle, 0.0])
-        down = rotation.apply([0.0, 0.0, -length])
-        body = scene.add_body(mass, (inertia, inertia, 1e-3), top + down / 2, rotation, name=f"link {i}")
-        scene.add(C.Revolute.at(before or scene.ground, body, point=top, axis=(0, 1, 0), name=f"pin {i}"))
-        top, before = top + down, body
-    return scene
-
-
-def pendulum_matrices(count, length=0.7, mass=1.3, inertia=0.02):
-    """M and K in absolute angles about the hanging position."""
-    M = np.zeros((count, count))
-    for j in range(count):
-        arms = np.where(np.arange(count) < j, length, np.where(np.arange(count) == j, length / 2, 0.0))
-        M += mass * np.outer(arms, arms)
-    K = np.diag([mass * G * length * (count - j - 0.5) for j in range(count)])
-    return M + inertia * np.eye(count), K
 
 
 @pytest.mark.parametrize("count", [1, 2, 8])
@@ -103,60 +79,6 @@ def test_derivatives_in_any_motion(seed):
         expected = expected[np.ix_(order, order)]
         np.testing.assert_allclose(-np.linalg.solve(linear.M, found), expected, atol=CLOSE * np.abs(expected).max())
     assert not linear.steady
-
-
-def spinning_top(theta, spin, precession, mass=2.0, arm=0.3, across=0.05, along=0.02):
-    """A symmetric top on its tip in steady motion: spin is the angular velocity about its axis."""
-    scene = ts.Scene(gravity=DOWN)
-    tilt = Rotation.from_rotvec([0.0, theta, 0.0])
-    axis = tilt.apply([0.0, 0.0, 1.0])
-    omega = precession * np.array([0.0, 0.0, 1.0]) + (spin - precession * np.cos(theta)) * axis
-    top = scene.add_body(
-        mass, (across, across, along), arm * axis, tilt, np.cross(omega, arm * axis), tilt.inv().apply(omega), "top"
-    )
-    scene.add(C.Spherical(top, scene.ground, point_a=(0, 0, -arm), point_b=(0, 0, 0)))
-    return scene, across + mass * arm * arm, along, mass * G * arm
-
-
-@pytest.mark.parametrize("fast", [True, False])
-def test_top_in_steady_precession(fast):
-    theta, spin = 0.5, 150.0
-    _, A, J, moment = spinning_top(theta, spin, 0.0)
-    root = np.sqrt((J * spin) ** 2 - 4.0 * A * np.cos(theta) * moment)
-    precession = (J * spin + (root if fast else -root)) / (2.0 * A * np.cos(theta))
-    linear = spinning_top(theta, spin, precession)[0].linearise()
-    nutation = np.sqrt(A**2 * precession**4 - 2.0 * A * moment * precession**2 * np.cos(theta) + moment**2)
-    nutation /= A * precession
-    assert linear.steady
-    np.testing.assert_allclose(linear.rotation_rate, (0, 0, precession), atol=CLOSE)
-    found = linear.eigenvalues()
-    np.testing.assert_allclose(found[:4], 0.0, atol=CLOSE)
-    np.testing.assert_allclose(np.sort(found.imag)[[0, -1]], (-nutation, nutation), rtol=CLOSE)
-    np.testing.assert_allclose(found.real, 0.0, atol=CLOSE)
-
-
-@pytest.mark.parametrize("spin", [150.0, 40.0])
-def test_sleeping_top(spin):
-    scene, A, J, moment = spinning_top(0.0, spin, 0.0)
-    linear = scene.linearise()
-    root = np.sqrt(complex((J * spin) ** 2 - 4.0 * A * moment))
-    assert linear.steady
-    assert not linear.rotation_rate.any()
-    for value in ((J * spin + root) / (2.0 * A), (J * spin - root) / (2.0 * A)):
-        for expected in (1j * value, -1j * value.conjugate()):
-            assert np.abs(linear.eigenvalues() - expected).min() < CLOSE * abs(value)
-
-
-def test_free_body_spinning_about_its_middle_axis():
-    """Euler's equations about the axis of the middle moment: +-spin sqrt((C - B) (B - A) / (A C)), and zeros."""
-    J, spin = np.array([1.0, 2.0, 2.5]), 3.0
-    scene = ts.Scene(gravity=(0, 0, 0))
-    scene.add_body(1.0, J, angular_velocity=(0.0, spin, 0.0), name="book")
-    linear = scene.linearise()
-    rate = spin * np.sqrt((J[2] - J[1]) * (J[1] - J[0]) / (J[0] * J[2]))
-    assert linear.steady
-    assert np.abs(linear.eigenvalues() - rate).min() < CLOSE
-    assert np.abs(linear.eigenvalues() + rate).min() < CLOSE
 
 
 def test_damped_pair_of_masses():
@@ -253,37 +175,6 @@ def test_joints_whose_coordinates_are_those_of_bodies(kind):
     slopes = differences(lambda x: np.array([one[1] for one in twists(x)]), x0) + turned
     expected = slopes @ np.linalg.inv(P)
     np.testing.assert_allclose(-np.linalg.solve(linear.M, linear.K), expected, atol=CLOSE * np.abs(expected).max())
-
-
-def test_governor_turning_steadily():
-    """Two arms about a shaft that turns steadily: the frequency of both opening together, shaft free to slow down."""
-    length, mass, shaft, own, rate = 0.5, 1.2, 0.3, 0.01, 7.0
-    theta = np.arccos(G / (length * rate**2))
-    scene = ts.Scene(gravity=DOWN)
-    post = scene.add_body(1.0, (shaft, shaft, shaft), angular_velocity=(0, 0, rate), name="post")
-    scene.add(C.Revolute.at(scene.ground, post, point=(0, 0, 0), axis=(0, 0, 1), name="bearing"))
-    for sign in (1.0, -1.0):
-        place = length * np.array([sign * np.sin(theta), 0.0, -np.cos(theta)])
-        ball = scene.add_body(
-            mass,
-            (own, own, own),
-            place,
-            velocity=(0, rate * place[0], 0),
-            angular_velocity=(0, 0, rate),
-            name=f"ball {sign}",
-        )
-        scene.add(C.Revolute.at(post, ball, point=(0, 0, 0), axis=(0, 1, 0), name=f"arm {sign}"))
-    linear = scene.linearise()
-    assert linear.steady
-    # (m l^2 + j) thetadd = m l^2 w^2 s c - m g l s, I(theta) w constant
-    s, c = np.sin(theta), np.cos(theta)
-    square = mass * length**2
-    inertia = shaft + 2.0 * own + 2.0 * square * s * s
-    apart = square * rate**2 * s * s / (square + own)
-    expected = np.sqrt([apart * (1.0 + 8.0 * square * c * c / inertia), apart])
-    found = linear.eigenvalues()
-    for value in expected:
-        assert np.abs(found - 1j * value).min() < CLOSE * value
 
 
 def test_what_has_no_linearisation_is_refused_by_name():

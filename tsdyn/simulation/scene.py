@@ -29,6 +29,7 @@ from ..validation import counted, demand_known, label, vector3
 from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
 from .editing import remove as _remove
+from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
 
 if TYPE_CHECKING:
@@ -343,6 +344,7 @@ class Scene:
     assemble = _assemble
     mobility = _mobility
     linearise = _linearise
+    equilibrium = _equilibrium
     set = set_joint
     remove = _remove
     copy = _copy

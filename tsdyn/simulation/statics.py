@@ -1,19 +1,21 @@
-"""`scene.linearise`: a consistent state, as a run would start from it, handed to the package `statics`."""
+"""`scene.linearise` and `scene.equilibrium`: consistent states, as of a run, handed to the package `statics`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..calls import fitting
-from ..errors import InvalidArgument
+from ..errors import InconsistentState, InvalidArgument
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
-from ..validation import number
+from ..validation import finite_vector, number
 from .scene_cache import prepared
 
 if TYPE_CHECKING:
-    from ..hints import Linearisation, Scene, State
+    from ..hints import ArrayLike, Equilibrium, Linearisation, Scene, State
 
 INITIAL_TOL = 1e-9  # of residuals of a state, as in `simulate`
 
@@ -86,3 +88,91 @@ def linearise(
     memory = remembered(state, kept, t, q)
     q, qd = kept.start(scene, (q, qd), t, INITIAL_TOL, memory, True)
     return find(scene, memory[kept.handles.count :], (t, q.copy(), qd.copy()), tuple(inputs), tuple(outputs))
+
+
+@fitting
+def equilibrium(scene: Scene, guess: State | ArrayLike | None = None, t: float = 0.0) -> Equilibrium:
+    """Find a static equilibrium: from the scene's pose, or a guess, down to a minimum of the potential energy.
+
+    Parameters
+    ----------
+    guess : State or array_like (n,), optional
+        Positions to start from; default: those of the bodies. They are moved to the nearest consistent ones first.
+    t : float, s
+        Time at which loads and constraints are taken.
+
+    Returns
+    -------
+    Equilibrium
+        `.state`, `.stable`, `.smallest_stiffness`, `.moved`, `.reaction(joint)` and more. The scene is not changed.
+
+    Raises
+    ------
+    NoEquilibrium
+        If none is found: something falls, or a load drives it on.
+    InconsistentState
+        If the constraints can't be satisfied near the start, or move at time t.
+    SingularConfiguration
+        If Phi_q loses rank at the start.
+    InvalidForce
+        If a load is sampled, or the equilibrium is on a jump of a force.
+    InvalidArgument
+        If the guess is not n finite numbers or a state.
+
+    Notes
+    -----
+    Levenberg steps with the exact stiffness, geometric stiffness of reactions included, lower the potential energy on
+    the constraint manifold; the last ones are Newton's, down to rounding. Saddles are left along their direction of
+    most negative stiffness. Work along a step takes the place of energy, so loads need no potential. Redundant rows are
+    allowed. Dampers and friction exert nothing at rest.
+
+    Examples
+    --------
+    A pendulum that stands upright falls over:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -9.0))
+    >>> rod = scene.add_body(**ts.shapes.rod(1.0, axis="z", mass=3.0), position=(0, 0, 0.5), name="rod")
+    >>> pin = scene.add(ts.constraints.Revolute.at(scene.ground, rod, point=(0, 0, 0), axis=(0, 1, 0), name="pin"))
+    >>> found = scene.equilibrium()
+    >>> found
+    <Equilibrium: stable, smallest stiffness 13.5 1/s^2>
+    >>> print(found.state.position(rod).round(6) + 0.0, found.reaction(pin)[0].round(6) + 0.0)
+    [ 0.   0.  -0.5] [ 0.  0. 27.]
+    """
+    from ..configuration.continuation import nearest
+    from ..configuration.kinetic_metric import Metric
+    from ..statics.equilibrium import find_equilibrium  # imported here: a run needs none of it
+
+    kept = prepared(scene)
+    if guess is None:
+        given = scene._initial()[0]
+    else:
+        given = finite_vector(getattr(guess, "q", guess), kept.n, "guess (q, or a State)")
+    if not np.isfinite(number(t)):
+        raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
+    metric = Metric(kept.packed, None, float(t))
+    q, (Phi, _, Phi_t) = given, metric.arrays(given)
+    if not np.abs(Phi).max(initial=0.0) <= INITIAL_TOL * (1.0 + np.abs(q).max()):
+        found = nearest(metric, given, INITIAL_TOL)
+        if not found.met:
+            raise InconsistentState(
+                "equilibrium: no consistent positions were found near the start. Call scene.assemble(), which names "
+                "the constraints in conflict, or pass another guess."
+            )
+        q, Phi_t = found.q, metric.arrays(found.q)[2]
+    _demand_rest(scene, Phi_t, t)
+    state = guess if hasattr(guess, "memory") else None
+    memory = remembered(state, kept, float(t), q)
+    q, _ = kept.start(scene, (q, np.zeros(kept.n)), float(t), INITIAL_TOL, memory, True)
+    return find_equilibrium(kept.packed, kept.handles, memory, float(t), q.copy(), given)
+
+
+def _demand_rest(scene, Phi_t, t):
+    """Refuse constraints that move at t, by name."""
+    if np.any(Phi_t):
+        row = scene.row_names()[int(np.abs(Phi_t).argmax())]
+        raise InconsistentState(
+            f"equilibrium: {row} moves at t = {float(t):g} s (Phi_t = {np.abs(Phi_t).max():.3g}), so the scene can't "
+            "be at rest. Choose a time at which its motion rests, or hold it with a constant value."
+        )

@@ -21,7 +21,6 @@ import numpy as np
 from ..configuration.kinetic_metric import Metric
 from ..elements.bodies import transform_g
 from ..errors import SingularConfiguration
-from .pairwise import derivatives
 from .variations import stacked
 
 
@@ -44,7 +43,7 @@ def reduce(motion, variations):
     from scipy.linalg import solve_triangular
 
     n, k = motion.q.size, len(variations)
-    found = derivatives(motion)
+    found = motion.derivatives
     Z, Zd, Zdd = stacked(variations, n)
     solve = _solver(motion.H, Z)
     G1, G2 = (each[motion.kept] for each in (found.G1, found.G2))

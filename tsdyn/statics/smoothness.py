@@ -7,20 +7,25 @@ from ..observables.generalised_forces import force_loads
 from .tolerances import PROBE, ROUGH, ROUNDING
 
 
+def demand_continuous(packed):
+    """Refuse sampled loads, which are held whatever the scene does."""
+    for load in packed.loads:
+        if getattr(load.force, "period", None) is not None:
+            raise InvalidForce(
+                f"{load.force.name}: a sampled load is no function of the state, so it has neither a derivative nor an "
+                "equilibrium. Take a continuous one (without period=), or remove it and name its joint as an input."
+            )
+
+
 def demand_smooth(motion):
     """Refuse forces that can't be linearised at a `Motion`."""
     loads = motion.packed.loads
-    for load in loads:
-        if getattr(load.force, "period", None) is not None:
-            raise InvalidForce(
-                f"{load.force.name}: a sampled load has no derivative. Linearise with a continuous one (without "
-                "period=), or remove it and name its joint among the inputs."
-            )
+    demand_continuous(motion.packed)
     if motion.packed.loads and _rough(motion, motion.system.forces):
         worst = [load.force.name for load in loads if _rough(motion, load.alone)]
         raise InvalidForce(
-            f"{', '.join(worst) or 'the forces'}: the force has a jump or a kink at this state, so there is no "
-            "linearisation. Choose another state, or a smooth law."
+            f"{', '.join(worst) or 'the forces'}: the force has a jump or a kink at this state, so it has no "
+            "derivative. Choose another state, or a smooth law."
         )
 
 

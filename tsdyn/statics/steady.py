@@ -33,10 +33,8 @@ def steady_rate(motion):
 
 def _largest_acceleration(motion, size, rate):
     """The acceleration, m/s^2, that others are compared with."""
-    loads = np.abs(motion.Q_A), np.abs(motion.H.T @ motion.lam[motion.kept])
-    r = motion.system.bodies[:, :1] + np.arange(3)
-    forces = max(float((each[r] / motion.system.mass[:, None]).max(initial=0.0)) for each in loads)
-    return max(forces, size * rate * rate, np.abs(motion.translations(2)).max(initial=0.0)) or 1.0
+    gains = np.abs(motion.translations(2)).max(initial=0.0)
+    return max(motion.acceleration_scale(size), size * rate * rate, gains)
 
 
 def _rate(motion, symmetric, size, rate):

@@ -88,9 +88,9 @@ def _work(future, call):
 
 
 def _end(future):
-    """Wait for a call, even if Ctrl-C is pressed again."""
+    """Wait for a call, even if Ctrl-C is pressed again, or another handler raises."""
     while not future.done():
-        with contextlib.suppress(KeyboardInterrupt):
+        with contextlib.suppress(BaseException):
             wait([future], LOOK)
 
 

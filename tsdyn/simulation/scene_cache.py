@@ -39,6 +39,7 @@ class Prepared:
     The memory belongs to the scene; after a change of numbers alone it is used again.
     """
 
+    @CollectionsDeferred()
     def __init__(self, scene, packed):
         self.packed, self.motions = packed, scene.motions()
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]

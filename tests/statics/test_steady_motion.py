@@ -94,3 +94,34 @@ def test_governor_turning_steadily():
     found = linear.eigenvalues()
     for value in expected:
         assert np.abs(found - 1j * value).min() < CLOSE * value
+
+
+def test_slider_on_a_rotor_that_a_motor_turns():
+    """Along the arm of a driven rotor k / m - rate^2 is left of the stiffness."""
+    rate, stiffness = 5.0, 100.0
+    scene = ts.Scene(gravity=(0, 0, 0))
+    arm = scene.add_body(2.0, (1, 2, 2.5), (0.3, 0, 0), velocity=(0, 0.3 * rate, 0), angular_velocity=(0, 0, rate))
+    shaft = scene.add(C.Revolute.at(scene.ground, arm, point=(0, 0, 0), axis=(0, 0, 1), name="shaft"))
+    scene.add(C.RotationMotor.of(shaft, angle=rate * ts.motions.time))
+    slider = scene.add_point_mass(mass=1.0, position=(1, 0, 0), velocity=(0, rate, 0), name="slider")
+    scene.add(C.Dot2(arm, slider, axis_a=(0, 1, 0), value=0.0))
+    scene.add(C.PlaneContact(slider, scene.ground, normal_b=(0, 0, 1)))
+    free_length = 1.0 - rate**2 / stiffness
+    scene.add(ts.forces.Spring(arm, slider, point_a=(-0.3, 0, 0), stiffness=stiffness, free_length=free_length))
+    linear = scene.linearise()
+    assert linear.steady
+    assert linear.coordinates == ("slider.x",)
+    np.testing.assert_allclose(linear.eigenvalues()[0], 1j * np.sqrt(stiffness - rate**2), rtol=CLOSE)
+
+
+def test_orbit_about_a_spring():
+    """A circular orbit on a table: the radius swings with k / m + 3 rate^2, and the angle is cyclic."""
+    scene = ts.Scene(gravity=DOWN)
+    ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0), velocity=(0, 3, 0), name="ball")
+    scene.add(C.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1)))
+    scene.add(ts.forces.Spring(ball, scene.ground, point_b=(0, 0, 0), stiffness=18.0, free_length=0.5))
+    linear = scene.linearise()
+    assert linear.steady
+    np.testing.assert_allclose(linear.rotation_rate, (0, 0, 3), atol=CLOSE)
+    expected = np.sqrt(18.0 + 3.0 * 9.0)
+    np.testing.assert_allclose(linear.eigenvalues(), [0, 0, 1j * expected, -1j * expected], atol=CLOSE)

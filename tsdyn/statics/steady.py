@@ -13,6 +13,7 @@ from ..elements.bodies import rotation_matrix
 from ..errors import TsdynError
 from .motion import Motion
 from .tolerances import EQUAL_INERTIA, STEADY, TURNS
+from .variations import transform_e
 
 
 def steady_rate(motion):
@@ -39,13 +40,10 @@ def _largest_acceleration(motion, size, rate):
 
 def _rate(motion, symmetric, size, rate):
     """The smallest Omega of the three conditions, or None; without symmetric no body spins on its own."""
-    rows, values = [np.zeros((0, 3))], [np.zeros(0)]
-    for x, xd, scale in ((1, 2, size), (1, 2, 1.0)):
-        first, second = (
-            (motion.translations(x), motion.translations(xd)) if scale is size else (motion.spins(x), motion.spins(xd))
-        )
-        rows.append(-_cross(first / (scale * rate)).reshape(-1, 3))
-        values.append((second / (scale * rate)).ravel())
+    rows, values = [], []
+    for vectors, scale in ((motion.translations, size * rate), (motion.spins, rate)):
+        rows.append(-_cross(vectors(1) / scale).reshape(-1, 3))
+        values.append((vectors(2) / scale).ravel())
     A = rotation_matrix(motion.parameters(0))
     J = motion.system.inertia[motion.rigid].reshape(-1, 3, 3)
     for turned, inertia, omega in zip(A, J, motion.spins(1), strict=True):
@@ -108,14 +106,8 @@ def _continued(motion, Omega, tau):
         turned = whole * Rotation.from_rotvec((spins - Omega) * tau) * Rotation.from_quat(np.roll(q[p], -1, axis=1))
         q[p] = np.roll(turned.as_quat(), 1, axis=1)
         omega = spins @ R.T  # pd = E^T omega / 2
-        qd[p] = _rates(q[p], omega)
+        qd[p] = 0.5 * np.einsum("bij,bi->bj", transform_e(q[p]), omega)
     return R, Motion(motion.packed, motion.memory, motion.t + tau, q, qd)
-
-
-def _rates(p, omega):
-    from .variations import transform_e
-
-    return 0.5 * np.einsum("bij,bi->bj", transform_e(p), omega)
 
 
 def _cross(v):

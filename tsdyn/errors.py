@@ -139,6 +139,23 @@ class SingularConfiguration(TsdynError, ArithmeticError):
     """
 
 
+class NoEquilibrium(TsdynError, ArithmeticError):
+    """No static equilibrium was found; the message says which body still accelerates.
+
+    Examples
+    --------
+    Nothing holds a ball:
+
+    >>> import tsdyn as ts
+    >>> ball = (scene := ts.Scene()).add_point_mass(mass=1.0, name="ball")
+    >>> try:
+    ...     scene.equilibrium()
+    ... except ts.NoEquilibrium as error:
+    ...     print("ball accelerates" in str(error))
+    True
+    """
+
+
 class UnknownAttribute(TsdynError, AttributeError):
     """Assignment to an attribute that a body, constraint, force or scene doesn't have.
 

@@ -33,6 +33,8 @@ from .profiling.phases import Phase
 from .profiling.report import Profile
 from .simulation.scene import Scene
 from .simulation.solution import Charts, Solution, Steps
+from .statics.equilibrium import Equilibrium
+from .statics.linearise import Linearisation
 
 
 class Rotation(Protocol):
@@ -141,6 +143,7 @@ __all__ = [
     "Class",
     "ConstraintError",
     "Data",
+    "Equilibrium",
     "Evaluation",
     "Event",
     "Floats",
@@ -159,6 +162,7 @@ __all__ = [
     "JointLaw",
     "JointLoads",
     "Kinematics",
+    "Linearisation",
     "Load",
     "Matrix",
     "Method",

@@ -43,6 +43,7 @@ ORDER = [
     "runs",
     "taylor",
     "configuration",
+    "statics",
     "ahead",
     "storage",
     "simulation",

@@ -43,6 +43,13 @@ def balance(packed, t, q, qd, Phi_q, solve):
     raise SingularConfiguration(JAMMED)
 
 
+def normal_loads(packed, t, q, qd, Phi_q, lam):
+    """Return the normal loads (frictions,) by multipliers (m,), and the friction forces of unit ones (frictions, n)."""
+    found = sorted((load for load in packed.loads if load.normal >= 0), key=lambda load: load.normal)
+    loads = np.array([_reaction(packed, load, q, qd, Phi_q)(lam)[0] for load in found])
+    return loads, np.array([_unit(packed.system, load, t, q, qd) for load in found])
+
+
 def _unit(system, load, t, q, qd):
     """Return the generalised forces g (n,) of one friction for unit normal load."""
     memory = np.zeros((1, system.memory.size + system.normals.size))

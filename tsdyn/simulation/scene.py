@@ -29,6 +29,8 @@ from ..validation import counted, demand_known, label, vector3
 from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
 from .editing import remove as _remove
+from .statics import equilibrium as _equilibrium
+from .statics import linearise as _linearise
 
 if TYPE_CHECKING:
     from ..hints import AnyBody, ArrayLike, Floats, Item, Orientation, Packed, System
@@ -341,6 +343,8 @@ class Scene:
     evaluate = _evaluate
     assemble = _assemble
     mobility = _mobility
+    linearise = _linearise
+    equilibrium = _equilibrium
     set = set_joint
     remove = _remove
     copy = _copy

@@ -1,0 +1,178 @@
+"""`scene.linearise` and `scene.equilibrium`: consistent states, as of a run, handed to the package `statics`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..calls import fitting
+from ..errors import InconsistentState, InvalidArgument
+from ..observables.state import remembered
+from ..runs.arguments import state_arrays
+from ..validation import finite_vector, number
+from .scene_cache import prepared
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, Equilibrium, Linearisation, Scene, State
+
+INITIAL_TOL = 1e-9  # of residuals of a state, as in `simulate`
+
+
+@fitting
+def linearise(
+    scene: Scene, state: State | None = None, inputs: Sequence[Any] = (), outputs: Sequence[Any] = ()
+) -> Linearisation:
+    """Linearise the equations of motion about a state, in named minimal coordinates.
+
+    Parameters
+    ----------
+    state : State, optional
+        Positions and velocities, such as `solution.state`, at its time; default: the start of the bodies at t = 0.
+    inputs : sequence of handles or names
+        JointTorque, JointForce (the load, N m or N); PointForce, Torque (components in their frame, "push.x" for one);
+        Spring (tension of the actuator); joints (torque or force along their coordinate).
+    outputs : sequence of handles or names
+        Joints (their coordinates), bodies (position of the centroid; "ball.x" for one component), pairs (body, point in
+        the body frame), names of coordinates; followed by " rate" in a name, their rates. Default: all coordinates and
+        rates.
+
+    Returns
+    -------
+    Linearisation
+        `.M`, `.C`, `.K`, `.coordinates`, `.eigenvalues()`, `.modes()`, `.state_space()`, `.to_scipy()`.
+
+    Raises
+    ------
+    InconsistentState
+        If the state violates a constraint by more than 1e-9.
+    SingularConfiguration
+        If Phi_q loses rank at the state, or a direction without inertia is free.
+    InvalidForce
+        If a force has a jump or a kink at the state, is sampled, or is friction of a joint in motion.
+    InvalidArgument
+        If the state, an input or an output is not of this scene.
+
+    Notes
+    -----
+    Coordinates are those of the joints ("pin.angle", "slide.displacement"), in the order of the joints, as far as they
+    are independent; then displacements and rotations of bodies ("ball.x", "top.rotation y"), in axes of the ground.
+    Derivatives are exact to rounding: complex steps of laws and primitives, the rest by algebra. In steady motion, axes
+    of bodies turn with the motion as a whole, so that all coefficients are constant (Likins 1967; Meirovitch 1970).
+    Functions of time have their values at the time of the state. The cost is O(N) for chains and trees, and that of k
+    solutions for k coordinates.
+
+    Examples
+    --------
+    A pendulum of 1 m:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -9.0))
+    >>> rod = scene.add_body(**ts.shapes.rod(1.0, axis="z", mass=3.0), position=(0, 0, -0.5), name="rod")
+    >>> pin = scene.add(ts.constraints.Revolute.at(scene.ground, rod, point=(0, 0, 0), axis=(0, 1, 0), name="pin"))
+    >>> linear = scene.linearise(inputs=[pin])
+    >>> linear
+    <Linearisation at rest: pin.angle>
+    >>> print(linear.M.round(6), linear.K.round(6), linear.eigenvalues().round(4))
+    [[1.]] [[13.5]] [0.+3.6742j 0.-3.6742j]
+    """
+    from ..statics.linearise import linearise as find  # imported here: a run needs none of it
+
+    for given, what in ((inputs, "inputs"), (outputs, "outputs")):
+        if isinstance(given, str) or not isinstance(given, (Sequence, list, tuple)):
+            raise InvalidArgument(f"{what} must be a sequence of handles or names, such as [motor], got {given!r}.")
+    kept = prepared(scene)
+    q, qd = scene._initial() if state is None else state_arrays(state, kept.n)
+    t = 0.0 if state is None else number(getattr(state, "t", 0.0))
+    memory = remembered(state, kept, t, q)
+    q, qd = kept.start(scene, (q, qd), t, INITIAL_TOL, memory, True)
+    return find(scene, memory[kept.handles.count :], (t, q.copy(), qd.copy()), tuple(inputs), tuple(outputs))
+
+
+@fitting
+def equilibrium(scene: Scene, guess: State | ArrayLike | None = None, t: float = 0.0) -> Equilibrium:
+    """Find a static equilibrium: from the scene's pose, or a guess, down to a minimum of the potential energy.
+
+    Parameters
+    ----------
+    guess : State or array_like (n,), optional
+        Positions to start from; default: those of the bodies. They are moved to the nearest consistent ones first.
+    t : float, s
+        Time at which loads and constraints are taken.
+
+    Returns
+    -------
+    Equilibrium
+        `.state`, `.stable`, `.smallest_stiffness`, `.moved`, `.reaction(joint)` and more. The scene is not changed.
+
+    Raises
+    ------
+    NoEquilibrium
+        If none is found: something falls, or a load drives it on.
+    InconsistentState
+        If the constraints can't be satisfied near the start, or move at time t.
+    SingularConfiguration
+        If Phi_q loses rank at the start.
+    InvalidForce
+        If a load is sampled, or the equilibrium is on a jump of a force.
+    InvalidArgument
+        If the guess is not n finite numbers or a state.
+
+    Notes
+    -----
+    Levenberg steps with the exact stiffness, geometric stiffness of reactions included, lower the potential energy on
+    the constraint manifold; the last ones are Newton's, down to rounding. Saddles are left along their direction of
+    most negative stiffness. Work along a step takes the place of energy, so loads need no potential. Redundant rows are
+    allowed. Dampers and friction exert nothing at rest.
+
+    Examples
+    --------
+    A pendulum that stands upright falls over:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -9.0))
+    >>> rod = scene.add_body(**ts.shapes.rod(1.0, axis="z", mass=3.0), position=(0, 0, 0.5), name="rod")
+    >>> pin = scene.add(ts.constraints.Revolute.at(scene.ground, rod, point=(0, 0, 0), axis=(0, 1, 0), name="pin"))
+    >>> found = scene.equilibrium()
+    >>> found
+    <Equilibrium: stable, smallest stiffness 13.5 1/s^2>
+    >>> print(found.state.position(rod).round(6) + 0.0, found.reaction(pin)[0].round(6) + 0.0)
+    [ 0.   0.  -0.5] [ 0.  0. 27.]
+    """
+    from ..configuration.continuation import nearest
+    from ..configuration.kinetic_metric import Metric
+    from ..statics.equilibrium import find_equilibrium  # imported here: a run needs none of it
+
+    kept = prepared(scene)
+    if guess is None:
+        given = scene._initial()[0]
+    else:
+        given = finite_vector(getattr(guess, "q", guess), kept.n, "guess (q, or a State)")
+    if not np.isfinite(number(t)):
+        raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
+    metric = Metric(kept.packed, None, float(t))
+    q, (Phi, _, Phi_t) = given, metric.arrays(given)
+    if not np.abs(Phi).max(initial=0.0) <= INITIAL_TOL * (1.0 + np.abs(q).max()):
+        found = nearest(metric, given, INITIAL_TOL)
+        if not found.met:
+            raise InconsistentState(
+                "equilibrium: no consistent positions were found near the start. Call scene.assemble(), which names "
+                "the constraints in conflict, or pass another guess."
+            )
+        q, Phi_t = found.q, metric.arrays(found.q)[2]
+    _demand_rest(scene, Phi_t, t)
+    state = guess if hasattr(guess, "memory") else None
+    memory = remembered(state, kept, float(t), q)
+    q, _ = kept.start(scene, (q, np.zeros(kept.n)), float(t), INITIAL_TOL, memory, True)
+    return find_equilibrium(kept.packed, kept.handles, memory, float(t), q.copy(), given)
+
+
+def _demand_rest(scene, Phi_t, t):
+    """Refuse constraints that move at t, by name."""
+    if np.any(Phi_t):
+        row = scene.row_names()[int(np.abs(Phi_t).argmax())]
+        raise InconsistentState(
+            f"equilibrium: {row} moves at t = {float(t):g} s (Phi_t = {np.abs(Phi_t).max():.3g}), so the scene can't "
+            "be at rest. Choose a time at which its motion rests, or hold it with a constant value."
+        )

@@ -1,0 +1,58 @@
+"""Eigenvalues of M xdd + C xd + K x = 0, exact zeros included.
+
+With unit mass, that is in y = R x where M = R^T R. The null space of K is split off: each of its directions has an
+eigenvalue zero, which rounding would otherwise make a pair of the size of its root.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .tolerances import NO_STIFFNESS, SYMMETRIC, ZERO
+
+
+class Pairs(NamedTuple):
+    """2 k eigenvalues and, in their order, vectors of coordinates (k, 2 k) complex, of unit kinetic energy norm."""
+
+    values: np.ndarray
+    vectors: np.ndarray
+
+
+def eigenpairs(reduced):
+    """The `Pairs` of `Reduced` equations."""
+    from scipy.linalg import solve_triangular
+
+    C, K, scale = reduced.C_hat, reduced.K_hat, reduced.scale
+    undamped = np.abs(C).max(initial=0.0) <= SYMMETRIC * np.sqrt(scale)
+    if undamped and np.abs(K - K.T).max(initial=0.0) <= SYMMETRIC * scale:
+        values, vectors = _symmetric(K, scale)
+    else:
+        values, vectors = _general(C, K, scale)
+    values = values + 0.0
+    order = np.lexsort((-values.imag, np.abs(values.imag), np.abs(values)))
+    values, vectors = values[order], vectors[:, order]
+    return Pairs(values, solve_triangular(reduced.R, vectors))
+
+
+def _symmetric(K, scale):
+    """Pairs +- of sqrt(-w)."""
+    w, vectors = np.linalg.eigh(0.5 * (K + K.T))
+    w = np.where(np.abs(w) <= NO_STIFFNESS * scale, 0.0, w)
+    roots = np.sqrt(-w.astype(complex))
+    return np.concatenate((roots, -roots)), np.concatenate((vectors, vectors), axis=1).astype(complex)
+
+
+def _general(C, K, scale):
+    """Of the first-order form, without the positions in the null space of K."""
+    k = len(K)
+    _, s, V = np.linalg.svd(K)
+    stiff = s > NO_STIFFNESS * scale
+    kept, free = V[stiff].T, V[~stiff].T  # K x = (K kept) kept^T x
+    A = np.block([[np.zeros((stiff.sum(), stiff.sum())), kept.T], [-K @ kept, -C]])
+    values, vectors = np.linalg.eig(A)
+    values = np.where(np.abs(values) <= ZERO * np.abs(values).max(initial=0.0), 0.0, values)
+    speeds, places = vectors[-k:], kept @ vectors[: len(vectors) - k]
+    moving = np.linalg.norm(speeds, axis=0) >= np.linalg.norm(places, axis=0) * np.abs(values) * 0.5
+    shapes = np.where(moving & (np.linalg.norm(speeds, axis=0) > 0.0), speeds, places)
+    shapes = shapes / np.linalg.norm(shapes, axis=0)
+    return np.concatenate((np.zeros(free.shape[1]), values)), np.concatenate((free, shapes), axis=1).astype(complex)

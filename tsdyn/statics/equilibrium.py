@@ -1,0 +1,128 @@
+"""`scene.equilibrium`: a static equilibrium, its stability and reactions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..calls import fitting_methods
+from ..errors import InvalidBody, InvalidConstraint, NoEquilibrium
+from ..model.packed import member_of
+from ..observables import reactions
+from ..observables.kinematics import Anchor
+from ..observables.state import RememberingState
+from .coordinates import chosen
+from .descent import Descent
+from .eigen import eigenpairs
+from .reduction import reduce
+from .smoothness import demand_continuous, demand_smooth
+from .tolerances import GROWING, MOST_SADDLES, NEUTRAL
+from .variations import Variations
+
+if TYPE_CHECKING:
+    from ..hints import BodyLike, Floats, ItemLike
+
+
+@fitting_methods
+class Equilibrium:
+    """A static equilibrium; the scene is as it was.
+
+    Attributes
+    ----------
+    state : State
+        At rest: `simulate(scene, span, state=report.state)` stays there, `scene.linearise(report.state)` has its modes.
+    stable : bool
+        No direction has negative stiffness, the potential energy being a minimum. With loads that have no potential: no
+        eigenvalue has a positive real part.
+    smallest_stiffness : float, 1/s^2
+        Of the reduced stiffness in the metric of kinetic energy: the square of the lowest angular frequency; negative
+        if unstable, NaN without freedom.
+    neutral : int
+        Number of directions without stiffness.
+    moved : float
+        Largest change of a coordinate from the start: m for positions, 1 for Euler parameters.
+    unbalanced : float
+        Largest acceleration left, over that of the loads by themselves.
+    steps : int
+    """
+
+    def __init__(self, descent: Any, q0: Any, findings: Any) -> None:
+        motion, packed = descent.motion, descent.packed
+        self.packed, self.system, self._memory = packed, packed.system, descent.memory[None]
+        self.t, self.q, self.qd = np.array([descent.t]), motion.q[None], motion.qd[None]
+        self.multipliers: Floats = reactions.multipliers(
+            packed, self.t, self.q, self.qd, motion.qdd[None], self._memory
+        )
+        arrays = descent.t, motion.q.copy(), motion.qd.copy(), motion.qdd.copy(), self.multipliers[0]
+        self.state: RememberingState = RememberingState.of(
+            descent.handles, descent.memory.copy(), Anchor(descent.angles.copy()), *arrays
+        )
+        self.stable, self.smallest_stiffness, self.neutral = findings
+        self.moved, self.unbalanced, self.steps = float(np.abs(motion.q - q0).max()), descent.unbalanced, descent.steps
+
+    def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
+        """Force (3,), N, and torque (3,), N m, of a constraint, joint or force, as `Solution.reaction` defines them."""
+        handles = self.state.handles
+        item = handles.item(item)
+        body = item.on if on is None else handles.body(on)
+        if body not in (item.a, item.b):
+            raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
+        load, member = reactions.loads_of(self.packed).get(id(item)), member_of(self.packed, item)
+        if load is None and member is None:
+            raise InvalidConstraint(f"{item!r} is not a constraint or force of this scene.")
+        found = reactions.reaction(self, member, body) if load is None else reactions.force_reaction(self, load, body)
+        return found[0][0], found[1][0]
+
+    def __repr__(self) -> str:
+        kind = "stable" if self.stable else "unstable"
+        neutral = f", {self.neutral} neutral" if self.neutral else ""
+        return f"<Equilibrium: {kind}{neutral}, smallest stiffness {self.smallest_stiffness:.4g} 1/s^2>"
+
+
+def find_equilibrium(packed, handles, remembered, t, q, q0):
+    """The `Equilibrium` reached from a consistent q, q0 being where the search began."""
+    demand_continuous(packed)
+    descent = Descent(packed, handles, remembered, t, q)
+    for _ in range(MOST_SADDLES):
+        if not descent.settle():
+            _refuse(descent)
+        demand_smooth(descent.motion)
+        *findings, way = _stability(descent.motion)
+        if way is None:
+            break
+        descent.kick(way)
+    return Equilibrium(descent, q0, findings)
+
+
+def _stability(motion):
+    """Whether stable, the smallest stiffness, number of neutral directions; and dq of negative stiffness, or None."""
+    if not motion.freedom:
+        return True, float("nan"), 0, None
+    reduced = reduce(motion, chosen(motion, Variations(motion, np.zeros(3))))
+    K, size = reduced.K_hat, reduced.scale
+    w, vectors = np.linalg.eigh(0.5 * (K + K.T))
+    neutral = int((np.abs(w) <= NEUTRAL * size).sum())
+    if np.abs(K - K.T).max() > NEUTRAL * size:
+        values = eigenpairs(reduced).values
+        return bool(values.real.max() <= GROWING * np.abs(values).max()), float(w[0]), neutral, None
+    if w[0] >= -NEUTRAL * size:
+        return True, float(w[0]), neutral, None
+    from scipy.linalg import solve_triangular
+
+    way = reduced.T @ solve_triangular(reduced.R, vectors[:, 0])
+    return False, float(w[0]), neutral, way
+
+
+def _refuse(descent):
+    """Say why none was found."""
+    motion = descent.motion
+    gains = np.linalg.norm(motion.translations(2), axis=1)
+    turning = np.zeros(len(gains))
+    turning[motion.rigid] = descent.reach * np.linalg.norm(motion.spins(2), axis=1)
+    body = descent.packed.bodies[int((gains + turning).argmax())]
+    raise NoEquilibrium(
+        f"no equilibrium was found in {descent.steps} steps and {descent.gone:.3g} m of way: {body.name} accelerates "
+        f"by {gains.max():.3g} m/s^2 still. If nothing holds it, add a constraint or a spring; if a load drives it on, "
+        "there is none; otherwise start nearer, with guess=."
+    )

@@ -1,0 +1,76 @@
+"""Limits of linearisation and of equilibria, each with its unit and where it comes from."""
+
+# --- factorisation ---
+LEAST_DIVISOR = 1e-300
+# Share of the largest pivot of the saddle-point matrix with unit masses and unit rows: a share of rounding.
+SINGULAR = 1e-15
+
+# Coordinates up to which redundant rows are chosen by QR with pivoting, which costs their cube; of larger scenes by
+# elimination, with this share of a pivot of S in its diagonal entry as in configuration.
+DENSE, REDUNDANT_SHARE = 400, 1e-6
+
+# --- choice of coordinates ---
+# A coordinate is taken in its turn if what the ones before leave of it is this share of the largest that is left.
+IN_TURN = 0.1
+# Share of a coordinate's own variation that the ones before it must leave: squares, as pivots of a Gram matrix are,
+# of which rounding leaves 1e-15.
+INDEPENDENT = 1e-9
+
+# --- steady motion ---
+# Share of the largest accelerations, speeds and constraint values up to which a motion counts as steady or at rest:
+# states of steady motion may be typed, or come from runs with tolerances.
+STEADY = 1e-7
+# Share of the mean principal inertia up to which two are equal.
+EQUAL_INERTIA = 1e-9
+# rad; the turns after which a motion is compared with itself.
+TURNS = 0.7, 2.1
+
+# --- eigenvalues ---
+# Share of the terms of K below which singular values are roundings: sums of a few hundred roundings.
+NO_STIFFNESS = 1e-13
+# Share of asymmetry, and of damping, that is rounding: then eigenvalues are those of a symmetric pencil.
+SYMMETRIC = 1e-12
+# Share of the largest eigenvalue below which one counts as zero.
+ZERO = 1e-12
+
+# --- smoothness of forces ---
+# Share of the scene's size, rad, and of the speeds by which loads are displaced on both sides of a state.
+PROBE = 1e-7
+# Share of the expected change of the loads by which the two sides may differ; smooth laws leave PROBE over their scale.
+ROUGH = 1e-2
+# Share of the loads' own size that is rounding of their differences.
+ROUNDING = 1e-12
+
+# --- inputs ---
+# Share of the largest generalised force of an input below which its projection onto the motions admitted is rounding.
+NO_EFFECT = 1e-12
+
+# --- equilibria ---
+# Share of the loads' own accelerations that counts as balanced: rounding of sums of a few loads. Steps end there.
+BALANCED = 1e-14
+# The same at the end of all steps; also of constraints, relative to 1 + max |q|.
+TURNED = 1e-9
+# Share of the scene's size, rad: a step that is shorter changes nothing.
+LEAST_STEP = 1e-15
+LEAST_SHIFT = 1e-300
+# rad, of a step: angles are counted by the nearest turn, and the trapezoidal rule holds.
+MOST_TURN = 0.5
+# Factors of mu after a step that is taken, and after one that isn't; its least share of the stiffness.
+SOFTER, STIFFER, SOFTEST = 0.1, 6.0, 1e-10
+# Steps at most, and the way in sizes of the scene: what is farther falls.
+MOST_STEPS, FARTHEST = 400, 1e5
+# rad, of all steps: what has turned farther is driven round.
+MOST_TURNED = 60.0
+# Constraints after a step, relative to 1 + max |q|: sums round several times. Sweeps that stall above the second are
+# left to Gauss-Newton steps; a sweep that leaves more than the third, a share, stalls.
+CLOSED, NEARLY_CLOSED, SLOWEST, MOST_SWEEPS = 1e-15, 1e-13, 0.7, 40
+# ... and above this the step is too long.
+STALLED = 1e-6
+# rad, or shares of the scene's size: ways off a saddle, tried in turn.
+KICKS = 0.1, 0.03, 0.01
+# Share of the terms of the stiffness below which a direction is neutral, and asymmetry that is no rounding.
+NEUTRAL = 1e-10
+# Saddles left at most.
+MOST_SADDLES = 12
+# Share of the largest eigenvalue up to which a real part of a circulatory system is rounding: the root of rounding.
+GROWING = 1e-7

@@ -22,8 +22,8 @@ FIRST_SHARE, FEWER = 1e-3, 1e-2
 WORSE = 0.1
 
 # Residual of a redundant row, its rate or its acceleration over the sum of its absolute terms: above it the row doesn't
-# hold (docs/theory.md). Points and axes that are typed with ten digits hold. The laws of random scenes, which have 1e-9,
-# may count the terms of a rotation as less by half.
+# hold (docs/theory.md). Points and axes that are typed with ten digits hold. Laws of random scenes have 1e-9, but may
+# count the terms of a rotation as less than half.
 HELD = 2e-10
 # Terms that are themselves rounding: a row's are taken for this share of the largest in the scene at least.
 FAINT = 1e-3

@@ -19,6 +19,7 @@ from .tolerances import (
     BODIES,
     EPS,
     FLOOR,
+    HELD,
     ILL_CONDITIONED,
     NEAR_SINGULAR,
     OUTPUTS,
@@ -248,7 +249,9 @@ def dense_output(solution):
 
 def off_steps(solution):
     """How far dense output may be off the ends of steps, relative to the coordinates."""
-    return SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0)
+    far = max((np.abs(solution.position(body)).max() for body in solution.scene.bodies), default=0.0)
+    near = HELD * far / (extent(solution) or 1.0)
+    return SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + near
 
 
 def is_near_singular(solution):

@@ -24,6 +24,8 @@ SAME = 1e-10
 # Roundings of an instant, and of places that are passed within as many: what is interpolated there changes by its rate
 # times these.
 TIME = 1e2
+# Share of the farthest position to which positions are held: in small scenes far away angles are, over their size.
+HELD = 1e-14
 # Next to a singular configuration, where a chart has a condition of ILL_CONDITIONED or more, rounding is amplified by
 # so much.
 NEAR_SINGULAR, ILL_CONDITIONED = 1e2, 1e8

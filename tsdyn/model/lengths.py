@@ -4,7 +4,7 @@ import numpy as np
 
 from ..elements.markers import POINT
 
-SMALL = 0.03  # m: a scene without longer lengths; rounding of one is 3e-14 of it
+SMALL = 1e-3  # m: a scene without longer lengths; rounding of one is 1e-12 of it
 
 
 def is_small(size):
@@ -17,9 +17,10 @@ def has_lengths(primitive):
     return any(marker.code == POINT for marker in primitive.markers)
 
 
-def size_of(primitives):
+def size_of(primitives, coordinates):
     """Size of a scene: the largest number among the coordinates of markers; of a small one, the largest length, m."""
-    pairs = (pair for each in primitives for pair in zip(each.markers, each.coordinates, strict=True))
+    items = zip(primitives, coordinates, strict=True)
+    pairs = (pair for item, places in items for pair in zip(item.markers, places, strict=True))
     sizes = [(marker.code, np.abs(s).max()) for marker, s in pairs]
     length = max((size for code, size in sizes if code == POINT), default=0.0)
     return float(length if is_small(length) else max((size for _, size in sizes), default=0.0))

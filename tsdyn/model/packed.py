@@ -146,7 +146,7 @@ def pack(scene):
         normals=np.array(normals, np.int64),
     )
     coordinates = tuple(constraint.coordinates for constraint in primitives)
-    size = size_of(primitives)
+    size = size_of(primitives, coordinates)
     members = tuple(_members(scene.constraints))
     order = {constraint: len(memory) + i for i, constraint in enumerate(kept)}
     slots = tuple(order.get(constraint, -1) for constraint in primitives)

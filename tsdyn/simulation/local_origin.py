@@ -14,6 +14,7 @@ from ..elements.markers import POINT
 from ..elements.user_functions import Kernels
 from ..jit.code_hash import is_ours
 from ..model.derived import Derived
+from ..model.lengths import size_of
 from ..model.packed import classes
 from ..runs.events import Instant
 from .scene_cache import Prepared
@@ -138,7 +139,7 @@ def _moved(packed, origin):
     return packed._replace(
         system=packed.system._replace(reals=reals),
         coordinates=coordinates,
-        size=float(max((np.abs(s).max() for each in coordinates for s in each), default=0.0)),
+        size=size_of(packed.constraints, coordinates),
         loads=loads,
         derived=Derived(),
     )

@@ -12,6 +12,7 @@ import tsdyn as ts
 from tests.helpers import closed_loops
 from tests.helpers.closed_loops import angles
 from tests.helpers.tolerances import ALGEBRA, CLOSE, COARSE, EXACT, FAIR, HELD, LOOSE, NEAR, ROUGH, ROUNDING
+from tsdyn.stress.gallery.planar_links import four_bars
 
 ROOT = Path(__file__).parents[2]
 SHAPES = {
@@ -309,3 +310,12 @@ print(ts.simulate(scene, (0.0, 0.6), integrator="nystrom4").success, *loaded())
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert result.stdout.splitlines() == ["True False False False", "True True True False"]
+
+
+@pytest.mark.parametrize(("loops", "tol"), [(2, 1e-6), (1, 1e-10)])
+def test_output_times_change_no_step_across_flat_places(loops, tol):
+    """Rows that are selected anew at an output time are those of the end of the step again."""
+    one = ts.simulate(four_bars(loops), (0.0, 4.0), rtol=tol, atol=tol)
+    two = ts.simulate(four_bars(loops), (0.0, 4.0), rtol=tol, atol=tol, t_eval=np.linspace(0.0, 4.0, 1001))
+    np.testing.assert_array_equal(one.steps.h, two.steps.h)
+    np.testing.assert_array_equal(one.q[-1], two.q[-1])

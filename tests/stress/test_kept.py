@@ -20,6 +20,9 @@ KEPT = {
     2012861: "dense output of a row of four-bars of 1e-6 m",
     2011212: "dense output of a scene of 1e-6 m",
     2011079: "two methods past singular configurations, mass ratio 5e8",
+    2200503: "links of 1e-6 m on joints with axes",
+    3202253: "the same far away",
+    3201248: "output times next to a singular configuration: the selection of rows outlived them",
     2002207: "far from the origin: balance of torques",
 }
 

@@ -194,11 +194,19 @@ def is_singular(c, status):
 
 @kernel
 def state_within(context, c, kernels, t, h):
-    """q, qd, qdd at t, h after the series' origin. Status."""
+    """q, qd, qdd at t, h after the series' origin, which leaves the selection of rows as it is. Status."""
+    f = c.tangent
+    weakest = f.selection.weakest
+    save_selection(f)
     status = call_reach(kernels.reach, context, t, h)
     if is_singular(c, status):
-        return call_reach(kernels.pass_singular, context, t, h)
-    return call_reach(kernels.accelerate_here, context, t, h) if status == 0 else status
+        return_to_selection(f)
+        status = call_reach(kernels.pass_singular, context, t, h)
+    elif status == 0:
+        status = call_reach(kernels.accelerate_here, context, t, h)
+    return_to_selection(f)
+    f.selection.weakest = weakest
+    return status
 
 
 @kernel

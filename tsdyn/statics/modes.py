@@ -37,7 +37,7 @@ class Modes:
         size = np.abs(values)
         self.eigenvalues, self.shapes, self.coordinates = values, shapes, coordinates
         self.frequency, self.damped_frequency = size / (2.0 * np.pi), values.imag / (2.0 * np.pi)
-        self.damping_ratio: Floats = np.where(size > 0.0, -values.real / np.where(size > 0.0, size, 1.0), np.nan)
+        self.damping_ratio: Floats = np.where(size > 0.0, (0.0 - values.real) / np.where(size > 0.0, size, 1.0), np.nan)
         self._twists, self._bodies = twists, bodies
 
     def __len__(self) -> int:

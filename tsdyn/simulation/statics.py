@@ -80,7 +80,7 @@ def linearise(
     from ..statics.linearise import linearise as find  # imported here: a run needs none of it
 
     for given, what in ((inputs, "inputs"), (outputs, "outputs")):
-        if isinstance(given, str) or not isinstance(given, (Sequence, list, tuple)):
+        if isinstance(given, str) or not isinstance(given, Sequence):
             raise InvalidArgument(f"{what} must be a sequence of handles or names, such as [motor], got {given!r}.")
     kept = prepared(scene)
     q, qd = scene._initial() if state is None else state_arrays(state, kept.n)

@@ -207,8 +207,12 @@ def rounding_of_places(solution):
     places = np.array([solution.position(body)[0] for body in bodies])
     radii = np.array([_radius_of_gyration(body) for body in bodies])
     nearest = cKDTree(places).query(places, k=[min(2, len(bodies))])[0][:, 0]
-    farthest = max(np.abs(solution.position(body)).max() for body in bodies)
-    return ROUNDINGS * EPS * float(farthest / (np.median(np.maximum(nearest, radii)) or 1.0))
+    return ROUNDINGS * EPS * float(_farthest(solution) / (np.median(np.maximum(nearest, radii)) or 1.0))
+
+
+def _farthest(solution):
+    """The largest coordinate of a body's position, m."""
+    return max((np.abs(solution.position(body)).max() for body in solution.scene.bodies), default=0.0)
 
 
 def _balance_limit(solution):
@@ -249,8 +253,7 @@ def dense_output(solution):
 
 def off_steps(solution):
     """How far dense output may be off the ends of steps, relative to the coordinates."""
-    far = max((np.abs(solution.position(body)).max() for body in solution.scene.bodies), default=0.0)
-    near = HELD * far / (extent(solution) or 1.0)
+    near = HELD * _farthest(solution) / (extent(solution) or 1.0)
     return SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + near
 
 

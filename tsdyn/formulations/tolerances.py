@@ -5,6 +5,10 @@
 # of these numbers, each rounded by 1.1e-16: 4e-16 as a random walk, 1.3e-15 at worst.
 ROUNDING = 1e-15
 
+# Share of the rounding of Phi above which a residual is corrected: sums over steps walk. Corrections of less would move
+# bodies by the rounding of Phi itself in every step, and energy with them.
+WALK = 0.5
+
 # |Phi_q qd + Phi_t| over |rd| + size |omega'|, in the same way: one unit in the last place, since few terms of a row
 # are large.
 SPEED_ROUNDING = 2e-16

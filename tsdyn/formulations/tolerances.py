@@ -65,6 +65,11 @@ TURN_SHARE = 0.55  # of |d|, as a contraction: a rotation that no constraint dep
 # Error of the factors of N at the end of a solve, relative: below it they tell the contraction (limit 0.15)
 SAME = 1e-6
 
+# --- units
+# m: numbers up to it, and down to its reciprocal, are of usual size. Beyond it an orthonormal V mixes positions with
+# Euler parameters that are smaller by as much, and D^T M D loses twice as many digits.
+USUAL = 64.0
+
 # --- rank
 # Pivot of D^T M D over its diagonal entry: below it the reduced mass is singular. A hundred roundings.
 MASS_PIVOT = 1e-14

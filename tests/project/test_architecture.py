@@ -40,6 +40,7 @@ ORDER = [
     "integrators",
     "formulations",
     "observables",
+    "viewer",
     "runs",
     "taylor",
     "configuration",

@@ -56,8 +56,11 @@ function instantiate(list) {
   }
   for (const members of groups.values()) {
     const { layer, kind } = members[0];
-    const material = new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide });
+    const solid = layer === "bodies" || layer === "joints"; // all else is drawn over them
+    const material = new THREE.MeshLambertMaterial({ vertexColors: true, depthTest: solid });
+    if (kind.startsWith("mesh")) material.side = THREE.DoubleSide;
     const mesh = new THREE.InstancedMesh(shapes[kind](), material, members.length);
+    mesh.renderOrder = solid ? 0 : 1;
     mesh.frustumCulled = false;
     mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
     mesh.owners = members;

@@ -43,7 +43,7 @@ function draw() {
   pose(frame);
   for (const part of parts) if (layers[part.layer].visible) follow(part);
   for (const link of run.links) stretch(link, placed(link.a, link.point_a, p), placed(link.b, link.point_b, q), link.radius);
-  const longest = 0.35 * extent.radius * 2 ** field("scale").value;
+  const longest = 0.5 * extent.radius * 2 ** field("scale").value;
   for (const arrow of arrows) if (layers[arrow.layer].visible) drawArrow(arrow, longest);
   for (const layer of Object.values(layers)) for (const mesh of layer.children) mesh.instanceMatrix.needsUpdate = true;
   for (const line of trailOf.values()) line.geometry.setDrawRange(0, Math.floor(frame) + 1);

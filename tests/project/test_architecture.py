@@ -45,6 +45,7 @@ ORDER = [
     "taylor",
     "configuration",
     "statics",
+    "figures",
     "ahead",
     "storage",
     "simulation",

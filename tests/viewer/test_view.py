@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from examples import four_bar
+from examples import door, four_bar
 from tests.helpers.pages import Tags, array, decoded, place
 from tsdyn.viewer.run_data import FRAMES
 
@@ -84,6 +84,12 @@ def test_arrows_are_the_reactions(run, page):
 
 def joints(run):
     return [constraint for constraint in run.scene.constraints if not getattr(constraint, "normalises", False)]
+
+
+def test_reactions_that_are_not_unique_say_so():
+    redundant = decoded(view(ts.simulate(door.build(), (0.0, 0.1))))
+    assert not any(arrow["unique"] for arrow in redundant.arrows)
+    assert all(arrow["unique"] for arrow in decoded(view(ts.simulate(chain(2), (0.0, 0.1)))).arrows)
 
 
 def test_joints_are_drawn_where_their_points_meet():

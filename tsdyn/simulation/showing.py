@@ -55,3 +55,38 @@ class Showing:
         from ..viewer.view import show
 
         return show(self, path, shapes)
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """Draw constraint errors, energies, steps and charts over time.
+
+        `ts.plots` has these and other figures by themselves.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            A file to write the figure to, in the format of its suffix.
+
+        Returns
+        -------
+        ndarray (2, 2) of matplotlib Axes
+
+        Raises
+        ------
+        MissingDependency
+            If matplotlib is not installed.
+        InvalidArgument
+            If the file can't be written.
+
+        Examples
+        --------
+        >>> import matplotlib
+        >>> import tsdyn as ts
+        >>> matplotlib.use("agg")
+        >>> stone = (scene := ts.Scene()).add_point_mass(mass=1.0)
+        >>> axes = ts.simulate(scene, (0, 1)).plot()
+        >>> axes[0, 1].get_ylabel()
+        'energy (J)'
+        """
+        from ..figures.overview import overview
+
+        return overview(self, path)

@@ -22,6 +22,7 @@ class Arrows(NamedTuple):
     body: int
     point: Any  # (3,), body frame
     values: Any
+    unique: bool  # False where redundant constraints may share the load in many ways
 
 
 def arrows(frames: Frames, constraints: list[Attached], forces: list[Attached], length: float) -> list[Arrows]:
@@ -29,14 +30,15 @@ def arrows(frames: Frames, constraints: list[Attached], forces: list[Attached], 
 
     length: of a usual body, m.
     """
-    found = []
+    found, redundant = [], bool(np.isnan(frames.run.multipliers).any())
     for layer, items in (("reactions", constraints), ("forces", forces)):
         for each in items:
             on_a = each.item.on is each.item.a
             index, point = (each.a, each.point("a")) if on_a else (each.b, each.point("b"))
+            unique = not redundant or bool(frames.run.reaction_unique(each.item).all())
             for unit, values in zip(UNITS, frames.run.reaction(each.item), strict=True):
                 values = np.nan_to_num(frames.interpolated(values))
-                found.append(Arrows(layer, unit, each.item.name, index, point, values))
+                found.append(Arrows(layer, unit, each.item.name, index, point, values, unique))
     arms = {"force": 1.0, "torque": length}
     largest = max((size(one) / arms[one.unit] for one in found), default=0.0)
     return [one for one in found if size(one) / arms[one.unit] > NONE * largest]

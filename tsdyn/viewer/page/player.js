@@ -20,7 +20,7 @@ const axes = [];
 const parts = [...run.parts, ...axes];
 const colours = { reactions: { force: "#d55e00", torque: "#cc79a7" }, forces: { force: "#009e73", torque: "#56b4e9" } };
 const arrows = run.arrows.map((arrow, index) => {
-  const colour = colours[arrow.layer][arrow.unit];
+  const colour = arrow.unique ? colours[arrow.layer][arrow.unit] : "#888888";
   return { ...arrow, index, shaft: { layer: arrow.layer, kind: "cylinder", colour }, head: { layer: arrow.layer, kind: "cone", colour } };
 });
 instantiate([...parts, ...run.links, ...arrows.flatMap((arrow) => [arrow.shaft, arrow.head])]);
@@ -84,7 +84,8 @@ function labels() {
   field("method").textContent = `${run.method}; tsdyn ${run.version}`;
   field("note").textContent = run.note;
   const largest = Object.entries(run.scales).filter(([, x]) => x > 0).map(([unit, x]) => `${x.toPrecision(3)} ${unit === "force" ? "N" : "N m"}`);
-  field("legend").textContent = `grid ${Number(step.toPrecision(1))} m${largest.length ? `\nlongest arrows ${largest.join(", ")}` : ""}`;
+  field("legend").textContent = `grid ${Number(step.toPrecision(1))} m${largest.length ? `\nlongest arrows ${largest.join(", ")}` : ""}`
+    + (run.arrows.every((arrow) => arrow.unique) ? "" : "\ngrey: reactions that are not unique");
   const usual = duration >= 1.5 && duration <= 60 ? 1 : Number((duration / 10).toPrecision(1)) || 1;
   for (const factor of [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10]) {
     const rate = Number((factor * usual).toPrecision(2));

@@ -53,7 +53,7 @@ def drawn_solid(mass: float, inertia: Any, points: Any, reach: float) -> Solid:
     """The solid of a body as it is drawn; points (j, 3) are where its joints are, m."""
     solid = solid_of(mass, inertia)
     factor = SMALL * reach / solid.extent if solid.extent > FAR * reach else 1.0
-    if len(points) == 2:
+    if sum(np.linalg.norm(point) > ROD * reach for point in points) == 2:
         factor = min(factor, SLIM * reach / solid.girth)
     return solid._replace(size=factor * solid.size)
 

@@ -24,6 +24,17 @@ class Helix extends THREE.Curve {
   }
 }
 
+// A coil; its wire is flat, since springs are stretched far along z.
+function coil() {
+  const rings = 200, wire = new THREE.TubeGeometry(new Helix(), rings, 0.14, 5), place = wire.getAttribute("position");
+  for (let i = 0; i < place.count; i++) {
+    const middle = Math.floor(i / 6) / rings - 0.5;
+    place.setZ(i, middle + 0.12 * (place.getZ(i) - middle));
+  }
+  wire.computeVertexNormals();
+  return wire;
+}
+
 function meshOf(data) {
   const shape = new THREE.BufferGeometry();
   shape.setAttribute("position", new THREE.BufferAttribute(new Float32Array(bytes(data.vertices)), 3));
@@ -39,7 +50,7 @@ const shapes = {
   sphere: () => painted(upright(new THREE.SphereGeometry(1, 24, 16)), 2),
   cylinder: () => painted(upright(new THREE.CylinderGeometry(1, 1, 1, 24)), 1),
   cone: () => painted(upright(new THREE.ConeGeometry(1, 1, 16)), 0),
-  coil: () => painted(new THREE.TubeGeometry(new Helix(), 160, 0.12, 5), 0),
+  coil: () => painted(coil(), 0),
 };
 run.meshes.forEach((data, i) => { shapes[`mesh${i}`] = () => painted(meshOf(data), 0); });
 

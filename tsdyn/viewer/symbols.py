@@ -50,7 +50,7 @@ def _ball(each, r, letter="a"):
 
 
 def _spherical(each, r, girth):
-    return [_ball(each, max(1.2 * r, 0.55 * min(girth)))]
+    return [_ball(each, max(1.2 * r, min(0.55 * min(girth), 3.0 * r)))]
 
 
 def _revolute(each, r, girth):

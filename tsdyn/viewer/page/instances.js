@@ -44,11 +44,12 @@ function meshOf(data) {
   return flat;
 }
 
+const sides = run.bodies.length < 200 ? 24 : 8; // of balls and cylinders
 const upright = (geometry) => geometry.rotateX(Math.PI / 2); // from y, the axis of three.js, to z
 const shapes = {
   box: () => painted(new THREE.BoxGeometry(1, 1, 1), 0),
-  sphere: () => painted(upright(new THREE.SphereGeometry(1, 24, 16)), 2),
-  cylinder: () => painted(upright(new THREE.CylinderGeometry(1, 1, 1, 24)), 1),
+  sphere: () => painted(upright(new THREE.SphereGeometry(1, sides, (2 * sides) / 3)), 2),
+  cylinder: () => painted(upright(new THREE.CylinderGeometry(1, 1, 1, sides)), 1),
   cone: () => painted(upright(new THREE.ConeGeometry(1, 1, 16)), 0),
   coil: () => painted(coil(), 0),
 };

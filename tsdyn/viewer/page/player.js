@@ -54,6 +54,7 @@ function draw() {
     camera.position.add(moved);
   }
   orbit.update();
+  focus();
   sun.position.copy(camera.position);
   sun.target.position.copy(orbit.target);
   renderer.render(stage, camera);
@@ -110,7 +111,16 @@ function pick(event) { // a click on a body names it and toggles its trail
 
 field("play").onclick = () => setPlaying(!playing);
 field("time").oninput = () => { setPlaying(false); frame = field("time").value * (run.frames - 1); };
-field("home").onclick = home;
+field("home").onclick = () => { field("follow").value = -1; home(); };
+field("follow").onchange = () => { // from where a body that is small in the whole motion is seen
+  const body = Number(field("follow").value);
+  if (body < 0) return;
+  const away = camera.position.clone().sub(orbit.target);
+  away.setLength(Math.min(away.length(), 12 * run.bulk[body]));
+  orbit.target.set(...placed(body, [0, 0, 0], p));
+  camera.position.copy(orbit.target).add(away);
+};
+field("scale").parentElement.hidden = !arrows.length;
 field("picture").onclick = () => Object.assign(document.createElement("a"), { href: canvas.toDataURL(), download: "tsdyn.png" }).click();
 for (const [name, group] of Object.entries({ ...layers, trails, grid })) {
   const box = field(`show-${name}`);
@@ -126,7 +136,7 @@ document.onkeydown = (event) => {
   if (event.target.matches("input[type=range], select")) return;
   const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
   if (event.key === " ") { setPlaying(!playing); event.preventDefault(); }
-  if (event.key === "Home") home();
+  if (event.key === "Home") field("home").click();
   if (by) { setPlaying(false); frame = Math.max(0, Math.min(run.frames - 1, Math.round(frame) + by)); }
 };
 labels();

@@ -17,7 +17,7 @@ const up = new THREE.Vector3(...run.up);
 const canvas = document.getElementById("canvas");
 const renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
 const stage = new THREE.Scene();
-const camera = new THREE.PerspectiveCamera(35, 1, 1e-3 * extent.radius, 1e3 * extent.radius);
+const camera = new THREE.PerspectiveCamera(35, 1);
 camera.up.copy(up);
 const orbit = new THREE.OrbitControls(camera, canvas);
 const sun = new THREE.DirectionalLight(0xffffff, 1.6);
@@ -76,10 +76,17 @@ function toggleTrail(body) {
 }
 run.trails.forEach(toggleTrail);
 
+// What is seen, from close by to beyond the motion.
+function focus() {
+  const distance = camera.position.distanceTo(orbit.target);
+  camera.near = 0.01 * distance;
+  camera.far = 100 * distance + 10 * extent.radius;
+  camera.updateProjectionMatrix();
+}
+
 function resize() {
   const width = canvas.clientWidth, height = canvas.clientHeight;
   renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
   renderer.setSize(width, height, false);
   camera.aspect = width / Math.max(1, height);
-  camera.updateProjectionMatrix();
 }

@@ -46,6 +46,7 @@ ORDER = [
     "statics",
     "ahead",
     "storage",
+    "files",
     "simulation",
     "benchmarking",
     "profiling",

@@ -29,6 +29,7 @@ from ..validation import counted, demand_known, label, vector3
 from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
 from .editing import remove as _remove
+from .scene_saving import save as _save
 from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
 
@@ -348,6 +349,7 @@ class Scene:
     set = set_joint
     remove = _remove
     copy = _copy
+    save = _save
     __copy__ = _copy
 
     def __repr__(self) -> str:

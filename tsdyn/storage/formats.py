@@ -14,6 +14,12 @@ BUFFER, how many floats are gathered before they are written, and functions for 
 
     read(path, column, part)                   a slice of a column
     count(path, columns)                       rows that all of these columns have
+
+and for what is written at once, beside the tables
+
+    put(path, group, arrays)                   arrays by name, into a new group of a closed store
+    get(path, group)                           the arrays of a group, by name; none where there is no such group
+    attributes(path)                           of the store as a whole
 """
 
 import contextlib

@@ -129,6 +129,25 @@ def count(path, columns):
         return min(len(file[column]) for column in columns)
 
 
+def put(path, group, arrays):
+    """As formats.py says."""
+    with h5py.File(path, "r+", libver="latest", locking=False) as file:
+        for name, values in arrays.items():
+            file.create_dataset(f"{group}/{name}", data=values)
+
+
+def get(path, group):
+    """As formats.py says."""
+    with reading(path), _opened(path) as file:
+        return {name: values[()] for name, values in file[group].items()} if group in file else {}
+
+
+def attributes(path):
+    """As formats.py says."""
+    with reading(path), _opened(path) as file:
+        return dict(file.attrs)
+
+
 def _opened(path):
     """The file to read: as one that may be written meanwhile, or as another reader in this process has opened it."""
     for options in ({"libver": "latest", "swmr": True, "locking": False}, {"locking": False}, {}):

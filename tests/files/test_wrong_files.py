@@ -171,7 +171,7 @@ def test_all_mistakes_at_once(tmp_path):
 
 
 def test_a_start_that_cannot_be_assembled(tmp_path):
-    with pytest.raises(ts.InvalidFile, match="assembled"):
+    with pytest.raises(ts.InvalidFile, match="arm, bob held fixed"):
         load(RIGHT.replace("1.2 + 0.0", "9.0 + 0.0").replace("[start]", '[start]\nfixed = ["arm", "bob"]'), tmp_path)
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import platform
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._version import __version__
-from ..errors import InvalidArgument, Status, StorageError
+from ..errors import InvalidArgument, Status, StorageError, TsdynError
 from ..files import scene_text
 from ..jit.cache import machine
 from .scene import Scene
@@ -21,6 +22,7 @@ from .trajectory_records import derived_record, record_of, take_derived, traject
 if TYPE_CHECKING:
     from ..hints import Place, Solution
 
+LOGS = {"steps": "_step_log", "charts": "_chart_log"}
 SETTINGS = ("rtol", "atol", "step", "max_step")
 SUFFIXES = (".h5", ".hdf5", ".nc", ".zarr")
 
@@ -57,32 +59,27 @@ def save(solution: Solution, path: Place) -> Path:
     saved_file.format_at(path)
     remembered = solution.handles.count + solution.packed.system.memory.size
     tables = tables_of(solution.packed.bodies, remembered, solution._step_log is not None)
-    saved_file.write(path, tables, _rows_of(solution), provenance(solution), _content(solution))
+    logs = {name: _columns_of(getattr(solution, log)) for name, log in LOGS.items() if name in tables}
+    counts = {"outputs": solution._length(), **{name: len(log[0]) for name, log in logs.items()}}
+    tables = {name: table._replace(longest=min(table.longest, counts[name])) for name, table in tables.items()}
+    rows = partial(_rows, solution, tables, logs)
+    saved_file.write(path, tables, rows, provenance(solution), _content(solution))
     return path
 
 
-def _rows_of(solution):
-    """A function that gives rows of a table, by column."""
-    logs = {}
+def _columns_of(log):
+    return [np.asarray(column, float) for column in log.arrays()]
 
-    def rows(table, start, count):
-        if table == "outputs":
-            part = solution[start : start + count]
-            found = {"time": part.t, "q": part.q, "qd": part.qd, "qdd": part.qdd}
-            remembered = np.concatenate((part.anchor.angles, part._remembers), axis=1)
-            return found | ({"remembered": remembered} if remembered.shape[1] else {})
-        if table not in logs:
-            names, log = {
-                "steps": (("step_time", "step_h", "step_accepted"), solution._step_log),
-                "charts": (
-                    ("chart_time", "chart_reason", "chart_condition", "chart_contraction", "chart_steps"),
-                    solution._chart_log,
-                ),
-            }[table]
-            logs[table] = dict(zip(names, log.arrays(), strict=True))
-        return {name: array[start : start + count] for name, array in logs[table].items()}
 
-    return rows
+def _rows(solution, tables, logs, table, start, count):
+    """Rows of a table from `start` on, at most `count`, by column."""
+    if table in logs:
+        names = [column.name for column in tables[table].columns]
+        return {name: column[start : start + count] for name, column in zip(names, logs[table], strict=True)}
+    part = solution[start : start + count]
+    found = {"time": part.t, "q": part.q, "qd": part.qd, "qdd": part.qdd}
+    remembered = np.concatenate((part.anchor.angles, part._remembers), axis=1)
+    return found | ({"remembered": remembered} if remembered.shape[1] else {})
 
 
 def _content(solution):
@@ -146,6 +143,8 @@ def load(path: Place, scene: Scene | None, kind: type[Solution]) -> Solution:
             raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
         take_derived(packed, record["derived"])
         return _solution(path, record, arrays, scene, kind)
+    except TsdynError:
+        raise
     except (KeyError, ValueError, IndexError, TypeError, AttributeError) as error:
         raise StorageError(f"{path} is damaged, or lacks something: {type(error).__name__}: {error}.") from error
 

@@ -47,11 +47,12 @@ class Table(NamedTuple):
     dimension: str
     columns: tuple  # of Column
     labels: dict  # of the other dimensions: the names along each
+    longest: int = LONGEST  # rows of a chunk at most
 
     def shapes(self, column):
         """The shapes of a column without rows, and of its chunks."""
         row = tuple(len(self.labels[dimension]) for dimension in column.dimensions)
-        return (0, *row), (max(min(CHUNK // max(math.prod(row), 1), LONGEST), 1), *row)
+        return (0, *row), (max(min(CHUNK // max(math.prod(row), 1), self.longest), 1), *row)
 
 
 def demand_rows(path, column, found, count):

@@ -1,7 +1,7 @@
 """Files of whole solutions: the tables of a store, and a group with all that is no table; no code, no pickle.
 
-The group has arrays by name. One of them, `record`, is JSON with numbers and words, and the SHA-256 of every array and
-column of the file.
+The group has arrays by name. One of them, `record`, is JSON behind its SHA-256: numbers and words, and the SHA-256 of
+every array and column of the file.
 """
 
 import hashlib
@@ -57,7 +57,7 @@ def write(path, tables, rows_of, attributes, content):
         store.close()
         sums = {**{c: s for found in sums.values() for c, s in found.items()}, **_sums(arrays)}
         words = json.dumps({**record, "tables": _columns(tables), "sums": sums}).encode()
-        form.put(partial, GROUP, {**arrays, RECORD: np.frombuffer(words, np.uint8)})
+        form.put(partial, GROUP, {**arrays, RECORD: np.frombuffer(_sealed(words), np.uint8)})
         if path.is_dir():
             shutil.rmtree(path)
         os.replace(partial, path)
@@ -68,6 +68,18 @@ def write(path, tables, rows_of, attributes, content):
         if isinstance(error, StorageError):
             raise
         raise StorageError(f"{path} can't be written: {type(error).__name__}: {error}.") from error
+
+
+def _sealed(words):
+    """Words behind their SHA-256."""
+    return hashlib.sha256(words).hexdigest().encode() + words
+
+
+def _unsealed(words):
+    """The words behind a SHA-256; raises ValueError if it is another one."""
+    if words != _sealed(words[64:]):
+        raise ValueError("it has another checksum")
+    return words[64:]
 
 
 def _columns(tables):
@@ -128,7 +140,7 @@ def read(path):
         )
     arrays = form.get(path, GROUP)
     try:
-        record = json.loads(arrays.pop(RECORD).tobytes())
+        record = json.loads(_unsealed(arrays.pop(RECORD).tobytes()))
         tables, sums = record["tables"], record["sums"]
         found = _sums(arrays) | {c: _sum_of(form, path, c) for columns in tables.values() for c in columns}
     except (KeyError, ValueError, AttributeError, TypeError) as error:

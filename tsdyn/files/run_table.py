@@ -8,8 +8,8 @@ from ..errors import InvalidArgument, TsdynError
 from ..methods.integrator import registered
 from ..validation import close
 from . import types
-from .build import known_keys
 from .expressions import Misread
+from .reading import known_keys
 from .values import decode_number
 
 ELSEWHERE = ("t_span", "integrator", "events", "store", "checkpoint", "progress", "state")  # and functions

@@ -106,9 +106,8 @@ class Records:
         >>> import tsdyn as ts
         >>> stone = (scene := ts.Scene(gravity=(0, 0, -10))).add_point_mass(mass=1.0, name="stone")
         >>> frame = ts.simulate(scene, (0, 1), t_eval=[0.0, 1.0]).to_dataframe()
-        >>> print(frame["q"])
-                stone.x  stone.y  stone.z
-        time (s)
+        >>> print(frame["q"]["stone.z"].to_numpy(), frame.attrs["units"]["q", "stone.z"])
+        [ 0. -5.] m
         """
         from .labelled import to_dataframe
 

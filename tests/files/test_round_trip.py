@@ -1,5 +1,7 @@
 """Scenes go to a file and back to the same bits."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline, PchipInterpolator
@@ -25,9 +27,11 @@ from tests.helpers.built_in import FORCES, JOINTS, PRIMITIVES, by_name
 from tests.helpers.plug_ins import Rod
 from tests.helpers.scene_marks import outcome, there_and_back
 from tsdyn.files import types
+from tsdyn.simulation.load import scene_file
 from tsdyn.stress.gallery.cases import CASES
 from tsdyn.stress.random_scenes import generate
 
+ROOT = Path(__file__).parents[2]
 MODULES = (
     bead_on_surface, door, four_bar, geared_pair, hooke_joint, pendulum_chain, plug_in_integrator, sarrus, screw_press,
     slider_crank, stick_slip, top, two_body_pendulum,
@@ -127,6 +131,14 @@ def test_edits_remain(tmp_path):
     scene.remove(scene.constraints[1])
     there_and_back(scene, tmp_path / "scene.toml")
     there_and_back(scene.copy(), tmp_path / "scene.toml")
+
+
+def test_the_example(tmp_path):
+    scene, given = scene_file(ROOT / "examples" / "four_bar.toml")
+    assert (given["t_span"], given["t_eval"].size) == ((0.0, 2.0), 201)
+    assert scene.mobility().degrees_of_freedom == 0  # it is driven
+    bodies = there_and_back(scene, tmp_path / "scene.toml").bodies
+    assert bodies[0].angular_velocity[2] == pytest.approx(6.0 + 0.6 * np.pi)
 
 
 def test_odd_names(tmp_path):

@@ -1,5 +1,7 @@
 """A scene of plain data; mistakes are gathered, and what depends on a part that is wrong is left out."""
 
+import math
+
 from ..elements.bodies import Body
 from ..validation import close
 from . import types
@@ -31,7 +33,10 @@ def build(document, make, mistakes, allow_code=False):
     reading = Reading(mistakes, _parameters(document, mistakes), allow_code, {}, {})
     given = {}
     if "gravity" in document:
-        given["gravity"] = decoded(reading, ("gravity",), document["gravity"], decode_array)
+        gravity = decoded(reading, ("gravity",), document["gravity"], decode_array)
+        given |= {} if gravity is None else {"gravity": gravity}
+    if not isinstance(document.get("title", ""), str):
+        mistakes.add_value(("title",), "title", document["title"], "it must be text in quotes.")
     scene = made(reading, ("gravity",), "", make, given=given) or make()
     reading.bodies["ground"] = scene.ground
     for path, table in _tables(reading, document, "body"):
@@ -73,7 +78,9 @@ def _parameters(document, mistakes):
         if name in (TIME, *CONSTANTS, *NAMES) or not name.isidentifier():
             mistakes.add(path, f"{name!r} can't be the name of a parameter; choose another one.")
         try:
-            found[name] = decode_number(value, found)
+            found[name] = float(decode_number(value, found))
+            if not math.isfinite(found[name]):
+                raise Misread("it must be finite.")
         except Misread as error:
             mistakes.add_value(path, name, value, str(error))
             found[name] = 1.0  # so that what uses it can be read

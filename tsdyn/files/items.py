@@ -34,7 +34,9 @@ def add_item(reading, scene, path, table, kinds):
     placed = _at(reading, path, table, cls, what, values)
     for argument in values.values():
         if argument.required and argument.name not in table:
-            reading.mistakes.add(path, f"{what} lacks {argument.name}.")
+            code = "; that is code, and a file holds none: build such a scene in Python."
+            end = code if argument.kind == types.FUNCTION else "."
+            reading.mistakes.add(path, f"{what} lacks {argument.name}{end}")
     if len(reading.mistakes.found) > before or positions is None:
         return
     make = cls if placed is None else cls.at

@@ -142,6 +142,8 @@ def find(name, known, others, what, allow_code):
         return found
     if name in others():
         raise Misread(f"{name} is no {what}: it belongs under [[{'force' if what == 'constraint' else 'constraint'}]].")
+    if name == EulerNormalization.__name__:
+        raise Misread("every rigid body has one by itself; leave it out.")
     near = close(name, known())
     if near:
         raise Misread(f"unknown type; did you mean {' or '.join(near)}?")

@@ -30,7 +30,7 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
     scene : Scene, optional
         That of a solution whose file holds none, because the scene has functions or classes of your own.
     allow_code : bool
-        Whether modules that a scene file names as those of plug-ins may be imported. Plug-ins that have been imported
+        Whether modules that a file names as those of plug-ins may be imported. Plug-ins that have been imported
         before are found anyway.
 
     Returns
@@ -55,6 +55,8 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
     <Scene of 1 point mass: 3 coordinates, 1 constraint row>
     """
     demand_path(path, "path")
+    if not isinstance(allow_code, bool):
+        raise InvalidArgument(f"allow_code must be True or False, got {allow_code!r}.")
     suffix = Path(path).suffix.lower()
     if suffix == ".toml":
         if scene is not None:
@@ -65,15 +67,13 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
 
     if suffix not in SUFFIXES:
         raise InvalidArgument(f"load reads files that end in {READS}, got {str(path)!r}.")
-    return load_solution(path, scene, Solution)
+    return load_solution(path, scene, allow_code, Solution)
 
 
 def scene_file(path: Place, allow_code: bool = False) -> tuple[Scene, dict[str, Any]]:
     """Return the scene of a TOML file, and the arguments of `simulate` that its table `run` asks for."""
     from ..files import scene_text
 
-    if not isinstance(allow_code, bool):
-        raise InvalidArgument(f"allow_code must be True or False, got {allow_code!r}.")
     try:
         if os.path.getsize(path) > scene_text.LARGEST:
             raise StorageError(f"{path} is too large for a scene file: {os.path.getsize(path)} bytes.")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._version import __version__
-from ..errors import InvalidArgument, Status, StorageError, TsdynError
+from ..errors import InvalidArgument, InvalidFile, Status, StorageError, TsdynError
 from ..files import scene_text
 from ..jit.cache import machine
 from .scene import Scene
@@ -130,14 +130,14 @@ def _plain(value):
     return value.item() if isinstance(value, np.generic) else value
 
 
-def load(path: Place, scene: Scene | None, kind: type[Solution]) -> Solution:
-    """Return the solution of a file; `scene` where the file holds none, `kind` is `Solution`."""
+def load(path: Place, scene: Scene | None, allow_code: bool, kind: type[Solution]) -> Solution:
+    """Return the solution of a file; arguments as of `ts.load`, `kind` is `Solution`."""
     from ..storage import saved_file
 
     path = Path(path).absolute()
     record, arrays = saved_file.read(path)
     try:
-        scene = _scene(path, record, arrays, scene)
+        scene = _scene(path, record, arrays, scene, allow_code)
         packed = scene.packed
         if hash_of(packed) != record["provenance"]["scene"]:
             raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
@@ -149,7 +149,7 @@ def load(path: Place, scene: Scene | None, kind: type[Solution]) -> Solution:
         raise StorageError(f"{path} is damaged, or lacks something: {type(error).__name__}: {error}.") from error
 
 
-def _scene(path, record, arrays, scene):
+def _scene(path, record, arrays, scene, allow_code):
     """The scene that a solution is of."""
     if scene is not None:
         if not isinstance(scene, Scene):
@@ -161,9 +161,11 @@ def _scene(path, record, arrays, scene):
             f"ts.load({str(path)!r}, scene=scene)."
         )
     try:
-        return scene_text.read(arrays["scene"].tobytes().decode(), f"{path} (scene)", Scene, None)[0]
-    except InvalidArgument as error:
-        raise StorageError(f"{path}: its scene can't be made: {error}") from error
+        return scene_text.read(arrays["scene"].tobytes().decode(), "its scene", Scene, None, allow_code)[0]
+    except InvalidFile as error:
+        raise StorageError(
+            f"{path}: {error}\nImport the modules of its classes before, or pass the scene: ts.load(path, scene=scene)."
+        ) from error
 
 
 def _solution(path, record, arrays, scene, kind):

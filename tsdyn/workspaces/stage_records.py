@@ -15,11 +15,18 @@ class StageNumbers(Record):
     theta: float  # contraction that the last stage measured
     t_before: float  # s, start of the last step; -inf for the first one
     eager: int  # stages that are still to be begun with a matrix of their own
+    rates_of: int  # counter of charts when z of the stages was last set; 0 where z and multipliers are unknown
+    time: float  # s, of the last stage, and of the one before; -inf where they are unknown
+    time_before: float
+    lag: float  # contraction of corrections by factors of N of an older place, as last measured
     fresh: int  # 1 if the derivatives of the forces' laws are to be taken by saddle_point.reduce
 
 
 class StageKernels(Record):
-    """Addresses of the kernels in formulations/linearisation.py or saddle_point.py, of `recall`, of the error norm."""
+    """Addresses of the kernels in formulations/linearisation.py or saddle_point.py, of `recall`, of the error norm.
+
+    `residual`, `correct` and `distance` are those of stage_equations.py; 0 for a form without them.
+    """
 
     linearise: int
     reduce: int
@@ -28,3 +35,6 @@ class StageKernels(Record):
     soften: int
     recall: int
     error_norm: int
+    residual: int
+    correct: int
+    distance: int

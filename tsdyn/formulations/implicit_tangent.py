@@ -12,7 +12,7 @@ from .chart_coordinates import turn_accelerations
 from .chart_validity import measure_turns
 from .saddle_point import factorise, linearise, reduce, soften, solve
 from .stage_equations import correct, distance, residual
-from .tangent import COLUMNS, accelerate, check, error_norm, place, start_chart, write_state
+from .tangent import COLUMNS, accelerate, check_chart, error_norm, place, start_chart, write_state
 
 __all__ = [  # parts of the form
     "COLUMNS",
@@ -31,6 +31,14 @@ __all__ = [  # parts of the form
     "start_chart",
 ]
 OK = int(Status.SUCCESS)
+
+
+@callback("p")
+def check(context):
+    """As tangent.check; N is factorised anew at the place, since the stages of the next step begin with its factors."""
+    c = load(context)
+    c.chart.state.factored = 0
+    return check_chart(c)
 
 
 @callback("pp")

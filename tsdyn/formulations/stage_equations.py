@@ -12,7 +12,7 @@ follows with the multipliers from the saddle-point matrix (saddle_point.py):
     [ M - g C_b - g^2 K_b    H^T ] [ C e  ]     [ F - M (a + C n) - H^T lam ]
     [ H                      0   ] [ dlam ]  =  [ 0                         ]
 
-The factors of N are those of an older place as long as they contract.
+The factors of N are those of an older place as long as they contract: of the step's start at first.
 """
 
 import math
@@ -39,7 +39,8 @@ from ..rows.interface import (
 )
 from ..workspaces.workspace import load
 from .accelerations import body_forces
-from .chart_coordinates import displace, factorise_normal, largest_rates, to_bodies, turn_accelerations, turn_rates
+from .chart_coordinates import displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
+from .projection import largest_residual, velocity_floor
 from .saddle_point import degrees, take_solution, turned_back
 from .tangent_error import weighted_square
 from .tolerances import (
@@ -51,7 +52,6 @@ from .tolerances import (
     REACTIONS_LEFT,
     ROUNDING_AT_MOST,
     SLOW,
-    SPEED_ROUNDING,
     STALLED,
     SWEEPS,
 )
@@ -97,7 +97,7 @@ def _begin(numbers, s, charts, t):
     if numbers.rates_of == 0:  # at the start, and where a stage has failed
         numbers.time = numbers.time_before = -math.inf
         for e in range(s.multipliers.size):
-            s.multipliers[e] = 0.0
+            s.multipliers[e] = s.before[e] = 0.0
     if numbers.rates_of != charts:
         numbers.rates_of, numbers.lag = charts, LAG
         for e in range(s.z.size):
@@ -170,7 +170,7 @@ def _solve_positions(c, t, g):
         if f.b.size == 0:
             return OK
         evaluate_rows(graph, system, f, f.rows, t)
-        worst = largest(f.b)
+        worst = largest_residual(graph, w, f)
         if not worst < math.inf:
             return NOT_FINITE
         if worst <= floor or (worst > SLOW * before and worst <= ROUNDING_AT_MOST * floor):
@@ -204,12 +204,11 @@ def _solve_rates(c, t):
         if f.b.size == 0:
             return OK
         if sweep == 0:
-            speed, spin = largest_rates(graph, f.poses)
-            floor = SPEED_ROUNDING * (speed + w.control.size * spin)
+            floor = velocity_floor(graph, w, f)
         multiply_rates(graph, f.rows, f.poses, f.b)
         if rheonomic:
             _add(l.drift, f.b)
-        worst = largest(f.b)
+        worst = largest_residual(graph, w, f)
         if not worst < math.inf:
             return NOT_FINITE
         if worst <= floor or (worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):
@@ -294,14 +293,14 @@ def _settle_reactions(c):
 
     H of the saddle-point matrix may be that of an older place: it would take a part of what is left for a load.
     """
-    f, s, graph, least = c.tangent, c.saddle, c.graph, 0.0
+    w, f, s, graph, least = c.work, c.tangent, c.saddle, c.graph, 0.0
     for sweep in range(REACTION_SWEEPS):
         copy(s.e, f.Z)
         put(f.Z, 8 * graph.bodies.shape[0], splat(0.0))  # the ground
         put(f.Z, 8 * graph.bodies.shape[0] + 4, splat(0.0))
         weigh_bodies(graph, f.Z)
         multiply_rows(graph, f.rows, f.Z, f.b)
-        worst = largest(f.b)
+        worst = largest_residual(graph, w, f)
         if sweep == 0:
             least = REACTIONS_LEFT * worst
         if worst <= least:

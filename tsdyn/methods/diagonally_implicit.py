@@ -25,6 +25,7 @@ from .tolerances import (
     DIVERGING,
     EAGER_SPARSE,
     EAGER_STAGES,
+    FIXED_ITERATIONS,
     FIXED_TOL,
     GUESS,
     ITERATIONS,
@@ -32,11 +33,13 @@ from .tolerances import (
     KAPPA_SPARSE,
     LEAST,
     MATRICES,
+    MATRICES_SPARSE,
     RESIDUAL_FLOOR,
     SAME_G,
     SLOW,
     SLOW_SPARSE,
     TOO_FAR,
+    WORSE,
 )
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
@@ -78,7 +81,7 @@ def _renew_matrix(context, c, t, g, f, anew, here):
         if here or anew:
             call_reduce(l.kernels.reduce, context, t)
         status = call_reduce(l.kernels.factorise, context, g)
-    l.numbers.g = g if status == 0 else 0.0
+    l.numbers.g, l.numbers.slow = g if status == 0 else 0.0, 0.0
     l.numbers.chart = c.work.counters.charts
     return status
 
@@ -148,17 +151,18 @@ def _solve_stage(context, c, r, i, t, g):
     before, theta, measured = math.inf, l.numbers.theta, False
     slow, apart, stuck, renewed = 0, 0, False, False
     eager, sparse = l.numbers.eager > 0, l.numbers.every_chart == 1
-    limit, kappa = (SLOW_SPARSE, KAPPA_SPARSE) if sparse else (SLOW, KAPPA)
-    kappa = kappa if r.numbers.adaptive == 1 else KAPPA  # residuals of thousands of steps add up
+    # what stages of fixed steps leave adds up over thousands of steps
+    limit, kappa = (SLOW_SPARSE, KAPPA_SPARSE) if sparse and r.numbers.adaptive == 1 else (SLOW, KAPPA)
+    matrices = MATRICES_SPARSE if sparse else MATRICES
     l.numbers.eager -= 1
-    for _ in range(ITERATIONS):
+    for _ in range(ITERATIONS if r.numbers.adaptive == 1 else FIXED_ITERATIONS):
         _set_stage(g, k, known, xs, ys)
         status = _evaluate(context, c, r, t, g, xs, ys, k, f)
         if status != 0:
             return status
         w.counters.stage_iterations += 1
         off_chart = not sparse and l.numbers.chart != w.counters.charts
-        slow_now = measured and theta > limit
+        slow_now = measured and theta > max(limit, l.numbers.slow)
         stale = eager or off_chart or abs(g - l.numbers.g) > SAME_G * g
         here = eager or slow_now or not sparse or l.numbers.g == 0.0 or l.numbers.known == 0
         eager = False
@@ -168,7 +172,7 @@ def _solve_stage(context, c, r, i, t, g):
                     l.numbers.eager = EAGER_SPARSE if sparse else EAGER_STAGES
                 slow += 1
             renewed = True
-            if _renew_matrix(context, c, t, g, f, slow == MATRICES, here) != 0:
+            if _renew_matrix(context, c, t, g, f, slow == matrices, here) != 0:
                 return STAGE_FAILED
             before, theta, measured = math.inf, GUESS, False
         size = _correct(context, c, g, k, f, dx)
@@ -176,6 +180,8 @@ def _solve_stage(context, c, r, i, t, g):
             return STAGE_FAILED
         if before < math.inf:
             theta, measured = size / before, True
+            if sparse and slow == matrices and l.numbers.slow == 0.0:  # no other matrix contracts better
+                l.numbers.slow = min(WORSE * theta, DIVERGING)
             stuck = theta > DIVERGING and size <= AT_FLOOR * floor
             apart += 1 if renewed and theta > DIVERGING else 0
             if apart == APART:

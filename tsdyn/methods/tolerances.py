@@ -7,8 +7,9 @@ Sizes of corrections are error norms: 1 is the step's tolerance. Contraction is 
 # written as quotients of integers.
 ORDER_CONDITION = 1e-14
 
-# Corrections of a stage at most: as many as KAPPA takes at a contraction of 0.7, and some after a new matrix.
-ITERATIONS = 20
+# Corrections of a stage at most: as many as KAPPA takes at a contraction of 0.7, and some after a new matrix. With fixed
+# steps, which can't be shortened, as many as rounding takes at a contraction of 0.4.
+ITERATIONS, FIXED_ITERATIONS = 20, 40
 
 # Error norm that a stage's iteration may leave. Hairer and Wanner, Solving ODEs II, IV.8, take 0.01 to 0.1 for Radau;
 # a run adds up the residuals of as many stages as it has, and a thousandth of a step's error stays below its estimate.
@@ -29,9 +30,13 @@ GUESS, LEAST = 0.3, 0.02
 # Contraction above which an iteration counts as diverging.
 DIVERGING = 0.9
 
-# New matrices within one stage, of which the last has new stiffness and damping; diverging iterations, all with a new
-# matrix, with which a stage is given up.
-MATRICES, APART = 3, 3
+# New matrices within one stage, of which the last has new stiffness and damping, and the same in the tangent form;
+# diverging iterations, all with a new matrix, with which a stage is given up.
+MATRICES, MATRICES_SPARSE, APART = 3, 2, 3
+
+# Contraction over that of a new matrix with new stiffness and damping, above which it is rebuilt in the tangent form:
+# where steps are long beside turns of bodies, no matrix contracts below SLOW_SPARSE.
+WORSE = 2.0
 
 # Stages that begin with a matrix of their own after an older one has failed: five steps of SDIRK54, one stage in the
 # tangent form.

@@ -13,6 +13,7 @@ class StageNumbers(Record):
     every_chart: int  # 1 for one whose P serves every chart
     known: int  # whether there are stiffness and damping
     theta: float  # contraction that the last stage measured
+    slow: float  # contraction above which P is rebuilt, if no new one contracts below the usual limit; else 0
     t_before: float  # s, start of the last step; -inf for the first one
     eager: int  # stages that are still to be begun with a matrix of their own
     rates_of: int  # counter of charts when z of the stages was last set; 0 where z and multipliers are unknown

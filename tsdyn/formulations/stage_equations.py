@@ -25,13 +25,17 @@ from ..maths.dense_linalg import copy, largest
 from ..methods.explicit import NORM
 from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
+    DYNAMICS,
     apply_multipliers,
+    clear_redundant,
     evaluate_bias,
     evaluate_drift,
     evaluate_rows,
+    factorise_selected_rows,
     multiply_rates,
     multiply_rows,
     solve_product,
+    solve_rows,
     solve_saddle,
     take_reactions,
     weigh,
@@ -236,7 +240,8 @@ def correct(context, g, k):
     k, n = vector(k, l.x.size - 8), w.q.size
     turn_accelerations(graph, l, f.poses, k, s.a)
     _correct_normal_part(c, g, k)
-    _balance(c)
+    if not _balance(c):
+        return math.inf
     solve_saddle(s)
     take_solution(graph, s)
     for b in range(graph.bodies.shape[0]):
@@ -268,7 +273,7 @@ def _correct_normal_part(c, g, k):
 
 @kernel
 def _balance(c):
-    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for the rows."""
+    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for the rows. False if S is singular."""
     f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     to_bodies(graph, l, s.r, f.Z)
     _add(s.a, f.Z)
@@ -277,23 +282,26 @@ def _balance(c):
     for i in range(s.e.size):
         s.e[i] = s.loads[i] - f.Z[i]
     take_reactions(graph, f.rows, s.multipliers, s.e)
-    if f.b.size > 0:
-        _settle_reactions(c)
+    if f.b.size > 0 and not _settle_reactions(c):
+        return False
     for i in range(s.x.size):
         s.x[i] = 0.0
     for b in range(graph.bodies.shape[0]):
         at, o = s.graph.body_at[b], 8 * b
         for i in range(degrees(graph, b)):
             s.x[at + i] = s.e[o + i + i // 3]
+    return True
 
 
 @kernel
 def _settle_reactions(c):
-    """Correct lam by N^-1 H W e until H W e, e = F - M (a + C n) - H^T lam, is small; s.e = e.
+    """Correct lam by S^-1 H W e until H W e, e = F - M (a + C n) - H^T lam, is small; s.e = e. False if S is singular.
 
-    H of the saddle-point matrix may be that of an older place: it would take a part of what is left for a load.
+    H of the saddle-point matrix may be that of an older place: it would take a part of what is left for a load. S is of
+    an older place, too, as long as it contracts: of the step's start at first.
     """
-    w, f, s, graph, least = c.work, c.tangent, c.saddle, c.graph, 0.0
+    w, f, s, graph, least, before, renewed = c.work, c.tangent, c.saddle, c.graph, 0.0, math.inf, False
+    lean = graph.axes.rows.shape[0] > 0  # S is of another metric than W
     for sweep in range(REACTION_SWEEPS):
         copy(s.e, f.Z)
         put(f.Z, 8 * graph.bodies.shape[0], splat(0.0))  # the ground
@@ -304,10 +312,21 @@ def _settle_reactions(c):
         if sweep == 0:
             least = REACTIONS_LEFT * worst
         if worst <= least:
-            return
-        _solve_normal(c)
+            return True
+        if lean:
+            _solve_normal(c)
+        else:
+            if worst > SLOW * before and not renewed:
+                w.counters.factorizations += 1
+                if factorise_selected_rows(graph, f, f.rows, DYNAMICS) >= 0:
+                    return False
+                renewed = True
+            solve_rows(graph, f.rows, f.b)
+            clear_redundant(f, f.b)  # which others may have been when S was made
         _add(f.b, s.multipliers)
         take_reactions(graph, f.rows, f.b, s.e)
+        before = worst
+    return True
 
 
 @callback(NORM, "d")

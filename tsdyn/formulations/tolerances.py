@@ -54,9 +54,9 @@ LAG, LEAST_LAG = 0.1, 0.01
 # Distance in time of a stage from the last one, over that of the last two, up to which multipliers are extrapolated.
 FARTHEST_AHEAD = 2.0
 
-# Corrections of the multipliers by these factors in an iteration of a stage, and what may be left of the unbalanced
-# loads along the rows, relative: a change of H since the iteration matrix was made acts on that.
-REACTION_SWEEPS, REACTIONS_LEFT = 5, 1e-4
+# Corrections of the multipliers in an iteration of a stage, and what may be left of the unbalanced loads along the
+# rows, relative: a change of H since the iteration matrix was made acts on that.
+REACTION_SWEEPS, REACTIONS_LEFT = 8, 1e-4
 
 # 1 / m: what Newton's method leaves of an error, over its square, until it is measured. One over a metre: links of
 # usual size.

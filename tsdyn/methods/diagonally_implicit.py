@@ -23,6 +23,7 @@ from .tolerances import (
     APART,
     AT_FLOOR,
     DIVERGING,
+    EAGER_LOST,
     EAGER_SPARSE,
     EAGER_STAGES,
     FIXED_ITERATIONS,
@@ -169,7 +170,7 @@ def _solve_stage(context, c, r, i, t, g):
         if stale or slow_now:
             if not stale:
                 if slow == 0 and not renewed:
-                    l.numbers.eager = EAGER_SPARSE if sparse else EAGER_STAGES
+                    l.numbers.eager = EAGER_STAGES if not sparse else EAGER_LOST if theta > DIVERGING else EAGER_SPARSE
                 slow += 1
             renewed = True
             if _renew_matrix(context, c, t, g, f, slow == matrices, here) != 0:

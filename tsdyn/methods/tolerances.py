@@ -7,8 +7,8 @@ Sizes of corrections are error norms: 1 is the step's tolerance. Contraction is 
 # written as quotients of integers.
 ORDER_CONDITION = 1e-14
 
-# Corrections of a stage at most: as many as KAPPA takes at a contraction of 0.7, and some after a new matrix. With fixed
-# steps, which can't be shortened, as many as rounding takes at a contraction of 0.4.
+# Corrections of a stage at most: as many as KAPPA takes at a contraction of 0.7, and some after a new matrix. With
+# fixed steps, which can't be shortened, as many as rounding takes at a contraction of 0.4.
 ITERATIONS, FIXED_ITERATIONS = 20, 40
 
 # Error norm that a stage's iteration may leave. Hairer and Wanner, Solving ODEs II, IV.8, take 0.01 to 0.1 for Radau;
@@ -38,9 +38,9 @@ MATRICES, MATRICES_SPARSE, APART = 3, 2, 3
 # where steps are long beside turns of bodies, no matrix contracts below SLOW_SPARSE.
 WORSE = 2.0
 
-# Stages that begin with a matrix of their own after an older one has failed: five steps of SDIRK54, one stage in the
-# tangent form.
-EAGER_STAGES, EAGER_SPARSE = 30, 1
+# Stages that begin with a matrix of their own after an older one has failed: five steps of SDIRK54. In the tangent form
+# one stage, but one step where iterations diverged: matrices of overdamped springs that turn serve one stage only.
+EAGER_STAGES, EAGER_SPARSE, EAGER_LOST = 30, 1, 6
 
 # Relative change of g = h a_ii up to which the factors of P are tried again: a damped stiff mode then contracts by
 # |1 - g / g_P| < 0.43. Measured contraction decides whether they are kept.

@@ -74,11 +74,12 @@ def _move(part, store, i, out):
 
 @kernel
 def _warm(c, store, out):
-    w, l, friction, i = c.work, c.chart, c.tangent.friction, 0
+    w, l, f, friction, i = c.work, c.chart, c.tangent, c.tangent.friction, 0
     for part in (w.u, w.v, friction.lam, friction.load):
         i = _move(part, store, i, out)
-    if c.saddle.K.size > 0:  # stages begin with the factors of N
-        i = _move(l.upper, store, _move(l.lower, store, i, out), out)
+    if c.saddle.K.size > 0:  # stages begin with the factors of N and S
+        for part in (l.lower, l.upper, f.rows.S):
+            i = _move(part, store, i, out)
         if out:
             store[i] = l.state.made
         else:
@@ -100,8 +101,9 @@ def _warm(c, store, out):
 
 def warm_size(work, tangent, chart, saddle):
     """Floats that `keep` stores."""
-    friction, normal = tangent.friction, chart.lower.size + chart.upper.size + 1 if saddle.K.size else 0
-    return sum(part.size for part in (work.u, work.v, friction.lam, friction.load, work.B, work.T)) + normal + 1
+    friction, factors = tangent.friction, (chart.lower, chart.upper, tangent.rows.S) if saddle.K.size else ()
+    kept = work.u, work.v, friction.lam, friction.load, work.B, work.T, *factors
+    return sum(part.size for part in kept) + 1 + (1 if factors else 0)
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Newton's method for a stage of an implicit method in the tangent form, without factors of S.
+"""Newton's method for a stage of an implicit method in the tangent form, its multipliers unknowns as well.
 
     Phi(q) = 0                         q  at x - Y0 u
     H C (xd - Y0 z) + Phi_t = 0        qd at xd - Y0 z
@@ -12,7 +12,8 @@ follows with the multipliers from the saddle-point matrix (saddle_point.py):
     [ M - g C_b - g^2 K_b    H^T ] [ C e  ]     [ F - M (a + C n) - H^T lam ]
     [ H                      0   ] [ dlam ]  =  [ 0                         ]
 
-The factors of N are those of an older place as long as they contract: of the step's start at first.
+Before, lam is corrected by S^-1 H W times the right-hand side, at the present H. The factors of N and S are those of an
+older place as long as they contract: of the step's start at first.
 """
 
 import math

@@ -34,7 +34,6 @@ from .tolerances import (
     KAPPA_SPARSE,
     LEAST,
     MATRICES,
-    MATRICES_SPARSE,
     RESIDUAL_FLOOR,
     SAME_G,
     SLOW,
@@ -154,7 +153,6 @@ def _solve_stage(context, c, r, i, t, g):
     eager, sparse = l.numbers.eager > 0, l.numbers.every_chart == 1
     # what stages of fixed steps leave adds up over thousands of steps
     limit, kappa = (SLOW_SPARSE, KAPPA_SPARSE) if sparse and r.numbers.adaptive == 1 else (SLOW, KAPPA)
-    matrices = MATRICES_SPARSE if sparse else MATRICES
     l.numbers.eager -= 1
     for _ in range(ITERATIONS if r.numbers.adaptive == 1 else FIXED_ITERATIONS):
         _set_stage(g, k, known, xs, ys)
@@ -173,7 +171,7 @@ def _solve_stage(context, c, r, i, t, g):
                     l.numbers.eager = EAGER_STAGES if not sparse else EAGER_LOST if theta > DIVERGING else EAGER_SPARSE
                 slow += 1
             renewed = True
-            if _renew_matrix(context, c, t, g, f, slow == matrices, here) != 0:
+            if _renew_matrix(context, c, t, g, f, slow == MATRICES, here) != 0:
                 return STAGE_FAILED
             before, theta, measured = math.inf, GUESS, False
         size = _correct(context, c, g, k, f, dx)
@@ -181,7 +179,7 @@ def _solve_stage(context, c, r, i, t, g):
             return STAGE_FAILED
         if before < math.inf:
             theta, measured = size / before, True
-            if sparse and slow == matrices and l.numbers.slow == 0.0:  # no other matrix contracts better
+            if sparse and slow == MATRICES and l.numbers.slow == 0.0:  # no other matrix contracts better
                 l.numbers.slow = min(WORSE * theta, DIVERGING)
             stuck = theta > DIVERGING and size <= AT_FLOOR * floor
             apart += 1 if renewed and theta > DIVERGING else 0

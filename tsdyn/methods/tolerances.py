@@ -30,9 +30,9 @@ GUESS, LEAST = 0.3, 0.02
 # Contraction above which an iteration counts as diverging.
 DIVERGING = 0.9
 
-# New matrices within one stage, of which the last has new stiffness and damping, and the same in the tangent form;
-# diverging iterations, all with a new matrix, with which a stage is given up.
-MATRICES, MATRICES_SPARSE, APART = 3, 2, 3
+# New matrices within one stage, of which the last has new stiffness and damping; diverging iterations, all with a new
+# matrix, with which a stage is given up.
+MATRICES, APART = 3, 3
 
 # Contraction over that of a new matrix with new stiffness and damping, above which it is rebuilt in the tangent form:
 # where steps are long beside turns of bodies, no matrix contracts below SLOW_SPARSE.

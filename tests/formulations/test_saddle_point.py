@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from benchmarks.scenes import SCENES as MECHANISMS
 from benchmarks.stiff import hung, jointed
 from benchmarks.stiff_chain import chain
 from tests.helpers import closed_loops, locked_scenes, rough_joints
@@ -177,6 +178,19 @@ def test_iterations_and_memory_of_a_stiff_chain(method):
         assert stats.jacobians == 1
         sizes.append(max(memory.nbytes for spare in scene._prepared._spare.values() for memory in spare))
     assert sizes[1] < 2.1 * sizes[0]
+
+
+def test_a_matrix_serves_a_long_chain_that_turns():
+    """Reactions are balanced at the present rows, by factors that contract however long the chain is."""
+    scene, end = MECHANISMS["chain of 64"].build(), MECHANISMS["chain of 64"].end
+    stats = ts.simulate(scene, (0.0, end), integrator=SDIRK54(1e-2, 1e-2)).raise_if_failed().stats
+    assert stats.iteration_matrices < stats.steps
+
+
+def test_long_fixed_steps_need_no_matrix_that_contracts_well():
+    """Where bodies turn by much within a step, terms that the matrix leaves out decide the contraction."""
+    scene = MECHANISMS["two-body pendulum"].build()
+    ts.simulate(scene, (0.0, 3.0), integrator=ImplicitTrapezoid(step=0.03)).raise_if_failed()
 
 
 def test_a_chart_that_turns_keeps_its_matrix():

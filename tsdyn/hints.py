@@ -31,6 +31,7 @@ from .observables.kinematics import Kinematics
 from .observables.state import RememberingState, State
 from .profiling.phases import Phase
 from .profiling.report import Profile
+from .simulation.kinematics import KinematicAnalysis
 from .simulation.scene import Scene
 from .simulation.solution import Charts, Solution, Steps
 from .statics.equilibrium import Equilibrium
@@ -161,6 +162,7 @@ __all__ = [
     "Joint",
     "JointLaw",
     "JointLoads",
+    "KinematicAnalysis",
     "Kinematics",
     "Linearisation",
     "Load",

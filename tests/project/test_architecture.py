@@ -44,6 +44,7 @@ ORDER = [
     "taylor",
     "configuration",
     "statics",
+    "inverse",
     "ahead",
     "storage",
     "simulation",

@@ -1,0 +1,7 @@
+"""Motions that are given: kinematic analysis, inverse dynamics.
+
+Imports statics and below.
+
+Begin with analysis.py (`scene.kinematics`): continuation of a configuration without freedom from time to time, by the
+steps of branch_steps.py.
+"""

@@ -196,7 +196,7 @@ def test_result_is_a_solution():
     again = pickle.loads(pickle.dumps(found))
     np.testing.assert_array_equal(again.reaction("motor")[1], found.reaction("motor")[1])
     assert found[1:3].t.size == 2
-    with pytest.raises(ts.InvalidArgument, match=r"scene\.kinematics\(t\)"):
+    with pytest.raises(ts.InvalidArgument, match="no interpolants"):
         found.at(0.5)
     run = ts.simulate(scene, (1.0, 1.1), state=found.state)
     assert run.angle("hinge")[-1] == pytest.approx(RATE * 1.1, abs=CLOSE)

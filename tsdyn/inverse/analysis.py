@@ -5,12 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import Status
+from ..errors import InvalidArgument, Status
 from ..jit.kernels import resident
+from ..model import joint_motion
 from ..model.handles import handles_of
 from ..rows.interface import allocate_tangent
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of
+from ..statics.descent import update_memory
 from .branch_steps import branch_of, follow
 from .tolerances import LEAST_STEPS, SHORTEST, SLICE
 
@@ -25,7 +27,7 @@ class Followed(NamedTuple):
     remembered: np.ndarray  # (angles + slots,)  there
     steps: int
     rejected: int
-    newton: int
+    newton_iterations: int
     factorizations: int
     seconds: float
 
@@ -91,3 +93,49 @@ def _with_stops(t0, times, stops):
         every += [*(between if end >= start else between[::-1]).tolist(), end]
         asked += [False] * between.size + [True]
     return np.array(every), np.array(asked, bool)
+
+
+def given(packed, times, levels, motion):
+    """A motion q, qd, qdd (k, n) at times (k,), as `Followed`; angles and memory are those of `motion`, if any."""
+    handles, k = handles_of(packed), times.size
+    angles, memory = _attribute(motion, "angles"), _attribute(motion, "_remembers", "memory")
+    slots = packed.system.memory.size
+    angles = np.reshape(angles, (k, handles.count)) if np.size(angles) == k * handles.count else None
+    if angles is None:
+        angles = _unwrapped(handles, times[0], levels[0])
+    if np.size(memory) == k * slots:
+        memory = np.reshape(memory, (k, slots))
+    else:
+        memory = _remembering(packed, times, levels)
+    rows = np.column_stack((times, *levels, angles, memory))
+    last, remembered = np.stack([level[-1] for level in levels]), np.concatenate((angles[-1], memory[-1]))
+    return Followed(Status.SUCCESS, rows, float(times[-1]), last, remembered, 0, 0, 0, 0, 0.0)
+
+
+def _attribute(motion, *names):
+    """The first of some attributes that there is; an empty array without one."""
+    for name in names:
+        try:
+            return np.asarray(getattr(motion, name), float)
+        except (AttributeError, TypeError, InvalidArgument):
+            continue
+    return np.full(1, np.nan)[:0]
+
+
+def _unwrapped(handles, t, q):
+    """Angles of joints (k, count), each on the turn nearest to the one before."""
+    found, near = np.zeros((len(q), handles.count)), handles.angles_at_start(t, q[0])
+    for row in handles.rows:
+        for j, geometry in enumerate(row.angles, row.first):
+            angle = np.unwrap(joint_motion.angle(geometry, *handles.motions(geometry, (q,)), 0))
+            found[:, j] = angle + (joint_motion.counted(angle[0], near[j]) - angle[0])
+    return found
+
+
+def _remembering(packed, times, levels):
+    """What forces and constraints remember (k, slots), if each instant follows the one before."""
+    system = packed.system._replace(reals=packed.system.reals.copy())
+    found = np.zeros((times.size, system.memory.size))
+    for i, t in enumerate(times):
+        update_memory(system, levels[0][i], levels[1][i], float(t), found[i])
+    return found

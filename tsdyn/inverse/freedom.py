@@ -3,12 +3,13 @@
 import numpy as np
 
 from ..configuration.kinetic_metric import Metric, least_step
-from ..errors import InvalidArgument
+from ..errors import InconsistentState, InvalidArgument
+from ..observables.diagnostics import constraint_rows
 from ..sparse.constraint_graphs import redundant_rows
 from ..statics.coordinates import chosen
 from ..statics.motion import Motion
 from ..statics.variations import Variations
-from .tolerances import LISTED, MET, SWEEPS
+from .tolerances import CONSISTENT, LISTED, MET, SWEEPS
 
 
 def degrees_of_freedom(packed):
@@ -43,3 +44,16 @@ def driven_rates(packed, t, q):
             break
         x = x + least_step(A, left)
     return metric.rates(q, x)
+
+
+def demand_consistent(scene, packed, t, q, qd, qdd):
+    """Refuse a given motion (k, n) that violates constraints, by the row that is violated most."""
+    levels = "position", "velocity", "acceleration"
+    for level, residuals, size in zip(levels, constraint_rows(packed, t, q, qd, qdd), (q, qd, qdd), strict=True):
+        share = np.abs(residuals) / (1.0 + np.abs(size).max(axis=1, keepdims=True))
+        if not share.max(initial=0.0) <= CONSISTENT:
+            i, row = np.unravel_index(int(np.nanargmax(share)), share.shape)
+            raise InconsistentState(
+                f"inverse_dynamics: the motion violates {scene.row_names()[row]} by {residuals[i, row]:.3g} "
+                f"({level}) at t = {t[i]:g} s. Give a motion of this scene, such as a Solution of it."
+            )

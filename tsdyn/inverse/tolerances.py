@@ -29,3 +29,25 @@ MET, SWEEPS = 1e-12, 20
 # --- messages ---
 # Names in a list, at most.
 LISTED = 6
+
+# --- inverse dynamics ---
+# Share of the scene's size, rad: a pose that is nearer to the start of a motion is there.
+THERE = 1e-12
+# Weight of accelerations that actuators can't give, over the largest square of a unit load with unit masses: small
+# against the loads that they can give, and large enough for a pivot.
+DELTA = 1e-10
+# Sweeps of refinement, which take the effect of that weight from the loads.
+REFINEMENTS = 2
+# Share of the largest accelerations that may be left where the matrix is regular: rounding of sums, of long chains too.
+SOLVED = 1e-9
+# The same above which a motion is refused: runs give accelerations to their tolerances.
+MISSING = 1e-6
+LEAST_DIVISOR = 1e-300
+# Residual of a given motion, relative to 1 + max |q|, |qd| or |qdd|, that is accepted: that of runs with tolerances.
+CONSISTENT = 1e-6
+# Coordinates up to which the matrices of an instant are dense: a dense factorisation takes less time there.
+DENSE = 120
+# Share of a unit load's own accelerations below which those under the constraints are rounding.
+NO_EFFECT = 1e-11
+# Share of the largest load below which one is idle, and looked at.
+IDLE = 1e-9

@@ -2,85 +2,29 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ..calls import fitting, fitting_methods
-from ..errors import InvalidArgument, Status
-from ..observables.state import remembered
-from ..runs.arguments import state_arrays
-from ..runs.task import Outcome
+from ..calls import fitting
 from ..validation import counted, finite_times
-from .scene_cache import prepared
-from .solution import Solution
-from .termination import suspect
+from .given_motion import GivenMotion, follow
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, Floats, Scene, State
+    from ..hints import ArrayLike, Scene, State
 
-INITIAL_TOL = 1e-9  # of residuals of a start, as in `simulate`
 REMEDY = "Drive them by motors or drivers, such as RotationMotor.of(joint, angle=...), or integrate with ts.simulate."
 
 
-@fitting_methods
-class KinematicAnalysis(Solution):
+class KinematicAnalysis(GivenMotion):
     """What `scene.kinematics` returns: a `Solution` whose motion follows from the constraints alone.
 
     Positions, reactions, power, constraint errors and energies are asked for as of a run. Steps are those between the
     times asked for; there are no charts, events and interpolants.
     """
 
-    def __init__(self, scene: Scene, kept: Any, times: Floats, followed: Any) -> None:
-        task = SimpleNamespace(
-            prepared=kept,
-            method=None,
-            form=SimpleNamespace(name="constraints alone"),
-            span=(float(times[0]), float(times[-1])),
-            q=followed.last[0],
-        )
-        counts = {name: getattr(followed, name) for name in ("steps", "rejected", "factorizations")}
-        counts |= {
-            "newton_iterations": followed.newton,
-            "charts": 0,
-            "evaluations": 0,
-            "steps_near_singular": 0,
-            "stiff": False,
-        }
-        outcome = Outcome(
-            followed.status, "", followed.rows, None, None, followed.reached, followed.last, followed.remembered,
-            counts, None, None, 0.0,
-        )  # fmt: skip
-        super().__init__(scene, task, outcome, {"run": followed.seconds})
-        self._message = _account(self, scene, times.size)
+    _method = "kinematic analysis"
 
-    @property
-    def method(self) -> str:
-        """Kinematic analysis."""
-        return "kinematic analysis"
-
-    def at(self, t: ArrayLike) -> NoReturn:
-        """Refused: no interpolants are kept; pass the times to `scene.kinematics`."""
-        raise InvalidArgument("a kinematic analysis has the times that were asked for: pass t to scene.kinematics(t).")
-
-    def _facts(self):
-        s = self.stats
-        return {
-            "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self.t.size, 'output')}",
-            "method": self.method,
-            "steps": f"{s.steps}, {s.rejected} rejected, {counted(s.newton_iterations, 'Newton sweep')}",
-            "time": f"{s.seconds['run']:.3g} s",
-        }
-
-    def __str__(self) -> str:
-        return super().__str__().replace("Solution", "KinematicAnalysis", 1)
-
-    def __repr__(self) -> str:
-        return (
-            f"<KinematicAnalysis: {self.status.name.lower()} at t = {self._reached:g} s: "
-            f"{counted(self.t.size, 'output')}, {counted(self.stats.steps, 'step')}>"
-        )
+    def _more(self):
+        return f", {counted(self.stats.steps, 'step')}"
 
 
 @fitting
@@ -141,43 +85,5 @@ def kinematics(scene: Scene, t: ArrayLike, state: State | None = None) -> Kinema
     >>> turn.acceleration(slider)[:, 0].round(3)
     array([-1.2  ,  0.462,  0.4  ,  0.462, -1.2  ])
     """
-    from ..inverse.analysis import analyse  # imported here: a run needs none of it
-    from ..inverse.freedom import demand_driven, driven_rates
-    from ..statics.smoothness import demand_continuous
-
     times = finite_times(t, "t")
-    kept = prepared(scene)
-    demand_continuous(kept.packed)
-    given = scene._initial() if state is None else state_arrays(state, kept.n)
-    t0 = _start_time(kept, given[0], times) if state is None else float(state.t)
-    every = np.append(times, t0)
-    stops = kept.stops(every.min(), every.max())[:, 0]
-    memory = remembered(state, kept, t0, given[0])
-    q, _ = kept.start(scene, (given[0], driven_rates(kept.packed, t0, given[0])), t0, INITIAL_TOL, memory, True)
-    demand_driven(kept.packed, memory[kept.handles.count :], t0, q.copy(), "kinematics", REMEDY)
-    return KinematicAnalysis(scene, kept, times, analyse(kept.packed, t0, q, memory, times, stops))
-
-
-def _start_time(kept, q, times):
-    """t[0] where the poses are consistent then; else 0, or the time nearest to it that data cover."""
-    from ..configuration.kinetic_metric import Metric
-
-    Phi = Metric(kept.packed, None, float(times[0])).arrays(q)[0]
-    if np.abs(Phi).max(initial=0.0) <= INITIAL_TOL * (1.0 + np.abs(q).max()):
-        return float(times[0])
-    return max((motion.origin for motion in kept.motions if hasattr(motion, "origin")), key=abs, default=0.0)
-
-
-def _account(solution, scene, wanted):
-    """The message of an analysis."""
-    status = solution.status
-    if solution.success:
-        return f"Kinematic analysis at {counted(wanted, 'time')}."
-    where = f"It stopped at t = {solution.reached:.9g} s, with {solution.t.size} of {counted(wanted, 'time')}."
-    if status is Status.INTERRUPTED:
-        return f"The analysis was interrupted. {where}"
-    found = suspect(solution, scene)
-    if found or status in (Status.SINGULAR, Status.CHART_LOST, Status.NEWTON_FAILED):
-        remedy = "Beyond it the mechanism has no position, or several: drive another coordinate, or end before it."
-        return " ".join(part for part in ("The motion can't be followed any further.", where, found, remedy) if part)
-    return f"{status.sentence} {where} {status.remedy}"
+    return KinematicAnalysis(scene, times.size, *follow(scene, times, state, "kinematics", REMEDY))

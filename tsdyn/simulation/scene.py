@@ -29,6 +29,7 @@ from ..validation import counted, demand_known, label, vector3
 from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
 from .editing import remove as _remove
+from .inverse_dynamics import inverse_dynamics as _inverse_dynamics
 from .kinematics import kinematics as _kinematics
 from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
@@ -347,6 +348,7 @@ class Scene:
     linearise = _linearise
     equilibrium = _equilibrium
     kinematics = _kinematics
+    inverse_dynamics = _inverse_dynamics
     set = set_joint
     remove = _remove
     copy = _copy

@@ -128,12 +128,7 @@ class Motion:
     @cached_property
     def root(self):
         """Square roots of the masses that go with the coordinates, of a body turning about any axis alike, (n,)."""
-        root = np.ones(self.q.size)
-        root[self.system.bodies[:, :1] + np.arange(3)] = np.sqrt(self.system.mass)[:, None]
-        J = self.system.inertia[self.rigid].reshape(-1, 3, 3)
-        mean = np.trace(J, axis1=1, axis2=2) / 3.0
-        root[self.system.bodies[self.rigid, :1] + np.arange(3, 7)] = 2.0 * np.sqrt(mean)[:, None]
-        return root
+        return roots_of_masses(self.system, self.q.size)
 
     @cached_property
     def stiffness(self):
@@ -173,3 +168,12 @@ class Motion:
         """omega (level 1) or its derivative (level 2) of the rigid bodies, ground frame, (b', 3)."""
         p = self.parameters(0)
         return 2.0 * np.einsum("bij,bjk,bk->bi", rotation_matrix(p), transform_g(p), self.parameters(level))
+
+
+def roots_of_masses(system, n):
+    """Square roots of the masses that go with the coordinates, of a body turning about any axis alike, (n,)."""
+    root, rigid = np.ones(n), system.bodies[:, 1] == 7
+    root[system.bodies[:, :1] + np.arange(3)] = np.sqrt(system.mass)[:, None]
+    mean = np.trace(system.inertia[rigid].reshape(-1, 3, 3), axis1=1, axis2=2) / 3.0
+    root[system.bodies[rigid, :1] + np.arange(3, 7)] = 2.0 * np.sqrt(mean)[:, None]
+    return root

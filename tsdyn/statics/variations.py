@@ -13,8 +13,22 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.bodies import IDENTITY, transform_g
+from ..elements.joint_coordinates import AngleGeometry
 from ..model.handles import handles_of
 from .jets import constant, product, quotient, turning
+
+
+def named_coordinates(handles):
+    """Of each item with joint coordinates, by its id: their names and geometries, angles first."""
+    found, seen = {}, Counter()
+    for row in handles.rows:
+        seen[row.item.name] += 1
+        title = row.item.name + (f" #{seen[row.item.name]}" if seen[row.item.name] > 1 else "")
+        own = found[id(row.item)] = []
+        for kind, geometries in (("angle", row.angles), ("displacement", row.displacements)):
+            for i, geometry in enumerate(geometries):
+                own.append((f"{title}.{kind}" + (f" {i + 1}" if len(geometries) > 1 else ""), geometry))
+    return found
 
 
 class Variation(NamedTuple):
@@ -31,11 +45,10 @@ class Variations:
 
     def __init__(self, motion, rate):
         self.motion, self.handles, self.axes = motion, handles_of(motion.packed), turning(rate)
-        self._titles, seen = {}, Counter()
-        for row in self.handles.rows:
-            seen[row.item.name] += 1
-            again = f" #{seen[row.item.name]}" if seen[row.item.name] > 1 else ""
-            self._titles[id(row.item)] = row.item.name + again
+
+    @cached_property
+    def _named(self):
+        return named_coordinates(self.handles)
 
     @cached_property
     def joints(self):
@@ -45,14 +58,10 @@ class Variations:
 
     def of_row(self, row):
         """Of the coordinates of one joint."""
-        found, title = [], self._titles[id(row.item)]
-        for kind, geometries, make in (
-            ("angle", row.angles, self.angle),
-            ("displacement", row.displacements, self.displacement),
-        ):
-            for i, geometry in enumerate(geometries):
-                number = f" {i + 1}" if len(geometries) > 1 else ""
-                found.append(Variation(f"{title}.{kind}{number}", *make(geometry), kind == "displacement"))
+        found = []
+        for name, geometry in self._named[id(row.item)]:
+            turns = isinstance(geometry, AngleGeometry)
+            found.append(Variation(name, *(self.angle if turns else self.displacement)(geometry), not turns))
         return found
 
     @cached_property

@@ -191,7 +191,7 @@ def test_result_is_a_solution():
     scene = slider_crank(rate=RATE)
     found = scene.kinematics(np.linspace(0.0, 1.0, 5))
     assert repr(found) == f"<KinematicAnalysis: success at t = 1 s: 5 outputs, {found.stats.steps} steps>"
-    assert "kinematic analysis" in str(found)
+    assert str(found).startswith("KinematicAnalysis\n  ended")
     assert "<table>" in found._repr_html_()
     again = pickle.loads(pickle.dumps(found))
     np.testing.assert_array_equal(again.reaction("motor")[1], found.reaction("motor")[1])

@@ -147,6 +147,11 @@ class Motion:
         return max(largest, float(np.abs(self.system.gravity).max()), self.stiffness * size) or 1.0
 
     @property
+    def accelerations(self):
+        """qdd (n,) of the nominal motion."""
+        return self.qdd
+
+    @property
     def freedom(self):
         """Degrees of freedom, k."""
         return self.q.size - self.kept.size

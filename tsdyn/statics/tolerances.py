@@ -74,3 +74,9 @@ NEUTRAL = 1e-10
 MOST_SADDLES = 12
 # Share of the largest eigenvalue up to which a real part of a circulatory system is rounding: the root of rounding.
 GROWING = 1e-7
+
+# --- relative equilibria ---
+# Newton steps at most, and halvings of one.
+MOST_NEWTON, HALVINGS = 60, 12
+# Share of a rotor's angular velocity that may be off its axis of symmetry: axes may be typed.
+ON_AXIS = 1e-9

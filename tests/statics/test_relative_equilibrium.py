@@ -6,8 +6,8 @@ from scipy.optimize import brentq
 
 import tsdyn as ts
 from tests.helpers.hanging_chains import DOWN, G, pendulums
+from tests.helpers.spinning_tops import spinning_top
 from tests.helpers.tolerances import CLOSE, FINE
-from tests.statics.test_steady_motion import spinning_top
 
 C, F, M = ts.constraints, ts.forces, ts.motions
 X, Y, Z = np.eye(3)

@@ -20,7 +20,7 @@ from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import graph_of, redundant_rows
 from .pairwise import derivatives
-from .tolerances import DENSE, LEAST_DIVISOR, REDUNDANT_SHARE, SINGULAR
+from .tolerances import DENSE, LEAST_DIVISOR, REDUNDANT_SHARE, ROUNDED, SINGULAR
 
 
 class Motion:
@@ -136,6 +136,12 @@ class Motion:
         K = (self.derivatives.K - self.derivatives.Q_q).tocoo()
         i, j = K.coords
         return float(np.abs(K.data / self.root[i] / self.root[j]).max(initial=0.0))
+
+    @property
+    def is_balanced(self):
+        """Whether accelerations are rounding of those that balance each other."""
+        loads = max(float(np.abs(load / self.root**2).max(initial=0.0)) for load in (self.Q_A, self.Phi_q.T @ self.lam))
+        return bool(np.abs(self.qdd).max(initial=0.0) <= ROUNDED * loads)
 
     def acceleration_scale(self, size):
         """The acceleration, m/s^2, that others are compared with: of loads, reactions, a spring stretched by size.

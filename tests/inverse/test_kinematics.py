@@ -175,6 +175,13 @@ def test_every_kind_of_driver_at_once():
     np.testing.assert_allclose(found.power, run.power, atol=CLOSE)
 
 
+def test_start_at_a_dead_centre_is_refused():
+    scene = slider_crank()
+    scene.add(C.TranslationMotor.of(scene["rail"], displacement=M.Ramp(0.0, -0.1), name="push"))
+    with pytest.raises(ts.SingularConfiguration, match=r"t = 0 s \(.*push.* dead centre"):
+        scene.kinematics([0.0, 1.0])
+
+
 def test_tables_are_followed_over_their_knots():
     t = np.linspace(0.0, 2.0, 9)
     scene = slider_crank()

@@ -3,13 +3,13 @@
 import numpy as np
 
 from ..configuration.kinetic_metric import Metric, least_step
-from ..errors import InconsistentState, InvalidArgument
+from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
 from ..observables.diagnostics import constraint_rows
 from ..sparse.constraint_graphs import redundant_rows
 from ..statics.coordinates import chosen
 from ..statics.motion import Motion
 from ..statics.variations import Variations
-from .tolerances import CONSISTENT, LISTED, MET, SWEEPS
+from .tolerances import CONSISTENT, DEAD, LISTED, MET, SWEEPS
 
 
 def degrees_of_freedom(packed):
@@ -32,8 +32,9 @@ def demand_driven(packed, memory, t, q, who, remedy):
     )
 
 
-def driven_rates(packed, t, q):
+def driven_rates(scene, t, q, who):
     """The smallest velocities qd (n,), in the metric of kinetic energy, with Phi_q qd + Phi_t = 0."""
+    packed = scene.packed
     metric = Metric(packed, None, t)
     _, Phi_q, Phi_t = metric.arrays(q)
     A, drift = metric.reduced(q, Phi_q[metric.own]), Phi_t[metric.own]
@@ -43,6 +44,13 @@ def driven_rates(packed, t, q):
         if np.abs(left).max() <= MET * (1.0 + np.abs(x).max()):
             break
         x = x + least_step(A, left)
+    left = np.abs(A @ x + drift)
+    if not left.max(initial=0.0) <= DEAD * (1.0 + np.abs(x).max(initial=0.0) + np.abs(drift).max(initial=0.0)):
+        names = [scene.row_names()[metric.own[i]] for i in np.flatnonzero(drift)[:LISTED]]
+        raise SingularConfiguration(
+            f"{who}: no velocities follow the motions at t = {t:g} s ({', '.join(names)}): the mechanism is at a dead "
+            "centre of what drives it, or motions contradict each other. Start elsewhere, or drive another coordinate."
+        )
     return metric.rates(q, x)
 
 

@@ -25,6 +25,8 @@ SLICE = 20000
 # --- velocities of a start, by sparse matrices ---
 # Share of the velocities that may be left of a rate of a constraint; sweeps of refinement, at most.
 MET, SWEEPS = 1e-12, 20
+# The same above which no velocities follow the motions.
+DEAD = 1e-7
 
 # --- messages ---
 # Names in a list, at most.

@@ -30,7 +30,7 @@ class GivenMotion(Solution):
 
     _method = ""  # what it is the result of
 
-    def __init__(self, scene: Scene, wanted: int, kept: Any, followed: Any) -> None:
+    def __init__(self, scene: Scene, wanted: int, kept: Any, followed: Any, message: str = "") -> None:
         span = (float(followed.rows[0, 0]), followed.reached) if len(followed.rows) else (followed.reached,) * 2
         form = SimpleNamespace(name="constraints alone")
         task = SimpleNamespace(prepared=kept, method=None, form=form, span=span, q=followed.last[0])
@@ -42,7 +42,7 @@ class GivenMotion(Solution):
             counts, None, None, 0.0,
         )  # fmt: skip
         super().__init__(scene, task, outcome, {"run": followed.seconds})
-        self._method, self._message = type(self)._method, _account(self, scene, wanted)
+        self._method, self._message = type(self)._method, message or _account(self, scene, wanted)
 
     def at(self, t: ArrayLike) -> NoReturn:
         """Refused: there are no interpolants; ask for the times."""
@@ -83,9 +83,20 @@ def follow(scene, times, state, who, remedy):
     every = np.append(times, t0)
     stops = kept.stops(every.min(), every.max())[:, 0]
     memory = remembered(state, kept, t0, given[0])
-    q, _ = kept.start(scene, (given[0], driven_rates(kept.packed, t0, given[0])), t0, INITIAL_TOL, memory, True)
+    _demand_consistent(scene, kept, given[0], t0)
+    q, _ = kept.start(scene, (given[0], driven_rates(scene, t0, given[0], who)), t0, INITIAL_TOL, memory, True)
     demand_driven(kept.packed, memory[kept.handles.count :], t0, q.copy(), who, remedy)
     return kept, analyse(kept.packed, t0, q, memory, times, stops)
+
+
+def _demand_consistent(scene, kept, q, t):
+    """Refuse positions that violate the constraints, before velocities are looked for."""
+    from ..configuration.kinetic_metric import Metric
+    from ..configuration.start_violations import demand_small
+
+    demand_small(
+        scene, Metric(kept.packed, None, t).arrays(q)[0], INITIAL_TOL * (1.0 + np.abs(q).max()), "position", "Phi"
+    )
 
 
 def _start_time(kept, q, times):

@@ -11,7 +11,7 @@ import numpy as np
 from ..calls import fitting
 from ..errors import InvalidArgument, Status
 from ..validation import finite_times, floats
-from .given_motion import follow
+from .given_motion import GivenMotion, follow
 from .inverse_result import InverseDynamics
 from .scene_cache import prepared
 
@@ -83,7 +83,11 @@ def inverse_dynamics(
 
     started = time.perf_counter()
     given = motion if hasattr(motion, "qdd") else None
-    kept, followed = _of_state(scene, given, t) if given is not None else _of_coordinates(scene, motion, t)
+    message = ""
+    if given is not None:
+        kept, followed = _of_state(scene, given, t)
+    else:
+        kept, followed, message = _of_coordinates(scene, motion, t)
     rows, n = followed.rows, kept.n
     if len(rows):
         start, angles = rows[0, 1 : 1 + n].copy(), kept.handles.count
@@ -92,11 +96,11 @@ def inverse_dynamics(
     every = actuators_of(scene, kept.handles, actuators, rows[:, 1 : 1 + n].copy())
     wanted = np.size(given.t) if t is None else np.size(t)
     followed = followed._replace(seconds=time.perf_counter() - started)
-    return InverseDynamics(scene, wanted, kept, followed, every)
+    return InverseDynamics(scene, wanted, kept, followed, every, message)
 
 
 def _of_coordinates(scene, motion, t):
-    """A scene's motion by those of some coordinates."""
+    """A scene's motion by those of some coordinates, and what there is to say of it."""
     from ..inverse.drivers import drive, driven_copy, way_to_start
 
     copied, driven = driven_copy(scene, motion)
@@ -110,8 +114,9 @@ def _of_coordinates(scene, motion, t):
     drive(copied, driven)
     if way is not None and state is None:
         copied.assemble(t=float(times[0]))
-    _, followed = follow(copied, times, state, WHO, REMEDY)
-    return kept, followed
+    driving, followed = follow(copied, times, state, WHO, REMEDY)
+    message = "" if followed.status is Status.SUCCESS else GivenMotion(copied, times.size, driving, followed).message
+    return kept, followed, message
 
 
 def _at_start(scene, copied, way, t):
@@ -126,8 +131,6 @@ def _at_start(scene, copied, way, t):
             f"{WHO}: the scene can't be moved from its poses to the start of the motion: {found.reached:.0%} of the "
             "way is possible. Place the bodies nearer to it, by scene.set or scene.assemble."
         )
-    from .given_motion import GivenMotion
-
     state = GivenMotion(copied, 2, kept, found).state
     for driver in way:
         copied.remove(driver)

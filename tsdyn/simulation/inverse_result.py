@@ -37,10 +37,10 @@ class InverseDynamics(Drawn, GivenMotion):
 
     _method = "inverse dynamics"
 
-    def __init__(self, scene: Scene, wanted: int, kept: Any, followed: Any, every: Any) -> None:
+    def __init__(self, scene: Scene, wanted: int, kept: Any, followed: Any, every: Any, message: str = "") -> None:
         from ..inverse.loads import demand_produced, find_loads  # imported here: a run needs none of it
 
-        super().__init__(scene, wanted, kept, followed)
+        super().__init__(scene, wanted, kept, followed, message)
         started = time.perf_counter()
         found = find_loads(self.packed, self.t, self.q, self.qd, self.qdd, self._remembers, every)
         self.residual: Floats = demand_produced(self, every, found)

@@ -7,7 +7,7 @@ shows what of a candidate is left when those taken before it are held.
 import numpy as np
 
 from ..errors import SingularConfiguration
-from .tolerances import CLEAR, IN_TURN, INDEPENDENT
+from .tolerances import CLEAR, HELD, IN_TURN, INDEPENDENT
 from .variations import stacked
 
 
@@ -57,6 +57,7 @@ def _independent(motion, every, given, k, size):
     W = motion.solve(Z.T, np.zeros((motion.kept.size, len(every))))[0]
     left = Z @ W
     own = np.maximum(np.diagonal(left).copy(), 0.0)
+    own[own <= HELD * (Z / motion.root**2 * Z).sum(axis=1)] = 0.0  # the constraints hold it
     remaining, taken = own.copy(), []
 
     def take(i):

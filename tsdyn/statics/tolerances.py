@@ -18,6 +18,8 @@ IN_TURN = 0.1
 # Share of a coordinate's own variation that the ones before it must leave: squares, as pivots of a Gram matrix are,
 # of which rounding leaves 1e-15.
 INDEPENDENT = 1e-9
+# Share of a coordinate's variation without constraints that is rounding: squares again, of sums of a few roundings.
+HELD = 1e-13
 # Share of the largest pivot of constraints and coordinates, unit rows, above which the coordinates are independent.
 CLEAR = 1e-6
 

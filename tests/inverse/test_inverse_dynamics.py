@@ -308,6 +308,19 @@ def test_actuator_beside_a_motor_is_refused():
     np.testing.assert_allclose(found.load("elbow"), arm_torques(found.t, found.t, 1.0, 1.0, 0.0, 0.0)[1], atol=HELD)
 
 
+def test_sampled_loads_are_replaced_as_actuators_and_refused_beside_them():
+    scene = arm()
+    for name in ("shoulder", "elbow"):
+        law = {"function": lambda t, angle, rate: 1.0, "period": 0.1}
+        scene.add(F.JointTorque(scene[name], **law, name=f"servo of {name}"))
+    found = scene.inverse_dynamics(SWING, ["servo of shoulder", "servo of elbow"], [0.0, 0.2])
+    plain = arm().inverse_dynamics(SWING, ["shoulder", "elbow"], [0.0, 0.2])
+    np.testing.assert_allclose(found.load("servo of elbow"), plain.load("elbow"), atol=HELD)
+    np.testing.assert_allclose(found.power, plain.power, atol=HELD)
+    with pytest.raises(ts.InvalidForce, match="servo of elbow: a sampled load"):
+        scene.inverse_dynamics(SWING, ["servo of shoulder", "elbow"], [0.0, 0.2])
+
+
 def test_times_of_a_solution():
     scene, _ = cart_pole()
     run = ts.simulate(scene, (0.0, 0.5), dense_output=True)

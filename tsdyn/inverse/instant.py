@@ -19,7 +19,8 @@ from .tolerances import DELTA, LEAST_DIVISOR, REFINEMENTS, SOLVED
 class Instant:
     """The equations of one instant."""
 
-    def __init__(self, system, q, Phi_q, kept, B):
+    def __init__(self, system, at, Phi_q, kept, B):
+        self.t, q = self.at = at
         self.Phi_q, self.kept, self.B, self.H = Phi_q, kept, B, Phi_q[kept]
         self.system, self.q, self.root = system, q, roots_of_masses(system, q.size)
         self.carried, self.u, self._factors = np.zeros(q.size), None, {}
@@ -39,13 +40,14 @@ class Instant:
                 lam[self.kept], self.u = x[n : n + m], x[n + m :]
                 return np.concatenate((x[:n], lam))
         raise SingularConfiguration(
-            "inverse_dynamics: Phi_q has lost rank at an instant of the motion: a singular configuration."
+            f"inverse_dynamics: Phi_q has lost rank at t = {self.t:g} s, a singular configuration, where loads are not "
+            "determined. Leave this time out."
         )
 
     def effect(self, j):
         """Accelerations by a unit load under the constraints, over those without them."""
         b = self.B[:, [j]] if isinstance(self.B, np.ndarray) else self.B[:, [j]].toarray()
-        solve = Instant(self.system, self.q, self.Phi_q, self.kept, self.B[:, :0])._factorised(1.0)
+        solve = Instant(self.system, self.at, self.Phi_q, self.kept, self.B[:, :0])._factorised(1.0)
         if solve is None:
             return 1.0
         gains, alone = solve(b[:, 0])[: self.q.size] * self.root, b[:, 0] / self.root

@@ -69,7 +69,7 @@ def find_loads(packed, t, q, qd, qdd, memory, actuators):
         Phi_q = constraint_arrays(system, q[i], qd[i], t[i], WIDTH if sparse else None)[1]
         B = (_sparse if sparse else _dense)(actuators, i, q.shape[1])
         Phi_q = as_csr(packed, Phi_q) if sparse else Phi_q
-        instant = Instant(packed.system, q[i], Phi_q, np.flatnonzero(kept[i]), B)
+        instant = Instant(packed.system, (t[i], q[i]), Phi_q, np.flatnonzero(kept[i]), B)
         load = d[i] - inertia[i]
         if frictions:
             friction, found.normals[i] = _friction(packed, t[i], q[i], qd[i], instant, load)

@@ -48,6 +48,12 @@ class GivenMotion(Solution):
         """Refused: there are no interpolants; ask for the times."""
         raise InvalidArgument(f"a result of {self._method} has no interpolants: ask for these times in the call.")
 
+    def _integrated(self, part):
+        raise InvalidArgument(
+            f"work is integrated over dense output, which a result of {self._method} has none of: integrate "
+            "`.power` or `.power_of(item)` over its times, by scipy.integrate.simpson for one."
+        )
+
     def _facts(self):
         s = self.stats
         facts = {"ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self.t.size, 'output')}"}
@@ -74,10 +80,8 @@ def follow(scene, times, state, who, remedy):
     """Follow the branch of a scene without freedom to times (k,); its `Prepared`, and how far it came, a `Followed`."""
     from ..inverse.analysis import analyse  # imported here: a run needs none of it
     from ..inverse.freedom import demand_driven, driven_rates
-    from ..statics.smoothness import demand_continuous
 
     kept = prepared(scene)
-    demand_continuous(kept.packed)
     given = scene._initial() if state is None else state_arrays(state, kept.n)
     t0 = _start_time(kept, given[0], times) if state is None else float(state.t)
     every = np.append(times, t0)

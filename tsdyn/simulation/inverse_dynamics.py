@@ -80,6 +80,7 @@ def inverse_dynamics(
     [0.  6.7] N m
     """
     from ..inverse.actuators import actuators_of  # imported here: a run needs none of it
+    from ..statics.smoothness import demand_continuous
 
     started = time.perf_counter()
     given = motion if hasattr(motion, "qdd") else None
@@ -94,6 +95,7 @@ def inverse_dynamics(
         memory = rows[0, 1 + 3 * n : 1 + 3 * n + angles + kept.packed.system.memory.size].copy()
         kept.start(scene, (start, rows[0, 1 + n : 1 + 2 * n].copy()), float(rows[0, 0]), CONSISTENT, memory, True)
     every = actuators_of(scene, kept.handles, actuators, rows[:, 1 : 1 + n].copy())
+    demand_continuous(kept.packed, [one.item for one in every])
     wanted = np.size(given.t) if t is None else np.size(t)
     followed = followed._replace(seconds=time.perf_counter() - started)
     return InverseDynamics(scene, wanted, kept, followed, every, message)

@@ -85,5 +85,8 @@ def kinematics(scene: Scene, t: ArrayLike, state: State | None = None) -> Kinema
     >>> turn.acceleration(slider)[:, 0].round(3)
     array([-1.2  ,  0.462,  0.4  ,  0.462, -1.2  ])
     """
+    from ..statics.smoothness import demand_continuous  # imported here: a run needs none of it
+
     times = finite_times(t, "t")
+    demand_continuous(scene.packed)
     return KinematicAnalysis(scene, times.size, *follow(scene, times, state, "kinematics", REMEDY))

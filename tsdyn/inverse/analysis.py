@@ -87,6 +87,8 @@ def _branch(packed, q, remembered):
 
 def _with_stops(t0, times, stops):
     """Times with the stops between them, in the order of the way, and which of them were asked for."""
+    if not stops.size:
+        return np.ascontiguousarray(times), np.ones(times.size, bool)
     every, asked = [], []
     for start, end in zip([t0, *times[:-1].tolist()], times.tolist(), strict=True):
         between = stops[(stops > min(start, end)) & (stops < max(start, end))]

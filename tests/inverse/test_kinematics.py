@@ -205,7 +205,7 @@ def test_result_is_a_solution():
     assert found[1:3].t.size == 2
     with pytest.raises(ts.InvalidArgument, match="no interpolants"):
         found.at(0.5)
-    with pytest.raises(ts.InvalidArgument, match="integrate `.power`"):
+    with pytest.raises(ts.InvalidArgument, match=r"integrate `\.power`"):
         found.work_of("motor")
     run = ts.simulate(scene, (1.0, 1.1), state=found.state)
     assert run.angle("hinge")[-1] == pytest.approx(RATE * 1.1, abs=CLOSE)

@@ -148,6 +148,13 @@ def test_slider_on_a_rotor_stretches_its_spring():
         scene.equilibrium()
 
 
+def test_reactions_are_of_constraints_and_forces():
+    found = pendulums([0.0]).equilibrium()
+    for wrong in (None, 3.0, found.state.handles.bodies[0], np.zeros(3)):
+        with pytest.raises(ts.InvalidConstraint, match="is not a constraint or force"):
+            found.reaction(wrong)
+
+
 def test_what_has_no_steady_motion():
     scene = ts.Scene(gravity=DOWN)
     scene.add_point_mass(1.0, (1, 0, 0), name="stone")

@@ -18,6 +18,7 @@ from ..forces.torque import Torque
 from ..motions.signals import Signal
 from ..statics.ports import AXES, item_of
 from ..statics.variations import named_coordinates
+from ..validation import sequence
 from .unit_loads import UnitLoads
 
 NEWTON, NEWTON_METRE = "N", "N m"
@@ -39,8 +40,7 @@ class Actuator(NamedTuple):
 
 def actuators_of(scene, handles, given, q):
     """The `Actuator`s of handles and names along q (k, n); what has no load to give is refused."""
-    if isinstance(given, (str, Force)) or not hasattr(given, "__iter__"):
-        raise InvalidArgument(f"actuators must be a sequence of handles or names, such as [motor], got {given!r}.")
+    given = sequence(given, "actuators must be a sequence of handles or names, such as [motor]", InvalidArgument)
     units, coordinates, found = UnitLoads(handles, q), named_coordinates(handles), []
     constraints = [row.item for row in handles.rows if not isinstance(row.item, Force)]
     by_name = {name: (item, geometry) for item in constraints for name, geometry in coordinates[id(item)]}

@@ -118,7 +118,8 @@ class InverseDynamics(Drawn, GivenMotion):
 
     def _of(self, item, required=False):
         """The actuators of a handle or a name; with `required` there is one."""
-        found = [one for one in self._every if one.item is item or item in (one.name, one.item.name)]
+        name = item if isinstance(item, str) else None
+        found = [one for one in self._every if one.item is item or name in (one.name, one.item.name)]
         if not found and required:
             raise unknown_name("actuator", item, self.actuators)
         return found

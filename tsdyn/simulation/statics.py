@@ -197,7 +197,7 @@ def equilibrium(
 
 def _field(packed, spin, about, rotors):
     """The `SteadyField` of a spin; None without one."""
-    if spin is None and not rotors:
+    if spin is None and rotors is None:
         return None
     from ..statics.steady_field import SteadyField, rotors_of
 

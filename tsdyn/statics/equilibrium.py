@@ -69,12 +69,12 @@ class Equilibrium:
         """Force (3,), N, and torque (3,), N m, of a constraint, joint or force, as `Solution.reaction` defines them."""
         handles = self.state.handles
         item = handles.item(item)
-        body = item.on if on is None else handles.body(on)
-        if body not in (item.a, item.b):
-            raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
         load, member = reactions.loads_of(self.packed).get(id(item)), member_of(self.packed, item)
         if load is None and member is None:
             raise InvalidConstraint(f"{item!r} is not a constraint or force of this scene.")
+        body = item.on if on is None else handles.body(on)
+        if body not in (item.a, item.b):
+            raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
         found = reactions.reaction(self, member, body) if load is None else reactions.force_reaction(self, load, body)
         return found[0][0], found[1][0]
 

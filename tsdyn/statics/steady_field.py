@@ -5,6 +5,8 @@
 They are linear in the coordinates, qd = D (q - c) and qdd = D D (q - c), since pd = (Omega o p + p o s) / 2.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..elements.bodies import Body
@@ -55,6 +57,10 @@ class SteadyField:
 def rotors_of(packed, given):
     """Angular velocities (3,) of rotors, body frame, by body; a number is about the axis of symmetry."""
     found = {}
+    if not (given is None or isinstance(given, Mapping)):
+        raise InvalidArgument(
+            f"rotors must be a dict of bodies and their rates, such as {{top: 150.0}}, got {given!r}."
+        )
     for key, rate in (given or {}).items():
         body = named(packed.bodies, key, "body", InvalidBody) if isinstance(key, str) else key
         if not any(body is one for one in packed.bodies) or not isinstance(body, Body):

@@ -198,7 +198,7 @@ def test_tables_are_followed_over_their_knots():
         scene.kinematics([0.0, 3.0])
 
 
-def test_result_is_a_solution():
+def test_result_is_a_solution(tmp_path):
     scene = slider_crank(rate=RATE)
     found = scene.kinematics(np.linspace(0.0, 1.0, 5))
     assert repr(found) == f"<KinematicAnalysis: success at t = 1 s: 5 outputs, {found.stats.steps} steps>"
@@ -207,6 +207,10 @@ def test_result_is_a_solution():
     again = pickle.loads(pickle.dumps(found))
     np.testing.assert_array_equal(again.reaction("motor")[1], found.reaction("motor")[1])
     assert found[1:3].t.size == 2
+    pytest.importorskip("h5py")
+    loaded = ts.load(found.save(tmp_path / "turn.h5"), scene=scene)
+    np.testing.assert_array_equal(loaded.reaction("motor")[1], found.reaction("motor")[1])
+    assert "Solution" in str(loaded)
     with pytest.raises(ts.InvalidArgument, match="no interpolants"):
         found.at(0.5)
     with pytest.raises(ts.InvalidArgument, match=r"integrate `\.power`"):

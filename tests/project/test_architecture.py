@@ -49,6 +49,7 @@ ORDER = [
     "figures",
     "ahead",
     "storage",
+    "files",
     "simulation",
     "benchmarking",
     "profiling",

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..hints import ArrayLike, Scene
 
 INITIAL_TOL = 1e-9  # of residuals of a start, as in `simulate`
-NO_COUNTS = ("charts", "evaluations", "steps_near_singular", "stiff")
+NO_COUNTS = ("charts", "evaluations", "placements", "steps_near_singular", "stiff")
 
 
 @fitting_methods
@@ -41,7 +41,7 @@ class GivenMotion(Solution):
             followed.status, "", followed.rows, None, None, followed.reached, followed.last, followed.remembered,
             counts, None, None, 0.0,
         )  # fmt: skip
-        super().__init__(scene, task, outcome, {"run": followed.seconds})
+        super().__init__(scene, task, outcome, {"prepare": 0.0, "run": followed.seconds})
         self._method, self._message = type(self)._method, message or _account(self, scene, wanted)
 
     def at(self, t: ArrayLike) -> NoReturn:

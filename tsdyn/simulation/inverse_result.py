@@ -47,7 +47,7 @@ class InverseDynamics(Drawn, GivenMotion):
         self.actuators: tuple[str, ...] = tuple(one.name for one in every)
         self.units: dict[str, str] = {one.name: one.unit for one in every}
         self.loads: dict[str, Floats] = {one.name: u for one, u in zip(every, found.u.T, strict=True)}
-        self._seconds = {"run": followed.seconds + time.perf_counter() - started}
+        self._seconds = {"prepare": 0.0, "run": followed.seconds + time.perf_counter() - started}
         self._every, self.multipliers, self._normals = every, found.multipliers, found.normals
 
     def __getitem__(self, part: slice) -> Self:

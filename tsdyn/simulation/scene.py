@@ -31,6 +31,7 @@ from .editing import copy as _copy
 from .editing import remove as _remove
 from .inverse_dynamics import inverse_dynamics as _inverse_dynamics
 from .kinematics import kinematics as _kinematics
+from .scene_saving import save as _save
 from .scene_table import table
 from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
@@ -353,6 +354,7 @@ class Scene:
     set = set_joint
     remove = _remove
     copy = _copy
+    save = _save
     __copy__ = _copy
 
     def _repr_html_(self) -> str:

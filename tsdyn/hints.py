@@ -31,6 +31,8 @@ from .observables.kinematics import Kinematics
 from .observables.state import RememberingState, State
 from .profiling.phases import Phase
 from .profiling.report import Profile
+from .simulation.inverse_result import InverseDynamics
+from .simulation.kinematics import KinematicAnalysis
 from .simulation.scene import Scene
 from .simulation.solution import Charts, Solution, Steps
 from .statics.equilibrium import Equilibrium
@@ -67,6 +69,7 @@ TimeFunction: TypeAlias = Callable[[float], float]
 Data: TypeAlias = Table | Callable[[Any], Any] | tuple[ArrayLike, ArrayLike]  # callable: a spline of SciPy's
 Prescribed: TypeAlias = float | Motion | Data | Sequence[TimeFunction]  # one of ts.motions is callable
 Path: TypeAlias = Sequence[Prescribed] | Data | Floats
+GivenMotions: TypeAlias = Mapping[Any, Prescribed | Path] | Solution | State  # of coordinates, or of the whole scene
 Load: TypeAlias = float | Table | Callable[[Any], Any]
 VectorLoad: TypeAlias = ArrayLike | Table | Callable[..., Any]  # a function of t, or of t and state
 JointLaw: TypeAlias = Callable[[float, float, float], float]
@@ -152,15 +155,18 @@ __all__ = [
     "Formulation",
     "Frame",
     "Function",
+    "GivenMotions",
     "Ground",
     "Handles",
     "Integers",
     "Integrator",
+    "InverseDynamics",
     "Item",
     "ItemLike",
     "Joint",
     "JointLaw",
     "JointLoads",
+    "KinematicAnalysis",
     "Kinematics",
     "Linearisation",
     "Load",

@@ -45,6 +45,7 @@ ORDER = [
     "taylor",
     "configuration",
     "statics",
+    "inverse",
     "figures",
     "ahead",
     "storage",

@@ -67,7 +67,7 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
 
     if suffix not in SUFFIXES:
         raise InvalidArgument(f"load reads files that end in {READS}, got {str(path)!r}.")
-    return load_solution(path, scene, allow_code, Solution)
+    return load_solution(path, scene, allow_code, (Scene, Solution))
 
 
 def scene_file(path: Place, allow_code: bool = False) -> tuple[Scene, dict[str, Any]]:

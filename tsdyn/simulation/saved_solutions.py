@@ -14,13 +14,12 @@ from .._version import __version__
 from ..errors import InvalidArgument, InvalidFile, Status, StorageError, TsdynError
 from ..files import scene_text
 from ..jit.cache import machine
-from .scene import Scene
 from .scene_cache import prepared
 from .stored_runs import demand_path, hash_of
 from .trajectory_records import derived_record, record_of, take_derived, trajectory_of
 
 if TYPE_CHECKING:
-    from ..hints import Place, Solution
+    from ..hints import Place, Scene, Solution
 
 LOGS = {"steps": "_step_log", "charts": "_chart_log"}
 SETTINGS = ("rtol", "atol", "step", "max_step")
@@ -113,7 +112,9 @@ def _content(solution):
             raise InvalidArgument(f"the dense output can't be saved: {error}. Save a run without it.") from error
         arrays |= {f"dense_{name}": array for name, array in found.items()}
     try:
-        arrays["scene"] = np.frombuffer(scene_text.write(_scene_as_run(solution), Scene).encode(), np.uint8)
+        arrays["scene"] = np.frombuffer(
+            scene_text.write(_scene_as_run(solution), type(solution.scene)).encode(), np.uint8
+        )
     except InvalidArgument as error:
         numbers["lacks"] = str(error)
     return numbers, arrays
@@ -130,29 +131,29 @@ def _plain(value):
     return value.item() if isinstance(value, np.generic) else value
 
 
-def load(path: Place, scene: Scene | None, allow_code: bool, kind: type[Solution]) -> Solution:
-    """Return the solution of a file; arguments as of `ts.load`, `kind` is `Solution`."""
+def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[type[Scene], type[Solution]]) -> Solution:
+    """Return the solution of a file; arguments as of `ts.load`, and the classes `Scene` and `Solution`."""
     from ..storage import saved_file
 
     path = Path(path).absolute()
     record, arrays = saved_file.read(path)
     try:
-        scene = _scene(path, record, arrays, scene, allow_code)
+        scene = _scene(path, record, arrays, scene, allow_code, kinds[0])
         packed = scene.packed
         if hash_of(packed) != record["provenance"]["scene"]:
             raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
         take_derived(packed, record["derived"])
-        return _solution(path, record, arrays, scene, kind)
+        return _solution(path, record, arrays, scene, kinds[1])
     except TsdynError:
         raise
     except (KeyError, ValueError, IndexError, TypeError, AttributeError) as error:
         raise StorageError(f"{path} is damaged, or lacks something: {type(error).__name__}: {error}.") from error
 
 
-def _scene(path, record, arrays, scene, allow_code):
+def _scene(path, record, arrays, scene, allow_code, kind):
     """The scene that a solution is of."""
     if scene is not None:
-        if not isinstance(scene, Scene):
+        if not isinstance(scene, kind):
             raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
         return scene
     if "scene" not in arrays:
@@ -161,7 +162,7 @@ def _scene(path, record, arrays, scene, allow_code):
             f"ts.load({str(path)!r}, scene=scene)."
         )
     try:
-        return scene_text.read(arrays["scene"].tobytes().decode(), "its scene", Scene, None, allow_code)[0]
+        return scene_text.read(arrays["scene"].tobytes().decode(), "its scene", kind, None, allow_code)[0]
     except InvalidFile as error:
         raise StorageError(
             f"{path}: {error}\nImport the modules of its classes before, or pass the scene: ts.load(path, scene=scene)."

@@ -29,6 +29,8 @@ from ..validation import counted, demand_known, label, vector3
 from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
 from .editing import remove as _remove
+from .inverse_dynamics import inverse_dynamics as _inverse_dynamics
+from .kinematics import kinematics as _kinematics
 from .scene_saving import save as _save
 from .scene_table import table
 from .statics import equilibrium as _equilibrium
@@ -347,6 +349,8 @@ class Scene:
     mobility = _mobility
     linearise = _linearise
     equilibrium = _equilibrium
+    kinematics = _kinematics
+    inverse_dynamics = _inverse_dynamics
     set = set_joint
     remove = _remove
     copy = _copy

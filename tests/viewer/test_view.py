@@ -1,5 +1,6 @@
 """The page of an animation: its poses and loads are those of the run, and it needs nothing from outside."""
 
+import subprocess
 import sys
 import webbrowser
 from pathlib import Path
@@ -14,6 +15,7 @@ from tests.helpers.pages import Tags, array, decoded, place
 from tsdyn.viewer.run_data import FRAMES
 
 C, S = ts.constraints, ts.shapes
+ROOT = Path(__file__).parents[2]
 SEEN = 2e-4  # of a length or a unit vector: less than a pixel
 
 
@@ -215,6 +217,16 @@ def test_wrong_shapes_and_paths_are_refused(run, tmp_path):
     with pytest.raises(ts.InvalidCall, match="did you mean shapes"):
         run.view(shape={})
     assert not list(tmp_path.iterdir())
+
+
+def test_a_run_loads_nothing_that_draws():
+    code = "import sys; from examples import top; top.ts.simulate(top.build(), (0.0, 0.1)); print(*sys.modules)"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    modules = result.stdout.split()
+    assert "tsdyn.simulation.simulate" in modules
+    assert not [
+        name for name in modules if name.startswith(("tsdyn.viewer", "tsdyn.figures", "matplotlib", "webbrowser"))
+    ]
 
 
 @pytest.mark.parametrize("display", [True, False])

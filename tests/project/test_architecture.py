@@ -48,6 +48,7 @@ ORDER = [
     "figures",
     "ahead",
     "storage",
+    "files",
     "simulation",
     "benchmarking",
     "profiling",

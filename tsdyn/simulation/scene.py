@@ -29,6 +29,7 @@ from ..validation import counted, demand_known, label, vector3
 from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
 from .editing import remove as _remove
+from .scene_saving import save as _save
 from .scene_table import table
 from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
@@ -349,6 +350,7 @@ class Scene:
     set = set_joint
     remove = _remove
     copy = _copy
+    save = _save
     __copy__ = _copy
 
     def _repr_html_(self) -> str:

@@ -119,7 +119,7 @@ def view(solution, **options):
     from tsdyn.viewer.run_data import run_data
     from tsdyn.viewer.view import page_of
 
-    return page_of(run_data(solution, options.get("shapes")))
+    return page_of(run_data(solution, **options))
 
 
 @pytest.mark.parametrize(
@@ -159,6 +159,14 @@ def test_shapes_of_the_user_are_drawn():
     assert stone["colour"] == "#336699"
     np.testing.assert_allclose(array(data.meshes[0]["vertices"], "<f4").reshape(-1, 3), 2.0 * np.array(vertices))
     np.testing.assert_array_equal(array(data.meshes[0]["faces"], "<u4").reshape(-1, 3), faces)
+
+
+def test_trails_are_of_bodies_and_of_points():
+    solution = ts.simulate(chain(12), (0.0, 0.1))
+    assert [trail["body"] for trail in decoded(view(solution)).trails] == [0, 1, 3, 4, 6, 7, 9, 11]
+    found = decoded(view(solution, trails=["body2", (solution.scene.bodies[11], (0.1, 0, 0))])).trails
+    assert found == [{"body": 1, "point": [0.0, 0.0, 0.0]}, {"body": 11, "point": [0.1, 0.0, 0.0]}]
+    assert decoded(view(solution, trails=[])).trails == []
 
 
 def test_fifty_bodies_fit_into_three_megabytes():
@@ -212,6 +220,12 @@ def test_wrong_shapes_and_paths_are_refused(run, tmp_path):
         run.view(tmp_path / "a", shapes={"crank": "box"})
     with pytest.raises(ts.InvalidArgument, match="dictionary"):
         run.view(tmp_path / "a", shapes=S.Sphere(1.0))
+    with pytest.raises(ts.InvalidBody, match="did you mean 'crank'"):
+        run.view(tmp_path / "a", trails=["crnk"])
+    with pytest.raises(ts.InvalidArgument, match="trail of 'crank': point"):
+        run.view(tmp_path / "a", trails=[("crank", (1, 2))])
+    with pytest.raises(ts.InvalidArgument, match="trails"):
+        run.view(tmp_path / "a", trails=7)
     with pytest.raises(ts.InvalidArgument, match="can't be written"):
         run.view(tmp_path / "nowhere" / "a.html")
     with pytest.raises(ts.InvalidCall, match="did you mean shapes"):

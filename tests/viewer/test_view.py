@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from examples import door, four_bar
@@ -142,6 +143,16 @@ def test_the_shape_of_a_free_body_follows_from_its_inertia(shape, kind, size):
     np.testing.assert_allclose(np.sort(np.linalg.norm(columns[:3], axis=1)), np.sort(size), rtol=1e-4)
     if kind == "cylinder":
         assert abs(columns[2, 0 if size[0] < 0.5 else 1]) == pytest.approx(size[2], rel=1e-4)
+
+
+def test_a_rod_in_any_direction_is_thin():
+    turned = S.rod(2.0, axis="x", mass=3.0).rotated(Rotation.from_rotvec((0.3, 1.1, -0.7)))
+    scene = ts.Scene(gravity=(0, 0, 0))
+    rod = scene.add_body(**turned, angular_velocity=(0, 0, 0))
+    scene.add(C.Fixed.at(scene.ground, rod, point=(0, 0, 0)))
+    part = decoded(view(ts.simulate(scene, (0.0, 0.1)))).parts[0]
+    lengths = np.linalg.norm(np.reshape(part["matrix"], (4, 3))[:3], axis=1)
+    np.testing.assert_allclose(lengths, (0.04, 0.04, 2.0), rtol=1e-4)
 
 
 def test_shapes_of_the_user_are_drawn():

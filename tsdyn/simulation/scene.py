@@ -30,6 +30,7 @@ from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
 from .editing import remove as _remove
 from .scene_saving import save as _save
+from .scene_table import table
 from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
 
@@ -351,6 +352,10 @@ class Scene:
     copy = _copy
     save = _save
     __copy__ = _copy
+
+    def _repr_html_(self) -> str:
+        """Return bodies, constraints and forces as a table, for notebooks."""
+        return table(self)
 
     def __repr__(self) -> str:
         rows = sum(constraint.rows for constraint in self.constraints)

@@ -24,6 +24,7 @@ from .balances import Balances
 from .conservation import energy_error
 from .outputs import Outputs
 from .records import Records
+from .showing import Showing
 from .termination import account
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class Charts(NamedTuple):
 
 
 @fitting_methods
-class Solution(Outputs, Balances, Records, Kinematics["Floats"]):
+class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
     """The result of `simulate`; k outputs, n coordinates, m constraint rows.
 
     Attributes

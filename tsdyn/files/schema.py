@@ -95,7 +95,10 @@ def _body(name, method):
 
 
 def _items(classes):
-    return {"type": "array", "items": {"oneOf": [_item(*pair) for pair in classes.items() if _is_published(*pair)]}}
+    """The schema of constraints or forces: one of the built-in classes, or a plug-in by its full name."""
+    known = [_item(*pair) for pair in classes.items() if _is_published(*pair)]
+    plug_in = {"type": "object", "required": ["type"], "properties": {"type": {"type": "string", "pattern": "[.]"}}}
+    return {"type": "array", "items": {"oneOf": [*known, plug_in]}}
 
 
 def _is_published(name, cls):

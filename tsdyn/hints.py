@@ -29,6 +29,7 @@ from .observables.diagnostics import ConstraintError
 from .observables.evaluate import Evaluation
 from .observables.kinematics import Kinematics
 from .observables.state import RememberingState, State
+from .parameters.listing import ParameterList
 from .profiling.phases import Phase
 from .profiling.report import Profile
 from .simulation.scene import Scene
@@ -171,6 +172,7 @@ __all__ = [
     "Motion",
     "Orientation",
     "Packed",
+    "ParameterList",
     "Path",
     "Phase",
     "PointMass",

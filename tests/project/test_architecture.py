@@ -46,6 +46,7 @@ ORDER = [
     "statics",
     "ahead",
     "storage",
+    "parameters",
     "simulation",
     "benchmarking",
     "profiling",

@@ -1,6 +1,7 @@
 """Handles of a packed scene: bodies, constraints, forces, their coordinates, and the angles that runs count."""
 
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -36,6 +37,8 @@ class Handles:
         Where the coordinates of the own and of the other body begin, and how many they are.
     frames : ndarray (count, 9)
         f, g and h of each angle.
+    aliases : WeakKeyDictionary
+        Handles of other scenes of the family, and what they stand for here.
     """
 
     def __init__(self, packed):
@@ -45,7 +48,7 @@ class Handles:
         constraints = [each for each in constraints if not getattr(each, "normalises", False)]
         self.items = (*constraints, *(load.force for load in packed.loads))
         self._where = {body: tuple(place) for body, place in zip(self.bodies, places, strict=True)}
-        self._by_item = None
+        self._by_item, self.aliases = None, WeakKeyDictionary()
         rows, joints, frames = [], [], []
         for item in self.items:
             if item.joint_coordinates:
@@ -60,7 +63,10 @@ class Handles:
 
     def __getstate__(self):
         """An item is another object where this is unpickled."""
-        return {**self.__dict__, "_by_item": None}
+        return {**self.__dict__, "_by_item": None, "aliases": None}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state, aliases=WeakKeyDictionary())
 
     def where(self, body):
         """Where the coordinates of a body begin, and how many they are; (0, 0) for the ground."""
@@ -70,13 +76,20 @@ class Handles:
         """A body of the scene, by handle or name."""
         if isinstance(body, str):
             return named(self.bodies, body, "body", InvalidBody)
+        body = self.own(body)
         if not isinstance(body, PointMass) or body not in self._where:
             raise InvalidBody(f"{body!r} is not a body of this solution's scene.")
         return body
 
     def item(self, item):
         """A constraint or force of the scene, by name; a handle as it is."""
-        return named(self.items, item, "constraint or force", InvalidConstraint) if isinstance(item, str) else item
+        if isinstance(item, str):
+            return named(self.items, item, "constraint or force", InvalidConstraint)
+        return self.own(item)
+
+    def own(self, handle):
+        """A handle of this scene in place of one of another scene of the family."""
+        return self.aliases.get(handle, handle) if isinstance(handle, (PointMass, Attachment)) else handle
 
     def row(self, joint, kind):
         """The `Row` of a joint that has some of a kind of coordinates: "angle" or "displacement"."""

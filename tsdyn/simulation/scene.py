@@ -21,6 +21,7 @@ from ..elements.names import named
 from ..elements.primitive import Primitive
 from ..errors import InvalidArgument, InvalidBody, InvalidConstraint
 from ..jit.cache import deep_hash
+from ..model.handles import handles_of
 from ..model.packed import pack, user_functions
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
@@ -31,6 +32,9 @@ from .editing import copy as _copy
 from .editing import remove as _remove
 from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
+from .variants import HANDLES, make_handles
+from .variants import parameters as _parameters
+from .variants import with_parameters as _with_parameters
 
 if TYPE_CHECKING:
     from ..hints import AnyBody, ArrayLike, Floats, Item, Orientation, Packed, System
@@ -85,6 +89,7 @@ class Scene:
         self._users = None  # of compiled functions; what holds them, see `user_functions`
         self._names = None  # of ground and bodies; None if a body may have been renamed
         self._twins = None  # handle of the scene that this one is a copy of -> handle here
+        self._aliases = None  # the same, where solutions may be asked by it; see variants.py
         self.gravity = gravity
 
     ground: AnyBody
@@ -93,6 +98,13 @@ class Scene:
         """Set an existing attribute; refuse a misspelt one."""
         demand_known(self, name, ("ground",))
         super().__setattr__(name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        """Make the handles of a scene that `with_parameters` has returned."""
+        if name not in HANDLES or "_later" not in self.__dict__:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        make_handles(self)
+        return self.__dict__[name]
 
     @property
     def gravity(self) -> Floats:
@@ -267,7 +279,8 @@ class Scene:
 
     def __getstate__(self):
         """Leave out the packed scene, which holds addresses of this process."""
-        gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins"))
+        _ = self._bodies  # made, if they weren't
+        gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins", "_aliases"))
         return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
 
     def touch(self) -> None:
@@ -277,10 +290,12 @@ class Scene:
     @property
     def packed(self) -> Packed:
         """The scene as a `Packed`; packed anew only after a change."""
-        if not self._bodies:
-            raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
         if self._packed is None:
+            if not self._bodies:
+                raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
             self._packed = pack(self)
+            if self._aliases:
+                handles_of(self._packed).aliases.update(self._aliases)
             self._users = list(user_functions(self._packed))
             self._functions = _marks(self._users)
         return self._packed
@@ -319,6 +334,7 @@ class Scene:
         """The body, constraint or force of a name, or, in a copy, the counterpart of a handle of the original."""
         if isinstance(item, str):
             return named([self.ground, *self._bodies, *self.constraints, *self._forces], item, WHAT)
+        _ = self._bodies  # made, if they weren't
         known = isinstance(item, (PointMass, Ground, Primitive, Joint, Force))
         twin = self._twins.get(item) if self._twins is not None and known else None
         return found(self, item) if twin is None else twin
@@ -345,6 +361,8 @@ class Scene:
     mobility = _mobility
     linearise = _linearise
     equilibrium = _equilibrium
+    parameters = _parameters
+    with_parameters = _with_parameters
     set = set_joint
     remove = _remove
     copy = _copy

@@ -37,8 +37,23 @@ class Series:
         if found:
             raise InvalidArgument(found)
         graph, self.kinds = moving_parts(packed)
-        self.constant_columns = masks(graph, packed)
+        self.constant_columns = _masks_once(graph, packed)
         self.graph = with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
+
+
+def _masks_once(graph, packed):
+    """As `layout.masks`, which scenes of a family with the same parameters of constraints share."""
+    shared = packed.derived.shared
+    if shared is None:
+        return masks(graph, packed)
+    key = masks, graph.row.tobytes(), graph.bodies.tobytes()
+    given, table, constant = shared.get(key, (None, None, 0))
+    if given == packed.parameters:
+        graph.table[...] = table
+        return constant
+    constant = masks(graph, packed)
+    shared[key] = packed.parameters, graph.table.copy(), constant
+    return constant
 
 
 class SeriesMemory(Memory):

@@ -133,7 +133,7 @@ class JointFriction:
         """Set an attribute, checked; where it acts is the joint's."""
         if name == "coordinates":
             return
-        if name in self.permanent or name in [marker.argument for marker in self.markers if marker.code != TURN]:
+        if name == "joint" or name in [marker.argument for marker in self.markers if marker.code != TURN]:
             raise self.error(f"{self.name}: {name} is that of its joint {self.joint.name!r}; set it there.")
         super().__setattr__(name, value)
 

@@ -19,6 +19,7 @@ from .elements.element import Attachment
 from .elements.force import Force
 from .elements.joint import Joint
 from .elements.primitive import Primitive
+from .ensembles.results import Ensemble
 from .errors import TsdynError
 from .methods.integrator import Integrator
 from .model.handles import Handles
@@ -72,6 +73,8 @@ Load: TypeAlias = float | Table | Callable[[Any], Any]
 VectorLoad: TypeAlias = ArrayLike | Table | Callable[..., Any]  # a function of t, or of t and state
 JointLaw: TypeAlias = Callable[[float, float, float], float]
 Event: TypeAlias = Callable[[float, State], float]
+CaseTable: TypeAlias = Mapping[str, Any] | Callable[[int], Mapping[str, Any]] | Any  # or a DataFrame
+Keep: TypeAlias = str | Callable[[Solution], Any]
 Progress: TypeAlias = bool | Callable[[float], object]
 
 Formulation: TypeAlias = Literal["tangent", "null-space", "maggi-kane"]
@@ -140,10 +143,12 @@ __all__ = [
     "Body",
     "BodyLike",
     "Bools",
+    "CaseTable",
     "Charts",
     "Class",
     "ConstraintError",
     "Data",
+    "Ensemble",
     "Equilibrium",
     "Evaluation",
     "Event",
@@ -162,6 +167,7 @@ __all__ = [
     "Joint",
     "JointLaw",
     "JointLoads",
+    "Keep",
     "Kinematics",
     "Linearisation",
     "Load",

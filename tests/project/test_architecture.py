@@ -48,6 +48,7 @@ ORDER = [
     "storage",
     "parameters",
     "simulation",
+    "ensembles",
     "benchmarking",
     "profiling",
     "plots",

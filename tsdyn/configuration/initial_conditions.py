@@ -72,6 +72,16 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     return start.landed()
 
 
+def regular_start(scene, system, q, qd, t, tol):
+    """Return what `consistent` returns where it is plain: at rounding, of independent rows; None elsewhere."""
+    start = _Start(scene, system, q, qd, t, tol)
+    regular = start.is_regular()
+    if regular:
+        settle(start.packed, start.graph, start.tangent.rows.H)
+    give(start.packed, start.workspace)
+    return (q, qd) if regular else None
+
+
 class _Start:
     """A start under check, with its workspace."""
 
@@ -132,6 +142,18 @@ class _Start:
         self.far = np.abs(Phi).max(initial=0.0) > ROUNDING * (1.0 + np.abs(q).max())
         self.fast = np.abs(velocity).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max())
         return dependent
+
+    def is_regular(self):
+        """Whether rows are independent and hold to rounding, as `check` finds it, with inertia about every axis."""
+        q, qd, tangent = self.q, self.qd, self.tangent
+        if len(self.graph.axes.rows) or evaluate_start(self.context, q, qd, self.t, self.rates, 1) != NONE:
+            return False
+        p, pd = q[self.at], qd[self.at]
+        lengths, rates = np.abs((p * p).sum(axis=1) - 1.0), np.abs((p * pd).sum(axis=1))
+        near, slow = (min(ROUNDING, self.tol) * (1.0 + np.abs(x).max()) for x in (q, qd))
+        held = np.abs(tangent.b).max(initial=0.0) <= near and 0.5 * lengths.max(initial=0.0) <= near
+        still_held = np.abs(self.rates).max(initial=0.0) <= slow and rates.max(initial=0.0) <= slow
+        return bool(held and still_held and np.isfinite(tangent.rows.H.sum()))
 
     def redundant_rows(self):
         """Return the rows that are redundant here and nearby; refuse a singular configuration."""

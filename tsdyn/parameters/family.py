@@ -60,19 +60,24 @@ class Family:
                 f"the scene has no parameter {name!r}{nearest(name, self.fields)} scene.parameters() lists them."
             ) from None
 
-    def is_structural(self, owner):
-        """Whether more than numbers may follow from the attributes of a constraint or force."""
+    def load_of(self, owner):
+        """The `Load` of a force of the template; None for a constraint."""
+        i = self._loads.get(id(owner))
+        return None if i is None else self.packed.loads[i]
+
+    def is_structural(self, owner, attributes):
+        """Whether more than numbers may follow from some attributes of a constraint or force."""
         known = self._structural.get(id(owner))
         if known is None:
             items = (*self.template._added, *self.template._forces)
             known = self._structural[id(owner)] = (
                 isinstance(owner, Joint)
                 or hasattr(owner, "opposed")
-                or bool(owner.joint_coordinates)
                 or getattr(owner, "period", None) is not None
                 or any(value is owner for item in items for value in vars(item).values())
             )
-        return known
+        places = [marker.argument for marker in owner.markers] if owner.joint_coordinates else []
+        return known or any(name in places for name in attributes)
 
     def numbers(self, values):
         """The `Packed` and the start of a scene with other values, by name; None if it must be packed anew.
@@ -113,7 +118,7 @@ class Edit:
         if isinstance(owner, PointMass):
             self._enter_body(owner, changes)
             return True
-        if self.family.is_structural(owner):
+        if self.family.is_structural(owner, changes):
             return False
         other = with_attributes(owner, changes)
         load = self.family._loads.get(id(owner))

@@ -188,14 +188,14 @@ def _facts(given, kept):
     functions += [load.force.function for load in kept.packed.loads if getattr(load.force, "period", None) is not None]
     return {
         **_here(),
-        "scene": _hash_of(kept.packed),
-        "functions": _sources(functions),
-        "events": _sources(events),
+        "scene": hash_of(kept.packed),
+        "functions": sources_of(functions),
+        "events": sources_of(events),
         "interval": given["checkpoint"] if given["checkpoint"] is None else float(given["checkpoint"]),
     }
 
 
-def _hash_of(packed):
+def hash_of(packed):
     """SHA-256 of the packed numbers, to the bit; without addresses."""
     digest = hashlib.sha256(repr([(body.name, body.dimension) for body in packed.bodies]).encode())
     for name, array in packed.system._asdict().items():
@@ -207,7 +207,7 @@ def _hash_of(packed):
     return digest.hexdigest()
 
 
-def _sources(functions):
+def sources_of(functions):
     """SHA-256 of the source of each function, by its name and place among the others."""
     found = {}
     for i, function in enumerate(functions):

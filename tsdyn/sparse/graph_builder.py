@@ -20,7 +20,6 @@ from .constraint_graph import (
     ROWS,
     ROWS_WELD,
     W_MASS,
-    W_ROTATION,
     WEIGHTS,
     WELD_ROWS,
     WELDS,
@@ -313,7 +312,7 @@ def weights(system, rows, lean):
     J = system.inertia[rigid].reshape(-1, 3, 3)
     spins[rigid] = (J[:, :1, :1] * np.eye(3) != J).any(axis=(1, 2))
     for out, matrices in ((inverse, inverses(J, [lean.get(i) for i in rigid])), (mass, J)):
-        out[rigid, W_ROTATION:] = np.pad(matrices, ((0, 0), (0, 0), (0, 1))).reshape(-1, 12)
+        out.reshape(-1, 4, 4)[rigid, 1:, :3] = matrices
     return inverse.ravel(), mass.ravel(), spins
 
 

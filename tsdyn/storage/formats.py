@@ -14,6 +14,8 @@ BUFFER, how many floats are gathered before they are written, and functions for 
 
     read(path, column, part)                   a slice of a column
     count(path, columns)                       rows that all of these columns have
+    attributes(path)                           what `create` was given
+    names(path)                                of all columns
 """
 
 import contextlib

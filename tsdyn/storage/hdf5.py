@@ -129,6 +129,18 @@ def count(path, columns):
         return min(len(file[column]) for column in columns)
 
 
+def attributes(path):
+    """As formats.py says."""
+    with reading(path), _opened(path) as file:
+        return dict(file.attrs)
+
+
+def names(path):
+    """As formats.py says."""
+    with reading(path), _opened(path) as file:
+        return list(file)
+
+
 def _opened(path):
     """The file to read: as one that may be written meanwhile, or as another reader in this process has opened it."""
     for options in ({"libver": "latest", "swmr": True, "locking": False}, {"locking": False}, {}):

@@ -85,6 +85,18 @@ def count(path, columns):
         return min(group[column].shape[0] for column in columns)
 
 
+def attributes(path):
+    """As formats.py says."""
+    with reading(path):
+        return dict(_group(path, "r").attrs)
+
+
+def names(path):
+    """As formats.py says."""
+    with reading(path):
+        return sorted(_group(path, "r").array_keys())
+
+
 def _demand_chunks(path, array):
     """Raise StorageError unless all chunks are there, and whole."""
     with reading(path):

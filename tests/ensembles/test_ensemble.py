@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from examples import four_bar, stick_slip, top
+from examples import four_bar, stability_map, stick_slip, top
 from tests.helpers.every_force import everything
 
 RNG = np.random.default_rng(7)
@@ -64,6 +64,15 @@ def test_options_are_those_of_simulate(options):
         solution = alone(scene, table, i, **options)
         assert found.q[i].tobytes() == solution.state.q.tobytes()
         assert (found.status[i], found.message[i], found.t[i]) == (solution.status, solution.message, solution.reached)
+
+
+def test_rods_without_inertia_about_their_axes():
+    scene = stability_map.build()
+    _, _, starts = stability_map.starts(2)
+    for table in (starts, {"gravity": RNG.normal(size=(4, 3))}, {"upper.mass": RNG.uniform(0.5, 2, 4)}):
+        found = ts.ensemble(scene, table, SPAN)
+        assert found.success.all(), found.message
+        assert all(found.q[i].tobytes() == alone(scene, table, i).q[-1].tobytes() for i in range(4))
 
 
 def test_redundant_rows_friction_and_functions():

@@ -11,7 +11,7 @@ from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of, set_redundant
 from ..sparse.massless_axes import axis_of
 from .rank import check_rank
-from .start_kernels import DOUBTFUL, NONE, evaluate_start, free_axis, go_near_by, land_start, select_redundant
+from .start_kernels import DOUBTFUL, NONE, evaluate_start, free_axis, go_near_by, holds, land_start, select_redundant
 from .start_violations import demand_finite, demand_small, refuse_vanished
 from .start_workspace import give, taken
 from .tolerances import (
@@ -145,15 +145,12 @@ class _Start:
 
     def is_regular(self):
         """Whether rows are independent and hold to rounding, as `check` finds it, with inertia about every axis."""
-        q, qd, tangent = self.q, self.qd, self.tangent
-        if len(self.graph.axes.rows) or evaluate_start(self.context, q, qd, self.t, self.rates, 1) != NONE:
+        q, qd, rates, tangent = self.q, self.qd, self.rates, self.tangent
+        if evaluate_start(self.context, q, qd, self.t, rates, 1) != NONE:
             return False
-        p, pd = q[self.at], qd[self.at]
-        lengths, rates = np.abs((p * p).sum(axis=1) - 1.0), np.abs((p * pd).sum(axis=1))
-        near, slow = (min(ROUNDING, self.tol) * (1.0 + np.abs(x).max()) for x in (q, qd))
-        held = np.abs(tangent.b).max(initial=0.0) <= near and 0.5 * lengths.max(initial=0.0) <= near
-        still_held = np.abs(self.rates).max(initial=0.0) <= slow and rates.max(initial=0.0) <= slow
-        return bool(held and still_held and np.isfinite(tangent.rows.H.sum()))
+        tol = min(ROUNDING, self.tol)
+        held = holds(tangent.b, rates, tangent.rows.H, q, qd, self.workspace.first_parameters, tol)
+        return held == 1 and self.loose_axis() < 0
 
     def redundant_rows(self):
         """Return the rows that are redundant here and nearby; refuse a singular configuration."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from examples import four_bar, stability_map, stick_slip, top
+from examples import four_bar, pendulum_chain, stability_map, stick_slip, top
 from tests.helpers.every_force import everything
 
 RNG = np.random.default_rng(7)
@@ -73,6 +73,15 @@ def test_rods_without_inertia_about_their_axes():
         found = ts.ensemble(scene, table, SPAN)
         assert found.success.all(), found.message
         assert all(found.q[i].tobytes() == alone(scene, table, i).q[-1].tobytes() for i in range(4))
+
+
+def test_masses_that_differ_by_orders_of_magnitude():
+    scene = pendulum_chain.build(4)
+    table = {"body2.mass": np.array([1.0, 1e-8, 1e8, 2.0]), "body3.mass": np.array([1.0, 1.0, 3.0, 1e-3])}
+    found = ts.ensemble(scene, table, SPAN, rtol=1e-3, atol=1e-3)
+    assert found.success.all(), found.message
+    for i in range(4):
+        assert found.q[i].tobytes() == alone(scene, table, i, rtol=1e-3, atol=1e-3).q[-1].tobytes(), i
 
 
 def test_redundant_rows_friction_and_functions():

@@ -14,6 +14,7 @@ FRAMES = {
     "another pose": {"pose": Rotation.from_rotvec([0.7, -0.4, 1.1])},
     "mm, g, ms": {"metre": 1e3, "kilogram": 1e3, "second": 1e3},
     "km, t, min": {"metre": 1e-3, "kilogram": 1e-3, "second": 1.0 / 60.0},
+    "um, mg, s": {"metre": 1e6, "kilogram": 1e6},
     "another order": {"order": (2, 0, 1)},
     "another sign": {"sign": -1.0},
 }
@@ -53,11 +54,12 @@ def build(metre=1.0, kilogram=1.0, second=1.0, origin=(0.0, 0.0, 0.0), pose=None
     return scene
 
 
-def positions(method, second=1.0, metre=1.0, origin=(0.0, 0.0, 0.0), pose=None, **others):
+def positions(method, second=1.0, metre=1.0, origin=(0.0, 0.0, 0.0), pose=None, formulation="tangent", **others):
     """Of the rods, in SI and in the frame of the scene as it was drawn."""
     scene = build(metre=metre, second=second, origin=origin, pose=pose, **others)
     times = np.linspace(0.0, END * second, 16)
-    solution = ts.simulate(scene, (0.0, times[-1]), integrator=METHODS[method](second), t_eval=times)
+    given = {"integrator": METHODS[method](second), "formulation": formulation}
+    solution = ts.simulate(scene, (0.0, times[-1]), t_eval=times, **given)
     solution.raise_if_failed()
     back = (pose or Rotation.identity()).inv()
     found = [back.apply(solution.position(f"rod {i}") - np.array(origin)) / metre for i in range(3)]
@@ -69,6 +71,14 @@ def positions(method, second=1.0, metre=1.0, origin=(0.0, 0.0, 0.0), pose=None, 
 @pytest.mark.parametrize("frame", FRAMES.values(), ids=FRAMES)
 def test_the_motion_is_the_same(frame, method):
     np.testing.assert_allclose(positions(method, **frame), positions(method), rtol=0.0, atol=ERRORS[method])
+
+
+@pytest.mark.slow_for("*maggi*")
+@pytest.mark.parametrize("formulation", ["null-space", "maggi-kane"])
+@pytest.mark.parametrize("frame", FRAMES.values(), ids=FRAMES)
+def test_forms_with_a_basis_give_the_same_motion(frame, formulation):
+    found, demanded = (positions("nystrom4", formulation=formulation, **where) for where in (frame, {}))
+    np.testing.assert_allclose(found, demanded, rtol=0.0, atol=ALGEBRA)
 
 
 def test_a_sign_changes_no_bit():

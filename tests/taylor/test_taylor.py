@@ -218,3 +218,12 @@ def test_steps_follow_the_tolerance_down_to_the_limit_of_rounding():
     assert steps[0] < steps[1] < steps[2]
     assert [I.Taylor(tol).step_tolerances()[0] for tol in (1e-8, 1e-12)] == [1e-8 / 1000.0, 1e-12 / 1000.0]
     assert I.Taylor(1e-12).refined == 0 < I.Taylor(9e-13).refined
+
+
+def test_residuals_of_positions_do_not_walk():
+    """Windows of a thousand steps: beyond the first one the residual was up to five times as large."""
+    scene = load("two_body_pendulum_spatial")[0]
+    solution = ts.simulate(scene, (0.0, 1000.0), integrator=I.Taylor())
+    windows = solution.constraint_error.position[: solution.stats.steps // 1000 * 1000].reshape(-1, 1000)
+    assert len(windows) > 20
+    assert np.median(windows, axis=1).max() < 7.0 * EPS

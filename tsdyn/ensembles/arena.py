@@ -28,6 +28,7 @@ from ..simulation import method_choice
 from ..simulation.simulate import run_task, simulate
 from ..sparse.graph_builder import weights
 from ..sparse.massless_axes import lean_bodies
+from ..taylor.run_memory import are_unequal
 from .first_slice import FirstSlice
 from .pen import pen_of
 
@@ -72,7 +73,7 @@ class Arena:
             packed=self.packed, system=system, bodies=template.bodies, constraints=template.constraints,
             row_names=template.row_names,
         )  # fmt: skip
-        self.moments = _moments(system)
+        self.moments, self._is_unequal = _moments(system), are_unequal(system)
         self._written, self._weights, self._start = set(), [], (None, None)
         self._pen = None if study.names is None else pen_of(self, study.names)
         self._slice = FirstSlice(study) if FirstSlice.serves(study) else None
@@ -174,6 +175,8 @@ class Arena:
         return self._run(start, scene)
 
     def _run(self, start, scene):
+        if self._written & OF_ROWS and are_unequal(self.packed.system) != self._is_unequal:
+            return None
         found = self.start(start)
         if found is None:
             return None

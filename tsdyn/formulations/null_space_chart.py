@@ -2,8 +2,9 @@
 
 U spans W0 Phi_q0^T, W0 being the inverse of the mass matrix with p p^T added: the normal space in the metric of kinetic
 energy, which weights lengths and angles by inertia. (The paper takes U = Phi_q0^T.) Columns are scaled so that Phi_q0 U
-has a unit diagonal; the columns of normalisation rows are p0. V is orthonormal. With the projection along U, P0 =
-I - U (Phi_q0 U)^-1 Phi_q0, L^T is V^T P0: L^T V = I, L^T U = 0.
+has a unit diagonal; the columns of normalisation rows are p0. V is orthonormal, with positions over the `unit` of a
+scene whose numbers are large or small. With the projection along U, P0 = I - U (Phi_q0 U)^-1 Phi_q0, and the
+pseudoinverse V^+, V^T where the unit is one, L^T is V^+ P0: L^T V = I, L^T U = 0.
 """
 
 import math
@@ -14,7 +15,7 @@ from .chart_validity import touch
 from .dense_products import add_product, add_transposed_product, clear_matrix, multiply
 from .dense_rows import evaluate_dense_rows, form_normal_matrix, invert_normal_matrix, take_selection
 from .newton_iterations import OK, SINGULAR, update_b
-from .tolerances import FIRST_RATE, RANK_LIMIT
+from .tolerances import FIRST_RATE, RANK_LIMIT, USUAL
 
 
 @kernel
@@ -24,18 +25,21 @@ def new_chart(graph, system, w, f, l, t):
     regular = touch(graph, system, w, f, l, t, largest(w.q))  # of p, too: Phi has the normalisations
     take_selection(graph, w, f)
     evaluate_dense_rows(system, w, t)
-    kept = 0
+    kept, metres = 0, unit(w.control.size)
     for i in range(n):
         w.q0[i] = w.q[i]
+        for j in range(m):
+            w.householder[i, j] = w.Phi_q[j, i]
+    _scale_positions(graph, metres, w.householder)
     for i in range(m):
         x = 0.0
         for c in range(n):
-            x += w.Phi_q[i, c] * w.Phi_q[i, c]
+            x += w.householder[c, i] * w.householder[c, i]
         w.u[i] = 0.0
         if x > 0.0:
             x = 1.0 / math.sqrt(x)
             for c in range(n):
-                w.householder[c, kept] = w.Phi_q[i, c] * x
+                w.householder[c, kept] = w.householder[c, i] * x
             kept += 1
     if kept != n - k:
         return SINGULAR
@@ -44,13 +48,33 @@ def new_chart(graph, system, w, f, l, t):
     low, high = null_space(w.householder, n, kept, w.V, w.R, w.z)
     if m > 0 and not (regular and low > RANK_LIMIT * high):
         return SINGULAR
+    _scale_positions(graph, metres, w.V)
     _normal_space(graph, w, l)
     form_normal_matrix(system, w)
     if not invert_normal_matrix(w) or update_b(w) != OK:
         return SINGULAR
-    _left_inverse(w)
+    _left_inverse(graph, w, metres)
     w.control.rate = FIRST_RATE
     return OK
+
+
+@kernel
+def unit(size):
+    """The unit of positions, m: one for numbers of usual size, else the power of two below."""
+    if not 0.0 < size < math.inf or 1.0 / USUAL <= size <= USUAL:
+        return 1.0
+    return 2.0 ** math.floor(math.log2(size))
+
+
+@kernel
+def _scale_positions(graph, factor, A):
+    """Multiply the rows of A that are positions of bodies."""
+    if factor == 1.0:
+        return
+    for b in range(graph.bodies.shape[0]):
+        for c in range(graph.bodies[b, 0], graph.bodies[b, 0] + 3):
+            for j in range(A.shape[1]):
+                A[c, j] *= factor
 
 
 @kernel
@@ -86,13 +110,14 @@ def _normal_space(graph, w, l):
 
 
 @kernel
-def _left_inverse(w):
-    """L = V - Phi_q^T B^T U^T V at q0; T and X are scratch, T zero at the end, as it is at q0."""
+def _left_inverse(graph, w, metres):
+    """L = V^+ - Phi_q^T B^T U^T V^+ at q0; T and X are scratch, T zero at the end, as it is at q0."""
+    _copy_matrix(w.V, w.L)
+    _scale_positions(graph, 1.0 / (metres * metres), w.L)
     clear_matrix(w.T)
-    add_transposed_product(1.0, w.U, w.V, w.T)
+    add_transposed_product(1.0, w.U, w.L, w.T)
     clear_matrix(w.X)
     add_transposed_product(1.0, w.B, w.T, w.X)
-    _copy_matrix(w.V, w.L)
     add_transposed_product(-1.0, w.Phi_q, w.X, w.L)
     clear_matrix(w.T)
 

@@ -24,7 +24,7 @@ from ..rows.interface import (
     redundant_rows_hold,
     singularity_indicator,
 )
-from .tolerances import LAND_SWEEPS, LEAST_MOVE, ROUNDING, ROUNDING_AT_MOST, STALLED
+from .tolerances import LAND_SWEEPS, LEAST_MOVE, ROUNDING, ROUNDING_AT_MOST, STALLED, WALK
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
@@ -62,7 +62,7 @@ def land(graph, system, w, f, t):
             if status != OK:
                 return status
             if f.landing.residual >= 0.0:
-                return _settle(graph, f, floor)
+                return _settle(graph, w, f)
             renew = False
         else:
             evaluate_residuals(graph, system, f, t)
@@ -75,7 +75,7 @@ def land(graph, system, w, f, t):
                 return NEWTON_FAILED
             if moved <= LEAST_MOVE:
                 w.counters.at_rounding += 1 if moved == 0.0 else 0
-                return _settle(graph, f, floor)
+                return _settle(graph, w, f)
             renew = True
             continue
         before = worst
@@ -86,14 +86,15 @@ def land(graph, system, w, f, t):
 
 
 @long_kernel
-def _settle(graph, f, floor):
-    """End a landing, b being Phi: next to a singular configuration it is corrected below its floor. Status.
+def _settle(graph, w, f):
+    """End a landing, b being Phi: a residual that has walked close to its floor is corrected. Status.
 
-    A residual of Phi there displaces bodies by the residual over the distance.
+    Next to a singular configuration every residual is: it displaces bodies by the residual over the distance.
     """
+    floor = w.control.floor
     if not redundant_rows_hold(graph, f, floor):
         return UNHELD
-    if is_near_singular(f, singularity_indicator(graph, f.rows)):
+    if largest_residual(graph, w, f) > WALK * floor or is_near_singular(f, singularity_indicator(graph, f.rows)):
         _displace(graph, f)
     return OK
 

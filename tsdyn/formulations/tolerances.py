@@ -5,6 +5,10 @@
 # of these numbers, each rounded by 1.1e-16: 4e-16 as a random walk, 1.3e-15 at worst.
 ROUNDING = 1e-15
 
+# Share of the rounding of Phi above which a residual is corrected: sums over steps walk. Corrections of less would move
+# bodies by the rounding of Phi itself in every step, and energy with them.
+WALK = 0.5
+
 # |Phi_q qd + Phi_t| over |rd| + size |omega'|, in the same way: one unit in the last place, since few terms of a row
 # are large.
 SPEED_ROUNDING = 2e-16
@@ -60,6 +64,11 @@ FARTHEST = 0.9  # |d|^2: d0 = 0.32, and C grows as 1 / d0
 TURN_SHARE = 0.55  # of |d|, as a contraction: a rotation that no constraint depends on reaches 0.9 in a step, 0.5 here
 # Error of the factors of N at the end of a solve, relative: below it they tell the contraction (limit 0.15)
 SAME = 1e-6
+
+# --- units
+# m: numbers up to it, and down to its reciprocal, are of usual size. Beyond it an orthonormal V mixes positions with
+# Euler parameters that are smaller by as much, and D^T M D loses twice as many digits.
+USUAL = 64.0
 
 # --- rank
 # Pivot of D^T M D over its diagonal entry: below it the reduced mass is singular. A hundred roundings.

@@ -28,6 +28,6 @@ TIME = 1e2
 HELD = 1e-14
 # Next to a singular configuration, where a chart has a condition of ILL_CONDITIONED or more, rounding is amplified by
 # so much.
-NEAR_SINGULAR, ILL_CONDITIONED = 1e2, 1e8
+NEAR_SINGULAR, ILL_CONDITIONED = 1e3, 1e8
 # Outputs of a run that are judged, and bodies whose balance is: the first, the last, and some between.
 OUTPUTS, BODIES = 25, 12

@@ -1,5 +1,7 @@
 """Run workspace of the Taylor driver, and what all Taylor runs of a scene share."""
 
+import numpy as np
+
 from ..errors import InvalidArgument, Status
 from ..formulations.locked_orientations import moving_parts
 from ..model.packed import System
@@ -13,6 +15,7 @@ from ..workspaces.workspace import plain_work
 from .layout import allocate_expansion, masks
 from .step_parts import check_laws, pass_singular
 from .stepper import advance_series
+from .tolerances import LIGHT, MANY
 from .workspace import SeriesContext, Trial
 
 PASSAGE = Status.PASSAGE
@@ -39,6 +42,13 @@ class Series:
         graph, self.kinds = moving_parts(packed)
         self.constant_columns = _masks_once(graph, packed)
         self.graph = with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
+        self.refined = int(len(graph.bodies) > MANY or are_unequal(packed.system))
+
+
+def are_unequal(system):
+    """Whether heavy bodies may load light ones: a last place of lam accelerates these by many of their own."""
+    largest = np.abs(system.inertia).max(axis=1)  # zero for a point mass
+    return any(x.max() > LIGHT * x.min() for x in (system.mass, largest[largest > 0.0]) if x.size)
 
 
 def _masks_once(graph, packed):

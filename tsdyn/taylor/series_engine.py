@@ -6,7 +6,6 @@ from .dense_output import read_series, reading_workspace
 from .layout import is_far, refusal, room
 from .run_memory import Series, SeriesMemory
 from .step_parts import accelerate_here, expand_far_series, expand_series, pass_singular, reach
-from .tolerances import MANY
 
 
 class SeriesEngine:
@@ -38,7 +37,7 @@ class SeriesEngine:
         order = memory.context.expansion.order
         order.room, (order.top, order.lowest, order.highest) = room(self.highest), self.orders
         order.next = order.top
-        order.refined = max(method.refined, int(len(graph.bodies) > MANY))
+        order.refined = max(method.refined, self.series.refined)
         if method.step is not None:  # the order follows from tolerances even so
             memory.run.clock.rtol, memory.run.clock.atol = method.step_tolerances()
         _set_kernels(memory.run, is_far(graph, self.highest), self.within)

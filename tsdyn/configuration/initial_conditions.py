@@ -72,14 +72,28 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     return start.landed()
 
 
-def regular_start(scene, system, q, qd, t, tol):
-    """Return what `consistent` returns where it is plain: at rounding, of independent rows; None elsewhere."""
-    start = _Start(scene, system, q, qd, t, tol)
-    regular = start.is_regular()
-    if regular:
-        settle(start.packed, start.graph, start.tangent.rows.H)
-    give(start.packed, start.workspace)
-    return (q, qd) if regular else None
+class RegularStarts:
+    """Checks one start after the other of a scene whose numbers change in place, as `consistent` does.
+
+    Parameters
+    ----------
+    scene : Scene, or what has its `packed`, bodies and names of rows
+    q, qd, t, tol
+        As of `consistent`, of a first start.
+    """
+
+    def __init__(self, scene, q, qd, t, tol):
+        self._start, self._system = _Start(scene, scene.packed.system, q, qd, t, tol), scene.packed.system
+
+    def are_plain(self, q, qd):
+        """Whether a start is at rounding, its rows independent, and every axis has inertia: it stays as it is."""
+        start = self._start
+        start.q, start.qd = q, qd
+        start.workspace.reals[...] = self._system.reals
+        regular = start.is_regular()
+        if regular and still(start.packed).bodies.size:
+            settle(start.packed, start.graph, start.tangent.rows.H)
+        return regular
 
 
 class _Start:

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ..configuration.initial_conditions import regular_start
+from ..configuration.initial_conditions import RegularStarts
 from ..configuration.mirrored_branches import demand_aligned
 from ..elements.bodies import PointMass
 from ..formulations.locked_orientations import hold
@@ -29,9 +29,11 @@ from ..simulation.simulate import run_task, simulate
 from ..sparse.graph_builder import weights
 from ..sparse.massless_axes import lean_bodies
 from ..taylor.run_memory import are_unequal
+from ..taylor.tolerances import LIGHT
 from .first_slice import FirstSlice
 from .pen import pen_of
 
+FEW = 30  # bodies that a list serves faster than an array
 OF_ROWS = {"mass", "inertia"}  # what the independence of rows depends on, beside where things are
 
 
@@ -74,7 +76,7 @@ class Arena:
             row_names=template.row_names,
         )  # fmt: skip
         self.moments, self._is_unequal = _moments(system), are_unequal(system)
-        self._written, self._weights, self._start = set(), [], (None, None)
+        self._written, self._weights, self._start, self._starts = set(), [], (None, None), None
         self._pen = None if study.names is None else pen_of(self, study.names)
         self._slice = FirstSlice(study) if FirstSlice.serves(study) else None
 
@@ -117,6 +119,13 @@ class Arena:
         """Whether a case has left redundant rows or bodies that turn behind, which the next one may not have."""
         return self.packed.derived.redundant is not None or bool(self.packed.derived.turning)
 
+    def _masses_are_unequal(self):
+        """As `are_unequal`; without inertias, unless these differ from case to case."""
+        if "inertia" in self._written or self._is_unequal or len(self.packed.bodies) > FEW:
+            return are_unequal(self.packed.system)
+        masses = self.packed.system.mass.tolist()
+        return max(masses) > LIGHT * min(masses)
+
     def _memories(self):
         return [memory for spare in self.kept._spare.values() for memory in spare]
 
@@ -144,12 +153,13 @@ class Arena:
         memory = remembered(state, kept, t, q)
         if packed.system.memory.size:
             return None
-        found = regular_start(self.scene, packed.system, q, qd, t, tol)
-        if found is None or self.is_spoilt:
+        if self._starts is None:
+            self._starts = RegularStarts(self.scene, q, qd, t, tol)
+        if not self._starts.are_plain(q, qd) or self.is_spoilt:
             return None
         if known is not q:
             demand_aligned(packed, q, t)
-        found = memory, hold(packed, *found)
+        found = memory, hold(packed, q, qd)
         self._start = q, found
         return found
 
@@ -175,7 +185,7 @@ class Arena:
         return self._run(start, scene)
 
     def _run(self, start, scene):
-        if self._written & OF_ROWS and are_unequal(self.packed.system) != self._is_unequal:
+        if self._written & OF_ROWS and self._masses_are_unequal() != self._is_unequal:
             return None
         found = self.start(start)
         if found is None:

@@ -9,6 +9,9 @@ from .keeping import TIMES
 from .runner import PLAIN
 
 
+ALWAYS = ("t", "q", "qd")  # of the same shape in every case
+
+
 class Chunk(NamedTuple):
     """Results of cases without a gap."""
 
@@ -51,6 +54,9 @@ def run_chunk(runner, first, count, offset=0):
 def _enter(arrays, k, found):
     """Write arrays of a case; what is wrong with them, or None."""
     for name, value in found.items():
+        if name in ALWAYS:
+            arrays[name][k] = value
+            continue
         if name not in arrays:
             arrays[name] = np.full((len(arrays["t"]), *np.shape(value)), np.nan)
         if np.shape(value) != arrays[name].shape[1:]:

@@ -76,12 +76,32 @@ def test_rods_without_inertia_about_their_axes():
 
 
 def test_masses_that_differ_by_orders_of_magnitude():
-    scene = pendulum_chain.build(4)
-    table = {f"{scene.bodies[1].name}.mass": np.array([1.0, 1e-8, 1e8, 2.0]), f"{scene.bodies[2].name}.mass": np.array([1.0, 1.0, 3.0, 1e-3])}
+    scene, masses = pendulum_chain.build(4), np.array([[1.0, 1e-8, 1e8, 2.0], [1.0, 1.0, 3.0, 1e-3]])
+    table = {f"{scene.bodies[i + 1].name}.mass": masses[i] for i in range(2)}
     found = ts.ensemble(scene, table, SPAN, rtol=1e-3, atol=1e-3)
     assert found.success.all(), found.message
     for i in range(4):
         assert found.q[i].tobytes() == alone(scene, table, i, rtol=1e-3, atol=1e-3).q[-1].tobytes(), i
+
+
+@pytest.mark.parametrize("rows", ["the same", "others"])
+def test_redundant_rows_are_selected_in_each_case(rows):
+    """A crank that is turned: the rows that depend on others differ from place to place, or don't."""
+    scene, table = four_bar.build(), {"crank.mass": RNG.uniform(1, 2, 6), "gravity": RNG.normal(size=(6, 3))}
+    if rows == "others":
+        places = [scene.copy() for _ in range(6)]
+        for i, place in enumerate(places):
+            place.set("bearing", angle=0.9 * i, rate=2.0)
+        for body in scene.bodies:
+            for part in ("position", "orientation", "velocity", "angular_velocity"):
+                table[f"{body.name}.{part}"] = np.array([getattr(place[body], part) for place in places])
+    for keep in ("final", lambda solution: solution.reaction("bearing")[0][-1]):
+        found = ts.ensemble(scene, table, SPAN, threads=1, keep=keep)
+        for i in range(6):
+            solution = alone(scene, table, i)
+            assert found.q[i].tobytes() == solution.state.q.tobytes(), i
+            assert found.message[i] == solution.message
+            assert not callable(keep) or found.kept[i].tobytes() == solution.reaction("bearing")[0][-1].tobytes()
 
 
 def test_redundant_rows_friction_and_functions():

@@ -96,6 +96,34 @@ class RegularStarts:
         return regular
 
 
+class RedundantStarts:
+    """The same for scenes with redundant rows, which are selected at each start.
+
+    Parameters
+    ----------
+    scenes : list of three
+        The scene with redundant rows unknown, none, and those of a first start.
+    """
+
+    def __init__(self, scenes, q, qd, t, tol):
+        self._starts = [_Start(scene, scene.packed.system, q, qd, t, tol) for scene in scenes]
+
+    def landed(self, q, qd):
+        """Return (q, qd) as `consistent` does; None where other rows are redundant."""
+        for start in self._starts:
+            start.renew(q, qd)
+        first, again, last = self._starts
+        if first.check() == NONE:
+            return None
+        first.demand_velocities()
+        again.check()
+        if not np.array_equal(again.redundant_rows(), last.packed.derived.redundant):
+            return None
+        last.check()
+        settle(last.packed, last.graph, last.tangent.rows.H)
+        return last.landed()
+
+
 class _Start:
     """A start under check, with its workspace."""
 
@@ -108,6 +136,11 @@ class _Start:
         self.tangent, self.work, self.rates = workspace.tangent, workspace.work, workspace.rates
         self.context, self.at = workspace.address, workspace.at
         self.far = self.fast = False
+
+    def renew(self, q, qd):
+        """Take other positions and velocities, and the numbers of the system as they are now."""
+        self.q, self.qd, self.far, self.fast = q, qd, False, False
+        self.workspace.enter(self.packed.system.reals, self.packed.size, q, self.tol)
 
     def demand_velocities(self):
         """Refuse velocities that violate the constraints."""

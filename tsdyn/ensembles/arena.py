@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ..configuration.initial_conditions import RegularStarts
+from ..configuration.initial_conditions import RedundantStarts, RegularStarts, consistent
 from ..configuration.mirrored_branches import demand_aligned
 from ..elements.bodies import PointMass
 from ..formulations.locked_orientations import hold
@@ -20,6 +20,7 @@ from ..model.derived import Derived
 from ..model.lengths import is_small
 from ..model.packed import System, classes
 from ..motions.signals import Signal
+from ..observables.friction_unique import demand_unique
 from ..observables.state import remembered
 from ..parameters.family import KEPT
 from ..runs.arguments import state_arrays
@@ -76,7 +77,9 @@ class Arena:
             row_names=template.row_names,
         )  # fmt: skip
         self.moments, self._is_unequal = _moments(system), are_unequal(system)
-        self._written, self._weights, self._start, self._starts = set(), [], (None, None), None
+        self._written, self._weights, self._start = set(), [], (None, None)
+        self._starts, self._selected, self._others = None, None, []
+        self.has_other_rows = False  # whether the last case had others than these that are redundant
         self._pen = None if study.names is None else pen_of(self, study.names)
         self._slice = FirstSlice(study) if FirstSlice.serves(study) else None
 
@@ -116,8 +119,14 @@ class Arena:
 
     @property
     def is_spoilt(self):
-        """Whether a case has left redundant rows or bodies that turn behind, which the next one may not have."""
-        return self.packed.derived.redundant is not None or bool(self.packed.derived.turning)
+        """Whether a case has left bodies that turn behind, which the next one may not have."""
+        return bool(self.packed.derived.turning)
+
+    @property
+    def is_immobile(self):
+        """Whether redundant rows leave no degree of freedom, which the message of a run says."""
+        rows, system = self.packed.derived.redundant, self.packed.system
+        return rows is not None and self.kept.n == len(system.segments) - len(rows)
 
     def _masses_are_unequal(self):
         """As `are_unequal`; without inertias, unless these differ from case to case."""
@@ -131,7 +140,8 @@ class Arena:
 
     def _graphs(self):
         known, series = self.packed.derived, vars(self.kept).get("series")
-        graphs = [found[0] for found in (known.graph, known.moving_graph) if found is not None]
+        others = [other.packed.derived.graph for other in self._others]
+        graphs = [found[0] for found in (known.graph, known.moving_graph, *others) if found is not None]
         return graphs if series is None else [*graphs, series.graph]
 
     def _weigh(self):
@@ -153,15 +163,43 @@ class Arena:
         memory = remembered(state, kept, t, q)
         if packed.system.memory.size:
             return None
-        if self._starts is None:
-            self._starts = RegularStarts(self.scene, q, qd, t, tol)
-        if not self._starts.are_plain(q, qd) or self.is_spoilt:
+        started = self._started(q, qd, t, tol)
+        if started is None or self.is_spoilt:
             return None
         if known is not q:
-            demand_aligned(packed, q, t)
-        found = memory, hold(packed, q, qd)
+            demand_aligned(packed, started[0], t)
+        demand_unique(packed, started[0], t)
+        found = memory, hold(packed, *started)
         self._start = q, found
         return found
+
+    def _started(self, q, qd, t, tol):
+        """A start as `consistent` returns it; None if it must be looked at in a scene of its own."""
+        if self._starts is None:
+            self._starts = RegularStarts(self.scene, q, qd, t, tol)
+        derived = self.packed.derived
+        if derived.redundant is None and self._starts.are_plain(q, qd):
+            return q, qd
+        if self.kept.packed.coordinates is not self.base.coordinates:
+            return None
+        if derived.redundant is None:
+            started = consistent(self.scene, self.packed.system, q, qd, t, tol, True)
+            return None if derived.redundant is None else started
+        if self._selected is None:
+            self._others = [self._with_redundant(rows) for rows in (None, np.zeros(0, np.int64))]
+            self._selected = RedundantStarts([*self._others, self.scene], q, qd, t, tol)
+        started = self._selected.landed(q, qd)
+        self.has_other_rows = started is None
+        return started
+
+    def _with_redundant(self, rows):
+        """The scene with the same arrays, and other redundant rows."""
+        derived = Derived(redundant=rows, shared=self.study.family.shared)
+        for name in KEPT:
+            setattr(derived, name, getattr(self.packed.derived, name))
+        own = SimpleNamespace(**vars(self.scene))
+        own.packed = self.packed._replace(derived=derived)
+        return own
 
     def run_values(self, values, scene):
         """As `run_packed`, from values by name."""
@@ -185,6 +223,7 @@ class Arena:
         return self._run(start, scene)
 
     def _run(self, start, scene):
+        self.has_other_rows = False
         if self._written & OF_ROWS and self._masses_are_unequal() != self._is_unequal:
             return None
         found = self.start(start)

@@ -8,7 +8,6 @@ from ..errors import InvalidArgument, Status
 from .keeping import TIMES
 from .runner import PLAIN
 
-
 ALWAYS = ("t", "q", "qd")  # of the same shape in every case
 
 

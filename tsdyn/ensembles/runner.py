@@ -13,6 +13,7 @@ from ..simulation.variants import family_of, of_numbers, packed_anew
 from .arena import Arena, method_of, serves
 from .first_slice import Finished
 from .keeping import demand_keep, record_of, reduced
+from .tolerances import ARENAS
 
 PLAIN = Status.SUCCESS.sentence
 
@@ -65,7 +66,7 @@ class Runner:
     """Runs cases of a `Study`; for one thread."""
 
     def __init__(self, study):
-        self.study, self._arena = study, None
+        self.study, self._arenas = study, []
 
     def run(self, i):
         """The `Record` of case i."""
@@ -80,21 +81,40 @@ class Runner:
         study = self.study
         changes = {**study.changes, **values} if study.changes else values
         if study.has_arena:
-            if self._arena is None:
-                self._arena = Arena(study)
-            ran = self._arena.run_values(changes, lambda: self._scene(changes))
+            ran = self._in_arena(lambda arena: arena.run_values(changes, lambda: self._scene(changes)))
             if ran is not None:
                 return self._record(changes, *ran)
         found = study.family.numbers(changes)
         if study.has_arena and found is not None:
-            ran = self._arena.run_packed(*found, lambda: self._scene(changes))
+            ran = self._in_arena(lambda arena: arena.run_packed(*found, lambda: self._scene(changes)))
             if ran is not None:
                 return self._record(changes, *ran)
-        if self._arena is not None and self._arena.is_spoilt:
-            self._arena = None
         scene = self._scene(changes)
         solution = run_from({**study.given, "scene": scene, "progress": study.report})
         return self._recorded(solution, _Rows(solution))
+
+    def _in_arena(self, run):
+        """An arena, that of the last case first, and what `run` makes of it; None if a case can't be run in any.
+
+        Each has the redundant rows of its first case, if there are any: the order of these follows from the numbers.
+        """
+        for arena in (*self._arenas, None):
+            if arena is None and len(self._arenas) < ARENAS:
+                arena = Arena(self.study)
+                self._arenas.append(arena)
+            if arena is None:
+                return None
+            ran = run(arena)
+            if arena.is_spoilt:
+                self._arenas.remove(arena)
+            elif ran is not None and arena is not self._arenas[0]:
+                self._arenas.remove(arena)
+                self._arenas.insert(0, arena)
+            if ran is not None:
+                return arena, *ran
+            if not arena.has_other_rows:
+                return None
+        return None
 
     def _scene(self, changes):
         """A scene with these values."""
@@ -104,14 +124,16 @@ class Runner:
             return packed_anew(family, changes)
         return of_numbers(self.study.scene, family, changes, *found)
 
-    def _record(self, changes, task, outcome):
-        """The `Record` of a run in the arena."""
+    def _record(self, changes, arena, task, outcome):
+        """The `Record` of a run in an arena."""
         study, keep = self.study, self.study.keep
-        if isinstance(outcome, Finished):
-            return Record(Status.SUCCESS, PLAIN, record_of(keep, outcome, study.n, task.times))
-        if not callable(keep) and outcome.status is Status.SUCCESS and not outcome.counts["steps_near_singular"]:
+        plain = isinstance(outcome, Finished) or (
+            outcome.status is Status.SUCCESS and not outcome.counts["steps_near_singular"] and not callable(keep)
+        )
+        if plain and not arena.is_immobile:
             return Record(Status.SUCCESS, PLAIN, record_of(keep, outcome, study.n, task.times))
         scene = self._scene(changes)
+        scene._packed.derived.redundant = arena.packed.derived.redundant
         solution = Solution(scene, task._replace(prepared=scene._prepared), outcome, {"prepare": 0.0, "run": 0.0})
         return self._recorded(solution, outcome)
 

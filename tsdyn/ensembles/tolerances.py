@@ -18,3 +18,5 @@ RETRIES = 3
 WAITING = 1 << 16
 # s: after which readers of a store see what has been written
 FLUSH = 1.0
+# sets of arrays of a thread: one for each selection of redundant rows that has been met
+ARENAS = 8

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from examples import four_bar, pendulum_chain, stability_map, stick_slip, top
+from examples import drive_train, four_bar, pendulum_chain, stability_map, stick_slip, top
 from tests.helpers.every_force import everything
 
 RNG = np.random.default_rng(7)
@@ -105,7 +105,7 @@ def test_redundant_rows_are_selected_in_each_case(rows):
 
 
 def test_redundant_rows_friction_and_functions():
-    for scene in (four_bar.build(), stick_slip.build(), everything(np.random.default_rng(1))[0]):
+    for scene in (four_bar.build(), stick_slip.build(), drive_train.build(), everything(np.random.default_rng(1))[0]):
         name = f"{scene.bodies[0].name}.mass"
         table = {name: scene.parameters()[name] * np.array([0.9, 1.1])}
         found = ts.ensemble(scene, table, SPAN, rtol=1e-5, atol=1e-5)
@@ -254,6 +254,7 @@ def test_tables_and_reprs():
 WRONG = {
     "did you mean bob.mass": {"parameters": {"bob.mas": [1.0]}},
     "as many values as there are cases": {"parameters": {"bob.mass": [1.0, 2.0], "gravity": np.zeros((3, 3))}},
+    "have no values": {"parameters": {"bob.mass": []}},
     "a mapping of names to arrays": {"parameters": 3},
     "needs the number of cases": {"parameters": lambda i: {}},
     "neither one for all cases": {"parameters": {"bob.mass": np.ones((2, 2))}},

@@ -162,7 +162,7 @@ class Arena:
             return found
         memory = remembered(state, kept, t, q)
         if packed.system.memory.size:
-            return None
+            packed.system.reals[packed.system.memory] = memory[kept.handles.count :]
         started = self._started(q, qd, t, tol)
         if started is None or self.is_spoilt:
             return None

@@ -103,6 +103,8 @@ def cases_of(scene, parameters, count):
         said = ", ".join(f"{name}: {length}" for name, length in lengths.items())
         raise InvalidArgument(f"parameters must have as many values as there are cases, got {said}.")
     known = next(iter(lengths.values()), None)
+    if known == 0:
+        raise InvalidArgument(f"parameters have no values: {', '.join(lengths)}; give an array with one for each case.")
     if count is not None and known not in (None, count):
         raise InvalidArgument(f"cases={count!r}, but the parameters have {counted(known, 'value')} each.")
     return Cases(columns, fixed, known if known is not None else int(count or 1))

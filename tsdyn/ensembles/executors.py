@@ -12,9 +12,9 @@ from ..errors import InvalidArgument, MissingDependency
 from .chunks import run_chunk
 from .runner import Runner, Study
 from .threads import Queue
-from .tolerances import AHEAD, LOOK, RETRIES, SENT_SECONDS
+from .tolerances import AHEAD, LOOK, RETRIES, SENT_SECONDS, STUDIES
 
-_idle = {}  # of a worker: what was sent -> runners that no thread uses
+_idle = {}  # of a worker: digest of what was sent -> runners that no thread uses
 
 
 def run_job(sent, part, offset):
@@ -22,8 +22,7 @@ def run_job(sent, part, offset):
 
     sent: a `Study`, or (digest, bytes) of what it is made of; part: the cases, or bytes of them.
     """
-    key = id(sent) if isinstance(sent, Study) else sent[0]
-    runners = _idle.setdefault(key, [])
+    runners = sent.idle if isinstance(sent, Study) else _runners_of(sent[0])
     try:
         runner = runners.pop()
     except IndexError:
@@ -38,6 +37,13 @@ def run_job(sent, part, offset):
         raise KeyboardInterrupt
     runners.append(runner)
     return chunk, time.perf_counter() - began
+
+
+def _runners_of(digest):
+    """The idle runners of a study, which are kept for the last few studies."""
+    while digest not in _idle and len(_idle) >= STUDIES:
+        _idle.pop(next(iter(_idle)), None)
+    return _idle.setdefault(digest, [])
 
 
 def _study(payload, cases):

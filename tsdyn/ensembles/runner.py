@@ -54,7 +54,7 @@ class Study:
         self.stops = self.kept.stops(*options.span)
         self.names = None if cases.names is None else {*self.changes, *cases.names}
         self.has_arena = settings.drop and serves(self.family, self.kept, self.names)
-        self.stopped = False
+        self.stopped, self.idle = False, []  # runners of the threads of an executor
 
     def report(self, fraction, *more):
         """Of a run: end it if the ensemble has been stopped."""

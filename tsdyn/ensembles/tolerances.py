@@ -20,3 +20,5 @@ WAITING = 1 << 16
 FLUSH = 1.0
 # sets of arrays of a thread: one for each selection of redundant rows that has been met
 ARENAS = 8
+# studies whose runners a worker keeps
+STUDIES = 4

@@ -6,6 +6,7 @@ are asked for; a run needs none of them.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
@@ -19,6 +20,7 @@ from .scene_cache import prepared
 if TYPE_CHECKING:
     from ..hints import ParameterList, Scene
 
+_making = threading.RLock()  # handles are made by one thread at a time: their aliases are shared
 HANDLES = ("ground", "_bodies", "_added", "_forces", "_normalisations")  # attributes of a scene
 
 
@@ -131,7 +133,8 @@ def of_numbers(scene, family, changes, packed, start):
 
 def packed_anew(family, changes):
     """Return a scene with other values, and handles of its own."""
-    scene, pairs = _made(family, changes)
+    with _making:
+        scene, pairs = _made(family, changes)
     scene._twins = scene._aliases = WeakKeyDictionary(pairs)
     packed, before = scene.packed, family.packed
     same = classes(packed) == classes(before) and packed.system.segments.shape == before.system.segments.shape
@@ -142,15 +145,18 @@ def packed_anew(family, changes):
 
 def make_handles(scene):
     """Make bodies, constraints and forces of a scene that is packed numbers so far."""
-    family, changes = vars(scene).pop("_later")
-    twin, pairs = _made(family, changes)
-    vars(scene).update({name: vars(twin)[name] for name in HANDLES})
-    scene.ground.scene = scene
-    for body in scene._bodies:
-        vars(body)["scene"] = scene
-    scene._twins = scene._aliases = WeakKeyDictionary(pairs)
-    handles = handles_of(scene._packed)
-    handles.aliases.update((own, handles.own(known)) for known, own in pairs)
+    with _making:
+        if "_later" not in vars(scene):  # another thread has made them
+            return
+        family, changes = scene._later
+        twin, pairs = _made(family, changes)
+        for body in (twin.ground, *twin._bodies):
+            vars(body)["scene"] = scene
+        scene._twins = scene._aliases = WeakKeyDictionary(pairs)
+        handles = handles_of(scene._packed)
+        handles.aliases.update((own, handles.own(known)) for known, own in pairs)
+        vars(scene).update({name: vars(twin)[name] for name in HANDLES})
+        del scene._later
 
 
 def _made(family, changes):

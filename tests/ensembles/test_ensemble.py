@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from examples import drive_train, four_bar, pendulum_chain, stability_map, stick_slip, top
+from examples import drive_train, four_bar, pendulum_chain, stability_map, stick_slip, tolerance_analysis, top
 from tests.helpers.every_force import everything
 
 RNG = np.random.default_rng(7)
@@ -64,6 +64,27 @@ def test_options_are_those_of_simulate(options):
         solution = alone(scene, table, i, **options)
         assert found.q[i].tobytes() == solution.state.q.tobytes()
         assert (found.status[i], found.message[i], found.t[i]) == (solution.status, solution.message, solution.reached)
+
+
+def test_geometry_of_joints():
+    scene = tolerance_analysis.build()
+    table = tolerance_analysis.table(scene, *tolerance_analysis.draw(3))
+
+    def keep(solution):
+        return {"angle": solution.angle("far bearing"), "load": solution.reaction("rocker pin")[1]}
+
+    found = ts.ensemble(scene, table, SPAN, keep=keep, t_eval=[0.0, 0.05], threads=1)
+    assert found.success.all(), found.message
+    for i in range(3):
+        solution = alone(scene, table, i, t_eval=[0.0, 0.05])
+        built = tolerance_analysis.build()
+        for name, values in table.items():
+            owner, _, attribute = name.rpartition(".")
+            setattr(built[owner], attribute, values[i])
+        assert ts.simulate(built, SPAN, t_eval=[0.0, 0.05]).q.tobytes() == solution.q.tobytes()
+        assert found.q[i].tobytes() == solution.q[-1].tobytes()
+        for name, values in keep(solution).items():
+            assert found.kept[name][i].tobytes() == values.tobytes()
 
 
 def test_rods_without_inertia_about_their_axes():

@@ -17,6 +17,7 @@ from ..formulations.locked_orientations import hold
 from ..jit.code_hash import is_ours
 from ..methods.integrator import frozen
 from ..model.derived import Derived
+from ..model.handles import handles_of
 from ..model.lengths import is_small
 from ..model.packed import System, classes
 from ..motions.signals import Signal
@@ -51,7 +52,8 @@ def serves(family, kept, names):
         load = family.load_of(owner)
         if load is not None and any(isinstance(value, Signal) for value in load.parameters):
             return False  # numbers beside a function of time are written into the memory of the series
-        if load is None and (type(owner) in driven or not is_ours(type(owner).__module__)):
+        kinds = {type(part) for part in getattr(owner, "parts", ())}
+        if load is None and (kinds & driven or not all(is_ours(kind.__module__) for kind in (type(owner), *kinds))):
             return False
     return True
 
@@ -111,6 +113,9 @@ class Arena:
         if moved or self.kept.packed.coordinates is not base.coordinates:
             own.derived.levers = own.derived.near = own.derived.grounded = None
             own.derived.origin = None, None
+        if packed.members is not base.members or self.kept.packed.members is not base.members:
+            own.derived.members = own.derived.aligned = None
+            own.derived.handles = self.kept.handles = handles_of(packed)
         if {"mass", "inertia"} & {*names, *self._written}:
             self._weigh()
         self._written = {*names}

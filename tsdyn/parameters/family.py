@@ -1,14 +1,15 @@
 """Scenes that differ in numbers: one analysis, one packing, and the numbers of each.
 
 A value that only enters numbers of the packed arrays (mass, inertia, gravity, a start, what a force or a primitive gets
-as par, where their markers are) is written into a copy of those arrays. All else, such as the geometry of a joint, from
-which its parts follow, asks for the scene to be packed anew.
+as par, where their markers are, those of the parts of a joint) is written into a copy of those arrays. All else, such
+as functions of time, or a joint whose coordinate a force measures, asks for the scene to be packed anew.
 """
 
 from ..elements.bodies import PointMass
 from ..elements.element import checked_parameters
 from ..elements.joint import Joint
 from ..errors import InvalidArgument
+from ..jit.code_hash import is_ours
 from ..model.derived import Derived
 from ..model.handles import handles_of
 from ..model.lengths import size_of
@@ -37,7 +38,9 @@ class Family:
         self.packed, self.start, self.template = packed, start, template
         self.fields, self.shared = fields_of(template), {}
         handles_of(packed)
-        self._members = {id(it): member for it, member in zip(template.constraints, packed.members, strict=True)}
+        self._members = {id(item): i for i, item in enumerate(template.constraints)}
+        bodies = zip((template.ground, *template.bodies), (packed.bodies[0].scene.ground, *packed.bodies), strict=True)
+        self._bodies = {id(body): own for body, own in bodies}
         self._loads = {id(force): i for i, force in enumerate(template._forces)}
         self._structural = {}
         self._begins = self._find_begins()
@@ -71,13 +74,18 @@ class Family:
         if known is None:
             items = (*self.template._added, *self.template._forces)
             known = self._structural[id(owner)] = (
-                isinstance(owner, Joint)
-                or hasattr(owner, "opposed")
-                or getattr(owner, "period", None) is not None
+                getattr(owner, "period", None) is not None
+                or (isinstance(owner, Joint) and not is_ours(type(owner).__module__))
                 or any(value is owner for item in items for value in vars(item).values())
             )
+        if isinstance(owner, Joint):
+            return known
         places = [marker.argument for marker in owner.markers] if owner.joint_coordinates else []
-        return known or any(name in places for name in attributes)
+        return known or hasattr(owner, "opposed") or any(name in places for name in attributes)
+
+    def own_body(self, body):
+        """The body of the packed scene that one of the template stands for."""
+        return self._bodies.get(id(body), body)
 
     def numbers(self, values):
         """The `Packed` and the start of a scene with other values, by name; None if it must be packed anew.
@@ -103,7 +111,7 @@ class Edit:
     def __init__(self, family):
         self.family, self.packed = family, family.packed
         self._arrays, self._start = {}, None
-        self._coordinates = self._parameters = self._loads = None
+        self._coordinates = self._parameters = self._loads = self._members = self._constraints = None
 
     def _array(self, name):
         if name not in self._arrays:
@@ -120,6 +128,8 @@ class Edit:
             return True
         if self.family.is_structural(owner, changes):
             return False
+        if isinstance(owner, Joint):
+            return self._enter_joint(self.family._members[id(owner)], owner, changes)
         other = with_attributes(owner, changes)
         load = self.family._loads.get(id(owner))
         return self._enter_constraint(owner, other) if load is None else self._enter_force(load, owner, other)
@@ -137,7 +147,29 @@ class Edit:
             self._start[0][at : at + length], self._start[1][at : at + length] = other.q, other.qd
 
     def _enter_constraint(self, owner, other):
-        i = self.family._members[id(owner)].parts.start
+        member = self.packed.members[self.family._members[id(owner)]]
+        return self._enter_primitive(member.parts.start, owner, other)
+
+    def _enter_joint(self, i, owner, changes):
+        """Enter the parts of a joint, which are made anew for the bodies of the packed scene."""
+        other, member = sketch(owner), self.packed.members[i]
+        vars(other).update(a=self.family.own_body(owner.a), b=self.family.own_body(owner.b))
+        other = with_attributes(other, changes)
+        if [type(part) for part in other.parts] != [type(part) for part in owner.parts]:
+            return False
+        first = member.parts.start
+        if not all(
+            self._enter_primitive(first + j, *pair) for j, pair in enumerate(zip(owner.parts, other.parts, strict=True))
+        ):
+            return False
+        if self._members is None:
+            self._members, self._constraints = list(self.packed.members), list(self.packed.constraints)
+        self._members[i] = member._replace(constraint=other, coordinates=other.coordinates)
+        self._constraints[member.parts] = other.parts
+        return True
+
+    def _enter_primitive(self, i, owner, other):
+        """Enter a primitive, the i-th of the packed scene, as another one like it; False if it isn't like it."""
         given, before = checked_motions(other), self.packed.parameters[i]
         if other.rheonomic != owner.rheonomic or not _alike(given, before):
             return False
@@ -187,7 +219,18 @@ class Edit:
             changes["size"] = size_of(packed.constraints, coordinates)
         if self._loads is not None:
             changes["loads"] = tuple(self._loads)
-        return packed._replace(**changes), self._start or self.family.start
+        if self._members is not None:
+            changes |= {"members": tuple(self._members), "constraints": tuple(self._constraints)}
+            derived.members = derived.aligned = derived.handles = None  # made of joints
+        found = packed._replace(**changes)
+        if self._members is not None:
+            aliases = {old.constraint: new.constraint for old, new in zip(packed.members, self._members, strict=True)}
+            known = handles_of(packed).aliases
+            handles_of(found).aliases.update(
+                [*((alias, aliases.get(meant, meant)) for alias, meant in known.items()),
+                 *((old, new) for old, new in aliases.items() if new is not old)]
+            )  # fmt: skip
+        return found, self._start or self.family.start
 
 
 def _pairs(before, given):

@@ -59,6 +59,7 @@ class Prepared:
         for name in OF_NUMBERS & vars(other).keys():
             del vars(other)[name]
         other.packed, other._start, other._spare = packed, ((None, None), None), {}
+        other.handles = handles_of(packed)
         return other
 
     @cached_property

@@ -79,9 +79,9 @@ def with_parameters(scene: Scene, values: Mapping[str, Any]) -> Scene:
 
     Notes
     -----
-    The constraint graph and the packed arrays are shared, so masses, inertias, starts, gravity, and the numbers of
-    forces and of constraints such as Distance take microseconds. The geometry of a joint and what its parts are made
-    from, functions of time and sampling periods take milliseconds: the scene is packed anew.
+    The constraint graph and the packed arrays are shared: masses, inertias, starts, gravity, and the numbers of forces
+    and of constraints such as Distance take tens of microseconds, the geometry of a joint some hundreds. Functions of
+    time, sampling periods, and joints that a force refers to take milliseconds: the scene is packed anew.
 
     Examples
     --------

@@ -1,8 +1,8 @@
 """The arrays that the runs of one thread have in common: each case writes its numbers into them.
 
 Everything that numbers don't change is made once: constraint graphs, memory of runs, addresses. A case whose numbers
-change more (an axis without inertia, redundant rows, a scene of micrometres) isn't run here; it is run as a scene of
-its own, with the same bits.
+change more (an axis without inertia, a scene of micrometres) isn't run here; it is run as a scene of its own, with the
+same bits.
 """
 
 from functools import partial
@@ -10,21 +10,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ..configuration.initial_conditions import RedundantStarts, RegularStarts, consistent
-from ..configuration.mirrored_branches import demand_aligned
-from ..elements.bodies import PointMass
-from ..formulations.locked_orientations import hold
-from ..jit.code_hash import is_ours
 from ..methods.integrator import frozen
 from ..model.derived import Derived
 from ..model.handles import handles_of
 from ..model.lengths import is_small
-from ..model.packed import System, classes
-from ..motions.signals import Signal
-from ..observables.friction_unique import demand_unique
-from ..observables.state import remembered
-from ..parameters.family import KEPT
-from ..runs.arguments import state_arrays
+from ..model.packed import System
+from ..parameters.edit import KEPT
 from ..runs.task import Task
 from ..simulation import method_choice
 from ..simulation.simulate import run_task, simulate
@@ -34,28 +25,10 @@ from ..taylor.run_memory import are_unequal
 from ..taylor.tolerances import LIGHT
 from .first_slice import FirstSlice
 from .pen import pen_of
+from .sharing import have_same_zeros
+from .starts import OF_ROWS, Starts
 
 FEW = 30  # bodies that a list serves faster than an array
-OF_ROWS = {"mass", "inertia"}  # what the independence of rows depends on, beside where things are
-
-
-def serves(family, kept, names):
-    """Return True if cases with other values of these parameters, all where names is None, can share arrays."""
-    packed = family.packed
-    driven = {kind for kind, row in zip(classes(packed), packed.system.kinds, strict=True) if row.phi_t}
-    if kept.sampled:
-        return False
-    fields = family.fields.values() if names is None else map(family.field, names)
-    for owner in {id(field.owner): field.owner for field in fields}.values():
-        if owner is family.template or isinstance(owner, PointMass):
-            continue
-        load = family.load_of(owner)
-        if load is not None and any(isinstance(value, Signal) for value in load.parameters):
-            return False  # numbers beside a function of time are written into the memory of the series
-        kinds = {type(part) for part in getattr(owner, "parts", ())}
-        if load is None and (kinds & driven or not all(is_ours(kind.__module__) for kind in (type(owner), *kinds))):
-            return False
-    return True
 
 
 class Arena:
@@ -79,9 +52,7 @@ class Arena:
             row_names=template.row_names,
         )  # fmt: skip
         self.moments, self._is_unequal = _moments(system), are_unequal(system)
-        self._written, self._weights, self._start = set(), [], (None, None)
-        self._starts, self._selected, self._others = None, None, []
-        self.has_other_rows = False  # whether the last case had others than these that are redundant
+        self.written, self._weights, self.starts = set(), [], Starts(self)
         self._pen = None if study.names is None else pen_of(self, study.names)
         self._slice = FirstSlice(study) if FirstSlice.serves(study) else None
 
@@ -99,13 +70,13 @@ class Arena:
     def enter(self, packed):
         """Write the numbers of a packed scene; False if they change more than numbers."""
         base, own = self.base, self.packed
-        if is_small(packed.size) != is_small(base.size) or not _same_zeros(packed.parameters, base.parameters):
+        if is_small(packed.size) != is_small(base.size) or not have_same_zeros(packed.parameters, base.parameters):
             return False
         names = [name for name in System._fields if getattr(packed.system, name) is not getattr(base.system, name)]
         moved = packed.coordinates is not base.coordinates
         if (moved or "mass" in names or "inertia" in names) and lean_bodies(packed):
             return False
-        for name in {*names, *self._written}:
+        for name in {*names, *self.written}:
             array = getattr(packed.system, name)
             getattr(own.system, name)[...] = array
             for memory in self._memories():
@@ -116,11 +87,16 @@ class Arena:
         if packed.members is not base.members or self.kept.packed.members is not base.members:
             own.derived.members = own.derived.aligned = None
             own.derived.handles = self.kept.handles = handles_of(packed)
-        if {"mass", "inertia"} & {*names, *self._written}:
+        if OF_ROWS & {*names, *self.written}:
             self._weigh()
-        self._written = {*names}
+        self.written = {*names}
         self.kept.packed = self.scene.packed = packed._replace(system=own.system, derived=own.derived)
         return True
+
+    @property
+    def has_other_rows(self):
+        """Whether the last case had other redundant rows than the first."""
+        return self.starts.has_other_rows
 
     @property
     def is_spoilt(self):
@@ -135,7 +111,7 @@ class Arena:
 
     def _masses_are_unequal(self):
         """As `are_unequal`; without inertias, unless these differ from case to case."""
-        if "inertia" in self._written or self._is_unequal or len(self.packed.bodies) > FEW:
+        if "inertia" in self.written or self._is_unequal or len(self.packed.bodies) > FEW:
             return are_unequal(self.packed.system)
         masses = self.packed.system.mass.tolist()
         return max(masses) > LIGHT * min(masses)
@@ -145,7 +121,7 @@ class Arena:
 
     def _graphs(self):
         known, series = self.packed.derived, vars(self.kept).get("series")
-        others = [other.packed.derived.graph for other in self._others]
+        others = [other.packed.derived.graph for other in self.starts.others]
         graphs = [found[0] for found in (known.graph, known.moving_graph, *others) if found is not None]
         return graphs if series is None else [*graphs, series.graph]
 
@@ -157,62 +133,13 @@ class Arena:
                 array[...] = value
         self.moments = _moments(self.packed.system)
 
-    def start(self, start):
-        """The memory of forces and a consistent start; None if more must be looked at."""
-        study, kept, packed = self.study, self.kept, self.kept.packed
-        t, tol, state = study.options.span[0], study.options.settings.initial_tol, study.given["state"]
-        q, qd = start if state is None else state_arrays(state, kept.n)
-        known, found = self._start
-        if known is q and not self._written & OF_ROWS:
-            return found
-        memory = remembered(state, kept, t, q)
-        if packed.system.memory.size:
-            packed.system.reals[packed.system.memory] = memory[kept.handles.count :]
-        started = self._started(q, qd, t, tol)
-        if started is None or self.is_spoilt:
-            return None
-        if known is not q:
-            demand_aligned(packed, started[0], t)
-        demand_unique(packed, started[0], t)
-        found = memory, hold(packed, *started)
-        self._start = q, found
-        return found
-
-    def _started(self, q, qd, t, tol):
-        """A start as `consistent` returns it; None if it must be looked at in a scene of its own."""
-        if self._starts is None:
-            self._starts = RegularStarts(self.scene, q, qd, t, tol)
-        derived = self.packed.derived
-        if derived.redundant is None and self._starts.are_plain(q, qd):
-            return q, qd
-        if self.kept.packed.coordinates is not self.base.coordinates:
-            return None
-        if derived.redundant is None:
-            started = consistent(self.scene, self.packed.system, q, qd, t, tol, True)
-            return None if derived.redundant is None else started
-        if self._selected is None:
-            self._others = [self._with_redundant(rows) for rows in (None, np.zeros(0, np.int64))]
-            self._selected = RedundantStarts([*self._others, self.scene], q, qd, t, tol)
-        started = self._selected.landed(q, qd)
-        self.has_other_rows = started is None
-        return started
-
-    def _with_redundant(self, rows):
-        """The scene with the same arrays, and other redundant rows."""
-        derived = Derived(redundant=rows, shared=self.study.family.shared)
-        for name in KEPT:
-            setattr(derived, name, getattr(self.packed.derived, name))
-        own = SimpleNamespace(**vars(self.scene))
-        own.packed = self.packed._replace(derived=derived)
-        return own
-
     def run_values(self, values, scene):
         """As `run_packed`, from values by name."""
         if self._pen is None:
             return None
         if self.kept.packed is not self.packed:
             self.kept.packed = self.scene.packed = self.packed
-        self._written |= self._pen.written
+        self.written |= self._pen.written
         start = self._pen.write(values)
         return None if start is None else self._run(start, scene)
 
@@ -228,10 +155,10 @@ class Arena:
         return self._run(start, scene)
 
     def _run(self, start, scene):
-        self.has_other_rows = False
-        if self._written & OF_ROWS and self._masses_are_unequal() != self._is_unequal:
+        self.starts.has_other_rows = False
+        if self.written & OF_ROWS and self._masses_are_unequal() != self._is_unequal:
             return None
-        found = self.start(start)
+        found = self.starts.start(start)
         if found is None:
             return None
         study, (memory, (q, qd)) = self.study, found
@@ -260,14 +187,6 @@ def method_of(kept, options, default):
 def _implicit_is_faster(scene, study, method, run):
     given = {**study.given, "scene": scene()}
     return method_choice.implicit_is_faster(simulate, given, method, study.options.span[1], run)
-
-
-def _same_zeros(parameters, base):
-    """Whether numbers of constraints are zero where others are: masks of columns depend on these."""
-    if parameters is base:
-        return True
-    changed = [(new, old) for new, old in zip(parameters, base, strict=True) if new is not old]
-    return all((x == 0.0) == (y == 0.0) for new, old in changed for x, y in zip(new, old, strict=True))
 
 
 def _moments(system):

@@ -12,7 +12,7 @@ from ..elements.bodies import PointMass
 from ..elements.element import checked_parameters
 from ..elements.tolerances import LEAST_MASS
 from ..motions.signals import Signal
-from ..parameters.family import sketch, with_values
+from ..parameters.edit import sketch, with_values
 from ..sparse.massless_axes import levers
 from ..sparse.tolerances import THIN
 

@@ -10,9 +10,10 @@ from ..simulation.options import checked
 from ..simulation.simulate import run_from
 from ..simulation.solution import Solution
 from ..simulation.variants import family_of, of_numbers, packed_anew
-from .arena import Arena, method_of, serves
+from .arena import Arena, method_of
 from .first_slice import Finished
 from .keeping import demand_keep, record_of, reduced
+from .sharing import serves
 from .tolerances import ARENAS
 
 PLAIN = Status.SUCCESS.sentence

@@ -1,5 +1,6 @@
 """Handles of a packed scene: bodies, constraints, forces, their coordinates, and the angles that runs count."""
 
+import threading
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -11,6 +12,8 @@ from ..elements.joint_coordinates import angles, displacements
 from ..elements.names import named
 from ..errors import InvalidBody, InvalidConstraint
 from .joint_motion import BodyMotion, displacement
+
+_lock = threading.Lock()  # of aliases, which scenes of a family share
 
 
 class Row(NamedTuple):
@@ -37,8 +40,6 @@ class Handles:
         Where the coordinates of the own and of the other body begin, and how many they are.
     frames : ndarray (count, 9)
         f, g and h of each angle.
-    aliases : WeakKeyDictionary
-        Handles of other scenes of the family, and what they stand for here.
     """
 
     def __init__(self, packed):
@@ -48,7 +49,7 @@ class Handles:
         constraints = [each for each in constraints if not getattr(each, "normalises", False)]
         self.items = (*constraints, *(load.force for load in packed.loads))
         self._where = {body: tuple(place) for body, place in zip(self.bodies, places, strict=True)}
-        self._by_item, self.aliases = None, WeakKeyDictionary()
+        self._by_item, self._aliases = None, WeakKeyDictionary()
         rows, joints, frames = [], [], []
         for item in self.items:
             if item.joint_coordinates:
@@ -63,10 +64,10 @@ class Handles:
 
     def __getstate__(self):
         """An item is another object where this is unpickled."""
-        return {**self.__dict__, "_by_item": None, "aliases": None}
+        return {**self.__dict__, "_by_item": None, "_aliases": None}
 
     def __setstate__(self, state):
-        self.__dict__.update(state, aliases=WeakKeyDictionary())
+        self.__dict__.update(state, _aliases=WeakKeyDictionary())
 
     def where(self, body):
         """Where the coordinates of a body begin, and how many they are; (0, 0) for the ground."""
@@ -89,7 +90,17 @@ class Handles:
 
     def own(self, handle):
         """A handle of this scene in place of one of another scene of the family."""
-        return self.aliases.get(handle, handle) if isinstance(handle, (PointMass, Attachment)) else handle
+        return self._aliases.get(handle, handle) if isinstance(handle, (PointMass, Attachment)) else handle
+
+    def add_aliases(self, pairs):
+        """Let handles of other scenes of the family stand for handles of this one, in pairs."""
+        with _lock:
+            self._aliases.update(pairs)
+
+    def aliases(self):
+        """All such pairs, a list."""
+        with _lock:
+            return list(self._aliases.items())
 
     def row(self, joint, kind):
         """The `Row` of a joint that has some of a kind of coordinates: "angle" or "displacement"."""

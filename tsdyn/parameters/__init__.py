@@ -3,6 +3,6 @@
 Imports model, sparse and below, and docstrings, which state the units.
 
 Begin with fields.py (the attributes of bodies, constraints and forces that may be set, with their units). listing.py
-is what `scene.parameters()` returns. family.py writes the numbers of other values into a copy of the packed arrays, so
-that scenes of one family share their analysis.
+is what `scene.parameters()` returns. Scenes of a family (family.py) share their analysis: edit.py writes the numbers of
+other values into copies of the packed arrays.
 """

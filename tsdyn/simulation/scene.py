@@ -295,7 +295,7 @@ class Scene:
                 raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
             self._packed = pack(self)
             if self._aliases:
-                handles_of(self._packed).aliases.update(self._aliases)
+                handles_of(self._packed).add_aliases(self._aliases.items())
             self._users = list(user_functions(self._packed))
             self._functions = _marks(self._users)
         return self._packed

@@ -154,7 +154,7 @@ def make_handles(scene):
             vars(body)["scene"] = scene
         scene._twins = scene._aliases = WeakKeyDictionary(pairs)
         handles = handles_of(scene._packed)
-        handles.aliases.update((own, handles.own(known)) for known, own in pairs)
+        handles.add_aliases([(own, handles.own(known)) for known, own in pairs])
         vars(scene).update({name: vars(twin)[name] for name in HANDLES})
         del scene._later
 
@@ -169,5 +169,5 @@ def _made(family, changes):
     known = (*packed.bodies, *(member.constraint for member in packed.members), *(load.force for load in packed.loads))
     owners = (*template.bodies, *template.constraints, *template.forces)
     pairs = {one: twin[owner] for one, owner in zip(known, owners, strict=True)}
-    aliases = [(one, pairs[meant]) for one, meant in handles_of(packed).aliases.items() if meant in pairs]
+    aliases = [(one, pairs[meant]) for one, meant in handles_of(packed).aliases() if meant in pairs]
     return twin, [*pairs.items(), *aliases]

@@ -1,5 +1,7 @@
 """Ensembles that stream to a store: the same numbers, and a study that goes on where it was stopped."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -29,6 +31,10 @@ def test_a_store_has_the_same_numbers(suffix, options, tmp_path):
     for name in ("t", "q", "qd", "status", "reached"):
         np.testing.assert_array_equal(getattr(stored, name), getattr(whole, name))
     assert stored.message == whole.message
+    for ensemble in (stored, whole):
+        twin = pickle.loads(pickle.dumps(ensemble))
+        np.testing.assert_array_equal(twin.q, whole.q)
+        np.testing.assert_array_equal(twin.case(3).q[-1], whole.case(3).q[-1])
     assert stored.to_xarray().q.equals(whole.to_xarray().q)
 
 

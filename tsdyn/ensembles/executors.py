@@ -1,7 +1,6 @@
 """Cases sent in chunks to an executor: processes, or workers of Dask on this machine and others."""
 
 import contextlib
-import copy
 import hashlib
 import pickle
 import time
@@ -29,7 +28,7 @@ def run_job(sent, part, offset):
         runner = None
     cases = pickle.loads(part) if isinstance(part, bytes) else part
     if runner is None:
-        runner = Runner(copy.copy(sent) if isinstance(sent, Study) else _study(sent[1], cases))
+        runner = Runner(sent.twin(cases) if isinstance(sent, Study) else _study(sent[1], cases))
     runner.study.cases = cases
     began = time.perf_counter()
     chunk, interrupted = run_chunk(runner, 0, cases.count, offset)

@@ -57,6 +57,16 @@ class Study:
         self.has_arena = settings.drop and serves(self.family, self.kept, self.names)
         self.stopped, self.idle = False, []  # runners of the threads of an executor
 
+    def __reduce__(self):
+        """What is analysed is analysed again in another process."""
+        return Study, (self.scene, self.cases, self.given, self.keep)
+
+    def twin(self, cases):
+        """The same for some of the cases."""
+        other = object.__new__(Study)
+        vars(other).update(vars(self), cases=cases)
+        return other
+
     def report(self, fraction, *more):
         """Of a run: end it if the ensemble has been stopped."""
         if self.stopped and fraction is not None:

@@ -59,6 +59,13 @@ class StoredResults:
             )
         return self._format.count(self.path, [CASE, "status", "q", "qd"])
 
+    def __getstate__(self):
+        """Leave out the format, a module."""
+        return {**self.__dict__, "_format": None, "_store": None}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state, _format=format_of(state["path"]))
+
     @property
     def is_full(self):
         """Whether many cases wait for one before them, which takes long."""

@@ -85,3 +85,15 @@ def test_all_cases_may_fail(tmp_path):
     found = ts.ensemble(top.build(), {"top.mass": [-1.0, -2.0]}, SPAN, store=tmp_path / "study.h5", keep=lambda s: 1.0)
     assert not found.success.any()
     assert "positive" in found.message[1]
+
+
+@pytest.mark.parametrize("store", [None, "study.h5"])
+def test_arrays_of_another_shape_fail_their_cases(store, tmp_path):
+    def keep(solution):
+        return np.ones(2 if solution.scene.bodies[0].mass < 38 else 3)
+
+    place = store and tmp_path / store
+    found = ts.ensemble(top.build(), {"top.mass": MASSES}, SPAN, keep=keep, store=place, threads=1)
+    assert found.success.tolist() == (MASSES < 38).tolist()
+    assert "of the same shape" in found.message[-1]
+    assert found.kept.shape == (12, 2)

@@ -4,11 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InvalidArgument, Status
+from ..errors import Status
 from .keeping import TIMES
 from .runner import PLAIN
 
 ALWAYS = ("t", "q", "qd")  # of the same shape in every case
+
+
+OTHER_SHAPE = "keep must return arrays of the same shape for every case, it gave one of shape {}, and {} before."
 
 
 class Chunk(NamedTuple):
@@ -59,8 +62,7 @@ def _enter(arrays, k, found):
         if name not in arrays:
             arrays[name] = np.full((len(arrays["t"]), *np.shape(value)), np.nan)
         if np.shape(value) != arrays[name].shape[1:]:
-            shapes = f"{np.shape(value)}, and {arrays[name].shape[1:]} before"
-            return f"keep must return arrays of the same shape for every case, it gave one of shape {shapes}."
+            return OTHER_SHAPE.format(np.shape(value), arrays[name].shape[1:])
         arrays[name][k] = value
     return None
 
@@ -69,6 +71,24 @@ def empty(study, cases):
     """Arrays by name for so many cases, all NaN."""
     shape = (study.options.times.size, study.n) if study.keep == TIMES else (study.n,)
     return {"t": np.full(cases, np.nan), "q": np.full((cases, *shape), np.nan), "qd": np.full((cases, *shape), np.nan)}
+
+
+def fitted(chunk, shapes):
+    """A chunk whose arrays have these shapes, by name: its cases have failed where they have others."""
+    wrong = {
+        name: array.shape[1:]
+        for name, array in chunk.arrays.items()
+        if array.shape[1:] != shapes.get(name, array.shape[1:])
+    }
+    if not wrong:
+        return chunk
+    status, messages = chunk.status.copy(), dict(chunk.messages)
+    name = next(iter(wrong))
+    for k in np.flatnonzero(np.isin(status, (int(Status.SUCCESS), int(Status.EVENT)))).tolist():
+        status[k], messages[chunk.first + k] = Status.CASE_FAILED, OTHER_SHAPE.format(wrong[name], shapes[name])
+    return chunk._replace(
+        status=status, messages=messages, arrays={k: v for k, v in chunk.arrays.items() if k not in wrong}
+    )
 
 
 class Collected:
@@ -87,6 +107,7 @@ class Collected:
 
     def add(self, chunk):
         """Take over the results of a chunk; cases that are known already stay as they are."""
+        chunk = fitted(chunk, {name: array.shape[1:] for name, array in self.arrays.items()})
         rows = slice(chunk.first, chunk.first + chunk.count)
         fresh = self.status[rows] == Status.NOT_RUN
         self.status[rows][fresh] = chunk.status[fresh]
@@ -94,9 +115,6 @@ class Collected:
         for name, values in chunk.arrays.items():
             if name not in self.arrays:
                 self.arrays[name] = np.full((len(self.status), *values.shape[1:]), np.nan)
-            if self.arrays[name].shape[1:] != values.shape[1:]:
-                shapes = f"{values.shape[1:]}, and {self.arrays[name].shape[1:]} before"
-                raise InvalidArgument(f"keep must return arrays of the same shape for every case, it gave {shapes}.")
             self.arrays[name][rows][fresh] = values[fresh]
 
     def close(self):

@@ -14,13 +14,13 @@ from ..simulation.simulate import simulate
 from .cases import cases_of
 from .chunks import Collected
 from .executors import run_executor
-from .progress import Progress
+from .progress import CaseProgress
 from .results import Ensemble
 from .runner import Study
 from .threads import run_threads
 
 if TYPE_CHECKING:
-    from ..hints import CaseTable, Keep, Place, Span
+    from ..hints import CaseTable, Keep, Place, Progress, Span
 
 OWN = ("scene", "t_span", "store", "checkpoint", "progress")  # arguments of `simulate` that are no options here
 
@@ -38,7 +38,7 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
     lanes: int | None = None,
     store: Place | None = None,
     resume: bool = False,
-    progress: Any = None,
+    progress: Progress | None = None,
     **options: Any,
 ) -> Ensemble:
     """Run a scene many times, with other parameters each time; the scene is not changed.
@@ -112,7 +112,7 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
         raise InvalidArgument(f"threads must be a positive whole number, got {threads!r}.")
     study = Study(scene, cases_of(scene, parameters, cases), given_of(t_span, options), keep)
     sink = sink_of(study, store, resume)
-    report, used = Progress(progress, study.cases.count, sink.first), 0
+    report, used = CaseProgress(progress, study.cases.count, sink.first), 0
     try:
         if executor is None:
             used, interrupted = run_threads(study, sink, threads, report)

@@ -126,7 +126,7 @@ class _Sender:
         return False
 
     def _send(self):
-        while len(self.pending) < self.most and not self.sink.is_full:
+        while len(self.pending) < self.most and (self.again or not self.sink.is_full):
             pair = self.again.pop() if self.again else self.queue.take()
             if pair is None:
                 return

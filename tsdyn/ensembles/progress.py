@@ -5,7 +5,7 @@ import sys
 from ..errors import InvalidArgument, MissingDependency
 
 
-class Progress:
+class CaseProgress:
     """What is told of cases that are finished.
 
     Parameters

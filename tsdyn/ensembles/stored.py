@@ -16,7 +16,7 @@ from .._version import __version__
 from ..errors import Status, StorageError
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
 from ..storage.formats import Column, Table, format_of
-from .chunks import empty
+from .chunks import empty, fitted
 from .keeping import TIMES
 from .tolerances import FLUSH, WAITING
 
@@ -80,9 +80,12 @@ class StoredResults:
             if self._store is None and not self._open(ready):
                 return
             del self._waiting[self.first]
-            self._write(ready)
+            self._write(fitted(ready, {column.name: self._table.shapes(column)[0][1:] for column in self._kept()}))
         if self._store is not None and time.perf_counter() > self._due:
             self._flush()
+
+    def _kept(self):
+        return [column for column in self._table.columns if column.name.startswith("kept")]
 
     def _open(self, chunk, last=False):
         """Make or open the store; False if the shapes of what is kept aren't known yet."""

@@ -125,6 +125,21 @@ def test_redundant_rows_are_selected_in_each_case(rows):
             assert not callable(keep) or found.kept[i].tobytes() == solution.reaction("bearing")[0][-1].tobytes()
 
 
+def test_a_mechanism_that_can_not_move():
+    scene = ts.Scene()
+    shelf = scene.add_body(2.0, (1, 1, 1), position=(1, 0, 0), name="shelf")
+    for i in range(2):
+        scene.add(ts.constraints.Fixed.at(shelf, scene.ground, point=(0, i, 0), name=f"bracket {i}"))
+    table = {"shelf.mass": np.array([1.0, 2.0, 3.0])}
+    found = ts.ensemble(scene, table, SPAN, keep=lambda s: s.reaction("bracket 0")[0][-1])
+    for i in range(3):
+        solution = alone(scene, table, i)
+        assert found.message[i] == solution.message
+        assert "immobile" in solution.message
+        assert found.kept[i].tobytes() == solution.reaction("bracket 0")[0][-1].tobytes()
+    assert ts.ensemble(scene, table, SPAN).message == found.message
+
+
 def test_redundant_rows_friction_and_functions():
     for scene in (four_bar.build(), stick_slip.build(), drive_train.build(), everything(np.random.default_rng(1))[0]):
         name = f"{scene.bodies[0].name}.mass"

@@ -135,6 +135,7 @@ class Arena:
 
     def run_values(self, values, scene):
         """As `run_packed`, from values by name."""
+        self.starts.has_other_rows = False
         if self._pen is None:
             return None
         if self.kept.packed is not self.packed:
@@ -148,6 +149,7 @@ class Arena:
 
         `scene()` makes it a scene of its own.
         """
+        self.starts.has_other_rows = False
         if not self.enter(packed):
             return None
         if packed.coordinates is not self.base.coordinates:
@@ -155,7 +157,6 @@ class Arena:
         return self._run(start, scene)
 
     def _run(self, start, scene):
-        self.starts.has_other_rows = False
         if self.written & OF_ROWS and self._masses_are_unequal() != self._is_unequal:
             return None
         found = self.starts.start(start)
@@ -169,7 +170,7 @@ class Arena:
             options.events, settings.constraint_tol, settings.max_steps, settings.chart_interval or 0, study.report,
             options.history, choose, study.stops,
         )  # fmt: skip
-        outcome = None if self._slice is None else self._slice.run(task)
+        outcome = None if self._slice is None or self.is_immobile else self._slice.run(task)
         if outcome is not None:
             return task, outcome
         outcome = run_task(task, self.scene, settings.initial_tol)

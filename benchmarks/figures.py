@@ -2,7 +2,7 @@
 
 import math
 
-from tsdyn.plots import BLUE, GREEN, GREY, VERMILION, save
+from tsdyn.drawing import BLUE, GREEN, GREY, VERMILION, save
 
 COLOURS = (VERMILION, GREEN, "#CC79A7", "#E69F00", "#56B4E9", "#8C564B", "#009E9E", "#B8860B", "#6A3D9A")
 MARKERS = "osD^vPX<>"

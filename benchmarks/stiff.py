@@ -19,10 +19,8 @@ RELEASE = np.radians(45.0)  # from hanging
 
 
 def hinge(scene, a, b, point_a, point_b):
-    """A revolute joint about y, of five rows."""
-    scene.add(ts.constraints.Spherical(a, b, point_a=point_a, point_b=point_b))
-    for axis in ((1, 0, 0), (0, 0, 1)):
-        scene.add(ts.constraints.Dot1(a, b, axis_a=axis, axis_b=Y))
+    """A revolute joint about y."""
+    scene.add(ts.constraints.Revolute(a, b, point_a=point_a, point_b=point_b, axis_a=Y, axis_b=Y))
 
 
 def jointed(scale=1.0, release=RELEASE):
@@ -60,4 +58,31 @@ def hung(scale=1.0, release=RELEASE, count=2):
     scene.add(ts.constraints.Distance(beads[0], scene.ground))
     for a, b in pairwise(beads):
         scene.add(ts.forces.Spring(a, b, stiffness=1e5 * scale, damping=1e5 * scale))
+    return scene
+
+
+def mounted(stiffness, count=4):
+    """Blocks in a row, each on a bushing at the one before, critically damped or more; the first is pushed."""
+    scene, before = ts.Scene(gravity=(0.0, 0.0, -9.81)), None
+    mount = {"stiffness": stiffness, "damping": 1e-2 * stiffness}
+    mount |= {"torsional_stiffness": stiffness, "torsional_damping": 1e-2 * stiffness}
+    for i in range(count):
+        block = scene.add_body(1.0, (0.01, 0.02, 0.02), (0.3 * (i + 0.5), 0.0, 0.0), velocity=(0.0, 0.5, 0.0))
+        a, point = (scene.ground, (0.0, 0.0, 0.0)) if before is None else (before, (0.15, 0.0, 0.0))
+        scene.add(ts.forces.Bushing(a, block, point_a=point, point_b=(-0.15, 0.0, 0.0), **mount))
+        before = block
+    return scene
+
+
+def net(side=32):
+    """Particles on stiff damped springs along the lines of a grid, held at its corners; sags under its weight."""
+    scene = ts.Scene(gravity=(0.0, 0.0, -9.81))
+    knots = {(i, j): scene.add_point_mass(0.01, (0.1 * i, 0.1 * j, 0.0)) for i in range(side) for j in range(side)}
+    law = {"stiffness": 1e5, "damping": 10.0}
+    for (i, j), knot in knots.items():
+        for other in ((i + 1, j), (i, j + 1)):
+            if other in knots:
+                scene.add(ts.forces.Spring(knot, knots[other], **law))
+        if {i, j} <= {0, side - 1}:
+            scene.add(ts.constraints.Spherical(knot, scene.ground, point_b=knot.position))
     return scene

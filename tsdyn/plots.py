@@ -1,6 +1,6 @@
 """Figures; matplotlib, an optional dependency, is imported on first use.
 
-`constraint_error` draws one solution into the caller's axes; `tables_figure` draws the result of
+Figures of a solution draw into the caller's axes, or into new ones; `tables_figure` draws the result of
 `haug_tables.reproduce` without pyplot, so it affects neither the caller's backend nor open figures.
 """
 
@@ -9,69 +9,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from .benchmarking.haug_tables import DURATION, LEVELS
-from .drawing import BLUE, GREEN, GREY, VERMILION, demand_matplotlib, new_figure, save
+from .drawing import BLUE, GREY, VERMILION, new_figure, save
+from .figures.axes import ZERO, largest
+from .figures.errors import constraint_error
+from .figures.history import charts, energy, reaction, steps
+from .figures.modes import mode_shapes
+from .figures.phase import phase_portrait, poincare_section
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from .hints import Solution
 
-ZERO = 1e-17  # what an error of exactly zero is drawn as: below any other
-POINTS = 400  # stretches of time, the largest error of each of which is drawn
 UNITS = ("m", "m/s", "m/s²")
-
-
-def constraint_error(solution: Solution, ax: Any = None) -> Any:
-    """Draw the constraint errors of a solution over time: position, velocity and acceleration, log scale.
-
-    Of a long run the largest error in each of 400 stretches of time is drawn; zeros are drawn at 1e-17.
-
-    Parameters
-    ----------
-    solution : Solution
-    ax : matplotlib Axes, optional
-        Where to draw; default new axes of pyplot's.
-
-    Returns
-    -------
-    matplotlib Axes
-
-    Raises
-    ------
-    MissingDependency
-        If matplotlib is not installed.
-
-    Examples
-    --------
-    The errors of a pendulum, in the axes of a figure made for them:
-
-    >>> import tsdyn as ts
-    >>> scene = ts.Scene(gravity=(0, 0, -10))
-    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
-    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
-    >>> from matplotlib.figure import Figure
-    >>> figure = Figure()
-    >>> axes = ts.plots.constraint_error(ts.simulate(scene, (0, 1)), figure.subplots())
-    >>> axes.get_yscale()
-    'log'
-    """
-    demand_matplotlib()
-    if ax is None:
-        from matplotlib import pyplot
-
-        _, ax = pyplot.subplots(layout="constrained")
-    for level, unit, error, colour in zip(
-        LEVELS, UNITS, solution.constraint_error, (BLUE, VERMILION, GREEN), strict=True
-    ):
-        _draw(ax, solution.t, error, colour, label=f"{level}\nup to {error.max():.1e} {unit}")
-    ax.set_yscale("log")
-    ax.set_xlabel("time (s)")
-    ax.set_ylabel("constraint error, maximum norm")
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, fontsize="small", columnspacing=1.2)
-    return ax
 
 
 def tables_figure(tables: Sequence[Any]) -> Any:
@@ -170,11 +120,20 @@ def _ceiling(value):
     return f"{(math.floor(value / power) + 1) * power:.0e}"
 
 
-def _draw(ax, t, error, colour, label=None):
-    """One curve, thinned to the largest error of each stretch of time, zeros lifted to where a log axis has them."""
-    size = max(1, -(-t.size // POINTS))
-    at = [start + int(error[start : start + size].argmax()) for start in range(0, t.size, size)]
-    ax.plot(t[at], np.maximum(error[at], ZERO), color=colour, linewidth=1.3, label=label)
+def _draw(ax, t, error, colour):
+    """One curve."""
+    ax.plot(*largest(t, error), color=colour, linewidth=1.3)
 
 
-__all__ = ["constraint_error", "save", "tables_figure"]
+__all__ = [
+    "charts",
+    "constraint_error",
+    "energy",
+    "mode_shapes",
+    "phase_portrait",
+    "poincare_section",
+    "reaction",
+    "save",
+    "steps",
+    "tables_figure",
+]

@@ -1,6 +1,6 @@
 """A ts.Scene in Exudyn: bodies with Euler parameters, joints by multipliers, generalised-alpha of index 3 or trapezoid.
 
-It takes the constraints and forces of the gallery of hard cases and of stiff chains.
+It takes the constraints and forces of the gallery of hard cases and of stiff scenes.
 """
 
 import time
@@ -37,24 +37,35 @@ class ExudynScene:
         self.container = exu.SystemContainer()
         self.mbs = self.container.AddSystem()
         self.bodies = {scene.ground: self.mbs.AddObject(ex.ObjectGround())}
+        self.particles = {body for body in scene.bodies if not hasattr(body, "inertia")}
         for body in scene.bodies:
-            A = rotation_matrix(np.asarray(body.orientation))
-            self.bodies[body] = self.mbs.CreateRigidBody(
-                inertia=ex.RigidBodyInertia(body.mass, np.asarray(body.inertia)), gravity=list(scene.gravity),
-                referencePosition=list(body.position), referenceRotationMatrix=A,
-                initialVelocity=list(body.velocity), initialAngularVelocity=list(A @ body.angular_velocity),
-                nodeType=exu.NodeType.RotationEulerParameters,
-            )  # fmt: skip
+            self.bodies[body] = self._particle(body) if body in self.particles else self._rigid_body(body)
         for item in (*scene.constraints, *scene.forces):
             getattr(self, f"_{type(item).__name__.lower()}", self._joint)(item)
         output = exu.OutputVariableType
-        self.sensors = [
-            [self._sensor(body, kind) for body in scene.bodies]
-            for kind in (output.Position, output.RotationMatrix, output.Velocity, output.AngularVelocityLocal)
-        ]
+        kinds = output.Position, output.RotationMatrix, output.Velocity, output.AngularVelocityLocal
+        kinds = kinds[:1] if self.particles else kinds
+        self.sensors = [[self._sensor(body, kind) for body in scene.bodies] for kind in kinds]
         self.mbs.Assemble()
 
+    def _particle(self, body):
+        return self.mbs.CreateMassPoint(
+            physicsMass=body.mass, referencePosition=list(body.position), initialVelocity=list(body.velocity),
+            gravity=list(self.scene.gravity), returnDict=True,
+        )["bodyNumber"]  # fmt: skip
+
+    def _rigid_body(self, body):
+        A = rotation_matrix(np.asarray(body.orientation))
+        return self.mbs.CreateRigidBody(
+            inertia=self.ex.RigidBodyInertia(body.mass, np.asarray(body.inertia)), gravity=list(self.scene.gravity),
+            referencePosition=list(body.position), referenceRotationMatrix=A,
+            initialVelocity=list(body.velocity), initialAngularVelocity=list(A @ body.angular_velocity),
+            nodeType=self.exu.NodeType.RotationEulerParameters,
+        )  # fmt: skip
+
     def _marker(self, body, place, turn=None):
+        if body in self.particles:
+            return self.mbs.AddMarker(self.ex.MarkerBodyPosition(bodyNumber=self.bodies[body]))
         at = self.exu.HT(rotation=np.eye(3) if turn is None else turn, translation=list(place))
         return self.mbs.AddMarker(self.ex.MarkerBodyRigid(bodyNumber=self.bodies[body], localHT=at))
 
@@ -104,12 +115,26 @@ class ExudynScene:
             )
         )
 
+    def _bushing(self, bushing):
+        """With angles of another kind, equal to first order."""
+        pair = [
+            self._marker(body, place)
+            for body, place in zip((bushing.a, bushing.b), bushing.coordinates[:2], strict=True)
+        ]
+        self.mbs.AddObject(
+            self.ex.ObjectConnectorRigidBodySpringDamper(
+                markerNumbers=pair,
+                stiffness=np.diag(np.concatenate((bushing.stiffness, bushing.torsional_stiffness))),
+                damping=np.diag(np.concatenate((bushing.damping, bushing.torsional_damping))),
+            )
+        )
+
     def _torque(self, motor):
         one = self._marker(motor.a, (0.0, 0.0, 0.0))
         self.mbs.AddLoad(self.ex.LoadTorqueVector(markerNumber=one, loadVector=list(motor.torque)))
 
     def run(self, end, step, outputs=OUTPUTS, dependent=False, solver=None):
-        """((r, A, v, omega) at the outputs, seconds); None where the solver gave up.
+        """((r, A, v, omega) at the outputs, seconds), r alone where there are particles; None where the solver gave up.
 
         With dependent rows by a dense solver that allows for these. solver: the name of a DynamicSolverType.
         """
@@ -127,13 +152,14 @@ class ExudynScene:
         try:
             kind = getattr(self.exu.DynamicSolverType, solver or "GeneralizedAlpha")
             done = self.mbs.SolveDynamic(settings, solverType=kind)
-        except ValueError:
+        except (ValueError, RuntimeError):
             return None
         seconds = time.perf_counter() - begun
         if not done:
             return None
-        r, A, v, omega = (
+        found = [
             np.stack([np.asarray(self.mbs.GetSensorStoredData(one))[:, 1:] for one in row], axis=1)
             for row in self.sensors
-        )
-        return (r, A.reshape(*A.shape[:2], 3, 3), v, omega), seconds
+        ]
+        found[1:2] = [A.reshape(*A.shape[:2], 3, 3) for A in found[1:2]]
+        return tuple(found), seconds

@@ -43,7 +43,7 @@ def registries():
 )
 @pytest.mark.parametrize("name", OBJECTS | METHODS)
 def test_examples_print_what_they_say(name, registries):
-    if "plots" in name:
+    if "plot" in name:
         pytest.importorskip("matplotlib")
     text = inspect.getdoc((OBJECTS | METHODS)[name])
     assert "\nExamples\n--------\n" in text

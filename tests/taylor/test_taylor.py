@@ -1,5 +1,7 @@
 """The Taylor integrator: accuracy, steps and orders, output between steps, scenes of every kind, refusals."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,8 @@ import tsdyn as ts
 from tests.helpers.closed_loops import bricard
 from tests.helpers.reference import demand_on_the_manifold, error, load
 from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, NEAR, ROUNDING, TIGHT
+from tsdyn.runs import slices
+from tsdyn.simulation import method_choice
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 TOLERANCES = (1e-4, 1e-8, 1e-12)
@@ -227,3 +231,43 @@ def test_residuals_of_positions_do_not_walk():
     windows = solution.constraint_error.position[: solution.stats.steps // 1000 * 1000].reshape(-1, 1000)
     assert len(windows) > 20
     assert np.median(windows, axis=1).max() < 7.0 * EPS
+
+
+def mounted(stiffness, count=2):
+    """Blocks in a row on overdamped bushings, pushed."""
+    scene = ts.Scene()
+    law = {"stiffness": stiffness, "damping": 0.01 * stiffness}
+    law |= {f"torsional_{name}": value for name, value in law.items()}
+    before, point = scene.ground, (0.0, 0.0, 0.0)
+    for i in range(count):
+        block = scene.add_body(1.0, (0.01, 0.02, 0.02), (0.3 * (i + 0.5), 0.0, 0.0), velocity=(0.0, 0.5, 0.0))
+        scene.add(F.Bushing(before, block, point_a=point, point_b=(-0.15, 0.0, 0.0), **law))
+        before, point = block, (0.15, 0.0, 0.0)
+    return scene
+
+
+def test_velocities_of_fast_modes_are_held_too():
+    """Rates of 1e8 1/s: errors of places within the tolerance were velocities of metres a second."""
+    scene, span = mounted(1e8), (0.0, 2e-6)
+    demanded = ts.simulate(scene, span, integrator=I.DOP853(1e-12, 1e-12), t_eval=span).state
+    state = ts.simulate(scene, span, integrator=I.Taylor(1e-6), t_eval=span).state
+    np.testing.assert_allclose(state.qd, demanded.qd, rtol=0.0, atol=1e-4)
+
+
+@pytest.mark.parametrize("slices_of", [1024, 7])
+def test_an_implicit_method_is_considered_again_at_times_of_the_motion_alone(slices_of, monkeypatch):
+    """Its steps are short at first: what did not pay then may pay later. Slices end where the clock wants it."""
+    asked = []
+    monkeypatch.setattr(slices, "FIRST_SLICE", slices_of)
+    monkeypatch.setattr(method_choice, "implicit_is_faster", lambda *given: asked.append(given[-1].numbers.steps))
+    ts.simulate(mounted(1e6), (0.0, 1.0), rtol=1e-6, atol=1e-6, max_steps=3000)
+    assert len(asked) == 4
+    assert [later / before for before, later in pairwise(asked)] == [4.0, 4.0, 4.0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tol", [1e-4, 1e-10])
+def test_an_implicit_method_takes_over_when_its_steps_have_grown(tol):
+    solution = ts.simulate(mounted(1e8), (0.0, 1.0), rtol=tol, atol=tol)
+    assert solution.method.startswith("SDIRK54")
+    assert solution.stats.steps < 2000

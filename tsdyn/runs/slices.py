@@ -12,7 +12,7 @@ from ..errors import InconsistentState, SingularConfiguration, Status
 from ..jit.interrupts import deferred_interrupts
 from . import snapshot
 from .recorder import Recorder
-from .tolerances import GETTING_ON, HOPELESS, PACED, SLICE_SECONDS
+from .tolerances import ASK_AGAIN, GETTING_ON, HOPELESS, PACED, SLICE_SECONDS
 
 SLICE_DONE = Status.SLICE_DONE  # which takes longer to look up than to compare
 FIRST_SLICE, FIRST_WORK = 1024, 1 << 15  # steps; coordinates stepped on, unless that is less than a step
@@ -61,6 +61,7 @@ class Slices:
     def __init__(self, memory, task, watch, recorder):
         self.memory, self.task, self.watch, self.recorder = memory, task, watch, recorder
         self.run, self.choose = memory.run, task.choose
+        self.ask = 0  # steps after which it is asked, once the motion has been found stiff
         wanted = self.run.numbers.steps_wanted
         self.limit = wanted + len(task.stops) if task.max_steps is None else task.max_steps
         self.most = min(max(FIRST_WORK // memory.weight, 1), FIRST_SLICE)
@@ -73,15 +74,21 @@ class Slices:
 
     def drive(self):
         """Advance until the end."""
-        rows = min(self.most, self.limit - self.run.numbers.steps)
+        rows = self._rows()
         while self.status is SLICE_DONE:
             self.recorder.begin_slice(rows)
             self._adapt(rows, self._advance(rows))
             self._look_up()
             if self.status is SLICE_DONE:
-                rows = min(self.most, self.limit - self.run.numbers.steps)
+                rows = self._rows()
                 if rows <= 0:
                     self.status = Status.MAX_STEPS
+
+    def _rows(self):
+        """Steps of the next slice, which ends where another method is considered: that mustn't depend on the clock."""
+        steps = self.run.numbers.steps
+        rows = min(self.most, self.limit - steps)
+        return min(rows, self.ask - steps) if self.ask > steps else rows
 
     def _advance(self, rows):
         """One slice; the seconds that it has taken."""
@@ -109,9 +116,7 @@ class Slices:
         """Between slices: whether another method takes over, the progress bar, the pace."""
         run, task, (start, end) = self.run, self.task, self.task.span
         if self.choose is not None and self.status is SLICE_DONE and run.numbers.stiff:
-            if self.choose(run):
-                self.status = Status.STIFF
-            self.choose = None
+            self._consider(run.numbers)
         try:
             t = run.clock.t
             task.report((t - start) / (end - start), t, run.numbers.steps)
@@ -128,13 +133,20 @@ class Slices:
                 self.recorder.collect()
                 task.archive.look_up(self.saved)
 
+    def _consider(self, numbers):
+        """Ask whether another method takes over; where not, again later, as the implicit one's steps grow."""
+        if numbers.steps >= self.ask:
+            if numbers.at_limit > 0 and self.choose(self.run):
+                self.status = Status.STIFF
+            self.ask = ASK_AGAIN * numbers.steps
+
     def saved(self):
         """The state between two slices: numbers, and arrays by name."""
         outputs, arrays = self.recorder.saved()
         numbers = {
             "t": self.run.clock.t,
             "outputs": outputs,
-            "chooses": self.choose is not None,
+            "ask": self.ask,
             "pace": vars(self.pace),
             "memory": self.memory.saved(),
         }
@@ -147,7 +159,7 @@ class Slices:
         """Begin between two slices of a run that was left there."""
         snapshot.restore(self.memory, arrays)
         self.recorder.restore(numbers["outputs"], arrays)
-        self.choose = self.choose if numbers["chooses"] else None
+        self.ask = numbers["ask"]
         vars(self.pace).update(numbers["pace"])
         self.memory.restore(numbers["memory"])
         if self.watch is not None:

@@ -69,17 +69,26 @@ class Outputs:
             raise InvalidArgument(
                 f"outputs are taken by slices, such as solution[100:200] or solution[::10], got {part!r}."
             )
+        if self._stored is None:
+            return self._picked(part)
+        other, found = self._bare(), range(self._stored.count)[self._slice][part]
+        other._slice = slice(found.start, max(found.stop, found.start), found.step)
+        return other
+
+    def _picked(self, part):
+        """A solution of some outputs of a run in memory; part is a slice or indices."""
         self._length()
-        other = copy.copy(self)
-        for name in [name for name in vars(other) if name in _COLUMNS or hasattr(type(self), name)]:
-            del vars(other)[name]  # what has been read, or derived from it
-        if self._stored is not None:
-            found = range(self._stored.count)[self._slice][part]
-            other._slice = slice(found.start, max(found.stop, found.start), found.step)
-            return other
+        other = self._bare()
         for name in ("t", "q", "qd", "qdd", "_remembers"):
             setattr(other, name, getattr(self, name)[part])
         other.anchor = Anchor(self.anchor.angles[part])
+        return other
+
+    def _bare(self):
+        """A copy without what has been read, or derived from it."""
+        other = copy.copy(self)
+        for name in [name for name in vars(other) if name in _COLUMNS or hasattr(type(self), name)]:
+            del vars(other)[name]
         return other
 
     __iter__ = None  # by the old protocol __getitem__ would make one

@@ -30,6 +30,7 @@ from ..validation import counted, demand_known, label, vector3
 from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
 from .editing import remove as _remove
+from .scene_table import table
 from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
 from .variants import HANDLES, make_handles
@@ -367,6 +368,10 @@ class Scene:
     remove = _remove
     copy = _copy
     __copy__ = _copy
+
+    def _repr_html_(self) -> str:
+        """Return bodies, constraints and forces as a table, for notebooks."""
+        return table(self)
 
     def __repr__(self) -> str:
         rows = sum(constraint.rows for constraint in self.constraints)

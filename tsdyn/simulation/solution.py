@@ -22,6 +22,7 @@ from ..validation import counted, floats
 from .balances import Balances
 from .conservation import energy_error
 from .outputs import Outputs
+from .showing import Showing
 from .termination import account
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class Charts(NamedTuple):
 
 
 @fitting_methods
-class Solution(Outputs, Balances, Kinematics["Floats"]):
+class Solution(Outputs, Balances, Showing, Kinematics["Floats"]):
     """The result of `simulate`; k outputs, n coordinates, m constraint rows.
 
     Attributes

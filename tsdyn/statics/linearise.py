@@ -44,6 +44,7 @@ class Linearisation:
         Mass, damping with gyroscopic terms, and stiffness; SI units of the coordinates.
     F : ndarray (k, inputs)
         Generalised forces of unit inputs.
+    bodies : tuple of Body
     coordinates, inputs, outputs : tuple of str
     t : float, s
     q, qd, qdd : ndarray (n,)
@@ -63,7 +64,7 @@ class Linearisation:
         self.t, self.q, self.qd, self.qdd, self.multipliers = motion.t, motion.q, motion.qd, motion.qdd, motion.lam
         self.coordinates: tuple[str, ...] = tuple(one.name for one in every)
         self.steady, self.rotation_rate = rate is not None, np.zeros(3) if rate is None else rate
-        self._bodies, self._reduced = motion.packed.bodies, reduced
+        self.bodies, self._reduced = motion.packed.bodies, reduced
         self._twists = _twists(motion, variations, reduced)
         inputs, self._outputs = ports
         self.inputs, self.outputs = tuple(one.name for one in inputs), self._outputs.names
@@ -82,7 +83,7 @@ class Linearisation:
 
     def modes(self) -> Modes:
         """Frequencies, damping ratios and shapes, a `Modes`."""
-        return modes_of(self._pairs, self._twists, self._bodies, self.coordinates)
+        return modes_of(self._pairs, self._twists, self.bodies, self.coordinates)
 
     def state_space(self) -> StateSpace:
         """A, B, C, D and the names of states, inputs and outputs, a `StateSpace`."""

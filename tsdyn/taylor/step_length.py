@@ -7,7 +7,7 @@ from ..formulations.chart_validity import ROUNDING
 from ..jit.kernels import kernel
 from ..jit.simd import first, four, larger, second, splat, third
 from ..rows.interface import is_near_singular
-from .tolerances import FAR_PASSING, LEAST_ORDER, PASSING, STEP_COST
+from .tolerances import FAR_PASSING, LEAST_ORDER, PASSING, STEP_COST, STIFF_RATES
 
 
 @kernel
@@ -46,17 +46,18 @@ def radius(bodies, nb, orders, top, far, fast):
 
 @kernel
 def weights(c, r):
-    """What coefficients of r and omega' are multiplied by to be compared with those of A; sets the floor of Phi."""
+    """Set the floor of Phi. Weights of the coefficients of r and of omega' beside those of A; 1 + the largest rate."""
     x, orders = c.expansion, c.expansion.order.room
     rtol, atol = r.clock.rtol, r.clock.atol
-    far, fast = splat(0.0), splat(0.0)
+    far, fast, speed = splat(0.0), splat(0.0), splat(0.0)
     for b in range(c.graph.bodies.shape[0]):
         at = b * orders * BODY_ROW
         far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
+        speed = larger(four(x.bodies, at + S_R * orders + 4), speed)
     far, fast = _most(far), _most(fast)
     c.work.control.floor = ROUNDING * (c.work.control.size + far)
     tol = atol + rtol
-    return tol / (atol + rtol * far), tol / (atol + rtol * fast)
+    return tol / (atol + rtol * far), tol / (atol + rtol * fast), 1.0 + max(fast, _most(speed))
 
 
 @kernel
@@ -65,8 +66,11 @@ def step_length(c, r):
     x, nb = c.expansion, c.graph.bodies.shape[0]
     top, orders = x.order.top, x.order.room
     tol = r.clock.atol + r.clock.rtol
-    far, fast = weights(c, r)
+    far, fast, rate = weights(c, r)
     h = radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2))
+    share = STIFF_RATES * rate * h / (top + 2)  # of what the error of rates, that of places over h / (top + 2), may be
+    if share < 1.0:
+        h *= share ** (1.0 / (top + 2))
     if x.order.highest > x.order.lowest:
         lower = radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top)
         change = 1 if h * (top + STEP_COST - 2) > lower * (top + STEP_COST) else -1
@@ -82,7 +86,7 @@ def longest(c, r, tol, most):
     see no further than to it.
     """
     x, nb = c.expansion, c.graph.bodies.shape[0]
-    far, fast = weights(c, r)
+    far, fast, _ = weights(c, r)
     h = 0.0
     for k in range(most, LEAST_ORDER, -1):
         longer = radius(x.bodies, nb, x.order.room, k, far, fast) * tol ** (1.0 / (k + 2))

@@ -120,7 +120,7 @@ def _watch_stiffness(c, r, h):
 def _mind_stop(c, r, h):
     """After a step that a stop has cut to h: the order of the next one."""
     x, tol = c.expansion, r.clock.atol + r.clock.rtol
-    far, fast = weights(c, r)
+    far, fast, _ = weights(c, r)
     rho = radius(x.bodies, c.graph.bodies.shape[0], x.order.room, x.order.top - 2, far, fast)
     lower_order(x.order, rho, tol, h)
 

@@ -26,6 +26,9 @@ HALVED = 0.5
 # Error of rates, 1/s, over that of places, up to which only the latter limits steps of sharp forces. Their steps can be
 # very short, and an error of places divided by the step is one of rates.
 RATES = 10.0
+# The same wherever the motion is stiff, over 1 + the largest rate: a fast mode that steps make grow shows in rates
+# first. A step's tolerance is a thousandth of the run's.
+STIFF_RATES = 1000.0
 
 # Places of a step, equally far apart, at which series of sharp forces are compared with their laws; steps of a run at
 # least, since a pulse between two places is missed.

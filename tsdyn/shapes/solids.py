@@ -1,24 +1,22 @@
-"""Mass and inertia of shapes: scene.add_body(**ts.shapes.box((1, 2, 3), density=7850)).
-
-box, sphere, cylinder, rod, from_mesh; +, moved and rotated make one body of several.
-"""
+"""Mass and inertia of shapes of uniform density: box, sphere, cylinder, rod, from_mesh, and what they compose."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import InvalidArgument
-from .maths.mesh_integrals import moments
-from .validation import floats, number, positive, vector3
+from ..errors import InvalidArgument
+from ..maths.mesh_integrals import moments
+from ..validation import number, positive, vector3
+from .geometry import AXES, Box, Cylinder, Geometry, Mesh, Sphere, rotation_of
 
 if TYPE_CHECKING:
-    from .hints import ArrayLike, Axis, Floats, Rotation
+    from ..hints import ArrayLike, Axis, Floats, Rotation
 
-AXES = {"x": 0, "y": 1, "z": 2}
+DRAWN_RADIUS = 0.02  # of a rod, which has none, per length
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +30,8 @@ class Shape:
         About the centroid, in axes parallel to the shape's own frame: those of the body.
     centroid : ndarray (3,), m
         In the shape's own frame. A point p of that frame is p - centroid in the body's.
+    pieces : tuple of Geometry
+        What the viewer draws, in the shape's own frame.
 
     Examples
     --------
@@ -49,6 +49,7 @@ class Shape:
     mass: float
     inertia: Floats
     centroid: Floats
+    pieces: tuple[Geometry, ...] = field(default=(), repr=False)
 
     def keys(self) -> tuple[str, str]:
         """What `add_body` is given."""
@@ -59,16 +60,14 @@ class Shape:
 
     def moved(self, by: ArrayLike) -> Shape:
         """The same shape elsewhere in its frame; by (3,), m."""
-        return Shape(self.mass, self.inertia, self.centroid + vector3(by, "shape.moved: by (m)", InvalidArgument))
+        by = vector3(by, "shape.moved: by (m)", InvalidArgument)
+        return Shape(self.mass, self.inertia, self.centroid + by, tuple(piece.moved(by) for piece in self.pieces))
 
     def rotated(self, rotation: ArrayLike | Rotation) -> Shape:
         """The shape turned about the origin of its frame, by a matrix (3, 3) or a scipy Rotation."""
-        A = floats(rotation.as_matrix() if hasattr(rotation, "as_matrix") else rotation)
-        if A.shape != (3, 3) or not np.abs(A @ A.T - np.eye(3)).max() < 1e-9 or np.linalg.det(A) < 0.0:
-            raise InvalidArgument(
-                f"shape.rotated: rotation must be a rotation matrix (3, 3) or one scipy Rotation, got {rotation!r}."
-            )
-        return Shape(self.mass, A @ self.inertia @ A.T, A @ self.centroid)
+        A = rotation_of(rotation, "shape.rotated")
+        pieces = tuple(piece.rotated(A) for piece in self.pieces)
+        return Shape(self.mass, A @ self.inertia @ A.T, A @ self.centroid, pieces)
 
     def __add__(self, other: Shape) -> Shape:
         if not isinstance(other, Shape):
@@ -77,7 +76,7 @@ class Shape:
         apart = other.centroid - self.centroid
         centroid = self.centroid + (other.mass / mass) * apart
         inertia = self.inertia + other.inertia + (self.mass * other.mass / mass) * _steiner(apart)
-        return Shape(mass, inertia, centroid)
+        return Shape(mass, inertia, centroid, self.pieces + other.pieces)
 
 
 def box(size: ArrayLike, *, mass: float | None = None, density: float | None = None) -> Shape:
@@ -112,7 +111,7 @@ def box(size: ArrayLike, *, mass: float | None = None, density: float | None = N
         raise InvalidArgument(f"box: size must be three positive lengths in m, got {size!r}.")
     m = _mass("box", float(edges.prod()), mass, density)
     squares = edges**2
-    return _shape(m, (m / 12.0) * (squares.sum() - squares))
+    return _shape(m, (m / 12.0) * (squares.sum() - squares), Box(edges))
 
 
 def sphere(radius: float, *, inner: float = 0.0, mass: float | None = None, density: float | None = None) -> Shape:
@@ -128,7 +127,7 @@ def sphere(radius: float, *, inner: float = 0.0, mass: float | None = None, dens
     m = _mass("sphere", 4.0 / 3.0 * math.pi * (a - b) * (a * a + a * b + b * b), mass, density)
     ratio = b / a  # (a^5 - b^5) / (a^3 - b^3), with a - b divided out
     share = (1 + ratio + ratio**2 + ratio**3 + ratio**4) / (1 + ratio + ratio**2)
-    return _shape(m, np.full(3, 0.4 * m * a * a * share))
+    return _shape(m, np.full(3, 0.4 * m * a * a * share), Sphere(a))
 
 
 def cylinder(
@@ -153,7 +152,7 @@ def cylinder(
     a, b = _radii("cylinder", radius, inner)
     length = positive(length, "cylinder: length (m)")
     m = _mass("cylinder", math.pi * (a - b) * (a + b) * length, mass, density)
-    return _round("cylinder", m, a * a + b * b, length, axis)
+    return _round(m, a * a + b * b, Cylinder(a, length, _axis("cylinder", axis)))
 
 
 def rod(length: float, *, axis: Axis = "z", mass: float) -> Shape:
@@ -172,7 +171,9 @@ def rod(length: float, *, axis: Axis = "z", mass: float) -> Shape:
     >>> print(ts.shapes.rod(2.0, axis="x", mass=3.0).inertia.diagonal())
     [0. 1. 1.]
     """
-    return _round("rod", positive(mass, "rod: mass (kg)"), 0.0, positive(length, "rod: length (m)"), axis)
+    length = positive(length, "rod: length (m)")
+    drawn = Cylinder(DRAWN_RADIUS * length, length, _axis("rod", axis))
+    return _round(positive(mass, "rod: mass (kg)"), 0.0, drawn)
 
 
 def from_mesh(
@@ -214,20 +215,24 @@ def from_mesh(
     volume, centroid, second = moments(vertices, faces)
     m = _mass("from_mesh", volume, mass, density)
     second = (m / volume) * second
-    return Shape(m, np.trace(second) * np.eye(3) - second, centroid)
+    return Shape(m, np.trace(second) * np.eye(3) - second, centroid, (Mesh((vertices, faces)),))
 
 
-def _round(what, m, squares, length, axis):
+def _round(m, squares, drawn):
     """A body of revolution without taper: squares is the sum of both radii's."""
+    inertia = np.full(3, m * (3.0 * squares + drawn.length**2) / 12.0)
+    inertia["xyz".index(drawn.axis)] = 0.5 * m * squares
+    return _shape(m, inertia, drawn)
+
+
+def _axis(what, axis):
     if not isinstance(axis, str) or axis not in AXES:
         raise InvalidArgument(f"{what}: axis must be 'x', 'y' or 'z', got {axis!r}.")
-    inertia = np.full(3, m * (3.0 * squares + length**2) / 12.0)
-    inertia[AXES[axis]] = 0.5 * m * squares
-    return _shape(m, inertia)
+    return axis
 
 
-def _shape(mass, inertia):
-    return Shape(mass, np.diag(inertia), np.zeros(3))
+def _shape(mass, inertia, drawn):
+    return Shape(mass, np.diag(inertia), np.zeros(3), (drawn,))
 
 
 def _steiner(d):
@@ -247,11 +252,3 @@ def _mass(what, volume, mass, density):
     if mass is not None:
         return positive(mass, f"{what}: mass (kg)")
     return positive(density, f"{what}: density (kg/m^3)") * volume
-
-
-__all__ = ["Shape", "box", "cylinder", "from_mesh", "rod", "sphere"]
-
-
-def __dir__():
-    """What users use, for completion."""
-    return sorted(__all__)

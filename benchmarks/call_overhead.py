@@ -19,16 +19,16 @@ TOLERANCES = {"rtol": 1e-8, "atol": 1e-8}
 
 
 class Clocked:
-    """A compiled kernel, with the time spent in it."""
+    """A compiled kernel, with the time spent in it by a clock."""
 
-    def __init__(self, kernel):
-        self.kernel, self.seconds, self.overloads = kernel, 0.0, True
+    def __init__(self, kernel, clock=time.perf_counter):
+        self.kernel, self.clock, self.seconds, self.overloads = kernel, clock, 0.0, True
 
     def __call__(self, *arguments):
         """Call it."""
-        started = time.perf_counter()
+        started = self.clock()
         status = self.kernel(*arguments)
-        self.seconds += time.perf_counter() - started
+        self.seconds += self.clock() - started
         return status
 
 

@@ -62,6 +62,7 @@ __all__ = [
     "Body",
     "DiagonallyImplicit",
     "Displacement",
+    "Ensemble",
     "ExplicitNystrom",
     "ExplicitRungeKutta",
     "Force",
@@ -100,6 +101,7 @@ __all__ = [
     "Vector",
     "benchmark",
     "constraints",
+    "ensemble",
     "forces",
     "integrators",
     "kernel",
@@ -117,10 +119,14 @@ __all__ = [
 if TYPE_CHECKING:
     from . import plots, testing
     from .benchmarking.benchmark import benchmark
+    from .ensembles.ensemble import ensemble
+    from .ensembles.results import Ensemble
     from .profiling.profile import profile
 else:
     _LATER = {
+        "Ensemble": ".ensembles.results",
         "benchmark": ".benchmarking.benchmark",
+        "ensemble": ".ensembles.ensemble",
         "plots": ".plots",
         "profile": ".profiling.profile",
         "testing": ".testing",

@@ -288,6 +288,8 @@ class Status(IntEnum):
     PASSAGE = 16
     SAMPLING_FAILED = 17
     STORE_FAILED = 18
+    CASE_FAILED = 19
+    NOT_RUN = 20
 
     def __str__(self) -> str:
         return self.name.lower()
@@ -364,4 +366,9 @@ _SENTENCES = {
         "The store could not be written any further.",
         "Free some space there; ts.resume goes on from the last checkpoint.",
     ),
+    Status.CASE_FAILED: (
+        "The case could not be run, or what was to be kept of it could not be found.",
+        "Run it alone: ensemble.case(i).",
+    ),
+    Status.NOT_RUN: ("The case has not been run.", "Go on: resume=True with a store, or run it: ensemble.case(i)."),
 }

@@ -19,6 +19,7 @@ from .elements.element import Attachment
 from .elements.force import Force
 from .elements.joint import Joint
 from .elements.primitive import Primitive
+from .ensembles.results import Ensemble
 from .errors import TsdynError
 from .methods.integrator import Integrator
 from .model.handles import Handles
@@ -29,6 +30,7 @@ from .observables.diagnostics import ConstraintError
 from .observables.evaluate import Evaluation
 from .observables.kinematics import Kinematics
 from .observables.state import RememberingState, State
+from .parameters.listing import ParameterList
 from .profiling.phases import Phase
 from .profiling.report import Profile
 from .simulation.inverse_result import InverseDynamics
@@ -74,6 +76,8 @@ Load: TypeAlias = float | Table | Callable[[Any], Any]
 VectorLoad: TypeAlias = ArrayLike | Table | Callable[..., Any]  # a function of t, or of t and state
 JointLaw: TypeAlias = Callable[[float, float, float], float]
 Event: TypeAlias = Callable[[float, State], float]
+CaseTable: TypeAlias = Mapping[str, Any] | Callable[[int], Mapping[str, Any]] | Any  # or a DataFrame
+Keep: TypeAlias = str | Callable[[Solution], Any]
 Progress: TypeAlias = bool | Callable[[float], object]
 
 Formulation: TypeAlias = Literal["tangent", "null-space", "maggi-kane"]
@@ -142,10 +146,12 @@ __all__ = [
     "Body",
     "BodyLike",
     "Bools",
+    "CaseTable",
     "Charts",
     "Class",
     "ConstraintError",
     "Data",
+    "Ensemble",
     "Equilibrium",
     "Evaluation",
     "Event",
@@ -166,6 +172,7 @@ __all__ = [
     "Joint",
     "JointLaw",
     "JointLoads",
+    "Keep",
     "KinematicAnalysis",
     "Kinematics",
     "Linearisation",
@@ -177,6 +184,7 @@ __all__ = [
     "Motion",
     "Orientation",
     "Packed",
+    "ParameterList",
     "Path",
     "Phase",
     "PointMass",

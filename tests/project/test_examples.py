@@ -22,7 +22,9 @@ from examples import (
     sarrus,
     screw_press,
     slider_crank,
+    stability_map,
     stick_slip,
+    tolerance_analysis,
     top,
     two_body_pendulum,
 )
@@ -168,3 +170,17 @@ def test_check_can_fail():
 
 def test_parallel_runs():
     parallel_runs.check(parallel_runs.SPINS[:3])
+
+
+def test_stability_map(tmp_path):
+    a, b, ensemble = stability_map.run(8, 2.0)
+    stability_map.check(a, b, ensemble)
+    stability_map.draw(a, b, ensemble.kept, 2.0, tmp_path / "map.png")
+    assert (tmp_path / "map.png").stat().st_size > 10_000
+
+
+def test_tolerance_analysis():
+    ensemble, lengths = tolerance_analysis.run(4)
+    tolerance_analysis.check(ensemble, lengths)
+    with pytest.raises(AssertionError):
+        tolerance_analysis.check(ensemble, lengths + 1e-3)

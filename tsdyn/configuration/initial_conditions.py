@@ -11,7 +11,7 @@ from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of, set_redundant
 from ..sparse.massless_axes import axis_of
 from .rank import check_rank
-from .start_kernels import DOUBTFUL, NONE, evaluate_start, free_axis, go_near_by, land_start, select_redundant
+from .start_kernels import DOUBTFUL, NONE, evaluate_start, free_axis, go_near_by, holds, land_start, select_redundant
 from .start_violations import demand_finite, demand_small, refuse_vanished
 from .start_workspace import give, taken
 from .tolerances import (
@@ -72,6 +72,58 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     return start.landed()
 
 
+class RegularStarts:
+    """Checks one start after the other of a scene whose numbers change in place, as `consistent` does.
+
+    Parameters
+    ----------
+    scene : Scene, or what has its `packed`, bodies and names of rows
+    q, qd, t, tol
+        As of `consistent`, of a first start.
+    """
+
+    def __init__(self, scene, q, qd, t, tol):
+        self._start, self._system = _Start(scene, scene.packed.system, q, qd, t, tol), scene.packed.system
+
+    def are_plain(self, q, qd):
+        """Whether a start is at rounding, its rows independent, and every axis has inertia: it stays as it is."""
+        start = self._start
+        start.q, start.qd = q, qd
+        start.workspace.reals[...] = self._system.reals
+        regular = start.is_regular()
+        if regular and still(start.packed).bodies.size:
+            settle(start.packed, start.graph, start.tangent.rows.H)
+        return regular
+
+
+class RedundantStarts:
+    """The same for scenes with redundant rows, which are selected at each start.
+
+    Parameters
+    ----------
+    scenes : list of three
+        The scene with redundant rows unknown, none, and those of a first start.
+    """
+
+    def __init__(self, scenes, q, qd, t, tol):
+        self._starts = [_Start(scene, scene.packed.system, q, qd, t, tol) for scene in scenes]
+
+    def landed(self, q, qd):
+        """Return (q, qd) as `consistent` does; None where other rows are redundant."""
+        for start in self._starts:
+            start.renew(q, qd)
+        first, again, last = self._starts
+        if first.check() == NONE:
+            return None
+        first.demand_velocities()
+        again.check()
+        if not np.array_equal(again.redundant_rows(), last.packed.derived.redundant):
+            return None
+        last.check()
+        settle(last.packed, last.graph, last.tangent.rows.H)
+        return last.landed()
+
+
 class _Start:
     """A start under check, with its workspace."""
 
@@ -84,6 +136,11 @@ class _Start:
         self.tangent, self.work, self.rates = workspace.tangent, workspace.work, workspace.rates
         self.context, self.at = workspace.address, workspace.at
         self.far = self.fast = False
+
+    def renew(self, q, qd):
+        """Take other positions and velocities, and the numbers of the system as they are now."""
+        self.q, self.qd, self.far, self.fast = q, qd, False, False
+        self.workspace.enter(self.packed.system.reals, self.packed.size, q, self.tol)
 
     def demand_velocities(self):
         """Refuse velocities that violate the constraints."""
@@ -132,6 +189,15 @@ class _Start:
         self.far = np.abs(Phi).max(initial=0.0) > ROUNDING * (1.0 + np.abs(q).max())
         self.fast = np.abs(velocity).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max())
         return dependent
+
+    def is_regular(self):
+        """Whether rows are independent and hold to rounding, as `check` finds it, with inertia about every axis."""
+        q, qd, rates, tangent = self.q, self.qd, self.rates, self.tangent
+        if evaluate_start(self.context, q, qd, self.t, rates, 1) != NONE:
+            return False
+        tol = min(ROUNDING, self.tol)
+        held = holds(tangent.b, rates, tangent.rows.H, q, qd, self.workspace.first_parameters, tol)
+        return held == 1 and self.loose_axis() < 0
 
     def redundant_rows(self):
         """Return the rows that are redundant here and nearby; refuse a singular configuration."""

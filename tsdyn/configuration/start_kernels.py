@@ -51,6 +51,31 @@ def evaluate_start(context, q, qd, t, velocity, every):
     return failed
 
 
+@entry("vvvvvwd")
+def holds(b, velocity, H, q, qd, at, tol):
+    """Return 1 if Phi, b, and its rate hold to tol (1 + max |q|) and tol (1 + max |qd|), and H is finite; else 0.
+
+    at: where the Euler parameters of the rigid bodies begin.
+    """
+    far, fast, size = 0.0, 0.0, 0.0
+    for i in range(q.size):
+        far, fast = max(far, abs(q[i])), max(fast, abs(qd[i]))
+    near, slow = tol * (1.0 + far), tol * (1.0 + fast)
+    for e in range(b.size):
+        if not (abs(b[e]) <= near and abs(velocity[e]) <= slow):
+            return 0
+    for i in at:
+        square, rate = -1.0, 0.0
+        for j in range(i, i + 4):
+            square += q[j] * q[j]
+            rate += q[j] * qd[j]
+        if not (abs(0.5 * square) <= near and abs(rate) <= slow):
+            return 0
+    for i in range(H.size):
+        size += H[i]
+    return 1 if size - size == 0.0 else 0
+
+
 @entry("pd")
 def land_start(context, t):
     """Project w.q and w.qd onto the constraint manifold. Status."""

@@ -29,7 +29,7 @@ class StartWorkspace:
         self.reals, self.tangent, self.work, self.rates = own.reals, whole.tangent, whole.work, np.zeros(len(graph.row))
         self.address, *self._keep = resident(whole)
         rigid = graph.bodies[graph.bodies[:, 1] == 7, 0]
-        self.at = rigid[:, None] + np.arange(3, 7)  # Euler parameters
+        self.at, self.first_parameters = rigid[:, None] + np.arange(3, 7), rigid + 3  # Euler parameters
 
     def enter(self, reals, size, q, tol):
         """As if it were new, for the numbers and size of a system and a start that is checked to a tolerance."""

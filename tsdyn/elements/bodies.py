@@ -155,6 +155,7 @@ class PointMass:
         demand_known(self, name, ("scene", "index", "name", "values"))
         if name == "name" and "name" in self.__dict__:
             self.scene._names = None
+            self.scene.touch()  # parameters go by names
         super().__setattr__(name, value)
 
     @property

@@ -83,6 +83,7 @@ class Attachment:
     lacks = ""  # what a base class is the base of, and has none of itself
     particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
     joint_coordinates: tuple[Angle | Displacement, ...] = ()  # Angle and Displacement, see tsdyn/joint_coordinates.py
+    permanent: tuple[str, ...] = ()  # arguments that can't be set later
     angle_near = 0.0  # on which turn its angles begin: set by `Scene.set`
     added = False  # to its scene
     named = False  # by its user

@@ -35,6 +35,7 @@ class JointLoad:
     """
 
     loads = ("function",)
+    permanent = ("joint", "which")
     memory = 1
     quantities = MappingProxyType({"function": law_of_joint, "period": instants})
     coordinate = ""  # "angle" or "displacement"
@@ -83,7 +84,7 @@ class JointLoad:
         """Set an attribute, checked; where it acts is the joint's."""
         if name == "coordinates":
             return
-        if name in ("joint", "which", "geometry") or name in [marker.argument for marker in self.markers]:
+        if name in (*self.permanent, "geometry") or name in [marker.argument for marker in self.markers]:
             raise self.error(f"{self.name}: {name} is that of its joint {self.joint.name!r}; set it there.")
         if name == "period" and self.added and (value is None) != (self.period is None):
             raise self.error(f"{self.name}: make a new one to change between a continuous and a sampled load.")

@@ -30,9 +30,19 @@ class Still(NamedTuple):
 
 def still(packed):
     """The `Still` of a packed scene with its redundant rows as of now; where they hold is for `settle` to say."""
-    if packed.derived.locked is None:
-        packed.derived.locked = _find(packed)
-    return packed.derived.locked
+    known = packed.derived
+    if known.locked is None:
+        known.locked = _find(packed) if known.shared is None else _found_once(packed)
+    return known.locked
+
+
+def _found_once(packed):
+    """The `Still` that scenes of a family share, with their redundant rows and bodies that turn."""
+    known, rows = packed.derived, packed.derived.redundant
+    key = still, None if rows is None else rows.tobytes(), frozenset(known.turning)
+    if key not in known.shared:
+        known.shared[key] = _find(packed)
+    return known.shared[key]
 
 
 def keep_turning(packed, bodies):

@@ -32,6 +32,8 @@ class Derived:
     grounded: tuple = None  # local_origin.origin_of, and for the start last seen:
     origin: tuple = (None, None)
     local: tuple = None  # the scene from an origin of its own: local_origin
+    family: object = None  # a parameters.family.Family: variants.family_of
+    shared: dict = None  # of a family: what numbers don't change, by the functions that find it; None for one scene
 
     def forget_graphs(self):
         """The constraint graph is another."""

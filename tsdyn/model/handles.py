@@ -1,6 +1,8 @@
 """Handles of a packed scene: bodies, constraints, forces, their coordinates, and the angles that runs count."""
 
+import threading
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -10,6 +12,8 @@ from ..elements.joint_coordinates import angles, displacements
 from ..elements.names import named
 from ..errors import InvalidBody, InvalidConstraint
 from .joint_motion import BodyMotion, displacement
+
+_lock = threading.Lock()  # of aliases, which scenes of a family share
 
 
 class Row(NamedTuple):
@@ -45,7 +49,7 @@ class Handles:
         constraints = [each for each in constraints if not getattr(each, "normalises", False)]
         self.items = (*constraints, *(load.force for load in packed.loads))
         self._where = {body: tuple(place) for body, place in zip(self.bodies, places, strict=True)}
-        self._by_item = None
+        self._by_item, self._aliases = None, WeakKeyDictionary()
         rows, joints, frames = [], [], []
         for item in self.items:
             if item.joint_coordinates:
@@ -60,7 +64,10 @@ class Handles:
 
     def __getstate__(self):
         """An item is another object where this is unpickled."""
-        return {**self.__dict__, "_by_item": None}
+        return {**self.__dict__, "_by_item": None, "_aliases": None}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state, _aliases=WeakKeyDictionary())
 
     def where(self, body):
         """Where the coordinates of a body begin, and how many they are; (0, 0) for the ground."""
@@ -70,13 +77,30 @@ class Handles:
         """A body of the scene, by handle or name."""
         if isinstance(body, str):
             return named(self.bodies, body, "body", InvalidBody)
+        body = self.own(body)
         if not isinstance(body, PointMass) or body not in self._where:
             raise InvalidBody(f"{body!r} is not a body of this solution's scene.")
         return body
 
     def item(self, item):
         """A constraint or force of the scene, by name; a handle as it is."""
-        return named(self.items, item, "constraint or force", InvalidConstraint) if isinstance(item, str) else item
+        if isinstance(item, str):
+            return named(self.items, item, "constraint or force", InvalidConstraint)
+        return self.own(item)
+
+    def own(self, handle):
+        """A handle of this scene in place of one of another scene of the family."""
+        return self._aliases.get(handle, handle) if isinstance(handle, (PointMass, Attachment)) else handle
+
+    def add_aliases(self, pairs):
+        """Let handles of other scenes of the family stand for handles of this one, in pairs."""
+        with _lock:
+            self._aliases.update(pairs)
+
+    def aliases(self):
+        """All such pairs, a list."""
+        with _lock:
+            return list(self._aliases.items())
 
     def row(self, joint, kind):
         """The `Row` of a joint that has some of a kind of coordinates: "angle" or "displacement"."""

@@ -123,7 +123,7 @@ def pack(scene):
     starts = np.cumsum([0, *(body.dimension for body in scene.bodies)])
     where = {id(body): (int(at), body.dimension) for at, body in zip(starts, scene.bodies, strict=False)}
     primitives = scene.primitives
-    parameters = {constraint: _parameters(constraint) for constraint in primitives}
+    parameters = {constraint: checked_motions(constraint) for constraint in primitives}
     table, reals = [], []
     kinds, motions, kept = _pack_constraints(parameters, int(starts[-1]), where, table, reals)
     forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals)
@@ -279,8 +279,8 @@ def with_curvatures(packed):
     return packed.system._replace(kinds=kinds)
 
 
-def _parameters(constraint):
-    """A constraint's parameters, checked."""
+def checked_motions(constraint):
+    """A primitive's parameters, checked: floats and Motions."""
     given = checked_parameters(constraint, Motion, "Motions")
     if "phi_t" not in constraint.kernels and any(isinstance(p, Motion) for p in given):
         raise InvalidConstraint(f"{constraint.name}: a Motion is among its parameters, so it needs a kernel phi_t.")

@@ -128,7 +128,8 @@ def copy(scene: Scene) -> Scene:
     own = (scene.ground, *scene._bodies, *scene._added, *scene._normalisations.values(), *scene._forces)
     for item in own:
         _freeze(vars(item), vars(memo[id(item)]))
-        _freeze(getattr(item, "values", {}), getattr(memo[id(item)], "values", {}))
+        if isinstance(item, PointMass):
+            _freeze(item.values, memo[id(item)].values)
     twin.gravity = scene.gravity
     twin._twins = WeakKeyDictionary((item, memo[id(item)]) for item in own)
     return twin

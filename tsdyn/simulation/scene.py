@@ -21,20 +21,24 @@ from ..elements.names import named
 from ..elements.primitive import Primitive
 from ..errors import InvalidArgument, InvalidBody, InvalidConstraint
 from ..jit.cache import deep_hash
+from ..model.handles import handles_of
 from ..model.packed import pack, user_functions
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..observables.evaluate import evaluate as _evaluate
-from ..validation import counted, demand_known, label, vector3
+from ..validation import demand_known, label, vector3
 from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
 from .editing import remove as _remove
 from .inverse_dynamics import inverse_dynamics as _inverse_dynamics
 from .kinematics import kinematics as _kinematics
 from .scene_saving import save as _save
-from .scene_table import table
+from .scene_table import summary, table
 from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
+from .variants import HANDLES, make_handles
+from .variants import parameters as _parameters
+from .variants import with_parameters as _with_parameters
 
 if TYPE_CHECKING:
     from ..hints import AnyBody, ArrayLike, Floats, Item, Orientation, Packed, System
@@ -89,6 +93,7 @@ class Scene:
         self._users = None  # of compiled functions; what holds them, see `user_functions`
         self._names = None  # of ground and bodies; None if a body may have been renamed
         self._twins = None  # handle of the scene that this one is a copy of -> handle here
+        self._aliases = None  # the same, where solutions may be asked by it; see variants.py
         self.gravity = gravity
 
     ground: AnyBody
@@ -97,6 +102,13 @@ class Scene:
         """Set an existing attribute; refuse a misspelt one."""
         demand_known(self, name, ("ground",))
         super().__setattr__(name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        """Make the handles of a scene that `with_parameters` has returned."""
+        if name not in HANDLES or "_later" not in self.__dict__:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        make_handles(self)
+        return self.__dict__[name]
 
     @property
     def gravity(self) -> Floats:
@@ -271,7 +283,8 @@ class Scene:
 
     def __getstate__(self):
         """Leave out the packed scene, which holds addresses of this process."""
-        gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins"))
+        _ = self._bodies  # made, if they weren't
+        gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins", "_aliases"))
         return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
 
     def touch(self) -> None:
@@ -281,10 +294,12 @@ class Scene:
     @property
     def packed(self) -> Packed:
         """The scene as a `Packed`; packed anew only after a change."""
-        if not self._bodies:
-            raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
         if self._packed is None:
+            if not self._bodies:
+                raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
             self._packed = pack(self)
+            if self._aliases:
+                handles_of(self._packed).add_aliases(self._aliases.items())
             self._users = list(user_functions(self._packed))
             self._functions = _marks(self._users)
         return self._packed
@@ -323,6 +338,7 @@ class Scene:
         """The body, constraint or force of a name, or, in a copy, the counterpart of a handle of the original."""
         if isinstance(item, str):
             return named([self.ground, *self._bodies, *self.constraints, *self._forces], item, WHAT)
+        _ = self._bodies  # made, if they weren't
         known = isinstance(item, (PointMass, Ground, Primitive, Joint, Force))
         twin = self._twins.get(item) if self._twins is not None and known else None
         return found(self, item) if twin is None else twin
@@ -351,6 +367,8 @@ class Scene:
     equilibrium = _equilibrium
     kinematics = _kinematics
     inverse_dynamics = _inverse_dynamics
+    parameters = _parameters
+    with_parameters = _with_parameters
     set = set_joint
     remove = _remove
     copy = _copy
@@ -362,13 +380,7 @@ class Scene:
         return table(self)
 
     def __repr__(self) -> str:
-        rows = sum(constraint.rows for constraint in self.constraints)
-        n = sum(body.dimension for body in self._bodies)
-        rigid = len(self._normalisations)
-        parts = [(rigid, "rigid body", "rigid bodies"), (len(self._bodies) - rigid, "point mass", "point masses")]
-        bodies = ", ".join(counted(*part) for part in parts if part[0]) or "no bodies"
-        forces = f", {counted(len(self._forces), 'force')}" if self._forces else ""
-        return f"<Scene of {bodies}: {counted(n, 'coordinate')}, {counted(rows, 'constraint row')}{forces}>"
+        return summary(self)
 
 
 def _marks(users):

@@ -1,5 +1,6 @@
 """Cache of data derived from a packed scene, shared by its runs until the scene changes."""
 
+import copy
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +20,7 @@ from ..taylor.layout import pays, refusal
 from ..taylor.run_memory import Series
 
 SPARE = 8  # idle memories of a kind that are kept: as many runs at once allocate nothing
+OF_NUMBERS = {"implicit", "spheres", "series", "sampled"}  # what `Prepared` derives from them
 KINDS = 8  # kinds of memory, and shapes of a scene, at most
 LARGEST = 1 << 24  # bytes of a memory that is kept, at most
 
@@ -50,6 +52,15 @@ class Prepared:
             every.clear()
         self.handles = handles_of(packed)
         self._spare = every.setdefault((self.handles.count, *(array.shape for array in packed.system)), {})
+
+    def like(self, packed):
+        """The same for a scene of the family, packed with other numbers."""
+        other = copy.copy(self)
+        for name in OF_NUMBERS & vars(other).keys():
+            del vars(other)[name]
+        other.packed, other._start, other._spare = packed, ((None, None), None), {}
+        other.handles = handles_of(packed)
+        return other
 
     @cached_property
     def implicit(self):

@@ -175,7 +175,7 @@ def run_from(given, numbers=None, arrays=None, archive=None):
     task = _request(scene, kept, method, options, given["state"], choose)
     if given["store"] is not None:
         return _run_stored(task, given, options, (numbers, arrays), archive)
-    outcome = _run(task, scene, settings.initial_tol)
+    outcome = run_task(task, scene, settings.initial_tol)
     ended = time.perf_counter()
     other = method_choice.instead(task, outcome.status)
     if other is not None:
@@ -197,7 +197,7 @@ def _run_stored(task, given, options, found, archive):
         outcome = stored_runs.ended_outcome(numbers, arrays, archive)
         return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
     try:
-        outcome = _run(task._replace(archive=archive), scene, options.settings.initial_tol)
+        outcome = run_task(task._replace(archive=archive), scene, options.settings.initial_tol)
         seconds = time.perf_counter() - started
         other = method_choice.instead(task, outcome.status)
         if other is not None:
@@ -226,7 +226,7 @@ def _request(scene, kept, method, options, state, choose):
     )  # fmt: skip
 
 
-def _run(task, scene, initial_tol):
+def run_task(task, scene, initial_tol):
     """Run the method's driver, relative to a local origin if the scene is far from its own."""
     driver, packed = DRIVERS.get(task.method.driver, task.method.driver), task.prepared.packed
     origin = origin_of(packed, task.q)

@@ -311,7 +311,7 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
         """Return the body on which a reaction is requested."""
         if on is None:
             return item.on
-        on = self.handles.body(on) if isinstance(on, str) else on
+        on = self.handles.body(on) if isinstance(on, str) else self.handles.own(on)
         if on is item.a or on is item.b:
             if on.dimension:
                 return on

@@ -189,8 +189,8 @@ def _facts(given, kept):
     return {
         **_here(),
         "scene": hash_of(kept.packed),
-        "functions": _sources(functions),
-        "events": _sources(events),
+        "functions": sources_of(functions),
+        "events": sources_of(events),
         "interval": given["checkpoint"] if given["checkpoint"] is None else float(given["checkpoint"]),
     }
 
@@ -207,7 +207,7 @@ def hash_of(packed):
     return digest.hexdigest()
 
 
-def _sources(functions):
+def sources_of(functions):
     """SHA-256 of the source of each function, by its name and place among the others."""
     found = {}
     for i, function in enumerate(functions):

@@ -20,7 +20,6 @@ from .constraint_graph import (
     ROWS,
     ROWS_WELD,
     W_MASS,
-    W_ROTATION,
     WEIGHTS,
     WELD_ROWS,
     WELDS,
@@ -53,8 +52,20 @@ def build(packed, still=None):
     """The graph of a packed scene, with the addresses of the loops still zero, and the classes of its kinds.
 
     With `still`, a `locked_orientations.Still`, without the rotations of those bodies and the rows that hold them.
+    Scenes of a family share all but numbers, unless a body has next to no inertia about an axis.
     """
-    return _Builder(packed, still).graph()
+    shared = packed.derived.shared
+    if shared is None or lean_bodies(packed):
+        return _Builder(packed, still).graph()
+    place = None if still is None else (still.bodies.tobytes(), still.omitted)
+    key = build, packed.derived.redundant is None, is_small(packed.size), place
+    if key not in shared:
+        shared[key] = _Builder(packed, still).graph()
+    graph, used = shared[key]
+    inverse, mass, spins = weights(packed.system, graph.bodies, {})
+    dropped = dropped_rows(packed, still, graph.row)
+    own = {"inverse": inverse, "mass": mass, "spins": spins, "dropped": dropped, "table": graph.table.copy()}
+    return graph._replace(**own), used
 
 
 class _Builder:
@@ -242,19 +253,6 @@ class _Builder:
                 table += entry
         return records(RowKind, [row_of(RowKind, **kind) for kind in kinds]), np.array(table, np.int64), tuple(used)
 
-    def _weights(self):
-        """ConstraintGraph.inverse, ConstraintGraph.mass and ConstraintGraph.spins."""
-        nb, system = self.nb, self.system
-        inverse, mass = np.zeros((nb + 1, WEIGHTS)), np.zeros((nb + 1, WEIGHTS))
-        spins = np.zeros(nb, np.int64)
-        inverse[:nb, W_MASS], mass[:nb, W_MASS] = 1.0 / system.mass, system.mass
-        rigid = np.flatnonzero(self.rows[:, 1] == 7)
-        J = system.inertia[rigid].reshape(-1, 3, 3)
-        spins[rigid] = (J[:, :1, :1] * np.eye(3) != J).any(axis=(1, 2))
-        for weights, matrices in ((inverse, inverses(J, [self.lean.get(i) for i in rigid])), (mass, J)):
-            weights[rigid, W_ROTATION:] = np.pad(matrices, ((0, 0), (0, 0), (0, 1))).reshape(-1, 12)
-        return inverse.ravel(), mass.ravel(), spins
-
     def _turns(self):
         """ConstraintGraph.turns."""
         turns = np.zeros(len(self.places))
@@ -262,19 +260,13 @@ class _Builder:
             turns[first : first + constraint.rows] = not has_lengths(constraint)
         return turns if is_small(self.packed.size) and turns.any() else np.zeros(0)
 
-    def _dropped(self):
-        if self.still is not None:
-            return np.flatnonzero(np.isin(self.places, self.still.redundant))
-        redundant = self.packed.derived.redundant
-        return np.zeros(0, np.int64) if redundant is None else redundant.copy()
-
     def graph(self):
         """The `ConstraintGraph`, and the classes of its kinds."""
         parts, scales = self._products_at_hubs()
         axes = self._axes()
         index = {id(joint.constraint): i for i, joint in enumerate(self.joints)}
         kinds, table, used = self._kinds(index)
-        inverse, mass, spins = self._weights()
+        inverse, mass, spins = weights(self.system, self.rows, self.lean)
 
         def rows_of(part):
             first = self.firsts[index[id(part)]]
@@ -298,13 +290,38 @@ class _Builder:
             scales=scales,
             welds=self._welds(),
             diagonal=_diagonal(self.pattern),
-            dropped=self._dropped(),
+            dropped=dropped_rows(self.packed, self.still, self.places),
             frictions=frictions,
             friction_rows=friction_rows,
             rub=np.zeros(1, np.int64),
             axes=axes,
         )
         return graph, used
+
+
+def weights(system, rows, lean):
+    """ConstraintGraph.inverse, ConstraintGraph.mass and ConstraintGraph.spins.
+
+    rows: as ConstraintGraph.bodies; lean: as `lean_bodies` returns it.
+    """
+    nb = len(rows)
+    inverse, mass = np.zeros((nb + 1, WEIGHTS)), np.zeros((nb + 1, WEIGHTS))
+    spins = np.zeros(nb, np.int64)
+    inverse[:nb, W_MASS], mass[:nb, W_MASS] = 1.0 / system.mass, system.mass
+    rigid = np.flatnonzero(rows[:, 1] == 7)
+    J = system.inertia[rigid].reshape(-1, 3, 3)
+    spins[rigid] = (J[:, :1, :1] * np.eye(3) != J).any(axis=(1, 2))
+    for out, matrices in ((inverse, inverses(J, [lean.get(i) for i in rigid])), (mass, J)):
+        out.reshape(-1, 4, 4)[rigid, 1:, :3] = matrices
+    return inverse.ravel(), mass.ravel(), spins
+
+
+def dropped_rows(packed, still, row):
+    """ConstraintGraph.dropped, of a graph whose rows have these places in Phi."""
+    if still is not None:
+        return np.flatnonzero(np.isin(row, still.redundant))
+    redundant = packed.derived.redundant
+    return np.zeros(0, np.int64) if redundant is None else redundant.copy()
 
 
 def _diagonal(pattern):

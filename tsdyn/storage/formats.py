@@ -19,7 +19,8 @@ and for what is written at once, beside the tables
 
     put(path, group, arrays)                   arrays by name, into a new group of a closed store
     get(path, group)                           the arrays of a group, by name; none where there is no such group
-    attributes(path)                           of the store as a whole
+    attributes(path)                           what `create` was given
+    names(path)                                of all columns
 """
 
 import contextlib

@@ -149,6 +149,12 @@ def attributes(path):
         return dict(file.attrs)
 
 
+def names(path):
+    """As formats.py says."""
+    with reading(path), _opened(path) as file:
+        return list(file)
+
+
 def _opened(path):
     """The file to read: as one that is being written, or as another reader in this process has opened it.
 

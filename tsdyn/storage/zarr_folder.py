@@ -105,6 +105,12 @@ def attributes(path):
         return dict(_group(path, "r").attrs)
 
 
+def names(path):
+    """As formats.py says."""
+    with reading(path):
+        return sorted(_group(path, "r").array_keys())
+
+
 def _demand_chunks(path, array):
     """Raise StorageError unless all chunks are there, and whole."""
     with reading(path):

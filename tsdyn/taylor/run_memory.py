@@ -40,15 +40,30 @@ class Series:
         if found:
             raise InvalidArgument(found)
         graph, self.kinds = moving_parts(packed)
-        self.constant_columns = masks(graph, packed)
+        self.constant_columns = _masks_once(graph, packed)
         self.graph = with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
-        self.refined = int(len(graph.bodies) > MANY or _are_unequal(packed.system))
+        self.refined = int(len(graph.bodies) > MANY or are_unequal(packed.system))
 
 
-def _are_unequal(system):
+def are_unequal(system):
     """Whether heavy bodies may load light ones: a last place of lam accelerates these by many of their own."""
     largest = np.abs(system.inertia).max(axis=1)  # zero for a point mass
     return any(x.max() > LIGHT * x.min() for x in (system.mass, largest[largest > 0.0]) if x.size)
+
+
+def _masks_once(graph, packed):
+    """As `layout.masks`, which scenes of a family with the same parameters of constraints share."""
+    shared = packed.derived.shared
+    if shared is None:
+        return masks(graph, packed)
+    key = masks, graph.row.tobytes(), graph.bodies.tobytes()
+    given, table, constant = shared.get(key, (None, None, 0))
+    if given == packed.parameters:
+        graph.table[...] = table
+        return constant
+    constant = masks(graph, packed)
+    shared[key] = packed.parameters, graph.table.copy(), constant
+    return constant
 
 
 class SeriesMemory(Memory):

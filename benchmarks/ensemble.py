@@ -1,0 +1,90 @@
+"""Cases a second of `ts.ensemble`: efficiency of threads, and what a case costs beside the compiled driver.
+
+Each case has another mass. Rounds of one thread, two threads and a loop over `simulate` are interleaved; medians. The
+overhead is the processor's time of one more case in one thread, less that in the compiled driver.
+
+Run it: python -m benchmarks.ensemble
+"""
+
+import argparse
+import time
+from statistics import median
+
+import numpy as np
+
+import tsdyn as ts
+from benchmarks.call_overhead import Clocked
+from benchmarks.scenes import SCENES
+from tsdyn.taylor.run_memory import SeriesMemory
+
+SPANS = {"sliding top": (1e-4, 1.0, 10.0), "two-body pendulum": (1e-4, 0.5, 5.0), "chain of 4": (1e-4, 0.2, 1.0)}
+CASES, ROUNDS, LOOPED = 1500, 5, 30  # cases of the longest span: a tenth
+
+
+def table(scene, count):
+    """Masses of the first body, within ten per cent."""
+    body = scene.bodies[0]
+    return {f"{body.name}.mass": body.mass * np.random.default_rng(0).uniform(0.9, 1.1, count)}
+
+
+def seconds(call, count):
+    """Seconds a case of a call that runs so many."""
+    began = time.perf_counter()
+    call()
+    return (time.perf_counter() - began) / count
+
+
+def overhead(scene, span, count):
+    """Seconds that a case takes outside the compiled driver: of an ensemble of twice as many less those of one."""
+    plain = SeriesMemory.advance_kernel
+    SeriesMemory.advance_kernel = clock = Clocked(plain, time.process_time)
+    outside = []
+    for many in (count, 2 * count):
+        values, clock.seconds = table(scene, many), 0.0
+        began = time.process_time()
+        ts.ensemble(scene, values, span, threads=1)
+        outside.append(time.process_time() - began - clock.seconds)
+    SeriesMemory.advance_kernel = staticmethod(plain)
+    return (outside[1] - outside[0]) / count
+
+
+def looped(scene, values, span):
+    """The same by a loop over `simulate`."""
+    for i in range(LOOPED):
+        ts.simulate(scene.with_parameters({name: array[i] for name, array in values.items()}), span)
+
+
+def measure(name, end, count, rounds):
+    """Medians of seconds a case: one thread, two threads, a loop over `simulate`, and the overhead."""
+    scene, span = SCENES[name].build(), (0.0, end)
+    values = table(scene, count)
+    calls = {threads: lambda threads=threads: ts.ensemble(scene, values, span, threads=threads) for threads in (1, 2)}
+    found = {1: [], 2: [], "loop": [], "overhead": []}
+    calls[1]()
+    for _ in range(rounds):
+        for threads, call in calls.items():
+            found[threads].append(seconds(call, count))
+        found["loop"].append(seconds(lambda: looped(scene, values, span), LOOPED))
+        found["overhead"].append(overhead(scene, (0.0, SPANS[name][0]), count))
+    return {key: median(times) for key, times in found.items()}
+
+
+def main():
+    """Print a row for each scene and span."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=CASES)
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
+    given = parser.parse_args()
+    columns = ("cases/s", "us a case", "2 threads", "efficiency", "loop", "overhead")
+    print(f"{'scene, s':26}" + "".join(f"{column:>11}" for column in columns))
+    for name, ends in SPANS.items():
+        for end in ends:
+            count = max(LOOPED, given.cases // (10 if end == ends[-1] else 1))
+            found = measure(name, end, count, given.rounds)
+            one, two = found[1], found[2]
+            times = f"{1e6 * one:11.0f}{1e6 * two:11.0f}{one / two / 2:11.0%}{1e6 * found['loop']:11.0f}"
+            print(f"{f'{name}, {end:g}':26}{1 / one:11.0f}{times}{1e6 * found['overhead']:11.1f}")
+
+
+if __name__ == "__main__":
+    main()

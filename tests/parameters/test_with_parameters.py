@@ -1,0 +1,167 @@
+"""Scenes with other parameters: the bits of scenes that are given the same values one by one."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from examples import drive_train, driven_pivot, four_bar, screw_press, stick_slip, top
+from tests.helpers.every_force import everything
+from tests.helpers.plug_ins import Rod
+
+RNG = np.random.default_rng(4)
+SCENES = {
+    "every force": lambda: everything(np.random.default_rng(1))[0],
+    "four-bar": four_bar.build,
+    "gears": drive_train.build,
+    "screw": screw_press.build,
+    "friction": stick_slip.build,
+    "top": top.build,
+}
+
+
+def other(name, value):
+    """An admissible value near another."""
+    if name.endswith("orientation"):
+        value = value + 1e-3 * RNG.normal(size=4)
+        return value / np.linalg.norm(value)
+    scale = 1.0 + 0.05 * RNG.uniform()
+    if np.ndim(value) == 2 or name.endswith(("mass", "stiffness", "damping", "velocity")):
+        return value * scale
+    return value * scale if np.all(value) else value + 0.01 * RNG.uniform(size=np.shape(value))
+
+
+def outcome(make, *arguments):
+    """Bits of a short run of a scene that is made, or why there is none."""
+    try:
+        solution = ts.simulate(make(*arguments), (0.0, 0.02), rtol=1e-6, atol=1e-6)
+    except ts.TsdynError as error:
+        return str(error)
+    return [getattr(solution, name).tobytes() for name in ("t", "q", "qd", "qdd", "multipliers", "energy")]
+
+
+def set_one_by_one(scene, values):
+    """A copy of a scene whose attributes are set."""
+    twin = scene.copy()
+    for name, value in values.items():
+        owner, _, attribute = name.rpartition(".")
+        setattr(twin[owner] if owner else twin, attribute, value)
+    return twin
+
+
+@pytest.mark.slow_for("every force")
+@pytest.mark.parametrize("which", SCENES)
+def test_runs_have_the_bits_of_a_scene_with_these_attributes(which):
+    scene = SCENES[which]()
+    before, listed = outcome(scene.copy), dict(scene.parameters())
+    assert len(listed) > 5
+    for name, value in listed.items():
+        values = {name: other(name, value)}
+        assert outcome(scene.with_parameters, values) == outcome(set_one_by_one, scene, values), name
+    assert outcome(lambda: scene) == before
+    assert all(np.array_equal(value, listed[name]) for name, value in scene.parameters().items())
+
+
+@pytest.mark.parametrize("which", ["top", "four-bar"])
+@pytest.mark.parametrize("method", ["dop853", "rk45", "nystrom4", "sdirk54"])
+def test_every_method_sees_the_values(which, method):
+    scene = SCENES[which]()
+    masses = {f"{body.name}.mass": 1.1 * body.mass for body in scene.bodies}
+    inertias = {f"{body.name}.inertia": 1.2 * body.inertia for body in scene.bodies}
+    values = {**masses, **inertias, "gravity": (0.1, 0.2, -9.0)}
+    runs = [ts.simulate(each, (0, 0.01), integrator=method)
+            for each in (scene.with_parameters(values), set_one_by_one(scene, values), scene)]  # fmt: skip
+    one, same, base = [run.qdd.tobytes() for run in runs]
+    assert one == same != base
+
+
+def test_values_add_up_and_handles_are_its_own():
+    scene = top.build()
+    body = scene.bodies[0]
+    first = scene.with_parameters({f"{body.name}.mass": 20.0})
+    both = first.with_parameters({f"{body.name}.velocity": (0.1, 0, 0)})
+    assert both[body] is both.bodies[0] is not body
+    assert (both[body].mass, first[body].mass, body.mass) == (20.0, 20.0, 30.0)
+    assert both[body].velocity[0] == 0.1
+    solution = ts.simulate(first, (0, 0.01))
+    assert np.array_equal(solution.position(body), solution.position(first[body]))
+    first[body].mass = 25.0
+    assert (both[body].mass, first[body].mass, first.with_parameters({})[body].mass) == (20.0, 25.0, 25.0)
+
+
+def test_the_original_may_change_afterwards():
+    scene = top.build()
+    values = {f"{scene.bodies[0].name}.inertia": (80.0, 80.0, 30.0)}
+    later, expected = scene.with_parameters(values), outcome(set_one_by_one, scene, values)
+    scene.bodies[0].mass = 1.0
+    scene.gravity = (0, 0, 0)
+    assert outcome(lambda: later) == expected
+    assert later.bodies[0].mass == 30.0
+
+
+def test_handles_of_the_original_serve_for_joints_made_anew():
+    scene = four_bar.build()
+    joint = next(item for item in scene.constraints if isinstance(item, ts.constraints.Revolute))
+    moved = {f"{joint.name}.{side}": getattr(joint, side) + np.array((0, 0, 0.1)) for side in ("point_a", "point_b")}
+    changed = scene.with_parameters(moved)
+    solution = ts.simulate(changed, (0, 0.01))
+    angle = solution.angle(joint)
+    assert np.array_equal(angle, solution.angle(changed[joint]))
+    assert np.array_equal(solution.reaction(joint)[0], solution.reaction(changed[joint])[0])
+
+
+def test_plug_ins_are_listed_by_their_arguments():
+    scene = ts.Scene()
+    bob = scene.add_point_mass(1.0, position=(1, 0, 0), name="bob")
+    scene.add(Rod(bob, scene.ground, name="rod"))
+    assert "rod.point_b" in scene.parameters()
+
+
+def test_a_value_that_is_no_number_is_packed_anew():
+    scene = driven_pivot.build_driven()
+    slower = ts.motions.Sine(driven_pivot.HEIGHT, driven_pivot.FREQUENCY / 2, phase=np.pi / 2)
+    values = {"pivot.path": (0.0, 0.0, slower)}
+    assert outcome(scene.with_parameters, values) == outcome(set_one_by_one, scene, values)
+
+
+def test_it_can_be_pickled_copied_and_assembled():
+    scene = top.build()
+    changed = scene.with_parameters({f"{scene.bodies[0].name}.mass": 20.0})
+    expected = outcome(lambda: changed)
+    for twin in (pickle.loads(pickle.dumps(changed)), changed.copy()):
+        assert outcome(lambda twin=twin: twin) == expected
+    assert changed.assemble().moved < 1e-12
+    assert "20" in str(changed.parameters())
+
+
+WRONG = {
+    "bob.mss": ("did you mean bob.mass", 1.0),
+    "bob.mass": ("must be a positive", -1.0),
+    "spring.stiffness": ("not negative", np.nan),
+    "rod.length": ("must be positive", 0.0),
+    "gravity": ("three finite numbers", 9.81),
+    "bob.velocity": ("three finite numbers", (1, 2)),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_values_are_refused_as_when_they_are_set(name):
+    scene = ts.Scene()
+    bob = scene.add_point_mass(1.0, position=(1, 0, 0), name="bob")
+    scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    scene.add(ts.forces.Spring(bob, scene.ground, stiffness=3.0, name="spring"))
+    message, value = WRONG[name]
+    with pytest.raises(ts.TsdynError, match=message):
+        scene.with_parameters({name: value})
+
+
+def test_units_and_tables():
+    scene = everything(np.random.default_rng(1))[0]
+    listed = scene.parameters()
+    assert listed.units["a.inertia"] == "kg m^2"
+    assert listed.units["Bushing(ground, b).torsional_damping"] == "N m s/rad"
+    assert listed.units["Spring(ground, dot).actuator"] == "N"
+    assert listed.units["a.orientation"] == "1"
+    assert "<td>a.mass</td><td>1.2</td><td>kg</td>" in listed._repr_html_()
+    assert repr(listed).startswith(f"<{len(listed)} parameters>")

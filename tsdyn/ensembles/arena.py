@@ -1,0 +1,199 @@
+"""The arrays that the runs of one thread have in common: each case writes its numbers into them.
+
+Everything that numbers don't change is made once: constraint graphs, memory of runs, addresses. A case whose numbers
+change more (an axis without inertia, a scene of micrometres) isn't run here; it is run as a scene of its own, with the
+same bits.
+"""
+
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+
+from ..methods.integrator import frozen
+from ..model.derived import Derived
+from ..model.handles import handles_of
+from ..model.lengths import is_small
+from ..model.packed import System
+from ..parameters.edit import KEPT
+from ..runs.task import Task
+from ..simulation import method_choice
+from ..simulation.simulate import run_task, simulate
+from ..sparse.graph_builder import weights
+from ..sparse.massless_axes import lean_bodies
+from ..taylor.run_memory import are_unequal
+from ..taylor.tolerances import LIGHT
+from .first_slice import FirstSlice
+from .pen import pen_of
+from .sharing import have_same_zeros
+from .starts import OF_ROWS, Starts
+
+FEW = 30  # bodies that a list serves faster than an array
+
+
+class Arena:
+    """Arrays of a scene, and the memory of its runs; for one thread.
+
+    Parameters
+    ----------
+    study : Study
+    """
+
+    def __init__(self, study):
+        self.study, family = study, study.family
+        derived = Derived(shared=family.shared)
+        for name in KEPT:
+            setattr(derived, name, getattr(family.packed.derived, name))
+        system = System(*(array.copy() for array in family.packed.system))
+        self.base, self.packed = family.packed, family.packed._replace(system=system, derived=derived)
+        self.kept, template = study.kept.like(self.packed), family.template
+        self.scene = SimpleNamespace(
+            packed=self.packed, system=system, bodies=template.bodies, constraints=template.constraints,
+            row_names=template.row_names,
+        )  # fmt: skip
+        self.moments, self._is_unequal = _moments(system), are_unequal(system)
+        self.written, self._weights, self.starts = set(), [], Starts(self)
+        self._pen = None if study.names is None else pen_of(self, study.names)
+        self._slice = FirstSlice(study) if FirstSlice.serves(study) else None
+
+    def systems(self):
+        """The `System`s whose arrays hold the numbers of a case, but for reals: the scene's, and the memory's."""
+        return [self.packed.system, *(memory.context.system for memory in self._memories())]
+
+    def weights(self):
+        """(inverse, mass, lengths of q_i, spins) of each constraint graph, the first two as (bodies + 1, 4, 4)."""
+        graphs = self._graphs()
+        if len(graphs) != len(self._weights):
+            self._weights = [_views(graph) for graph in graphs]
+        return self._weights
+
+    def enter(self, packed):
+        """Write the numbers of a packed scene; False if they change more than numbers."""
+        base, own = self.base, self.packed
+        if is_small(packed.size) != is_small(base.size) or not have_same_zeros(packed.parameters, base.parameters):
+            return False
+        names = [name for name in System._fields if getattr(packed.system, name) is not getattr(base.system, name)]
+        moved = packed.coordinates is not base.coordinates
+        if (moved or "mass" in names or "inertia" in names) and lean_bodies(packed):
+            return False
+        for name in {*names, *self.written}:
+            array = getattr(packed.system, name)
+            getattr(own.system, name)[...] = array
+            for memory in self._memories():
+                getattr(memory.context.system, name)[...] = array
+        if moved or self.kept.packed.coordinates is not base.coordinates:
+            own.derived.levers = own.derived.near = own.derived.grounded = None
+            own.derived.origin = None, None
+        if packed.members is not base.members or self.kept.packed.members is not base.members:
+            own.derived.members = own.derived.aligned = None
+            own.derived.handles = self.kept.handles = handles_of(packed)
+        if OF_ROWS & {*names, *self.written}:
+            self._weigh()
+        self.written = {*names}
+        self.kept.packed = self.scene.packed = packed._replace(system=own.system, derived=own.derived)
+        return True
+
+    @property
+    def has_other_rows(self):
+        """Whether the last case had other redundant rows than the first."""
+        return self.starts.has_other_rows
+
+    @property
+    def is_spoilt(self):
+        """Whether a case has left bodies that turn behind, which the next one may not have."""
+        return bool(self.packed.derived.turning)
+
+    @property
+    def is_immobile(self):
+        """Whether redundant rows leave no degree of freedom, which the message of a run says."""
+        rows, system = self.packed.derived.redundant, self.packed.system
+        return rows is not None and self.kept.n == len(system.segments) - len(rows)
+
+    def _masses_are_unequal(self):
+        """As `are_unequal`; without inertias, unless these differ from case to case."""
+        if "inertia" in self.written or self._is_unequal or len(self.packed.bodies) > FEW:
+            return are_unequal(self.packed.system)
+        masses = self.packed.system.mass.tolist()
+        return max(masses) > LIGHT * min(masses)
+
+    def _memories(self):
+        return [memory for spare in self.kept._spare.values() for memory in spare]
+
+    def _graphs(self):
+        known, series = self.packed.derived, vars(self.kept).get("series")
+        others = [other.packed.derived.graph for other in self.starts.others]
+        graphs = [found[0] for found in (known.graph, known.moving_graph, *others) if found is not None]
+        return graphs if series is None else [*graphs, series.graph]
+
+    def _weigh(self):
+        """Write masses and inertias into the constraint graphs."""
+        for graph in self._graphs():
+            found = weights(self.packed.system, graph.bodies, {})
+            for array, value in zip((graph.inverse, graph.mass, graph.spins), found, strict=True):
+                array[...] = value
+        self.moments = _moments(self.packed.system)
+
+    def run_values(self, values, scene):
+        """As `run_packed`, from values by name."""
+        self.starts.has_other_rows = False
+        if self._pen is None:
+            return None
+        if self.kept.packed is not self.packed:
+            self.kept.packed = self.scene.packed = self.packed
+        self.written |= self._pen.written
+        start = self._pen.write(values)
+        return None if start is None else self._run(start, scene)
+
+    def run_packed(self, packed, start, scene):
+        """The `Task` and the `Outcome` of a case, or a `Finished`; None if it can't be run here.
+
+        `scene()` makes it a scene of its own.
+        """
+        self.starts.has_other_rows = False
+        if not self.enter(packed):
+            return None
+        if packed.coordinates is not self.base.coordinates:
+            start = tuple(np.array(array) for array in start)  # of another size, if of the same numbers
+        return self._run(start, scene)
+
+    def _run(self, start, scene):
+        if self.written & OF_ROWS and self._masses_are_unequal() != self._is_unequal:
+            return None
+        found = self.starts.start(start)
+        if found is None:
+            return None
+        study, (memory, (q, qd)) = self.study, found
+        options, settings, method = study.options, study.options.settings, study.method
+        choose = partial(_implicit_is_faster, scene, study, method) if study.given["integrator"] is None else None
+        task = Task(
+            self.kept, method, settings.form, options.span, q, qd, memory, options.times, settings.dense_output,
+            options.events, settings.constraint_tol, settings.max_steps, settings.chart_interval or 0, study.report,
+            options.history, choose, study.stops,
+        )  # fmt: skip
+        outcome = None if self._slice is None or self.is_immobile else self._slice.run(task)
+        if outcome is not None:
+            return task, outcome
+        outcome = run_task(task, self.scene, settings.initial_tol)
+        return None if method_choice.instead(task, outcome.status) is not None else (task, outcome)
+
+
+def method_of(kept, options, default):
+    """The method of a run, as `simulate` chooses it."""
+    method, settings = options.method, options.settings
+    if method is None:
+        method = method_choice.explicit(kept, *default)
+    return method if settings.max_step is None else frozen(method.bounded(settings.max_step))
+
+
+def _implicit_is_faster(scene, study, method, run):
+    given = {**study.given, "scene": scene()}
+    return method_choice.implicit_is_faster(simulate, given, method, study.options.span[1], run)
+
+
+def _moments(system):
+    """Principal moments of inertia of each body, in increasing order."""
+    return np.linalg.eigh(system.inertia.reshape(-1, 3, 3))[0].tolist()
+
+
+def _views(graph):
+    return graph.inverse.reshape(-1, 4, 4), graph.mass.reshape(-1, 4, 4), graph.bodies[:, 1], graph.spins

@@ -1,0 +1,156 @@
+"""The table of cases: for each parameter a value of its own in each case, or one for all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..elements.bodies import Body
+from ..errors import InvalidArgument
+from ..parameters.fields import fields_of
+from ..validation import counted, nearest
+
+MATRIX = 2  # dimensions of an inertia
+
+
+class Cases:
+    """Values by case.
+
+    Attributes
+    ----------
+    columns : dict
+        Name -> array of which the first dimension is the case; of what differs from case to case.
+    fixed : dict
+        Name -> value for all cases.
+    count : int
+    """
+
+    def __init__(self, columns, fixed, count):
+        self.columns, self.fixed, self.count = columns, fixed, count
+
+    @property
+    def names(self):
+        """Names of the parameters of every case."""
+        return (*self.columns, *self.fixed)
+
+    def values(self, i):
+        """Values of case i by name."""
+        return {name: column[i] for name, column in self.columns.items()} | self.fixed
+
+    def part(self, cases):
+        """Some of the cases, a slice, as a table of their own."""
+        columns = {name: column[cases] for name, column in self.columns.items()}
+        return Cases(columns, self.fixed, len(range(self.count)[cases]))
+
+    @property
+    def table(self):
+        """Name -> array (cases, ...), what is fixed repeated."""
+        same = {name: np.broadcast_to(value, (self.count, *np.shape(value))) for name, value in self.fixed.items()}
+        return {**self.columns, **same}
+
+
+class CalledCases:
+    """Cases whose values a function gives."""
+
+    names = None  # they may be others in each case
+
+    def __init__(self, function, count, first=0):
+        self.function, self.count, self.first = function, count, first
+
+    def values(self, i):
+        """As of `Cases`."""
+        found = self.function(self.first + i)
+        if not isinstance(found, Mapping):
+            raise InvalidArgument(f"the function of cases must return a mapping of names to values, it gave {found!r}.")
+        return dict(found)
+
+    def part(self, cases):
+        """As of `Cases`."""
+        chosen = range(self.count)[cases]
+        return CalledCases(self.function, len(chosen), self.first + chosen.start)
+
+    @property
+    def table(self):
+        """As of `Cases`; lists where values don't make an array."""
+        every = [self.values(i) for i in range(self.count)]
+        return {name: np.array([values.get(name, np.nan) for values in every]) for name in (every[0] if every else ())}
+
+
+def cases_of(scene, parameters, count):
+    """Return the cases that a user gives: a mapping, a DataFrame, or a function with the number of cases.
+
+    Raises
+    ------
+    InvalidArgument
+        If a name is unknown, lengths differ, or the number of cases can't be told.
+    """
+    if callable(parameters):
+        if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
+            raise InvalidArgument(f"a function of the case needs the number of cases: cases=1000; got cases={count!r}.")
+        return CalledCases(parameters, int(count))
+    fields = fields_of(scene)
+    columns, fixed = {}, {}
+    for name, given in _listed(parameters).items():
+        if name not in fields:
+            raise InvalidArgument(
+                f"the scene has no parameter {name!r}{nearest(name, fields)} scene.parameters() lists them."
+            )
+        values, several = _column(name, given, fields[name])
+        (columns if several else fixed)[name] = values
+    lengths = {name: len(column) for name, column in columns.items()}
+    if len(set(lengths.values())) > 1:
+        said = ", ".join(f"{name}: {length}" for name, length in lengths.items())
+        raise InvalidArgument(f"parameters must have as many values as there are cases, got {said}.")
+    known = next(iter(lengths.values()), None)
+    if known == 0:
+        raise InvalidArgument(f"parameters have no values: {', '.join(lengths)}; give an array with one for each case.")
+    if count is not None and known not in (None, count):
+        raise InvalidArgument(f"cases={count!r}, but the parameters have {counted(known, 'value')} each.")
+    return Cases(columns, fixed, known if known is not None else int(count or 1))
+
+
+def _listed(parameters):
+    """A mapping of names to values; of a DataFrame its columns."""
+    if isinstance(parameters, Mapping):
+        return dict(parameters)
+    if hasattr(parameters, "columns") and hasattr(parameters, "__getitem__"):
+        return {str(name): np.array(list(parameters[name])) for name in parameters.columns}
+    raise InvalidArgument(
+        "parameters must be a mapping of names to arrays, a DataFrame, or a function of the case, got "
+        f"{type(parameters).__name__}."
+    )
+
+
+def _column(name, given, field):
+    """Values of a parameter as an array, and whether it has one value a case."""
+    if hasattr(given, "as_quat") and not isinstance(given, type):  # rotations of SciPy: the scalar is last
+        given = np.roll(given.as_quat(), 1, axis=-1)
+    array = _array(given)
+    if array.dtype.kind not in "iuf":  # functions of time, for instance
+        return (array, True) if array.ndim else (given, False)
+    array = array.astype(float)
+    whole = np.ndim(field.value) if field.is_numeric else 0
+    if field.attribute == "inertia" and isinstance(field.owner, Body) and array.ndim == MATRIX:
+        if array.shape == (3, 3) and (array == array.T).all():
+            raise InvalidArgument(
+                f"{name}: three cases of principal values, or one matrix? Give an array (cases, 3, 3)."
+            )
+        return array, True
+    least = 1 if whole == MATRIX else whole  # principal values do for a matrix
+    if array.ndim not in range(least, whole + 2):
+        raise InvalidArgument(
+            f"{name}: values of shape {array.shape} are neither one for all cases nor one for each; a value has "
+            f"{counted(whole, 'dimension')}."
+        )
+    array.setflags(write=False)
+    return (array, True) if array.ndim > whole else (float(array) if whole == 0 else array, False)
+
+
+def _array(given):
+    try:
+        return np.array(given)
+    except ValueError:  # ragged
+        found = np.empty(len(given), object)
+        found[:] = list(given)
+        return found

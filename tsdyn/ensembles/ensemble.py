@@ -1,0 +1,155 @@
+"""`ts.ensemble`: many runs of a scene with other parameters."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..calls import fitting, unknown_argument
+from ..errors import InvalidArgument, TsdynError
+from ..simulation.scene import Scene
+from ..simulation.simulate import simulate
+from .cases import cases_of
+from .chunks import Collected
+from .executors import run_executor
+from .progress import CaseProgress
+from .results import Ensemble
+from .runner import Study
+from .threads import run_threads
+
+if TYPE_CHECKING:
+    from ..hints import CaseTable, Keep, Place, Progress, Span
+
+OWN = ("scene", "t_span", "store", "checkpoint", "progress")  # arguments of `simulate` that are no options here
+
+
+@fitting
+def ensemble(  # many arguments, by name: each is an option of the ensemble; the others are those of `simulate`
+    scene: Scene,
+    parameters: CaseTable,
+    t_span: Span,
+    *,
+    keep: Keep = "final",
+    cases: int | None = None,
+    executor: Any = None,
+    threads: int | None = None,
+    lanes: int | None = None,
+    store: Place | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Ensemble:
+    """Run a scene many times, with other parameters each time; the scene is not changed.
+
+    Parameters
+    ----------
+    scene : Scene
+    parameters : mapping, DataFrame or callable
+        Name -> array of which the first dimension is the case, or one value for all cases; names are those of
+        `scene.parameters()`. Or a function of the case (0, 1, ...) that returns a mapping of names to values.
+    t_span : (float, float), s
+    keep : {"final", "t_eval"} or callable
+        What is kept of each case: the last state; the states at the times of `t_eval`; or what a function returns for
+        the Solution: a number, an array, or a mapping of names to these.
+    cases : int, optional
+        The number of cases; needed for a function of the case.
+    executor : concurrent.futures.Executor, dask.distributed.Client or address of its scheduler, optional
+        Where the cases run, in place of threads of this process. They are sent in chunks, and chunks of a worker that
+        Dask has lost are sent again.
+    threads : int, optional
+        Threads of this process. By default one where cases are so short that threads wait for each other, else one a
+        processor. The bits are the same.
+    lanes : int, optional
+        Cases that one thread runs at once: 1.
+    store : str or PathLike, optional
+        Stream the results to a file, in constant memory; by its suffix Zarr (.zarr) or HDF5 (.h5, .hdf5, .nc).
+    resume : bool
+        Go on with the cases that an ensemble left out in its store.
+    progress : bool or callable, optional
+        True shows a bar with rate and remaining time; a callable receives the fraction done.
+    **options
+        Options of `simulate`: integrator, rtol, t_eval, events, dense_output, and so on.
+
+    Returns
+    -------
+    Ensemble
+        A case that fails has its status and message there, and ends no other. Ctrl-C keeps what is finished.
+
+    Raises
+    ------
+    TsdynError
+        A subclass, before the first run: an unknown parameter, lengths that differ, an option that isn't admissible.
+
+    Notes
+    -----
+    Every case has the bits of `simulate(scene.with_parameters(values), t_span, **options)`, whatever the number of
+    threads, and wherever it ran on machines of one kind.
+
+    Examples
+    --------
+    The period of a pendulum grows with its amplitude:
+
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(0, 0, -1), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground))
+    >>> def lowest(t, state):
+    ...     return state.position(bob)[0]
+    >>> lowest.terminal, lowest.direction = 1, 1
+    >>> angles = np.array([0.1, 1.0, 2.0])
+    >>> starts = np.stack([np.sin(angles), 0 * angles, -np.cos(angles)], axis=1)
+    >>> swings = ts.ensemble(scene, {"bob.position": starts}, (0, 10), events=lowest)
+    >>> print((swings.t * 4 / 3).round(4))
+    [1.9882 2.1187 2.6404]
+    """
+    if not isinstance(scene, Scene):
+        raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
+    demand_lanes(lanes)
+    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1):
+        raise InvalidArgument(f"threads must be a positive whole number, got {threads!r}.")
+    study = Study(scene, cases_of(scene, parameters, cases), given_of(t_span, options), keep)
+    sink = sink_of(study, store, resume)
+    report, used = CaseProgress(progress, study.cases.count, sink.first), 0
+    try:
+        if executor is None:
+            used, interrupted = run_threads(study, sink, threads, report)
+        else:
+            interrupted = run_executor(study, sink, executor, report)
+    finally:
+        report.close()
+        sink.close()
+    return Ensemble(study, sink, used, interrupted)
+
+
+def sink_of(study, store, resume):
+    """Where the results go: memory, or a store."""
+    if store is None:
+        if resume:
+            raise InvalidArgument(
+                "resume=True goes on with a store; give store= that of the ensemble that was stopped."
+            )
+        return Collected(study)
+    from .stored import StoredResults
+
+    return StoredResults(study, store, bool(resume))
+
+
+def demand_lanes(lanes):
+    """Refuse other than one case at a time."""
+    if lanes is not None and (isinstance(lanes, bool) or lanes != 1):
+        raise TsdynError(f"lanes={lanes!r}: a thread runs one case at a time so far; leave lanes out, or pass 1.")
+
+
+def given_of(t_span, options):
+    """The arguments of `simulate` by name, the options among them checked by name."""
+    defaults = {
+        name: p.default for name, p in inspect.signature(simulate).parameters.items() if name not in ("scene", "t_span")
+    }
+    known = [name for name in defaults if name not in OWN]
+    for name in options:
+        if name not in known:
+            raise unknown_argument("ensemble", name, known)
+    return {**defaults, **options, "scene": None, "t_span": t_span}

@@ -1,0 +1,53 @@
+"""Progress of an ensemble: a bar with rate and remaining time, or a user's function."""
+
+import sys
+
+from ..errors import InvalidArgument, MissingDependency
+
+
+class CaseProgress:
+    """What is told of cases that are finished.
+
+    Parameters
+    ----------
+    progress : bool or callable
+        As of `simulate`.
+    count : int
+        Cases in all.
+    done : int
+        Cases that were finished before.
+    """
+
+    def __init__(self, progress, count, done=0):
+        self.count, self.done, self._bar, self._tell = count, done, None, None
+        if callable(progress):
+            self._tell = progress
+        elif progress is True:
+            self._bar = _bar(count, done)
+        elif progress not in (None, False):
+            raise InvalidArgument(
+                f"progress must be True, False, None or a function of the fraction done, got {progress!r}."
+            )
+
+    def __call__(self, cases):
+        """So many more cases are finished."""
+        self.done += cases
+        if self._bar is not None:
+            self._bar.update(cases)
+        if self._tell is not None and cases:
+            self._tell(self.done / self.count)
+
+    def close(self):
+        """It has ended."""
+        if self._bar is not None:
+            self._bar.close()
+
+
+def _bar(count, done):
+    try:
+        from tqdm.auto import tqdm
+    except ImportError as error:
+        raise MissingDependency(
+            "progress=True needs tqdm: pip install 'tsdyn[progress]'; or pass a function of the fraction done."
+        ) from error
+    return tqdm(total=count, initial=done, unit=" cases", file=sys.stderr)

@@ -1,0 +1,211 @@
+"""The result of an ensemble."""
+
+from __future__ import annotations
+
+import html
+from collections import Counter
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..calls import fitting_methods
+from ..errors import InvalidArgument, MissingDependency, Status
+from ..validation import counted
+from .keeping import TIMES
+
+if TYPE_CHECKING:
+    from ..hints import Bools, Floats, Integers, Solution
+
+COORDINATES = ("x", "y", "z", "e0", "e1", "e2", "e3")
+
+
+@fitting_methods
+class Ensemble:
+    """The result of `ensemble`: cases in the order of the table of parameters; n coordinates.
+
+    Attributes
+    ----------
+    t : ndarray
+        keep="t_eval": the times (k,), s; otherwise the time that each case reached (cases,), s.
+    q, qd : ndarray
+        keep="t_eval": (cases, k, n), NaN after the end of a case; otherwise the last state (cases, n).
+    kept : ndarray (cases, ...), or dict of these
+        What a function `keep` made of each solution.
+    status : ndarray of int (cases,)
+        A `Status` each; CASE_FAILED where a case could not be run, NOT_RUN where none was made.
+    success : ndarray of bool (cases,)
+    message : list of str
+        Why each case ended.
+    reached : ndarray (cases,), s
+    parameters : dict
+        The table of parameters, name -> (cases, ...).
+    lanes : int
+        Cases at once in one thread: 1.
+    threads : int
+        Threads of this process that ran the cases; 0 with an executor.
+    interrupted : bool
+        Whether Ctrl-C, or an executor that broke, ended it early.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> stone = scene.add_point_mass(mass=1.0, name="stone")
+    >>> throws = ts.ensemble(scene, {"stone.velocity": [(1, 0, 5), (2, 0, 5), (3, 0, 5)]}, (0, 1))
+    >>> throws
+    <Ensemble of 3 cases: 3 success>
+    >>> print(throws.q[:, 0], throws.case(1).position(stone)[-1, 0])
+    [1. 2. 3.] 2.0
+    """
+
+    def __init__(self, study: Any, results: Any, threads: int, interrupted: bool) -> None:
+        self._study, self._results = study, results
+        self.threads, self.interrupted, self.lanes = threads, bool(interrupted), 1
+
+    def __len__(self) -> int:
+        return self._study.cases.count
+
+    @property
+    def status(self) -> Integers:
+        """The `Status` of each case, int (cases,)."""
+        return self._results.status
+
+    @property
+    def success(self) -> Bools:
+        """True where a case reached the end of the interval, or a terminal event."""
+        return np.isin(self.status, (int(Status.SUCCESS), int(Status.EVENT)))
+
+    @property
+    def message(self) -> list[str]:
+        """Why each case ended."""
+        known, missing = self._results.messages, f"{Status.NOT_RUN.sentence} {self._results.reason}".rstrip()
+        sentences = {int(status): status.sentence for status in Status} | {int(Status.NOT_RUN): missing}
+        return [known.get(i) or sentences[code] for i, code in enumerate(self.status.tolist())]
+
+    @property
+    def reached(self) -> Floats:
+        """The time that each case reached, s; NaN where none was made."""
+        return self._results.arrays["t"]
+
+    @property
+    def t(self) -> Floats:
+        """The times of t_eval (k,), or those reached (cases,), s."""
+        return self._study.options.times if self._study.keep == TIMES else self.reached
+
+    @property
+    def q(self) -> Floats:
+        """Positions (cases, n) or (cases, k, n)."""
+        return self._results.arrays["q"]
+
+    @property
+    def qd(self) -> Floats:
+        """Velocities (cases, n) or (cases, k, n)."""
+        return self._results.arrays["qd"]
+
+    @property
+    def kept(self) -> Any:
+        """What a function `keep` returned: an array (cases, ...), or a dict of them."""
+        found = {name[5:]: array for name, array in self._results.arrays.items() if name.startswith("kept")}
+        if not callable(self._study.keep):
+            raise InvalidArgument("kept is what a function keep= made of each solution; none was given.")
+        return found[""] if found.keys() == {""} else found
+
+    @property
+    def parameters(self) -> dict[str, Floats]:
+        """The table of parameters: name -> (cases, ...)."""
+        return self._study.cases.table
+
+    def case(self, i: int) -> Solution:
+        """Run a case again and return its Solution, of the bits of the ensemble.
+
+        Raises
+        ------
+        InvalidArgument
+            If there is no such case.
+        TsdynError
+            If a value of the case is inadmissible.
+        """
+        if isinstance(i, bool) or not isinstance(i, (int, np.integer)) or not -len(self) <= i < len(self):
+            raise InvalidArgument(f"the ensemble has cases 0 to {len(self) - 1}, got {i!r}.")
+        from ..simulation.simulate import simulate
+
+        study = self._study
+        given = {name: value for name, value in study.given.items() if name != "scene"}
+        return simulate(study.scene.with_parameters(study.cases.values(int(i) % len(self))), **given)
+
+    @property
+    def coordinates(self) -> list[str]:
+        """Names of the coordinates, "crank.x" and so on, (n,)."""
+        return [f"{body.name}.{x}" for body in self._study.family.packed.bodies for x in COORDINATES[: body.dimension]]
+
+    def to_xarray(self) -> Any:
+        """Return an xarray.Dataset: dimensions case, coordinate and time, parameters as variables of the case."""
+        try:
+            import xarray
+        except ImportError as error:
+            raise MissingDependency("to_xarray() needs xarray: pip install 'tsdyn[data]'.") from error
+        grid = ("time",) if self._study.keep == TIMES else ()
+        found = {"status": ("case", self.status), "reached": ("case", self.reached, {"units": "s"})}
+        for name, units in (("q", "m or 1"), ("qd", "m/s or 1/s")):
+            found[name] = (("case", *grid, "coordinate"), getattr(self, name), {"units": units})
+        known = self._study.family.fields
+        for name, values in (*self.parameters.items(), *self._named()):
+            dimensions = ("case", *(f"axis {i} of {name}" for i in range(np.ndim(values) - 1)))
+            attributes = {"units": known[name].unit} if name in known else {}
+            found[name] = (dimensions, np.asarray(values), attributes)
+        coordinates = {"case": np.arange(len(self)), "coordinate": self.coordinates}
+        coordinates |= {"time": ("time", self.t, {"units": "s"})} if grid else {}
+        return xarray.Dataset(found, coordinates)
+
+    def to_dataframe(self) -> Any:
+        """Return a pandas.DataFrame: a row for each case (for each case and time with keep="t_eval")."""
+        try:
+            import pandas
+        except ImportError as error:
+            raise MissingDependency("to_dataframe() needs pandas: pip install 'tsdyn[data]'.") from error
+        columns = {}
+        for name, values in (*self.parameters.items(), *self._named()):
+            columns |= _flat(name, values)
+        columns |= {"status": [str(Status(code)) for code in self.status.tolist()], "message": self.message}
+        columns["reached"] = self.reached
+        names, n = self.coordinates, len(self.coordinates)
+        times = self.t.size if self._study.keep == TIMES else 1
+        columns = {name: np.repeat(np.asarray(values), times) for name, values in columns.items()}
+        for level in ("q", "qd"):
+            rows = np.asarray(getattr(self, level)).reshape(-1, n)
+            columns |= {f"{level} {name}": rows[:, j] for j, name in enumerate(names)}
+        index = np.repeat(np.arange(len(self)), times)
+        if self._study.keep == TIMES:
+            return pandas.DataFrame(columns, index=[index, np.tile(self.t, len(self))]).rename_axis(["case", "time"])
+        return pandas.DataFrame(columns, index=index).rename_axis("case")
+
+    def _named(self):
+        """What a function made of each case, by name."""
+        if not callable(self._study.keep):
+            return ()
+        kept = self.kept
+        return tuple(kept.items()) if isinstance(kept, Mapping) else (("kept", kept),)
+
+    def _facts(self):
+        count = Counter(self.status.tolist())
+        return ", ".join(f"{many} {Status(code)}" for code, many in sorted(count.items()))
+
+    def __repr__(self) -> str:
+        return f"<Ensemble of {counted(len(self), 'case')}: {self._facts()}>"
+
+    def _repr_html_(self) -> str:
+        """Return a table, for notebooks."""
+        facts = {"cases": len(self), "ended": self._facts(), "parameters": ", ".join(self.parameters)}
+        rows = "".join(f"<tr><th>{name}</th><td>{html.escape(str(fact))}</td></tr>" for name, fact in facts.items())
+        return f"<table><caption>Ensemble</caption>{rows}</table>"
+
+
+def _flat(name, values):
+    """Columns of numbers: name[0], name[1], ... of an array."""
+    array = np.asarray(values)
+    if array.ndim == 1:
+        return {name: array}
+    rows = array.reshape(len(array), -1)
+    return {f"{name}[{j}]": rows[:, j] for j in range(rows.shape[1])}

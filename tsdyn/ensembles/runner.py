@@ -1,0 +1,172 @@
+"""Cases, run one after the other."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..ahead.first_run import prepare_first_run
+from ..errors import Status, TsdynError
+from ..simulation.options import checked
+from ..simulation.simulate import run_from
+from ..simulation.solution import Solution
+from ..simulation.variants import family_of, of_numbers, packed_anew
+from .arena import Arena, method_of
+from .first_slice import Finished
+from .keeping import demand_keep, record_of, reduced
+from .sharing import serves
+from .tolerances import ARENAS
+
+PLAIN = Status.SUCCESS.sentence
+
+
+class Record(NamedTuple):
+    """What is known of a case that has been run."""
+
+    status: Status
+    message: str
+    arrays: dict  # by name
+
+
+class Study:
+    """What all cases have in common: the scene, the options of their runs, what is kept.
+
+    Parameters
+    ----------
+    scene : Scene
+    cases : Cases or CalledCases
+    given : dict
+        The arguments of `simulate` by name; scene and progress among them are not used.
+    keep : str or callable
+
+    Raises
+    ------
+    TsdynError
+        As `simulate` does for its options.
+    """
+
+    def __init__(self, scene, cases, given, keep):
+        self.scene, self.cases, self.keep, self.given = scene, cases, keep, {**given, "progress": None}
+        self.options = options = checked(self.given)
+        demand_keep(keep, options.times)
+        self.family, self.changes = family_of(scene)
+        self.kept, settings, default = scene._prepared, options.settings, (given["rtol"], given["atol"], options.series)
+        prepare_first_run(scene, options.method, settings.form, options.within, default)
+        self.method, self.n = method_of(self.kept, options, default), self.kept.n
+        self.stops = self.kept.stops(*options.span)
+        self.names = None if cases.names is None else {*self.changes, *cases.names}
+        self.has_arena = settings.drop and serves(self.family, self.kept, self.names)
+        self.stopped, self.idle = False, []  # runners of the threads of an executor
+
+    def __reduce__(self):
+        """What is analysed is analysed again in another process."""
+        return Study, (self.scene, self.cases, self.given, self.keep)
+
+    def twin(self, cases):
+        """The same for some of the cases."""
+        other = object.__new__(Study)
+        vars(other).update(vars(self), cases=cases)
+        return other
+
+    def report(self, fraction, *more):
+        """Of a run: end it if the ensemble has been stopped."""
+        if self.stopped and fraction is not None:
+            raise KeyboardInterrupt
+
+
+class Runner:
+    """Runs cases of a `Study`; for one thread."""
+
+    def __init__(self, study):
+        self.study, self._arenas = study, []
+
+    def run(self, i):
+        """The `Record` of case i."""
+        try:
+            return self._run(self.study.cases.values(i))
+        except TsdynError as error:
+            return Record(Status.CASE_FAILED, str(error), {})
+        except Exception as error:  # of a user's function: the other cases go on
+            return Record(Status.CASE_FAILED, f"{type(error).__name__}: {error}", {})
+
+    def _run(self, values):
+        study = self.study
+        changes = {**study.changes, **values} if study.changes else values
+        if study.has_arena:
+            ran = self._in_arena(lambda arena: arena.run_values(changes, lambda: self._scene(changes)))
+            if ran is not None:
+                return self._record(changes, *ran)
+        found = study.family.numbers(changes)
+        if study.has_arena and found is not None:
+            ran = self._in_arena(lambda arena: arena.run_packed(*found, lambda: self._scene(changes)))
+            if ran is not None:
+                return self._record(changes, *ran)
+        scene = self._scene(changes)
+        solution = run_from({**study.given, "scene": scene, "progress": study.report})
+        return self._recorded(solution, _Rows(solution))
+
+    def _in_arena(self, run):
+        """An arena, that of the last case first, and what `run` makes of it; None if a case can't be run in any.
+
+        Each has the redundant rows of its first case, if there are any: the order of these follows from the numbers.
+        """
+        for arena in (*self._arenas, None):
+            if arena is None and len(self._arenas) < ARENAS:
+                arena = Arena(self.study)
+                self._arenas.append(arena)
+            if arena is None:
+                return None
+            ran = run(arena)
+            if arena.is_spoilt:
+                self._arenas.remove(arena)
+            elif ran is not None and arena is not self._arenas[0]:
+                self._arenas.remove(arena)
+                self._arenas.insert(0, arena)
+            if ran is not None:
+                return arena, *ran
+            if not arena.has_other_rows:
+                return None
+        return None
+
+    def _scene(self, changes):
+        """A scene with these values."""
+        family = self.study.family
+        found = None if self.study.kept.sampled else family.numbers(changes)
+        if found is None:  # or functions that are sampled, which may have a state
+            return packed_anew(family, changes)
+        return of_numbers(self.study.scene, family, changes, *found)
+
+    def _record(self, changes, arena, task, outcome):
+        """The `Record` of a run in an arena."""
+        study, keep = self.study, self.study.keep
+        plain = isinstance(outcome, Finished) or (
+            outcome.status is Status.SUCCESS and not outcome.counts["steps_near_singular"] and not callable(keep)
+        )
+        if plain and not arena.is_immobile:
+            return Record(Status.SUCCESS, PLAIN, record_of(keep, outcome, study.n, task.times))
+        scene = self._scene(changes)
+        scene._packed.derived.redundant = arena.packed.derived.redundant
+        solution = Solution(scene, task._replace(prepared=scene._prepared), outcome, {"prepare": 0.0, "run": 0.0})
+        return self._recorded(solution, outcome)
+
+    def _recorded(self, solution, outcome):
+        study = self.study
+        if solution.status is Status.INTERRUPTED:
+            raise KeyboardInterrupt
+        arrays = record_of(study.keep, outcome, study.n, study.options.times)
+        status, message = solution.status, solution.message
+        if callable(study.keep):
+            arrays |= reduced(study.keep, solution)
+        return Record(status, message, arrays)
+
+
+class _Rows:
+    """Of a solution what `record_of` reads of an outcome."""
+
+    def __init__(self, solution: Any) -> None:
+        self.reached, self.last, self.solution = solution._reached, solution._last, solution
+
+    @property
+    def rows(self):
+        """Outputs (k, 1 + 2 n): t, q, qd."""
+        solution = self.solution
+        return np.column_stack((solution.t, solution.q, solution.qd))

@@ -1,0 +1,259 @@
+"""Results of an ensemble in a store: a row for each case, in the order of the cases, in constant memory.
+
+Messages are beside the store, a line of JSON for each case that has one of its own.
+"""
+
+import contextlib
+import hashlib
+import json
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from .._version import __version__
+from ..errors import Status, StorageError
+from ..simulation.stored_runs import demand_path, hash_of, sources_of
+from ..storage.formats import Column, Table, format_of
+from .chunks import empty, fitted
+from .keeping import TIMES
+from .tolerances import FLUSH, WAITING
+
+CASE, DIGEST = "case", "ensemble"
+
+
+class StoredResults:
+    """A sink of chunks that writes them to a store, as `Collected` keeps them in memory.
+
+    Parameters
+    ----------
+    study : Study
+    path : str or PathLike
+    resume : bool
+        Whether to go on with what is there.
+    """
+
+    reason = ""
+
+    def __init__(self, study, path, resume):
+        demand_path(path, "store")
+        self.study, self.path = study, Path(path).absolute()
+        self._format, self._store, self._table = format_of(self.path), None, None
+        self._said = self.path.with_name(f"{self.path.name}.messages")
+        self._waiting, self._due = {}, time.perf_counter() + FLUSH
+        if not self.path.parent.is_dir():
+            raise StorageError(f"there is no folder {self.path.parent} to write {self.path.name} to.")
+        if self.path.exists() and not resume:
+            raise StorageError(f"{self.path} exists. Delete it, take another name, or go on with it: resume=True.")
+        self.first = self._found() if self.path.exists() else 0
+        if not self.first:
+            self._said.unlink(missing_ok=True)
+
+    def _found(self):
+        """How many cases are in the store; raises StorageError if they are of another ensemble."""
+        attributes = self._format.attributes(self.path)
+        if attributes.get(DIGEST) != digest_of(self.study):
+            raise StorageError(
+                f"{self.path} is the store of another ensemble: scene, parameters, options or functions differ."
+            )
+        return self._format.count(self.path, [CASE, "status", "q", "qd"])
+
+    def __getstate__(self):
+        """Leave out the format, a module."""
+        return {**self.__dict__, "_format": None, "_store": None}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state, _format=format_of(state["path"]))
+
+    @property
+    def is_full(self):
+        """Whether many cases wait for one before them, which takes long."""
+        return sum(chunk.count for chunk in self._waiting.values()) > WAITING
+
+    def add(self, chunk):
+        """Take over a chunk; it is written when all before it are."""
+        if chunk.count and chunk.first >= self.first:
+            self._waiting.setdefault(chunk.first, chunk)
+        while self.first in self._waiting:
+            ready = self._waiting[self.first]
+            if self._store is None and not self._open(ready):
+                return
+            del self._waiting[self.first]
+            self._write(fitted(ready, {column.name: self._table.shapes(column)[0][1:] for column in self._kept()}))
+        if self._store is not None and time.perf_counter() > self._due:
+            self._flush()
+
+    def _kept(self):
+        return [column for column in self._table.columns if column.name.startswith("kept")]
+
+    def _open(self, chunk, last=False):
+        """Make or open the store; False if the shapes of what is kept aren't known yet."""
+        known = {name for each in self._waiting.values() for name in each.arrays}
+        if callable(self.study.keep) and len(known) == 3 and not last:  # t, q, qd: all cases have failed so far
+            return False
+        kept = {name: array for each in self._waiting.values() for name, array in each.arrays.items()}
+        parameters = self.study.cases.part(slice(chunk.first, chunk.first + 1)).table
+        self._table = table_of(self.study, parameters, kept)
+        attributes = {"source": f"tsdyn {__version__}", DIGEST: digest_of(self.study)}
+        attributes |= {"cases": self.study.cases.count, "times": json.dumps(self.study.options.times.tolist())}
+        make = self._format.Store
+        with _writing(self.path):
+            if self.first:
+                self._store = make.reopen(self.path, {CASE: self._table}, attributes, {CASE: self.first}, 0)
+            else:
+                self._store = make.create(self.path, {CASE: self._table}, attributes)
+        return True
+
+    def _write(self, chunk):
+        end = chunk.first + chunk.count
+        given = self.study.cases.part(slice(chunk.first, end)).table
+        arrays = {"reached" if name == "t" else name: array for name, array in chunk.arrays.items()}
+        arrays |= {"status": chunk.status} | {_column(name): np.asarray(array) for name, array in given.items()}
+        rows = {}
+        for column in (column for column in self._table.columns if column.name != CASE):
+            shape = self._table.shapes(column)[0][1:]
+            rows[column.name] = arrays.get(column.name, np.full((chunk.count, *shape), np.nan))
+        rows[CASE] = np.arange(chunk.first, end, dtype=float)  # last, for readers who count by it
+        with _writing(self.path):
+            self._store.write(chunk.first, rows)
+            if chunk.messages:
+                with open(self._said, "a", encoding="utf-8") as file:
+                    file.writelines(json.dumps([i, text]) + "\n" for i, text in sorted(chunk.messages.items()))
+        self.first = end
+
+    def _flush(self):
+        with _writing(self.path):
+            self._store.flush()
+        self._due = time.perf_counter() + FLUSH
+
+    def close(self):
+        """Bring everything to the store and close it; cases after one that is missing are left out."""
+        if self._store is None and self.first in self._waiting:
+            self._open(self._waiting[self.first], last=True)
+            while self.first in self._waiting:
+                self._write(self._waiting.pop(self.first))
+        if self._store is not None:
+            with _writing(self.path):
+                self._store.flush()
+                self._store.close()
+            self._store = None
+        self._waiting = {}
+
+    @property
+    def status(self):
+        """As of `Collected`."""
+        return self.arrays["status"].astype(int)
+
+    @property
+    def messages(self):
+        """As of `Collected`; of a case that was run twice the last."""
+        if not self._said.exists():
+            return {}
+        with open(self._said, encoding="utf-8") as file:
+            return dict(json.loads(line) for line in file)
+
+    @property
+    def arrays(self):
+        """As of `Collected`, read when they are asked for."""
+        return _StoredArrays(self)
+
+
+class _StoredArrays(Mapping):
+    """Arrays by name, those of cases that are missing NaN, or NOT_RUN."""
+
+    def __init__(self, results):
+        self.results = results
+
+    def __getitem__(self, name):
+        results = self.results
+        column = "reached" if name == "t" else name
+        total, found = results.study.cases.count, None
+        if results.first:
+            found = results._format.read(results.path, column, slice(0, results.first))
+        elif column in ("reached", "q", "qd"):
+            found = empty(results.study, 0)[name]
+        missing = float(Status.NOT_RUN) if name == "status" else np.nan
+        found = np.zeros(0) if found is None else found
+        return np.concatenate((found, np.full((total - len(found), *found.shape[1:]), missing)))
+
+    def __iter__(self):
+        names = ("t", "q", "qd")
+        if self.results._table is not None:
+            names += tuple(column.name for column in self.results._table.columns if column.name.startswith("kept"))
+        elif self.results.first:
+            names += tuple(name for name in self.results._format.names(self.results.path) if name.startswith("kept"))
+        return iter(dict.fromkeys(names))
+
+    def __len__(self):
+        return len([*iter(self)])
+
+
+def table_of(study, parameters, kept):
+    """The `Table` of a store: parameters by name with one case each, what is kept with any number of them."""
+    bodies = study.family.packed.bodies
+    names = [f"{body.name}.{x}" for body in bodies for x in ("x", "y", "z", "e0", "e1", "e2", "e3")[: body.dimension]]
+    labels, grid = {"coordinate": names}, ()
+    if study.keep == TIMES:
+        labels["time"], grid = [repr(t) for t in study.options.times.tolist()], ("time",)
+    columns = [Column(CASE, (), {"long_name": "case", "units": "1"})]
+    columns += [
+        Column("status", (), _said("number of the Status", "1")),
+        Column("reached", (), _said("time reached", "s")),
+    ]
+    for name, units in (("q", "m or 1"), ("qd", "m/s or 1/s")):
+        columns.append(Column(name, (*grid, "coordinate"), _said(name, units)))
+    others = [(_column(name), array, study.family.fields[name].unit) for name, array in parameters.items()
+              if np.asarray(array).dtype.kind in "iuf"]  # fmt: skip
+    others += [(name, array, "") for name, array in kept.items() if name.startswith("kept")]
+    for name, array, units in others:
+        dimensions = tuple(f"axis {i} of {name}" for i in range(np.ndim(array) - 1))
+        labels |= {each: [str(i) for i in range(size)] for each, size in zip(dimensions, array.shape[1:], strict=True)}
+        columns.append(Column(name, dimensions, _said(name, units)))
+    return Table(CASE, tuple(columns), labels)
+
+
+def _said(text, units):
+    return {"long_name": text, "units": units}
+
+
+def _column(name):
+    """The name of a parameter's column; a slash would make a group of it."""
+    return f"parameter {name}".replace("/", "|")
+
+
+def digest_of(study):
+    """SHA-256 of all that the results depend on: scene, cases, options, functions."""
+    digest, given = hashlib.sha256(hash_of(study.family.packed).encode()), study.given
+    digest.update(np.concatenate(study.family.start).tobytes() + repr(sorted(study.changes)).encode())
+    cases = study.cases
+    if cases.names is None:
+        digest.update(repr((cases.count, sources_of([cases.function]))).encode())
+    else:
+        for name, array in sorted(cases.table.items()):
+            array = np.asarray(array)
+            digest.update(f"{name} {array.shape}".encode() + (array.tobytes() if array.dtype.kind in "iuf" else b""))
+    events = given["events"]
+    functions = [] if events is None else [events] if callable(events) else list(events)
+    functions += [study.keep] if callable(study.keep) else []
+    plain = {name: repr(value) for name, value in given.items() if name not in ("scene", "events", "t_eval", "state")}
+    digest.update(
+        repr((sorted(plain.items()), sources_of(functions), study.keep if not callable(study.keep) else "")).encode()
+    )
+    digest.update(study.options.times.tobytes())
+    state = given["state"]
+    digest.update(b"" if state is None else np.asarray(state.q).tobytes() + np.asarray(state.qd).tobytes())
+    return digest.hexdigest()
+
+
+@contextlib.contextmanager
+def _writing(path):
+    """A block in which an OSError is the store's."""
+    try:
+        yield
+    except StorageError:
+        raise
+    except OSError as error:
+        raise StorageError(
+            f"{path} can't be written: {type(error).__name__}: {error}. Free space there, and go on: resume=True."
+        ) from error

@@ -1,0 +1,24 @@
+"""Limits of ensembles."""
+
+# s: what a chunk of cases takes, so that handing it out costs nothing and the last ones end together
+CHUNK_SECONDS = 0.02
+# s: the same for an executor, which sends chunks to other processes
+SENT_SECONDS = 0.5
+# cases of a chunk at most
+MOST_CASES = 4096
+# s: a case that is shorter runs no faster on threads, which wait for each other's Python part
+SHORT_CASE = 1.0e-4
+# s: between looks at the progress
+LOOK = 0.1
+# chunks in the hands of an executor for each of its workers: none waits for the next
+AHEAD = 2
+# times that a chunk of a lost worker is sent again
+RETRIES = 3
+# cases that may wait for one before them until it can be written
+WAITING = 1 << 16
+# s: after which readers of a store see what has been written
+FLUSH = 1.0
+# sets of arrays of a thread: one for each selection of redundant rows that has been met
+ARENAS = 8
+# studies whose runners a worker keeps
+STUDIES = 4

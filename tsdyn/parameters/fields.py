@@ -1,0 +1,84 @@
+"""The attributes of a scene that may vary from run to run, by stable names."""
+
+import inspect
+import math
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.bodies import Attribute, PointMass
+from ..motions.elementary import Constant
+from ..motions.prescribed import Motion
+from ..validation import number
+from .units import units_of
+
+GRAVITY = "gravity"
+
+
+class Field(NamedTuple):
+    """An attribute of the scene (gravity), a body, a constraint or a force."""
+
+    owner: object
+    attribute: str
+    unit: str  # "" if it is described nowhere
+
+    @property
+    def value(self):
+        """The present value: a float, a read-only array, or what else the attribute is."""
+        value = getattr(self.owner, self.attribute)
+        if isinstance(value, Motion) and isinstance(value.smooth, Constant):
+            return value.value(0.0)[0]
+        return float(value) if isinstance(value, np.floating) else value
+
+    @property
+    def is_numeric(self):
+        """Whether the present value is a number, or an array of numbers."""
+        value = self.value
+        if isinstance(value, np.ndarray):
+            return value.dtype.kind == "f" and value.size > 0
+        return not isinstance(value, (bool, str)) and math.isfinite(number(value))
+
+
+def fields_of(scene):
+    """The `Field`s of a scene by name, "object.attribute"; names that stand for several are left out."""
+    found, several = {GRAVITY: Field(scene, GRAVITY, "m/s^2")}, set()
+    for owner in (*scene.bodies, *scene._added, *scene._forces):
+        units = units_of(type(owner))
+        for attribute in attributes_of(type(owner)):
+            if not _is_own(owner, attribute):
+                continue
+            name = f"{owner.name}.{attribute}"
+            if name in found:
+                several.add(name)
+            found[name] = Field(owner, attribute, units.get(attribute, ""))
+    return {name: field for name, field in found.items() if name not in several}
+
+
+@cache
+def attributes_of(cls):
+    """The names of the attributes of a class that may be set: those checked, and arguments that are kept."""
+    if issubclass(cls, PointMass):
+        return tuple(name for base in reversed(cls.__mro__) for name, it in vars(base).items() if _is_attribute(it))
+    checked = getattr(cls, "quantities", ())
+    checked = checked() if callable(checked) else checked
+    known = dict.fromkeys([*inspect.signature(cls).parameters, *checked])
+    return tuple(name for name in known if name not in ("a", "b", "name", *cls.permanent))
+
+
+def _is_attribute(value):
+    return isinstance(value, Attribute)
+
+
+def _is_own(owner, attribute):
+    """Whether an item keeps an argument: as an attribute, or as where a marker is."""
+    if isinstance(owner, PointMass):
+        return True
+    placed = [marker.argument for marker in owner.markers if marker.placed and not _is_particle(owner, marker)]
+    borrowed = isinstance(getattr(type(owner), "coordinates", None), property)  # markers are where those of a joint are
+    return attribute in vars(owner) or (attribute in placed and not borrowed)
+
+
+def _is_particle(owner, marker):
+    """Whether a marker is on a point mass, which has no other point than itself."""
+    return getattr(owner.body_of(marker), "dimension", 0) == 3

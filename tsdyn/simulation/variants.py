@@ -1,0 +1,173 @@
+"""`scene.parameters` and `scene.with_parameters`: scenes with other numbers, which share their analysis.
+
+A scene with other parameters is packed numbers at first. It makes bodies, constraints and forces of its own when these
+are asked for; a run needs none of them.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
+
+from ..calls import fitting
+from ..errors import InvalidArgument
+from ..model.handles import handles_of
+from ..model.packed import classes
+from .scene_cache import prepared
+
+if TYPE_CHECKING:
+    from ..hints import ParameterList, Scene
+
+_making = threading.RLock()  # handles are made by one thread at a time: their aliases are shared
+HANDLES = ("ground", "_bodies", "_added", "_forces", "_normalisations")  # attributes of a scene
+
+
+def parameters(scene: Scene) -> ParameterList:
+    """Return what may vary from run to run: numbers of bodies, constraints and forces, by name, with units.
+
+    Returns
+    -------
+    ParameterList
+        A mapping of names, "object.attribute", to values; `.units` has their units. Masses, inertias, points, axes,
+        lengths, stiffnesses, loads, starts and so on, those of plug-ins included, and "gravity".
+
+    Notes
+    -----
+    Give every part a name of its own: a name that stands for several is left out.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.5, position=(1, 0, 0), name="bob")
+    >>> spring = scene.add(ts.forces.Spring(bob, scene.ground, stiffness=80.0, name="spring"))
+    >>> scene.parameters()["spring.stiffness"], scene.parameters().units["spring.stiffness"]
+    (80.0, 'N/m')
+    """
+    from ..parameters.fields import fields_of
+    from ..parameters.listing import ParameterList
+
+    fields = {name: field for name, field in fields_of(scene).items() if field.is_numeric}
+    values = {name: field.value for name, field in fields.items()}
+    return ParameterList(values, {name: field.unit for name, field in fields.items()})
+
+
+@fitting
+def with_parameters(scene: Scene, values: Mapping[str, Any]) -> Scene:
+    """Return a scene with other values of some parameters; this scene is not changed.
+
+    Parameters
+    ----------
+    values : mapping
+        Values by name, as `parameters()` lists them; checked as the attributes are when they are set. Values that were
+        derived from others when the scene was built, such as the free length of a spring, remain as they are.
+
+    Returns
+    -------
+    Scene
+        Independent of this scene; handles of this scene serve for its solutions, too. A run of it has the bits of a
+        scene built anew with these values.
+
+    Raises
+    ------
+    InvalidArgument
+        If there is no such parameter.
+    TsdynError
+        If a value is inadmissible.
+
+    Notes
+    -----
+    The constraint graph and the packed arrays are shared: masses, inertias, starts, gravity, and the numbers of forces
+    and of constraints such as Distance take tens of microseconds, the geometry of a joint some hundreds. Functions of
+    time, sampling periods, and joints that a force refers to take milliseconds: the scene is packed anew.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(0, 0, -1), name="bob")
+    >>> spring = scene.add(ts.forces.Spring(bob, scene.ground, stiffness=80.0, name="spring"))
+    >>> stiff = scene.with_parameters({"spring.stiffness": 200.0, "bob.velocity": (0, 0, 1)})
+    >>> print(stiff["spring"].stiffness, spring.stiffness)
+    200.0 80.0
+    >>> print(ts.simulate(stiff, (0, 0.1)).position(bob)[-1].round(4))
+    [ 0.      0.     -0.9724]
+    """
+    if not isinstance(values, Mapping):
+        raise InvalidArgument(
+            f"values must be a mapping of names to values, such as {{'bob.mass': 2.0}}, got {values!r}."
+        )
+    family, changes = family_of(scene)
+    changes = {**changes, **values}
+    found = family.numbers(changes)
+    return packed_anew(family, changes) if found is None else of_numbers(scene, family, changes, *found)
+
+
+def family_of(scene):
+    """The `Family` of a scene as it is now, and by which values the scene differs from its template."""
+    from ..parameters.family import Family
+
+    kept = prepared(scene)
+    known = kept.packed.derived
+    if known.family is None:
+        _ = kept.refusal, kept.pays, kept.sharp, kept.sampled  # for `Prepared.like`
+        known.family = Family(kept.packed, scene._initial(), scene.copy()), {}, kept
+    return known.family[:2]
+
+
+def of_numbers(scene, family, changes, packed, start):
+    """Return a scene of these packed numbers, which makes its handles later."""
+    kept = scene._prepared
+    packed.derived.family = family, changes, kept
+    other = object.__new__(type(scene))
+    vars(other).update(
+        _gravity=packed.system.gravity.copy(), _packed=packed, _start=start, _prepared=kept.like(packed),
+        _users=scene._users, _functions=scene._functions, _waiting={}, _titles=None, _names=None, _twins=None,
+        _aliases=None, _later=(family, changes),
+    )  # fmt: skip
+    other._gravity.setflags(write=False)
+    return other
+
+
+def packed_anew(family, changes):
+    """Return a scene with other values, and handles of its own."""
+    with _making:
+        scene, pairs = _made(family, changes)
+    scene._twins = scene._aliases = WeakKeyDictionary(pairs)
+    packed, before = scene.packed, family.packed
+    same = classes(packed) == classes(before) and packed.system.segments.shape == before.system.segments.shape
+    if same and (packed.system.segments == before.system.segments).all():
+        packed.derived.shared = family.shared
+    return scene
+
+
+def make_handles(scene):
+    """Make bodies, constraints and forces of a scene that is packed numbers so far."""
+    with _making:
+        if "_later" not in vars(scene):  # another thread has made them
+            return
+        family, changes = scene._later
+        twin, pairs = _made(family, changes)
+        for body in (twin.ground, *twin._bodies):
+            vars(body)["scene"] = scene
+        scene._twins = scene._aliases = WeakKeyDictionary(pairs)
+        handles = handles_of(scene._packed)
+        handles.add_aliases([(own, handles.own(known)) for known, own in pairs])
+        vars(scene).update({name: vars(twin)[name] for name in HANDLES})
+        del scene._later
+
+
+def _made(family, changes):
+    """Return a copy of the template with other values; pairs of each handle of the original and its counterpart."""
+    template, packed = family.template, family.packed
+    twin = template.copy()
+    for name, value in changes.items():
+        owner, attribute, _ = family.field(name)
+        setattr(twin if owner is template else twin[owner], attribute, value)
+    known = (*packed.bodies, *(member.constraint for member in packed.members), *(load.force for load in packed.loads))
+    owners = (*template.bodies, *template.constraints, *template.forces)
+    pairs = {one: twin[owner] for one, owner in zip(known, owners, strict=True)}
+    aliases = [(one, pairs[meant]) for one, meant in handles_of(packed).aliases() if meant in pairs]
+    return twin, [*pairs.items(), *aliases]

@@ -24,6 +24,7 @@ from .errors import (  # noqa: E402
     InvalidBody,
     InvalidCall,
     InvalidConstraint,
+    InvalidFile,
     InvalidForce,
     MissingDependency,
     NoEquilibrium,
@@ -47,6 +48,7 @@ from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau 
 from .motions.prescribed import Motion  # noqa: E402
 from .motions.tables import Table  # noqa: E402
 from .observables.state import State  # noqa: E402
+from .simulation.load import load  # noqa: E402
 from .simulation.resume import resume  # noqa: E402
 from .simulation.scene import Scene  # noqa: E402
 from .simulation.simulate import simulate  # noqa: E402
@@ -71,6 +73,7 @@ __all__ = [
     "InvalidBody",
     "InvalidCall",
     "InvalidConstraint",
+    "InvalidFile",
     "InvalidForce",
     "Joint",
     "JointFriction",
@@ -102,6 +105,7 @@ __all__ = [
     "forces",
     "integrators",
     "kernel",
+    "load",
     "motions",
     "plots",
     "profile",

@@ -191,6 +191,36 @@ class StorageError(TsdynError, OSError):
     """
 
 
+class InvalidFile(TsdynError, ValueError):
+    r"""A scene file has mistakes; the message lists all, with line and column.
+
+    Attributes
+    ----------
+    mistakes : tuple
+        (line, column, message) of each, from 1.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import tsdyn as ts
+    >>> path = Path(mkdtemp(), "scene.toml")
+    >>> _ = path.write_text('version = 1\n[[body]]\nname = "bob"\nmas = 1.0\ninertia = [1, 1, 1]\n')
+    >>> try:
+    ...     ts.load(path)
+    ... except ts.InvalidFile as error:
+    ...     print(error.mistakes[0])
+    (2, 1, "body 'bob' lacks mass.")
+    """
+
+    def __init__(self, message: str, mistakes: tuple[tuple[int, int, str], ...] = ()) -> None:
+        super().__init__(message)
+        self.mistakes = mistakes
+
+    def __reduce__(self) -> Any:
+        return type(self), (self.args[0], self.mistakes)
+
+
 class StepFailure(TsdynError, ArithmeticError):
     """A run ended early; raised by `Solution.raise_if_failed`, with the partial solution as `.solution`.
 

@@ -33,6 +33,8 @@ from .observables.state import RememberingState, State
 from .parameters.listing import ParameterList
 from .profiling.phases import Phase
 from .profiling.report import Profile
+from .simulation.inverse_result import InverseDynamics
+from .simulation.kinematics import KinematicAnalysis
 from .simulation.scene import Scene
 from .simulation.solution import Charts, Solution, Steps
 from .statics.equilibrium import Equilibrium
@@ -69,6 +71,7 @@ TimeFunction: TypeAlias = Callable[[float], float]
 Data: TypeAlias = Table | Callable[[Any], Any] | tuple[ArrayLike, ArrayLike]  # callable: a spline of SciPy's
 Prescribed: TypeAlias = float | Motion | Data | Sequence[TimeFunction]  # one of ts.motions is callable
 Path: TypeAlias = Sequence[Prescribed] | Data | Floats
+GivenMotions: TypeAlias = Mapping[Any, Prescribed | Path] | Solution | State  # of coordinates, or of the whole scene
 Load: TypeAlias = float | Table | Callable[[Any], Any]
 VectorLoad: TypeAlias = ArrayLike | Table | Callable[..., Any]  # a function of t, or of t and state
 JointLaw: TypeAlias = Callable[[float, float, float], float]
@@ -158,16 +161,19 @@ __all__ = [
     "Formulation",
     "Frame",
     "Function",
+    "GivenMotions",
     "Ground",
     "Handles",
     "Integers",
     "Integrator",
+    "InverseDynamics",
     "Item",
     "ItemLike",
     "Joint",
     "JointLaw",
     "JointLoads",
     "Keep",
+    "KinematicAnalysis",
     "Kinematics",
     "Linearisation",
     "Load",

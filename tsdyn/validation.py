@@ -82,6 +82,14 @@ def finite_vector(value, n, what):
     return array
 
 
+def finite_times(value, what):
+    """Return one or more finite times as an array (k,), or raise InvalidArgument."""
+    array = np.atleast_1d(floats(value))
+    if array.ndim != 1 or not array.size or not np.isfinite(array).all():
+        raise InvalidArgument(f"{what} must be a finite time in s, or a vector of them, got {value!r}.")
+    return array
+
+
 def whole(value, what):
     """Return a positive whole number, None for None, or raise InvalidArgument."""
     if value is None:

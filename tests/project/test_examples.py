@@ -15,6 +15,7 @@ from examples import (
     four_bar,
     geared_pair,
     hooke_joint,
+    inverse_dynamics,
     parallel_runs,
     pendulum_chain,
     plug_in_integrator,
@@ -75,6 +76,14 @@ def test_a_rheonomic_pendulum():
         driven_pivot.check(ts.simulate(build(), (0.0, 1.0), integrator=method), tol=1e-9)
     solution = ts.simulate(driven_pivot.build_driven(), (0.0, 1.0), integrator=ts.integrators.Taylor(tol=1e-15))
     driven_pivot.check(solution, tol=1e-9)
+
+
+def test_inverse_dynamics(capsys):
+    inverse_dynamics.main()
+    assert "right motor.angle" in capsys.readouterr().out
+    found = inverse_dynamics.solve(np.linspace(0.0, 1.0, 11))
+    with pytest.raises(AssertionError):  # too few times for a spline
+        inverse_dynamics.check(found, inverse_dynamics.drive(found))
 
 
 @pytest.mark.slow

@@ -271,3 +271,12 @@ def test_every_force_and_a_driven_rod_in_motion(seed):
         dx, dxd, dxdd = Z @ dq, Z @ dqd + Zd @ dq, Z @ dqdd + 2.0 * Zd @ dqd + Zdd @ dq
         parts = linear.M @ dxdd, linear.C @ dxd, linear.K @ dx
         np.testing.assert_allclose(sum(parts), 0.0, atol=CLOSE * max(np.abs(part).max() for part in parts))
+
+
+def test_joint_that_constraints_hold_is_no_coordinate():
+    scene = ts.Scene()
+    one, two = (scene.add_body(1.0, (1, 1, 1), (x, 0, 0), name=name) for x, name in ((0.5, "one"), (1.5, "two")))
+    scene.add(ts.constraints.Spherical.at(scene.ground, one, point=(0, 0, 0)))
+    scene.add(ts.constraints.Fixed.at(one, two, point=(1, 0, 0)))
+    scene.add(ts.constraints.Revolute.at(one, two, point=(1, 0, 0), axis=(0, 1, 0), name="hinge"))
+    assert not any("hinge" in name for name in scene.linearise().coordinates)

@@ -1,11 +1,12 @@
-"""The command `tsdyn`, also `python -m tsdyn`: the tables of Haug (2018), profiles, compiling ahead, hard cases."""
+"""The command `tsdyn`, also `python -m tsdyn`: scene files and their runs, profiles, compiling ahead, hard cases."""
 
-import argparse
 import inspect
 import sys
 import time
 
 from ..errors import MissingDependency, TsdynError
+from . import run, scenes
+from .parser import Parser
 from .stress import _stress, add_options
 
 DEFAULT_FIGURE = "tables.png"
@@ -13,7 +14,9 @@ DEFAULT_FIGURE = "tables.png"
 
 def main(arguments=None):
     """Run the command line; returns the exit code (wrong arguments exit with 2, as argparse does)."""
-    parsed = _parser().parse_args(arguments)
+    parser = _parser()
+    parser.given = sys.argv[1:] if arguments is None else arguments
+    parsed = parser.parse_args(arguments)
     try:
         return parsed.run(parsed)
     except TsdynError as error:
@@ -24,11 +27,14 @@ def main(arguments=None):
 def _parser():
     from .._version import __version__
 
-    parser = argparse.ArgumentParser(
-        prog="tsdyn", description="Constrained rigid-body dynamics by Haug's tangent-space ODE."
-    )
+    parser = Parser(prog="tsdyn", description="Constrained rigid-body dynamics by Haug's tangent-space ODE.")
     parser.add_argument("--version", action="version", version=f"tsdyn {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    run.add_run_options(_command(commands, run._run))
+    scenes.add_check_options(_command(commands, scenes._check))
+    scenes.add_info_options(_command(commands, scenes._info))
+    scenes.add_new_options(_command(commands, scenes._new))
+    scenes.add_convert_options(_command(commands, scenes._convert))
     tables = _command(commands, _tables)
     figure = tables.add_mutually_exclusive_group()
     figure.add_argument(
@@ -39,7 +45,8 @@ def _parser():
     profile.add_argument(
         "scene",
         metavar="SCENE",
-        help="a Python file with a function build(), or a scene; file.py:name takes another one; or an example's name",
+        help="a scene file (.toml); a Python file with a function build(), or a scene; file.py:name takes another one; "
+        "or an example's name",
     )
     profile.add_argument("--t-start", type=float, default=0.0, metavar="S", help="start of the run (default 0)")
     profile.add_argument("--t-end", type=float, default=10.0, metavar="S", help="end of the run (default 10)")

@@ -1,4 +1,4 @@
-"""Loading of a scene from a Python file, for the command line."""
+"""Loading of a scene from a TOML or Python file, for the command line."""
 
 import importlib.util
 import sys
@@ -8,19 +8,32 @@ from ..errors import InvalidArgument
 from ..simulation.scene import Scene
 
 
-def load_scene(where):
-    """The scene of a file's `build()`, or its `scene`.
+def load_run(where, allow_code=False):
+    """The scene of a file, and the arguments of `simulate` that it asks for; arguments as for `load_scene`."""
+    if Path(where).suffix.lower() == ".toml":
+        from ..simulation.load import scene_file
+
+        return scene_file(where, allow_code)
+    return load_scene(where), {}
+
+
+def load_scene(where, allow_code=False):
+    """The scene of a TOML file; or, of a Python file, that of its `build()`, or its `scene`.
 
     Parameters
     ----------
     where : str
         A path, or the name of an example; a name behind a colon is of another function, or scene, in the file.
+    allow_code : bool
+        Whether a TOML file may import modules of plug-ins.
 
     Raises
     ------
     InvalidArgument
         If there is no such file or name, it can't be run, or what it gives is no scene.
     """
+    if Path(where).suffix.lower() == ".toml":
+        return load_run(where, allow_code)[0]
     path, _, name = where.partition(":") if not Path(where).exists() else (where, "", "")
     file = _file(path)
     module = _module(file)
@@ -49,7 +62,7 @@ def _file(where):
             return path.resolve()
     known = sorted(path.stem for path in examples.glob("*.py") if not path.stem.startswith("_"))
     raise InvalidArgument(
-        f"no file {where!r}; give the path of a Python file that has a function build()"
+        f"no file {where!r}; give the path of a scene file (.toml), or of a Python file that has a function build()"
         + (f", or an example: {', '.join(known)}." if known else ".")
     )
 

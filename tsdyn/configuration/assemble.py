@@ -114,6 +114,7 @@ def assemble(
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     one_of(folds, ("keep", "free"), "folds")
     packed, (sketch, qd) = scene.packed, scene.start
+    fixed = _bodies(scene, fixed)
     held = _held(scene, fixed)
     metric = Metric(packed, held, float(t))
     demand_finite(scene, *metric.arrays(sketch))
@@ -146,14 +147,21 @@ def assemble(
     )
 
 
+def _bodies(scene, fixed):
+    """Return the bodies that are to be fixed, given by handle or name."""
+    given = sequence(fixed, "fixed must be a sequence of bodies, such as (body,)", InvalidBody)
+    found = [named(scene.bodies, it, "body to be fixed", InvalidBody) if isinstance(it, str) else it for it in given]
+    for body in found:
+        if not any(body is known for known in scene.bodies):
+            raise InvalidBody(f"fixed: {body!r} is not a body of this scene.")
+    return found
+
+
 def _held(scene, fixed):
     """Return True for each coordinate that is held, (n,)."""
     bodies = scene.system.bodies
     held = np.zeros(int(bodies[:, 1].sum()), bool)
-    for body in sequence(fixed, "fixed must be a sequence of bodies, such as (body,)", InvalidBody):
-        body = named(scene.bodies, body, "body to be fixed", InvalidBody) if isinstance(body, str) else body
-        if not any(body is known for known in scene.bodies):
-            raise InvalidBody(f"fixed: {body!r} is not a body of this scene.")
+    for body in fixed:
         at = int(bodies[body.index, 0])
         held[at : at + body.dimension] = True
     return held

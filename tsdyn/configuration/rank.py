@@ -43,7 +43,7 @@ def weakest_row(scene, Phi_q, redundant=0):
         return "", 1.0
     scaled = unit_rows(Phi_q)
     size = singular_values(scaled)
-    last = -1 - redundant
+    last = len(scaled) - 1 - redundant  # there are fewer values where rows are more than coordinates
     return scene.row_names()[_pivots(scene, scaled)[last]], size[last] / size[0]
 
 

@@ -106,7 +106,7 @@ def reaction(solution, member, body):
     lam = np.ascontiguousarray(particular(solution.multipliers)[:, member.rows])
     first, halves = member.rows.start, np.array(halves, np.int64)
     constraint_loads(system, solution.t, solution.q, lam, first, halves, rows, load)
-    return _at_first_point(solution, body, load, member.constraint, member.coordinates)
+    return at_first_point(solution, body, load, member.constraint, member.coordinates)
 
 
 def only(packed, parts):
@@ -138,10 +138,10 @@ def force_reaction(solution, load, body):
     force, system = load.force, solution.system._replace(forces=load.alone)
     Q = force_loads(system, solution.t, solution.q, solution.qd, solution._memory)
     at, length = solution.system.bodies[index_of(solution.packed, body)]
-    return _at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)
+    return at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)
 
 
-def _at_first_point(solution, body, load, item, coordinates):
+def at_first_point(solution, body, load, item, coordinates):
     """Force and torque of generalised forces load (k, 7 or 3) on a body, about the first point of the item on it."""
     at, length = solution.system.bodies[index_of(solution.packed, body)]
     force, torque = load[:, :3].copy(), np.zeros((load.shape[0], 3))

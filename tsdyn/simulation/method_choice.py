@@ -21,6 +21,15 @@ def explicit(prepared, rtol, atol, series):
     return adaptive(Taylor if series and not prepared.refusal and prepared.pays else DOP853, rtol, atol)
 
 
+def reason(prepared):
+    """Return the initial method, and why, in words."""
+    if prepared.refusal:
+        return f"DOP853. {prepared.refusal}"
+    if not prepared.pays:
+        return "DOP853: a force changes sharply, and without constraints series are no quicker."
+    return "Taylor: every constraint and force has a series. SDIRK54 takes over where the motion is found stiff."
+
+
 def implicit(method):
     """Return the implicit method of the same tolerances."""
     return SDIRK54(method.rtol, method.atol)

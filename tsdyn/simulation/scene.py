@@ -27,15 +27,16 @@ from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..observables.evaluate import evaluate as _evaluate
 from ..validation import counted, demand_known, label, vector3
+from . import variants
 from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
 from .editing import remove as _remove
+from .inverse_dynamics import inverse_dynamics as _inverse_dynamics
+from .kinematics import kinematics as _kinematics
+from .scene_saving import save as _save
 from .scene_table import table
 from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
-from .variants import HANDLES, make_handles
-from .variants import parameters as _parameters
-from .variants import with_parameters as _with_parameters
 
 if TYPE_CHECKING:
     from ..hints import AnyBody, ArrayLike, Floats, Item, Orientation, Packed, System
@@ -102,9 +103,9 @@ class Scene:
 
     def __getattr__(self, name: str) -> Any:
         """Make the handles of a scene that `with_parameters` has returned."""
-        if name not in HANDLES or "_later" not in self.__dict__:
+        if name not in variants.HANDLES or "_later" not in self.__dict__:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        make_handles(self)
+        variants.make_handles(self)
         return self.__dict__[name]
 
     @property
@@ -362,11 +363,14 @@ class Scene:
     mobility = _mobility
     linearise = _linearise
     equilibrium = _equilibrium
-    parameters = _parameters
-    with_parameters = _with_parameters
+    parameters = variants.parameters
+    with_parameters = variants.with_parameters
+    kinematics = _kinematics
+    inverse_dynamics = _inverse_dynamics
     set = set_joint
     remove = _remove
     copy = _copy
+    save = _save
     __copy__ = _copy
 
     def _repr_html_(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import time
 from functools import cached_property
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -22,6 +23,7 @@ from ..validation import counted, floats
 from .balances import Balances
 from .conservation import energy_error
 from .outputs import Outputs
+from .records import Records
 from .showing import Showing
 from .termination import account
 
@@ -50,7 +52,7 @@ class Charts(NamedTuple):
 
 
 @fitting_methods
-class Solution(Outputs, Balances, Showing, Kinematics["Floats"]):
+class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
     """The result of `simulate`; k outputs, n coordinates, m constraint rows.
 
     Attributes
@@ -112,7 +114,7 @@ class Solution(Outputs, Balances, Showing, Kinematics["Floats"]):
         self._step_log, self._chart_log = outcome.steps, outcome.charts
         self._counts, self._seconds, near = outcome.counts, seconds, outcome.counts["steps_near_singular"]
         self._energy_error = energy_error(self, task) if near else None
-        self._reason, self._message = outcome.reason, None
+        self._reason, self._message, self._made = outcome.reason, None, time.time()
         if near or outcome.status not in SUCCESSES or self.packed.derived.redundant is not None:
             self._message = account(self, scene, self._reason)  # written now, since the scene may change
 

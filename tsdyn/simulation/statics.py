@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,11 +11,11 @@ from ..calls import fitting
 from ..errors import InconsistentState, InvalidArgument
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
-from ..validation import finite_vector, number
+from ..validation import finite_vector, number, vector3
 from .scene_cache import prepared
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, Equilibrium, Linearisation, Scene, State
+    from ..hints import ArrayLike, BodyLike, Equilibrium, Linearisation, Scene, State
 
 INITIAL_TOL = 1e-9  # of residuals of a state, as in `simulate`
 
@@ -91,8 +91,17 @@ def linearise(
 
 
 @fitting
-def equilibrium(scene: Scene, guess: State | ArrayLike | None = None, t: float = 0.0) -> Equilibrium:
+def equilibrium(
+    scene: Scene,
+    guess: State | ArrayLike | None = None,
+    t: float = 0.0,
+    spin: ArrayLike | None = None,
+    about: ArrayLike = (0.0, 0.0, 0.0),
+    rotors: Mapping[BodyLike, ArrayLike] | None = None,
+) -> Equilibrium:
     """Find a static equilibrium: from the scene's pose, or a guess, down to a minimum of the potential energy.
+
+    With a spin: a relative equilibrium, a configuration that turns steadily as a whole.
 
     Parameters
     ----------
@@ -100,6 +109,14 @@ def equilibrium(scene: Scene, guess: State | ArrayLike | None = None, t: float =
         Positions to start from; default: those of the bodies. They are moved to the nearest consistent ones first.
     t : float, s
         Time at which loads and constraints are taken.
+    spin : array_like (3,), rad/s, optional
+        Angular velocity, ground frame, at which everything turns.
+    about : array_like (3,), m
+        A point of the axis of the spin.
+    rotors : dict, optional
+        Bodies that spin about their own axis of symmetry besides, relative to the turning axes: rad/s about that axis,
+        or an angular velocity (3,) in the body frame. A number counts about the direction of the axis whose largest
+        component in the body frame is positive.
 
     Returns
     -------
@@ -111,7 +128,7 @@ def equilibrium(scene: Scene, guess: State | ArrayLike | None = None, t: float =
     NoEquilibrium
         If none is found: something falls, or a load drives it on.
     InconsistentState
-        If the constraints can't be satisfied near the start, or move at time t.
+        If the constraints can't be satisfied near the start, move at time t, or don't admit the spin.
     SingularConfiguration
         If Phi_q loses rank at the start.
     InvalidForce
@@ -124,7 +141,9 @@ def equilibrium(scene: Scene, guess: State | ArrayLike | None = None, t: float =
     Levenberg steps with the exact stiffness, geometric stiffness of reactions included, lower the potential energy on
     the constraint manifold; the last ones are Newton's, down to rounding. Saddles are left along their direction of
     most negative stiffness. Work along a step takes the place of energy, so loads need no potential. Redundant rows are
-    allowed. Dampers and friction exert nothing at rest.
+    allowed. Dampers and friction exert nothing at rest. With a spin, Newton steps lead to the nearest relative
+    equilibrium, a top's steady precession for one; where it is unstable, gyroscopic terms included, it is left along
+    the mode that grows, down to a minimum of the amended potential V - Omega . J Omega / 2.
 
     Examples
     --------
@@ -142,9 +161,11 @@ def equilibrium(scene: Scene, guess: State | ArrayLike | None = None, t: float =
     """
     from ..configuration.continuation import nearest
     from ..configuration.kinetic_metric import Metric
-    from ..statics.equilibrium import find_equilibrium  # imported here: a run needs none of it
+    from ..statics.equilibrium import find_equilibrium, find_relative  # imported here: a run needs none of it
+    from ..statics.relative_equilibrium import demand_admitted
 
     kept = prepared(scene)
+    field = _field(kept.packed, spin, about, rotors)
     if guess is None:
         given = scene._initial()[0]
     else:
@@ -152,7 +173,7 @@ def equilibrium(scene: Scene, guess: State | ArrayLike | None = None, t: float =
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     metric = Metric(kept.packed, None, float(t))
-    q, (Phi, _, Phi_t) = given, metric.arrays(given)
+    q, Phi = given, metric.arrays(given)[0]
     if not np.abs(Phi).max(initial=0.0) <= INITIAL_TOL * (1.0 + np.abs(q).max()):
         found = nearest(metric, given, INITIAL_TOL)
         if not found.met:
@@ -160,12 +181,29 @@ def equilibrium(scene: Scene, guess: State | ArrayLike | None = None, t: float =
                 "equilibrium: no consistent positions were found near the start. Call scene.assemble(), which names "
                 "the constraints in conflict, or pass another guess."
             )
-        q, Phi_t = found.q, metric.arrays(found.q)[2]
-    _demand_rest(scene, Phi_t, t)
+        q = found.q
+    _, Phi_q, Phi_t = metric.arrays(q)
+    qd = np.zeros(kept.n) if field is None else field.levels(q)[0]
+    if field is None:
+        _demand_rest(scene, Phi_t, t)
+    else:
+        demand_admitted(scene, Phi_q @ qd + Phi_t, qd)
     state = guess if hasattr(guess, "memory") else None
     memory = remembered(state, kept, float(t), q)
-    q, _ = kept.start(scene, (q, np.zeros(kept.n)), float(t), INITIAL_TOL, memory, True)
-    return find_equilibrium(kept.packed, kept.handles, memory, float(t), q.copy(), given)
+    q, _ = kept.start(scene, (q, qd), float(t), INITIAL_TOL, memory, True)
+    arguments = kept.packed, kept.handles, memory, float(t), q.copy(), given
+    return find_equilibrium(*arguments) if field is None else find_relative(*arguments, field)
+
+
+def _field(packed, spin, about, rotors):
+    """The `SteadyField` of a spin; None without one."""
+    if spin is None and rotors is None:
+        return None
+    from ..statics.steady_field import SteadyField, rotors_of
+
+    spin = vector3(np.zeros(3) if spin is None else spin, "equilibrium: spin (rad/s)", InvalidArgument)
+    about = vector3(about, "equilibrium: about (m)", InvalidArgument)
+    return SteadyField(packed, spin, about, rotors_of(packed, rotors))
 
 
 def _demand_rest(scene, Phi_t, t):
@@ -174,5 +212,6 @@ def _demand_rest(scene, Phi_t, t):
         row = scene.row_names()[int(np.abs(Phi_t).argmax())]
         raise InconsistentState(
             f"equilibrium: {row} moves at t = {float(t):g} s (Phi_t = {np.abs(Phi_t).max():.3g}), so the scene can't "
-            "be at rest. Choose a time at which its motion rests, or hold it with a constant value."
+            "be at rest. Choose a time at which its motion rests, hold it with a constant value, or give the spin= "
+            "with which everything turns."
         )

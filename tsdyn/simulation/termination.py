@@ -21,14 +21,14 @@ def account(solution, scene, reason):
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
     steps = counted(solution.stats.steps, "step")
     where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
-    suspect = _suspect(solution, scene)
-    remedy = Status.SINGULAR.remedy if suspect else solution.status.remedy
-    lacking = without_series(solution.packed)[:FEW] if suspect else ()
+    found = suspect(solution, scene)
+    remedy = Status.SINGULAR.remedy if found else solution.status.remedy
+    lacking = without_series(solution.packed)[:FEW] if found else ()
     if lacking:
         remedy += f" Without a series: {'; '.join(lacking)}."
-    if not suspect and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
-        suspect = _growth(solution)
-    parts = (solution.status.sentence, reason, where, suspect, remedy)
+    if not found and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
+        found = _growth(solution)
+    parts = (solution.status.sentence, reason, where, found, remedy)
     return " ".join(part for part in parts if part)
 
 
@@ -62,7 +62,7 @@ def _growth(solution):
     return said.strip()
 
 
-def _suspect(solution, scene):
+def suspect(solution, scene):
     """Name the nearly singular item at the last state."""
     if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
         return ""

@@ -7,13 +7,15 @@ shows what of a candidate is left when those taken before it are held.
 import numpy as np
 
 from ..errors import SingularConfiguration
-from .tolerances import IN_TURN, INDEPENDENT
+from .tolerances import CLEAR, HELD, IN_TURN, INDEPENDENT
 from .variations import stacked
 
 
 def chosen(motion, variations):
     """As many independent coordinates as the motion has degrees of freedom, `Variation` each."""
     k, size = motion.freedom, motion.packed.size or 1.0
+    if len(variations.joints) == k and _regular(motion, variations.joints, size):
+        return list(variations.joints)  # as in trees
     found = []
     for kind in ("joints", "bodies"):
         if len(found) == k:
@@ -29,6 +31,25 @@ def chosen(motion, variations):
     return found
 
 
+def _regular(motion, every, size):
+    """Whether as many coordinates as there are degrees of freedom are clearly independent, in O(N)."""
+    from scipy.sparse import diags_array, vstack
+    from scipy.sparse.linalg import splu
+
+    lengths = np.where([one.length for one in every], size, 1.0)
+    A = vstack([motion.H, diags_array(1.0 / lengths) @ stacked(every, motion.q.size)[0]]) @ diags_array(
+        1.0 / motion.root
+    )
+    rows = np.sqrt(A.multiply(A).sum(axis=1))
+    if not rows.all():
+        return False
+    try:
+        pivots = np.abs(splu((diags_array(1.0 / rows) @ A).tocsc()).U.diagonal())
+    except RuntimeError:
+        return False
+    return bool(pivots.min() > CLEAR * pivots.max())
+
+
 def _independent(motion, every, given, k, size):
     """Indices of k coordinates at most; the first `given` are taken already."""
     Z = stacked(every, motion.q.size)[0].toarray()
@@ -36,6 +57,7 @@ def _independent(motion, every, given, k, size):
     W = motion.solve(Z.T, np.zeros((motion.kept.size, len(every))))[0]
     left = Z @ W
     own = np.maximum(np.diagonal(left).copy(), 0.0)
+    own[own <= HELD * (Z / motion.root**2 * Z).sum(axis=1)] = 0.0  # the constraints hold it
     remaining, taken = own.copy(), []
 
     def take(i):

@@ -90,7 +90,7 @@ class Descent:
     def _step(self):
         """Take a step; False if none is left that the loads do work on."""
         motion = self.motion
-        solve, stiffness = _saddle(motion), motion.stiffness
+        solve, stiffness = saddle(motion), motion.stiffness
         if stiffness > 0.0:
             self.mu = min(max(self.mu, SOFTEST * stiffness), stiffness)
         else:
@@ -187,7 +187,7 @@ class Descent:
         self.mu = 0.0
 
 
-def _saddle(motion):
+def saddle(motion):
     """Return solve(mu, load) -> dq; None where the matrix is singular."""
     from scipy.sparse import block_array, diags_array
     from scipy.sparse.linalg import splu

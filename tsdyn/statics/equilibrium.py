@@ -26,38 +26,42 @@ if TYPE_CHECKING:
 
 @fitting_methods
 class Equilibrium:
-    """A static equilibrium; the scene is as it was.
+    """A static equilibrium, or one relative to axes that turn steadily; the scene is as it was.
 
     Attributes
     ----------
     state : State
-        At rest: `simulate(scene, span, state=report.state)` stays there, `scene.linearise(report.state)` has its modes.
+        At rest, or in steady motion: `simulate(scene, span, state=report.state)` stays so,
+        `scene.linearise(report.state)` has its modes.
     stable : bool
-        No direction has negative stiffness, the potential energy being a minimum. With loads that have no potential: no
-        eigenvalue has a positive real part.
+        No direction has negative stiffness, the potential energy being a minimum. In steady motion, or with loads that
+        have no potential: no eigenvalue has a positive real part.
     smallest_stiffness : float, 1/s^2
         Of the reduced stiffness in the metric of kinetic energy: the square of the lowest angular frequency; negative
-        if unstable, NaN without freedom.
+        if unstable, NaN without freedom. In steady motion centrifugal terms are in it, but no gyroscopic ones, which
+        may stabilise.
     neutral : int
         Number of directions without stiffness.
     moved : float
         Largest change of a coordinate from the start: m for positions, 1 for Euler parameters.
+    rotation_rate : ndarray (3,), rad/s
+        Of a steady motion, ground frame; zero at rest.
     unbalanced : float
         Largest acceleration left, over that of the loads by themselves.
     steps : int
     """
 
-    def __init__(self, descent: Any, q0: Any, findings: Any) -> None:
+    def __init__(self, descent: Any, q0: Any, findings: Any, spin: Any = None) -> None:
         motion, packed = descent.motion, descent.packed
         self.packed, self.system, self._memory = packed, packed.system, descent.memory[None]
         self.t, self.q, self.qd = np.array([descent.t]), motion.q[None], motion.qd[None]
-        self.multipliers: Floats = reactions.multipliers(
-            packed, self.t, self.q, self.qd, motion.qdd[None], self._memory
-        )
-        arrays = descent.t, motion.q.copy(), motion.qd.copy(), motion.qdd.copy(), self.multipliers[0]
+        qdd = motion.accelerations
+        self.multipliers: Floats = reactions.multipliers(packed, self.t, self.q, self.qd, qdd[None], self._memory)
+        arrays = descent.t, motion.q.copy(), motion.qd.copy(), qdd.copy(), self.multipliers[0]
         self.state: RememberingState = RememberingState.of(
             descent.handles, descent.memory.copy(), Anchor(descent.angles.copy()), *arrays
         )
+        self.rotation_rate: Floats = np.zeros(3) if spin is None else spin
         self.stable, self.smallest_stiffness, self.neutral = findings
         self.moved, self.unbalanced, self.steps = float(np.abs(motion.q - q0).max()), descent.unbalanced, descent.steps
 
@@ -65,19 +69,20 @@ class Equilibrium:
         """Force (3,), N, and torque (3,), N m, of a constraint, joint or force, as `Solution.reaction` defines them."""
         handles = self.state.handles
         item = handles.item(item)
-        body = item.on if on is None else handles.body(on)
-        if body not in (item.a, item.b):
-            raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
         load, member = reactions.loads_of(self.packed).get(id(item)), member_of(self.packed, item)
         if load is None and member is None:
             raise InvalidConstraint(f"{item!r} is not a constraint or force of this scene.")
+        body = item.on if on is None else handles.body(on)
+        if body not in (item.a, item.b):
+            raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
         found = reactions.reaction(self, member, body) if load is None else reactions.force_reaction(self, load, body)
         return found[0][0], found[1][0]
 
     def __repr__(self) -> str:
         kind = "stable" if self.stable else "unstable"
         neutral = f", {self.neutral} neutral" if self.neutral else ""
-        return f"<Equilibrium: {kind}{neutral}, smallest stiffness {self.smallest_stiffness:.4g} 1/s^2>"
+        moving = " in steady motion" if self.state.qd.any() else ""
+        return f"<Equilibrium{moving}: {kind}{neutral}, smallest stiffness {self.smallest_stiffness:.4g} 1/s^2>"
 
 
 def find_equilibrium(packed, handles, remembered, t, q, q0):
@@ -93,6 +98,17 @@ def find_equilibrium(packed, handles, remembered, t, q, q0):
             break
         descent.kick(way)
     return Equilibrium(descent, q0, findings)
+
+
+def find_relative(packed, handles, remembered, t, q, q0, field):
+    """The same in steady motion with the velocities of a `SteadyField`."""
+    from .relative_equilibrium import SteadyDescent, find_steady
+
+    demand_continuous(packed)
+    descent = SteadyDescent(field, packed, handles, remembered, t, q)
+    findings = find_steady(descent)
+    demand_smooth(descent.motion)
+    return Equilibrium(descent, q0, findings, field.spin)
 
 
 def _stability(motion):

@@ -16,7 +16,7 @@ from .ports import RATE, demand_effective, inputs_of, outputs_of
 from .reduction import reduce
 from .smoothness import demand_smooth
 from .steady import steady_rate
-from .variations import Variations, stacked
+from .variations import Variations, transform_e
 
 if TYPE_CHECKING:
     from ..hints import Floats
@@ -59,13 +59,13 @@ class Linearisation:
         rotations of bodies. Zero at rest.
     """
 
-    def __init__(self, motion: Any, variations: Any, every: Any, reduced: Any, ports: Any, rate: Any) -> None:
+    def __init__(self, motion: Any, every: Any, reduced: Any, ports: Any, rate: Any) -> None:
         self.M, self.C, self.K = reduced.M, reduced.C, reduced.K
         self.t, self.q, self.qd, self.qdd, self.multipliers = motion.t, motion.q, motion.qd, motion.qdd, motion.lam
         self.coordinates: tuple[str, ...] = tuple(one.name for one in every)
         self.steady, self.rotation_rate = rate is not None, np.zeros(3) if rate is None else rate
         self.bodies, self._reduced = motion.packed.bodies, reduced
-        self._twists = _twists(motion, variations, reduced)
+        self._twists = _twists(motion, reduced)
         inputs, self._outputs = ports
         self.inputs, self.outputs = tuple(one.name for one in inputs), self._outputs.names
         self.F: Floats = np.zeros((len(every), len(inputs)))
@@ -123,16 +123,14 @@ def linearise(scene, memory, state, inputs, outputs):
     every = chosen(motion, variations)
     reduced = reduce(motion, every)
     ports = ports, outputs_of(scene, variations, outputs, every, reduced)
-    return Linearisation(motion, variations, every, reduced, ports, rate)
+    return Linearisation(motion, every, reduced, ports, rate)
 
 
-def _twists(motion, variations, reduced):
+def _twists(motion, reduced):
     """Displacements and rotations of all bodies by the coordinates, (b, 6, k)."""
-    rows = stacked(variations.bodies, motion.q.size)[0] @ reduced.T
-    found = np.zeros((len(motion.rigid), 6, rows.shape[1]))
-    at = 0
-    for i, rigid in enumerate(motion.rigid):
-        size = 6 if rigid else 3
-        found[i, :size] = rows[at : at + size]
-        at += size
+    T, bodies = reduced.T, motion.system.bodies
+    found = np.zeros((len(bodies), 6, T.shape[1]))
+    found[:, :3] = T[bodies[:, :1] + np.arange(3)]
+    p = bodies[motion.rigid, :1] + np.arange(3, 7)
+    found[motion.rigid, 3:] = 2.0 * transform_e(motion.parameters(0)) @ T[p]
     return found

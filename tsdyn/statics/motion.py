@@ -20,7 +20,7 @@ from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import graph_of, redundant_rows
 from .pairwise import derivatives
-from .tolerances import DENSE, LEAST_DIVISOR, REDUNDANT_SHARE, SINGULAR
+from .tolerances import DENSE, LEAST_DIVISOR, REDUNDANT_SHARE, ROUNDED, SINGULAR
 
 
 class Motion:
@@ -128,12 +128,7 @@ class Motion:
     @cached_property
     def root(self):
         """Square roots of the masses that go with the coordinates, of a body turning about any axis alike, (n,)."""
-        root = np.ones(self.q.size)
-        root[self.system.bodies[:, :1] + np.arange(3)] = np.sqrt(self.system.mass)[:, None]
-        J = self.system.inertia[self.rigid].reshape(-1, 3, 3)
-        mean = np.trace(J, axis1=1, axis2=2) / 3.0
-        root[self.system.bodies[self.rigid, :1] + np.arange(3, 7)] = 2.0 * np.sqrt(mean)[:, None]
-        return root
+        return roots_of_masses(self.system, self.q.size)
 
     @cached_property
     def stiffness(self):
@@ -141,6 +136,12 @@ class Motion:
         K = (self.derivatives.K - self.derivatives.Q_q).tocoo()
         i, j = K.coords
         return float(np.abs(K.data / self.root[i] / self.root[j]).max(initial=0.0))
+
+    @property
+    def is_balanced(self):
+        """Whether accelerations are rounding of those that balance each other."""
+        loads = max(float(np.abs(load / self.root**2).max(initial=0.0)) for load in (self.Q_A, self.Phi_q.T @ self.lam))
+        return bool(np.abs(self.qdd).max(initial=0.0) <= ROUNDED * loads)
 
     def acceleration_scale(self, size):
         """The acceleration, m/s^2, that others are compared with: of loads, reactions, a spring stretched by size.
@@ -150,6 +151,11 @@ class Motion:
         loads = (self.Q_A, self.Phi_q.T @ self.lam)
         largest = max(float(np.abs(load / self.root**2).max(initial=0.0)) for load in loads)
         return max(largest, float(np.abs(self.system.gravity).max()), self.stiffness * size) or 1.0
+
+    @property
+    def accelerations(self):
+        """qdd (n,) of the nominal motion."""
+        return self.qdd
 
     @property
     def freedom(self):
@@ -173,3 +179,12 @@ class Motion:
         """omega (level 1) or its derivative (level 2) of the rigid bodies, ground frame, (b', 3)."""
         p = self.parameters(0)
         return 2.0 * np.einsum("bij,bjk,bk->bi", rotation_matrix(p), transform_g(p), self.parameters(level))
+
+
+def roots_of_masses(system, n):
+    """Square roots of the masses that go with the coordinates, of a body turning about any axis alike, (n,)."""
+    root, rigid = np.ones(n), system.bodies[:, 1] == 7
+    root[system.bodies[:, :1] + np.arange(3)] = np.sqrt(system.mass)[:, None]
+    mean = np.trace(system.inertia[rigid].reshape(-1, 3, 3), axis1=1, axis2=2) / 3.0
+    root[system.bodies[rigid, :1] + np.arange(3, 7)] = 2.0 * np.sqrt(mean)[:, None]
+    return root

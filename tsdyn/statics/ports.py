@@ -36,7 +36,7 @@ def inputs_of(scene, variations, given):
     for one in given:
         same = [Input(joint.name, joint.columns, joint.jet[0]) for joint in variations.joints if joint.name == one]
         if not same:
-            item, axis = _item(scene, one, [*scene.forces, *scene.constraints], "force or joint")
+            item, axis = item_of(scene, one, [*scene.forces, *scene.constraints], "force or joint")
             same = [load for load in _loads_of(variations, item) if axis is None or load.name.endswith(axis)]
         found += same
     return found
@@ -52,7 +52,7 @@ def demand_effective(inputs, F):
             )
 
 
-def _item(scene, given, things, what):
+def item_of(scene, given, things, what):
     """The thing that a handle or a name means, and an axis ".x" at the end of the name, or None."""
     if not isinstance(given, str):
         if not any(given is thing for thing in things):
@@ -124,11 +124,11 @@ def _of(scene, variations, given, coordinates):
         if every:
             return every[:1]
     if isinstance(given, (tuple, list)) and len(given) == 2:
-        body, _ = _item(scene, given[0], scene.bodies, "body")
+        body, _ = item_of(scene, given[0], scene.bodies, "body")
         point = vector3(given[1], f"{body.name}: point (m, body frame)", InvalidArgument)
         return variations.point(body, point, f"{body.name}{tuple(point.tolist())}")
     joints = [item for item in scene.constraints if not (isinstance(item, Primitive) and item.normalises)]
-    item, axis = _item(scene, given, [*scene.bodies, *joints], "body or joint")
+    item, axis = item_of(scene, given, [*scene.bodies, *joints], "body or joint")
     if isinstance(item, PointMass):
         found = variations.of_body(item)[:3]
     else:

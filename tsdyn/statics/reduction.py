@@ -48,20 +48,31 @@ def reduce(motion, variations):
     solve = _solver(motion.H, Z)
     G1, G2 = (each[motion.kept] for each in (found.G1, found.G2))
     T = solve(np.zeros((motion.kept.size, k)), np.eye(k))
-    T1 = solve(-(G1 @ T), -(Zd @ T))
-    T2 = solve(-(G2 @ T) - 2.0 * (G1 @ T1), -(Zdd @ T) - 2.0 * (Zd @ T1))
+    still = not (G1.data.any() or Zd.data.any())
+    T1 = np.zeros((n, k)) if still else solve(-(G1 @ T), -(Zd @ T))
+    if still and motion.is_balanced:
+        T2 = np.zeros((n, k))
+    else:
+        T2 = solve(-(G2 @ T) - 2.0 * (G1 @ T1), -(Zdd @ T) - 2.0 * (Zd @ T1))
     K_inertia, C_inertia = inertia_derivatives(motion)
     C_all = found.Q_qd + C_inertia
 
     def project(T, T1, T2):
+        moved = 0.0 if still else motion.M @ T1
         stiffness = [motion.M @ T2 - C_all @ T1, K_inertia @ T, -(found.Q_q @ T), found.K @ T]
-        return T.T @ (2.0 * (motion.M @ T1) - C_all @ T), [T.T @ part for part in stiffness]
+        return _across(T, 2.0 * moved - C_all @ T), [_across(T, part) for part in stiffness]
 
     C, parts = project(T, T1, T2)
     R = _root(motion, T)
-    C_hat, parts_hat = project(*(solve_triangular(R, each.T, trans="T").T for each in (T, T1, T2)))
+    C_hat, parts_hat = project(*(solve_triangular(R, A.T, trans="T").T if A.any() else A for A in (T, T1, T2)))
     scale = sum(float(np.linalg.norm(part)) for part in parts_hat)
     return Reduced(R.T @ R, C, sum(parts), T, T1, C_hat, sum(parts_hat), R, scale)
+
+
+def _across(T, part):
+    """T^T part, of rows of the part that aren't zero."""
+    rows = np.flatnonzero(part.any(axis=1))
+    return T[rows].T @ part[rows] if rows.size < len(T) else T.T @ part
 
 
 def _root(motion, T):

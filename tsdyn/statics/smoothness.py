@@ -7,10 +7,11 @@ from ..observables.generalised_forces import force_loads
 from .tolerances import PROBE, ROUGH, ROUNDING
 
 
-def demand_continuous(packed):
-    """Refuse sampled loads, which are held whatever the scene does."""
+def demand_continuous(packed, but=()):
+    """Refuse sampled loads, which are held whatever the scene does; those of some forces don't count."""
     for load in packed.loads:
-        if getattr(load.force, "period", None) is not None:
+        held = getattr(load.force, "period", None) is not None
+        if held and not any(load.force is force for force in but):
             raise InvalidForce(
                 f"{load.force.name}: a sampled load is no function of the state, so it has neither a derivative nor an "
                 "equilibrium. Take a continuous one (without period=), or remove it and name its joint as an input."

@@ -27,7 +27,7 @@ def steady_rate(motion):
         return np.zeros(3) if np.abs(gains).max(initial=0.0) <= limit else None
     for symmetric in (True, False):
         Omega = _rate(motion, symmetric, size, rate)
-        if Omega is not None and _invariant(motion, Omega, size, rate):
+        if Omega is not None and is_invariant(motion, Omega, size, rate):
             return Omega
     return None
 
@@ -47,7 +47,7 @@ def _rate(motion, symmetric, size, rate):
     A = rotation_matrix(motion.parameters(0))
     J = motion.system.inertia[motion.rigid].reshape(-1, 3, 3)
     for turned, inertia, omega in zip(A, J, motion.spins(1), strict=True):
-        across = turned @ _asymmetry(inertia) @ turned.T if symmetric else np.eye(3)
+        across = turned @ asymmetry(inertia) @ turned.T if symmetric else np.eye(3)
         rows.append(across)
         values.append(across @ omega)
     rows, values = np.concatenate(rows), np.concatenate(values)
@@ -55,7 +55,7 @@ def _rate(motion, symmetric, size, rate):
     return Omega if np.abs(rows @ Omega - values).max(initial=0.0) <= STEADY * rate else None
 
 
-def _asymmetry(J):
+def asymmetry(J):
     """Projection onto the axes about which a body can't spin unseen: none of a sphere, two of a solid of rotation."""
     values, axes = np.linalg.eigh(J)
     equal = np.diff(values) <= EQUAL_INERTIA * values.sum()
@@ -67,7 +67,7 @@ def _asymmetry(J):
     return np.eye(3) - np.outer(axis, axis)
 
 
-def _invariant(motion, Omega, size, rate):
+def is_invariant(motion, Omega, size, rate):
     """Whether the motion continued rigidly is a motion of the scene."""
     limit = STEADY * _largest_acceleration(motion, size, rate)
     for turn in TURNS:

@@ -5,6 +5,9 @@ LEAST_DIVISOR = 1e-300
 # Share of the largest pivot of the saddle-point matrix with unit masses and unit rows: a share of rounding.
 SINGULAR = 1e-15
 
+# Share of the loads' own accelerations below which those that are left are rounding.
+ROUNDED = 1e-13
+
 # Coordinates up to which redundant rows are chosen by QR with pivoting, which costs their cube; of larger scenes by
 # elimination, with this share of a pivot of S in its diagonal entry as in configuration.
 DENSE, REDUNDANT_SHARE = 400, 1e-6
@@ -15,6 +18,10 @@ IN_TURN = 0.1
 # Share of a coordinate's own variation that the ones before it must leave: squares, as pivots of a Gram matrix are,
 # of which rounding leaves 1e-15.
 INDEPENDENT = 1e-9
+# Share of a coordinate's variation without constraints that is rounding: squares again, of sums of a few roundings.
+HELD = 1e-13
+# Share of the largest pivot of constraints and coordinates, unit rows, above which the coordinates are independent.
+CLEAR = 1e-6
 
 # --- steady motion ---
 # Share of the largest accelerations, speeds and constraint values up to which a motion counts as steady or at rest:
@@ -74,3 +81,9 @@ NEUTRAL = 1e-10
 MOST_SADDLES = 12
 # Share of the largest eigenvalue up to which a real part of a circulatory system is rounding: the root of rounding.
 GROWING = 1e-7
+
+# --- relative equilibria ---
+# Newton steps at most, and halvings of one.
+MOST_NEWTON, HALVINGS = 60, 12
+# Share of a rotor's angular velocity that may be off its axis of symmetry: axes may be typed.
+ON_AXIS = 1e-9

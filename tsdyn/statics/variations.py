@@ -12,9 +12,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.bodies import IDENTITY, transform_g
+from ..elements.bodies import transform_g
+from ..elements.joint_coordinates import AngleGeometry
 from ..model.handles import handles_of
 from .jets import constant, product, quotient, turning
+
+
+def named_coordinates(handles):
+    """Of each item with joint coordinates, by its id: their names and geometries, angles first."""
+    found, seen = {}, Counter()
+    for row in handles.rows:
+        seen[row.item.name] += 1
+        title = row.item.name + (f" #{seen[row.item.name]}" if seen[row.item.name] > 1 else "")
+        own = found[id(row.item)] = []
+        for kind, geometries in (("angle", row.angles), ("displacement", row.displacements)):
+            for i, geometry in enumerate(geometries):
+                own.append((f"{title}.{kind}" + (f" {i + 1}" if len(geometries) > 1 else ""), geometry))
+    return found
 
 
 class Variation(NamedTuple):
@@ -31,29 +45,32 @@ class Variations:
 
     def __init__(self, motion, rate):
         self.motion, self.handles, self.axes = motion, handles_of(motion.packed), turning(rate)
-        self._titles, seen = {}, Counter()
-        for row in self.handles.rows:
-            seen[row.item.name] += 1
-            again = f" #{seen[row.item.name]}" if seen[row.item.name] > 1 else ""
-            self._titles[id(row.item)] = row.item.name + again
+
+    @cached_property
+    def _named(self):
+        return named_coordinates(self.handles)
 
     @cached_property
     def joints(self):
         """Of all joint coordinates of the constraints."""
         own = {id(member.constraint) for member in self.motion.packed.members}
-        return [one for row in self.handles.rows if id(row.item) in own for one in self.of_row(row)]
+        return self._of(
+            [pair for row in self.handles.rows if id(row.item) in own for pair in self._named[id(row.item)]]
+        )
 
     def of_row(self, row):
         """Of the coordinates of one joint."""
-        found, title = [], self._titles[id(row.item)]
-        for kind, geometries, make in (
-            ("angle", row.angles, self.angle),
-            ("displacement", row.displacements, self.displacement),
-        ):
-            for i, geometry in enumerate(geometries):
-                number = f" {i + 1}" if len(geometries) > 1 else ""
-                found.append(Variation(f"{title}.{kind}{number}", *make(geometry), kind == "displacement"))
-        return found
+        return self._of(self._named[id(row.item)])
+
+    def _of(self, named):
+        """Of pairs (name, geometry) of joint coordinates."""
+        turns = [isinstance(geometry, AngleGeometry) for _, geometry in named]
+        jets = [None] * len(named)
+        for make, kind in ((self._angles, True), (self._displacements, False)):
+            which = [i for i, turn in enumerate(turns) if turn is kind]
+            for i, jet in zip(which, make([named[i][1] for i in which]) if which else (), strict=True):
+                jets[i] = jet
+        return [Variation(name, *jet, not turn) for (name, _), jet, turn in zip(named, jets, turns, strict=True)]
 
     @cached_property
     def bodies(self):
@@ -79,30 +96,49 @@ class Variations:
 
     def angle(self, geometry):
         """Columns and jet of an angle atan2(F, E), E = f.v, F = g.v, all in the ground frame."""
-        own, other = geometry.own, geometry.other
-        (v, v_p), (f, f_p), (g, g_p) = (
-            self._direction(body, s) for body, s in ((other, geometry.h), (own, geometry.f), (own, geometry.g))
-        )
-        E, F = product(f, v, "i,i->"), product(g, v, "i,i->")
-        E_p = np.concatenate((product(v, f_p, "i,ij->j"), product(f, v_p, "i,ij->j")), axis=1)
-        F_p = np.concatenate((product(v, g_p, "i,ij->j"), product(g, v_p, "i,ij->j")), axis=1)
-        square = product(E, E, ",->") + product(F, F, ",->")
-        jet = quotient(product(E, F_p, ",j->j") - product(F, E_p, ",j->j"), square)
-        return np.concatenate((self._turning(own), self._turning(other))), jet
+        return self._angles([geometry])[0]
 
     def displacement(self, geometry):
         """Columns and jet of e.(x_other - x_own), e a direction of the own body."""
-        own, other = geometry.own, geometry.other
-        e, e_p = self._direction(own, geometry.e)
-        own_columns, own_rows = self._point(own, geometry.s_own)
-        other_columns, other_rows = self._point(other, geometry.s_other)
-        apart = self._position(other, geometry.s_other) - self._position(own, geometry.s_own)
+        return self._displacements([geometry])[0]
+
+    def _angles(self, geometries):
+        """The same of several (b), all at once."""
+        own, other, f, g, h = zip(*geometries, strict=True)
+        (v, v_p), (f, f_p), (g, g_p) = (self._directions(*each) for each in ((other, h), (own, f), (own, g)))
+        E, F = product(f, v, "bi,bi->b"), product(g, v, "bi,bi->b")
+        E_p = np.concatenate((product(v, f_p, "bi,bij->bj"), product(f, v_p, "bi,bij->bj")), axis=2)
+        F_p = np.concatenate((product(v, g_p, "bi,bij->bj"), product(g, v_p, "bi,bij->bj")), axis=2)
+        square = product(E, E, "b,b->b") + product(F, F, "b,b->b")
+        jets = quotient(product(E, F_p, "b,bj->bj") - product(F, E_p, "b,bj->bj"), square[:, :, None])
+        return self._with_columns(jets, (own, 3), (other, 3))
+
+    def _displacements(self, geometries):
+        """The same of several (b), all at once."""
+        own, other, e, s_own, s_other = zip(*geometries, strict=True)
+        e, e_p = self._directions(own, e)
+        (x, x_p), (y, y_p) = (self._points(*each) for each in ((own, s_own), (other, s_other)))
         parts = (
-            (self._turning(own), product(apart, e_p, "i,ij->j")),
-            (own_columns, -product(e, own_rows, "i,ij->j")),
-            (other_columns, product(e, other_rows, "i,ij->j")),
+            product(y - x, e_p, "bi,bij->bj"),
+            -e,
+            -product(e, x_p, "bi,bij->bj"),
+            e,
+            product(e, y_p, "bi,bij->bj"),
         )
-        return np.concatenate([c for c, _ in parts]), np.concatenate([jet for _, jet in parts], axis=1)
+        return self._with_columns(np.concatenate(parts, axis=2), (own, 3), (own, 0), (other, 0))
+
+    def _with_columns(self, jets, *blocks):
+        """Pairs of columns and jets, of jets (3, b, .) of the coordinates of some bodies (b) from the first one on."""
+        found = []
+        for i in range(jets.shape[1]):
+            columns, used, place = [], [], 0
+            for bodies, first in blocks:
+                at, dimension = self._place(bodies[i])
+                columns.append(np.arange(at + first, at + dimension))
+                used.append(np.arange(place, place + max(dimension - first, 0)))
+                place += 7 - first
+            found.append((np.concatenate(columns), jets[:, i, np.concatenate(used)]))
+        return found
 
     def elongation(self, a, s, b, s_b):
         """Columns and row, at this instant alone, of the distance of two points."""
@@ -124,11 +160,23 @@ class Variations:
 
     def _parameters(self, body):
         """Jet of p."""
-        at, dimension = self._place(body)
-        if dimension != 7:
-            return constant(IDENTITY)
-        motion, span = self.motion, slice(at + 3, at + 7)
-        return np.stack((motion.q[span], motion.qd[span], 0.5 * motion.qdd[span]))
+        return self._all_parameters([body])[:, 0]
+
+    def _all_parameters(self, bodies):
+        """Jets (3, b, 4) of p; of the ground and of point masses those of a body that doesn't turn."""
+        jets = np.zeros((3, len(bodies), 4))
+        jets[0, :, 0] = 1.0
+        self._fill(jets, bodies, 7, 3)
+        return jets
+
+    def _fill(self, jets, bodies, least, first):
+        """Coordinates of bodies that have so many at least, from the first one on, into jets (3, b, .)."""
+        places = [self._place(body) for body in bodies]
+        which = [i for i, (_, dimension) in enumerate(places) if dimension >= least]
+        at = np.array([places[i][0] for i in which], int)[:, None] + first + np.arange(jets.shape[2])
+        motion = self.motion
+        for level, values in enumerate((motion.q[at], motion.qd[at], 0.5 * motion.qdd[at])):
+            jets[level, which] = values
 
     def _turning(self, body):
         """Columns of p."""
@@ -137,10 +185,22 @@ class Variations:
 
     def _direction(self, body, s):
         """Jets of A s and of its derivative with respect to p."""
-        p = self._parameters(body)
-        slope = arm_by_parameters(p, np.asarray(s, float))
-        value = 0.5 * product(slope, p, "ij,j->i")
+        value, slope = (each[:, 0] for each in self._directions([body], [s]))
         return value, slope if self._place(body)[1] == 7 else np.zeros((3, 3, 0))
+
+    def _directions(self, bodies, s):
+        """The same of several: (3, b, 3) and (3, b, 3, 4)."""
+        p = self._all_parameters(bodies)
+        slope = arm_by_parameters(p, np.array(s, float))
+        return 0.5 * product(slope, p, "bij,bj->bi"), slope
+
+    def _points(self, bodies, s):
+        """Jets of r + A s of several, (3, b, 3), and of its derivative with respect to p; a point mass has no s."""
+        r = np.zeros((3, len(bodies), 3))
+        self._fill(r, bodies, 3, 0)
+        s = [(0.0, 0.0, 0.0) if self._place(body)[1] == 3 else each for body, each in zip(bodies, s, strict=True)]
+        value, slope = self._directions(bodies, s)
+        return r + value, slope
 
     def _position(self, body, s):
         """Jet of r + A s."""
@@ -160,11 +220,12 @@ class Variations:
 
 
 def arm_by_parameters(p, s):
-    """The derivative of A(p) s with respect to p, linear in p: (..., 3, 4) for p (..., 4)."""
+    """The derivative of A(p) s with respect to p, linear in p: (..., 3, 4) for p (..., 4) and s (3,) or (..., 3)."""
     e0, e = p[..., 0, None], p[..., 1:]
-    along = (e @ s)[..., None, None]
-    cross = np.array([[0.0, -s[2], s[1]], [s[2], 0.0, -s[0]], [-s[1], s[0], 0.0]])
-    by_e = along * np.eye(3) + e[..., :, None] * s - s[:, None] * e[..., None, :] - e0[..., None] * cross
+    along = (e * s).sum(axis=-1)[..., None, None]
+    cross = np.cross(s[..., None, :], -np.eye(3))
+    by_e = along * np.eye(3) + e[..., :, None] * s[..., None, :] - s[..., :, None] * e[..., None, :]
+    by_e = by_e - e0[..., None] * cross
     return 2.0 * np.concatenate(((e0 * s + np.cross(e, s))[..., None], by_e), axis=-1)
 
 

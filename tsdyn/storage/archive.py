@@ -12,7 +12,7 @@ from .formats import Column, Table, format_of
 READERS = 1.0  # s, after which readers see what has been written; later in proportion where that takes longer than
 BRIEF = 0.01  # s
 OUTPUTS, STEPS, CHARTS = "outputs", "steps", "charts"
-_COORDINATES = ("x", "y", "z", "e0", "e1", "e2", "e3")
+COORDINATES = ("x", "y", "z", "e0", "e1", "e2", "e3")
 _LEVELS = {
     "q": ("positions and Euler parameters", "m or 1"),
     "qd": ("their first derivatives", "m/s or 1/s"),
@@ -29,7 +29,7 @@ _CHARTS = {
 
 def tables_of(bodies, remembered, history):
     """The tables of a store: outputs of these bodies, so many remembered numbers, histories."""
-    names = [f"{body.name}.{x}" for body in bodies for x in _COORDINATES[: body.dimension]]
+    names = [f"{body.name}.{x}" for body in bodies for x in COORDINATES[: body.dimension]]
     labels, columns = {"coordinate": names}, [_times("time", "model time")]
     columns += [Column(name, ("coordinate",), _attributes(*said)) for name, said in _LEVELS.items()]
     if remembered:
@@ -43,6 +43,11 @@ def tables_of(bodies, remembered, history):
             rest = [Column(column, (), _attributes(*words)) for column, words in said.items()]
             tables[name] = Table(dimension, (_times(dimension, "start"), *rest), {})
     return tables
+
+
+def units_of_level(level):
+    """The units of q, qd or qdd: of positions, and of Euler parameters."""
+    return _LEVELS[level][1]
 
 
 def _times(name, said):

@@ -14,8 +14,13 @@ BUFFER, how many floats are gathered before they are written, and functions for 
 
     read(path, column, part)                   a slice of a column
     count(path, columns)                       rows that all of these columns have
-    attributes(path)                           what `create` was given
     names(path)                                of all columns
+
+and for what is written at once, beside the tables
+
+    put(path, group, arrays)                   arrays by name, into a new group of a closed store
+    get(path, group)                           the arrays of a group, by name; none where there is no such group
+    attributes(path)                           of the store as a whole
 """
 
 import contextlib
@@ -43,11 +48,12 @@ class Table(NamedTuple):
     dimension: str
     columns: tuple  # of Column
     labels: dict  # of the other dimensions: the names along each
+    longest: int = LONGEST  # rows of a chunk at most
 
     def shapes(self, column):
         """The shapes of a column without rows, and of its chunks."""
         row = tuple(len(self.labels[dimension]) for dimension in column.dimensions)
-        return (0, *row), (max(min(CHUNK // max(math.prod(row), 1), LONGEST), 1), *row)
+        return (0, *row), (max(min(CHUNK // max(math.prod(row), 1), self.longest), 1), *row)
 
 
 def demand_rows(path, column, found, count):

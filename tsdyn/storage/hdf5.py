@@ -18,6 +18,7 @@ from .formats import CHUNK, demand_rows, reading
 
 BUFFER = CHUNK
 COPIED = 1 << 16  # rows at a time
+FLAGS = 11  # offset of the flags of file consistency in the superblock
 CACHE = 1 << 19  # bytes of each array that are kept in memory
 
 
@@ -129,6 +130,19 @@ def count(path, columns):
         return min(len(file[column]) for column in columns)
 
 
+def put(path, group, arrays):
+    """As formats.py says."""
+    with h5py.File(path, "r+", libver="latest", locking=False) as file:
+        for name, values in arrays.items():
+            file.create_dataset(f"{group}/{name}", data=values)
+
+
+def get(path, group):
+    """As formats.py says."""
+    with reading(path), _opened(path) as file:
+        return {name: values[()] for name, values in file[group].items()} if group in file else {}
+
+
 def attributes(path):
     """As formats.py says."""
     with reading(path), _opened(path) as file:
@@ -142,13 +156,25 @@ def names(path):
 
 
 def _opened(path):
-    """The file to read: as one that may be written meanwhile, or as another reader in this process has opened it."""
-    for options in ({"libver": "latest", "swmr": True, "locking": False}, {"locking": False}, {}):
+    """The file to read: as one that is being written, or as another reader in this process has opened it.
+
+    Of a damaged file that nobody writes, HDF5 would wait for the missing part for ever.
+    """
+    written = ({"libver": "latest", "swmr": True, "locking": False},) if _is_being_written(path) else ()
+    for options in (*written, {"locking": False}, {}):
         try:
             return h5py.File(path, "r", **options)
         except OSError as error:
             reason = error
     raise StorageError(f"{path} can't be read as HDF5: {reason}.") from reason
+
+
+def _is_being_written(path):
+    """Whether the superblock says that the file is open for writing; a killed process leaves that, too."""
+    with contextlib.suppress(OSError), open(path, "rb") as file:
+        head = file.read(FLAGS + 1)
+        return len(head) > FLAGS and head[FLAGS] != 0
+    return False
 
 
 def _laid_out(path, tables, attributes):

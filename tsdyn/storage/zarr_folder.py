@@ -85,6 +85,20 @@ def count(path, columns):
         return min(group[column].shape[0] for column in columns)
 
 
+def put(path, group, arrays):
+    """As formats.py says."""
+    inner = _group(path, "r+").create_group(group)
+    for name, values in arrays.items():
+        inner.create_array(name, data=np.ascontiguousarray(values))
+
+
+def get(path, group):
+    """As formats.py says."""
+    with reading(path):
+        whole = _group(path, "r")
+        return {name: array[...] for name, array in whole[group].arrays()} if group in whole else {}
+
+
 def attributes(path):
     """As formats.py says."""
     with reading(path):

@@ -1,0 +1,156 @@
+"""tsdyn run, check, info, new and convert: what they print and write, and their exit codes."""
+
+import json
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from examples import four_bar
+from tsdyn.cli import main
+
+FALL = 'version = 1\n[[body]]\nname = "stone"\ntype = "PointMass"\nmass = 1.0\nposition = [0, 0, 5]\n'
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "fall.toml").write_text(FALL)
+    four_bar.build().save("bars.toml")
+    return tmp_path
+
+
+def called(capsys, *words):
+    """Exit code, stdout and stderr of a command."""
+    try:
+        code = main(list(words))
+    except SystemExit as ended:
+        code = ended.code
+    return code, *capsys.readouterr()
+
+
+def test_run(folder, capsys):
+    code, out, _ = called(capsys, "run", "bars.toml", "--to", "0.1")
+    assert code == 0
+    assert all(word in out for word in ("3 rigid bodies", "Taylor", "success at t = 0.1 s", "errors", "energy"))
+
+
+def test_run_lasts_ten_seconds_by_default(folder, capsys):
+    code, out, _ = called(capsys, "run", "fall.toml", "--json")
+    found = json.loads(out)
+    assert (code, found["reached"], found["success"]) == (0, 10.0, True)
+    assert found["provenance"]["method"].startswith("Taylor")
+
+
+def test_options_come_before_the_file(folder, capsys):
+    (folder / "fall.toml").write_text(FALL + '[run]\nend = 0.2\nevery = 0.1\nmethod = "rk45"\nrtol = 1e-7\n')
+    found = json.loads(called(capsys, "run", "fall.toml", "--json")[1])
+    assert (found["reached"], found["outputs"]) == (0.2, 3)
+    assert found["provenance"]["rtol"] == 1e-7
+    words = "--to", "0.1", "--method", "dop853", "--rtol", "1e-5", "--every", "0.02"
+    found = json.loads(called(capsys, "run", "fall.toml", "--json", *words)[1])
+    assert (found["reached"], found["outputs"], found["provenance"]["rtol"]) == (0.1, 6, 1e-5)
+    assert found["provenance"]["method"].startswith("DOP853")
+
+
+def test_results(folder, capsys):
+    outputs = [word for name in ("a.h5", "a.csv", "a.zarr") for word in ("--output", name)]
+    code, out, _ = called(capsys, "run", "bars.toml", "--to", "0.1", *outputs)
+    assert code == 0
+    assert "written   a.csv" in out
+    solution = ts.load("a.h5")
+    np.testing.assert_array_equal(ts.load("a.zarr").q, solution.q)
+    rows = np.genfromtxt("a.csv", delimiter=",", skip_header=1)
+    np.testing.assert_array_equal(rows[:, 1:22], solution.q)
+    header = (folder / "a.csv").read_text().splitlines()[0]
+    assert header.startswith("time (s),q crank.x (m),")
+
+
+def test_plot(folder, capsys):
+    pytest.importorskip("matplotlib")
+    assert called(capsys, "run", "fall.toml", "--to", "0.1", "--plot")[0] == 0
+    assert (folder / "fall.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_run_that_fails(folder, capsys):
+    (folder / "fall.toml").write_text(
+        FALL + "[run]\nmax_steps = 1\nend = 1.0\nmethod = { type = 'Nystrom4', step = 0.1 }\n"
+    )
+    code, out, err = called(capsys, "run", "fall.toml", "--output", "a.h5")
+    assert code == 1
+    assert "max_steps" in out
+    assert err.startswith("tsdyn: ")
+    assert not ts.load("a.h5").success
+
+
+def test_check(folder, capsys):
+    assert called(capsys, "check", "bars.toml")[0] == 0
+    text = (folder / "bars.toml").read_text()
+    (folder / "bars.toml").write_text(text.replace("Revolute", "Revolut", 1).replace("mass =", "mas =", 1))
+    code, _, err = called(capsys, "check", "bars.toml")
+    assert code == 1
+    assert "2 mistakes" in err or "3 mistakes" in err
+    code, out, _ = called(capsys, "check", "bars.toml", "--json")
+    assert code == 1
+    assert json.loads(out)["mistakes"][0]["line"] == 4
+
+
+def test_check_compares_the_start_with_the_constraints(folder, capsys):
+    text = (folder / "bars.toml").read_text()
+    (folder / "bars.toml").write_text(text.replace("position = [0.12", "position = [0.13", 1))
+    code, _, err = called(capsys, "check", "bars.toml")
+    assert code == 1
+    assert "initial position breaks" in err
+
+
+def test_info(folder, capsys):
+    code, out, _ = called(capsys, "info", "bars.toml")
+    assert code == 0
+    assert all(word in out for word in ("crank pin", "redundant rows", "Taylor", "degrees of freedom"))
+    found = json.loads(called(capsys, "info", "bars.toml", "--json")[1])
+    assert (found["degrees_of_freedom"], len(found["redundant_rows"])) == (1, 3)
+    called(capsys, "run", "bars.toml", "--to", "0.1", "--output", "a.h5")
+    assert "Provenance" in called(capsys, "info", "a.h5")[1]
+
+
+def test_new(folder, capsys):
+    assert called(capsys, "new")[0] == 0
+    assert called(capsys, "run", "scene.toml", "--to", "0.1")[0] == 0
+    code, _, err = called(capsys, "new")
+    assert code == 1
+    assert "exists" in err
+    assert called(capsys, "new", "scene.txt")[0] == 1
+
+
+def test_convert(folder, capsys):
+    assert called(capsys, "convert", "four_bar", "again.toml")[0] == 0
+    assert (folder / "again.toml").read_bytes() == (folder / "bars.toml").read_bytes()
+    called(capsys, "run", "bars.toml", "--to", "0.1", "--output", "a.h5")
+    for name in ("a.zarr", "a.csv", "b.h5"):
+        assert called(capsys, "convert", "a.h5", name)[0] == 0
+    np.testing.assert_array_equal(ts.load("b.h5").q, ts.load("a.h5").q)
+    assert called(capsys, "convert", "bars.toml", "bars.h5")[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["rnu", "fall.toml"], 2, "did you mean run?"),
+        (["run", "fall.toml", "--methd=rk45"], 2, "did you mean --method"),
+        (["run", "fall.toml", "--methd", "rk45"], 2, "did you mean --method"),
+        (["run", "fall.toml", "--method", "dop835"], 1, "dop853"),
+        (["run", "missing.toml"], 1, "can't be read"),
+        (["run", "fall.toml", "--output", "a.txt"], 1, ".csv"),
+        (["run", "fall.toml", "--output", "missing/a.h5"], 1, "no folder"),
+        (["run", "fall.toml", "--every", "-1"], 1, "every must be"),
+        (["run", "fall.toml", "--to", "-1"], 1, "end after it starts"),
+        (["run"], 2, "SCENE"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_wrong_usage(words, code, said, folder, capsys):
+    before = sorted(folder.iterdir())
+    found, _, err = called(capsys, *words)
+    assert found == code
+    assert said in err
+    assert sorted(folder.iterdir()) == before

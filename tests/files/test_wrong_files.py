@@ -1,0 +1,246 @@
+"""Wrong scene files: every mistake at once, each with its line and what to write; fuzzed files never crash."""
+
+import re
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from tsdyn.files.starting_file import TEXT
+
+RIGHT = """\
+version = 1
+gravity = [0, 0, -9.81]
+[parameters]
+length = 0.5
+[[body]]
+name = "arm"
+mass = 2
+inertia = [0.1, 0.2, 0.1]
+position = ["length", 0, 0]
+[[body]]
+name = "bob"
+type = "PointMass"
+mass = 0.1
+position = [1, 0, 1]
+[[constraint]]
+type = "Revolute"
+name = "hinge"
+a = "ground"
+b = "arm"
+at = { point = [0, 0, 0], axis = [0, 1, 0] }
+[[constraint]]
+type = "Distance"
+a = "arm"
+b = "bob"
+length = "1.2 + 0.0 * sin(t)"
+[[force]]
+type = "RevoluteFriction"
+joint = "hinge"
+radius = 0.01
+kinetic = 0.1
+[[force]]
+type = "PointForce"
+a = "arm"
+force = [0, 0, { times = [0, 1], values = [0, 1] }]
+frame = "body"
+[start]
+assemble = true
+[run]
+end = 1.0
+method = { type = "RK45", rtol = 1e-9 }
+"""
+WRONG = {  # name: (what is replaced, by what, line, words of the message)
+    "no TOML": ("[[body]]\nname = \"arm\"", "[[body]\nname = \"arm\"", 5, ("no TOML",)),
+    "twice": ("mass = 2\n", "mass = 2\nmass = 3\n", 8, ("no TOML", "overwrite")),
+    "no version": ("version = 1\n", "", 1, ("write version = 1",)),
+    "version misspelt": ("version", "verson", 1, ("verson", "write version = 1")),
+    "later version": ("version = 1", "version = 7", 1, ("newer tsdyn",)),
+    "version is text": ("version = 1", 'version = "1"', 1, ("write version = 1",)),
+    "unknown table": ("[start]", "[starts]", 36, ("'starts'", "start?")),
+    "plural": ("[[force]]\ntype = \"Rev", "[[forces]]\ntype = \"Rev", 26, ("'forces'", "force?")),
+    "table in single brackets": ("[[body]]\nname = \"bob\"", "[bodyy]\nname = \"bob\"", 10, ("bodyy", "body?")),
+    "title is a number": ("version = 1", "version = 1\ntitle = 3", 2, ("title = 3", "text in quotes")),
+    "infinite parameter": ("length = 0.5", "length = 1e400", 4, ("finite",)),
+    "gravity of two": ("[0, 0, -9.81]", "[0, 0]", 2, ("gravity", "three finite numbers")),
+    "gravity is text": ("[0, 0, -9.81]", '"down"', 2, ("'down'", "unknown name")),
+    "parameter of t": ("length = 0.5", 'length = "t"', 4, ("depends on the time",)),
+    "parameter of nothing": ("length = 0.5", 'length = "lenght2"', 4, ("lenght2",)),
+    "parameter with a name of a function": ("length = 0.5", "length = 0.5\nsin = 1", 5, ("'sin'", "another")),
+    "wrong parameter": ('["length", 0, 0]', '["lenght", 0, 0]', 9, ("'lenght'", "did you mean length")),
+    "key of a body": ("mass = 2\n", "mas = 2\n", 7, ("'mas'", "mass?")),
+    "body lacks mass": ("mass = 2\n", "", 5, ("'arm'", "lacks mass")),
+    "negative mass": ("mass = 2\n", "mass = -2\n", 7, ("positive", "-2")),
+    "mass is true": ("mass = 2\n", "mass = true\n", 7, ("True", "must be a number")),
+    "mass is infinite": ("mass = 2\n", "mass = inf\n", 7, ("positive finite",)),
+    "mass is huge": ("mass = 2\n", f"mass = {10**400}\n", 7, ("too large",)),
+    "impossible inertia": ("[0.1, 0.2, 0.1]", "[0.1, 0.2, 0.9]", 8, ("triangle inequality",)),
+    "ragged inertia": ("[0.1, 0.2, 0.1]", "[0.1, [0.2], 0.1]", 8, ("3 principal values",)),
+    "type of a body": ('"PointMass"', '"Pointmass"', 12, ("'PointMass'",)),
+    "inertia of a particle": ("mass = 0.1\n", "mass = 0.1\ninertia = [1, 1, 1]\n", 14, ("'inertia'",)),
+    "name in use": ('name = "bob"', 'name = "arm"', 11, ("'arm' is in use",)),
+    "name is a number": ('name = "bob"', "name = 3", 11, ("text in quotes",)),
+    "type of a constraint": ('"Revolute"', '"Revolut"', 16, ("'Revolut'", "Revolute?")),
+    "no type": ('type = "Revolute"\n', "", 15, ("has no type",)),
+    "force among constraints": ('"Distance"', '"Spring"', 22, ("no constraint", "[[force]]")),
+    "plug-in": ('"Distance"', '"os.system"', 22, ("--allow-code",)),
+    "normalisation": ('"Distance"', '"EulerNormalization"', 22, ("by itself",)),
+    "force of code": ('"PointForce"', '"UserForce"', 31, ("lacks function", "no")),
+    "unknown body": ('b = "arm"', 'b = "amr"', 19, ("'amr'", "did you mean 'arm'")),
+    "body is a list": ('b = "arm"', 'b = ["arm"]', 19, ("no body",)),
+    "no second body": ('b = "arm"\n', "", 15, ("lacks b",)),
+    "same bodies": ('a = "ground"\nb = "arm"', 'a = "arm"\nb = "arm"', 15, ("to itself",)),
+    "key of at": ("axis = [", "axes = [", 20, ("'axes'", "axis")),
+    "zero axis": ("axis = [0, 1, 0]", "axis = [0, 0, 0]", 20, ("length zero",)),
+    "marker beside at": ('b = "arm"\nat', 'b = "arm"\npoint_a = [0, 0, 0]\nat', 20, ("within at",)),
+    "at is a list": ("{ point = [0, 0, 0], axis = [0, 1, 0] }", "[0, 0, 0]", 20, ("write at = {",)),
+    "unknown function": ("sin(t)", "sine(t)", 25, ("'sine'", "sin")),
+    "unknown variable": ("sin(t)", "sin(x)", 25, ("'x'",)),
+    "unfinished expression": ("sin(t)", "sin(t", 25, ("no expression",)),
+    "code": ("sin(t)", "__import__('os').system('true')", 25, ("no arithmetic",)),
+    "attribute": ("sin(t)", "t.__class__", 25, ("no arithmetic",)),
+    "negative length": ("1.2 +", "-1.2 +", 25, ("must be positive",)),
+    "no such joint": ('joint = "hinge"', 'joint = "hing"', 28, ("did you mean 'hinge'",)),
+    "joint of another class": ('joint = "hinge"', 'joint = "Distance(arm, bob)"', 26, ("must be a Revolute",)),
+    "friction lacks a number": ("kinetic = 0.1\n", "", 26, ("lacks kinetic",)),
+    "negative friction": ("kinetic = 0.1", "kinetic = -0.1", 30, ("not negative",)),
+    "load of two": ("[0, 0, { times", "[0, { times", 34, ("force",)),
+    "table without values": ("values = [0, 1]", "value = [0, 1]", 34, ("times and values",)),
+    "times go back": ("times = [0, 1]", "times = [1, 0]", 34, ("each after the one before",)),
+    "unknown frame": ('frame = "body"', 'frame = "boddy"', 35, ("write 'body'",)),
+    "assemble is a number": ("assemble = true", "assemble = 1", 37, ("true or false",)),
+    "run ends first": ("end = 1.0", "end = -1.0", 38, ("after the start",)),
+    "unknown method": ('"RK45"', '"RK54"', 40, ("RK45",)),
+    "argument of a method": ("rtol = 1e-9", "rtoll = 1e-9", 40, ("rtoll", "did you mean rtol")),
+    "tolerance of a method": ("rtol = 1e-9", "rtol = -1e-9", 40, ("positive",)),
+    "unknown option": ("end = 1.0\n", "end = 1.0\nto = 3\n", 40, ("'to'",)),
+}  # fmt: skip
+
+MODULE = """
+import tsdyn as ts
+
+class Pair(ts.Joint):
+    markers = (ts.Point("a"), ts.Point("b"))
+
+    def compose(self):
+        yield "pair", ts.constraints.Spherical(self.a, self.b)
+"""
+PLUGGED = """
+version = 1
+[[body]]
+name = "bob"
+mass = 1
+inertia = [1, 1, 1]
+[[constraint]]
+type = "pair_of_a_file.Pair"
+a = "bob"
+b = "ground"
+"""
+
+
+def load(text, folder):
+    path = folder / "scene.toml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return ts.load(path)
+
+
+def test_the_right_file(tmp_path):
+    scene = load(RIGHT, tmp_path)
+    assert ts.simulate(scene, (0.0, 0.01), integrator="dop853").constraint_error.position.max() < 1e-14
+    assert len(load(TEXT, tmp_path).bodies) == 1
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_mistake_is_named_with_its_line(name, tmp_path):
+    old, new, line, words = WRONG[name]
+    assert RIGHT.count(old) >= 1
+    with pytest.raises(ts.InvalidFile) as caught:
+        load(RIGHT.replace(old, new, 1), tmp_path)
+    message = str(caught.value)
+    lines = [found for found, _, _ in caught.value.mistakes]
+    assert line in lines, message
+    assert f"scene.toml:{line}:" in message
+    said = " ".join(text for found, _, text in caught.value.mistakes if found == line)
+    assert all(word in said for word in words), message
+
+
+def test_all_mistakes_at_once(tmp_path):
+    several = [WRONG[name] for name in ("negative mass", "unknown body", "code", "unknown frame", "unknown method")]
+    text = RIGHT
+    for old, new, _, _ in several:
+        text = text.replace(old, new, 1)
+    with pytest.raises(ts.InvalidFile) as caught:
+        load(text, tmp_path)
+    assert [line for _, _, line, _ in several] == [line for line, _, _ in caught.value.mistakes]
+
+
+def test_a_start_that_cannot_be_assembled(tmp_path):
+    with pytest.raises(ts.InvalidFile, match="arm, bob held fixed"):
+        load(RIGHT.replace("1.2 + 0.0", "9.0 + 0.0").replace("[start]", '[start]\nfixed = ["arm", "bob"]'), tmp_path)
+
+
+def test_files_that_are_none(tmp_path):
+    for text in (b"\xff\xfe\x00", b"version = 1\n\x00", b"\xef\xbb\xbf" + b"version = 1\nx=\xc3"):
+        with pytest.raises((ts.StorageError, ts.InvalidFile), match=re.escape("scene.toml")):
+            load(text, tmp_path)
+    with pytest.raises(ts.StorageError, match="can't be read"):
+        ts.load(tmp_path / "missing.toml")
+    (tmp_path / "folder.toml").mkdir()
+    with pytest.raises(ts.StorageError, match="can't be read"):
+        ts.load(tmp_path / "folder.toml")
+    with pytest.raises(ts.InvalidFile, match="TOML"):
+        load("version = " + "[" * 5000, tmp_path)
+
+
+def test_code_of_plug_ins_is_imported_only_if_allowed(tmp_path, monkeypatch):
+    (tmp_path / "pair_of_a_file.py").write_text(MODULE)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ts.InvalidFile, match="allow-code"):
+        load(PLUGGED, tmp_path)
+    assert ts.load(tmp_path / "scene.toml", allow_code=True).constraints[0].rows == 3
+
+
+def fuzzed(rng, text):
+    """A text with a few bytes, lines or words changed."""
+    data = bytearray(text.encode())
+    for _ in range(rng.integers(1, 6)):
+        at, way = int(rng.integers(len(data))), rng.integers(5)
+        if way == 0:
+            data[at] = int(rng.integers(256))
+        elif way == 1:
+            del data[at : at + int(rng.integers(1, 12))]
+        elif way == 2:
+            data[at:at] = rng.choice(
+                [b"[", b"]", b'"', b"=", b"{", b"\n", b"nan", b"1e999", b"-1", b"[[body]]\n", b"t"]
+            )
+        else:
+            lines = bytes(data).split(b"\n")
+            i, j = rng.integers(len(lines), size=2)
+            lines[i] = lines[j] if way == 3 else lines[i][::-1]
+            data = bytearray(b"\n".join(lines))
+        if not data:
+            return b""
+    return bytes(data)
+
+
+def fuzz(seeds, folder):
+    wrong = 0
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        text = fuzzed(rng, RIGHT if seed % 2 else TEXT)
+        try:
+            load(text, folder)
+        except ts.TsdynError:
+            wrong += 1
+        except BaseException as error:
+            raise AssertionError(f"seed {seed}: {type(error).__name__}: {error}\n{text!r}") from error
+    return wrong
+
+
+def test_fuzzed_files(tmp_path):
+    assert fuzz(range(150), tmp_path) > 75
+
+
+@pytest.mark.slow
+def test_many_fuzzed_files(tmp_path):
+    assert fuzz(range(1000, 11000), tmp_path) > 5000

@@ -1,0 +1,40 @@
+"""A parser of arguments that answers a wrong word with the nearest right one."""
+
+import argparse
+import re
+
+from ..validation import close
+
+
+class Parser(argparse.ArgumentParser):
+    """An `ArgumentParser` whose errors end with the nearest right words."""
+
+    given = ()  # arguments of the command line
+
+    def error(self, message):
+        """Exit with code 2 after the usage, the message and what may have been meant."""
+        super().error(message + self._hint(message))
+
+    def _hint(self, message):
+        """What may have been meant; empty if nothing is near."""
+        choice = re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)
+        if choice:
+            return _meant(choice[1], [word.strip(" '") for word in choice[2].split(",")])
+        unknown = re.search(r"unrecognized arguments: (.*)", message)
+        words = [word.partition("=")[0] for word in unknown[1].split() if word.startswith("-")] if unknown else []
+        return "".join(_meant(word, self._options()) for word in words)
+
+    def _options(self):
+        """Options of the command that is given."""
+        found = list(self._option_string_actions)
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                for word in self.given:
+                    if word in action.choices:
+                        return [*found, *action.choices[word]._option_string_actions]
+        return found
+
+
+def _meant(word, known):
+    near = close(word, known)
+    return f"; did you mean {' or '.join(near)}?" if near else ""

@@ -1,0 +1,175 @@
+"""The command `tsdyn run`: a run of a scene file, its summary, results in files."""
+
+import csv
+import json
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InvalidArgument
+from ..files import run_table
+from .scene_file import load_run
+
+TABLES, SOLUTIONS = (".csv",), (".h5", ".hdf5", ".nc", ".zarr")
+
+
+def add_run_options(parser):
+    """Add the options of `tsdyn run` to its parser."""
+    add_scene(parser)
+    parser.add_argument("--to", type=float, metavar="S", help="end of the run (default: that of the file, or 10 s)")
+    parser.add_argument("--method", metavar="NAME", help="an integrator, such as dop853")
+    parser.add_argument("--rtol", type=float, metavar="TOL", help="relative tolerance")
+    parser.add_argument("--atol", type=float, metavar="TOL", help="absolute tolerance")
+    parser.add_argument("--formulation", metavar="NAME", help="tangent, null-space or maggi-kane")
+    parser.add_argument("--every", type=float, metavar="S", help="interval of outputs instead of every step")
+    parser.add_argument(
+        "--output", action="append", default=[], metavar="PATH",
+        help="where to write results, again for more: .h5, .nc or .zarr (ts.load reads them), or .csv",
+    )  # fmt: skip
+    parser.add_argument("--plot", nargs="?", const="", metavar="PATH", help="draw the constraint errors (default PNG)")
+    add_json(parser)
+
+
+def add_scene(parser, metavar="SCENE"):
+    """Add the file of a scene, and whether it may import plug-ins."""
+    parser.add_argument(
+        "scene", metavar=metavar, help="a TOML file; or a Python file with a function build(), which is then executed"
+    )
+    parser.add_argument("--allow-code", action="store_true", help="import modules that the file names for plug-ins")
+
+
+def add_json(parser):
+    """Add the option of machine-readable output."""
+    parser.add_argument("--json", action="store_true", help="print JSON, and nothing else")
+
+
+def _run(parsed):
+    """Run a scene file and print how good the run is.
+
+    What the table [run] of the file says holds where no option is given; without either the run lasts 10 s, by the
+    default method. The exit code is 0 only if the run reached its end, and all results were written.
+    """
+    from ..simulation.simulate import simulate
+
+    _demand_writable(parsed)
+    scene, given = load_run(parsed.scene, parsed.allow_code)
+    span, options = _options(parsed, given)
+    if not parsed.json:
+        print(f"{parsed.scene}: {scene!r}", flush=True)
+    show = sys.stderr.isatty() and not parsed.json and find_spec("tqdm") is not None
+    solution = simulate(scene, span, progress=show or None, **options)
+    written = [str(write(solution, path)) for path in parsed.output]
+    if parsed.plot is not None:
+        written.append(str(_draw(solution, parsed.plot or Path(parsed.scene).with_suffix(".png").name)))
+    if parsed.json:
+        print(json.dumps({**summary(solution), "written": written}, indent=1))
+    else:
+        print("\n".join([str(solution), *_lines(solution), *(f"  written   {path}" for path in written)]))
+    if not solution.success:
+        print(f"tsdyn: {solution.message}", file=sys.stderr)
+    return 0 if solution.success else 1
+
+
+def _options(parsed, given):
+    """The span, and the other arguments of `simulate`."""
+    given = dict(given)
+    start, end = given.pop("t_span", (0.0, run_table.END))
+    end = end if parsed.to is None else parsed.to
+    if parsed.method is not None:
+        given["integrator"] = parsed.method
+    given |= {name: getattr(parsed, name) for name in ("rtol", "atol", "formulation")
+              if getattr(parsed, name) is not None}  # fmt: skip
+    if parsed.every is not None:
+        given["t_eval"] = run_table.output_times(start, end, parsed.every)
+    elif "t_eval" in given and parsed.to is not None:
+        kept = np.asarray(given["t_eval"])
+        given["t_eval"] = kept[kept <= end]
+    return (start, end), given
+
+
+def _demand_writable(parsed):
+    """Refuse at once, not after the run, what can't be written at its end."""
+    for path in (*parsed.output, *([parsed.plot] if parsed.plot else [])):
+        if not Path(path).resolve().parent.is_dir():
+            raise InvalidArgument(f"there is no folder {Path(path).resolve().parent} to write {Path(path).name} to.")
+    for path in parsed.output:
+        demand_format(path)
+    if parsed.plot is not None:
+        from ..drawing import demand_matplotlib
+
+        demand_matplotlib()
+
+
+def demand_format(path):
+    """Refuse a path of results whose suffix says no format."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in (*TABLES, *SOLUTIONS):
+        raise InvalidArgument(f"results are written to {', '.join((*SOLUTIONS, *TABLES))}; got {path!r}.")
+    if suffix in SOLUTIONS:
+        from ..storage.saved_file import format_at
+
+        format_at(path)
+
+
+def write(solution, path):
+    """Write a solution to a file, in the format of its suffix; the path."""
+    if Path(path).suffix.lower() in SOLUTIONS:
+        solution.save(path)
+        return path
+    from ..simulation.labelled import table_of
+
+    columns, units, array = table_of(solution)
+    try:
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            rows = csv.writer(file)
+            rows.writerow(["time (s)", *(f"{' '.join(filter(None, key))} ({units[key]})" for key in columns)])
+            rows.writerows([t, *row] for t, row in zip(solution.t.tolist(), array.tolist(), strict=True))
+    except OSError as error:
+        raise InvalidArgument(f"{path} can't be written: {error.strerror}.") from error
+    return path
+
+
+def _draw(solution, path):
+    from matplotlib.figure import Figure
+
+    from ..drawing import save
+    from ..plots import constraint_error
+
+    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+    constraint_error(solution, figure.subplots())
+    return save(figure, path)
+
+
+def summary(solution):
+    """Figures of a run, for JSON."""
+    error, energy = solution.constraint_error, solution.energy
+    return {
+        "success": bool(solution.success),
+        "status": solution.status.name.lower(),
+        "message": solution.message,
+        "reached": float(solution.reached),
+        "outputs": int(solution.t.size),
+        "constraint_error": {name: _largest(getattr(error, name)) for name in ("position", "velocity", "acceleration")},
+        "energy": {"start": float(energy[0]), "end": float(energy[-1]), "range": float(np.ptp(energy))}
+        if energy.size
+        else None,
+        "stats": {name: value for name, value in vars(solution.stats).items()},
+        "provenance": solution.provenance,
+    }
+
+
+def _largest(values):
+    return float(values.max(initial=0.0))
+
+
+def _lines(solution):
+    """The errors and the energy of a run, for people."""
+    found = summary(solution)
+    error = found["constraint_error"]
+    lines = [f"  errors    position {error['position']:.1e} m, velocity {error['velocity']:.1e} m/s, acceleration "
+             f"{error['acceleration']:.1e} m/s^2 at most"]  # fmt: skip
+    if found["energy"]:
+        lines.append(f"  energy    {found['energy']['start']:.6g} J, range {found['energy']['range']:.1e} J")
+    return lines

@@ -1,0 +1,161 @@
+"""The commands on scene files: check, info, new, convert."""
+
+import json
+from pathlib import Path
+
+from ..errors import InvalidArgument, TsdynError
+from .run import SOLUTIONS, add_json, add_scene, demand_format, write
+from .scene_file import load_run, load_scene
+
+SCENES = (".toml",)
+
+
+def add_check_options(parser):
+    """Add the options of `tsdyn check`."""
+    add_scene(parser)
+    add_json(parser)
+
+
+def add_info_options(parser):
+    """Add the options of `tsdyn info`."""
+    add_scene(parser, "FILE")
+    add_json(parser)
+
+
+def add_new_options(parser):
+    """Add the options of `tsdyn new`."""
+    parser.add_argument("path", nargs="?", default="scene.toml", metavar="PATH", help="default scene.toml")
+
+
+def add_convert_options(parser):
+    """Add the options of `tsdyn convert`."""
+    add_scene(parser, "FROM")
+    parser.add_argument("target", metavar="TO", help="where to write; the suffix is the format")
+
+
+def _check(parsed):
+    """Check a scene file, and whether the scene can start.
+
+    All mistakes of the file are listed with line and column; then the start is compared with the constraints. The exit
+    code is 0 only if a run could begin.
+    """
+    from ..simulation.start_check import demand_startable
+
+    found = {"file": parsed.scene, "ok": True, "mistakes": [], "message": "It can start."}
+    try:
+        scene, given = load_run(parsed.scene, parsed.allow_code)
+        demand_startable(scene, given)
+    except TsdynError as error:
+        if not parsed.json:
+            raise
+        lines = [{"line": line, "column": column, "message": said}
+                 for line, column, said in getattr(error, "mistakes", ())]  # fmt: skip
+        found |= {"ok": False, "mistakes": lines, "message": str(error)}
+    if parsed.json:
+        print(json.dumps(found, indent=1))
+    else:
+        print(f"{parsed.scene}: {scene!r}\nIt can start: positions and velocities satisfy the constraints.")
+    return 0 if found["ok"] else 1
+
+
+def _info(parsed):
+    """Print what is in a file: bodies, mobility, redundant rows, the method and why; or the facts of a solution."""
+    if Path(parsed.scene).suffix.lower() in SOLUTIONS:
+        return _solution_info(parsed)
+    from ..simulation.method_choice import reason
+    from ..simulation.scene_cache import prepared
+
+    scene, given = load_run(parsed.scene, parsed.allow_code)
+    mobility, why = scene.mobility(), reason(prepared(scene))
+    if parsed.json:
+        print(json.dumps(_facts(scene, mobility, why, given), indent=1))
+        return 0
+    print(f"{parsed.scene}: {scene!r}")
+    _print_table("bodies", [(body.name, type(body).__name__, f"{body.mass:g} kg") for body in scene.bodies])
+    items = [(item.name, type(item).__name__, f"{item.rows} rows") for item in scene._added]
+    _print_table("constraints", items)
+    _print_table("forces", [(force.name, force._kind(), "") for force in scene.forces])
+    print(mobility)
+    print(f"Method: {why}")
+    if given:
+        print(f"Run: {', '.join(f'{name}={value!r}' for name, value in given.items() if name != 't_eval')}")
+    return 0
+
+
+def _print_table(title, rows):
+    if not rows:
+        return
+    print(f"{title}:")
+    widths = [max(len(row[i]) for row in rows) for i in range(3)]
+    for row in rows:
+        print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+
+
+def _facts(scene, mobility, why, given):
+    """What `info` tells of a scene, for JSON."""
+    return {
+        "bodies": [{"name": body.name, "type": type(body).__name__, "mass": float(body.mass)} for body in scene.bodies],
+        "constraints": [{"name": it.name, "type": type(it).__name__, "rows": it.rows} for it in scene._added],
+        "forces": [{"name": force.name, "type": force._kind()} for force in scene.forces],
+        "coordinates": mobility.coordinates,
+        "rows": mobility.rows,
+        "rank": mobility.rank,
+        "degrees_of_freedom": mobility.degrees_of_freedom,
+        "redundant_rows": [row.name for row in mobility.redundant],
+        "singular": bool(mobility.singular),
+        "method": why,
+        "run": {name: str(value) for name, value in given.items() if name != "t_eval"},
+    }
+
+
+def _solution_info(parsed):
+    """Print the facts of a solution in a file."""
+    from ..simulation.load import load
+    from .run import summary
+
+    solution = load(parsed.scene)
+    if parsed.json:
+        print(json.dumps(summary(solution), indent=1))
+        return 0
+    print(f"{solution}\nProvenance")
+    for name, value in solution.provenance.items():
+        print(f"  {name:12}{value}")
+    return 0
+
+
+def _new(parsed):
+    """Write a scene file to start from, with comments: a pendulum with a spring and a run."""
+    from ..files.starting_file import TEXT
+
+    path = Path(parsed.path)
+    if path.suffix.lower() not in SCENES:
+        raise InvalidArgument(f"a scene file ends in .toml, got {parsed.path!r}.")
+    try:
+        with open(path, "x", encoding="utf-8") as file:
+            file.write(TEXT)
+    except FileExistsError:
+        raise InvalidArgument(f"{path} exists; choose another name: tsdyn new other.toml.") from None
+    except OSError as error:
+        raise InvalidArgument(f"{path} can't be written: {error.strerror}.") from error
+    print(f"{path} is written. Run it: tsdyn run {path}")
+    return 0
+
+
+def _convert(parsed):
+    """Write a scene, or a solution, in another format.
+
+    A scene (.toml, or a Python file) becomes .toml, without comments and expressions of parameters; a solution (.h5,
+    .nc, .zarr) becomes another of these, or .csv.
+    """
+    source, target = Path(parsed.scene).suffix.lower(), Path(parsed.target).suffix.lower()
+    if source in SOLUTIONS:
+        from ..simulation.load import load
+
+        demand_format(parsed.target)
+        written = write(load(parsed.scene), parsed.target)
+    elif target in SCENES:
+        written = load_scene(parsed.scene, parsed.allow_code).save(parsed.target)
+    else:
+        raise InvalidArgument(f"a scene is written to .toml, got {parsed.target!r}; tsdyn run --output runs it.")
+    print(f"{written} is written.")
+    return 0

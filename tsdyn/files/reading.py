@@ -1,0 +1,109 @@
+"""What the reading of a document has in common: decoded values, names, and mistakes at their places."""
+
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import TsdynError
+from ..validation import close
+from .expressions import Misread
+
+ROUNDING = 8.0 * np.finfo(float).eps  # of a direction of unit length, scaled again
+
+
+class Reading(NamedTuple):
+    """What is known while a document is read."""
+
+    mistakes: Any
+    names: dict  # parameters, by name
+    allow_code: bool
+    bodies: dict  # by name, None for one that is wrong
+    items: dict  # constraints and forces, likewise
+
+
+def known_keys(path, table, known, mistakes):
+    """Add a mistake for each key that isn't known."""
+    for key in table:
+        if key not in known:
+            near = close(key, known) or close(key.rstrip("s"), known)
+            hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known)}."
+            mistakes.add((*path, key), f"unknown key {key!r}; {hint}")
+
+
+def decoded(reading, path, value, decode):
+    """A value by a decoder of values.py; None, and a mistake, where that fails."""
+    try:
+        return decode(value, reading.names)
+    except Misread as error:
+        reading.mistakes.add_value(path, str(path[-1]), value, str(error))
+        return None
+
+
+def made(reading, path, what, make, positions=(), given=MappingProxyType({})):
+    """What a call makes; None, and a mistake at the argument that the message names, where that fails."""
+    try:
+        return make(*positions, **given)
+    except TsdynError as error:
+        message = str(error)
+    except (TypeError, ValueError, ArithmeticError, OverflowError, AttributeError) as error:
+        message = f"{type(error).__name__}: {error}"
+    own = not what or what.partition(" ")[2].strip("'") in message
+    reading.mistakes.add(_blamed(path, given, message), message if own else f"{what}: {message}")
+    return None
+
+
+def _blamed(path, given, message):
+    """The path of the argument that a message names, or else of the table."""
+    words = {word.strip(".,:;()'\"").partition("[")[0] for word in message.split()}
+    for key in given:
+        if words & {key, f"{key}_a", f"{key}_b"}:
+            return (*path, key)
+    return path
+
+
+def name_of(reading, path, table, what, taken):
+    """The name of a table, "" where there is none."""
+    name = table.get("name", "")
+    if not isinstance(name, str):
+        reading.mistakes.add_value((*path, "name"), f"{what}: name", name, "it must be text in quotes.")
+        return ""
+    if name and name in taken:
+        reading.mistakes.add((*path, "name"), f"{what}: the name {name!r} is in use; choose another one.")
+    return name
+
+
+def arguments_in(reading, path, table, known, what):
+    """The decoded values of a table by argument; None where one is wrong."""
+    found = {}
+    for key, value in table.items():
+        if key in known:
+            try:
+                found[key] = known[key].decode(value, reading.names)
+            except Misread as error:
+                reading.mistakes.add_value((*path, key), f"{what}: {key}", value, str(error))
+    return found
+
+
+def referred(reading, path, table, referred):
+    """The body or constraint that a key names; None where there is none, or it is wrong itself."""
+    what, key, kind, known = referred
+    if key not in table:
+        reading.mistakes.add(path, f"{what} lacks {key}, the name of a {kind}.")
+        return None
+    name = table[key]
+    if not isinstance(name, str) or name not in known:
+        near = close(str(name), known)
+        there = ", ".join(list(known)[:10]) or "none"
+        hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {there}."
+        reading.mistakes.add_value((*path, key), f"{what}: {key}", name, f"no {kind} before it has this name; {hint}")
+        return None
+    return known[name]
+
+
+def keep_bits(values, name, given):
+    """Where a value of unit length was scaled again, put that of the file in its place: the last bit stays."""
+    given, kept = np.array(given, float), values[name]
+    if given.shape == kept.shape and np.abs(given - kept).max() <= ROUNDING:
+        given.setflags(write=False)
+        values[name] = given

@@ -1,0 +1,136 @@
+"""The JSON Schema of scene files, from the signatures that files are read by. `python -m tools.schema` writes it."""
+
+import inspect
+import json
+
+from . import run_table, types
+from .build import KEYS
+from .describe import BUILT, VERSION
+
+ID = "tsdyn scene"
+NUMBER = {"$ref": "#/$defs/number"}
+VECTOR = {"$ref": "#/$defs/vector"}
+DEFINITIONS = {
+    "number": {"description": "a number, or an expression of parameters", "type": ["number", "string"]},
+    "vector": {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3},
+    "array": {"anyOf": [NUMBER, {"type": "array", "items": {"$ref": "#/$defs/array"}}]},
+    "motion": {
+        "description": "a number, an expression of the time t, or data",
+        "anyOf": [NUMBER, {"$ref": "#/$defs/data"}],
+    },
+    "vector motion": {
+        "anyOf": [
+            {"type": "array", "items": {"$ref": "#/$defs/motion"}, "minItems": 3, "maxItems": 3},
+            {"$ref": "#/$defs/data"},
+        ]
+    },
+    "data": {
+        "anyOf": [
+            {"type": "object", "required": ["times", "values"], "additionalProperties": False,
+             "properties": {"times": {"$ref": "#/$defs/array"}, "values": {"$ref": "#/$defs/array"}}},
+            {"type": "object", "required": ["knots", "coefficients"], "additionalProperties": False,
+             "properties": {"knots": {"$ref": "#/$defs/array"}, "coefficients": {"$ref": "#/$defs/array"},
+                            "beyond": {"enum": [True, False, "periodic"]}}},
+            {"type": "object", "required": ["expression"], "properties": {"expression": {"type": "string"}},
+             "additionalProperties": {"$ref": "#/$defs/motion"}},
+        ]
+    },
+}  # fmt: skip
+BY_KIND = {
+    types.NUMBER: NUMBER,
+    types.WHOLE: {"type": "integer"},
+    types.FLAG: {"type": "boolean"},
+    types.TEXT: {"type": "string"},
+    types.ARRAY: {"$ref": "#/$defs/array"},
+    types.MOTION: {"$ref": "#/$defs/motion"},
+    types.VECTOR: {"$ref": "#/$defs/vector motion"},
+    types.REFERENCE: {"description": "the name of a constraint", "type": "string"},
+    types.NAMES: {"type": "array", "items": {"type": "string"}},
+    types.ANY: {},
+}
+
+
+def schema(scene, simulate):
+    """The JSON Schema, with all built-in classes; by the class of scenes and `simulate`."""
+    bodies = [_body(name, getattr(scene, method)) for name, method in types.BODY_TYPES.items()]
+    run = {name: _property(argument) for name, argument in run_table.arguments(simulate).items()}
+    own = {"start": NUMBER, "end": NUMBER, "every": NUMBER, "method": {"type": ["string", "object"]}}
+    properties = {
+        "version": {"const": VERSION},
+        "title": {"type": "string"},
+        "gravity": VECTOR,
+        "parameters": {"type": "object", "additionalProperties": NUMBER},
+        "body": {"type": "array", "items": {"anyOf": bodies}},
+        "constraint": _items(types.constraints()),
+        "force": _items(types.forces()),
+        "start": _start(scene),
+        "run": {"type": "object", "additionalProperties": False, "properties": {**own, **run}},
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": ID,
+        "type": "object",
+        "required": ["version"],
+        "additionalProperties": False,
+        "properties": {key: properties[key] for key in KEYS},
+        "$defs": DEFINITIONS,
+    }
+
+
+def _property(argument):
+    found = dict(BY_KIND[argument.kind])
+    return found | ({"enum": list(argument.options)} if argument.options else {})
+
+
+def _body(name, method):
+    known = types.of_body(method)
+    properties = {key: _property(argument) for key, argument in known.items()}
+    kind = {"type": {"const": name}}
+    return {
+        "type": "object",
+        "required": [*(["type"] if name != "Body" else []), *(a.name for a in known.values() if a.required)],
+        "additionalProperties": False,
+        "properties": {**kind, "name": {"type": "string"}, **properties},
+    }
+
+
+def _items(classes):
+    return {"type": "array", "items": {"oneOf": [_item(*pair) for pair in classes.items() if _is_published(*pair)]}}
+
+
+def _is_published(name, cls):
+    """Whether a class is built in, and needs no function."""
+    return "." not in name and not any(argument.kind == types.FUNCTION for argument in types.of_class(cls).values())
+
+
+def _item(name, cls):
+    """The schema of a class of constraints or forces."""
+    bodies, arguments = types.bodies_of(cls), types.of_class(cls)
+    places = inspect.signature(cls.at).parameters
+    at = [key for key in places if key not in ("a", "b", "joint", "name", "cls")]
+    at = [key for key in at if key not in arguments or arguments[key].place]
+    properties = {
+        "type": {"const": name},
+        "name": {"type": "string"},
+        **{key: {"description": "the name of a body, or ground", "type": "string"} for key in bodies},
+        **{key: _property(argument) for key, argument in arguments.items()},
+        "at": {"type": "object", "additionalProperties": False, "properties": dict.fromkeys(at, VECTOR)},
+    }
+    if cls.joint_coordinates:
+        properties |= {key: {"$ref": "#/$defs/array"} for key in (*BUILT, "angle_near")}
+    required = ["type", *(key for key, needed in bodies.items() if needed)]
+    required += [argument.name for argument in arguments.values() if argument.required]
+    return {"type": "object", "required": required, "additionalProperties": False, "properties": properties}
+
+
+def _start(scene):
+    known = {name: _property(argument) for name, argument in types.of_body(scene.assemble).items()}
+    coordinates = {name: _property(argument) for name, argument in types.of_body(scene.set).items()}
+    each = {"type": "object", "required": ["joint"], "additionalProperties": False, "properties": coordinates}
+    properties = {"assemble": {"type": "boolean"}, "set": {"type": "array", "items": each}, **known}
+    return {"type": "object", "additionalProperties": False, "properties": properties}
+
+
+def text(scene, simulate):
+    """The schema as JSON text."""
+    return json.dumps(schema(scene, simulate), indent=1) + "\n"

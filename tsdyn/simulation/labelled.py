@@ -1,0 +1,96 @@
+"""Outputs of a run as labelled arrays and data frames, with the names and units of stores."""
+
+import numpy as np
+
+from ..errors import MissingDependency
+from ..storage.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
+from .saved_solutions import provenance
+
+ERRORS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+ENERGIES = ("kinetic_energy", "potential_energy", "energy")
+INDEX = "time"
+
+
+def _columns(solution):
+    """Arrays (k, ...) by name: (array, dimensions, attributes)."""
+    table = tables_of(solution.packed.bodies, 0, False)[OUTPUTS]
+    found = {
+        column.name: (getattr(solution, column.name), (table.dimension, *column.dimensions), column.attributes)
+        for column in table.columns[1:]
+    }
+    said = {"long_name": "Lagrange multipliers", "units": "N or N m, by row"}
+    found["multipliers"] = solution.multipliers, (INDEX, "row"), said
+    for level, unit in ERRORS.items():
+        said = {"long_name": f"largest {level} constraint error", "units": unit}
+        found[f"{level}_error"] = getattr(solution.constraint_error, level), (INDEX,), said
+    for name in ENERGIES:
+        found[name] = getattr(solution, name), (INDEX,), {"long_name": name.replace("_", " "), "units": "J"}
+    return found, table
+
+
+def _rows(solution):
+    """Names of the rows of Phi as they were run."""
+    return [f"{title}{label}" for title, label in _labelled(solution)]
+
+
+def _labelled(solution):
+    seen = {}
+    for member in solution.packed.members:
+        title = member.constraint.title
+        seen[title] = seen.get(title, 0) + 1
+        again = "" if seen[title] == 1 else f" #{seen[title]}"
+        yield from ((title + again, label) for label in member.constraint.row_labels)
+
+
+def _library(name):
+    try:
+        return __import__(name)
+    except ImportError as error:
+        raise MissingDependency(f"this needs {name}: pip install 'tsdyn[data]'.") from error
+
+
+def to_xarray(solution):
+    """As of `Records.to_xarray`."""
+    xarray = _library("xarray")
+    found, table = _columns(solution)
+    names = table.labels["coordinate"]
+    time = table.columns[0]
+    coordinates = {
+        INDEX: (INDEX, solution.t, time.attributes),
+        "coordinate": ("coordinate", names),
+        "coordinate_units": ("coordinate", _units_of(names, "q")),
+        "row": ("row", _rows(solution)),
+    }
+    data = {name: (dimensions, array, said) for name, (array, dimensions, said) in found.items()}
+    return xarray.Dataset(data, coordinates, provenance(solution))
+
+
+def _units_of(names, level):
+    """The unit of each coordinate at a level."""
+    lengths, numbers = units_of_level(level).split(" or ")
+    return [lengths if name.rpartition(".")[2] in COORDINATES[:3] else numbers for name in names]
+
+
+def table_of(solution):
+    """Names (quantity, component) of columns, their units, and the columns as an array (k, columns)."""
+    found, table = _columns(solution)
+    labels = {"coordinate": table.labels["coordinate"], "row": _rows(solution)}
+    columns, arrays, units = [], [], {}
+    for name, (array, dimensions, said) in found.items():
+        parts = labels[dimensions[1]] if len(dimensions) == 2 else [""]
+        own = _units_of(parts, name) if dimensions[1:] == ("coordinate",) else [said["units"]] * len(parts)
+        keys = [(name, part) for part in parts]
+        columns += keys
+        units |= dict(zip(keys, own, strict=True))
+        arrays.append(array.reshape(len(array), len(parts)))
+    return columns, units, np.concatenate(arrays, axis=1)
+
+
+def to_dataframe(solution):
+    """As of `Records.to_dataframe`."""
+    pandas = _library("pandas")
+    columns, units, array = table_of(solution)
+    index = pandas.Index(solution.t, name=f"{INDEX} (s)")
+    frame = pandas.DataFrame(array, index, pandas.MultiIndex.from_tuples(columns))
+    frame.attrs = {"units": units, **provenance(solution)}
+    return frame

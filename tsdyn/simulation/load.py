@@ -1,0 +1,85 @@
+"""`load`: a scene or a solution of a file, and `Scene.save`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..calls import fitting
+from ..errors import InvalidArgument, StorageError
+from .scene import Scene
+from .simulate import simulate
+from .solution import Solution
+from .stored_runs import demand_path
+
+if TYPE_CHECKING:
+    from ..hints import Place
+
+READS = ".toml (a scene), .h5, .hdf5, .nc or .zarr (a solution)"
+
+
+@fitting
+def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -> Any:
+    """Return the scene or the solution of a file; nothing in it is executed.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        A scene file (.toml), or a solution (.h5, .hdf5, .nc, .zarr) that `Solution.save` has written.
+    scene : Scene, optional
+        That of a solution whose file holds none, because the scene has functions or classes of your own.
+    allow_code : bool
+        Whether modules that a file names as those of plug-ins may be imported. Plug-ins that have been imported
+        before are found anyway.
+
+    Returns
+    -------
+    Scene or Solution
+
+    Raises
+    ------
+    InvalidFile
+        If a scene file has mistakes; lists all with their lines.
+    StorageError
+        If a file can't be read, is damaged, foreign, or of a later version.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> ts.load(scene.save(mkdtemp() + "/pendulum.toml"))
+    <Scene of 1 point mass: 3 coordinates, 1 constraint row>
+    """
+    demand_path(path, "path")
+    if not isinstance(allow_code, bool):
+        raise InvalidArgument(f"allow_code must be True or False, got {allow_code!r}.")
+    suffix = Path(path).suffix.lower()
+    if suffix == ".toml":
+        if scene is not None:
+            raise InvalidArgument("scene= is for solutions; a scene file holds its own.")
+        return scene_file(path, allow_code)[0]
+    from .saved_solutions import SUFFIXES
+    from .saved_solutions import load as load_solution
+
+    if suffix not in SUFFIXES:
+        raise InvalidArgument(f"load reads files that end in {READS}, got {str(path)!r}.")
+    return load_solution(path, scene, allow_code, (Scene, Solution))
+
+
+def scene_file(path: Place, allow_code: bool = False) -> tuple[Scene, dict[str, Any]]:
+    """Return the scene of a TOML file, and the arguments of `simulate` that its table `run` asks for."""
+    from ..files import scene_text
+
+    try:
+        if os.path.getsize(path) > scene_text.LARGEST:
+            raise StorageError(f"{path} is too large for a scene file: {os.path.getsize(path)} bytes.")
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise StorageError(f"{path} is no text in UTF-8: {error}.") from error
+    except OSError as error:
+        raise StorageError(f"{path} can't be read: {error.strerror or error}.") from error
+    return scene_text.read(text, os.fspath(path), Scene, simulate, allow_code)

@@ -1,0 +1,175 @@
+"""Relative equilibria: configurations that a steady spin keeps, their stability with gyroscopic terms.
+
+With qd = D (q - c) the loads that are not balanced are Q_A + Q_v - M D D (q - c) - Phi_q^T lam, and their stiffness is
+
+    K = M D D - C* D + K*        C* = (Q_A + Q_v)_qd,    K* = (M qdd - Q_A - Q_v)_q + (Phi_q^T lam)_q
+
+Newton's method goes to the nearest root. One that is not stable is left by the descent of descent.py, on the amended
+potential V - Omega . J Omega / 2 (Simo, Lewis, Marsden 1991).
+"""
+
+from functools import cached_property
+from types import SimpleNamespace
+
+import numpy as np
+
+from ..errors import InconsistentState, NoEquilibrium, SingularConfiguration
+from ..observables.generalised_forces import velocity_forces
+from .coordinates import chosen
+from .descent import Descent, saddle
+from .eigen import eigenpairs
+from .motion import Motion
+from .reduction import inertia_derivatives, reduce
+from .steady import is_invariant
+from .tolerances import (
+    BALANCED,
+    GROWING,
+    HALVINGS,
+    LEAST_SHIFT,
+    MOST_NEWTON,
+    MOST_SADDLES,
+    MOST_TURN,
+    NEUTRAL,
+    SOFTEST,
+    STEADY,
+    TURNED,
+)
+from .variations import Variations
+
+
+class SteadyMotion(Motion):
+    """A `Motion` with the velocities of a `SteadyField`; qdd are the accelerations that are left over."""
+
+    def __init__(self, packed, memory, t, q, field):
+        qd, self._gains = field.levels(q)
+        super().__init__(packed, memory, t, q, qd, still=True)
+        self.field = field
+        Q = self.Q_A + velocity_forces(self.system, q[None], qd[None])[0]
+        self.qdd, found = self.solve(Q - self.M @ self._gains, np.zeros(self.kept.size))
+        self.lam = np.zeros(len(self.Phi))
+        self.lam[self.kept] = found
+
+    @property
+    def accelerations(self):
+        """Those of the steady motion."""
+        return self._gains
+
+    @cached_property
+    def derivatives(self):
+        """Those of a `Motion`, K being the whole stiffness and Q_q zero."""
+        found, D = super().derivatives, self.field.D
+        parameters = self._gains[self.system.bodies[self.rigid, :1] + np.arange(3, 7)]
+        levels = self.parameters(0), self.parameters(1), parameters
+        shim = SimpleNamespace(q=self.q, system=self.system, rigid=self.rigid, parameters=lambda level: levels[level])
+        K, C = inertia_derivatives(shim)
+        whole = self.M @ D @ D - (found.Q_qd + C) @ D + K - found.Q_q + found.K
+        return found._replace(K=whole.tocsr(), Q_q=0.0 * found.Q_q)
+
+
+class SteadyDescent(Descent):
+    """A configuration in steady motion, moved step by step; arguments of `Descent` after the `SteadyField`."""
+
+    def __init__(self, field, *start):
+        self.field = field
+        super().__init__(*start)
+
+    def _at(self, q, memory):
+        return SteadyMotion(self.packed, memory, self.t, q, self.field)
+
+    def approach(self):
+        """Take Newton steps to the nearest root; True if it is reached."""
+        for _ in range(MOST_NEWTON):
+            before, motion = self.unbalanced, self.motion
+            if before <= BALANCED:
+                break
+            way = saddle(motion)(SOFTEST * motion.stiffness, motion.M @ motion.qdd)
+            if way is None:
+                break
+            self.steps += 1
+            shift, turn = self._extent(way)
+            factor = min(1.0, self.longest / max(shift, LEAST_SHIFT), MOST_TURN / max(turn, LEAST_SHIFT))
+            if not any(self._nearer(factor * 0.5**i * way, before) for i in range(HALVINGS)):
+                break
+        return self.unbalanced <= TURNED
+
+    def _nearer(self, way, before):
+        """Move if less is unbalanced there."""
+        old, q = self.motion, self._moved(way)
+        if q is None:
+            return False
+        try:
+            self.motion = self._at(q, self.memory)
+        except SingularConfiguration:
+            return False
+        if self.unbalanced < before:
+            self._remember()
+            return True
+        self.motion = old
+        return False
+
+
+def find_steady(descent):
+    """The findings of a relative equilibrium, the descent being moved there."""
+    unstable = None
+    for _ in range(MOST_SADDLES):
+        if not (descent.approach() or (descent.settle() and descent.approach())):
+            if unstable is None:
+                _refuse(descent)
+            break
+        *findings, way = _stability(descent)
+        if way is None:
+            return findings
+        if unstable is None or not findings[0]:
+            unstable = findings, descent.motion, descent.memory.copy(), descent.angles.copy()
+        descent.kick(way)
+        if not descent.settle():
+            break
+    findings, descent.motion, descent.memory, descent.angles = unstable
+    return findings
+
+
+def _stability(descent):
+    """Whether stable, the smallest amended stiffness, number of neutral directions; and dq of growth, or None."""
+    at, field = descent.motion, descent.field
+    motion = Motion(at.packed, at.memory, at.t, at.q, at.qd)
+    size = motion.packed.size or descent.reach
+    rate = max(np.abs(motion.spins(1)).max(initial=0.0), np.linalg.norm(field.spin))
+    if not is_invariant(motion, field.spin, size, rate):
+        raise NoEquilibrium(
+            "a configuration is balanced in the turning axes at this instant only: from axes that turn about "
+            f"{field.spin} rad/s the scene doesn't look the same. Gravity, ground points, springs to the ground and "
+            "rotors must be symmetric about the axis; about= moves it."
+        )
+    if not motion.freedom:
+        return True, float("nan"), 0, None
+    reduced = reduce(motion, chosen(motion, Variations(motion, field.spin)))
+    w = np.linalg.eigvalsh(0.5 * (reduced.K_hat + reduced.K_hat.T))
+    neutral = int((np.linalg.svd(reduced.K_hat, compute_uv=False) <= NEUTRAL * reduced.scale).sum())
+    pairs = eigenpairs(reduced)
+    worst = int(pairs.values.real.argmax())
+    if pairs.values.real[worst] <= GROWING * np.abs(pairs.values).max(initial=0.0):
+        return True, float(w[0]), neutral, None
+    shape = pairs.vectors[:, worst]
+    real = shape.real if np.linalg.norm(shape.real) >= np.linalg.norm(shape.imag) else shape.imag
+    return False, float(w[0]), neutral, reduced.T @ real
+
+
+def demand_admitted(scene, rates, qd):
+    """Refuse a spin that constraints don't admit, by the row; rates (m,) are Phi_q qd + Phi_t."""
+    size = max(scene.packed.size, 1.0) * max(np.abs(qd).max(), LEAST_SHIFT)
+    if not np.abs(rates).max(initial=0.0) <= STEADY * size:
+        row = int(np.abs(rates).argmax())
+        raise InconsistentState(
+            f"equilibrium: {scene.row_names()[row]} doesn't admit this spin: Phi_q qd + Phi_t = {rates[row]:.3g}. "
+            "Choose its axis, about= a point of it, or the rate that a motor has."
+        )
+
+
+def _refuse(descent):
+    motion = descent.motion
+    gains = np.linalg.norm(motion.translations(2), axis=1)
+    body = motion.packed.bodies[int(gains.argmax())]
+    raise NoEquilibrium(
+        f"no steady motion with this spin was found in {descent.steps} steps: {body.name} accelerates by "
+        f"{gains.max():.3g} m/s^2 still in the turning axes. Start nearer, with guess=, or change the rate."
+    )

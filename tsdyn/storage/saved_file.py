@@ -1,0 +1,166 @@
+"""Files of whole solutions: the tables of a store, and a group with all that is no table; no code, no pickle.
+
+The group has arrays by name. One of them, `record`, is JSON behind its SHA-256: numbers and words, and the SHA-256 of
+every array and column of the file.
+"""
+
+import hashlib
+import json
+import os
+import shutil
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InvalidArgument, StorageError
+from .formats import format_of
+
+FORMAT, VERSION = "tsdyn solution", 1
+GROUP, RECORD = "run", "record"
+ROWS = 1 << 14  # at a time
+SUFFIXES = ".h5, .hdf5, .nc or .zarr"
+
+
+def format_at(path):
+    """The module of the format of a path; raises InvalidArgument or MissingDependency."""
+    if Path(path).suffix.lower() not in (".h5", ".hdf5", ".nc", ".zarr"):
+        raise InvalidArgument(f"a solution is saved to a path that ends in {SUFFIXES}, got {str(path)!r}.")
+    return format_of(path)
+
+
+def write(path, tables, rows_of, attributes, content):
+    """Write a file as a whole, in place of a saved solution that is there.
+
+    Parameters
+    ----------
+    path : Path
+    tables : dict
+        As `archive.tables_of` makes them.
+    rows_of : callable (table, start, count)
+        Columns by name, (count, ...) each or fewer at the end.
+    attributes : dict
+    content : (dict, dict)
+        Numbers for the record, arrays by name.
+
+    Raises
+    ------
+    StorageError
+        If there is something else at the path, or it can't be written.
+    """
+    form, (record, arrays) = format_at(path), content
+    _demand_replaceable(path, form)
+    partial = path.with_name(f"{path.stem}-partial-{os.getpid()}{path.suffix}")
+    try:
+        store = form.Store.create(partial, tables, {"format": FORMAT, "format_version": VERSION, **attributes})
+        sums = {name: _write_table(store, name, rows_of) for name in tables}
+        store.close()
+        sums = {**{c: s for found in sums.values() for c, s in found.items()}, **_sums(arrays)}
+        words = json.dumps({**record, "tables": _columns(tables), "sums": sums}).encode()
+        form.put(partial, GROUP, {**arrays, RECORD: np.frombuffer(_sealed(words), np.uint8)})
+        if path.is_dir():
+            shutil.rmtree(path)
+        os.replace(partial, path)
+    except (OSError, RuntimeError) as error:
+        shutil.rmtree(partial, ignore_errors=True)
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+        if isinstance(error, StorageError):
+            raise
+        raise StorageError(f"{path} can't be written: {type(error).__name__}: {error}.") from error
+
+
+def _sealed(words):
+    """Words behind their SHA-256."""
+    return hashlib.sha256(words).hexdigest().encode() + words
+
+
+def _unsealed(words):
+    """The words behind a SHA-256; raises ValueError if it is another one."""
+    if words != _sealed(words[64:]):
+        raise ValueError("it has another checksum")
+    return words[64:]
+
+
+def _columns(tables):
+    return {name: [column.name for column in table.columns] for name, table in tables.items()}
+
+
+def _demand_replaceable(path, form):
+    """Raise StorageError unless a path is free, or that of a saved solution."""
+    if not path.parent.is_dir():
+        raise StorageError(f"there is no folder {path.parent} to write {path.name} to.")
+    if not path.exists():
+        return
+    try:
+        known = form.attributes(path).get("format") == FORMAT
+    except StorageError:
+        known = False
+    if not known:
+        raise StorageError(f"{path} exists, and is no saved solution. Delete it, or take another name.")
+
+
+def _write_table(store, name, rows_of):
+    """Write the rows of a table; the SHA-256 of its columns."""
+    sums, start = {}, 0
+    while True:
+        rows = {column: np.ascontiguousarray(values, float) for column, values in rows_of(name, start, ROWS).items()}
+        count = len(next(iter(rows.values())))
+        for column, values in rows.items():
+            sums.setdefault(column, hashlib.sha256()).update(values.tobytes())
+        if count:
+            store.write(start, rows)
+        if count < ROWS:
+            return {column: digest.hexdigest() for column, digest in sums.items()}
+        start += count
+
+
+def _sums(arrays):
+    return {name: hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest() for name, values in arrays.items()}
+
+
+def read(path):
+    """The record and the arrays of a file, all its content checked; the columns of its tables are read when asked for.
+
+    Raises
+    ------
+    StorageError
+        If there is no such file, it is foreign, of a later version, or damaged.
+    """
+    form = format_at(path)
+    if not path.exists():
+        raise StorageError(f"there is no file {path}.")
+    attributes = form.attributes(path)
+    if attributes.get("format") != FORMAT:
+        raise StorageError(f"{path} is no saved solution{_hint(attributes, path)}.")
+    if attributes.get("format_version") != VERSION:
+        raise StorageError(
+            f"{path} has the format {FORMAT} {attributes.get('format_version')}, and this tsdyn reads {VERSION}: "
+            f"{attributes.get('source', 'another tsdyn')} has written it. Install that, or a later one."
+        )
+    arrays = form.get(path, GROUP)
+    try:
+        record = json.loads(_unsealed(arrays.pop(RECORD).tobytes()))
+        tables, sums = record["tables"], record["sums"]
+        found = _sums(arrays) | {c: _sum_of(form, path, c) for columns in tables.values() for c in columns}
+    except (KeyError, ValueError, AttributeError, TypeError) as error:
+        raise StorageError(f"{path} is damaged: its record can't be read ({type(error).__name__}: {error}).") from error
+    wrong = [name for name in sums if sums[name] != found.get(name)]
+    if wrong:
+        raise StorageError(f"{path} is damaged: {', '.join(wrong[:5])} has another checksum than when it was written.")
+    return record, arrays
+
+
+def _hint(attributes, path):
+    """What else a file is."""
+    if str(attributes.get("source", "")).startswith("tsdyn"):
+        return f": it is the store of a run. ts.resume({str(path)!r}) returns its solution, if it has checkpoints"
+    return " of tsdyn: it has no attribute 'format' that says so"
+
+
+def _sum_of(form, path, column):
+    """The SHA-256 of a column, read in parts."""
+    digest, count = hashlib.sha256(), form.count(path, [column])
+    for start in range(0, count, ROWS):
+        digest.update(np.ascontiguousarray(form.read(path, column, slice(start, start + ROWS)), float).tobytes())
+    return digest.hexdigest()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from benchmarks.scenes import SCENES as MECHANISMS
 from benchmarks.stiff import hung, jointed
 from benchmarks.stiff_chain import chain
 from tests.helpers import closed_loops, locked_scenes, rough_joints
@@ -162,16 +163,34 @@ def test_the_motion_is_that_of_the_null_space_form(make, end):
 @pytest.mark.slow_but("SDIRK54")
 @pytest.mark.parametrize("method", [SDIRK54, ImplicitTrapezoid], **by_name)
 def test_iterations_and_memory_of_a_stiff_chain(method):
-    """Three corrections a stage and less; memory in proportion to the number of bodies."""
+    """Three corrections a stage and less, few matrices, and memory in proportion to the number of bodies.
+
+    Factors of S are made at the ends of steps, those of N there, too, and with iteration matrices.
+    """
     sizes = []
     for links in (8, 16):
         scene = chain(links)
         stats = ts.simulate(scene, (0.0, 0.1), integrator=method(1e-4, 1e-4)).raise_if_failed().stats
-        stages = (len(method.tableau.c) - 1) * (stats.steps + stats.rejected)
-        assert stats.stage_iterations <= 3 * stages
+        tried = stats.steps + stats.rejected
+        assert stats.stage_iterations <= 3 * (len(method.tableau.c) - 1) * tried
+        assert stats.iteration_matrices < 0.6 * tried
+        assert stats.factorizations < 3 * tried
         assert stats.jacobians == 1
         sizes.append(max(memory.nbytes for spare in scene._prepared._spare.values() for memory in spare))
     assert sizes[1] < 2.1 * sizes[0]
+
+
+def test_a_matrix_serves_a_long_chain_that_turns():
+    """Reactions are balanced at the present rows, by factors that contract however long the chain is."""
+    scene, end = MECHANISMS["chain of 64"].build(), MECHANISMS["chain of 64"].end
+    stats = ts.simulate(scene, (0.0, end), integrator=SDIRK54(1e-2, 1e-2)).raise_if_failed().stats
+    assert stats.iteration_matrices < stats.steps
+
+
+def test_long_fixed_steps_need_no_matrix_that_contracts_well():
+    """Where bodies turn by much within a step, terms that the matrix leaves out decide the contraction."""
+    scene = MECHANISMS["two-body pendulum"].build()
+    ts.simulate(scene, (0.0, 3.0), integrator=ImplicitTrapezoid(step=0.03)).raise_if_failed()
 
 
 def test_a_chart_that_turns_keeps_its_matrix():

@@ -54,6 +54,7 @@ def turn_rates(graph, l, rates, poses):
 def factorise_normal(graph, w, f, l):
     """Factorise N = H C Y0 at the present H; False if N is singular."""
     w.counters.factorizations += 1
+    l.state.made = 1
     return factorise_chart_matrix(graph, f, l)
 
 
@@ -68,6 +69,26 @@ def write_back(graph, l, poses, Z, out):
             d, omega, change = lanes(x, y, z), four(poses, at + OMEGA), four(Z, o + 4)
             square = -0.5 * total(times(omega, omega))
             put(out, o + 4, add(change, fma(d, splat(square), fma(change, splat(w), cross(d, change)))))
+
+
+@kernel
+def turn_accelerations(graph, l, poses, yd, Z):
+    """Set Z = (rdd, omega'd) from accelerations of chart coordinates: omega'd = C (etadd + |omega'|^2 d / 2)."""
+    for b in range(graph.bodies.shape[0]):
+        o, at = 8 * b, b * POSE + OMEGA
+        put(Z, o, four(yd, o))
+        if graph.bodies[b, 1] == 7:
+            omega = four(poses, at)
+            d = lanes(l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2])
+            put(Z, o + 4, rotate_rate(l, b, fma(d, splat(0.5 * total(times(omega, omega))), four(yd, o + 4))))
+
+
+@kernel
+def to_bodies(graph, l, x, Z):
+    """Z = (rho, C eta) of x = (rho, eta)."""
+    for b in range(graph.bodies.shape[0]):
+        put(Z, 8 * b, four(x, 8 * b))
+        put(Z, 8 * b + 4, rotate_rate(l, b, four(x, 8 * b + 4)) if graph.bodies[b, 1] == 7 else splat(0.0))
 
 
 @kernel

@@ -70,7 +70,7 @@ def touch(graph, system, w, f, l, t, largest):
     w.counters.charts += 1
     w.control.floor = ROUNDING * (w.control.size + largest)
     w.control.contraction, w.control.condition = 0.0, 1.0
-    l.state.time, l.state.factored, l.state.placement = t, 0, 0
+    l.state.time, l.state.factored, l.state.placement, l.state.made = t, 0, 0, 0
     return regular
 
 

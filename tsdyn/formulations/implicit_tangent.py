@@ -1,28 +1,31 @@
 """The tangent form for implicit methods: accelerations that a stage gives, and rates of other places, in a chart.
 
-The matrices of its stages are those of saddle_point.py.
+Newton's method for its stages is that of stage_equations.py; the matrices are those of saddle_point.py.
 """
 
-from ..elements.loops.body_poses import OMEGA, POSE
 from ..errors import Status
 from ..jit.kernels import callback, vector
-from ..jit.simd import add, cross, fma, four, lanes, put, splat, times, total
+from ..jit.simd import add, cross, fma, lanes, put, splat, times, total
 from ..maths.vectors import spin
-from ..rows.interface import rotate_rate
 from ..workspaces.workspace import load
+from .chart_coordinates import turn_accelerations
 from .chart_validity import measure_turns
 from .saddle_point import factorise, linearise, reduce, soften, solve
-from .tangent import COLUMNS, accelerate, check, error_norm, place, start_chart, write_state
+from .stage_equations import correct, distance, residual
+from .tangent import COLUMNS, accelerate, check_chart, error_norm, place, start_chart, write_state
 
 __all__ = [  # parts of the form
     "COLUMNS",
     "accelerate",
     "check",
+    "correct",
+    "distance",
     "error_norm",
     "factorise",
     "linearise",
     "place",
     "reduce",
+    "residual",
     "soften",
     "solve",
     "start_chart",
@@ -30,22 +33,24 @@ __all__ = [  # parts of the form
 OK = int(Status.SUCCESS)
 
 
+@callback("p")
+def check(context):
+    """As tangent.check; N is factorised anew at the place, since the stages of the next step begin with its factors."""
+    c = load(context)
+    c.chart.state.factored = 0
+    return check_chart(c)
+
+
 @callback("pp")
 def complete(context, yd):
     """Write q, qd and qdd at the place and velocities of the last `accelerate`, yd being accelerations of the chart.
 
-    omega'd = C (etadd + |omega'|^2 d / 2), projected onto H (rdd, omega'd) + gamma = 0.
+    They are projected onto H (rdd, omega'd) + gamma = 0.
     """
     c = load(context)
     f, l, graph = c.tangent, c.chart, c.graph
     yd = vector(yd, l.x.size - 8)
-    for b in range(graph.bodies.shape[0]):
-        o, at = 8 * b, b * POSE + OMEGA
-        put(f.Z, o, four(yd, o))
-        if graph.bodies[b, 1] == 7:
-            omega = four(f.poses, at)
-            d = lanes(l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2])
-            put(f.Z, o + 4, rotate_rate(l, b, fma(d, splat(0.5 * total(times(omega, omega))), four(yd, o + 4))))
+    turn_accelerations(graph, l, f.poses, yd, f.Z)
     write_state(graph, c.work, f)
     return OK
 

@@ -24,7 +24,8 @@ from ..rows.interface import (
     redundant_rows_hold,
     singularity_indicator,
 )
-from .tolerances import LAND_SWEEPS, LEAST_MOVE, ROUNDING, ROUNDING_AT_MOST, STALLED, WALK
+from .chart_coordinates import largest_rates
+from .tolerances import LAND_SWEEPS, LEAST_MOVE, ROUNDING, ROUNDING_AT_MOST, SPEED_ROUNDING, STALLED, WALK
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
@@ -41,6 +42,13 @@ def lever(w):
 def largest_residual(graph, w, f):
     """The largest |f.b|, m; infinity if an entry is not finite. In small scenes pure numbers count times the lever."""
     return largest(f.b) if graph.turns.size == 0 else largest_of(f.b, graph.turns, lever(w))
+
+
+@kernel
+def velocity_floor(graph, w, f):
+    """|Phi_q qd + Phi_t| that rounding leaves at the velocities of the poses, m/s."""
+    speed, spin = largest_rates(graph, f.poses)
+    return SPEED_ROUNDING * (speed + (w.control.size if graph.turns.size == 0 else lever(w)) * spin)
 
 
 @long_kernel

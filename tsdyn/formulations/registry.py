@@ -62,6 +62,7 @@ class Formulation:
         """The kernels that implicit methods need, by their names in `StageKernels`."""
         module = self.kernels if self.basis_free else linearisation
         names = ("linearise", "reduce", "factorise", "solve", "soften", "recall")
+        names += ("residual", "correct", "distance") if self.basis_free else ()
         return {name: getattr(module, name) for name in names} | {"error_norm": self.kernels.error_norm}
 
 

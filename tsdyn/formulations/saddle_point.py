@@ -17,12 +17,13 @@ from ..jit.kernels import callback, kernel, stack, stack2, vector
 from ..jit.simd import add, cross, fma, four, lanes, put, splat, sub
 from ..maths.dense_linalg import copy
 from ..rows.interface import (
+    DYNAMICS,
     apply_multipliers,
     factorise_saddle,
+    factorise_selected_rows,
     inner,
     more,
     multiply_rows,
-    rotate_rate,
     solve_product,
     solve_saddle,
     weigh,
@@ -31,7 +32,9 @@ from ..rows.interface import (
 from ..sparse.constraint_graph import W_MASS, W_ROTATION, WEIGHTS
 from ..sparse.saddle_graph import BLOCK, LOWER, OWN, UPPER
 from ..workspaces.workspace import load
+from .accelerations import solve_accelerations
 from .body_stiffness import add_constraints, add_forces
+from .chart_coordinates import factorise_normal, to_bodies
 from .chart_derivatives import acceleration_by_turn, add_gyroscopic, add_inertia, rate_by_turn
 from .friction_loads import body_of
 
@@ -40,11 +43,23 @@ OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 
 @callback("pdp")
 def linearise(context, t, yd):
-    """Have the derivatives of the forces' laws taken anew by the next `reduce`. Status."""
+    """Have the derivatives of the forces' laws taken anew by the next `reduce`, and find multipliers. Status."""
     c = load(context)
+    system, w, f, graph = c.system, c.work, c.tangent, c.graph
     c.linear.numbers.fresh = 1
-    c.work.counters.jacobians += 1
+    w.counters.jacobians += 1
+    if is_direct(graph):
+        w.counters.factorizations += 1
+        if f.b.size > 0 and factorise_selected_rows(graph, f, f.rows, DYNAMICS) >= 0:
+            return SINGULAR
+        solve_accelerations(graph, system, w, f, t)
     return OK
+
+
+@kernel
+def is_direct(graph):
+    """Whether stage_equations.py solves the stages: reactions on which friction depends are found by `accelerate`."""
+    return graph.frictions.shape[0] == 0
 
 
 @callback("pd")
@@ -105,7 +120,7 @@ def _turn_damping(s, i, j):
 
 
 @kernel
-def _degrees(graph, b):
+def degrees(graph, b):
     """Unknowns of a body."""
     return 6 if graph.bodies[b, 1] == 7 else 3
 
@@ -123,7 +138,7 @@ def _write_blocks(graph, s, g):
     """Add M - g C_b - g^2 K_b in the places of the factors."""
     for i in range(s.graph.blocks.shape[0]):
         block, o = s.graph.blocks[i], BLOCK * i
-        rows, columns = _degrees(graph, block.row), _degrees(graph, block.column)
+        rows, columns = degrees(graph, block.row), degrees(graph, block.column)
         for r in range(rows):
             for c in range(columns):
                 x = -g * (s.C[o + 6 * r + c] + g * s.K[o + 6 * r + c])
@@ -155,7 +170,7 @@ def _write_frictions(graph, f, s):
                 b, base, step = graph.sides[e, k], s.graph.sides[e, k, 0], s.graph.sides[e, k, 1]
                 if base >= 0 and b in (friction.body_a, friction.body_b):
                     right = s.lower if step == 1 else s.upper  # where the row is eliminated before the body, or not
-                    for c in range(_degrees(graph, b)):
+                    for c in range(degrees(graph, b)):
                         more(right, base + step * c, n * s.e[8 * b + c + c // 3])
 
 
@@ -168,6 +183,8 @@ def factorise(context, g):
     _write_blocks(graph, s, g)
     _write_frictions(graph, f, s)
     c.work.counters.iteration_matrices += 1
+    if is_direct(graph) and f.b.size > 0 and not factorise_normal(graph, c.work, f, c.chart):
+        return SINGULAR
     return OK if factorise_saddle(s) else SINGULAR
 
 
@@ -183,19 +200,11 @@ def _take_tangent_part(graph, f, l, x, factored, out):
         out[i] = 0.0
     lower, upper = l.lower if factored else f.rows.S, l.upper if factored else f.rows.S
     for _ in range((1 if factored else 2) if f.b.size > 0 else 0):
-        _to_bodies(graph, l, out, f.Z)
+        to_bodies(graph, l, out, f.Z)
         multiply_rows(graph, f.rows, f.Z, f.b)
         solve_product(graph, lower, upper, f.b)
         apply_multipliers(graph, l.rows0, f.b, out)
-    _to_bodies(graph, l, out, f.Z)
-
-
-@kernel
-def _to_bodies(graph, l, x, Z):
-    """Z = (rho, C eta) of x = (rho, eta)."""
-    for b in range(graph.bodies.shape[0]):
-        put(Z, 8 * b, four(x, 8 * b))
-        put(Z, 8 * b + 4, rotate_rate(l, b, four(x, 8 * b + 4)) if graph.bodies[b, 1] == 7 else splat(0.0))
+    to_bodies(graph, l, out, f.Z)
 
 
 @kernel
@@ -219,12 +228,21 @@ def _add_stiffness(graph, s, g, Z):
     for i in range(s.graph.blocks.shape[0]):
         block, o = s.graph.blocks[i], BLOCK * i
         at, z = s.graph.body_at[block.row], 8 * block.column
-        columns = _degrees(graph, block.column)
-        for r in range(_degrees(graph, block.row)):
+        columns = degrees(graph, block.column)
+        for r in range(degrees(graph, block.row)):
             x = 0.0
             for c in range(columns):
                 x += s.K[o + 6 * r + c] * Z[z + c + c // 3]
             s.x[at + r] += g * x
+
+
+@kernel
+def turned_back(l, b, s, at):
+    """The rotation s.x[at : at + 3] of body b in chart coordinates: C^-1 = d0 I + d~."""
+    d0 = 1.0 + l.d[4 * b + 3]
+    d = lanes(l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2])
+    a = lanes(s.x[at], s.x[at + 1], s.x[at + 2])
+    return fma(a, splat(d0), cross(d, a))
 
 
 @kernel
@@ -236,11 +254,19 @@ def _correct(graph, l, s, x, r):
         for c in range(3):
             x[o + c] += s.x[at + c] - r[o + c]
         if graph.bodies[b, 1] == 7:
-            d0 = 1.0 + l.d[4 * b + 3]
-            d = lanes(l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2])
-            a = lanes(s.x[at + 3], s.x[at + 4], s.x[at + 5])
-            turned = fma(a, splat(d0), cross(d, a))
+            turned = turned_back(l, b, s, at + 3)
             put(x, o + 4, add(four(x, o + 4), sub(turned, four(r, o + 4))))
+
+
+@kernel
+def take_solution(graph, s):
+    """Add s.x to multipliers and accelerations."""
+    for e in range(s.multipliers.size):
+        if s.graph.row_at[e] >= 0:
+            s.multipliers[e] += s.x[s.graph.row_at[e]]
+    for b in range(graph.bodies.shape[0]):
+        for i in range(degrees(graph, b)):
+            s.a[8 * b + i + i // 3] += s.x[s.graph.body_at[b] + i]
 
 
 @callback("pp")
@@ -250,18 +276,13 @@ def solve(context, x):
     f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     x = vector(x, l.x.size - 8)
     copy(f.b, s.multipliers)
-    _to_bodies(graph, l, x, s.e)
+    to_bodies(graph, l, x, s.e)
     for i in range(s.a.size):
         s.a[i] = f.Z[i] - s.e[i]
     _take_tangent_part(graph, f, l, x, l.state.factored == 1, s.r)
     _weigh(graph, s, f.Z)
     _correct(graph, l, s, x, s.r)
-    for e in range(s.multipliers.size):
-        if s.graph.row_at[e] >= 0:
-            s.multipliers[e] += s.x[s.graph.row_at[e]]
-    for b in range(graph.bodies.shape[0]):
-        for i in range(_degrees(graph, b)):
-            s.a[8 * b + i + i // 3] += s.x[s.graph.body_at[b] + i]
+    take_solution(graph, s)
     return OK
 
 

@@ -42,13 +42,12 @@ from .accelerations import solve_accelerations
 from .chart_coordinates import (
     displace,
     factorise_normal,
-    largest_rates,
     turn_rates,
     write_back,
 )
 from .chart_validity import every_level_holds, touch, turning
 from .friction_loads import call_rub
-from .projection import largest_residual, lever
+from .projection import largest_residual, velocity_floor
 from .tangent_error import error_norm
 from .tolerances import (
     CONTRACTION_LOST,
@@ -57,7 +56,6 @@ from .tolerances import (
     ROUNDING_AT_MOST,
     SLOW,
     SLOW_VELOCITIES,
-    SPEED_ROUNDING,
     STALLED,
     SWEEPS,
 )
@@ -183,9 +181,7 @@ def solve_velocities(graph, system, w, f, l, t):
         if f.b.size == 0:
             return True
         if sweep == 0:
-            speed, spin = largest_rates(graph, f.poses)
-            arm = w.control.size if graph.turns.size == 0 else lever(w)
-            floor = SPEED_ROUNDING * (speed + arm * spin)
+            floor = velocity_floor(graph, w, f)
         multiply_rates(graph, f.rows, f.poses, f.b)
         if rheonomic:
             for e in range(f.b.size):
@@ -251,7 +247,12 @@ def write_state(graph, w, f):
 @callback("p")
 def check(context):
     """Return the reason to abandon the chart, or zero; negative, a Status, where the state can't be taken."""
-    c = load(context)
+    return check_chart(load(context))
+
+
+@kernel
+def check_chart(c):
+    """As `check`."""
     w, f, l = c.work, c.tangent, c.chart
     reason = turning(c.graph, w, f, l)
     l.state.placement = w.counters.placements if w.control.contraction < CONTRACTION_LOST else 0

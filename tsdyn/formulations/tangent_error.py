@@ -10,26 +10,31 @@ from ..workspaces.workspace import load
 
 
 @kernel
-def _weighted_square(graph, f, l, e, values, old, at, rtol, atol):
-    """(dq_i / (atol + rtol |value|))^2 summed, dq the change of coordinates (n,) that P0 e makes at q0.
-
-    Nine arguments: the graph, two workspaces, the error e, values at both ends of the step, and tolerances.
-    """
+def _tangent_part(graph, f, l, e):
+    """f.Z = P0 e."""
     copy(e, f.Z)
     for i in range(e.size, f.Z.size):
         f.Z[i] = 0.0
     if f.b.size > 0:
         project(graph, l.rows0, f.Z, f.b)
+
+
+@kernel
+def weighted_square(graph, l, Z, values, old, at, rtol, atol):
+    """(dq_i / (atol + rtol |value|))^2 summed, dq the change of coordinates (n,) that Z makes at q0.
+
+    Eight arguments: the graph, the chart, the change Z, values at both ends of the step, and tolerances.
+    """
     total = 0.0
     for b in range(graph.bodies.shape[0]):
         i, o = graph.bodies[b, 0], 8 * b
         for c in range(3):
-            x = f.Z[o + c] / (atol + rtol * max(abs(values[i + c]), abs(old[at + i + c])))
+            x = Z[o + c] / (atol + rtol * max(abs(values[i + c]), abs(old[at + i + c])))
             total += x * x
         if graph.bodies[b, 1] == 7:
             i += 3
             e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
-            x, y, z = 0.5 * f.Z[o + 4], 0.5 * f.Z[o + 5], 0.5 * f.Z[o + 6]
+            x, y, z = 0.5 * Z[o + 4], 0.5 * Z[o + 5], 0.5 * Z[o + 6]
             for c in range(4):
                 if c == 0:
                     part = -e1 * x - e2 * y - e3 * z
@@ -51,6 +56,8 @@ def error_norm(context, ex, ey, old, rtol, atol):
     w, f, l, graph = c.work, c.tangent, c.chart, c.graph
     n, k = w.q.size, l.x.size - 8
     old = vector(old, 3 * n)
-    total = _weighted_square(graph, f, l, vector(ex, k), w.q, old, 0, rtol, atol)
-    total += _weighted_square(graph, f, l, vector(ey, k), w.qd, old, n, rtol, atol)
+    _tangent_part(graph, f, l, vector(ex, k))
+    total = weighted_square(graph, l, f.Z, w.q, old, 0, rtol, atol)
+    _tangent_part(graph, f, l, vector(ey, k))
+    total += weighted_square(graph, l, f.Z, w.qd, old, n, rtol, atol)
     return math.sqrt(total / (2 * n))

@@ -49,6 +49,19 @@ LOAD_SWEEPS, DAMPED, DAMPED_SHARE = 40, 12, 0.5
 # leaves rounding; two digits less are asked for, since the matrix is that of the multipliers before.
 NEWTON_DONE = 1e-10
 
+# Error norm that the solves for u and z may leave at each place of a stage: less than the stage's iteration (KAPPA).
+LEFT = 1e-4
+
+# Contraction of corrections by factors of N of an older place: assumed in a new chart, and the least that is trusted.
+LAG, LEAST_LAG = 0.1, 0.01
+
+# Distance in time of a stage from the last one, over that of the last two, up to which multipliers are extrapolated.
+FARTHEST_AHEAD = 2.0
+
+# Corrections of the multipliers in an iteration of a stage, and what may be left of the unbalanced loads along the
+# rows, relative: a change of H since the iteration matrix was made acts on that.
+REACTION_SWEEPS, REACTIONS_LEFT = 8, 1e-4
+
 # 1 / m: what Newton's method leaves of an error, over its square, until it is measured. One over a metre: links of
 # usual size.
 CURVATURE = 1.0

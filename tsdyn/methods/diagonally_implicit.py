@@ -23,12 +23,15 @@ from .tolerances import (
     APART,
     AT_FLOOR,
     DIVERGING,
+    EAGER_LOST,
     EAGER_SPARSE,
     EAGER_STAGES,
+    FIXED_ITERATIONS,
     FIXED_TOL,
     GUESS,
     ITERATIONS,
     KAPPA,
+    KAPPA_SPARSE,
     LEAST,
     MATRICES,
     RESIDUAL_FLOOR,
@@ -36,6 +39,7 @@ from .tolerances import (
     SLOW,
     SLOW_SPARSE,
     TOO_FAR,
+    WORSE,
 )
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
@@ -48,6 +52,8 @@ call_reduce = caller("pd")
 call_solve = caller("pp")
 call_soften = caller("ppdp")
 call_recall = caller("ppp")
+call_residual = caller("pddppp")
+call_correct = caller("pdp", "d")
 
 
 def memory_of(stages, n):
@@ -62,16 +68,20 @@ def _scratch_at(r):
 
 
 @kernel
-def _renew_matrix(context, c, t, g, f, anew):
-    """P at the place last taken, f being the accelerations there; with anew, from new stiffness and damping. Status."""
+def _renew_matrix(context, c, t, g, f, anew, here):
+    """P at the place last taken, f being the accelerations there; with anew, from new stiffness and damping. Status.
+
+    Without here, from the matrices of stiffness and damping that the last P was made from.
+    """
     l, status = c.linear, 0
     if anew or l.numbers.known == 0:
         status = call_linearise(l.kernels.linearise, context, t, f)
         l.numbers.known = 1 if status == 0 else 0
     if status == 0:
-        call_reduce(l.kernels.reduce, context, t)
+        if here or anew:
+            call_reduce(l.kernels.reduce, context, t)
         status = call_reduce(l.kernels.factorise, context, g)
-    l.numbers.g = g if status == 0 else 0.0
+    l.numbers.g, l.numbers.slow = g if status == 0 else 0.0, 0.0
     l.numbers.chart = c.work.counters.charts
     return status
 
@@ -86,25 +96,47 @@ def _set_stage(g, k, known, xs, ys):
 
 
 @kernel
-def _correct(context, l, g, k, f, dx):
+def _is_direct(c):
+    """Whether the form solves a stage's equations for positions, velocities and reactions at the same time."""
+    return c.linear.kernels.residual != 0 and c.graph.frictions.shape[0] == 0
+
+
+@kernel
+def _evaluate(context, c, r, t, g, xs, ys, k, f):  # nine: a stage and its equations
+    """Evaluate the equations of a stage at (t, xs, ys) and k; f = the accelerations there, if it needs them. Status."""
+    if _is_direct(c):
+        return call_residual(c.linear.kernels.residual, context, t, g, xs, ys, k)
+    status = call_place(r.kernels.place, context, t, xs)
+    if status == 0:
+        status = call_accelerate(r.kernels.accelerate, context, t, ys, f, f)
+    return status
+
+
+@kernel
+def _correct(context, c, g, k, f, dx):
     """k += P^-1 A (f - k); the size of g times it, and of g^2 times it, in the error norm."""
-    for c in range(k.size):
-        f[c] -= k[c]
+    l = c.linear
+    if _is_direct(c):
+        return call_correct(l.kernels.correct, context, g, k)
+    for i in range(k.size):
+        f[i] -= k[i]
     call_solve(l.kernels.solve, context, f)
-    for c in range(k.size):
-        k[c] += f[c]
-        f[c] *= g
-        dx[c] = g * f[c]
+    for i in range(k.size):
+        k[i] += f[i]
+        f[i] *= g
+        dx[i] = g * f[i]
     return call_norm(l.kernels.error_norm, context, dx, f, l.now, l.numbers.rtol, l.numbers.atol)
 
 
 @kernel
-def _is_near(context, l, g, k, guess, f, dx):
+def _is_near(context, c, g, k, guess, f, dx):
     """Return True if the positions of a solution are near to those of its prediction: another one may be far."""
-    for c in range(k.size):
-        f[c] = 0.0  # of velocities a stiff transient may change any amount
-        dx[c] = g * g * (k[c] - guess[c])
-    return call_norm(l.kernels.error_norm, context, dx, f, l.now, 1.0, 1.0) < TOO_FAR
+    l = c.linear
+    for i in range(k.size):
+        f[i] = 0.0  # of velocities a stiff transient may change any amount
+        dx[i] = g * g * (k[i] - guess[i])
+    norm = l.kernels.distance if _is_direct(c) else l.kernels.error_norm
+    return call_norm(norm, context, dx, f, l.now, 1.0, 1.0) < TOO_FAR
 
 
 @kernel
@@ -119,41 +151,44 @@ def _solve_stage(context, c, r, i, t, g):
     before, theta, measured = math.inf, l.numbers.theta, False
     slow, apart, stuck, renewed = 0, 0, False, False
     eager, sparse = l.numbers.eager > 0, l.numbers.every_chart == 1
-    limit = SLOW_SPARSE if sparse else SLOW
+    # what stages of fixed steps leave adds up over thousands of steps
+    limit, kappa = (SLOW_SPARSE, KAPPA_SPARSE) if sparse and r.numbers.adaptive == 1 else (SLOW, KAPPA)
     l.numbers.eager -= 1
-    for _ in range(ITERATIONS):
+    for _ in range(ITERATIONS if r.numbers.adaptive == 1 else FIXED_ITERATIONS):
         _set_stage(g, k, known, xs, ys)
-        status = call_place(r.kernels.place, context, t, xs)
-        if status == 0:
-            status = call_accelerate(r.kernels.accelerate, context, t, ys, f, f)
+        status = _evaluate(context, c, r, t, g, xs, ys, k, f)
         if status != 0:
             return status
         w.counters.stage_iterations += 1
         off_chart = not sparse and l.numbers.chart != w.counters.charts
+        slow_now = measured and theta > max(limit, l.numbers.slow)
         stale = eager or off_chart or abs(g - l.numbers.g) > SAME_G * g
+        here = eager or slow_now or not sparse or l.numbers.g == 0.0 or l.numbers.known == 0
         eager = False
-        if stale or (measured and theta > limit):
+        if stale or slow_now:
             if not stale:
                 if slow == 0 and not renewed:
-                    l.numbers.eager = EAGER_SPARSE if sparse else EAGER_STAGES
+                    l.numbers.eager = EAGER_STAGES if not sparse else EAGER_LOST if theta > DIVERGING else EAGER_SPARSE
                 slow += 1
             renewed = True
-            if _renew_matrix(context, c, t, g, f, slow == MATRICES) != 0:
+            if _renew_matrix(context, c, t, g, f, slow == MATRICES, here) != 0:
                 return STAGE_FAILED
             before, theta, measured = math.inf, GUESS, False
-        size = _correct(context, l, g, k, f, dx)
+        size = _correct(context, c, g, k, f, dx)
         if not size < math.inf:
             return STAGE_FAILED
         if before < math.inf:
             theta, measured = size / before, True
+            if sparse and slow == MATRICES and l.numbers.slow == 0.0:  # no other matrix contracts better
+                l.numbers.slow = min(WORSE * theta, DIVERGING)
             stuck = theta > DIVERGING and size <= AT_FLOOR * floor
             apart += 1 if renewed and theta > DIVERGING else 0
             if apart == APART:
                 return STAGE_FAILED
-        if size <= floor or stuck or (theta < 1.0 and size * theta <= KAPPA * (1.0 - theta)):
+        if size <= floor or stuck or (theta < 1.0 and size * theta <= kappa * (1.0 - theta)):
             l.numbers.theta = min(max(theta, LEAST), GUESS)
             _set_stage(g, k, known, xs, ys)
-            return 0 if _is_near(context, l, g, k, guess, f, dx) else STAGE_FAILED
+            return 0 if _is_near(context, c, g, k, guess, f, dx) else STAGE_FAILED
         before = size
     return STAGE_FAILED
 
@@ -196,6 +231,7 @@ def implicit_step(context, run, t, h):
                 k[j] += ratio * (r.yd[j] - k_before[j])
         status = _solve_stage(context, c, r, i, t + h * row[1], h * row[2 + i])
         if status != 0:
+            c.linear.numbers.rates_of = 0
             return status
     combine(tableau[1 + stages * width :], stages, h, 2 * n, memory, memory)
     copy(x, r.dx)

@@ -7,18 +7,21 @@ Sizes of corrections are error norms: 1 is the step's tolerance. Contraction is 
 # written as quotients of integers.
 ORDER_CONDITION = 1e-14
 
-# Corrections of a stage at most: as many as KAPPA takes at a contraction of 0.7, and some after a new matrix.
-ITERATIONS = 20
+# Corrections of a stage at most: as many as KAPPA takes at a contraction of 0.7, and some after a new matrix. With
+# fixed steps, which can't be shortened, as many as rounding takes at a contraction of 0.4.
+ITERATIONS, FIXED_ITERATIONS = 20, 40
 
 # Error norm that a stage's iteration may leave. Hairer and Wanner, Solving ODEs II, IV.8, take 0.01 to 0.1 for Radau;
 # a run adds up the residuals of as many stages as it has, and a thousandth of a step's error stays below its estimate.
-KAPPA = 1e-3
+# In the tangent form three thousandths leave the errors of stiff chains, linkages and of the governor as they are; a
+# hundredth shows in the number of steps at the loosest tolerances.
+KAPPA, KAPPA_SPARSE = 1e-3, 3e-3
 
 # Contraction above which the iteration matrix is rebuilt: up to it three corrections reach KAPPA
 # (docs/design-decisions.md, one Jacobian for many steps; benchmarks/stiff.py counts matrices).
-# The matrix of the tangent form costs as much as four iterations: kept up to SLOW_SPARSE, half as many matrices take a
-# tenth more iterations in stiff chains and joints.
-SLOW, SLOW_SPARSE = 0.1, 0.15
+# The matrix of the tangent form costs as much as eight iterations: kept up to SLOW_SPARSE, a quarter as many matrices
+# take a fifth more iterations in stiff chains and joints than with SLOW.
+SLOW, SLOW_SPARSE = 0.1, 0.25
 
 # Contraction assumed where none has been measured, and the least that one measurement is trusted with: a stage that
 # converges by chance at once says nothing of the next one.
@@ -31,9 +34,13 @@ DIVERGING = 0.9
 # matrix, with which a stage is given up.
 MATRICES, APART = 3, 3
 
-# Stages that begin with a matrix of their own after an older one has failed: five steps of SDIRK54, one in the tangent
-# form.
-EAGER_STAGES, EAGER_SPARSE = 30, 6
+# Contraction over that of a new matrix with new stiffness and damping, above which it is rebuilt in the tangent form:
+# where steps are long beside turns of bodies, no matrix contracts below SLOW_SPARSE.
+WORSE = 2.0
+
+# Stages that begin with a matrix of their own after an older one has failed: five steps of SDIRK54. In the tangent form
+# one stage, but one step where iterations diverged: matrices of overdamped springs that turn serve one stage only.
+EAGER_STAGES, EAGER_SPARSE, EAGER_LOST = 30, 1, 6
 
 # Relative change of g = h a_ii up to which the factors of P are tried again: a damped stiff mode then contracts by
 # |1 - g / g_P| < 0.43. Measured contraction decides whether they are kept.

@@ -165,7 +165,7 @@ class Timekeeper(Stopwatch):
         return np.concatenate(parts), np.array(firsts, np.int64)
 
     def entries(self, cost):
-        """Return the readings, a list of `Entry`, the driver first, less the cost of the timers (`timers.own_cost`)."""
+        """Return the readings, a list of `Entry`, the driver first, less the timers' cost (`timer_cost.own_cost`)."""
         half = 0.5 * cost
         slots = self.notes[timers.SLOTS :].reshape(-1, 2)
         unit, found = self.seconds / slots[:, 1].sum(), []

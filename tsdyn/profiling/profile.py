@@ -25,7 +25,7 @@ from .instrumentation import Stopwatch, Timekeeper
 from .micro_benchmarks import prices
 from .phases import Phase, of_series, of_steps, orders
 from .report import Profile
-from .timers import own_cost
+from .timer_cost import own_cost
 from .tolerances import FEWEST, LONG, MOST, RESOLUTION, SAMPLE
 
 if TYPE_CHECKING:

@@ -29,9 +29,8 @@ from ..jit.kernels import (
     integers,
     kernel,
     specialised,
-    vector,
 )
-from ..methods.diagonally_implicit import call_reduce, call_soften
+from ..methods.diagonally_implicit import call_correct, call_reduce, call_residual, call_soften
 from ..methods.explicit import ACCELERATE as ACCELERATE_SIGNATURE
 from ..methods.explicit import NORM as NORM_SIGNATURE
 from ..methods.explicit import PLACE as PLACE_SIGNATURE
@@ -43,7 +42,8 @@ from ..taylor.step_parts import call_expand, call_reach
 
 # roles: the driver, and the kernels called by address; ROWS is any loop over constraints or forces
 DRIVER, PLACE, ACCELERATE, COMPLETE, CHECK, CHART, STEP, NORM = range(8)
-LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, EXPAND, REACH, ROWS, ROLES = range(8, 17)
+LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, EXPAND, REACH = range(8, 15)
+RESIDUAL, CORRECT, DISTANCE, ROWS, ROLES = range(15, 20)
 # roles of the kernels whose addresses drivers are given, by their names in `Kernels` and `StageKernels`
 OF_DRIVERS = {
     "place": PLACE,
@@ -63,6 +63,9 @@ OF_STAGES = {
     "solve": SOLVE,
     "soften": SOFTEN,
     "error_norm": NORM,
+    "residual": RESIDUAL,
+    "correct": CORRECT,
+    "distance": DISTANCE,
 }
 # the notes: the clock where the processor has none, what it is given first, what it writes, the factor of its first
 # number; the time last read; the slot and role of what runs in what; addresses that timers stand for; then the slots:
@@ -191,6 +194,22 @@ def _soften(context, x, g, y):
     return status
 
 
+def _residual(context, t, g, x, y, k):
+    notes = integers(_before(context), ANY)
+    _enter(notes, ROLE * ROLES, ROLE)
+    status = call_residual(notes[TARGETS + ROLE], context, t, g, x, y, k)
+    _leave(notes)
+    return status
+
+
+def _correct(context, g, k):
+    notes = integers(_before(context), ANY)
+    _enter(notes, ROLE * ROLES, ROLE)
+    size = call_correct(notes[TARGETS + ROLE], context, g, k)
+    _leave(notes)
+    return size
+
+
 def _expand(context, k):
     notes = integers(_before(context), ANY)
     _enter(notes, FIRST_ORDER + min(k, ORDERS - 1), ROLE)
@@ -254,6 +273,9 @@ TIMERS = {
     FACTORISE: _timer(_number, "pd", "factorise", ROLE=FACTORISE),
     SOLVE: _timer(_vector, "pp", "solve", ROLE=SOLVE),
     SOFTEN: _timer(_soften, "ppdp", "soften", ROLE=SOFTEN),
+    RESIDUAL: _timer(_residual, "pddppp", "residual", ROLE=RESIDUAL),
+    CORRECT: _timer(_correct, "pdp", "correct", "d", ROLE=CORRECT),
+    DISTANCE: _timer(_norm, NORM_SIGNATURE, "distance", "d", ROLE=DISTANCE),
     EXPAND: _timer(_expand, "pi", "expand", ROLE=EXPAND),
     REACH: _timer(_reach, "pdd", "reach", ROLE=REACH),
 }
@@ -290,43 +312,3 @@ def stop(notes):
     """Stop the clock of the driver."""
     now = _now(notes)
     notes[SLOTS + 1] += now - notes[LAST]
-
-
-@entry
-def _call_often(address, context, count):
-    for _ in range(count):
-        call_check(address, context)
-
-
-LITTLE = 20  # numbers
-
-
-def _do_little(context):
-    """Work of a typical callback: it hides part of the cost of a reading."""
-    x = vector(context, LITTLE)
-    a, b, c, d = 0.0, 0.0, 0.0, 0.0
-    for i in range(0, LITTLE, 4):
-        a += x[i] * x[i + 1]
-        b += x[i + 1] * x[i + 2]
-        c += x[i + 2] * x[i + 3]
-        d += x[i + 3] * x[i]
-    x[0] = a + b + c + d
-    return 0
-
-
-_little = Callback(_do_little, "p")
-
-
-def own_cost(count=10000, rounds=15):
-    """Return the seconds of a timer, half of them in the timed phase: least time with it, less least time without."""
-    notes, context = new_notes(0), np.zeros(1 + LITTLE)
-    notes[TARGETS + CHECK] = _little.address
-    context[:1].view(np.int64)[0] = notes.ctypes.data
-    least = [np.inf, np.inf]
-    for _ in range(1 + rounds):  # the first loads
-        start(notes)
-        for i, address in enumerate((_little.address, TIMERS[CHECK].address)):
-            began = time.perf_counter()
-            _call_often(address, context.ctypes.data + 8, count)
-            least[i] = min(least[i], (time.perf_counter() - began) / count)
-    return max(least[1] - least[0], 0.0)

@@ -18,6 +18,7 @@ Solve:
     constrain               lam = S^-1 (H Z + c), Z <- Z - Y^T lam
     constrain_accelerations the same with axis rows, for Z = W F and c = gamma
     balance_loads           lam = S^-1 H W F, F <- F - H^T lam
+    take_reactions          F <- F - H^T lam
     solve_series            the same for one order of a Taylor series
 Ask:
     redundant_rows_hold, rates_hold, accelerations_hold       of redundant rows
@@ -61,6 +62,7 @@ from .schur_complement import (
     multiply_rows,
     project,
     solve_rows,
+    take_reactions,
     weigh,
     weigh_bodies,
 )
@@ -140,6 +142,7 @@ __all__ = [
     "solve_rows",
     "solve_saddle",
     "solve_series",
+    "take_reactions",
     "weigh",
     "weigh_bodies",
     "write_saddle_rows",

@@ -196,6 +196,12 @@ def apply_multipliers(graph, rows, lam, Z):
 
 
 @kernel
+def take_reactions(graph, rows, lam, F):
+    """F <- F - H^T lam, loads on bodies."""
+    _scatter(graph, rows.H, lam, F)
+
+
+@kernel
 def find_correction(graph, rows, b, Z):
     """Smallest Z in the metric with H Z = -b; b becomes its multipliers.
 

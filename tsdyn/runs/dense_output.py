@@ -62,15 +62,29 @@ def bring_back(c, store):
 
 
 @kernel
+def _move(part, store, i, out):
+    """Copy a part to its place i in the store, or back; where the next part begins."""
+    for j in range(part.size):
+        if out:
+            store[i + j] = part[j]
+        else:
+            part[j] = store[i + j]
+    return i + part.size
+
+
+@kernel
 def _warm(c, store, out):
-    w, friction, i = c.work, c.tangent.friction, 0
+    w, l, f, friction, i = c.work, c.chart, c.tangent, c.tangent.friction, 0
     for part in (w.u, w.v, friction.lam, friction.load):
-        for j in range(part.size):
-            if out:
-                store[i] = part[j]
-            else:
-                part[j] = store[i]
-            i += 1
+        i = _move(part, store, i, out)
+    if c.saddle.K.size > 0:  # stages begin with the factors of N and S
+        for part in (l.lower, l.upper, f.rows.S):
+            i = _move(part, store, i, out)
+        if out:
+            store[i] = l.state.made
+        else:
+            l.state.made = int(store[i])
+        i += 1
     for part in (w.B, w.T):
         for a in range(part.shape[0]):
             for b in range(part.shape[1]):
@@ -85,9 +99,11 @@ def _warm(c, store, out):
         w.control.rate = store[i]
 
 
-def warm_size(work, friction):
+def warm_size(work, tangent, chart, saddle):
     """Floats that `keep` stores."""
-    return sum(part.size for part in (work.u, work.v, friction.lam, friction.load, work.B, work.T)) + 1
+    friction, factors = tangent.friction, (chart.lower, chart.upper, tangent.rows.S) if saddle.K.size else ()
+    kept = work.u, work.v, friction.lam, friction.load, work.B, work.T, *factors
+    return sum(part.size for part in kept) + 1 + (1 if factors else 0)
 
 
 @kernel

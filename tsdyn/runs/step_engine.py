@@ -82,7 +82,7 @@ def _reading(packed, form, constraint_tol, kernels):
         own = system._replace(reals=system.reals.copy())  # the motions' places are written to
         work = allocate(n, m, len(packed.bodies), constraint_tol, packed.size, rows, redundant)
         parts = basis_free_parts(graph, n, not form.basis_free)
-        run = lay_out(n, *sizes, 0, 0, warm=warm_size(work, parts[1].friction))
+        run = lay_out(n, *sizes, 0, 0, warm=warm_size(work, *parts[1:]))
         _set(run.kernels, kernels)
         return Context(own, work, allocate_linear(own, n, m, False), *parts), run
 

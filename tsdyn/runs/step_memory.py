@@ -40,7 +40,7 @@ class StepMemory(Memory):
         work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant)
         angles, slots = prepared.handles.count, system.memory.size
         parts = basis_free_parts(graph, n, not basis_free, saddle)
-        run = lay_out(n, *sizes, angles, slots, warm=warm_size(work, parts[1].friction), **lengths)
+        run = lay_out(n, *sizes, angles, slots, warm=warm_size(work, *parts[1:]), **lengths)
         linear = allocate_linear(system, n, m, implicit and not basis_free, kept, redundant)
         if implicit:
             linear = linear._replace(now=run.now, before=run.before)

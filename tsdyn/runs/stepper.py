@@ -182,6 +182,8 @@ def _change_chart(context, c, r, log, h, status, driven):
     """Reject a step that left the chart: back to its start, on a new chart if this one has been used. Status."""
     restore_now(c.work, r)
     c.chart.state.placement = 0  # the poses are not those that the next chart begins at
+    if c.saddle.K.size > 0:  # factors with which stages begin
+        bring_back(c, r.warm)
     r.numbers.rejected += 1
     if r.numbers.in_chart == 0:
         if r.numbers.adaptive == 0:

@@ -5,8 +5,9 @@
 # are short at first.
 PILOTS = (20, 2.0), (60, 1.0)
 # The cost of an evaluation within an implicit stage, its share of the matrices included, in evaluations of an explicit
-# one and in orders of a series: stiff chains of 1 to 64 links take 1.5 to 3, and 2 to 13.
-COST, SERIES_COST = 2.3, 8.0
+# one and in orders of a series: stiff chains of 4 to 64 links and a stiff joint take 0.8 to 1.7, and 4 to 9, overdamped
+# springs of particles up to 3 and 13.
+COST, SERIES_COST = 1.4, 6.5
 STEP_EVALUATIONS = 16  # of a step of SDIRK54, about
 # Cost of an order of a series in scenes with sharp forces, where steps are as short as they are for a while only, over
 # that of an evaluation: chains of four with friction, slip velocities of 1e-3 to 1e-1.

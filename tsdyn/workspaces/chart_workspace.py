@@ -21,6 +21,7 @@ class ChartState(Record):
     time: float  # of the last position solve
     factored: int  # 1 if lower and upper hold factors of N
     off: float  # error of these factors at the configuration itself, relative
+    made: int  # 1 if lower and upper hold factors of N at any place of this chart
     placement: int  # number of the position solve at the end of the last step; 0 if the chart is of no use
 
 

@@ -20,10 +20,13 @@ class SaddleWorkspace(NamedTuple):
     lower: np.ndarray  # factors; saddle_point.factorise
     upper: np.ndarray
     multipliers: np.ndarray  # (m,)  what the last Newton correction led to; saddle_point.solve
+    before: np.ndarray  # (m,)  those of the stage before; stage_equations.py
     a: np.ndarray  # ((nb + 1) * 8,)  accelerations of bodies, the same
     x: np.ndarray  # (s,)  right-hand side and solution, in order of elimination
     r: np.ndarray  # ((nb + 1) * 8,)  tangent part of a vector of chart coordinates
     e: np.ndarray  # ((nb + 1) * 8,)  the same of an error of positions
+    loads: np.ndarray  # ((nb + 1) * 8,)  forces on bodies at a stage; stage_equations.py
+    z: np.ndarray  # (m,)  normal part of the velocities: xd - Y0 z; stage_equations.py
     q: np.ndarray  # (14,)  coordinates of an instance's two bodies
     qd: np.ndarray  # (14,)
     zero: np.ndarray  # (14,)  accelerations that its derivatives don't depend on
@@ -45,8 +48,8 @@ def allocate_saddle(graph=None):
         "B": (9 * nb,),
         **dict.fromkeys(("lower", "upper"), (size,)),
         "x": (s,),
-        "multipliers": (len(graph.row_at),),
-        **dict.fromkeys(("a", "r", "e"), (8 * (nb + 1) * wanted,)),
+        **dict.fromkeys(("multipliers", "before", "z"), (len(graph.row_at),)),
+        **dict.fromkeys(("a", "r", "e", "loads"), (8 * (nb + 1) * wanted,)),
         **dict.fromkeys(("q", "qd", "zero", "R"), (local,)),
         "lam": (most,),
         **dict.fromkeys(("X", "Xd"), (local, local)),

@@ -13,13 +13,21 @@ class StageNumbers(Record):
     every_chart: int  # 1 for one whose P serves every chart
     known: int  # whether there are stiffness and damping
     theta: float  # contraction that the last stage measured
+    slow: float  # contraction above which P is rebuilt, if no new one contracts below the usual limit; else 0
     t_before: float  # s, start of the last step; -inf for the first one
     eager: int  # stages that are still to be begun with a matrix of their own
+    rates_of: int  # counter of charts when z of the stages was last set; 0 where z and multipliers are unknown
+    time: float  # s, of the last stage, and of the one before; -inf where they are unknown
+    time_before: float
+    lag: float  # contraction of corrections by factors of N of an older place, as last measured
     fresh: int  # 1 if the derivatives of the forces' laws are to be taken by saddle_point.reduce
 
 
 class StageKernels(Record):
-    """Addresses of the kernels in formulations/linearisation.py or saddle_point.py, of `recall`, of the error norm."""
+    """Addresses of the kernels in formulations/linearisation.py or saddle_point.py, of `recall`, of the error norm.
+
+    `residual`, `correct` and `distance` are those of stage_equations.py; 0 for a form without them.
+    """
 
     linearise: int
     reduce: int
@@ -28,3 +36,6 @@ class StageKernels(Record):
     soften: int
     recall: int
     error_norm: int
+    residual: int
+    correct: int
+    distance: int

@@ -1,0 +1,341 @@
+"""Newton's method for a stage of an implicit method in the tangent form, its multipliers unknowns as well.
+
+    Phi(q) = 0                         q  at x - Y0 u
+    H C (xd - Y0 z) + Phi_t = 0        qd at xd - Y0 z
+    H a + gamma = 0                    a = (rdd, omega'd), the accelerations k of chart coordinates
+    M a + H^T lam = F
+
+x and xd are those of k. `residual` solves the first two for u and z, as exactly as the stage needs it, and evaluates
+the others. `correct` takes n = -Y0 N^-1 (H a + gamma) for the normal part of the correction of k; the tangent part e
+follows with the multipliers from the saddle-point matrix (saddle_point.py):
+
+    [ M - g C_b - g^2 K_b    H^T ] [ C e  ]     [ F - M (a + C n) - H^T lam ]
+    [ H                      0   ] [ dlam ]  =  [ 0                         ]
+
+Before, lam is corrected by S^-1 H W times the right-hand side, at the present H. The factors of N and S are those of an
+older place as long as they contract: of the step's start at first.
+"""
+
+import math
+
+from ..elements.loops.body_poses import write_positions, write_velocities
+from ..errors import Status
+from ..jit.kernels import callback, kernel, vector
+from ..jit.simd import add, four, lanes, put, splat
+from ..maths.dense_linalg import copy, largest
+from ..methods.explicit import NORM
+from ..model.equations import is_rheonomic, set_time
+from ..rows.interface import (
+    DYNAMICS,
+    apply_multipliers,
+    clear_redundant,
+    evaluate_bias,
+    evaluate_drift,
+    evaluate_rows,
+    factorise_selected_rows,
+    multiply_rates,
+    multiply_rows,
+    solve_product,
+    solve_rows,
+    solve_saddle,
+    take_reactions,
+    weigh,
+    weigh_bodies,
+)
+from ..workspaces.workspace import load
+from .accelerations import body_forces
+from .chart_coordinates import displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
+from .projection import largest_residual, velocity_floor
+from .saddle_point import degrees, take_solution, turned_back
+from .tangent_error import weighted_square
+from .tolerances import (
+    FARTHEST_AHEAD,
+    LAG,
+    LEAST_LAG,
+    LEFT,
+    REACTION_SWEEPS,
+    REACTIONS_LEFT,
+    ROUNDING_AT_MOST,
+    SLOW,
+    STALLED,
+    SWEEPS,
+)
+
+OK, NOT_FINITE, SINGULAR = int(Status.SUCCESS), int(Status.NOT_FINITE), int(Status.SINGULAR)
+CHART_LOST, NEWTON_FAILED = int(Status.CHART_LOST), int(Status.NEWTON_FAILED)
+
+
+@callback("pddppp")
+def residual(context, t, g, x, y, k):
+    """Place the stage at chart coordinates x and rates y; rows, loads and the accelerations of bodies there. Status."""
+    c = load(context)
+    system, w, f, l, s, graph = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph
+    numbers, n = c.linear.numbers, l.x.size - 8
+    l.state.time = t
+    w.counters.evaluations += 1
+    if not set_time(system, t):
+        return NOT_FINITE
+    _begin(numbers, s, w.counters.charts, t)
+    copy(vector(x, n), l.x)
+    copy(vector(y, n), l.y)
+    apply_multipliers(graph, l.rows0, w.u, l.x)
+    apply_multipliers(graph, l.rows0, s.z, l.y)
+    status = _solve_positions(c, t, g)
+    if status == OK:
+        status = _solve_rates(c, t)
+    if status != OK:
+        return status
+    if system.forces.shape[0] > 0:
+        write_positions(graph.bodies, f.poses, w.q)
+        write_velocities(graph.bodies, f.poses, w.qd)
+    if f.b.size > 0:
+        evaluate_bias(graph, system, f, t)
+    body_forces(graph, system, w, f, t)
+    copy(f.Z, s.loads)
+    turn_accelerations(graph, l, f.poses, vector(k, n), s.a)
+    return OK if largest(s.loads) < math.inf else NOT_FINITE
+
+
+@kernel
+def _begin(numbers, s, charts, t):
+    """In a new stage, multipliers along the line through the last two; z and lag in a new chart."""
+    if numbers.rates_of == 0:  # at the start, and where a stage has failed
+        numbers.time = numbers.time_before = -math.inf
+        for e in range(s.multipliers.size):
+            s.multipliers[e] = s.before[e] = 0.0
+    if numbers.rates_of != charts:
+        numbers.rates_of, numbers.lag = charts, LAG
+        for e in range(s.z.size):
+            s.z[e] = 0.0
+    if t == numbers.time:
+        return
+    span, ratio = numbers.time - numbers.time_before, 0.0
+    if 0.0 < abs(span) < math.inf:
+        ratio = min(max((t - numbers.time) / span, -FARTHEST_AHEAD), FARTHEST_AHEAD)
+    for e in range(s.multipliers.size):
+        last = s.multipliers[e]
+        s.multipliers[e] += ratio * (last - s.before[e])
+        s.before[e] = last
+    numbers.time_before, numbers.time = numbers.time, t
+
+
+@kernel
+def _renew_normal(c):
+    """Factors of N at the present place; False if it is singular."""
+    c.linear.numbers.lag = LEAST_LAG
+    return factorise_normal(c.graph, c.work, c.tangent, c.chart)
+
+
+@kernel
+def _add(x, out):
+    """Add x to out."""
+    for i in range(x.size):
+        out[i] += x[i]
+
+
+@kernel
+def _solve_normal(c):
+    """f.b <- N^-1 f.b, by factors that may be of an older place, such as q0 of the chart."""
+    l = c.chart
+    lower, upper = (l.lower, l.upper) if l.state.made == 1 else (l.rows0.S, l.rows0.S)
+    solve_product(c.graph, lower, upper, c.tangent.b)
+
+
+@kernel
+def _take_off(c, x):
+    """f.b <- N^-1 f.b and x -= Y0 f.b; s.r is the change of x."""
+    f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
+    _solve_normal(c)
+    for i in range(s.r.size):
+        s.r[i] = 0.0
+    apply_multipliers(graph, l.rows0, f.b, s.r)
+    for i in range(x.size):
+        x[i] += s.r[i]
+
+
+@kernel
+def _rate_size(c, x):
+    """The error norm of a change x of rates in chart coordinates."""
+    numbers, n = c.linear.numbers, c.work.q.size
+    square = weighted_square(c.graph, c.chart, x, c.work.qd, c.linear.now[1], 0, numbers.rtol, numbers.atol)
+    return math.sqrt(square / (2 * n))
+
+
+@kernel
+def _solve_positions(c, t, g):
+    """Newton's method for u: poses and H. Status.
+
+    What it leaves of a position, over g, is to be no velocity that the stage would notice.
+    """
+    system, w, f, l, s, graph, numbers = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
+    floor, before, renewed = w.control.floor, math.inf, False
+    for _ in range(SWEEPS):
+        if not displace(graph, l, f.poses):
+            return CHART_LOST
+        if f.b.size == 0:
+            return OK
+        evaluate_rows(graph, system, f, f.rows, t)
+        worst = largest_residual(graph, w, f)
+        if not worst < math.inf:
+            return NOT_FINITE
+        if worst <= floor or (worst > SLOW * before and worst <= ROUNDING_AT_MOST * floor):
+            return OK
+        if before < math.inf:
+            numbers.lag = max(worst / before, LEAST_LAG)
+            if numbers.lag > SLOW and renewed:
+                return NEWTON_FAILED
+            if not renewed:  # one correction was not enough
+                if not _renew_normal(c):
+                    return SINGULAR
+                renewed = True
+        _take_off(c, l.x)
+        _add(f.b, w.u)
+        w.counters.newton += 1
+        if numbers.lag * _rate_size(c, s.r) <= g * LEFT:
+            return OK if displace(graph, l, f.poses) else CHART_LOST
+        before = worst
+    return NEWTON_FAILED
+
+
+@kernel
+def _solve_rates(c, t):
+    """rd and omega' of the poses from the rates l.y, tangent as far as the stage notices. Status."""
+    system, w, f, l, s, graph, numbers = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
+    rheonomic, floor, before, renewed = is_rheonomic(system), 0.0, math.inf, False
+    if rheonomic:
+        evaluate_drift(graph, system, f, t, l.drift)
+    for sweep in range(SWEEPS):
+        turn_rates(graph, l, l.y, f.poses)
+        if f.b.size == 0:
+            return OK
+        if sweep == 0:
+            floor = velocity_floor(graph, w, f)
+        multiply_rates(graph, f.rows, f.poses, f.b)
+        if rheonomic:
+            _add(l.drift, f.b)
+        worst = largest_residual(graph, w, f)
+        if not worst < math.inf:
+            return NOT_FINITE
+        if worst <= floor or (worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):
+            return OK
+        if worst > SLOW * before:
+            if renewed:
+                return NEWTON_FAILED
+            if not _renew_normal(c):
+                return SINGULAR
+            renewed = True
+        _take_off(c, l.y)
+        _add(f.b, s.z)
+        if numbers.lag * _rate_size(c, s.r) <= LEFT:
+            turn_rates(graph, l, l.y, f.poses)
+            return OK
+        before = worst
+    return NEWTON_FAILED
+
+
+@callback("pdp", "d")
+def correct(context, g, k):
+    """Correct k (8 b,) and the multipliers; the size of the change of positions and velocities in the error norm."""
+    c = load(context)
+    w, f, l, s, graph, numbers = c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
+    k, n = vector(k, l.x.size - 8), w.q.size
+    turn_accelerations(graph, l, f.poses, k, s.a)
+    _correct_normal_part(c, g, k)
+    if not _balance(c):
+        return math.inf
+    solve_saddle(s)
+    take_solution(graph, s)
+    for b in range(graph.bodies.shape[0]):
+        at, o = s.graph.body_at[b], 8 * b
+        put(s.r, o, lanes(s.x[at], s.x[at + 1], s.x[at + 2]))
+        put(k, o, add(four(k, o), four(s.r, o)))
+        if graph.bodies[b, 1] == 7:
+            put(s.r, o + 4, turned_back(l, b, s, at + 3))
+            put(k, o + 4, add(four(k, o + 4), four(s.r, o + 4)))
+    square = weighted_square(graph, l, s.r, w.q, c.linear.now[0], 0, numbers.rtol, numbers.atol)
+    return g * math.sqrt(square * g * g / (2 * n) + _rate_size(c, s.r) ** 2)
+
+
+@kernel
+def _correct_normal_part(c, g, k):
+    """k += n; s.r = n. A change n moves x and xd by g^2 n and g n, which u and z take off again."""
+    w, f, s = c.work, c.tangent, c.saddle
+    if f.b.size == 0:
+        for i in range(s.r.size):
+            s.r[i] = 0.0
+        return
+    multiply_rows(c.graph, f.rows, s.a, f.b)
+    _add(f.gamma, f.b)
+    _take_off(c, k)
+    for e in range(f.b.size):
+        w.u[e] -= g * g * f.b[e]
+        s.z[e] -= g * f.b[e]
+
+
+@kernel
+def _balance(c):
+    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for the rows. False if S is singular."""
+    f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
+    to_bodies(graph, l, s.r, f.Z)
+    _add(s.a, f.Z)
+    for b in range(graph.bodies.shape[0]):
+        weigh(graph.mass, b, f.Z, 8 * b, f.Z, 8 * b)
+    for i in range(s.e.size):
+        s.e[i] = s.loads[i] - f.Z[i]
+    take_reactions(graph, f.rows, s.multipliers, s.e)
+    if f.b.size > 0 and not _settle_reactions(c):
+        return False
+    for i in range(s.x.size):
+        s.x[i] = 0.0
+    for b in range(graph.bodies.shape[0]):
+        at, o = s.graph.body_at[b], 8 * b
+        for i in range(degrees(graph, b)):
+            s.x[at + i] = s.e[o + i + i // 3]
+    return True
+
+
+@kernel
+def _settle_reactions(c):
+    """Correct lam by S^-1 H W e until H W e, e = F - M (a + C n) - H^T lam, is small; s.e = e. False if S is singular.
+
+    H of the saddle-point matrix may be that of an older place: it would take a part of what is left for a load. S is of
+    an older place, too, as long as it contracts: of the step's start at first.
+    """
+    w, f, s, graph, least, before, renewed = c.work, c.tangent, c.saddle, c.graph, 0.0, math.inf, False
+    lean = graph.axes.rows.shape[0] > 0  # S is of another metric than W
+    for sweep in range(REACTION_SWEEPS):
+        copy(s.e, f.Z)
+        put(f.Z, 8 * graph.bodies.shape[0], splat(0.0))  # the ground
+        put(f.Z, 8 * graph.bodies.shape[0] + 4, splat(0.0))
+        weigh_bodies(graph, f.Z)
+        multiply_rows(graph, f.rows, f.Z, f.b)
+        worst = largest_residual(graph, w, f)
+        if sweep == 0:
+            least = REACTIONS_LEFT * worst
+        if worst <= least:
+            return True
+        if lean:
+            _solve_normal(c)
+        else:
+            if worst > SLOW * before and not renewed:
+                w.counters.factorizations += 1
+                if factorise_selected_rows(graph, f, f.rows, DYNAMICS) >= 0:
+                    return False
+                renewed = True
+            solve_rows(graph, f.rows, f.b)
+            clear_redundant(f, f.b)  # which others may have been when S was made
+        _add(f.b, s.multipliers)
+        take_reactions(graph, f.rows, f.b, s.e)
+        before = worst
+    return True
+
+
+@callback(NORM, "d")
+def distance(context, ex, ey, old, rtol, atol):
+    """As `error_norm`, of changes that are tangent to the constraints already."""
+    c = load(context)
+    w, l, graph, n = c.work, c.chart, c.graph, c.work.q.size
+    old = vector(old, 3 * n)
+    total = weighted_square(graph, l, vector(ex, l.x.size - 8), w.q, old, 0, rtol, atol)
+    total += weighted_square(graph, l, vector(ey, l.x.size - 8), w.qd, old, n, rtol, atol)
+    return math.sqrt(total / (2 * n))

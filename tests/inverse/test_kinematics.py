@@ -179,6 +179,19 @@ def test_every_kind_of_driver_at_once():
     np.testing.assert_allclose(found.power, run.power, atol=CLOSE)
 
 
+@pytest.mark.parametrize("power", [2, 3, 5])
+def test_motion_from_rest_of_a_point(power):
+    scene = ts.Scene()
+    bead = scene.add_point_mass(2.0, name="bead")
+    path = (M.Polynomial((0.0,) * power + (1.0,)), 0.0, 0.0)
+    driver = scene.add(C.PointDriver(scene.ground, bead, path=path))
+    t = np.linspace(0.0, 2.0, 5)
+    found = scene.kinematics(t)
+    np.testing.assert_allclose(found.position(bead)[:, 0], t**power, atol=ALGEBRA)
+    force = 2.0 * power * (power - 1) * t ** (power - 2)
+    np.testing.assert_allclose(found.reaction(driver, on=bead)[0][:, 0], force, atol=HELD)
+
+
 def test_start_at_a_dead_centre_is_refused():
     scene = slider_crank()
     scene.add(C.TranslationMotor.of(scene["rail"], displacement=M.Ramp(0.0, -0.1), name="push"))

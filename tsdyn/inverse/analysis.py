@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..configuration.kinetic_metric import Metric
 from ..errors import InvalidArgument, Status
 from ..jit.kernels import resident
 from ..model import joint_motion
@@ -48,7 +49,7 @@ def analyse(packed, t0, q, remembered, times, stops):
     branch = _branch(packed, q, remembered)
     address, *_keep = resident(branch)
     way = branch.way
-    way.t = t0
+    way.t, way.size = t0, Metric(packed, None, t0).reach(q)
     span = float(np.ptp(np.append(times, t0)))
     way.longest = way.h = max(span / LEAST_STEPS, np.finfo(float).tiny)
     way.least = SHORTEST * max(span, np.abs(times).max())

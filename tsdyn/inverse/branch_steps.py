@@ -32,7 +32,7 @@ from ..model.packed import System
 from ..rows.interface import TangentWorkspace, constrain, evaluate_bias, note_indicator
 from ..sparse.constraint_graph import ConstraintGraph, no_graph
 from ..workspaces.workspace import Work, parts, plain_context
-from .tolerances import GROWTH, LARGEST_CHANGE, LARGEST_TURN, LEAST_SIZE, NO_CHANGE, ROUNDING, SMALL, TIME_ROUNDING
+from .tolerances import GROWTH, LARGEST_CHANGE, LARGEST_TURN, NO_CHANGE, ROUNDING, SMALL, TIME_ROUNDING
 
 OK, NOT_FINITE, CHART_LOST = int(Status.SUCCESS), int(Status.NOT_FINITE), int(Status.CHART_LOST)
 SLICE_DONE = int(Status.SLICE_DONE)
@@ -45,6 +45,7 @@ class Way(Record):
     h: float  # length of the next step, s
     longest: float  # step, s
     least: float  # step, s; a shorter one is none
+    size: float  # of the scene, m
     begun: int  # whether velocities and accelerations of the start are known
     steps: int
     rejected: int
@@ -190,8 +191,7 @@ def _solve(c, t):
 @kernel
 def _change(c, h):
     """How far the step has come from its prediction, as a share of what is allowed."""
-    f, size = c.tangent, max(c.work.control.size, LEAST_SIZE)
-    worst, allowed = 0.0, 0.0
+    f, worst, allowed = c.tangent, 0.0, 0.0
     for part in range(2):  # displacements, rotations
         way, off = 0.0, 0.0
         for b in range(c.graph.bodies.shape[0]):
@@ -200,7 +200,7 @@ def _change(c, h):
                 speed = f.poses[at + i]
                 way = max(way, max(abs(f.a[o + i]), abs(h * speed)))
                 off = max(off, abs(h * (speed - c.speeds[o + i] - h * c.gains[o + i])))
-        most = LARGEST_CHANGE * way + NO_CHANGE * (1.0 if part == 1 else size)
+        most = LARGEST_CHANGE * way + NO_CHANGE * (1.0 if part == 1 else c.way.size)
         worst, allowed = max(worst, off / most), allowed + most
     return max(worst, f.landing.moved / allowed)
 

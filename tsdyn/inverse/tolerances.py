@@ -17,8 +17,6 @@ SHORTEST = 1e-11
 TIME_ROUNDING = 1e-10
 # |Phi| that rounding leaves, over the largest coordinate: sums of a few products.
 ROUNDING = 1e-15
-# m; smaller scenes count as being of this size.
-LEAST_SIZE = 1e-12
 # Steps in one call of the compiled code: some hundredths of a second, so that Ctrl-C is answered.
 SLICE = 20000
 

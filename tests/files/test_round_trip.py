@@ -154,6 +154,7 @@ def test_extreme_numbers(tmp_path):
     scene.add_body(
         1e-300, np.array([[2, 0.1, -0.0], [0.1, 3, 0.2], [-0.0, 0.2, 2.5]]), position=(1e16, 0.1 + 0.2, -0.0)
     )
+    scene.add_body(1.0, (1, 1, 1), orientation=(1.0, -0.0, 0.0, -0.0), velocity=(0.0, -0.0, 0.0))
     there_and_back(scene, tmp_path / "scene.toml")
 
 

@@ -16,11 +16,10 @@ def test_the_schema_is_up_to_date():
 
 def test_every_class_of_data_is_in_it():
     found = json.loads(TARGET.read_text())["properties"]
-    names = {
-        kind["properties"]["type"]["const"] for key in ("constraint", "force") for kind in found[key]["items"]["oneOf"]
-    }
-    kinds = {kind.__name__ for kind in (*PRIMITIVES, *JOINTS, *FORCES)}
-    assert kinds - names == {"EulerNormalization", "JointTorque", "JointForce", "UserForce"}
+    kinds = [found[key]["items"]["oneOf"][:-1] for key in ("constraint", "force")]  # the last one is that of plug-ins
+    names = {kind["properties"]["type"]["const"] for several in kinds for kind in several}
+    known = {kind.__name__ for kind in (*PRIMITIVES, *JOINTS, *FORCES)}
+    assert known - names == {"EulerNormalization", "JointTorque", "JointForce", "UserForce"}
 
 
 def test_a_plain_run_imports_nothing_of_it():

@@ -50,6 +50,7 @@ assemble = true
 end = 1.0
 method = { type = "RK45", rtol = 1e-9 }
 """
+INERTIA = "mass = 2\ninertia = [0.1, 0.2, 0.1]"
 WRONG = {  # name: (what is replaced, by what, line, words of the message)
     "no TOML": ("[[body]]\nname = \"arm\"", "[[body]\nname = \"arm\"", 5, ("no TOML",)),
     "twice": ("mass = 2\n", "mass = 2\nmass = 3\n", 8, ("no TOML", "overwrite")),
@@ -77,6 +78,12 @@ WRONG = {  # name: (what is replaced, by what, line, words of the message)
     "impossible inertia": ("[0.1, 0.2, 0.1]", "[0.1, 0.2, 0.9]", 8, ("triangle inequality",)),
     "ragged inertia": ("[0.1, 0.2, 0.1]", "[0.1, [0.2], 0.1]", 8, ("3 principal values",)),
     "type of a body": ('"PointMass"', '"Pointmass"', 12, ("'PointMass'",)),
+    "shape beside mass": ("mass = 2\n", "mass = 2\nshape = { type = 'rod', length = 1 }\n", 7, ("beside shape",)),
+    "unknown shape": (INERTIA, "shape = { type = 'bx' }", 7, ("'bx'", "type box")),
+    "shape is a list": (INERTIA, "shape = { type = [1] }", 7, ("[1]", "type box")),
+    "shape lacks a length": (INERTIA, "shape = { type = 'rod', mass = 1 }", 7, ("lacks length",)),
+    "shape without mass": (INERTIA, "shape = { type = 'sphere', radius = 1 }", 7, ("density",)),
+    "axis of a shape": (INERTIA, "shape = { type = 'rod', mass = 1, length = 1, axis = 'w' }", 7, ("'x'",)),
     "inertia of a particle": ("mass = 0.1\n", "mass = 0.1\ninertia = [1, 1, 1]\n", 14, ("'inertia'",)),
     "name in use": ('name = "bob"', 'name = "arm"', 11, ("'arm' is in use",)),
     "name is a number": ('name = "bob"', "name = 3", 11, ("text in quotes",)),
@@ -148,6 +155,14 @@ def test_the_right_file(tmp_path):
     scene = load(RIGHT, tmp_path)
     assert ts.simulate(scene, (0.0, 0.01), integrator="dop853").constraint_error.position.max() < 1e-14
     assert len(load(TEXT, tmp_path).bodies) == 1
+
+
+def test_shapes_give_mass_and_inertia(tmp_path):
+    shape = "shape = { type = 'box', size = ['2 * length', 0.2, 0.3], density = 100 }"
+    arm = load(RIGHT.replace(INERTIA, shape), tmp_path).bodies[0]
+    box = ts.shapes.box((1.0, 0.2, 0.3), density=100)
+    assert arm.mass == box.mass
+    np.testing.assert_array_equal(arm.inertia, box.inertia)
 
 
 @pytest.mark.parametrize("name", WRONG)

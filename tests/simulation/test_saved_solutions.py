@@ -68,6 +68,14 @@ def test_every_format(suffix, tmp_path):
         loaded.at(0.1)
 
 
+def test_it_is_shown_in_the_same_way(tmp_path):
+    pages = tmp_path / "run.html", tmp_path / "loaded.html"
+    solution = run(t_eval=TIMES)
+    for each, page in zip((solution, ts.load(solution.save(tmp_path / "run.h5"))), pages, strict=True):
+        each.view(page)
+    assert pages[0].read_bytes() == pages[1].read_bytes()
+
+
 def test_another_process_reads_it(tmp_path):
     solution = run(dense_output=True)
     path = solution.save(tmp_path / "run.h5")

@@ -2,6 +2,7 @@
 
 import shutil
 
+import numpy as np
 import pytest
 
 import tsdyn as ts
@@ -14,7 +15,7 @@ WAIT = 60_000  # ms
 
 @pytest.fixture(scope="module")
 def browser():
-    play = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install 'tsdyn[view]'")
+    play = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install 'tsdyn[test]'")
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     with play.sync_playwright() as playwright:
         try:
@@ -79,6 +80,16 @@ def test_controls_do_what_they_say(opened):
         before = after
     page.select_option("#follow", label=crank.name)
     assert picture(page) != before
+    assert reports == []
+
+
+def test_a_trail_goes_through_its_point(opened):
+    scene = four_bar.build()
+    solution = ts.simulate(scene, (0.0, 1.0))
+    page, reports = opened(solution, trails=[("crank", (0.15, 0, 0))])
+    way = page.evaluate("[...trails.children[0].geometry.getAttribute('position').array]")
+    end = np.reshape(way, (-1, 3))[-1] + page.evaluate("run.origin")
+    np.testing.assert_allclose(end, solution.position("crank", point=(0.15, 0, 0))[-1], atol=1e-4)
     assert reports == []
 
 

@@ -1,5 +1,6 @@
 """The page of an animation: its poses and loads are those of the run, and it needs nothing from outside."""
 
+import subprocess
 import sys
 import webbrowser
 from pathlib import Path
@@ -7,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from examples import door, four_bar
@@ -14,6 +16,7 @@ from tests.helpers.pages import Tags, array, decoded, place
 from tsdyn.viewer.run_data import FRAMES
 
 C, S = ts.constraints, ts.shapes
+ROOT = Path(__file__).parents[2]
 SEEN = 2e-4  # of a length or a unit vector: less than a pixel
 
 
@@ -117,7 +120,7 @@ def view(solution, **options):
     from tsdyn.viewer.run_data import run_data
     from tsdyn.viewer.view import page_of
 
-    return page_of(run_data(solution, options.get("shapes")))
+    return page_of(run_data(solution, **options))
 
 
 @pytest.mark.parametrize(
@@ -142,6 +145,16 @@ def test_the_shape_of_a_free_body_follows_from_its_inertia(shape, kind, size):
         assert abs(columns[2, 0 if size[0] < 0.5 else 1]) == pytest.approx(size[2], rel=1e-4)
 
 
+def test_a_rod_in_any_direction_is_thin():
+    turned = S.rod(2.0, axis="x", mass=3.0).rotated(Rotation.from_rotvec((0.3, 1.1, -0.7)))
+    scene = ts.Scene(gravity=(0, 0, 0))
+    rod = scene.add_body(**turned, angular_velocity=(0, 0, 0))
+    scene.add(C.Fixed.at(scene.ground, rod, point=(0, 0, 0)))
+    part = decoded(view(ts.simulate(scene, (0.0, 0.1)))).parts[0]
+    lengths = np.linalg.norm(np.reshape(part["matrix"], (4, 3))[:3], axis=1)
+    np.testing.assert_allclose(lengths, (0.04, 0.04, 2.0), rtol=1e-4)
+
+
 def test_shapes_of_the_user_are_drawn():
     scene = ts.Scene()
     hammer = S.cylinder(0.02, 0.3, density=700) + S.box((0.1, 0.03, 0.03), density=7850).moved((0, 0, 0.15))
@@ -157,6 +170,14 @@ def test_shapes_of_the_user_are_drawn():
     assert stone["colour"] == "#336699"
     np.testing.assert_allclose(array(data.meshes[0]["vertices"], "<f4").reshape(-1, 3), 2.0 * np.array(vertices))
     np.testing.assert_array_equal(array(data.meshes[0]["faces"], "<u4").reshape(-1, 3), faces)
+
+
+def test_trails_are_of_bodies_and_of_points():
+    solution = ts.simulate(chain(12), (0.0, 0.1))
+    assert [trail["body"] for trail in decoded(view(solution)).trails] == [0, 1, 3, 4, 6, 7, 9, 11]
+    found = decoded(view(solution, trails=["body2", (solution.scene.bodies[11], (0.1, 0, 0))])).trails
+    assert found == [{"body": 1, "point": [0.0, 0.0, 0.0]}, {"body": 11, "point": [0.1, 0.0, 0.0]}]
+    assert decoded(view(solution, trails=[])).trails == []
 
 
 def test_fifty_bodies_fit_into_three_megabytes():
@@ -210,11 +231,27 @@ def test_wrong_shapes_and_paths_are_refused(run, tmp_path):
         run.view(tmp_path / "a", shapes={"crank": "box"})
     with pytest.raises(ts.InvalidArgument, match="dictionary"):
         run.view(tmp_path / "a", shapes=S.Sphere(1.0))
+    with pytest.raises(ts.InvalidBody, match="did you mean 'crank'"):
+        run.view(tmp_path / "a", trails=["crnk"])
+    with pytest.raises(ts.InvalidArgument, match="trail of 'crank': point"):
+        run.view(tmp_path / "a", trails=[("crank", (1, 2))])
+    with pytest.raises(ts.InvalidArgument, match="trails"):
+        run.view(tmp_path / "a", trails=7)
     with pytest.raises(ts.InvalidArgument, match="can't be written"):
         run.view(tmp_path / "nowhere" / "a.html")
     with pytest.raises(ts.InvalidCall, match="did you mean shapes"):
         run.view(shape={})
     assert not list(tmp_path.iterdir())
+
+
+def test_a_run_loads_nothing_that_draws():
+    code = "import sys; from examples import top; top.ts.simulate(top.build(), (0.0, 0.1)); print(*sys.modules)"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    modules = result.stdout.split()
+    assert "tsdyn.simulation.simulate" in modules
+    assert not [
+        name for name in modules if name.startswith(("tsdyn.viewer", "tsdyn.figures", "matplotlib", "webbrowser"))
+    ]
 
 
 @pytest.mark.parametrize("display", [True, False])

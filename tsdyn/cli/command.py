@@ -5,7 +5,7 @@ import sys
 import time
 
 from ..errors import MissingDependency, TsdynError
-from . import run, scenes
+from . import run, scenes, view
 from .parser import Parser
 from .stress import _stress, add_options
 
@@ -31,6 +31,7 @@ def _parser():
     parser.add_argument("--version", action="version", version=f"tsdyn {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     run.add_run_options(_command(commands, run._run))
+    view.add_view_options(_command(commands, view._view))
     scenes.add_check_options(_command(commands, scenes._check))
     scenes.add_info_options(_command(commands, scenes._info))
     scenes.add_new_options(_command(commands, scenes._new))

@@ -18,18 +18,23 @@ TABLES, SOLUTIONS = (".csv",), (".h5", ".hdf5", ".nc", ".zarr")
 def add_run_options(parser):
     """Add the options of `tsdyn run` to its parser."""
     add_scene(parser)
-    parser.add_argument("--to", type=float, metavar="S", help="end of the run (default: that of the file, or 10 s)")
-    parser.add_argument("--method", metavar="NAME", help="an integrator, such as dop853")
-    parser.add_argument("--rtol", type=float, metavar="TOL", help="relative tolerance")
-    parser.add_argument("--atol", type=float, metavar="TOL", help="absolute tolerance")
-    parser.add_argument("--formulation", metavar="NAME", help="tangent, null-space or maggi-kane")
-    parser.add_argument("--every", type=float, metavar="S", help="interval of outputs instead of every step")
+    add_method(parser)
     parser.add_argument(
         "--output", action="append", default=[], metavar="PATH",
         help="where to write results, again for more: .h5, .nc or .zarr (ts.load reads them), or .csv",
     )  # fmt: skip
     parser.add_argument("--plot", nargs="?", const="", metavar="PATH", help="draw the constraint errors (default PNG)")
     add_json(parser)
+
+
+def add_method(parser):
+    """Add how a scene is run: what the arguments of `simulate` are called here."""
+    parser.add_argument("--to", type=float, metavar="S", help="end of the run (default: that of the file, or 10 s)")
+    parser.add_argument("--method", metavar="NAME", help="an integrator, such as dop853")
+    parser.add_argument("--rtol", type=float, metavar="TOL", help="relative tolerance")
+    parser.add_argument("--atol", type=float, metavar="TOL", help="absolute tolerance")
+    parser.add_argument("--formulation", metavar="NAME", help="tangent, null-space or maggi-kane")
+    parser.add_argument("--every", type=float, metavar="S", help="interval of outputs instead of every step")
 
 
 def add_scene(parser, metavar="SCENE"):
@@ -55,7 +60,7 @@ def _run(parsed):
 
     _demand_writable(parsed)
     scene, given = load_run(parsed.scene, parsed.allow_code)
-    span, options = _options(parsed, given)
+    span, options = options_of(parsed, given)
     if not parsed.json:
         print(f"{parsed.scene}: {scene!r}", flush=True)
     show = sys.stderr.isatty() and not parsed.json and find_spec("tqdm") is not None
@@ -72,7 +77,7 @@ def _run(parsed):
     return 0 if solution.success else 1
 
 
-def _options(parsed, given):
+def options_of(parsed, given):
     """The span, and the other arguments of `simulate`."""
     given = dict(given)
     start, end = given.pop("t_span", (0.0, run_table.END))

@@ -12,6 +12,7 @@ from .reading import Reading, arguments_in, decoded, keep_bits, known_keys, made
 from .start_table import carry_out_start
 from .values import decode_array, decode_number
 
+SHAPED = ("mass", "inertia")  # what a shape gives
 KEYS = ("version", "title", "gravity", "parameters", "body", "constraint", "force", "start", "run")
 
 
@@ -112,8 +113,12 @@ def _add_body(reading, scene, path, table):
     method, before = getattr(scene, types.BODY_TYPES[kind]), len(reading.mistakes.found)
     name = name_of(reading, path, table, what, reading.bodies)
     known = types.of_body(method.__func__)
-    known_keys(path, table, ("type", "name", *known), reading.mistakes)
+    solid = "inertia" in known
+    known_keys(path, table, ("type", "name", *(["shape"] if solid else []), *known), reading.mistakes)
     given = arguments_in(reading, path, table, known, what)
+    if solid and "shape" in table:
+        known = {key: argument for key, argument in known.items() if key not in SHAPED}
+        given |= _shaped(reading, path, table, what)
     for missing in [argument.name for argument in known.values() if argument.required and argument.name not in table]:
         reading.mistakes.add(path, f"{what} lacks {missing}.")
     body = None
@@ -122,3 +127,23 @@ def _add_body(reading, scene, path, table):
     if isinstance(body, Body) and "orientation" in given:
         keep_bits(body.values, "orientation", given["orientation"])
     reading.bodies[body.name if body is not None else name] = body
+
+
+def _shaped(reading, path, table, what):
+    """Mass and inertia of the table `shape` of a body."""
+    shape, where, mistakes = table["shape"], (*path, "shape"), reading.mistakes
+    for key in SHAPED:
+        if key in table:
+            mistakes.add((*path, key), f"{what}: {key} beside shape, which gives it; leave one of them out.")
+    kind = shape.get("type") if isinstance(shape, dict) else shape
+    if not isinstance(shape, dict) or not isinstance(kind, str) or kind not in types.SHAPES:
+        hint = " or ".join(close(str(kind), types.SHAPES) or types.SHAPES)
+        mistakes.add_value(where, f"{what}: shape", kind, f"write a table with the type {hint} and its arguments.")
+        return {}
+    known, before = types.of_body(types.SHAPES[kind]), len(mistakes.found)
+    known_keys(where, shape, ("type", *known), mistakes)
+    given = arguments_in(reading, where, shape, known, what)
+    for missing in [argument.name for argument in known.values() if argument.required and argument.name not in shape]:
+        mistakes.add(where, f"{what}: the {kind} lacks {missing}.")
+    found = made(reading, where, what, types.SHAPES[kind], given=given) if len(mistakes.found) == before else None
+    return {} if found is None else dict(found)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..elements.bodies import Body
+from ..elements.bodies import IDENTITY, Body
 from ..errors import InvalidArgument
 from . import types
 from .values import Unwritable, encode
@@ -49,7 +49,7 @@ def _body(body):
     for name, value in body.values.items():
         value = np.diagonal(value) if name == "inertia" and _is_diagonal(value) else value
         value = encode(value)
-        if not _is_plain_zero(value) and (name != "orientation" or value != [1.0, 0.0, 0.0, 0.0]):
+        if not _is_plain_zero(value) and not (name == "orientation" and repr(value) == repr(IDENTITY.tolist())):
             found[name] = value
     return found
 

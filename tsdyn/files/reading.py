@@ -46,7 +46,7 @@ def made(reading, path, what, make, positions=(), given=MappingProxyType({})):
         return make(*positions, **given)
     except TsdynError as error:
         message = str(error)
-    except (TypeError, ValueError, ArithmeticError, OverflowError, AttributeError) as error:
+    except Exception as error:  # of a plug-in, too
         message = f"{type(error).__name__}: {error}"
     own = not what or what.partition(" ")[2].strip("'") in message
     reading.mistakes.add(_blamed(path, given, message), message if own else f"{what}: {message}")

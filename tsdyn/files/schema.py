@@ -85,17 +85,36 @@ def _property(argument):
 def _body(name, method):
     known = types.of_body(method)
     properties = {key: _property(argument) for key, argument in known.items()}
-    kind = {"type": {"const": name}}
+    kind, required = {"type": {"const": name}}, [argument.name for argument in known.values() if argument.required]
+    if "inertia" in known:
+        kind["shape"] = {"oneOf": [_shape(*pair) for pair in types.SHAPES.items()]}
+        given = {"anyOf": [{"required": required}, {"required": ["shape"]}]}
+    else:
+        given = {"required": ["type", *required]}
     return {
         "type": "object",
-        "required": [*(["type"] if name != "Body" else []), *(a.name for a in known.values() if a.required)],
+        **given,
         "additionalProperties": False,
         "properties": {**kind, "name": {"type": "string"}, **properties},
     }
 
 
+def _shape(name, function):
+    """The schema of a shape that gives mass and inertia."""
+    known = types.of_body(function)
+    return {
+        "type": "object",
+        "required": ["type", *(argument.name for argument in known.values() if argument.required)],
+        "additionalProperties": False,
+        "properties": {"type": {"const": name}, **{key: _property(argument) for key, argument in known.items()}},
+    }
+
+
 def _items(classes):
-    return {"type": "array", "items": {"oneOf": [_item(*pair) for pair in classes.items() if _is_published(*pair)]}}
+    """The schema of constraints or forces: one of the built-in classes, or a plug-in by its full name."""
+    known = [_item(*pair) for pair in classes.items() if _is_published(*pair)]
+    plug_in = {"type": "object", "required": ["type"], "properties": {"type": {"type": "string", "pattern": "[.]"}}}
+    return {"type": "array", "items": {"oneOf": [*known, plug_in]}}
 
 
 def _is_published(name, cls):

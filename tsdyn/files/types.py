@@ -6,6 +6,7 @@ from functools import cache
 from importlib import import_module
 from typing import Any, NamedTuple
 
+from .. import shapes
 from ..constraints.euler_normalization import EulerNormalization
 from ..elements import force, joint, primitive
 from ..elements.bodies import Body, PointMass
@@ -15,10 +16,12 @@ from .expressions import Misread
 
 BODIES, OWN = ("a", "b"), ("name", "self", "scene")
 BUILT_IN = ("tsdyn.constraints.", "tsdyn.forces.")
+SHAPES = {name: getattr(shapes, name) for name in ("box", "sphere", "cylinder", "rod", "from_mesh")}
 BODY_TYPES = {"Body": "add_body", "PointMass": "add_point_mass"}  # by the methods of a scene
 ENUMERATIONS = {  # by the aliases of hints.py
     "Frame": ("ground", "body"),
     "Folds": ("keep", "free"),
+    "Axis": ("x", "y", "z"),
     "Formulation": ("tangent", "null-space", "maggi-kane"),
     "Redundancy": ("drop", "refuse"),
 }

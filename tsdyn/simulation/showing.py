@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from ..calls import fitting_methods
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
 
@@ -15,7 +15,13 @@ if TYPE_CHECKING:
 class Showing:
     """Mixed into `Solution`; what draws is loaded when it is asked for."""
 
-    def view(self, path: str | Path | None = None, *, shapes: Mapping[Any, Any] | None = None) -> Any:
+    def view(
+        self,
+        path: str | Path | None = None,
+        *,
+        shapes: Mapping[Any, Any] | None = None,
+        trails: Sequence[Any] | None = None,
+    ) -> Any:
         """Show the run as an interactive 3-D animation: one HTML page, which works offline.
 
         Parameters
@@ -27,6 +33,9 @@ class Showing:
             Body, ground or name -> what to draw for it: one of `ts.shapes` (`Box`, `Sphere`, `Cylinder`, `Mesh`, or a
             shape with mass) or a list of them, in the frame of the body. Other bodies are drawn as the uniform solid
             with their inertia, and rods to their joints.
+        trails : sequence, optional
+            Whose ways are shown: bodies, for their centroids, or pairs (body, point), point (3,) in the body frame, m.
+            By default the centroids of up to eight bodies.
 
         Returns
         -------
@@ -35,9 +44,9 @@ class Showing:
         Raises
         ------
         InvalidArgument
-            If there are no outputs, a shape is none, or the file can't be written.
+            If there are no outputs, a shape or trail is none, or the file can't be written.
         InvalidBody
-            If a key of shapes is not a body of this solution's scene.
+            If a key of shapes, or what should leave a trail, is not a body of this solution's scene.
 
         Examples
         --------
@@ -54,7 +63,7 @@ class Showing:
         """
         from ..viewer.view import show
 
-        return show(self, path, shapes)
+        return show(self, path, shapes, trails)
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw constraint errors, energies, steps and charts over time.

@@ -61,6 +61,7 @@ def drawn_solid(mass: float, inertia: Any, points: Any, reach: float) -> Solid:
 def solid_of(mass: float, inertia: Any) -> Solid:
     """The solid of uniform density with a mass, kg, and an inertia (3, 3), kg m^2."""
     moments, axes = np.linalg.eigh(inertia)
+    moments = np.maximum(moments, 0.0)  # that of a rod may be rounded below
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     least = EQUAL * moments[2]
     if moments[2] - moments[0] <= least:
@@ -91,15 +92,16 @@ def given(index: int, shapes: Any, meshes: list[Mesh], name: str) -> list[Part]:
     """Parts of a body, or of the ground, with shapes of its user's; meshes are appended to `meshes`."""
     parts = []
     for piece in _pieces(shapes, name):
-        kind, size, rotation = type(piece).__name__.lower(), np.ones(3), piece.rotation
+        rotation = piece.rotation
         if isinstance(piece, Box):
-            size = piece.size
+            kind, size = "box", piece.size
         elif isinstance(piece, Sphere):
-            size = np.full(3, piece.radius)
+            kind, size = "sphere", np.full(3, piece.radius)
         elif isinstance(piece, Cylinder):
-            size, rotation = np.array([piece.radius, piece.radius, piece.length]), rotation @ AXES[piece.axis]
+            kind, size = "cylinder", np.array([piece.radius, piece.radius, piece.length])
+            rotation = rotation @ AXES[piece.axis]
         else:
-            kind = f"mesh{len(meshes)}"
+            kind, size = f"mesh{len(meshes)}", np.ones(3)
             meshes.append(piece)
         colour = piece.colour or (COLOURS[index % len(COLOURS)] if index >= 0 else "gray")
         parts.append(Part("bodies", kind, index, colour, piece.position, rotation, size))

@@ -13,6 +13,7 @@ import numpy as np
 from .._version import __version__
 from ..errors import InvalidArgument
 from ..shapes import Mesh
+from ..validation import sequence, vector3
 from .body_shapes import by_body, derived, drawn_solid, given
 from .frames import resample
 from .loads import UNITS, arrows, size
@@ -28,8 +29,8 @@ FAST = 1.5  # rotation between frames, rad, from which it is said that the anima
 TRAILS = 8  # bodies at most whose trails are shown at first
 
 
-def run_data(solution: Any, shapes: Any) -> dict[str, Any]:
-    """All that a page shows of a solution, with the shapes (body -> shape or list) that a user gives."""
+def run_data(solution: Any, shapes: Any = None, trails: Any = None) -> dict[str, Any]:
+    """All that a page shows of a solution, with the shapes (body -> shape or list) and trails that a user gives."""
     if not solution.t.size:
         raise InvalidArgument("view: the solution has no outputs, so there is nothing to show.")
     packed = solution.packed
@@ -59,7 +60,7 @@ def run_data(solution: Any, shapes: Any) -> dict[str, Any]:
         "bodies": [{"name": body.name, "rigid": body.dimension == 7} for body in packed.bodies],
         "reach": rounded(reach),
         "bulk": rounded(bulk),
-        "trails": sorted({*np.linspace(len(packed.bodies) - 1, 0, TRAILS).astype(int).tolist()}),
+        "trails": _trails(trails, solution.handles),
         "origin": origin.tolist(),
         "positions": encoded(frames.position - origin, "<f4"),
         "rotations": encoded(np.rint(FULL * np.roll(frames.orientation, -1, axis=2)), "<i2"),
@@ -74,6 +75,22 @@ def run_data(solution: Any, shapes: Any) -> dict[str, Any]:
 def encoded(values: Any, kind: str) -> str:
     """An array in base64, little-endian; "<f4", "<i2", "<u4"."""
     return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode("ascii")
+
+
+def _trails(trails, handles):
+    """Points whose trails are shown at first: those that are asked for, or centroids of some bodies along the list."""
+    if trails is None:
+        some = np.linspace(len(handles.bodies) - 1, 0, TRAILS).astype(int)
+        trails = [handles.bodies[i] for i in sorted({*some.tolist()})]
+    found = []
+    for each in sequence(
+        trails, "view: trails must be a sequence of bodies, or of pairs (body, point)", InvalidArgument
+    ):
+        body, point = each if isinstance(each, tuple) and len(each) == 2 else (each, np.zeros(3))
+        body = handles.body(body)
+        point = vector3(point, f"view: trail of {body.name!r}: point (m)", InvalidArgument)
+        found.append({"body": handles.bodies.index(body), "point": rounded(point)})
+    return found
 
 
 def _name(packed, index):

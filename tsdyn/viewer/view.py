@@ -45,9 +45,9 @@ class View:
         return f"<View: an HTML page of {len(self.html) / 1e6:.2g} MB; .save(path) writes it>"
 
 
-def show(solution: Any, path: str | Path | None, shapes: Any) -> Path | View:
+def show(solution: Any, path: str | Path | None, shapes: Any, trails: Any) -> Path | View:
     """What `Solution.view` does."""
-    page = page_of(run_data(solution, shapes))
+    page = page_of(run_data(solution, shapes, trails))
     if path is not None:
         return write(page, path)
     if in_notebook():

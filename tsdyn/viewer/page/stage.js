@@ -15,6 +15,9 @@ const extent = (() => { // of the motion: centre and radius of a ball about it
 const up = new THREE.Vector3(...run.up);
 
 const canvas = document.getElementById("canvas");
+if (!document.createElement("canvas").getContext("webgl2")) {
+  document.getElementById("note").textContent = "This page needs WebGL 2, which this browser lacks or has switched off.";
+}
 const renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
 const stage = new THREE.Scene();
 const camera = new THREE.PerspectiveCamera(35, 1);
@@ -55,26 +58,34 @@ grid.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), up);
 }
 stage.add(grid);
 
-// Trails: the way of a body's centroid so far.
+// Trails: the way so far of a point of a body, (3,) in its frame.
 const trails = new THREE.Group(), trailOf = new Map();
 stage.add(trails);
-function toggleTrail(body) {
-  if (trailOf.has(body)) {
-    trails.remove(trailOf.get(body));
-    trailOf.delete(body);
+function wayOf(body, point) {
+  const way = new Float32Array(3 * run.frames), x = [0, 0, 0], away = point.some((s) => s !== 0);
+  for (let k = 0; k < run.frames; k++) {
+    const centroid = 3 * (k * count + body);
+    if (away) pose(k);
+    way.set(away ? placed(body, point, x) : positions.subarray(centroid, centroid + 3), 3 * k);
+  }
+  return way;
+}
+function toggleTrail(body, point = [0, 0, 0]) {
+  const key = `${body}: ${point}`;
+  if (trailOf.has(key)) {
+    trails.remove(trailOf.get(key));
+    trailOf.delete(key);
     return;
   }
-  const way = new Float32Array(3 * run.frames);
-  for (let k = 0; k < run.frames; k++) way.set(positions.subarray(3 * (k * count + body), 3 * (k * count + body) + 3), 3 * k);
   const shape = new THREE.BufferGeometry();
-  shape.setAttribute("position", new THREE.BufferAttribute(way, 3));
+  shape.setAttribute("position", new THREE.BufferAttribute(wayOf(body, point), 3));
   const colour = (run.parts.find((part) => part.body === body) || { colour: "gray" }).colour;
   const line = new THREE.Line(shape, new THREE.LineBasicMaterial({ color: colour }));
   line.frustumCulled = false;
   trails.add(line);
-  trailOf.set(body, line);
+  trailOf.set(key, line);
 }
-run.trails.forEach(toggleTrail);
+for (const { body, point } of run.trails) toggleTrail(body, point);
 
 // What is seen, from close by to beyond the motion.
 function focus() {

@@ -1,0 +1,40 @@
+"""The command `tsdyn view`: the animation of a scene's run, or of a saved solution."""
+
+import sys
+from pathlib import Path
+
+from .run import SOLUTIONS, add_method, add_scene, options_of
+from .scene_file import load_run
+
+
+def add_view_options(parser):
+    """Add the options of `tsdyn view` to its parser."""
+    add_scene(parser)
+    add_method(parser)
+    parser.add_argument("--output", metavar="PATH", help="where to write the page (default: the browser opens it)")
+
+
+def _view(parsed):
+    """Show the run of a scene, or a saved solution, as an animation in the web browser.
+
+    A scene is run first, as `tsdyn run` does; a solution (.h5, .nc, .zarr) is shown as it is. The exit code is 0 only
+    if the run reached its end.
+    """
+    solution = _solution(parsed)
+    path = solution.view(parsed.output)
+    print(f"Animation: {path}")
+    if not solution.success:
+        print(f"tsdyn: {solution.message}", file=sys.stderr)
+    return 0 if solution.success else 1
+
+
+def _solution(parsed):
+    if Path(parsed.scene).suffix.lower() in SOLUTIONS:
+        from ..simulation.load import load
+
+        return load(parsed.scene)
+    from ..simulation.simulate import simulate
+
+    scene, given = load_run(parsed.scene, parsed.allow_code)
+    span, options = options_of(parsed, given)
+    return simulate(scene, span, **options, dense_output=True)

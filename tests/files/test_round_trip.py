@@ -37,9 +37,8 @@ MODULES = (
     slider_crank, stick_slip, top, two_body_pendulum,
 )  # fmt: skip
 SCENES = {module.__name__.partition(".")[2]: module.build for module in MODULES}
-SCENES |= {"driven_pivot": driven_pivot.build_driven} | {
-    case.name: case.build for case in CASES if "500" not in case.name
-}
+GALLERY = {case.name: case.build for case in CASES if "500" not in case.name}
+SCENES |= {"driven_pivot": driven_pivot.build_driven} | GALLERY
 PULSE = 0.1 * np.exp(-ts.motions.time) * np.sin(3.0 * ts.motions.time) ** 2
 MOTIONS = {
     "constant": ts.motions.Constant(0.4),
@@ -58,7 +57,7 @@ MOTIONS = {
 }
 
 
-@pytest.mark.slow_for(*(case.name for case in CASES))
+@pytest.mark.slow_for(*GALLERY)
 @pytest.mark.parametrize("name", SCENES)
 def test_scenes_of_examples_and_gallery(name, tmp_path):
     there_and_back(SCENES[name](), tmp_path / "scene.toml")

@@ -66,7 +66,7 @@ def save(figure: Any, path: str | Path) -> Path:
     Raises
     ------
     InvalidArgument
-        If the folder doesn't exist or can't be written to, or the format is unknown.
+        If the path is none, the folder doesn't exist or can't be written to, or the format is unknown.
 
     Examples
     --------
@@ -80,13 +80,12 @@ def save(figure: Any, path: str | Path) -> Path:
     """
     from matplotlib import style
 
-    path = Path(path)
-    if not path.suffix:
-        path = path.with_suffix(".png")
     try:
+        path = Path(path)
+        path = path if path.suffix else path.with_suffix(".png")
         with style.context("default"):
             figure.savefig(path)
-    except (OSError, ValueError) as error:
+    except (OSError, TypeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InvalidArgument(f"the figure can't be written to {path}: {reason}") from error
     return path

@@ -4,8 +4,10 @@ import copy
 import inspect
 import pickle
 from html.parser import HTMLParser
+from tempfile import TemporaryDirectory
 
 import numpy as np
+from matplotlib import pyplot
 
 import tsdyn as ts
 
@@ -183,6 +185,26 @@ class Tour:
 
     def raise_if_failed(self):
         assert self.on.raise_if_failed() is self.on
+
+    def plot(self):
+        axes = self.on.plot()
+        assert axes.shape == (2, 2)
+        pyplot.close(axes[0, 0].figure)
+
+    def view(self):
+        with TemporaryDirectory() as folder:
+            assert self.on.view(f"{folder}/run.html").stat().st_size > 0
+
+    def save(self):
+        with TemporaryDirectory() as folder:
+            again = ts.load(self.on.save(f"{folder}/run.h5"), self.scene)
+            np.testing.assert_array_equal(again.q, self.on.q)
+
+    def to_xarray(self):
+        assert self.on.to_xarray()["q"].shape == self.on.q.shape
+
+    def to_dataframe(self):
+        assert len(self.on.to_dataframe()) == len(self.on.t)
 
     def at(self):
         times = np.linspace(self.on.t[0], self.on.reached, 3)

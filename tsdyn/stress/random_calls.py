@@ -30,6 +30,8 @@ from .judgement import FAULT, Outcome
 PATIENCE = 120.0  # s a call may take, compiling included
 RUNS = 0.1  # of the calls are of `simulate`
 KINDS = (Primitive, Joint, Force, Integrator, motions.Smooth)
+INNER = ("place", "touch", "refresh", "motions", "row_names")
+WRITE = ("save", "view", "plot")  # files, and windows of a browser
 SPACES = (constraints, forces, integrators, motions)
 
 
@@ -56,7 +58,7 @@ def targets(w):
     found += [("Scene", Scene), ("Table", Table), ("Motion", Motion), ("Integrator", Integrator)]
     for owner, label in ((w.scene, "scene"), (w.solution, "solution")):
         for name, _ in inspect.getmembers(type(owner), inspect.isfunction):
-            if not name.startswith("_") and name not in ("place", "touch", "refresh", "motions", "row_names"):
+            if not name.startswith("_") and name not in (*INNER, *WRITE):
                 found.append((f"{label}.{name}", getattr(owner, name)))
     return found
 

@@ -271,3 +271,22 @@ def test_an_implicit_method_takes_over_when_its_steps_have_grown(tol):
     solution = ts.simulate(mounted(1e8), (0.0, 1.0), rtol=tol, atol=tol)
     assert solution.method.startswith("SDIRK54")
     assert solution.stats.steps < 2000
+
+
+@pytest.mark.parametrize("tol", [1e-8, 1e-12, 1e-15])
+def test_rows_are_selected_anew_where_kept_ones_stop_holding_an_axis_without_inertia(tol):
+    """A slider-crank of thin rods, stretched at first: as the crank is upright, other rows hold it upright."""
+    scene = ts.Scene()
+    crank = scene.add_body(**ts.shapes.rod(0.2, axis="x", mass=1.0), position=(0.1, 0, 0))
+    rod = scene.add_body(**ts.shapes.rod(0.4, axis="x", mass=2.0), position=(0.4, 0, 0))
+    slider = scene.add_body(**ts.shapes.box((0.1, 0.1, 0.1), mass=3.0), position=(0.6, 0, 0))
+    bodies, points = [scene.ground, crank, rod, slider], [(0, 0, 0), (0.2, 0, 0), (0.6, 0, 0)]
+    hinge, *_ = (
+        scene.add(C.Revolute.at(*pair, point=point, axis=(0, 0, 1)))
+        for pair, point in zip(pairwise(bodies), points, strict=True)
+    )
+    scene.add(C.Translational.at(scene.ground, slider, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(C.RotationMotor.of(hinge, angle=2.0 * ts.motions.time))
+    scene.assemble()
+    solution = ts.simulate(scene, (0.0, 3.5), integrator=I.Taylor(tol)).raise_if_failed()
+    assert solution.constraint_error.acceleration.max() < FINE

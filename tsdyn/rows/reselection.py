@@ -7,7 +7,7 @@ import numpy as np
 from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, vector
 from ..sparse.constraint_graph import ConstraintGraph, no_graph
 from .evaluation import evaluate_all, evaluate_every_row
-from .independent_rows import select, weakest
+from .independent_rows import select, weakest_of_all
 from .redundant_rows import keep_every_row, leave_redundant_rows
 from .row_workspace import Rows, TangentWorkspace, no_tangent_workspace
 from .schur_complement import factorise_selected_rows
@@ -47,7 +47,7 @@ def _choose(graph, reals, f, rows, t, metric):
     leave_redundant_rows(graph, f, f.b, rows.H)
     regular = factorise_selected_rows(graph, f, rows, metric) < 0
     if found and regular:
-        f.selection.weakest = weakest(graph, rows.S)
+        f.selection.weakest = weakest_of_all(graph, rows.S)
     return regular
 
 
@@ -75,7 +75,7 @@ def selection_serves(graph, f, rows):
     """Return True if the selected rows are nearly as independent as at their best, judged by the factors of S."""
     if f.dropped[0] == 0:
         return True
-    share = weakest(graph, rows.S)
+    share = weakest_of_all(graph, rows.S)
     f.selection.weakest = max(f.selection.weakest, share)  # a selection next to a singular configuration is no measure
     return share >= WORSE * f.selection.weakest
 

@@ -19,11 +19,18 @@ RELEASE = np.radians(45.0)  # from hanging
 
 
 def hinge(scene, a, b, point_a, point_b):
-    """A revolute joint about y."""
+    """A revolute joint about y, of five rows."""
+    scene.add(ts.constraints.Spherical(a, b, point_a=point_a, point_b=point_b))
+    for axis in ((1, 0, 0), (0, 0, 1)):
+        scene.add(ts.constraints.Dot1(a, b, axis_a=axis, axis_b=Y))
+
+
+def revolute(scene, a, b, point_a, point_b):
+    """The same as one joint, which other engines have."""
     scene.add(ts.constraints.Revolute(a, b, point_a=point_a, point_b=point_b, axis_a=Y, axis_b=Y))
 
 
-def jointed(scale=1.0, release=RELEASE):
+def jointed(scale=1.0, release=RELEASE, joint=hinge):
     """The double pendulum with a stiff joint; scale multiplies stiffness and damping."""
     scene = ts.Scene(gravity=(0.0, 0.0, -9.81))
     along, turn = np.array([np.sin(release), 0.0, -np.cos(release)]), np.pi / 4 - release / 2
@@ -34,8 +41,8 @@ def jointed(scale=1.0, release=RELEASE):
         )
         for i, name in enumerate(("upper", "lower"))
     ]  # fmt: skip
-    hinge(scene, scene.ground, rods[0], (0, 0, 0), (-0.5, 0, 0))
-    hinge(scene, rods[0], rods[1], (0.5, 0, 0), (-0.5, 0, 0))
+    joint(scene, scene.ground, rods[0], (0, 0, 0), (-0.5, 0, 0))
+    joint(scene, rods[0], rods[1], (0.5, 0, 0), (-0.5, 0, 0))
     scene.add(
         ts.forces.TorsionalSpring(
             rods[0],

@@ -42,7 +42,7 @@ class Stiff(NamedTuple):
 
 SCENES = {
     **{f"chain of {n}": Stiff(partial(chain, n), end, n) for n, end in ((4, 1.0), (16, 1.0), (64, 1.0), (256, 0.2))},
-    "stiff joint": Stiff(stiff.jointed, 2.0),
+    "stiff joint": Stiff(partial(stiff.jointed, joint=stiff.revolute), 2.0),
     "stiff springs": Stiff(stiff.hung, 2.0),
     "governor": Stiff(partial(governor, 3e5, 5e3), 2.0),
     **{f"bushings of {k:.0e}": Stiff(partial(stiff.mounted, k), 1.0) for k in (1e4, 1e6, 1e8)},

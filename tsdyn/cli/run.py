@@ -10,9 +10,10 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..files import run_table
+from ..storage.formats import SUFFIXES as SOLUTIONS
 from .scene_file import load_run
 
-TABLES, SOLUTIONS = (".csv",), (".h5", ".hdf5", ".nc", ".zarr")
+TABLES = (".csv",)
 
 
 def add_run_options(parser):

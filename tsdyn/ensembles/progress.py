@@ -2,7 +2,7 @@
 
 import sys
 
-from ..errors import InvalidArgument, MissingDependency
+from ..simulation.progress import bar_class
 
 
 class CaseProgress:
@@ -22,12 +22,8 @@ class CaseProgress:
         self.count, self.done, self._bar, self._tell = count, done, None, None
         if callable(progress):
             self._tell = progress
-        elif progress is True:
-            self._bar = _bar(count, done)
         elif progress not in (None, False):
-            raise InvalidArgument(
-                f"progress must be True, False, None or a function of the fraction done, got {progress!r}."
-            )
+            self._bar = bar_class(progress)(total=count, initial=done, unit=" cases", file=sys.stderr)
 
     def __call__(self, cases):
         """So many more cases are finished."""
@@ -41,13 +37,3 @@ class CaseProgress:
         """It has ended."""
         if self._bar is not None:
             self._bar.close()
-
-
-def _bar(count, done):
-    try:
-        from tqdm.auto import tqdm
-    except ImportError as error:
-        raise MissingDependency(
-            "progress=True needs tqdm: pip install 'tsdyn[progress]'; or pass a function of the fraction done."
-        ) from error
-    return tqdm(total=count, initial=done, unit=" cases", file=sys.stderr)

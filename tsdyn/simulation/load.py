@@ -62,7 +62,7 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
         if scene is not None:
             raise InvalidArgument("scene= is for solutions; a scene file holds its own.")
         return scene_file(path, allow_code)[0]
-    from .saved_solutions import SUFFIXES
+    from ..storage.formats import SUFFIXES
     from .saved_solutions import load as load_solution
 
     if suffix not in SUFFIXES:

@@ -10,12 +10,8 @@ def _silent(fraction, *more):
     """Report nothing."""
 
 
-def reporter(progress):
-    """Return a function that receives the fraction done (None at the end), the time reached, s, and the steps."""
-    if progress is None or progress is False:
-        return _silent
-    if callable(progress):
-        return lambda fraction, *more: None if fraction is None else progress(min(max(float(fraction), 0.0), 1.0))
+def bar_class(progress):
+    """Return the class of bars, progress being no function and not off; refuse what isn't True."""
     if progress is not True:
         raise InvalidArgument(
             f"progress must be True, False, None or a function of the fraction done, got {progress!r}."
@@ -26,6 +22,16 @@ def reporter(progress):
         raise MissingDependency(
             "progress=True needs tqdm: pip install 'tsdyn[progress]'; or pass a function of the fraction done."
         ) from error
+    return tqdm
+
+
+def reporter(progress):
+    """Return a function that receives the fraction done (None at the end), the time reached, s, and the steps."""
+    if progress is None or progress is False:
+        return _silent
+    if callable(progress):
+        return lambda fraction, *more: None if fraction is None else progress(min(max(float(fraction), 0.0), 1.0))
+    tqdm = bar_class(progress)
     form = "{desc}{percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
     bars, begun = [], []  # made at the first report: a refused run shows none
 

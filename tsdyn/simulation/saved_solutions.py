@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 LOGS = {"steps": "_step_log", "charts": "_chart_log"}
 SETTINGS = ("rtol", "atol", "step", "max_step")
-SUFFIXES = (".h5", ".hdf5", ".nc", ".zarr")
 
 
 def provenance(solution: Solution) -> dict[str, Any]:

@@ -31,6 +31,8 @@ from typing import NamedTuple
 
 from ..errors import InvalidArgument, MissingDependency, StorageError
 
+HDF5, ZARR = (".h5", ".hdf5", ".nc"), (".zarr",)  # suffixes of paths
+SUFFIXES = *HDF5, *ZARR
 CHUNK, LONGEST = 1 << 15, 1 << 14  # floats of a chunk, and rows at most
 
 
@@ -76,9 +78,9 @@ def reading(path):
 def format_of(path):
     """The module of a path's format, by its suffix; raises InvalidArgument or MissingDependency."""
     suffix = Path(path).suffix.lower()
-    if suffix in (".h5", ".hdf5", ".nc"):
+    if suffix in HDF5:
         module, library = "hdf5", "h5py"
-    elif suffix == ".zarr":
+    elif suffix in ZARR:
         module, library = "zarr_folder", "zarr"
     else:
         raise InvalidArgument(f"store must end in .zarr, .h5, .hdf5 or .nc, which say its format, got {str(path)!r}.")

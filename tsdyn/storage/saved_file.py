@@ -14,18 +14,18 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidArgument, StorageError
-from .formats import format_of
+from .formats import SUFFIXES, format_of
 
 FORMAT, VERSION = "tsdyn solution", 1
 GROUP, RECORD = "run", "record"
 ROWS = 1 << 14  # at a time
-SUFFIXES = ".h5, .hdf5, .nc or .zarr"
 
 
 def format_at(path):
     """The module of the format of a path; raises InvalidArgument or MissingDependency."""
-    if Path(path).suffix.lower() not in (".h5", ".hdf5", ".nc", ".zarr"):
-        raise InvalidArgument(f"a solution is saved to a path that ends in {SUFFIXES}, got {str(path)!r}.")
+    if Path(path).suffix.lower() not in SUFFIXES:
+        ends = f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
+        raise InvalidArgument(f"a solution is saved to a path that ends in {ends}, got {str(path)!r}.")
     return format_of(path)
 
 

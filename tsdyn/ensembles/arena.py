@@ -5,7 +5,6 @@ change more (an axis without inertia, a scene of micrometres) isn't run here; it
 same bits.
 """
 
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,7 +17,7 @@ from ..model.packed import System
 from ..parameters.edit import KEPT
 from ..runs.task import Task
 from ..simulation import method_choice
-from ..simulation.simulate import run_task, simulate
+from ..simulation.simulate import run_task
 from ..sparse.graph_builder import weights
 from ..sparse.massless_axes import lean_bodies
 from ..taylor.run_memory import are_unequal
@@ -164,7 +163,9 @@ class Arena:
             return None
         study, (memory, (q, qd)) = self.study, found
         options, settings, method = study.options, study.options.settings, study.method
-        choose = partial(_implicit_is_faster, scene, study, method) if study.given["integrator"] is None else None
+        choose = None
+        if study.given["integrator"] is None:
+            choose = method_choice.turns_of(self.scene, self.kept, method, options)
         task = Task(
             self.kept, method, settings.form, options.span, q, qd, memory, options.times, settings.dense_output,
             options.events, settings.constraint_tol, settings.max_steps, settings.chart_interval or 0, study.report,
@@ -183,11 +184,6 @@ def method_of(kept, options, default):
     if method is None:
         method = method_choice.explicit(kept, *default)
     return method if settings.max_step is None else frozen(method.bounded(settings.max_step))
-
-
-def _implicit_is_faster(scene, study, method, run):
-    given = {**study.given, "scene": scene()}
-    return method_choice.implicit_is_faster(simulate, given, method, study.options.span[1], run)
 
 
 def _moments(system):

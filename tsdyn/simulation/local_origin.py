@@ -84,15 +84,7 @@ def run_near(driver, task, scene, origin, tol):
     if task.archive is not None:
         task.archive.shift = shift
     watched = task.events and [each._replace(function=_away(each.function, packed, shift)) for each in task.events]
-    outcome = driver(
-        task._replace(
-            prepared=local,
-            q=q,
-            qd=qd,
-            events=watched,
-            choose=task.choose and (lambda run: task.choose(run._replace(now=run.now + [[1.0], [0.0], [0.0]] * shift))),
-        )
-    )
+    outcome = driver(task._replace(prepared=local, q=q, qd=qd, events=watched))
     rows, last, events = outcome.rows, outcome.last.copy(), outcome.events
     if task.archive is None:
         rows = rows.copy()

@@ -53,6 +53,10 @@ class Starts:
         self._known = q, found
         return found
 
+    def kernel(self):
+        """As of `RegularStarts`, once a start has been checked."""
+        return self._regular.kernel()
+
     def _started(self, q, qd, t, tol):
         """A start as `consistent` returns it; None if it must be looked at in a scene of its own."""
         arena, derived = self._arena, self._arena.packed.derived

@@ -44,7 +44,9 @@ class Batch:
     def serves(arena):
         """Whether Python has nothing to do between the cases of an arena."""
         packed, pen, state = arena.packed, arena.pen, arena.study.given["state"]
-        if DEBUG or pen is None or packed.derived.redundant is not None:
+        if DEBUG or pen is None:
+            return False
+        if packed.derived.redundant is not None and (pen.moves or pen.written & OF_ROWS):  # they are selected anew
             return False
         moved = still(packed).bodies.size or packed.system.memory.size or not arena.kept.handles.begin_at_zero
         return not (pen.moves and (moved or state is not None))

@@ -67,8 +67,7 @@ class Starts:
         if arena.kept.packed.coordinates is not arena.base.coordinates:
             return None
         if derived.redundant is None:
-            started = consistent(arena.scene, arena.packed.system, q, qd, t, tol, True)
-            return None if derived.redundant is None else started
+            return consistent(arena.scene, arena.packed.system, q, qd, t, tol, True)
         if self._redundant is None:
             self.others = [self._with_redundant(rows) for rows in (None, np.zeros(0, np.int64))]
             self._redundant = RedundantStarts([*self.others, arena.scene], q, qd, t, tol)

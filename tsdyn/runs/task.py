@@ -16,8 +16,10 @@ from .history import ChartLog, StepLog
 
 def between(times, span):
     """Whether there are times between the ends of a span."""
-    start, end = span
-    return times.size > 2 or any([start < t < end for t in times.tolist()])  # a list: faster for two
+    if times.size > 2:
+        return True
+    (start, end), listed = span, times.tolist()  # a list: faster for two
+    return bool(listed) and (start < listed[0] < end or start < listed[-1] < end)
 
 
 class Task(NamedTuple):
@@ -51,8 +53,7 @@ class Task(NamedTuple):
     @property
     def within(self):
         """True if output between the ends of steps is requested."""
-        times = self.times
-        return self.dense_output or self.events is not None or (times.size > 0 and between(times, self.span))
+        return self.dense_output or self.events is not None or between(self.times, self.span)
 
 
 class Outcome(NamedTuple):

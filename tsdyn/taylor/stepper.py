@@ -45,7 +45,7 @@ def _stand(context, c, r, log, t):
     copy(c.expansion.low_end, c.expansion.low)
     status = 0
     if c.trial.singular == 0:
-        call_expand(r.kernels.expand, context, 0)
+        call_expand(r.kernels.expand, context, 0, 1)
         status = hold_accelerations(c, t)
     if not is_finite(w.qdd):
         return NOT_FINITE
@@ -81,8 +81,7 @@ def _expand(context, c, r):
     """The series of the next step, order by order."""
     order = c.expansion.order
     order.top = order.next
-    for k in range(1, order.top):
-        call_expand(r.kernels.expand, context, k)
+    call_expand(r.kernels.expand, context, 1, order.top)
     c.work.counters.evaluations += order.top
 
 

@@ -145,6 +145,20 @@ WRONG = {
 }
 
 
+@pytest.mark.slow_for("every force")
+@pytest.mark.parametrize("which", SCENES)
+def test_a_scene_that_ran_has_the_bits_of_a_new_one_after_its_start_has_changed(which):
+    scene = SCENES[which]()
+    before = outcome(lambda: scene)
+    for body in scene.bodies:
+        body.velocity = 0.9 * body.velocity
+        if hasattr(body, "inertia"):
+            body.angular_velocity = 0.9 * body.angular_velocity
+    after = outcome(lambda: scene)
+    assert after == outcome(scene.copy)
+    assert after != before or not np.any(scene.start[1])
+
+
 @pytest.mark.parametrize("name", WRONG)
 def test_wrong_values_are_refused_as_when_they_are_set(name):
     scene = ts.Scene()

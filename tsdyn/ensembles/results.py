@@ -133,7 +133,7 @@ class Ensemble:
 
         study = self._study
         given = {name: value for name, value in study.given.items() if name != "scene"}
-        return simulate(study.scene.with_parameters(study.cases.values(int(i) % len(self))), **given)
+        return simulate(study.scene.with_parameters(study.values(int(i) % len(self))), **given)
 
     @property
     def coordinates(self) -> list[str]:

@@ -125,6 +125,83 @@ def test_a_value_that_is_no_number_is_packed_anew():
     assert outcome(scene.with_parameters, values) == outcome(set_one_by_one, scene, values)
 
 
+def lift(t, *, height=0.1, rate=2.0):
+    return 1.0 + height * np.cos(rate * t)
+
+
+def pull(t, *, size=3.0):
+    return 0.0, 0.0, size * np.cos(t)
+
+
+class Hold:
+    """Not a plain function: no keywords of its own are listed."""
+
+    def __call__(self, t, angle, rate, *, gain=1.0):
+        return -gain * rate
+
+
+def driven_by_functions():
+    scene = ts.Scene(gravity=(0, 0, -10))
+    bob = scene.add_point_mass(1.0, position=(1.1, 0, 0), name="bob")
+    scene.add(ts.constraints.Distance(bob, scene.ground, length=lift, name="rod"))
+    scene.add(ts.forces.PointForce(bob, force=pull, name="wind"))
+    wheel = scene.add_body(1.0, (1, 1, 2), name="wheel")
+    hinge = scene.add(ts.constraints.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1), name="hinge"))
+
+    def controller(t, angle, rate, *, goal=1.0, gain=50.0):
+        return gain * (goal - angle) - 20.0 * rate
+
+    scene.add(ts.forces.JointTorque(hinge, function=controller, period=0.01, name="drive"))
+    scene.add(ts.forces.JointTorque(hinge, function=Hold(), period=0.01, name="hold"))
+    return scene
+
+
+@pytest.mark.parametrize("method", [None, "dop853"])
+def test_keyword_arguments_of_users_functions_are_parameters(method):
+    scene = driven_by_functions()
+    numbers = {name: value for name, value in scene.parameters().items() if name.count(".") == 2}
+    assert numbers == {
+        "rod.length.height": 0.1, "rod.length.rate": 2.0, "wind.force.size": 3.0,
+        "drive.function.goal": 1.0, "drive.function.gain": 50.0,
+    }  # fmt: skip
+    other = scene.with_parameters({"rod.length.rate": 1.0, "wind.force.size": 5.0, "drive.function.goal": -1.0})
+    built = scene.copy()
+    built["rod"].length = lambda t: 1.0 + 0.1 * np.cos(1.0 * t)
+    built["wind"].force = lambda t: (0.0, 0.0, 5.0 * np.cos(t))
+    built["drive"].function = lambda t, angle, rate: 50.0 * (-1.0 - angle) - 20.0 * rate
+    one, same = (ts.simulate(each, (0.0, 0.5), integrator=method).state.q for each in (other, built))
+    np.testing.assert_allclose(one, same, rtol=0.0, atol=1e-10)
+    assert other.parameters()["rod.length.rate"] == 1.0
+    back = other.with_parameters({"rod.length.rate": 2.0, "wind.force.size": 3.0, "drive.function.goal": 1.0})
+    assert outcome(lambda: back) == outcome(lambda: scene)
+
+
+def test_an_ensemble_over_a_number_of_a_function():
+    scene = driven_by_functions()
+    found = ts.ensemble(scene, {"wind.force.size": [0.0, 3.0, 6.0], "rod.length.rate": [1.0, 2.0, 3.0]}, (0.0, 0.1))
+    assert found.success.all(), found.message
+    assert found.q[1].tobytes() == ts.simulate(scene, (0.0, 0.1)).state.q.tobytes()
+    assert len({row.tobytes() for row in found.q}) == 3
+
+
+def jumps(t, *, size=1.0):
+    return size if t > 0.5 else 0.0
+
+
+@pytest.mark.parametrize("wrong", ["value", "name", "branch"])
+def test_wrong_numbers_of_functions(wrong):
+    scene = driven_by_functions()
+    if wrong == "branch":
+        with pytest.raises(ts.TsdynError, match=r"without branches .*it compares"):
+            ts.forces.Spring(scene["bob"], scene.ground, stiffness=1.0, actuator=jumps)
+        return
+    given = {"wind.force.size": np.nan} if wrong == "value" else {"wind.force.sise": 1.0}
+    with pytest.raises(
+        ts.InvalidArgument, match="finite number" if wrong == "value" else "did you mean wind.force.size"
+    ):
+        scene.with_parameters(given)
+
+
 def test_it_can_be_pickled_copied_and_assembled():
     scene = top.build()
     changed = scene.with_parameters({f"{scene.bodies[0].name}.mass": 20.0})

@@ -108,9 +108,7 @@ class Metric:
         p, angle = q[self.p], np.linalg.norm(w, axis=1)[:, None]
         sine = np.sinc(angle / (2.0 * np.pi)) / 2.0  # sin(angle / 2) / angle
         turned = np.cos(angle / 2.0) * p + sine * np.einsum("bij,bi->bj", _transforms(p), w)
-        q[self.p] = np.where(
-            angle > 0.0, turned / np.linalg.norm(turned, axis=1)[:, None], p
-        )  # rest keeps its bits
+        q[self.p] = np.where(angle > 0.0, turned / np.linalg.norm(turned, axis=1)[:, None], p)  # rest keeps its bits
         return q
 
     def largest_turn(self, x):

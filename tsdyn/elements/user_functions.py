@@ -68,9 +68,11 @@ def kernels_of(kind, function):
 
 
 def arguments_of(function):
-    """The number of arguments of a plain Python function; 0 for anything else."""
+    """The number of arguments of a plain Python function without keyword-only ones; 0 for anything else."""
     plain = getattr(function, "py_func", function)
-    return plain.__code__.co_argcount if isinstance(plain, FunctionType) else 0
+    if not isinstance(plain, FunctionType) or plain.__code__.co_kwonlyargcount:
+        return 0
+    return plain.__code__.co_argcount
 
 
 @kernel

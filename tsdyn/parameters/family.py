@@ -93,7 +93,9 @@ class Family:
         edit, groups = Edit(self), {}
         for name, value in values.items():
             field = self.field(name)
-            groups.setdefault(id(field.owner), (field.owner, {}))[1][field.attribute] = value
+            owner, changes = groups.setdefault(id(field.owner), (field.owner, {}))
+            present = changes.get(field.attribute) if field.attribute in changes else getattr(owner, field.attribute)
+            changes[field.attribute] = field.entered(value, present)
         for owner, changes in groups.values():
             if not edit.enter(owner, changes):
                 return None

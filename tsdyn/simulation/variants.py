@@ -197,8 +197,9 @@ def _made(family, changes):
     template, packed = family.template, family.packed
     twin = template.copy()
     for name, value in changes.items():
-        owner, attribute, _ = family.field(name)
-        setattr(twin if owner is template else twin[owner], attribute, value)
+        field = family.field(name)
+        owner = twin if field.owner is template else twin[field.owner]
+        setattr(owner, field.attribute, field.entered(value, getattr(owner, field.attribute)))
     known = (*packed.bodies, *(member.constraint for member in packed.members), *(load.force for load in packed.loads))
     owners = (*template.bodies, *template.constraints, *template.forces)
     pairs = {one: twin[owner] for one, owner in zip(known, owners, strict=True)}

@@ -20,10 +20,12 @@ MOVED = {"position": 0, "velocity": 1}  # attributes that are three numbers of q
 
 
 def pen_of(arena, names):
-    """The `Pen` for these parameters of all cases; None if there is one of a constraint, or none at all."""
+    """The `Pen` for these parameters of all cases; None if there is one of a constraint or function, or none at all."""
     family, owners = arena.study.family, {}
     for name in names:
         field = family.field(name)
+        if field.keyword:
+            return None
         owners.setdefault(id(field.owner), (field.owner, []))[1].append((name, field.attribute))
     bodies = (PointMass, type(family.template))
     if any(not isinstance(owner, bodies) and family.load_of(owner) is None for owner, _ in owners.values()):

@@ -32,7 +32,7 @@ class Field(NamedTuple):
         """The present value: a float, a read-only array, or what else the attribute is."""
         value = getattr(self.owner, self.attribute)
         if self.keyword:
-            return numbers_of(function_of(self.owner, value))[self.keyword]
+            return numbers_of(function_of(value))[self.keyword]
         if isinstance(value, Motion) and isinstance(value.smooth, Constant):
             return value.value(0.0)[0]
         return float(value) if isinstance(value, np.floating) else value
@@ -42,7 +42,7 @@ class Field(NamedTuple):
         if not self.keyword:
             return value
         what = f"{self.owner.name}.{self.attribute}.{self.keyword}"
-        function = present if isinstance(present, FunctionType) else function_of(self.owner, present)
+        function = present if isinstance(present, FunctionType) else function_of(present)
         return with_number(function, self.keyword, value, what)
 
     @property
@@ -66,18 +66,18 @@ def fields_of(scene):
             if name in found:
                 several.add(name)
             found[name] = Field(owner, attribute, units.get(attribute, ""))
-            for keyword in numbers_of(function_of(owner, getattr(owner, attribute))):
+            for keyword in numbers_of(function_of(getattr(owner, attribute))):
                 found[f"{name}.{keyword}"] = Field(owner, attribute, "", keyword)
     return {name: field for name, field in found.items() if name not in several}
 
 
-def function_of(owner, value):
-    """The user's function of time that a motion or load is, or one that is sampled; else None."""
+def function_of(value):
+    """The user's function that a motion or load is; None for anything else."""
     if isinstance(value, Motion):
         return value.given[0] if len(value.given) == 1 else None
     if isinstance(value, Signal):
         return value.source if value.is_function else None
-    return value if isinstance(value, FunctionType) and getattr(owner, "period", None) is not None else None
+    return value if isinstance(value, FunctionType) else None
 
 
 @cache

@@ -58,7 +58,8 @@ def by_python(monkeypatch):
 
 def compare(scene, table, found, **options):
     for i in range(CASES):
-        solution = ts.simulate(scene.with_parameters({name: array[i] for name, array in table.items()}), SPAN, **options)
+        case = scene.with_parameters({name: array[i] for name, array in table.items()})
+        solution = ts.simulate(case, SPAN, **options)
         assert found.q[i].tobytes() == solution.state.q.tobytes(), i
         assert found.qd[i].tobytes() == solution.state.qd.tobytes(), i
         assert (found.message[i], found.reached[i]) == (solution.message, solution.reached)

@@ -124,8 +124,8 @@ class Arena:
         return self._batch.run(k, len(chunk.status))
 
     def _takes(self, chunk):
-        """Have the pen lay out a chunk; False if there is none."""
-        if self.pen is None:
+        """Have the pen lay out a chunk; False if there is none, or the chunk has no values for it."""
+        if self.pen is None or chunk.values is None:
             return False
         if chunk is not self._chunk:
             self._chunk = chunk

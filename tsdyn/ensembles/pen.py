@@ -26,10 +26,12 @@ class Place(NamedTuple):
 
 
 def pen_of(arena, names):
-    """The `Pen` for these parameters of all cases; None if there is one of a constraint, or none at all."""
+    """The `Pen` for these parameters of all cases; None if there is one of a constraint or function, or none at all."""
     family, owners = arena.study.family, {}
     for name in names:
         field = family.field(name)
+        if field.keyword:
+            return None
         owners.setdefault(id(field.owner), (field.owner, {}))[1][field.attribute] = name
     bodies = (PointMass, type(family.template))
     if any(not isinstance(owner, bodies) and family.load_of(owner) is None for owner, _ in owners.values()):

@@ -167,7 +167,12 @@ def _move_on(context, c, r, log, t1):
 @entry("pp", no_log(), "i")
 def advance_series(context, run, log, most):
     """Make up to `most` steps, as `stepper.advance` does; context is the address of a `SeriesContext`. Status."""
-    c, r = load_series(context), load_run(run)
+    return advance_by_series(context, load_series(context), load_run(run), log, most)
+
+
+@kernel
+def advance_by_series(context, c, r, log, most):
+    """As `advance_series`, for kernels that call it."""
     adaptive, status = r.numbers.adaptive == 1, 0
     if r.numbers.begun == 0 and most != 0:
         status = _enter(context, c, r, log)

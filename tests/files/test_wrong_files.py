@@ -49,7 +49,16 @@ assemble = true
 [run]
 end = 1.0
 method = { type = "RK45", rtol = 1e-9 }
+[ensemble]
+cases = 3
+assemble = ["bob"]
+[ensemble.parameters]
+"arm.mass" = { uniform = [1, "4 * length"] }
+"hinge.point_a" = [0, 0, 0]
+[output]
+files = ["a.h5"]
 """
+SPREAD, POINT = 'uniform = [1, "4 * length"]', '"hinge.point_a" = [0, 0, 0]'
 INERTIA = "mass = 2\ninertia = [0.1, 0.2, 0.1]"
 WRONG = {  # name: (what is replaced, by what, line, words of the message)
     "no TOML": ("[[body]]\nname = \"arm\"", "[[body]\nname = \"arm\"", 5, ("no TOML",)),
@@ -120,6 +129,27 @@ WRONG = {  # name: (what is replaced, by what, line, words of the message)
     "unknown method": ('"RK45"', '"RK54"', 40, ("RK45",)),
     "argument of a method": ("rtol = 1e-9", "rtoll = 1e-9", 40, ("rtoll", "did you mean rtol")),
     "tolerance of a method": ("rtol = 1e-9", "rtol = -1e-9", 40, ("positive",)),
+    "unknown parameter": ('"arm.mass" =', '"arm.mas" =', 45, ("did you mean arm.mass")),
+    "unknown spread": ("uniform", "unifrm", 45, ("{ uniform = [low, high] }",)),
+    "spread of three": (SPREAD, "uniform = [1, 2, 3]", 45, ("two values",)),
+    "spread of text": (SPREAD, 'uniform = [1, "two"]', 45, ("unknown name", "'two'")),
+    "negative deviation": (SPREAD, "normal = [1, -1]", 45, ("must not be negative",)),
+    "spread of a motion": (SPREAD, 'uniform = [1, "2 + t"]', 45, ("depends on the time",)),
+    "shape of a parameter": (POINT, '"hinge.point_a" = [0, 0]', 46, ("(3,)",)),
+    "ragged cases": (POINT, '"hinge.point_a" = [[0, 0, 0], [0, 0]]', 46, ("different lengths",)),
+    "infinite case": (POINT, '"bob.mass" = [1, inf, 2]', 46, ("finite",)),
+    "numbers of cases": (POINT, '"bob.mass" = [1, 2]', 41, ("bob.mass 2", "cases 3")),
+    "no cases": ("cases = 3\n", "", 41, ("cases = 100",)),
+    "cases is text": ("cases = 3", 'cases = "3"', 42, ("whole number from 1 on",)),
+    "too many cases": ("cases = 3", "cases = 100000000", 42, ("at most",)),
+    "body to assemble": ('["bob"]', '["bobb"]', 43, ("names of bodies",)),
+    "grid is a number": ("cases = 3", "grid = 3", 42, ("true or false",)),
+    "keep": ("cases = 3", 'keep = "last"', 42, ("'t_eval'",)),
+    "nothing varies": ("[ensemble.parameters]", "[ensemble.parmeters]", 44, ("'parmeters'", "parameters?")),
+    "output above": ('["a.h5"]', '["../a.h5"]', 48, ("below the working folder",)),
+    "output elsewhere": ('["a.h5"]', '["/etc/a.h5"]', 48, ("below the working folder",)),
+    "output is text": ('["a.h5"]', '"a.h5"', 48, ("list of paths",)),
+    "key of the output": ("files =", "file =", 48, ("'file'", "files")),
     "unknown option": ("end = 1.0\n", "end = 1.0\nto = 3\n", 40, ("'to'",)),
 }  # fmt: skip
 

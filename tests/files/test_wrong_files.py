@@ -1,12 +1,18 @@
 """Wrong scene files: every mistake at once, each with its line and what to write; fuzzed files never crash."""
 
+import os
 import re
+import signal
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tsdyn as ts
 from tsdyn.files.starting_file import TEXT
+
+ROOT = Path(__file__).parents[2]
 
 RIGHT = """\
 version = 1
@@ -268,24 +274,62 @@ def fuzzed(rng, text):
     return bytes(data)
 
 
+FORBIDDEN = ("os.system", "subprocess.Popen", "os.exec", "os.posix_spawn", "os.remove", "os.rename", "socket.connect")
+watched = []  # the folder that files are read from, while they are
+
+
+def watch(event, arguments):
+    """An audit hook: while a file is read, nothing is started, removed or written."""
+    if watched and (event in FORBIDDEN or (event == "open" and isinstance(arguments[1], str) and "w" in arguments[1])):
+        raise AssertionError(f"{event} {arguments}")
+
+
+def hanging(number, frame):
+    raise AssertionError("a file takes a minute")
+
+
+@pytest.fixture
+def watching():
+    if not hasattr(watch, "added"):
+        watch.added = sys.addaudithook(watch)
+    yield
+    watched.clear()
+
+
 def fuzz(seeds, folder):
-    wrong = 0
+    """How many of the files are refused; every error but a TsdynError, and every side effect, fails."""
+    wrong, texts = 0, (RIGHT, TEXT, (ROOT / "examples" / "four_bar.toml").read_text())
+    path, before = folder / "scene.toml", signal.signal(signal.SIGALRM, hanging)
     for seed in seeds:
-        rng = np.random.default_rng(seed)
-        text = fuzzed(rng, RIGHT if seed % 2 else TEXT)
+        text = fuzzed(np.random.default_rng(seed), texts[seed % len(texts)])
+        path.write_bytes(text)
+        watched.append(folder)
+        signal.alarm(60)
         try:
-            load(text, folder)
+            ts.load(path)
         except ts.TsdynError:
             wrong += 1
         except BaseException as error:
             raise AssertionError(f"seed {seed}: {type(error).__name__}: {error}\n{text!r}") from error
+        finally:
+            signal.alarm(0)
+            watched.clear()
+    signal.signal(signal.SIGALRM, before)
     return wrong
 
 
-def test_fuzzed_files(tmp_path):
+def test_the_watch_sees_what_a_file_must_not_do(watching, tmp_path):
+    watched.append(tmp_path)
+    with pytest.raises(AssertionError, match=r"os\.system"):
+        os.system("true")
+    with pytest.raises(AssertionError, match="open"):
+        (tmp_path / "made").write_text("")
+
+
+def test_fuzzed_files(watching, tmp_path):
     assert fuzz(range(150), tmp_path) > 75
 
 
 @pytest.mark.slow
-def test_many_fuzzed_files(tmp_path):
+def test_many_fuzzed_files(watching, tmp_path):
     assert fuzz(range(1000, 11000), tmp_path) > 5000

@@ -67,8 +67,8 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
         Where the cases run, in place of threads of this process. They are sent in chunks, and chunks of a worker that
         Dask has lost are sent again.
     threads : int, optional
-        Threads of this process. By default one where cases are so short that threads wait for each other, else one a
-        processor. The bits are the same.
+        Threads of this process. By default one where all cases together are short, else one a processor. The bits are
+        the same.
     lanes : int, optional
         Cases that one thread runs at once: 1.
     store : str or PathLike, optional

@@ -60,7 +60,16 @@ class Study:
         if self.names is not None and free is not None:
             self.names |= start_names(self.kept.packed)
         self.has_arena = settings.drop and serves(self.family, self.kept, self.names)
-        self.stopped, self.idle = False, []  # runners of the threads of an executor
+        self.halt, self.idle = np.zeros(1, np.int64), []  # runners of the threads of an executor
+
+    @property
+    def stopped(self):
+        """Whether the ensemble ends: loops of cases see it, too."""
+        return bool(self.halt[0])
+
+    @stopped.setter
+    def stopped(self, whether):
+        self.halt[0] = whether
 
     def __reduce__(self):
         """What is analysed is analysed again in another process."""
@@ -87,26 +96,50 @@ class Study:
             raise KeyboardInterrupt
 
 
+class Room(NamedTuple):
+    """A chunk of cases, and arrays for their results."""
+
+    first: int
+    values: dict  # name -> (k, ...); None where arenas take none
+    status: np.ndarray
+    arrays: dict
+
+
 class Runner:
     """Runs cases of a `Study`; for one thread."""
 
     def __init__(self, study):
         self.study, self._arenas = study, []
 
-    def run(self, i):
-        """The `Record` of case i."""
+    def room(self, first, status, arrays):
+        """The `Room` of the cases from `first` on."""
+        study, values = self.study, None
+        if study.has_arena and study.names is not None and study.free is None:
+            given = {**study.changes, **study.cases.fixed}
+            values = {name: _repeated(value, len(status)) for name, value in given.items()}
+            part = slice(first, first + len(status))
+            values |= {name: column[part] for name, column in study.cases.columns.items()}
+        return Room(first, values, status, arrays)
+
+    def run_many(self, room, k):
+        """Run cases from k on that need no Python; the first that was not run."""
+        return self._arenas[0].run_cases(room, k) if self._arenas else k
+
+    def run(self, room, k):
+        """The `Record` of case k of a chunk."""
         try:
-            return self._run(self.study.values(i))
+            return self._run(room, k)
         except TsdynError as error:
             return Record(Status.CASE_FAILED, str(error), {})
         except Exception as error:  # of a user's function: the other cases go on
             return Record(Status.CASE_FAILED, f"{type(error).__name__}: {error}", {})
 
-    def _run(self, values):
+    def _run(self, room, k):
         study = self.study
+        values = study.values(room.first + k)
         changes = {**study.changes, **values} if study.changes else values
         if study.has_arena:
-            ran = self._in_arena(lambda arena: arena.run_values(changes, lambda: self._scene(changes)))
+            ran = self._in_arena(lambda arena: arena.run_case(room, k, lambda: self._scene(changes)))
             if ran is not None:
                 return self._record(changes, *ran)
         found = study.family.numbers(changes)
@@ -171,6 +204,13 @@ class Runner:
         if callable(study.keep):
             arrays |= reduced(study.keep, solution)
         return Record(status, message, arrays)
+
+
+def _repeated(value, count):
+    """A value for all cases as a column."""
+    array = np.asarray(value)
+    array = array.astype(float) if array.dtype.kind in "iuf" else array
+    return np.broadcast_to(array, (count, *array.shape))
 
 
 class _Rows:

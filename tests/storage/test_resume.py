@@ -156,7 +156,7 @@ def test_a_stiff_run_begins_again(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("short_slices")
-@pytest.mark.parametrize("method", ["dop853", "sdirk54"])
+@pytest.mark.parametrize("method", ["taylor", "dop853", "sdirk54"])
 def test_friction_of_joints(method, tmp_path):
     def build():
         scene = ts.Scene(gravity=(0.0, 0.0, -10.0))

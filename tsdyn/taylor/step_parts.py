@@ -52,7 +52,17 @@ def expand_far_series(context, k):
 @kernel
 def _expand(context, k, ahead):
     c = load_series(context)
-    w, x, f = c.work, c.expansion, c.tangent
+    refine = begin_order(c, k)
+    expand(c.graph, c.system, k, k > 0 and k + 1 == c.expansion.order.top, ahead, refine, c.expansion, c.tangent)
+    if k == 0:
+        write_qdd(c)
+    return 0
+
+
+@kernel
+def begin_order(c, k):
+    """Begin the series where k is zero; how many orders of lam are refined."""
+    x, f = c.expansion, c.tangent
     orders = x.order.room
     if k == 0:
         expand_motions(c.system, x)
@@ -63,14 +73,18 @@ def _expand(context, k, ahead):
     sweeps = refinements(f.indicator.start)
     if sweeps > 0 and not near:
         refine, x.order.sweeps = max(refine, ILL_ORDERS), sweeps
-    expand(c.graph, c.system, k, k > 0 and k + 1 == x.order.top, ahead, refine, x, f)
-    if k == 0:
-        for b in range(c.graph.bodies.shape[0]):
-            at = b * orders * BODY_ROW
-            put(f.a, 8 * b, times(four(x.bodies, at + S_R * orders + 8), splat(2.0)))
-            put(f.a, 8 * b + 4, four(x.bodies, at + S_OMEGA * orders + 4))
-        write_accelerations(c.graph.bodies, f.poses, f.a, w.qdd)
-    return 0
+    return refine
+
+
+@kernel
+def write_qdd(c):
+    """Qdd of the series at order zero."""
+    x, f, orders = c.expansion, c.tangent, c.expansion.order.room
+    for b in range(c.graph.bodies.shape[0]):
+        at = b * orders * BODY_ROW
+        put(f.a, 8 * b, times(four(x.bodies, at + S_R * orders + 8), splat(2.0)))
+        put(f.a, 8 * b + 4, four(x.bodies, at + S_OMEGA * orders + 4))
+    write_accelerations(c.graph.bodies, f.poses, f.a, c.work.qdd)
 
 
 @kernel

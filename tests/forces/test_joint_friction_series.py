@@ -5,7 +5,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import tsdyn as ts
-from tests.helpers.rough_joints import G, block, chain, demand_balance, four_bar, pendulum, pendulum_rates, slide
+from tests.helpers.rough_joints import (
+    G,
+    SmoothBall,
+    block,
+    chain,
+    demand_balance,
+    four_bar,
+    pendulum,
+    pendulum_rates,
+    slide,
+)
 from tests.helpers.tolerances import ALGEBRA, CLOSE, HELD, NEAR
 from tsdyn.jit.kernels import twin
 from tsdyn.testing.friction_checks import check_friction_series
@@ -115,17 +125,27 @@ def test_the_default_method_and_what_is_between_its_steps():
     np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=NEAR)
 
 
+def test_a_plug_in_with_series():
+    ts.testing.check_force(SmoothBall, states=1)
+    scene = ts.Scene()
+    body = scene.add_body(1.0, (0.1, 0.2, 0.15), position=(0.5, 0, 0), angular_velocity=(1, 2, 3))
+    body.velocity = np.cross((1, 2, 3), (0.5, 0, 0))
+    ball = scene.add(C.Spherical(body, scene.ground, point_a=(-0.5, 0, 0)))
+    scene.add(SmoothBall(ball, radius=0.05, kinetic=0.2, slip_velocity=0.01))
+    solution, other = (ts.simulate(scene, (0.0, 0.5), **given) for given in (PRECISE, STAGES))
+    np.testing.assert_allclose(solution.q[-1], other.q[-1], atol=HELD)
+
+
 def test_a_law_that_is_written_anew_has_no_series():
-    class Wet(F.ContactFriction):
+    class Wet(SmoothBall):
         @staticmethod
-        def law(x, xd, par, t, out):
-            for i in range(3):
-                out[i] = -par[-1] * par[0] * xd[i] / 100.0
+        def normal_load(x, f, par):
+            return 1.0
 
     scene = ts.Scene()
-    body = scene.add_point_mass(2.0, velocity=(1, 0, 0))
-    contact = scene.add(C.PlaneContact(body, scene.ground, normal_b=(0, 0, 1)))
-    scene.add(Wet(contact, kinetic=0.5, name="wet"))
+    body = scene.add_body(2.0, (1, 1, 1), angular_velocity=(1, 0, 0))
+    ball = scene.add(C.Spherical(body, scene.ground))
+    scene.add(Wet(ball, radius=0.1, kinetic=0.5, name="wet"))
     with pytest.raises(ts.InvalidArgument, match="Wet 'wet': Wet has no kernel `series` and `normal_series`"):
         ts.simulate(scene, (0.0, 1.0), integrator="taylor")
     assert ts.simulate(scene, (0.0, 1.0), max_steps=1).method.startswith("DOP853")

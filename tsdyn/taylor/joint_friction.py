@@ -30,7 +30,7 @@ from .coefficients import (
     turn,
     turn_ahead,
 )
-from .step_parts import begin_order, write_qdd
+from .step_parts import begin_orders, write_qdd
 from .workspace import load_series
 
 JAMMED = int(Status.JAMMED)
@@ -148,15 +148,16 @@ def expand_with_friction(graph, system, w, k, last, refine, x, f):
     return True
 
 
-@callback("pi")
-def expand_friction_series(context, k):
+@callback("pii")
+def expand_friction_series(context, start, end):
     """As `step_parts.expand_series`. Status."""
     c = load_series(context)
-    x, refine = c.expansion, begin_order(c, k)
-    last = k > 0 and k + 1 == x.order.top
-    if not expand_with_friction(c.graph, c.system, c.work, k, last, refine, x, c.tangent):
-        return JAMMED
-    if k == 0:
+    x, refine = c.expansion, begin_orders(c, start)
+    for k in range(start, end):
+        last = k > 0 and k + 1 == x.order.top
+        if not expand_with_friction(c.graph, c.system, c.work, k, last, refine, x, c.tangent):
+            return JAMMED
+    if start == 0:
         write_qdd(c)
     return 0
 

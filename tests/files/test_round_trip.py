@@ -9,17 +9,26 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 import tsdyn as ts
 from examples import (
     bead_on_surface,
+    bricard,
+    cardan_shaft,
     door,
     driven_pivot,
+    flyball_governor,
     four_bar,
     geared_pair,
+    gyroscope,
     hooke_joint,
+    peaucellier,
     pendulum_chain,
+    planetary_gear,
     plug_in_integrator,
     sarrus,
+    scotch_yoke,
     screw_press,
     slider_crank,
+    stewart_platform,
     stick_slip,
+    suspension,
     top,
     two_body_pendulum,
 )
@@ -33,8 +42,9 @@ from tsdyn.stress.random_scenes import generate
 
 ROOT = Path(__file__).parents[2]
 MODULES = (
-    bead_on_surface, door, four_bar, geared_pair, hooke_joint, pendulum_chain, plug_in_integrator, sarrus, screw_press,
-    slider_crank, stick_slip, top, two_body_pendulum,
+    bead_on_surface, bricard, cardan_shaft, door, flyball_governor, four_bar, geared_pair, gyroscope, hooke_joint,
+    peaucellier, pendulum_chain, planetary_gear, plug_in_integrator, sarrus, scotch_yoke, screw_press, slider_crank,
+    stewart_platform, stick_slip, suspension, top, two_body_pendulum,
 )  # fmt: skip
 SCENES = {module.__name__.partition(".")[2]: module.build for module in MODULES}
 GALLERY = {case.name: case.build for case in CASES if "500" not in case.name}

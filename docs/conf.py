@@ -1,0 +1,54 @@
+"""Sphinx: the site of the documentation.
+
+    python -m sphinx -W docs build/site
+
+Pages of classes and of the gallery are written into docs/reference and docs/gallery before the build; notebooks are
+executed by it.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))  # the checkout is what is documented
+
+from docs import class_pages, gallery_pages  # noqa: E402
+from tsdyn._version import __version__  # noqa: E402
+
+project = "tsdyn"
+author = "The tsdyn authors"
+version = release = __version__
+extensions = ["myst_nb"]
+exclude_patterns = ["**/.ipynb_checkpoints"]
+html_theme = "furo"
+html_title = f"tsdyn {version}"
+html_static_path = []
+myst_enable_extensions = ["deflist", "dollarmath"]
+myst_heading_anchors = 4
+nb_execution_mode = "force"
+nb_execution_timeout = 600
+nb_execution_raise_on_error = True
+suppress_warnings = ["misc.highlighting_failure"]
+BESIDE = re.compile(r"\]\(((?:\.\./)+)([\w/.-]+?)(#[\w-]+)?\)")  # links to files outside docs/
+PAGES = {"README.md": "/index.md", "CONTRIBUTING.md": "/contributing.md", "CHANGELOG.md": "/changelog.md"}
+
+
+def within_site(app, name, source):
+    """Lead links to files beside docs/ to the pages that show these files."""
+
+    def page(match):
+        path, anchor = match[2], match[3] or ""
+        example = re.fullmatch(r"examples/(\w+)\.py", path)
+        if example:
+            return f"](/gallery/{example[1]}.md)"
+        return f"]({PAGES[path]}{anchor})" if path in PAGES else match[0]
+
+    source[0] = BESIDE.sub(page, source[0])
+
+
+def setup(app):
+    """Write the pages that are made from the code."""
+    class_pages.write(HERE / "reference")
+    gallery_pages.write(HERE / "gallery")
+    app.connect("source-read", within_site)

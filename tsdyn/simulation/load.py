@@ -16,26 +16,27 @@ from .stored_runs import demand_path
 if TYPE_CHECKING:
     from ..hints import Place
 
-READS = ".toml (a scene), .h5, .hdf5, .nc or .zarr (a solution)"
+READS = ".toml (a scene), .h5, .hdf5, .nc or .zarr (a solution or an ensemble)"
+LOADERS = {}  # of files of packages above: by the name of the format, a function of path, scene and allow_code
 
 
 @fitting
 def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -> Any:
-    """Return the scene or the solution of a file; nothing in it is executed.
+    """Return the scene, solution or ensemble of a file; nothing in it is executed.
 
     Parameters
     ----------
     path : str or PathLike
-        A scene file (.toml), or a solution (.h5, .hdf5, .nc, .zarr) that `Solution.save` has written.
+        A scene file (.toml), or a solution or ensemble (.h5, .hdf5, .nc, .zarr) that its method `save` has written.
     scene : Scene, optional
-        That of a solution whose file holds none, because the scene has functions or classes of your own.
+        That of a solution or ensemble whose file holds none, because the scene has functions or classes of your own.
     allow_code : bool
         Whether modules that a file names as those of plug-ins may be imported. Plug-ins that have been imported
         before are found anyway.
 
     Returns
     -------
-    Scene or Solution
+    Scene, Solution or Ensemble
 
     Raises
     ------
@@ -63,10 +64,14 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
             raise InvalidArgument("scene= is for solutions; a scene file holds its own.")
         return scene_file(path, allow_code)[0]
     from ..storage.formats import SUFFIXES
+    from ..storage.saved_file import kind_of
     from .saved_solutions import load as load_solution
 
     if suffix not in SUFFIXES:
         raise InvalidArgument(f"load reads files that end in {READS}, got {str(path)!r}.")
+    loader = LOADERS.get(kind_of(Path(path)))
+    if loader is not None:
+        return loader(path, scene, allow_code)
     return load_solution(path, scene, allow_code, (Scene, Solution))
 
 

@@ -6,12 +6,14 @@ Pages of classes and of the gallery are written into docs/reference and docs/gal
 executed by it.
 """
 
+import os
 import re
 import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))  # the checkout is what is documented
+sys.path.insert(0, str(HERE.parent))  # the checkout is what is documented, in the processes of notebooks, too
+os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
 
 from docs import class_pages, gallery_pages  # noqa: E402
 from tsdyn._version import __version__  # noqa: E402

@@ -47,6 +47,15 @@ def within_site(app, name, source):
         return f"]({PAGES[path]}{anchor})" if path in PAGES else match[0]
 
     source[0] = BESIDE.sub(page, source[0])
+    if name == "index":
+        source[0] = with_every_page(source[0])
+
+
+def with_every_page(index):
+    """The index, with pages that it doesn't name listed after plug-ins."""
+    named = {line.strip() for line in index.splitlines()}
+    others = [file.stem for file in sorted(HERE.glob("*.md")) if file.stem not in named | {"index"}]
+    return index.replace("\nplug-ins\n", "\n" + "\n".join(["plug-ins", *others]) + "\n", 1)
 
 
 def setup(app):

@@ -22,6 +22,7 @@ class Entry(NamedTuple):
     at: tuple[float, ...] = (0.0, 1.0)  # fractions of the time at which the scene is painted
     build: str = "build"
     run: Callable | None = None  # module -> Solution, where it is not a run of build()
+    shapes: dict | None = None  # of bodies, by name, where the derived ones hide the mechanism
     draw: Callable | None = None  # (module, figure), where there is no scene to paint
 
     @property
@@ -36,6 +37,22 @@ class Entry(NamedTuple):
         times = np.linspace(0.0, self.end, OUTPUTS)
         build = getattr(self.module, self.build)
         return ts.simulate(build(), (0.0, self.end), t_eval=times, dense_output=True).raise_if_failed()
+
+
+S = ts.shapes
+CAR = {
+    "chassis": S.Box((0.3, 0.08, 0.62), position=(0.0, 0.3, 0.45)),
+    "upright": [S.Cylinder(0.28, 0.18, axis="y", position=(0.0, 0.12, 0.0)), S.Box((0.05, 0.05, 0.3))],
+    "lower": S.Box((0.12, 0.4, 0.03)),
+    "upper": S.Box((0.08, 0.27, 0.03)),
+}
+YOKE = {"wheel": S.Cylinder(0.115, 0.005, axis="z", position=(0, 0, -0.01))}
+GOVERNOR = {
+    "shaft": S.Cylinder(0.012, 0.65, axis="z", position=(0.0, 0.0, -0.27)),
+    "sleeve": S.Cylinder(0.05, 0.08, axis="z"),
+    "left": S.Sphere(0.05),
+    "right": S.Sphere(0.05),
+}
 
 
 def _rate(name):
@@ -83,14 +100,18 @@ SECTIONS = {
             run=lambda m: m.build().kinematics(np.linspace(0.0, np.pi, OUTPUTS)),
         ),
         Entry("peaucellier", "Peaucellier's exact straight line", 2.0, "y of D (m)", lambda m, s: m.guided(s)[:, 1]),
-        Entry("scotch_yoke", "Scotch yoke", 0.5, "rate of the wheel (rad/s)", _rate("bearing"), (0.0, 0.3)),
+        Entry(
+            "scotch_yoke", "Scotch yoke", 0.5, "rate of the wheel (rad/s)", _rate("bearing"), (0.0, 0.3), shapes=YOKE
+        ),
         Entry("sarrus", "Sarrus linkage", 0.4, "height (m)", lambda m, s: s.position("platform")[:, 2]),
         Entry("bricard", "Bricard's six-bar", 1.5, "two angles (rad)", lambda m, s: m.angles(s)[:, :2], (0.0, 0.5)),
         Entry(
             "andrews_squeezer", "Andrews' squeezer", 0.03, "beta (rad)", lambda m, s: s.angle(s.scene.constraints[0])
         ),
         Entry("stewart_platform", "Stewart platform", 2.09, "forces of legs (N)", lambda m, s: m.forces(s), (0.0, 0.5)),
-        Entry("suspension", "Double-wishbone suspension", 2.0, "ride (m)", lambda m, s: s.displacement("ride")),
+        Entry(
+            "suspension", "Double-wishbone suspension", 2.0, "ride (m)", lambda m, s: s.displacement("ride"), shapes=CAR
+        ),
     ),
     "Pendulums and tops": (
         Entry("double_pendulum", "Double pendulum", 3.0, "angles (rad)", lambda m, s: m.angles(s).T, (0.0, 0.2, 0.4)),
@@ -107,7 +128,7 @@ SECTIONS = {
         Entry("door", "Door on three hinges", 10.0, "turn (rad)", lambda m, s: m.turn(s), (0.0, 0.15)),
         Entry("top", "Sliding top", 10.0, "tilt (rad)", lambda m, s: m.tilt(s)),
         Entry("gyroscope", "Steady precession", 3.0, "precession (rad)", lambda m, s: m.turn_and_tilt(s)[0]),
-        Entry("flyball_governor", "Flyball governor", 3.0, "arms (rad)", lambda m, s: m.angle(s)),
+        Entry("flyball_governor", "Flyball governor", 3.0, "arms (rad)", lambda m, s: m.angle(s), shapes=GOVERNOR),
         Entry("stability_map", "Stability map of a double pendulum", draw=_map),
     ),
     "Drives": (

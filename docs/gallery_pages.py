@@ -28,7 +28,7 @@ def draw(entry):
         else:
             solution = entry.solution()
             scene, curve = figure.subplots(1, 2, width_ratios=(3, 2))
-            paint(scene, solution, at=entry.at)
+            paint(scene, solution, entry.shapes, at=entry.at)
             curve.plot(solution.t, entry.curve(entry.module, solution), linewidth=1.2)
             curve.set(xlabel="time (s)", ylabel=entry.label)
             curve.spines[["top", "right"]].set_visible(False)

@@ -173,7 +173,7 @@ class Arena:
         options, settings, method = study.options, study.options.settings, study.method
         choose = None
         if study.given["integrator"] is None:
-            choose = method_choice.turns_of(self.scene, self.kept, method, options)
+            choose = method_choice.turns_of(study.scene, self.kept, method, options)
         task = Task(
             self.kept, method, settings.form, options.span, q, qd, memory, options.times, settings.dense_output,
             options.events, settings.constraint_tol, settings.max_steps, settings.chart_interval or 0, study.report,

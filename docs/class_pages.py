@@ -84,9 +84,14 @@ def _public(cls):
     return cls.__qualname__
 
 
-def _source(cls, kind):
+def file_of(cls):
+    """The file of a class from the root of the project, its name alone for a plug-in elsewhere."""
     file = Path(inspect.getsourcefile(cls))
-    where = file.relative_to(ROOT) if file.is_relative_to(ROOT) else file.name
+    return file.relative_to(ROOT).as_posix() if file.is_relative_to(ROOT) else file.name
+
+
+def _source(cls, kind):
+    where, file = file_of(cls), Path(inspect.getsourcefile(cls))
     how = f"[a {WRITTEN_IN[kind]} of your own](/plug-ins.md)".replace("[a i", "[an i")
     code = fenced(file.read_text(encoding="utf-8").strip(), "python")
     return f"## Source\n\n`{where}`; {how} has the same form.\n\n{code}"

@@ -16,6 +16,7 @@ sys.path.insert(0, str(HERE.parent))  # the checkout is what is documented, in t
 os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
 
 from docs import class_pages, gallery_pages  # noqa: E402
+from docs.gallery import ENTRIES  # noqa: E402
 from tsdyn._version import __version__  # noqa: E402
 
 project = "tsdyn"
@@ -34,17 +35,19 @@ nb_execution_raise_on_error = True
 suppress_warnings = ["misc.highlighting_failure"]
 BESIDE = re.compile(r"\]\(((?:\.\./)+)([\w/.-]+?)(#[\w-]+)?\)")  # links to files outside docs/
 PAGES = {"README.md": "/index.md", "CONTRIBUTING.md": "/contributing.md", "CHANGELOG.md": "/changelog.md"}
+PAGES |= {"examples": "/gallery/index.md"} | {f"examples/{one.name}.py": f"/gallery/{one.name}.md" for one in ENTRIES}
+PAGES |= {
+    class_pages.file_of(cls): f"/reference/{kind}/{cls.__name__}.md"
+    for kind in class_pages.KINDS
+    for cls in class_pages.classes(kind)
+}
 
 
 def within_site(app, name, source):
     """Lead links to files beside docs/ to the pages that show these files."""
 
     def page(match):
-        path, anchor = match[2], match[3] or ""
-        example = re.fullmatch(r"examples/(\w+)\.py", path)
-        if example:
-            return f"](/gallery/{example[1]}.md)"
-        return f"]({PAGES[path]}{anchor})" if path in PAGES else match[0]
+        return f"]({PAGES[match[2]]}{match[3] or ''})" if match[2] in PAGES else match[0]
 
     source[0] = BESIDE.sub(page, source[0])
     if name == "index":

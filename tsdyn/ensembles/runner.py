@@ -187,8 +187,7 @@ class Runner:
         study, keep = self.study, self.study.keep
         plain = isinstance(outcome, Finished) or (
             outcome.status is Status.SUCCESS
-            and not (outcome.reason or outcome.counts["steps_near_singular"])
-            and not callable(keep)
+            and not (outcome.reason or outcome.counts["steps_near_singular"] or callable(keep))
         )
         if plain and not arena.is_immobile:
             return Record(Status.SUCCESS, PLAIN, record_of(keep, outcome, study.n, task.times))

@@ -17,6 +17,18 @@ def load_run(where, allow_code=False):
     return load_scene(where), {}
 
 
+def load_document(where, allow_code=False, study=None):
+    """What a file holds, as `scene_text.Document`; `study`: keys of its table ensemble that others replace."""
+    from ..files.scene_text import Document
+
+    if Path(where).suffix.lower() == ".toml":
+        from ..simulation.load import document_of
+
+        return document_of(where, allow_code, study)
+    scene, given = load_run(where, allow_code)
+    return Document(scene, given, {}, {"files": [], "plot": None})
+
+
 def load_scene(where, allow_code=False):
     """The scene of a TOML file; or, of a Python file, that of its `build()`, or its `scene`.
 

@@ -14,6 +14,8 @@ from .solution import Solution
 from .stored_runs import demand_path
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from ..hints import Place
 
 READS = ".toml (a scene), .h5, .hdf5, .nc or .zarr (a solution or an ensemble)"
@@ -77,6 +79,14 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
 
 def scene_file(path: Place, allow_code: bool = False) -> tuple[Scene, dict[str, Any]]:
     """Return the scene of a TOML file, and the arguments of `simulate` that its table `run` asks for."""
+    return document_of(path, allow_code)[:2]
+
+
+def document_of(path: Place, allow_code: bool = False, study: Mapping[str, Any] | None = None) -> Any:
+    """Return the `Document` of a TOML file: its scene, and what its tables run, ensemble and output ask for.
+
+    `study` has keys of the table ensemble, such as cases, in place of those of the file, where they are not None.
+    """
     from ..files import scene_text
 
     try:
@@ -87,4 +97,4 @@ def scene_file(path: Place, allow_code: bool = False) -> tuple[Scene, dict[str, 
         raise StorageError(f"{path} is no text in UTF-8: {error}.") from error
     except OSError as error:
         raise StorageError(f"{path} can't be read: {error.strerror or error}.") from error
-    return scene_text.read(text, os.fspath(path), Scene, simulate, allow_code)
+    return scene_text.read_all(text, os.fspath(path), Scene, simulate, allow_code, study)

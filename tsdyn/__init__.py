@@ -19,6 +19,7 @@ from .elements.joint_friction import JointFriction  # noqa: E402
 from .elements.markers import Parameters, Point, Turn, Vector  # noqa: E402
 from .elements.primitive import Primitive  # noqa: E402
 from .errors import (  # noqa: E402
+    ImportLosses,
     InconsistentState,
     InvalidArgument,
     InvalidBody,
@@ -67,6 +68,7 @@ __all__ = [
     "ExplicitRungeKutta",
     "Force",
     "ImplicitTableau",
+    "ImportLosses",
     "InconsistentState",
     "Integrator",
     "InvalidArgument",

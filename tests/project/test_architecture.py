@@ -50,6 +50,7 @@ ORDER = [
     "ahead",
     "storage",
     "files",
+    "importing",
     "parameters",
     "simulation",
     "ensembles",

@@ -16,22 +16,27 @@ from .stored_runs import demand_path
 if TYPE_CHECKING:
     from ..hints import Place
 
-READS = ".toml (a scene), .h5, .hdf5, .nc or .zarr (a solution)"
+SCENES = (".toml", ".urdf", ".xml", ".mjcf", ".sdf", ".world")
+
+READS = ".toml, .urdf, .xml, .mjcf, .sdf or .world (a scene), .h5, .hdf5, .nc or .zarr (a solution)"
 
 
 @fitting
-def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -> Any:
+def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, free_base: bool = False) -> Any:
     """Return the scene or the solution of a file; nothing in it is executed.
 
     Parameters
     ----------
     path : str or PathLike
-        A scene file (.toml), or a solution (.h5, .hdf5, .nc, .zarr) that `Solution.save` has written.
+        A scene file (.toml); a URDF, MJCF or SDF file (.urdf, .xml, .mjcf, .sdf, .world); or a solution (.h5, .hdf5,
+        .nc, .zarr) that `Solution.save` has written.
     scene : Scene, optional
         That of a solution whose file holds none, because the scene has functions or classes of your own.
     allow_code : bool
         Whether modules that a file names as those of plug-ins may be imported. Plug-ins that have been imported
         before are found anyway.
+    free_base : bool
+        Whether the root link of a URDF is free to move; else it is fixed to the ground.
 
     Returns
     -------
@@ -43,6 +48,13 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
         If a scene file has mistakes; lists all with their lines.
     StorageError
         If a file can't be read, is damaged, foreign, or of a later version.
+    MissingDependency
+        If the parser of a format is not installed: `pip install 'tsdyn[import]'`.
+
+    Warns
+    -----
+    ImportLosses
+        If a URDF, MJCF or SDF file has what can't be carried over; `scene.imported` lists each.
 
     Examples
     --------
@@ -57,11 +69,17 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
     demand_path(path, "path")
     if not isinstance(allow_code, bool):
         raise InvalidArgument(f"allow_code must be True or False, got {allow_code!r}.")
+    if not isinstance(free_base, bool):
+        raise InvalidArgument(f"free_base must be True or False, got {free_base!r}.")
     suffix = Path(path).suffix.lower()
-    if suffix == ".toml":
+    if suffix in SCENES:
         if scene is not None:
             raise InvalidArgument("scene= is for solutions; a scene file holds its own.")
-        return scene_file(path, allow_code)[0]
+        return scene_file(path, allow_code, free_base)[0]
+    if free_base:
+        raise InvalidArgument("free_base= is for URDF files.")
+    if suffix == ".xacro":
+        raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
     from ..storage.formats import SUFFIXES
     from .saved_solutions import load as load_solution
 
@@ -70,8 +88,14 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
     return load_solution(path, scene, allow_code, (Scene, Solution))
 
 
-def scene_file(path: Place, allow_code: bool = False) -> tuple[Scene, dict[str, Any]]:
-    """Return the scene of a TOML file, and the arguments of `simulate` that its table `run` asks for."""
+def scene_file(path: Place, allow_code: bool = False, free_base: bool = False) -> tuple[Scene, dict[str, Any]]:
+    """Return the scene of a file, and the arguments of `simulate` that the table `run` of a TOML file asks for."""
+    if Path(path).suffix.lower() != ".toml":
+        from ..importing.reading import load as imported
+
+        return imported(path, Scene, free_base), {}
+    if free_base:
+        raise InvalidArgument("free_base= is for URDF files.")
     from ..files import scene_text
 
     try:

@@ -18,7 +18,7 @@ from ..elements.joint import across
 from ..forces.spring import Spring
 from .couplings import couple
 from .description import GROUND
-from .joint_forces import add_joint_forces
+from .joint_forces import add_joint_forces, unused
 from .report import FrameOn
 from .tolerances import TRIANGLE
 
@@ -39,7 +39,7 @@ def build(description, make, report):
         scene.add(
             Spring.at(
                 bodies[spring.a], bodies[spring.b], point_a=spring.point_a, point_b=spring.point_b,
-                stiffness=spring.stiffness, damping=spring.damping, free_length=spring.free_length, name=spring.name,
+                stiffness=spring.stiffness, damping=spring.damping, free_length=spring.free_length, name=unused(scene, spring.name),
             )
         )  # fmt: skip
     couple(scene, description, report)

@@ -34,6 +34,16 @@ class Slide(NamedTuple):
     load: float
 
 
+class Servo(NamedTuple):
+    """Spring, damper and constant load of an actuator on a joint; as those of a `JointItem`."""
+
+    name: str
+    stiffness: float
+    damping: float
+    free: float
+    load: float
+
+
 @dataclass(eq=False)
 class JointItem:
     """A joint; a and b are names of links, points and axes are in the ground frame."""
@@ -54,6 +64,7 @@ class JointItem:
     frame_a: Any = None  # of a loop: frames of a and b that coincide, ground frame
     frame_b: Any = None
     slides: list = field(default_factory=list)  # `Slide`s, of translations and planar
+    servos: list = field(default_factory=list)
 
     def normal(self):
         """Across its two slides, (3,)."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from .description import GROUND
 from .merging import merge
-from .tolerances import HALVINGS, NO_INERTIA, NO_MASS, REACH, SHARE, SOLID, TRIFLE
+from .tolerances import HALVINGS, NO_INERTIA, NO_MASS, REACH, SHARE, SLIGHT, SOLID, TRIFLE
 
 
 def complete(description, report):
@@ -32,9 +32,11 @@ def complete(description, report):
     for link in lone:
         report.leave("link without mass", link.name)
         del description.links[link.name]
-    all_poor = poor = [link for link in reversed(description.links.values()) if is_poor(link)]
+    usual = _usual_mass(description)
+    all_poor = poor = [link for link in reversed(description.links.values()) if is_poor(link, SLIGHT * usual)]
     for _ in all_poor:  # one may have to wait for its neighbour
-        poor = [link for link in poor if not _endow(description, link)]
+        poor = [link for link in poor if not _endow(description, link, SLIGHT * usual)]
+    poor = [link for link in poor if is_poor(link)]
     given = [link.name for link in all_poor if link not in poor]
     if given:
         report.note(f"without mass or inertia, given a share of what their neighbours carry for them: {', '.join(given)}")
@@ -47,9 +49,9 @@ def _deeper(before, now):
     return {name: (now[link][0], now[link][1] @ at) for name, (link, at) in before.items() if link in now}
 
 
-def is_poor(link):
+def is_poor(link, least=NO_MASS):
     """Whether a link lacks mass or inertia."""
-    return link.mass <= NO_MASS or not np.abs(link.inertia).max() > NO_INERTIA
+    return link.mass <= least or not np.abs(link.inertia).max() > NO_INERTIA
 
 
 def _joints_of(description, link):
@@ -66,13 +68,13 @@ def _idle_joints(description):
     return found
 
 
-def _endow(description, link):
+def _endow(description, link, least):
     """Move mass to a link from its neighbours; whether it has enough then."""
     for joint in _joints_of(description, link):
         name = joint.a if joint.b == link.name else joint.b
         donor = None if name == GROUND else description.links[name]
         common = _common(joint, link, donor)
-        if common is None or (donor is not None and is_poor(donor)):
+        if common is None or (donor is not None and is_poor(donor, least)):
             continue
         if donor is None:
             share, size = common, _usual_mass(description)
@@ -85,7 +87,7 @@ def _endow(description, link):
             take(donor, there - size * moved)
             share = common
         take(link, moments(link) + size * share)
-    return not is_poor(link)
+    return not is_poor(link, least)
 
 
 def _add_trifle(description, link, report):

@@ -31,7 +31,7 @@ def merge(description, report):
     frames = {name: (top(name), inside(description, name, top(name))) for name in description.links}
     for name, (link, frame) in description.frames.items():
         owner, at = (GROUND, frame) if link == GROUND else (frames[link][0], frames[link][1] @ frame)
-        frames[name] = owner, at
+        frames[name if name not in frames else f"{name} (site)"] = owner, at
     for name, members in groups.items():
         _join(description, name, members, report)
     description.frames = frames

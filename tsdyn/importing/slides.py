@@ -19,7 +19,9 @@ def gather(description, report):
         _join(description, *pair)
     while (pair := _next(description, _is_planar)) is not None:
         first, link, second = pair
-        second.kind, second.a, second.axis, second.slides = "planar", first.a, first.normal(), first.slides
+        second.kind, second.a, second.slides = "planar", first.a, first.slides
+        for servo in first.servos:
+            report.leave("actuator", servo.name)
         _drop(description, first, link)
         report.note(f"{first.name}, {second.name}: one planar joint")
     for joint in [joint for joint in description.joints if len(joint.slides) == 3]:
@@ -52,6 +54,7 @@ def _slides(joint):
 def _join(description, first, link, second):
     slides = [*_slides(first), *_slides(second)]
     second.kind, second.a, second.slides = "translations", first.a, slides
+    second.servos = first.servos + second.servos  # without counterpart there, so listed
     second.stiffness = second.damping = second.free = second.load = 0.0
     second.name = ", ".join(slide.name for slide in slides)
     _drop(description, first, link)

@@ -75,3 +75,56 @@ def _primitive(shape, name, folder, report):
             report.leave("shape without extent", name)
         return None
     return kind, arguments
+
+
+def add_sdf_shapes(link, node, frames, folder, report):
+    """Add the shapes of an SDF element <link>."""
+    drawn = [_sdf_shape(one, link.name, frames, folder, report) for one in node.all("visual")]
+    link.shapes = [shape for shape in drawn if shape is not None]
+    for one in node.all("collision"):
+        shape = _sdf_shape(one, link.name, frames, folder, report if not link.shapes else None)
+        report.leave("contact shape", link.name)
+        one.skip()
+        if shape is not None and not any(drawn):
+            link.shapes.append(shape)
+
+
+def _sdf_shape(node, name, frames, folder, report):
+    node.get("name")
+    place, geometry, material = frames.pose(node), node.one("geometry"), node.one("material")
+    colour = ""
+    if material is not None:
+        for tag in ("diffuse", "ambient"):
+            child = material.one(tag)
+            if child is not None and not colour:
+                colour = hexadecimal(child.numbers(" ".join(child.text.split()[:3]), 3, np.full(3, 0.5), f"<{tag}>"))
+        material.skip()
+    if geometry is None or not geometry.nodes:
+        return None
+    shape = geometry.nodes[0]
+    geometry.all(shape.tag)
+    made = _sdf_primitive(shape, name, folder, report)
+    return None if made is None else DrawnShape(*made, place, colour)
+
+
+def _sdf_primitive(shape, name, folder, report):
+    """Kind and arguments of a shape; capsules are drawn as cylinders."""
+    if shape.tag == "mesh":
+        uri, scale = shape.one("uri"), shape.value("scale", 3, np.ones(3))
+        shape.skip()
+        return None if report is None or uri is None else mesh(uri.text, scale, folder, report, name)
+    sizes = {
+        "box": lambda: (shape.value("size", 3, np.ones(3)),),
+        "cylinder": lambda: (shape.scalar("radius", 1.0), shape.scalar("length", 1.0)),
+        "capsule": lambda: (shape.scalar("radius", 0.5), shape.scalar("length", 1.0)),
+        "sphere": lambda: (shape.scalar("radius", 1.0),),
+    }.get(shape.tag)
+    if sizes is None:
+        shape.skip()
+        if report is not None:
+            report.leave(f"shape <{shape.tag}>", name)
+        return None
+    found = sizes()
+    if not all(np.all(size > 0.0) for size in found):
+        return None
+    return {"box": "Box", "sphere": "Sphere"}.get(shape.tag, "Cylinder"), found

@@ -102,6 +102,7 @@ __all__ = [
     "UnknownAttribute",
     "Vector",
     "benchmark",
+    "compare",
     "constraints",
     "ensemble",
     "forces",
@@ -121,6 +122,7 @@ __all__ = [
 if TYPE_CHECKING:
     from . import plots, testing
     from .benchmarking.benchmark import benchmark
+    from .comparison.compare import compare
     from .ensembles.ensemble import ensemble
     from .ensembles.results import Ensemble
     from .profiling.profile import profile
@@ -128,6 +130,7 @@ else:
     _LATER = {
         "Ensemble": ".ensembles.results",
         "benchmark": ".benchmarking.benchmark",
+        "compare": ".comparison.compare",
         "ensemble": ".ensembles.ensemble",
         "plots": ".plots",
         "profile": ".profiling.profile",

@@ -55,6 +55,7 @@ ORDER = [
     "simulation",
     "ensembles",
     "benchmarking",
+    "comparison",
     "profiling",
     "plots",
     "testing",

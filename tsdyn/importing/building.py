@@ -50,7 +50,10 @@ def build(description, make, report):
     scene.imported = report
     vars(scene)["_drawn"] = {
         bodies[name].name: (shapes, np.zeros(3) if name == GROUND else description.links[name].centroid)
-        for name, shapes in [(GROUND, description.ground_shapes), *((n, li.shapes) for n, li in description.links.items())]
+        for name, shapes in [
+            (GROUND, description.ground_shapes),
+            *((n, li.shapes) for n, li in description.links.items()),
+        ]
         if shapes
     }
     return scene

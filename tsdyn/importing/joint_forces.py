@@ -51,11 +51,7 @@ def _add(scene, joint, bodies, report, suffix):
         if joint.damping:
             places = {} if joint.point is None else {"point_a": joint.point}
             linear = {"damping": joint.damping} if joint.kind == "free" else {}
-            scene.add(
-                ViscousFriction.at(
-                    b, a, torsional_damping=joint.damping, **linear, **places, name=name
-                )
-            )
+            scene.add(ViscousFriction.at(b, a, torsional_damping=joint.damping, **linear, **places, name=name))
     else:
         report.leave(f"stiffness and damping of a {joint.kind} joint", joint.name)
 

@@ -39,7 +39,9 @@ def complete(description, report):
     poor = [link for link in poor if is_poor(link)]
     given = [link.name for link in all_poor if link not in poor]
     if given:
-        report.note(f"without mass or inertia, given a share of what their neighbours carry for them: {', '.join(given)}")
+        report.note(
+            f"without mass or inertia, given a share of what their neighbours carry for them: {', '.join(given)}"
+        )
     for link in poor:
         _add_trifle(description, link, report)
 
@@ -124,7 +126,9 @@ def _usual_mass(description):
 
 def moments(link):
     """Second moments S (4, 4) of a link in its own frame."""
-    second = 0.5 * np.trace(link.inertia) * np.eye(3) - link.inertia + link.mass * np.outer(link.centroid, link.centroid)
+    second = (
+        0.5 * np.trace(link.inertia) * np.eye(3) - link.inertia + link.mass * np.outer(link.centroid, link.centroid)
+    )
     first = link.mass * link.centroid[:, None]
     return np.block([[second, first], [first.T, np.array([[link.mass]])]])
 

@@ -1,6 +1,6 @@
 """Links that are fixed to each other become one body: the one nearest to the root, with the mass of all.
 
-    m = sum m_i,  r = sum m_i r_i / m,  J = sum (J_i + m_i (d.d I - d d^T)),  d = r_i - r
+m = sum m_i,  r = sum m_i r_i / m,  J = sum (J_i + m_i (d.d I - d d^T)),  d = r_i - r
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Actuators and tendons of MJCF: servos with the control that MuJoCo starts with, and springs between two sites.
 
-    force = gain u + b0 + b1 l + b2 ld,  l = gear q,  torque = gear force     u: 0, or the nearest control in its range
+force = gain u + b0 + b1 l + b2 ld,  l = gear q,  torque = gear force     u: 0, or the nearest control in its range
 """
 
 import numpy as np
@@ -38,18 +38,28 @@ def _add_actuator(mujoco, model, i, joints, names, report):
     joint, q0 = on
     b = np.array(model.actuator_biasprm[i, :3]) * (bias != int(mujoco.mjtBias.mjBIAS_NONE))
     g = np.array(model.actuator_gainprm[i, :3]) * (1.0, *(2 * [gain != int(mujoco.mjtGain.mjGAIN_FIXED)]))
-    constant, stiffness, damping = gear * (b[0] + g[0] * u), -(gear**2) * (b[1] + g[1] * u), -(gear**2) * (b[2] + g[2] * u)
+    constant, stiffness, damping = (
+        gear * (b[0] + g[0] * u),
+        -(gear**2) * (b[1] + g[1] * u),
+        -(gear**2) * (b[2] + g[2] * u),
+    )
     if model.actuator_forcelimited[i]:
         low, high = model.actuator_forcerange[i]
         report.leave("limit of force", name, f"[{low:g}, {high:g}]")
     if not (constant or stiffness or damping):
-        report.leave("motor", name, f"(of {joint.name}, gear {gear:g}: no torque without control; see ts.forces.JointTorque)")
+        report.leave(
+            "motor", name, f"(of {joint.name}, gear {gear:g}: no torque without control; see ts.forces.JointTorque)"
+        )
         return
     load = constant - stiffness * q0  # stiffness counts from q = 0, not from the start
     free = 0.0
     if stiffness > 0.0:
         free, load = load / stiffness, 0.0
-    joint.servos.append(Servo(f"{name} actuator" if name in joints else name, float(stiffness), float(damping), float(free), float(load)))
+    joint.servos.append(
+        Servo(
+            f"{name} actuator" if name in joints else name, float(stiffness), float(damping), float(free), float(load)
+        )
+    )
     report.note(f"actuator {name}: with the control {u:g}, as a spring and damper of {joint.name}")
 
 

@@ -1,8 +1,8 @@
 """Equality constraints of MJCF: connect, weld and joint, held exactly.
 
-    connect    x_1 + A_1 s_1 = x_2 + A_2 s_2
-    weld       x_1 + A_1 s_1 = x_2 + A_2 s_2,  A_1 R = A_2
-    joint      q_1 - q_1(0) = a1 (q_2 - q_2(0))
+connect    x_1 + A_1 s_1 = x_2 + A_2 s_2
+weld       x_1 + A_1 s_1 = x_2 + A_2 s_2,  A_1 R = A_2
+joint      q_1 - q_1(0) = a1 (q_2 - q_2(0))
 """
 
 import numpy as np

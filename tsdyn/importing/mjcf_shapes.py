@@ -15,7 +15,9 @@ SHOWN = 3  # groups of geoms that are drawn: 0, 1, 2
 def drop_missing_meshes(spec, path, root, report):
     """Delete geoms of meshes that are not found; where a body's inertia is that of its geoms, this is a mistake."""
     folder = Path(path).parent / (spec.meshdir or "")
-    missing = {mesh.name or Path(mesh.file).stem: mesh for mesh in spec.meshes if mesh.file and not _is_there(mesh, folder)}
+    missing = {
+        mesh.name or Path(mesh.file).stem: mesh for mesh in spec.meshes if mesh.file and not _is_there(mesh, folder)
+    }
     if not missing:
         return
     for geom in list(spec.geoms):

@@ -13,8 +13,6 @@ from .sdf_joints import add_joints
 from .urdf_shapes import add_sdf_shapes
 
 
-
-
 def describe(root, folder, report):
     """The `Description` of a root element <sdf>."""
     root.get("version")

@@ -1,9 +1,9 @@
 """Prismatic joints one after another, with nothing but massless links between them, become one joint.
 
-    two                        two displacements, no rotation      rows: Parallel, Dot1, Dot2
-    two, and a hinge across    Planar                              of the hinge's name, with its angle
-    three                      three displacements, no rotation    rows: Parallel, Dot1
-    three, and a ball or three hinges                              the link is free
+two                        two displacements, no rotation      rows: Parallel, Dot1, Dot2
+two, and a hinge across    Planar                              of the hinge's name, with its angle
+three                      three displacements, no rotation    rows: Parallel, Dot1
+three, and a ball or three hinges                              the link is free
 """
 
 import numpy as np

@@ -49,6 +49,7 @@ from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau 
 from .motions.prescribed import Motion  # noqa: E402
 from .motions.tables import Table  # noqa: E402
 from .observables.state import State  # noqa: E402
+from .simulation.load import LOADERS as _LOADERS  # noqa: E402
 from .simulation.load import load  # noqa: E402
 from .simulation.resume import resume  # noqa: E402
 from .simulation.scene import Scene  # noqa: E402
@@ -56,6 +57,15 @@ from .simulation.simulate import simulate  # noqa: E402
 from .simulation.solution import Solution  # noqa: E402
 
 _moved.install()
+
+
+def _ensemble_of(*given):
+    from .ensembles.saved import load
+
+    return load(*given)
+
+
+_LOADERS["tsdyn ensemble"] = _ensemble_of
 
 __all__ = [
     "Adaptive",

@@ -366,7 +366,7 @@ _SENTENCES = {
         "The mechanism may jam: with large friction coefficients rigid-body dynamics has no solution. Otherwise take a "
         "smaller step.",
     ),
-    Status.STIFF: ("The motion is stiff; an implicit method is cheaper.", "Use SDIRK54."),
+    Status.STIFF: ("The motion has become stiff, or is stiff no more; another method takes over.", ""),
     Status.SLICE_DONE: ("A slice of the run is done.", ""),
     Status.SAMPLING_FAILED: (
         "The function of a sampled load returned no number.",

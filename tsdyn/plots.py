@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from .benchmarking.haug_tables import DURATION, LEVELS
 from .drawing import BLUE, GREY, VERMILION, new_figure, save
 from .figures.axes import ZERO, largest
+from .figures.ensembles import final_map, quantile_bands
 from .figures.errors import constraint_error
 from .figures.history import charts, energy, reaction, steps
 from .figures.modes import mode_shapes
@@ -129,9 +130,11 @@ __all__ = [
     "charts",
     "constraint_error",
     "energy",
+    "final_map",
     "mode_shapes",
     "phase_portrait",
     "poincare_section",
+    "quantile_bands",
     "reaction",
     "save",
     "steps",

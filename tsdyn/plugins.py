@@ -71,6 +71,7 @@ from .methods.interpolants import linear_second
 from .methods.plug_in import step_kernel
 from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
 from .motions.expressions import Smooth
+from .motions.keywords import numbers_of
 from .motions.prescribed import Motion
 from .motions.signals import Signal
 from .motions.tables import is_data
@@ -153,6 +154,7 @@ __all__ = [
     "load_at",
     "not_negative",
     "number",
+    "numbers_of",
     "optional",
     "positive",
     "product",

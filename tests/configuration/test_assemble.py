@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from examples import tolerance_analysis
 from tests.helpers.mechanisms import (
     LENGTH,
     SEEDS,
@@ -206,3 +207,74 @@ def test_constraints_that_depend_on_time_are_met_at_t(t):
     assert np.linalg.norm(d) == pytest.approx(LENGTH[0](t), abs=ALGEBRA)
     assert d @ dd / np.linalg.norm(d) == pytest.approx(LENGTH[1](t), abs=ALGEBRA)
     ts.simulate(scene, (t, t + 0.01), integrator=ts.integrators.Nystrom4(1e-3)).raise_if_failed()
+
+
+@pytest.mark.parametrize("free", [("two",), ("one", "four"), ("one", "two", "three", "four")], ids=str)
+def test_free_names_the_bodies_that_may_move(free):
+    scene = mechanism(np.random.default_rng(1))
+    scene.assemble()
+    for body_, name in zip(scene.bodies, ("one", "two", "three", "four"), strict=True):
+        body_.name = name
+    scene.body("two").position = scene.body("two").position + np.array([0.01, -0.02, 0.01])
+    twin = scene.copy()
+    if "two" not in free:
+        with pytest.raises(ts.InconsistentState, match="two"):
+            scene.assemble(free=free)
+        return
+    scene.assemble(free=free)
+    twin.assemble(fixed=[b for b in twin.bodies if b.name not in free])
+    assert_same(snapshot(scene), snapshot(twin))
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    ({"free": ["bse"]}, "did you mean 'base'"),
+    ({"free": "base"}, "free must be a sequence of bodies"),
+    ({"free": ["base"], "fixed": ["base"]}, "give the bodies that stay, or those that may move"),
+], ids=str)  # fmt: skip
+def test_what_is_free_is_checked(arguments, message):
+    scene = ts.Scene()
+    scene.add_point_mass(1.0, name="base")
+    with pytest.raises(ts.TsdynError, match=message):
+        scene.assemble(**arguments)
+
+
+def nearby(scene, size=1e-3):
+    """The scene with a joint of its mechanism moved a little."""
+    return scene.with_parameters({"rocker pin.point_a": scene["rocker pin"].point_a + np.array([size, 0, 0])})
+
+
+def test_a_start_near_by_takes_a_few_steps():
+    scene = tolerance_analysis.build()
+    assert nearby(scene).assemble().iterations <= 8
+
+
+def test_other_geometry_is_assembled_without_handles_and_to_the_same_bits():
+    scene = tolerance_analysis.build()
+    case, built = nearby(scene), scene.copy()
+    built["rocker pin"].point_a = case.parameters()["rocker pin.point_a"]
+    case = nearby(scene)
+    reports = [one.assemble(free=("coupler", "rocker")) for one in (case, built)]
+    assert reports[0] == reports[1]
+    assert "_later" in vars(case), "handles have been made"
+    for one, other in zip(case.start, built.start, strict=True):
+        assert one.tobytes() == other.tobytes()
+    assert ts.simulate(case, (0.0, 0.02)).q.tobytes() == ts.simulate(built, (0.0, 0.02)).q.tobytes()
+    assert_same(snapshot(case), snapshot(built))
+
+
+def test_a_scene_that_is_moved_is_not_packed_anew():
+    """Starts of its bodies are no part of what is analysed; runs have the bits of a scene that never ran."""
+    scene = tolerance_analysis.build()
+    before = ts.simulate(scene, (0.0, 0.02))
+    packed = scene.packed
+    scene.set("bearing", angle=1.0)
+    assert scene.packed is not packed  # drivers come and go
+    ts.simulate(scene, (0.0, 0.02))
+    packed = scene.packed
+    for _ in range(2):
+        scene.body("coupler").position = scene.body("coupler").position + np.array([1e-3, 0, 0])
+        scene.assemble(fixed=["crank"])
+        assert scene.packed is packed
+        solution, fresh = ts.simulate(scene, (0.0, 0.02)), ts.simulate(scene.copy(), (0.0, 0.02))
+        assert solution.q.tobytes() == fresh.q.tobytes() != before.q.tobytes()
+        assert solution.multipliers.tobytes() == fresh.multipliers.tobytes()

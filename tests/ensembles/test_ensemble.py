@@ -68,23 +68,39 @@ def test_options_are_those_of_simulate(options):
 
 def test_geometry_of_joints():
     scene = tolerance_analysis.build()
-    table = tolerance_analysis.table(scene, *tolerance_analysis.draw(3))
+    table = tolerance_analysis.table(*tolerance_analysis.draw(3))
 
     def keep(solution):
         return {"angle": solution.angle("far bearing"), "load": solution.reaction("rocker pin")[1]}
 
-    found = ts.ensemble(scene, table, SPAN, keep=keep, t_eval=[0.0, 0.05], threads=1)
+    free = ("coupler", "rocker")
+    found = ts.ensemble(scene, table, SPAN, keep=keep, assemble=free, t_eval=[0.0, 0.05], threads=1)
     assert found.success.all(), found.message
     for i in range(3):
-        solution = alone(scene, table, i, t_eval=[0.0, 0.05])
-        built = tolerance_analysis.build()
+        case = scene.with_parameters({name: values[i] for name, values in table.items()})
+        case.assemble(free=free)
+        solution, built = ts.simulate(case, SPAN, t_eval=[0.0, 0.05]), tolerance_analysis.build()
         for name, values in table.items():
             owner, _, attribute = name.rpartition(".")
             setattr(built[owner], attribute, values[i])
+        built.assemble(free=free)
         assert ts.simulate(built, SPAN, t_eval=[0.0, 0.05]).q.tobytes() == solution.q.tobytes()
+        assert found.case(i).q.tobytes() == solution.q.tobytes()
         assert found.q[i].tobytes() == solution.q[-1].tobytes()
         for name, values in keep(solution).items():
             assert found.kept[name][i].tobytes() == values.tobytes()
+
+
+def test_a_start_that_can_not_be_assembled_fails_its_case_alone():
+    scene = ball()
+    table = {"rod.length": [1.0, 1.2, 1.3]}
+    found = ts.ensemble(scene, table, SPAN, assemble=True)
+    assert found.success.all(), found.message
+    distances = np.linalg.norm(found.q[:, :3] - (0, 0, 0.5), axis=1)
+    np.testing.assert_allclose(distances, table["rod.length"], rtol=1e-12)
+    held = ts.ensemble(scene, {"rod.length": [1.0, np.sqrt(1.25)]}, SPAN, assemble=())
+    assert held.success.tolist() == [False, True]
+    assert "with bob held fixed" in held.message[0]
 
 
 def test_rods_without_inertia_about_their_axes():
@@ -238,13 +254,15 @@ def test_controllers_have_a_state_of_their_own_in_each_case():
 
 def test_ctrl_c_keeps_finished_cases():
     def interrupt(fraction):
-        if fraction >= 0.5:
+        if fraction >= 0.02:
             raise KeyboardInterrupt
 
-    scene, masses = ball(), np.linspace(1, 2, 6)
-    found = ts.ensemble(scene, {"bob.mass": masses}, SPAN, progress=interrupt, threads=1)
-    assert found.interrupted
-    assert 3 <= found.success.sum() < 6
+    scene, masses = ball(), np.linspace(1, 2, 600)
+    for threads in (1, 2):
+        found = ts.ensemble(scene, {"bob.mass": masses}, SPAN, progress=interrupt, threads=threads)
+        assert found.interrupted
+        assert 12 <= found.success.sum() < 600 or threads == 2
+    masses = masses[:6]
 
     calls = []
 
@@ -305,6 +323,9 @@ WRONG = {
     "rtol must be": {"rtol": -1.0},
     "has no argument checkpoint": {"checkpoint": 1.0},
     "progress must be": {"progress": 3},
+    "did you mean 'bob'": {"assemble": ["bobb"]},
+    "assemble must be True": {"assemble": "bob"},
+    "leave one of them out": {"assemble": True, "state": 3},
 }
 
 

@@ -125,6 +125,162 @@ def test_a_value_that_is_no_number_is_packed_anew():
     assert outcome(scene.with_parameters, values) == outcome(set_one_by_one, scene, values)
 
 
+def lift(t, *, height=0.1, rate=2.0):
+    return 1.0 + height * np.cos(rate * t)
+
+
+def pull(t, *, size=3.0):
+    return 0.0, 0.0, size * np.cos(t)
+
+
+class Hold:
+    """Not a plain function: no keywords of its own are listed."""
+
+    def __call__(self, t, angle, rate, *, gain=1.0):
+        return -gain * rate
+
+
+def driven_by_functions():
+    scene = ts.Scene(gravity=(0, 0, -10))
+    bob = scene.add_point_mass(1.0, position=(1.1, 0, 0), name="bob")
+    scene.add(ts.constraints.Distance(bob, scene.ground, length=lift, name="rod"))
+    scene.add(ts.forces.PointForce(bob, force=pull, name="wind"))
+    wheel = scene.add_body(1.0, (1, 1, 2), name="wheel")
+    hinge = scene.add(ts.constraints.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1), name="hinge"))
+
+    def controller(t, angle, rate, *, goal=1.0, gain=50.0):
+        return gain * (goal - angle) - 20.0 * rate
+
+    scene.add(ts.forces.JointTorque(hinge, function=controller, period=0.01, name="drive"))
+    scene.add(ts.forces.JointTorque(hinge, function=Hold(), period=0.01, name="hold"))
+    return scene
+
+
+@pytest.mark.parametrize("method", [None, "dop853"])
+def test_keyword_arguments_of_users_functions_are_parameters(method):
+    scene = driven_by_functions()
+    numbers = {name: value for name, value in scene.parameters().items() if name.count(".") == 2}
+    assert numbers == {
+        "rod.length.height": 0.1, "rod.length.rate": 2.0, "wind.force.size": 3.0,
+        "drive.function.goal": 1.0, "drive.function.gain": 50.0,
+    }  # fmt: skip
+    other = scene.with_parameters({"rod.length.rate": 1.0, "wind.force.size": 5.0, "drive.function.goal": -1.0})
+    built = scene.copy()
+    built["rod"].length = lambda t: 1.0 + 0.1 * np.cos(1.0 * t)
+    built["wind"].force = lambda t: (0.0, 0.0, 5.0 * np.cos(t))
+    built["drive"].function = lambda t, angle, rate: 50.0 * (-1.0 - angle) - 20.0 * rate
+    one, same = (ts.simulate(each, (0.0, 0.5), integrator=method).state.q for each in (other, built))
+    np.testing.assert_allclose(one, same, rtol=0.0, atol=1e-10)
+    assert other.parameters()["rod.length.rate"] == 1.0
+    back = other.with_parameters({"rod.length.rate": 2.0, "wind.force.size": 3.0, "drive.function.goal": 1.0})
+    assert outcome(lambda: back) == outcome(lambda: scene)
+
+
+def test_an_ensemble_over_a_number_of_a_function():
+    scene = driven_by_functions()
+    found = ts.ensemble(scene, {"wind.force.size": [0.0, 3.0, 6.0], "rod.length.rate": [1.0, 2.0, 3.0]}, (0.0, 0.1))
+    assert found.success.all(), found.message
+    assert found.q[1].tobytes() == ts.simulate(scene, (0.0, 0.1)).state.q.tobytes()
+    assert len({row.tobytes() for row in found.q}) == 3
+
+
+def drag(t, state, *, first=0.5, second=0.1):
+    speed = np.sqrt(state[7] ** 2 + state[8] ** 2 + state[9] ** 2)
+    factor = first + second * speed
+    return -factor * state[7], -factor * state[8], -factor * state[9]
+
+
+def oil(t, state, *, c=0.3):
+    return -c * state[10], 0.0, 0.0
+
+
+def law(t, x, rate, *, goal=0.2, gain=50.0, loss=4.0):
+    return gain * (goal - x) - loss * rate
+
+
+def ruled_by_functions():
+    scene = ts.Scene(gravity=(0, 0, -10))
+    bob = scene.add_body(1.0, (1, 1, 1), velocity=(1, 0, 3), angular_velocity=(1, 2, 3), name="bob")
+    scene.add(ts.forces.PointForce(bob, force=drag, name="air"))
+    scene.add(ts.forces.Torque(bob, torque=oil, frame="body", name="oil"))
+    wheel, slider = (scene.add_body(1.0, (1, 1, 2), name=name) for name in ("wheel", "slider"))
+    C = ts.constraints
+    scene.add(C.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1), name="hinge"))
+    scene.add(C.Translational.at(scene.ground, slider, point=(0, 0, 0), axis=(1, 0, 0), name="slide"))
+    scene.add(ts.forces.JointTorque(scene["hinge"], function=law, name="turn"))
+    scene.add(ts.forces.JointForce(scene["slide"], function=law, name="push"))
+    return scene
+
+
+OTHER = {
+    "air.force.second": 0.7, "oil.torque.c": 2.0, "turn.function.goal": -0.3, "turn.function.gain": 9.0,
+    "push.function.loss": 1.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", [None, "taylor", "dop853", "sdirk54"])
+def test_numbers_of_functions_of_the_state(method):
+    scene = ruled_by_functions()
+    before = scene.parameters()
+    assert [name for name in before if name.count(".") == 2] == [
+        "air.force.first", "air.force.second", "oil.torque.c", "turn.function.goal", "turn.function.gain",
+        "turn.function.loss", "push.function.goal", "push.function.gain", "push.function.loss",
+    ]  # fmt: skip
+    other = scene.with_parameters(OTHER)
+    assert other.packed.system.table is scene.packed.system.table, "packed anew"
+
+    def air(t, state):
+        factor = 0.5 + 0.7 * np.sqrt(state[7] ** 2 + state[8] ** 2 + state[9] ** 2)
+        return -factor * state[7], -factor * state[8], -factor * state[9]
+
+    built = scene.copy()
+    built["air"].force, built["oil"].torque = air, lambda t, state: (-2.0 * state[10], 0.0, 0.0)
+    built["turn"].function = lambda t, x, rate: 9.0 * (-0.3 - x) - 4.0 * rate
+    built["push"].function = lambda t, x, rate: 50.0 * (0.2 - x) - rate
+    one, same = (ts.simulate(each, (0.0, 0.5), integrator=method).state.q for each in (other, built))
+    np.testing.assert_allclose(one, same, rtol=0.0, atol=1e-8)
+    back = other.with_parameters({name: before[name] for name in OTHER})
+    assert outcome(lambda: back) == outcome(lambda: scene)
+    assert other.copy().parameters()["push.function.loss"] == 1.0
+
+
+def test_an_ensemble_over_numbers_of_functions_of_the_state():
+    scene = ruled_by_functions()
+    found = ts.ensemble(scene, {"turn.function.gain": [50.0, 20.0], "oil.torque.c": [0.3, 1.0]}, (0.0, 0.1))
+    assert found.success.all(), found.message
+    assert found.q[0].tobytes() == ts.simulate(scene, (0.0, 0.1)).state.q.tobytes()
+    values = {"turn.function.gain": 20.0, "oil.torque.c": 1.0}
+    assert found.q[1].tobytes() == ts.simulate(scene.with_parameters(values), (0.0, 0.1)).state.q.tobytes()
+
+
+def test_a_user_force_has_its_numbers_as_par():
+    def pull(t, a, b, par, out, *, size=1.0):
+        out[0] = size
+
+    scene = ts.Scene()
+    bob = scene.add_point_mass(1.0, name="bob")
+    with pytest.raises(ts.InvalidForce, match="parameters=, which it gets as par"):
+        ts.forces.UserForce(bob, function=pull)
+
+
+def jumps(t, *, size=1.0):
+    return size if t > 0.5 else 0.0
+
+
+@pytest.mark.parametrize("wrong", ["value", "name", "branch"])
+def test_wrong_numbers_of_functions(wrong):
+    scene = driven_by_functions()
+    if wrong == "branch":
+        with pytest.raises(ts.TsdynError, match=r"without branches .*it compares"):
+            ts.forces.Spring(scene["bob"], scene.ground, stiffness=1.0, actuator=jumps)
+        return
+    given = {"wind.force.size": np.nan} if wrong == "value" else {"wind.force.sise": 1.0}
+    with pytest.raises(
+        ts.InvalidArgument, match="finite number" if wrong == "value" else "did you mean wind.force.size"
+    ):
+        scene.with_parameters(given)
+
+
 def test_it_can_be_pickled_copied_and_assembled():
     scene = top.build()
     changed = scene.with_parameters({f"{scene.bodies[0].name}.mass": 20.0})
@@ -143,6 +299,20 @@ WRONG = {
     "gravity": ("three finite numbers", 9.81),
     "bob.velocity": ("three finite numbers", (1, 2)),
 }
+
+
+@pytest.mark.slow_for("every force")
+@pytest.mark.parametrize("which", SCENES)
+def test_a_scene_that_ran_has_the_bits_of_a_new_one_after_its_start_has_changed(which):
+    scene = SCENES[which]()
+    before = outcome(lambda: scene)
+    for body in scene.bodies:
+        body.velocity = 0.9 * body.velocity
+        if hasattr(body, "inertia"):
+            body.angular_velocity = 0.9 * body.angular_velocity
+    after = outcome(lambda: scene)
+    assert after == outcome(scene.copy)
+    assert after != before or not np.any(scene.start[1])
 
 
 @pytest.mark.parametrize("name", WRONG)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from benchmarks.stiff import jointed
 from examples import driven_pivot, four_bar, geared_pair, top
 from tests.helpers.refusals import refuse
 from tsdyn.runs import slices
@@ -141,17 +142,20 @@ def test_singular_configurations(method, count, tmp_path):
     assert method is None or "singular" in whole.message
 
 
-def stiff():
-    scene = ts.Scene()
-    bob = scene.add_point_mass(1.0, position=(1.0, 0.0, 0.0), name="bob")
-    scene.add(ts.forces.Spring(bob, scene.ground, stiffness=1e8, damping=2e5, free_length=0.9))
-    return scene
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("short_slices")
-def test_a_stiff_run_begins_again(tmp_path):
-    stop_and_go_on(stiff, 1.0, tmp_path / "run.h5")
+@pytest.mark.parametrize("count", [2, 5, 12, 14, 20, 24])
+def test_runs_that_turn_to_an_implicit_method(count, tmp_path):
+    """Stopped in segments of either method, of which there are five."""
+    path, options = tmp_path / "run.h5", {"rtol": 1e-6, "atol": 1e-6, "history": True}
+    whole = ts.simulate(jointed(), (0.0, 0.6), **options)
+    assert "SDIRK54 took over 3 times" in whole.message
+    stopped = ts.simulate(jointed(), (0.0, 0.6), store=path, checkpoint=0.0, progress=Stop(count), **options)
+    assert stopped.status == ts.Status.INTERRUPTED
+    same(whole, ts.resume(path))
+    again = ts.resume(path)
+    same(whole, again)
+    assert again.method == whole.method
 
 
 @pytest.mark.slow

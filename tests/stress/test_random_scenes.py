@@ -1,11 +1,13 @@
 """A small sample of the random scenes of `tsdyn stress --fuzz`: each runs within the laws, is refused, or says why."""
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.helpers.drawn_numbers import DrawnNumbers
 from tsdyn.stress.judgement import comparison, judge_case, judge_scene
+from tsdyn.stress.random_parts import Draw
 from tsdyn.stress.random_scenes import KINDS, drawn, generate
 
 
@@ -17,6 +19,14 @@ def test_a_seed_is_a_scene():
     one, two = (generate(18) for _ in range(2))
     assert (one.name, one.span, repr(one.options)) == (two.name, two.span, repr(two.options))
     assert (one.scene.start[0] == two.scene.start[0]).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_kind_is_drawn_of_one_body(kind):
+    for seed in range(10):
+        d = Draw(np.random.default_rng(seed))
+        KINDS[kind](d, 1)
+        assert d.scene.bodies
 
 
 @pytest.mark.slow_for("*")

@@ -15,11 +15,11 @@ from ..maths.row_rank import row_lengths
 from ..validation import number, one_of, positive, sequence
 from .continuation import Found, Kept, close, nearest, relax, settle, stuck
 from .infeasible_subset import refuse
-from .kinetic_metric import Metric, least_step
+from .kinetic_metric import Metric, least_step, rotation_vectors
 from .loop_folds import Folds
 from .mirrored_branches import demand_aligned
 from .start_violations import demand_finite, refuse_vanished
-from .tolerances import LEAST_VELOCITY_TOL, ROUNDING, STAGES, STIFFER
+from .tolerances import LEAST_VELOCITY_TOL, ROUNDING, STAGES, STIFFER, UNFOLDED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,6 +63,7 @@ def assemble(
     fixed: Sequence[PointMass | str] = (),
     t: float = 0.0,
     folds: Folds = "keep",
+    free: Sequence[PointMass | str] | None = None,
 ) -> AssemblyReport:
     """Move the bodies to the nearest consistent positions, then to the nearest consistent velocities.
 
@@ -78,6 +79,8 @@ def assemble(
         "keep": links of closed loops fold as in the sketch wherever the sketch is unambiguous, that is by 0.2 rad or
         more, by the directions of the links and by the positions of their joints. "free": the nearest configuration
         on any branch. The report lists links that fold over.
+    free : sequence of Body, or names; optional
+        The bodies that may move, in place of `fixed`: the pose of all others stays as it is.
 
     Returns
     -------
@@ -114,28 +117,27 @@ def assemble(
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     one_of(folds, ("keep", "free"), "folds")
     packed, (sketch, qd) = scene.packed, scene.start
-    fixed = _bodies(scene, fixed)
-    held = _held(scene, fixed)
-    metric = Metric(packed, held, float(t))
+    fixed = _fixed(scene, fixed, free)
+    metric = whole = Metric(packed, None, float(t))
+    if fixed:
+        metric = Metric(packed, _held(packed, fixed), float(t))
     demand_finite(scene, *metric.arrays(sketch))
     found = nearest(metric, sketch, tol)
     if not found.met:
         _demand_direction(scene, metric, found)
-        refuse(scene, metric, sketch, found, tol, fixed)
-    links = Folds(packed)
-    drawn = links.drawn(metric, sketch)
-    if folds == "keep":
-        found = _unfolded(scene, metric, sketch, found, links, drawn, tol)
+        refuse(scene, metric, sketch, found, tol, [scene.bodies[i] for i in fixed])
+    links = Folds(packed) if _largest_turn(metric, sketch, found.q) > UNFOLDED else None
+    if links is not None and folds == "keep":
+        found = _unfolded(metric, sketch, found, links, tol)
     q = found.q
-    metric = Metric(packed, None, float(t))
-    Phi, Phi_q, Phi_t = metric.arrays(q)
-    A = metric.reduced(q, Phi_q[metric.own])
-    _demand_regular(scene, metric, A)
+    Phi, Phi_q, Phi_t = whole.arrays(q)
+    A = whole.reduced(q, Phi_q[whole.own])
+    _demand_regular(scene, whole, A)
     demand_aligned(packed, q, float(t))
-    given, qd = _velocities(scene, metric, q, qd, A, Phi_t[metric.own])
+    given, qd = _velocities(whole, q, (sketch, qd), A, Phi_t[whole.own])
     residual = Phi_q @ qd + Phi_t
     _demand_compatible(scene, residual, max(tol, LEAST_VELOCITY_TOL) * (1.0 + np.abs(qd).max()))
-    over = links.turned(metric, q, links.shown(metric, sketch))
+    over = () if links is None else links.turned(metric, q, links.shown(metric, sketch))
     scene.place(q, qd)
     return AssemblyReport(
         moved=float(np.abs(q - sketch).max()),
@@ -147,28 +149,45 @@ def assemble(
     )
 
 
-def _bodies(scene, fixed):
-    """Return the bodies that are to be fixed, given by handle or name."""
-    given = sequence(fixed, "fixed must be a sequence of bodies, such as (body,)", InvalidBody)
-    found = [named(scene.bodies, it, "body to be fixed", InvalidBody) if isinstance(it, str) else it for it in given]
-    for body in found:
-        if not any(body is known for known in scene.bodies):
-            raise InvalidBody(f"fixed: {body!r} is not a body of this scene.")
+def _fixed(scene, fixed, free):
+    """Return the numbers of the bodies that are to be fixed."""
+    if free is None:
+        return _numbers(scene, fixed, "fixed")
+    if len(sequence(fixed, "fixed must be a sequence of bodies", InvalidBody)):
+        raise InvalidArgument("fixed and free say the same twice: give the bodies that stay, or those that may move.")
+    moving = _numbers(scene, free, "free")
+    return [i for i in range(len(scene.packed.bodies)) if i not in moving]
+
+
+def _numbers(scene, given, word):
+    """Return the numbers of bodies that are given by handle or name; names of a scene need no handles."""
+    given, found = sequence(given, f"{word} must be a sequence of bodies, such as (body,)", InvalidBody), []
+    for it in given:
+        known = scene.packed.bodies if isinstance(it, str) else scene.bodies
+        body = named(known, it, f"body to be {word}", InvalidBody) if isinstance(it, str) else it
+        if not any(body is other for other in known):
+            raise InvalidBody(f"{word}: {body!r} is not a body of this scene.")
+        found.append(body.index)
     return found
 
 
-def _held(scene, fixed):
+def _held(packed, fixed):
     """Return True for each coordinate that is held, (n,)."""
-    bodies = scene.system.bodies
-    held = np.zeros(int(bodies[:, 1].sum()), bool)
-    for body in fixed:
-        at = int(bodies[body.index, 0])
-        held[at : at + body.dimension] = True
+    places = packed.system.bodies
+    held = np.zeros(int(places[:, 1].sum()), bool)
+    for at, length in places[fixed].tolist():
+        held[at : at + length] = True
     return held
 
 
-def _unfolded(scene, metric, sketch, found, links, drawn, tol):
+def _largest_turn(metric, sketch, q):
+    """Return the largest rotation of a body between two configurations, rad."""
+    return np.linalg.norm(rotation_vectors(sketch[metric.p], q[metric.p]), axis=1).max(initial=0.0)
+
+
+def _unfolded(metric, sketch, found, links, tol):
     """Return the configuration found, or a nearby one whose links fold as in the sketch."""
+    drawn = links.drawn(metric, sketch)
     turned = links.turned(metric, found.q, drawn)
     kept, total, first = set(), found.iterations, turned
     for softness in STIFFER:
@@ -203,11 +222,10 @@ def _unfolded(scene, metric, sketch, found, links, drawn, tol):
     )
 
 
-def _velocities(scene, metric, q, qd, A, Phi_t):
-    """Return qd of the angular velocities as set, at the new orientations, and the nearest consistent qd."""
-    rigid = [body for body in scene.bodies if body.dimension == 7]
-    turning = np.array([body.angular_velocity for body in rigid]).reshape(-1, 3)
-    x = metric.speeds(qd[metric.r], turning)
+def _velocities(metric, q, sketch, A, Phi_t):
+    """Return qd of the sketch (q, qd), its angular velocities at the orientations q, and the nearest consistent qd."""
+    qd = sketch[1]
+    x = metric.speeds(qd[metric.r], metric.spins(*sketch))
     given = qd.copy()
     given[metric.p] = metric.rates(q, x)[metric.p]
     fitted = given

@@ -145,6 +145,9 @@ def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
         for _ in range(most):
             *arrays, energy = now
             step = soft_step(arrays[1], arrays[0], arrays[2], arrays[3])
+            size = np.linalg.norm(step)
+            if size <= CONVERGED * np.linalg.norm(arrays[2]):
+                break
             turn = metric.largest_turn(step)
             factor = min(1.0, MOST_TURN / turn) if turn > 0.0 else 1.0
             steps += 1
@@ -157,8 +160,7 @@ def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
             else:
                 break
             q, now = trial, after
-            size = np.linalg.norm(step)
-            if size <= (CONVERGED if softness == stages[-1][0] else PASSED) * (np.linalg.norm(now[2]) + LEAST_DIVISOR):
+            if softness != stages[-1][0] and size <= PASSED * (np.linalg.norm(now[2]) + LEAST_DIVISOR):
                 break
     return q, steps
 

@@ -11,7 +11,17 @@ from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of, set_redundant
 from ..sparse.massless_axes import axis_of
 from .rank import check_rank
-from .start_kernels import DOUBTFUL, NONE, evaluate_start, free_axis, go_near_by, holds, land_start, select_redundant
+from .start_kernels import (
+    DOUBTFUL,
+    NONE,
+    evaluate_start,
+    free_axis,
+    go_near_by,
+    holds,
+    land_start,
+    select_redundant,
+    take_start,
+)
 from .start_violations import demand_finite, demand_small, refuse_vanished
 from .start_workspace import give, taken
 from .tolerances import (
@@ -94,6 +104,15 @@ class RegularStarts:
         if regular and still(start.packed).bodies.size:
             settle(start.packed, start.graph, start.tangent.rows.H)
         return regular
+
+    def kernel(self):
+        """What `start_kernels.take_start` is called with but for q and qd, and the arrays that it finds as they are."""
+        start = self._start
+        workspace = start.workspace
+        workspace.enter(self._system.reals, start.packed.size, start.q, start.tol)
+        self._at = np.ascontiguousarray(workspace.first_parameters, np.int64)
+        addresses = start.context, start.rates.ctypes.data, self._at.ctypes.data, len(self._at)
+        return (take_start.address, *addresses, start.t, start.tol), workspace.entered()
 
 
 class RedundantStarts:

@@ -13,7 +13,9 @@ from ..maths.row_rank import row_lengths
 from ..maths.sparse_lu import sparse_lu
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
-from .tolerances import DENSE, IMMOBILE, LEAST_DIVISOR, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
+from .tolerances import DENSE, IMMOBILE, LEAST_DIVISOR, PLAIN, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
+
+_G = transform_g(np.eye(4)).reshape(4, 12)  # G is linear in p
 
 
 class Metric:
@@ -46,6 +48,7 @@ class Metric:
             free[self.move[held[self.r[:, 0]]]] = False
             free[self.turn[held[self.p[:, 0]]]] = False
         self.columns = np.flatnonzero(free)
+        self._last = None, None, None  # q and rows of the last `linear`, and what it returned
 
     def arrays(self, q):
         """Phi (m,), Phi_q (m, n), Phi_t (m,), all rows."""
@@ -56,17 +59,22 @@ class Metric:
 
     def linear(self, q, rows=None):
         """Phi (m',) and A (m', free columns) of some rows; None takes all but normalisations."""
+        rows, (known, among, found) = self.own if rows is None else rows, self._last
+        if known is q and among is rows:
+            return found
         Phi, Phi_q, _ = self.arrays(q)
-        rows = self.own if rows is None else rows
-        return Phi[rows], self.reduced(q, Phi_q[rows])[:, self.columns]
+        A = self.reduced(q, Phi_q[rows])
+        found = Phi[rows], A if self.columns.size == self.size else A[:, self.columns]
+        self._last = q, rows, found
+        return found
 
     def reduced(self, q, Phi_q):
         """A of rows of Phi_q, all columns."""
-        blocks = 0.5 * transform_g(q[self.p]).swapaxes(1, 2) @ self.rise
+        blocks = 0.5 * _transforms(q[self.p]).swapaxes(1, 2) @ self.rise
         if not self.sparse:
             A = np.zeros((Phi_q.shape[0], self.size))
             A[:, self.move] = Phi_q[:, self.r] / self.root
-            A[:, self.turn] = np.einsum("mbi,bij->mbj", Phi_q[:, self.p], blocks)
+            A[:, self.turn] = (Phi_q.T[self.p].swapaxes(1, 2) @ blocks).swapaxes(0, 1)
             return A
         from scipy.sparse import csr_array
 
@@ -87,9 +95,9 @@ class Metric:
         small = a < SMALL_ANGLE
         a = np.where(small, 1.0, a)
         c = np.where(small, 1.0 / 12.0, (1.0 - a / 2.0 / np.tan(a / 2.0)) / a**2)
-        across = np.cross(v, Jv)
+        across = _cross(v, Jv)
         x[self.move] = shift
-        x[self.turn] = np.einsum("bji,bj->bi", self.rise, Jv + 0.5 * across + c * np.cross(v, across))
+        x[self.turn] = np.einsum("bji,bj->bi", self.rise, Jv + 0.5 * across + c * _cross(v, across))
         return 0.5 * float((shift * shift).sum() + (turn * turn).sum()), x[self.columns]
 
     def moved(self, q, x):
@@ -99,14 +107,18 @@ class Metric:
         w = np.einsum("bij,bj->bi", self.rise, whole[self.turn])
         p, angle = q[self.p], np.linalg.norm(w, axis=1)[:, None]
         sine = np.sinc(angle / (2.0 * np.pi)) / 2.0  # sin(angle / 2) / angle
-        p = np.cos(angle / 2.0) * p + sine * np.einsum("bij,bi->bj", transform_g(p), w)
-        q[self.p] = p / np.linalg.norm(p, axis=1)[:, None]
+        turned = np.cos(angle / 2.0) * p + sine * np.einsum("bij,bi->bj", _transforms(p), w)
+        q[self.p] = np.where(angle > 0.0, turned / np.linalg.norm(turned, axis=1)[:, None], p)  # rest keeps its bits
         return q
 
     def largest_turn(self, x):
         """Rad, of a change of the free coordinates."""
         w = np.einsum("bij,bj->bi", self.rise, self._whole(x)[self.turn])
         return float(np.linalg.norm(w, axis=1).max(initial=0.0))
+
+    def spins(self, q, qd):
+        """Angular velocities of the rigid bodies, body frames."""
+        return 2.0 * np.einsum("bij,bj->bi", _transforms(q[self.p]), qd[self.p])
 
     def speeds(self, velocity, omega):
         """xd (size,) of velocities (bodies, 3) and angular velocities (rigid bodies, 3), body frames."""
@@ -120,7 +132,7 @@ class Metric:
         qd = np.zeros(self.n)
         qd[self.r] = x[self.move] / self.root
         w = np.einsum("bij,bj->bi", self.rise, x[self.turn])
-        qd[self.p] = 0.5 * np.einsum("bij,bi->bj", transform_g(q[self.p]), w)
+        qd[self.p] = 0.5 * np.einsum("bij,bi->bj", _transforms(q[self.p]), w)
         return qd
 
     def reach(self, q):
@@ -155,9 +167,22 @@ class Metric:
         return whole
 
 
+def _transforms(p):
+    """G(p), (b, 3, 4), of p (b, 4)."""
+    return (p @ _G).reshape(-1, 3, 4)
+
+
+def _cross(u, v):
+    """u x v, (b, 3) each."""
+    found = np.empty_like(u)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        found[:, i] = u[:, j] * v[:, k] - u[:, k] * v[:, j]
+    return found
+
+
 def rotation_vectors(p, target):
     """Return the rotation vectors (b, 3) from orientations p (b, 4) to the target, in the frames of p, up to pi."""
-    e = np.einsum("bij,bj->bi", transform_g(p), target)
+    e = np.einsum("bij,bj->bi", _transforms(p), target)
     e0, size = np.einsum("bi,bi->b", p, target), np.linalg.norm(e, axis=1)
     angle = 2.0 * np.arctan2(size, np.abs(e0))
     factor = np.where(size > 0.0, angle / np.maximum(size, LEAST_DIVISOR), 0.0)
@@ -185,12 +210,23 @@ def least_step(A, residual, rcond=SOLVED):
     if not some.any():
         return np.zeros(A.shape[1])
     if isinstance(A, np.ndarray):
-        unit = A[some] / lengths[some, None]
-        return np.linalg.lstsq(unit, -residual[some] / lengths[some], rcond=rcond)[0]
+        unit, target = A[some] / lengths[some, None], -residual[some] / lengths[some]
+        found = _of_independent(unit, target)
+        return np.linalg.lstsq(unit, target, rcond=rcond)[0] if found is None else found
     from scipy.sparse import diags_array
 
     unit = diags_array(1.0 / lengths[some]) @ A[some]
     return soft_step(unit, residual[some] / lengths[some], np.zeros(A.shape[1]), np.full(some.sum(), SOFT))
+
+
+def _of_independent(unit, target):
+    """Return the smallest x of A x = target A of unit rows; None where these are nearly dependent."""
+    K = unit @ unit.T
+    try:
+        far = np.linalg.cholesky(K).diagonal().min()
+    except np.linalg.LinAlgError:
+        return None
+    return unit.T @ np.linalg.solve(K, target) if far > PLAIN else None
 
 
 def unit_tangent(metric, q, rng):

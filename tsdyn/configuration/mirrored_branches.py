@@ -8,18 +8,8 @@ from ..errors import InconsistentState
 
 def demand_aligned(packed, q, t):
     """Refuse positions q (n,) at t that meet the rows with directions opposed, by the joint's name."""
-    if packed.derived.aligned is None:
-        packed.derived.aligned = _pairs(packed)
-    titles, places, directions, moving = packed.derived.aligned
-    if not titles:
-        return
-    if moving:
-        directions = directions.copy()
-        for i, direction in moving:
-            directions[0, i] = direction(t)
-    p = np.append(q, IDENTITY)[places]
-    one, other = np.einsum("skij,skj->ski", rotation_matrix(p), directions)
-    opposed = np.flatnonzero(~((one * other).sum(axis=1) > 0.0))
+    opposed, titles = _opposed(packed, q, t)
+    opposed = np.flatnonzero(opposed)
     if opposed.size:
         names = list(dict.fromkeys(titles[i] for i in opposed))
         more = f" and {len(names) - 8} more" if len(names) > 8 else ""
@@ -28,6 +18,27 @@ def demand_aligned(packed, q, t):
             "rows hold so, too, but it is the mirrored joint. Give one of the axes (or references) the other sign, or "
             "turn a body half a turn."
         )
+
+
+def are_aligned(packed, q, t):
+    """Which of many positions (k, n) at t `demand_aligned` lets pass."""
+    return ~_opposed(packed, q, t)[0].any(axis=-1)
+
+
+def _opposed(packed, q, t):
+    """Which pairs of directions are opposed at positions q (..., n), and their titles."""
+    if packed.derived.aligned is None:
+        packed.derived.aligned = _pairs(packed)
+    titles, places, directions, moving = packed.derived.aligned
+    if not titles:
+        return np.zeros((*q.shape[:-1], 0), bool), titles
+    if moving:
+        directions = directions.copy()
+        for i, direction in moving:
+            directions[0, i] = direction(t)
+    p = np.concatenate((q, np.broadcast_to(IDENTITY, (*q.shape[:-1], 4))), axis=-1)[..., places]
+    turned = np.einsum("...skij,skj->...ski", rotation_matrix(p), directions)
+    return ~((turned[..., 0, :, :] * turned[..., 1, :, :]).sum(axis=-1) > 0.0), titles
 
 
 def _pairs(packed):

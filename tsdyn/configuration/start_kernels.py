@@ -1,9 +1,13 @@
 """Kernels of initial conditions: residuals, projection, selection of independent rows, motion to a place near by."""
 
+import math
+
 from ..elements.loops.body_poses import move_bodies, place_bodies, write_positions, write_velocities
 from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
-from ..jit.kernels import entry, kernel
+from ..jit.kernels import callback, entry, integers, kernel, vector
+from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import set_time
+from ..model.lengths import SMALL
 from ..rows.interface import (
     DYNAMICS,
     METRIC,
@@ -18,10 +22,11 @@ from ..rows.interface import (
     singularity_indicator,
 )
 from ..workspaces.workspace import load_parts
-from .tolerances import DOUBTFUL_SHARE, IMMOBILE, LEAST_SIZE
+from .tolerances import DOUBTFUL_SHARE, IMMOBILE, LEAST_SIZE, ROUNDING
 
 # In place of a row that depends on others: there is none; rounding may hide one.
 NONE, DOUBTFUL = -1, -2
+PLAIN, LANDED = 1, 2  # what `take_start` has done
 
 
 @entry("pvvdvi")
@@ -31,7 +36,11 @@ def evaluate_start(context, q, qd, t, velocity, every):
     With every = 1 of every row, with 0 without the redundant ones. Where no row depends on others, NONE; DOUBTFUL, with
     every = 1, if a pivot is so small that the rounding errors it causes may hide a redundant row.
     """
-    c = load_parts(context)
+    return _evaluate(load_parts(context), q, qd, t, velocity, every)
+
+
+@kernel
+def _evaluate(c, q, qd, t, velocity, every):
     graph, system, f = c.graph, c.system, c.tangent
     set_time(system, t)
     place_bodies(graph.bodies, q, f.poses)
@@ -57,6 +66,11 @@ def holds(b, velocity, H, q, qd, at, tol):
 
     at: where the Euler parameters of the rigid bodies begin.
     """
+    return _hold(b, velocity, H, q, qd, at, tol)
+
+
+@kernel
+def _hold(b, velocity, H, q, qd, at, tol):
     far, fast, size = 0.0, 0.0, 0.0
     for i in range(q.size):
         far, fast = max(far, abs(q[i])), max(fast, abs(qd[i]))
@@ -79,7 +93,11 @@ def holds(b, velocity, H, q, qd, at, tol):
 @entry("pd")
 def land_start(context, t):
     """Project w.q and w.qd onto the constraint manifold. Status."""
-    c = load_parts(context)
+    return _land(load_parts(context), t)
+
+
+@kernel
+def _land(c, t):
     graph, system, w, f = c.graph, c.system, c.work, c.tangent
     set_time(system, t)
     place_bodies(graph.bodies, w.q, f.poses)
@@ -106,13 +124,95 @@ def select_redundant(context, t, share):
 @entry("pvd")
 def free_axis(context, q, t):
     """Return the row of a massless axis about which the kept rows leave rotation free at q, or -1."""
-    c = load_parts(context)
+    return _free_axis(load_parts(context), q, t)
+
+
+@kernel
+def _free_axis(c, q, t):
     graph, f = c.graph, c.tangent
     set_time(c.system, t)
     place_bodies(graph.bodies, q, f.poses)
     evaluate_rows(graph, c.system, f, f.rows, t)
     failed = factorise_selected_rows(graph, f, f.rows, DYNAMICS)
     return failed if is_axis(graph, f.rows, failed) else -1
+
+
+@callback("pppppidd")
+def take_start(context, q, qd, velocity, at, count, t, tol):  # eight: addresses
+    """Make q and qd consistent, in place, as `initial_conditions.consistent` does where all rows are independent.
+
+    The workspace is as `StartWorkspace.enter` leaves it. Return PLAIN if q and qd were at rounding, LANDED if they have
+    been projected, and 0 if there is more to be looked at.
+    """
+    c = load_parts(context)
+    w, f, n = c.work, c.tangent, c.work.q.size
+    x, xd, at = vector(q, n), vector(qd, n), integers(at, count)
+    rates = vector(velocity, c.graph.row.shape[0])
+    _set_floor(w.control, x, at)
+    if _evaluate(c, x, xd, t, rates, 1) != NONE:
+        return 0
+    if c.graph.axes.rows.shape[0] > 0 and _free_axis(c, x, t) >= 0:
+        return 0
+    if _hold(f.b, rates, f.rows.H, x, xd, at, min(ROUNDING, tol)) == 1:
+        return PLAIN
+    far, fast = _residuals(c, rates, x, xd, at)
+    whole, rate = 1.0 + _largest(x), 1.0 + _largest(xd)
+    if not (far <= tol * whole and fast <= tol * rate and is_finite(f.rows.H)):
+        return 0
+    if far > ROUNDING * whole:
+        for i in at:
+            length = math.sqrt(x[i] * x[i] + x[i + 1] * x[i + 1] + x[i + 2] * x[i + 2] + x[i + 3] * x[i + 3])
+            for j in range(i, i + 4):
+                x[j] /= length
+    elif fast <= ROUNDING * rate:
+        return PLAIN
+    copy(x, w.q)
+    copy(xd, w.qd)
+    if _land(c, t) != 0:
+        return 0
+    copy(w.q, x)
+    copy(w.qd, xd)
+    return LANDED
+
+
+@kernel
+def _set_floor(control, q, at):
+    """As `StartWorkspace.enter` sets it."""
+    far, scale = _largest(q), 1.0
+    if 0.0 < control.size < SMALL:
+        far, scale, last = 0.0, control.size, 0
+        for i in range(q.size):
+            turns = last < at.size and i >= at[last]
+            far = max(far, abs(q[i]) * scale if turns else abs(q[i]))
+            if turns and i == at[last] + 3:
+                last += 1
+    control.floor = ROUNDING * (control.size + far)
+
+
+@kernel
+def _largest(x):
+    found = 0.0
+    for i in range(x.size):
+        found = max(found, abs(x[i]))
+    return found
+
+
+@kernel
+def _residuals(c, rates, q, qd, at):
+    """The largest residual of positions and of velocities; inf if one is not finite."""
+    far, fast, row, b = 0.0, 0.0, c.graph.row, c.tangent.b
+    for e in range(row.shape[0]):
+        if row[e] >= 0:
+            if not (abs(b[e]) < math.inf and abs(rates[e]) < math.inf):
+                return math.inf, math.inf
+            far, fast = max(far, abs(b[e])), max(fast, abs(rates[e]))
+    for i in at:
+        square, rate = 0.0, 0.0
+        for j in range(i, i + 4):
+            square += q[j] * q[j]
+            rate += q[j] * qd[j]
+        far, fast = max(far, abs(0.5 * (square - 1.0))), max(fast, abs(rate))
+    return far, fast
 
 
 @entry("pdvd")

@@ -4,7 +4,8 @@ import numpy as np
 
 from ..jit.kernels import resident
 from ..model.lengths import is_small
-from ..rows.interface import allocate_tangent, reset_selection
+from ..rows.interface import allocate_tangent, reset_selection, selection_parts
+from ..workspaces.carving import words
 from ..workspaces.workspace import parts
 from .tolerances import KEPT_FLOATS, ROUNDING
 
@@ -44,6 +45,13 @@ class StartWorkspace:
         if is_small(size):
             far[self.at] *= size
         control.floor = ROUNDING * (size + far.max())
+
+    def entered(self):
+        """The arrays that `enter` sets but for reals."""
+        tangent = self.tangent
+        arrays, records = selection_parts(tangent)
+        arrays += [self.work.q.base, tangent.b, tangent.gamma, tangent.Z, tangent.a]
+        return [*arrays, *map(words, (tangent.landing, *records))]
 
 
 def taken(packed, graph, n):

@@ -44,6 +44,9 @@ FIRM = 1e-3
 # The same below which a direction isn't corrected: by steps towards a sketch while the constraints aren't met yet, by
 # Gauss-Newton steps, by tangents. The last two are below RANK_TOL and at it.
 STEEP, SOLVED, TANGENT = 1e-6, 1e-10, 1e-7
+# Distance of a unit row from the rows before it, down to which all are independent for sure: the smallest singular
+# value is hardly smaller by more than the square root of their number, and normal equations lose its square.
+PLAIN = 1e-2
 # Softness of rows in sparse least squares, which no rank is known of: above the rounding of their squares.
 SOFT = 1e-13
 # Inertia of an axis that has none, as a share of the body's mean moment: the metric of kinetic energy stays a metric.
@@ -61,7 +64,7 @@ MOST_TURN, MOST_SLIDE = 0.5, 0.2
 # Steps at most: of Gauss-Newton, and of the descent along the constraints.
 MOST_CLOSING, MOST_SETTLING = 60, 60
 # Length of a step, as a share of the wish, at which a stage has converged: the last one, and those before it.
-CONVERGED, PASSED = 1e-9, 0.03
+CONVERGED, PASSED = 1e-8, 0.03
 # What is left of the slope, as a share of the distance, when the descent ends; and the least decrease of a step.
 SETTLED, DECREASE = 1e-11, 0.9
 # Residual, as a share of the largest, above which a row whose derivative vanishes is named.
@@ -75,6 +78,8 @@ STIFFER = (0.1, 0.01, 0.001)
 # --- loops, conflicts, mobility, plug-ins ---
 # rad; an angle of a fold that is drawn deliberately, and one that is reported when it comes out on the other side.
 CLEAR, SHOWN = 0.2, 0.1
+# rad; rotations of the three directions of a fold, each by at most this, reverse none of SHOWN: sin(0.1) > 3 * 0.025.
+UNFOLDED = SHOWN / 4.0
 # Share of a slide's direction across the axis beside it below which the two make no fold; m, of a link without length.
 FLAT, POINT_LIKE = 0.1, 1e-9
 # Share of the largest |Phi| below which a row takes no part in a conflict.

@@ -128,7 +128,7 @@ class GivenByState(ByState):
     """
 
     first = 0
-    arguments, given_numbers, slots = (1, STATE), 3, 16
+    arguments, given_numbers, slots, begin = (1, STATE), 3, 16, 1
 
     @staticmethod
     def results(function, t, state):
@@ -139,6 +139,8 @@ class GivenByState(ByState):
     def inputs(x, xd, par, k, first, s):
         """The state."""
         fill_state_series(x, xd, 0, k, first, s)
+        for i in range(1, par.size):
+            s[first + STATE - 1 + i, k] = par[i] if k == 0 else 0.0
 
     @staticmethod
     def series(x, xd, par, k, s, out):
@@ -146,8 +148,8 @@ class GivenByState(ByState):
         out[0], out[1], out[2] = given_series(x, par, k, s)
 
     def parameters(self):
-        """One flag: the vector is given in the body frame."""
-        return (float(self.frame == "body"),)
+        """One flag: the vector is given in the body frame; then the numbers of the function."""
+        return (float(self.frame == "body"), *super().parameters())
 
     @classmethod
     def _wrap(cls, inner, owner, **others):
@@ -160,7 +162,7 @@ def _law(x, xd, par, t, out):
     state, given = stack(13), stack(3)
     fill_state(x, xd, 0, state)
     try:
-        value = function(t, state)
+        value = function(t, state, par)
         given[0], given[1], given[2] = value[0], value[1], value[2]
     except Exception:
         given[0], given[1], given[2] = math.nan, math.nan, math.nan

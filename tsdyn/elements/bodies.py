@@ -41,6 +41,7 @@ class Ground:
         return "<ground>"
 
 
+START = ("position", "velocity", "orientation", "angular_velocity")  # attributes that say where a run starts
 Given = TypeVar("Given")  # what an attribute is set to
 Kept = TypeVar("Kept")  # and what is kept of it
 
@@ -61,7 +62,10 @@ class Attribute(Generic[Given, Kept]):
         value = self.check(value, body)
         value.setflags(write=False)  # a change of one component would not reach the packed numbers
         body.values[self.name] = value
-        body.scene.touch()
+        if self.name in START:
+            body.scene.touch_start()
+        else:
+            body.scene.touch()
 
 
 def _mass(value, body):
@@ -111,6 +115,9 @@ def _orientation(value, body):
             f"{body.name}: orientation must be four finite Euler parameters (e0, e1, e2, e3), scalar first, or one "
             f"scipy Rotation, got {value!r}."
         )
+    known = body.values.get("orientation")
+    if known is not None and p.tobytes() == known.tobytes():
+        return p.copy()  # scaled before: once more might change a bit
     length = np.sqrt(p @ p)
     if abs(length - 1.0) > UNIT_LENGTH:
         raise InvalidBody(
@@ -175,7 +182,12 @@ class PointMass:
 
     def place(self, q: Floats, qd: Floats) -> None:
         """Take over coordinates and velocities as the values at the start."""
-        self.position, self.velocity = q, qd
+        for name, value in self.values_at(q, qd).items():
+            setattr(self, name, value)
+
+    def values_at(self, q: Floats, qd: Floats) -> dict[str, Floats]:
+        """Return the attributes of a start with these coordinates and velocities."""
+        return {"position": q, "velocity": qd}
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name!r}>"
@@ -216,28 +228,36 @@ class Body(PointMass):
         p, w = self.values["orientation"], self.values["angular_velocity"]
         return np.concatenate((self.values["velocity"], 0.5 * (transform_g(p).T @ w)))
 
-    def place(self, q: Floats, qd: Floats) -> None:
-        """Take over coordinates and velocities as the values at the start."""
-        self.position, self.velocity, self.orientation = q[:3], qd[:3], q[3:]
-        self.angular_velocity = 2.0 * (transform_g(q[3:]) @ qd[3:])
+    def values_at(self, q: Floats, qd: Floats) -> dict[str, Floats]:
+        """Return the attributes of a start with these coordinates and velocities."""
+        spin = 2.0 * (transform_g(q[3:]) @ qd[3:])
+        return {"position": q[:3], "velocity": qd[:3], "orientation": q[3:], "angular_velocity": spin}
 
 
 def transform_g(p: ArrayLike) -> Floats:
     """G(p) = [-e, -e~ + e0 I], shape (3, 4), or (..., 3, 4) for p of shape (..., 4)."""
-    e0, e1, e2, e3 = np.moveaxis(np.asarray(p), -1, 0)
+    e0, e1, e2, e3 = _components(p)
     rows = [[-e1, e0, e3, -e2], [-e2, -e3, e0, e1], [-e3, e2, -e1, e0]]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    found = np.array(rows)
+    return found if found.ndim == 2 else np.moveaxis(found, (0, 1), (-2, -1))
 
 
 def rotation_matrix(p: ArrayLike) -> Floats:
     """A(p), homogeneous, shape (3, 3), or (..., 3, 3) for p of shape (..., 4)."""
-    e0, e1, e2, e3 = np.moveaxis(np.asarray(p), -1, 0)
+    e0, e1, e2, e3 = _components(p)
     rows = [
         [e0 * e0 + e1 * e1 - e2 * e2 - e3 * e3, 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)],
         [2 * (e1 * e2 + e0 * e3), e0 * e0 - e1 * e1 + e2 * e2 - e3 * e3, 2 * (e2 * e3 - e0 * e1)],
         [2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), e0 * e0 - e1 * e1 - e2 * e2 + e3 * e3],
     ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    found = np.array(rows)
+    return found if found.ndim == 2 else np.moveaxis(found, (0, 1), (-2, -1))
+
+
+def _components(p):
+    """e0 to e3: numbers of Python, which are quicker, where there is one p."""
+    p = np.asarray(p)
+    return p.tolist() if p.ndim == 1 else np.moveaxis(p, -1, 0)
 
 
 def ground_point(body: Any, s: ArrayLike) -> Floats:

@@ -9,6 +9,8 @@ from typing import Any
 
 from ..jit.compiled_once import compiled_once
 from ..jit.kernels import kernel, part, specialised
+from ..jit.spread import spread
+from ..motions.keywords import numbers_of, positional
 from ..motions.state_program import Writer
 from ..motions.tracing import Untraceable, demand_same, retold, traced
 from .force import callbacks
@@ -20,11 +22,13 @@ class Kernels(dict):
     """The callbacks of one kind with one function; pickled as the two."""
 
     def __init__(self, kind, function):
-        functions = {"law": kind._wrap(kernel(function, allocates=True), function)}
+        self.names = tuple(numbers_of(function))
+        plain = positional(function) if self.names else function
+        functions = {"law": kind._wrap(_with_numbers(kind, plain, len(self.names)), plain)}
         if kind.memory:
             functions["remember"] = kind.remember
         series = {name: kind.own_kernels[name] for name in ("series", "check")}
-        super().__init__({**callbacks(kind, functions, function), **series})
+        super().__init__({**callbacks(kind, functions, plain), **series})
         self.made_of, self.programs = (kind, function), {}
 
     def program(self, numbers):
@@ -37,7 +41,7 @@ class Kernels(dict):
         """
         if numbers not in self.programs:
             try:
-                self.programs[numbers] = _program(*self.made_of, numbers)
+                self.programs[numbers] = _program(*self.made_of, self.names, numbers)
             except Untraceable as reason:
                 self.programs[numbers] = reason
         if isinstance(self.programs[numbers], Untraceable):
@@ -50,27 +54,68 @@ class Kernels(dict):
         return kernels_of, self.made_of
 
 
-def _program(kind, function, numbers):
-    """What `Kernels.program` gives."""
-    counts = (*kind.arguments, numbers) if kind.has_numbers else kind.arguments
-    first = sum(kind.arguments)
-    twin = retold(function)
-    results = traced(partial(kind.results, twin), counts, kind.given_numbers)
-    demand_same(results, partial(kind.results, getattr(function, "py_func", function)), counts)
+def _program(kind, function, names, numbers):
+    """What `Kernels.program` gives; names: of the function's numbers."""
+    counts, first = kind.arguments, sum(kind.arguments)
+    if names or kind.has_numbers:
+        counts = (*counts, len(names) or numbers)
+    results = traced(_results(kind, retold(function), names), counts, kind.given_numbers)
+    demand_same(results, _results(kind, getattr(function, "py_func", function), names), counts)
     fixed = range(first, sum(counts))
     return Writer(results, sum(counts), fixed, kind.slots, kind.place).numbers()
 
 
+def _results(kind, function, names):
+    """What a function makes of its arguments, the last of which are its numbers, if it has names for some."""
+    if not names:
+        return partial(kind.results, function)
+    return lambda *given: kind.results(partial(function, **dict(zip(names, given[-1], strict=True))), *given[:-1])
+
+
 def kernels_of(kind, function):
-    """The kernels of a kind with a user's function; the same ones for the same two."""
+    """The kernels of a kind with a user's function; the same ones for the same two, whatever the function's numbers."""
     function = getattr(function, "py_func", function)
-    return compiled_once(kind, function, partial(Kernels, kind, function))
+    plain = positional(function) if numbers_of(function) else function
+    return compiled_once(kind, plain, partial(Kernels, kind, function))
+
+
+BEGIN = COUNT = 0  # where the numbers of a function are in par; filled in, as is the function
+
+
+def _bare_of_state(t, state, par):
+    return function(t, state)
+
+
+def _bare_of_joint(t, coordinate, rate, par):
+    return function(t, coordinate, rate)
+
+
+def _tuned_of_state(t, state, par):
+    return function(t, state, *spread(par[BEGIN:], COUNT))
+
+
+def _tuned_of_joint(t, coordinate, rate, par):
+    return function(t, coordinate, rate, *spread(par[BEGIN:], COUNT))
+
+
+def _with_numbers(kind, plain, count):
+    """The function as a kernel of its arguments and par; that of a kind whose function takes par itself is as it is."""
+    inner = kernel(plain, allocates=True)
+    if kind.has_numbers:
+        return inner
+    of_state = len(kind.arguments) == 2
+    tuned, bare = (_tuned_of_state, _bare_of_state) if of_state else (_tuned_of_joint, _bare_of_joint)
+    name = f"{plain.__qualname__}.{kind.__name__}.call"
+    call = specialised(tuned if count else bare, name, plain, function=inner, BEGIN=kind.begin, COUNT=count)
+    return kernel(call, allocates=True)
 
 
 def arguments_of(function):
-    """The number of arguments of a plain Python function; 0 for anything else."""
+    """The number of arguments of a plain Python function, but for numbers by keyword; 0 for anything else."""
     plain = getattr(function, "py_func", function)
-    return plain.__code__.co_argcount if isinstance(plain, FunctionType) else 0
+    if not isinstance(plain, FunctionType) or plain.__code__.co_kwonlyargcount != len(numbers_of(function)):
+        return 0
+    return plain.__code__.co_argcount
 
 
 @kernel
@@ -110,11 +155,11 @@ function = None  # filled in by `ByState`
 
 
 @part
-def load_at(t, coordinate, rate):
+def load_at(t, coordinate, rate, par):
     """The load of a user's function of a joint coordinate; NaN if it raises."""
     load = math.nan
     try:
-        load = float(function(t, coordinate, rate))
+        load = float(function(t, coordinate, rate, par))
     except Exception:
         load = math.nan
     return load
@@ -134,6 +179,7 @@ class ByState:
     arguments: tuple[int, ...] = ()  # how many numbers each has, t first
     has_numbers = False  # whether par is one more
     given_numbers, place = 1, 0  # results, and their first row
+    begin = 0  # where the numbers of the function are in par
 
     @staticmethod
     def results(function, *arguments):
@@ -172,5 +218,5 @@ class ByState:
         """Nothing is known of a function."""
 
     def parameters(self):
-        """None: the function has its own constants."""
-        return ()
+        """The numbers of the function, by keyword."""
+        return tuple(numbers_of(self.function_of_state).values())

@@ -5,7 +5,6 @@ change more (an axis without inertia, a scene of micrometres) isn't run here; it
 same bits.
 """
 
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,17 +17,15 @@ from ..model.packed import System
 from ..parameters.edit import KEPT
 from ..runs.task import Task
 from ..simulation import method_choice
-from ..simulation.simulate import run_task, simulate
+from ..simulation.simulate import run_task
 from ..sparse.graph_builder import weights
 from ..sparse.massless_axes import lean_bodies
 from ..taylor.run_memory import are_unequal
-from ..taylor.tolerances import LIGHT
-from .first_slice import FirstSlice
+from .batch import Batch
+from .first_slice import Finished, FirstSlice
 from .pen import pen_of
 from .sharing import have_same_zeros
 from .starts import OF_ROWS, Starts
-
-FEW = 30  # bodies that a list serves faster than an array
 
 
 class Arena:
@@ -51,21 +48,15 @@ class Arena:
             packed=self.packed, system=system, bodies=template.bodies, constraints=template.constraints,
             row_names=template.row_names,
         )  # fmt: skip
-        self.moments, self._is_unequal = _moments(system), are_unequal(system)
-        self.written, self._weights, self.starts = set(), [], Starts(self)
-        self._pen = None if study.names is None else pen_of(self, study.names)
+        self.is_unequal = are_unequal(system)
+        self.written, self.starts = set(), Starts(self)
+        self.pen = None if study.names is None else pen_of(self, study.names)
         self._slice = FirstSlice(study) if FirstSlice.serves(study) else None
+        self._chunk, self._batch = None, None
 
     def systems(self):
         """The `System`s whose arrays hold the numbers of a case, but for reals: the scene's, and the memory's."""
         return [self.packed.system, *(memory.context.system for memory in self._memories())]
-
-    def weights(self):
-        """(inverse, mass, lengths of q_i, spins) of each constraint graph, the first two as (bodies + 1, 4, 4)."""
-        graphs = self._graphs()
-        if len(graphs) != len(self._weights):
-            self._weights = [_views(graph) for graph in graphs]
-        return self._weights
 
     def enter(self, packed):
         """Write the numbers of a packed scene; False if they change more than numbers."""
@@ -109,17 +100,11 @@ class Arena:
         rows, system = self.packed.derived.redundant, self.packed.system
         return rows is not None and self.kept.n == len(system.segments) - len(rows)
 
-    def _masses_are_unequal(self):
-        """As `are_unequal`; without inertias, unless these differ from case to case."""
-        if "inertia" in self.written or self._is_unequal or len(self.packed.bodies) > FEW:
-            return are_unequal(self.packed.system)
-        masses = self.packed.system.mass.tolist()
-        return max(masses) > LIGHT * min(masses)
-
     def _memories(self):
         return [memory for spare in self.kept._spare.values() for memory in spare]
 
-    def _graphs(self):
+    def graphs(self):
+        """The constraint graphs of the arena and of its runs."""
         known, series = self.packed.derived, vars(self.kept).get("series")
         others = [other.packed.derived.graph for other in self.starts.others]
         graphs = [found[0] for found in (known.graph, known.moving_graph, *others) if found is not None]
@@ -127,22 +112,44 @@ class Arena:
 
     def _weigh(self):
         """Write masses and inertias into the constraint graphs."""
-        for graph in self._graphs():
+        for graph in self.graphs():
             found = weights(self.packed.system, graph.bodies, {})
             for array, value in zip((graph.inverse, graph.mass, graph.spins), found, strict=True):
                 array[...] = value
-        self.moments = _moments(self.packed.system)
 
-    def run_values(self, values, scene):
-        """As `run_packed`, from values by name."""
+    def run_cases(self, chunk, k):
+        """Run cases of a chunk from k on without Python between them; the first that was not run."""
+        if self._batch is None or not self._takes(chunk):
+            return k
+        return self._batch.run(k, len(chunk.status))
+
+    def _takes(self, chunk):
+        """Have the pen lay out a chunk; False if there is none, or the chunk has no values for it."""
+        if self.pen is None or chunk.values is None:
+            return False
+        if chunk is not self._chunk:
+            self._chunk = chunk
+            self.pen.take(chunk.values, len(chunk.status))
+            if self._batch is not None:
+                self._batch.enter(chunk.arrays, chunk.status)
+        return True
+
+    def run_case(self, chunk, k, scene):
+        """As `run_packed`, case k of a chunk."""
         self.starts.has_other_rows = False
-        if self._pen is None:
+        if not self._takes(chunk):
             return None
         if self.kept.packed is not self.packed:
             self.kept.packed = self.scene.packed = self.packed
-        self.written |= self._pen.written
-        start = self._pen.write(values)
-        return None if start is None else self._run(start, scene)
+        self.written |= self.pen.written
+        start = self.pen.write(k)
+        if start is None:
+            return None
+        ran = self._run(start, scene)
+        if self._batch is None and ran is not None and isinstance(ran[1], Finished) and Batch.serves(self):
+            self._batch = Batch(self, ran[0], self._slice)
+            self._batch.enter(chunk.arrays, chunk.status)
+        return ran
 
     def run_packed(self, packed, start, scene):
         """The `Task` and the `Outcome` of a case, or a `Finished`; None if it can't be run here.
@@ -157,14 +164,16 @@ class Arena:
         return self._run(start, scene)
 
     def _run(self, start, scene):
-        if self.written & OF_ROWS and self._masses_are_unequal() != self._is_unequal:
+        if self.written & OF_ROWS and are_unequal(self.packed.system) != self.is_unequal:
             return None
         found = self.starts.start(start)
         if found is None:
             return None
         study, (memory, (q, qd)) = self.study, found
         options, settings, method = study.options, study.options.settings, study.method
-        choose = partial(_implicit_is_faster, scene, study, method) if study.given["integrator"] is None else None
+        choose = None
+        if study.given["integrator"] is None:
+            choose = method_choice.turns_of(self.scene, self.kept, method, options)
         task = Task(
             self.kept, method, settings.form, options.span, q, qd, memory, options.times, settings.dense_output,
             options.events, settings.constraint_tol, settings.max_steps, settings.chart_interval or 0, study.report,
@@ -183,17 +192,3 @@ def method_of(kept, options, default):
     if method is None:
         method = method_choice.explicit(kept, *default)
     return method if settings.max_step is None else frozen(method.bounded(settings.max_step))
-
-
-def _implicit_is_faster(scene, study, method, run):
-    given = {**study.given, "scene": scene()}
-    return method_choice.implicit_is_faster(simulate, given, method, study.options.span[1], run)
-
-
-def _moments(system):
-    """Principal moments of inertia of each body, in increasing order."""
-    return np.linalg.eigh(system.inertia.reshape(-1, 3, 3))[0].tolist()
-
-
-def _views(graph):
-    return graph.inverse.reshape(-1, 4, 4), graph.mass.reshape(-1, 4, 4), graph.bodies[:, 1], graph.spins

@@ -8,6 +8,7 @@ from ..errors import Status
 from .keeping import TIMES
 from .runner import PLAIN
 
+NOT_RUN = int(Status.NOT_RUN)
 ALWAYS = ("t", "q", "qd")  # of the same shape in every case
 
 
@@ -33,22 +34,24 @@ def run_chunk(runner, first, count, offset=0):
 
     offset: the number of the first case of the study among all.
     """
-    study, done, messages = runner.study, 0, {}
-    status, arrays = np.full(count, int(Status.NOT_RUN)), empty(study, count)
-    interrupted = False
+    study, messages = runner.study, {}
+    status, arrays = np.full(count, NOT_RUN), empty(study, count)
+    interrupted, k = False, 0
     try:
-        for k in range(count):
+        room = runner.room(first, status, arrays)
+        while (k := runner.run_many(room, k)) < count:
             if study.stopped:
                 raise KeyboardInterrupt
-            record = runner.run(first + k)
+            record = runner.run(room, k)
             said = _enter(arrays, k, record.arrays)
-            status[k] = record.status if said is None else Status.CASE_FAILED
             message = said or record.message
             if message is not PLAIN:
                 messages[offset + first + k] = message
-            done = k + 1
+            status[k] = record.status if said is None else Status.CASE_FAILED
+            k += 1
     except KeyboardInterrupt:
         interrupted = True
+    done = int(np.argmax(status == NOT_RUN)) if (status == NOT_RUN).any() else count
     parts = {name: array[:done] for name, array in arrays.items()}
     return Chunk(offset + first, status[:done], messages, parts), interrupted
 

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..calls import fitting, unknown_argument
+from ..elements.names import named
 from ..errors import InvalidArgument, TsdynError
 from ..simulation.scene import Scene
 from ..simulation.simulate import simulate
+from ..validation import sequence
 from .cases import cases_of
 from .chunks import Collected
 from .executors import run_executor
@@ -20,6 +22,8 @@ from .runner import Study
 from .threads import run_threads
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..hints import CaseTable, Keep, Place, Progress, Span
 
 OWN = ("scene", "t_span", "store", "checkpoint", "progress")  # arguments of `simulate` that are no options here
@@ -33,6 +37,7 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
     *,
     keep: Keep = "final",
     cases: int | None = None,
+    assemble: bool | Sequence[str] = False,
     executor: Any = None,
     threads: int | None = None,
     lanes: int | None = None,
@@ -55,12 +60,15 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
         the Solution: a number, an array, or a mapping of names to these.
     cases : int, optional
         The number of cases; needed for a function of the case.
+    assemble : bool or sequence of str
+        Whether the start of each case is made consistent: by `scene.assemble`, which moves the bodies of these names,
+        or all. For parameters that change lengths, points or axes.
     executor : concurrent.futures.Executor, dask.distributed.Client or address of its scheduler, optional
         Where the cases run, in place of threads of this process. They are sent in chunks, and chunks of a worker that
         Dask has lost are sent again.
     threads : int, optional
-        Threads of this process. By default one where cases are so short that threads wait for each other, else one a
-        processor. The bits are the same.
+        Threads of this process. By default one where all cases together are short, else one a processor. The bits are
+        the same.
     lanes : int, optional
         Cases that one thread runs at once: 1.
     store : str or PathLike, optional
@@ -84,8 +92,8 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
 
     Notes
     -----
-    Every case has the bits of `simulate(scene.with_parameters(values), t_span, **options)`, whatever the number of
-    threads, and wherever it ran on machines of one kind.
+    Every case has the bits of `simulate(scene.with_parameters(values), t_span, **options)`, assembled before where
+    `assemble` says so, whatever the number of threads, and wherever it ran on machines of one kind.
 
     Examples
     --------
@@ -110,7 +118,8 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
     demand_lanes(lanes)
     if threads is not None and (isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1):
         raise InvalidArgument(f"threads must be a positive whole number, got {threads!r}.")
-    study = Study(scene, cases_of(scene, parameters, cases), given_of(t_span, options), keep)
+    given = given_of(t_span, options)
+    study = Study(scene, cases_of(scene, parameters, cases), given, keep, free_of(scene, assemble, given["state"]))
     sink = sink_of(study, store, resume)
     report, used = CaseProgress(progress, study.cases.count, sink.first), 0
     try:
@@ -122,6 +131,18 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
         report.close()
         sink.close()
     return Ensemble(study, sink, used, interrupted)
+
+
+def free_of(scene, assemble, state):
+    """The names of the bodies that may move to make starts consistent; None if none may."""
+    if assemble is False:
+        return None
+    if state is not None:
+        raise InvalidArgument("assemble and state: a run from a state starts there; leave one of them out.")
+    if assemble is True:
+        return [body.name for body in scene.bodies]
+    given = sequence(assemble, 'assemble must be True, False or names of bodies such as ("rod",)', InvalidArgument)
+    return [named(scene.bodies, getattr(it, "name", it), "body to assemble").name for it in given]
 
 
 def sink_of(study, store, resume):

@@ -46,8 +46,8 @@ def _runners_of(digest):
 
 
 def _study(payload, cases):
-    scene, given, keep = pickle.loads(payload)
-    return Study(scene, cases, given, keep)
+    scene, given, keep, free = pickle.loads(payload)
+    return Study(scene, cases, given, keep, free)
 
 
 def run_executor(study, sink, executor, report):
@@ -99,7 +99,7 @@ class _Sender:
         else:
             self.dump = _pickler(is_dask)
             given = {**study.given, "scene": None}
-            payload = self.dump((study.scene, given, study.keep))
+            payload = self.dump((study.scene, given, study.keep, study.free))
             self.sent = hashlib.sha256(payload).hexdigest(), payload
 
     def run(self, report):

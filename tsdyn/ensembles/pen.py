@@ -1,30 +1,38 @@
-"""Numbers of a case, written straight into the arrays of an arena.
+"""Numbers of the cases of a chunk: checked, laid out as rows of a table, and where each of them is written to.
 
-Each parameter has a function that writes a value, or finds that it can't: the case is then entered as a packed scene,
-which says what is wrong with it.
+A value that is not admissible, or asks for more than numbers, makes its case one that doesn't fit: it is entered as a
+packed scene, which says what is wrong with it.
 """
 
-import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ..elements.bodies import PointMass
-from ..elements.element import checked_parameters
-from ..elements.tolerances import LEAST_MASS
-from ..motions.signals import Signal
-from ..parameters.edit import sketch, with_values
-from ..sparse.massless_axes import levers
+from ..sparse.massless_axes import lean_bodies, levers
 from ..sparse.tolerances import THIN
+from ..taylor.tolerances import LIGHT
+from .columns import inertias, masses, orientations, parameter_rates, vectors
+from .force_columns import ForceColumns
 
-MOVED = {"position": 0, "velocity": 1}  # attributes that are three numbers of q, or of qd
+WEIGHTS = {"mass", "inertia"}
+
+
+class Place(NamedTuple):
+    """Words of a row of the table, and the array that they are written to."""
+
+    to: np.ndarray  # (words,) float64, a view
+    column: int
 
 
 def pen_of(arena, names):
-    """The `Pen` for these parameters of all cases; None if there is one of a constraint, or none at all."""
+    """The `Pen` for these parameters of all cases; None if there is one of a constraint or function, or none at all."""
     family, owners = arena.study.family, {}
     for name in names:
         field = family.field(name)
-        owners.setdefault(id(field.owner), (field.owner, []))[1].append((name, field.attribute))
+        if field.keyword:
+            return None
+        owners.setdefault(id(field.owner), (field.owner, {}))[1][field.attribute] = name
     bodies = (PointMass, type(family.template))
     if any(not isinstance(owner, bodies) and family.load_of(owner) is None for owner, _ in owners.values()):
         return None
@@ -32,7 +40,7 @@ def pen_of(arena, names):
 
 
 class Pen:
-    """Writes the numbers of one case after the other.
+    """Checks the values of a chunk, and writes the numbers of one case after the other.
 
     Attributes
     ----------
@@ -40,145 +48,228 @@ class Pen:
         The arrays of a `System` that it writes to.
     moves : bool
         Whether starts differ.
+    fits : ndarray of bool (k,)
+        Which cases of the chunk are written; the others must be entered in another way.
+    numbers : ndarray (k, width)
+    starts : ndarray (k, 2, n)
+        q, qd of each case; of all, (1, 2, n), where starts don't differ.
     """
 
     def __init__(self, arena, owners):
-        self.arena, self.written, self.moves, self._far = arena, set(), False, {}
-        self._writers = [writer for owner, pairs in owners for writer in self._writers_of(owner, pairs)]
+        self.arena, self._parts, self._known = arena, [], ([], [])
+        self._weights = Weights(arena.base, arena.is_unequal)
+        for owner, names in owners:
+            self._parts += self._parts_of(owner, names)
+        at = 0
+        for part in self._parts:
+            part.column, at = at, at + part.width
+        self.width, self.written = at, {name for part in self._parts for name in part.written}
+        self.moves = any(isinstance(part, StateColumns) for part in self._parts)
 
-    def write(self, values):
-        """Write values by name; the start of the case, or None if it must be entered in another way."""
-        start = self.arena.study.family.start
-        if self.moves:
-            start = start[0].copy(), start[1].copy()
-        for writer in self._writers:
-            if not writer(values, start):
-                return None
-        return None if self._far and self._is_lean() else start
-
-    def _is_lean(self):
-        """Whether a body has next to no inertia about an axis, as `massless_axes.lean_bodies` finds it."""
-        mass, moments = self.arena.packed.system.mass, self.arena.moments
-        return any(moments[i][0] < THIN * max(moments[i][2], mass[i] * far) for i, far in self._far.items())
-
-    def _writers_of(self, owner, pairs):
+    def _parts_of(self, owner, names):
         family = self.arena.study.family
         if owner is family.template:
-            self.written.add("gravity")
-            return [self._gravity(pairs[0][0])]
+            return [GravityColumns(names["gravity"])]
         if not isinstance(owner, PointMass):
-            self.written.add("reals")
-            return [self._force(owner, family.load_of(owner), pairs)]
-        writers, rest = [], []
-        if owner.dimension == 7 and any(attribute in ("mass", "inertia") for _, attribute in pairs):
-            self._far[owner.index] = float(levers(self.arena.base)[owner.index] ** 2)
-        for name, attribute in pairs:
-            if attribute == "mass":
-                self.written |= {"mass"}
-                writers.append(self._mass(owner, name))
-            elif attribute == "inertia":
-                self.written |= {"inertia"}
-                writers.append(self._inertia(owner, name))
-            else:
-                self.moves = True
-                rest.append((name, attribute))
-        if rest and all(attribute in MOVED for _, attribute in rest):
-            writers += [self._place(owner, *pair) for pair in rest]
-        elif rest:
-            writers.append(self._state(owner, rest))
-        return writers
+            return [ForceColumns(family, owner, names)]
+        parts = []
+        if "mass" in names:
+            parts.append(MassColumns(owner, names["mass"], self._weights))
+        if "inertia" in names:
+            parts.append(InertiaColumns(owner, names["inertia"], self._weights))
+        moved = {attribute: name for attribute, name in names.items() if attribute not in WEIGHTS}
+        return [*parts, StateColumns(owner, moved, self.arena)] if moved else parts
 
-    def _gravity(self, name):
-        arena = self.arena
+    def take(self, values, count):
+        """Lay out the values of so many cases: arrays (count, ...) by name."""
+        self.fits, self.numbers = np.ones(count, bool), np.zeros((count, self.width))
+        self.starts = np.empty((count if self.moves else 1, 2, self.arena.study.n))
+        self.starts[:] = self.arena.study.family.start
+        if any(array.dtype != float for array in values.values()):
+            self.fits[:] = False
+            return
+        with np.errstate(all="ignore"):
+            for part in self._parts:
+                columns = slice(part.column, part.column + part.width)
+                self.fits &= part.fill(values, self.numbers[:, columns], self.starts)
+            self.fits &= self._weights.fit(count)
 
-        def write(values, start):
-            value = values[name]
-            if not _is_vector(value):
-                return False
-            for system in arena.systems():
-                system.gravity[:] = value
-            return True
+    def places(self):
+        """All `Place`s, in the arrays of the arena and of its runs."""
+        systems, graphs = self.arena.systems(), self.arena.graphs()
+        if not (_same(systems, self._known[0]) and _same(graphs, self._known[1])):
+            self._known, self._places = (systems, graphs), []
+            for part in self._parts:
+                for array, begin, words, at in part.places(systems, graphs):
+                    to = array.reshape(-1).view(float)[begin : begin + words]
+                    self._places.append(Place(to, part.column + at))
+        return self._places
 
-        return write
-
-    def _mass(self, body, name):
-        arena, i = self.arena, body.index
-
-        def write(values, start):
-            m = values[name]
-            if not (isinstance(m, float) and LEAST_MASS <= m < math.inf):
-                return False
-            for system in arena.systems():
-                system.mass[i] = m
-            for inverse, mass, _, _ in arena.weights():
-                inverse[i, 0, 0], mass[i, 0, 0] = 1.0 / m, m
-            return True
-
-        return write
-
-    def _inertia(self, body, name):
-        arena, i = self.arena, body.index
-        check = type(body).inertia.check
-
-        def write(values, start):
-            J = check(values[name], body)
-            arena.moments[i] = np.linalg.eigh(J)[0].tolist()
-            for system in arena.systems():
-                system.inertia[i] = J.ravel()
-            inverted, spins = np.linalg.inv(J), bool((J[0, 0] * np.eye(3) != J).any())
-            for inverse, mass, lengths, turning in arena.weights():
-                if lengths[i] == 7:  # of an orientation that isn't locked
-                    inverse[i, 1:, :3], mass[i, 1:, :3], turning[i] = inverted, J, spins
-            return True
-
-        return write
-
-    def _place(self, body, name, attribute):
-        at, level = int(self.arena.base.system.bodies[body.index, 0]), MOVED[attribute]
-
-        def write(values, start):
-            value = values[name]
-            if not _is_vector(value):
-                return False
-            start[level][at : at + 3] = value
-            return True
-
-        return write
-
-    def _state(self, body, pairs):
-        at, length = self.arena.base.system.bodies[body.index].tolist()
-
-        def write(values, start):
-            other = with_values(body, {attribute: values[name] for name, attribute in pairs})
-            start[0][at : at + length], start[1][at : at + length] = other.q, other.qd
-            return True
-
-        return write
-
-    def _force(self, force, load, pairs):
-        arena, other = self.arena, sketch(force)
-        vars(other)["added"] = False
-        at, kernels, places = int(load.alone[0].reals), force.kernels, force.coordinates
-        count = len(load.parameters)
-
-        def write(values, start):
-            for name, attribute in pairs:
-                setattr(other, attribute, values[name])
-            other.check()
-            given = checked_parameters(other, Signal, "loads")
-            if other.kernels is not kernels or len(given) != count or any(isinstance(x, Signal) for x in given):
-                return False
-            reals, begin = arena.packed.system.reals, at
-            for old, new in zip(places, other.coordinates, strict=True):
-                if new is not old:
-                    reals[begin : begin + 3] = new
-                begin += 3
-            reals[begin : begin + count] = given
-            return True
-
-        return write
+    def write(self, k):
+        """Write the numbers of case k of the chunk; its start, or None if it must be entered in another way."""
+        if not self.fits[k]:
+            return None
+        row = self.numbers[k]
+        for to, column in self.places():
+            to[...] = row[column : column + to.size]
+        return (self.starts[k, 0], self.starts[k, 1]) if self.moves else self.arena.study.family.start
 
 
-def _is_vector(value):
-    """Whether a value is three finite numbers, as an array of floats."""
-    return isinstance(value, np.ndarray) and value.shape == (3,) and bool(np.isfinite(value).all())
+def _same(arrays, known):
+    return len(arrays) == len(known) and all(a is b for a, b in zip(arrays, known, strict=True))
+
+
+class GravityColumns:
+    """The acceleration of free fall of each case.
+
+    As each sort of columns it has `width`, the numbers of a case; `fill`, which checks and writes them and says which
+    cases fit; and `places`: arrays, where a part of them begins, how many words, from which number on.
+    """
+
+    width, written = 3, ("gravity",)
+
+    def __init__(self, name):
+        self.name = name
+
+    def fill(self, values, numbers, starts):
+        """Gravity as it is."""
+        numbers[:], fits = vectors(values[self.name])
+        return fits
+
+    def places(self, systems, graphs):
+        """Gravity of each system."""
+        return [(system.gravity, 0, 3, 0) for system in systems]
+
+
+class MassColumns:
+    """m and 1 / m of a body."""
+
+    width, written = 2, ("mass",)
+
+    def __init__(self, body, name, weights):
+        self.i, self.name, self.weights = body.index, name, weights
+        weights.follow(body)
+
+    def fill(self, values, numbers, starts):
+        """Mass and its inverse."""
+        m, fits = masses(values[self.name])
+        numbers[:, 0], numbers[:, 1] = m, 1.0 / m
+        self.weights.masses[self.i] = m
+        return fits
+
+    def places(self, systems, graphs):
+        """In each system and constraint graph."""
+        found = [(system.mass, self.i, 1, 0) for system in systems]
+        for graph in graphs:
+            found += [(graph.mass, 16 * self.i, 1, 0), (graph.inverse, 16 * self.i, 1, 1)]
+        return found
+
+
+class InertiaColumns:
+    """J' and its inverse, and whether the body has a gyroscopic torque, as a word."""
+
+    width, written = 19, ("inertia",)
+
+    def __init__(self, body, name, weights):
+        self.i, self.name, self.weights = body.index, name, weights
+        weights.follow(body)
+
+    def fill(self, values, numbers, starts):
+        """Inertia, its inverse, and whether it is that of a sphere."""
+        J, fits = inertias(values[self.name])
+        moments = np.linalg.eigh(J)[0]
+        fits &= moments[:, 0] > THIN * moments[:, 2]
+        numbers[:, :9] = J.reshape(-1, 9)
+        J = np.where(fits[:, None, None], J, np.eye(3))
+        numbers[:, 9:18] = np.linalg.inv(J).reshape(-1, 9)
+        spins = (J[:, :1, :1] * np.eye(3) != J).any(axis=(1, 2))
+        numbers[:, 18] = spins.astype(np.int64).view(float)
+        self.weights.moments[self.i], self.weights.inertias[self.i] = moments, np.abs(J).max(axis=(1, 2))
+        return fits
+
+    def places(self, systems, graphs):
+        """In each system, and in each graph in which the orientation isn't locked."""
+        i = self.i
+        found = [(system.inertia, 9 * i, 9, 0) for system in systems]
+        for graph in graphs:
+            if graph.bodies[i, 1] == 7:
+                for row in range(3):
+                    found.append((graph.mass, 16 * i + 4 * (row + 1), 3, 3 * row))
+                    found.append((graph.inverse, 16 * i + 4 * (row + 1), 3, 9 + 3 * row))
+                found.append((graph.spins, i, 1, 18))
+        return found
+
+
+class StateColumns:
+    """The start of a body, which is no number of a system."""
+
+    width, written = 0, ()
+
+    def __init__(self, body, names, arena):
+        self.names, self.values = names, body.values
+        self.at, length = arena.base.system.bodies[body.index].tolist()
+        self.turns = length == 7
+
+    def fill(self, values, numbers, starts):
+        """q and qd of the body in the starts of all cases."""
+        fits, kept = True, {}
+        for attribute, name in self.names.items():
+            kept[attribute], good = (orientations if attribute == "orientation" else vectors)(values[name])
+            fits = fits & good
+        at, q, qd = self.at, starts[:, 0], starts[:, 1]
+        if "position" in kept:
+            q[:, at : at + 3] = kept["position"]
+        if "velocity" in kept:
+            qd[:, at : at + 3] = kept["velocity"]
+        if self.turns and not kept.keys().isdisjoint(("orientation", "angular_velocity")):
+            p, w = (
+                kept[name] if name in kept else np.tile(self.values[name], (len(starts), 1))
+                for name in ("orientation", "angular_velocity")
+            )
+            q[:, at + 3 : at + 7], qd[:, at + 3 : at + 7] = p, parameter_rates(p, w)
+        return fits
+
+    def places(self, systems, graphs):
+        """None: starts are no part of a system."""
+        return []
+
+
+class Weights:
+    """Whether masses and inertias of the cases ask for no other equations than those of the arena.
+
+    They do where a body has next to no inertia about an axis (`massless_axes.lean_bodies`), or where masses become
+    unequal (`taylor.run_memory.are_unequal`).
+    """
+
+    def __init__(self, base, is_unequal):
+        self._base, self._is_unequal, self._far, self._thin = base, is_unequal, {}, False
+        self._moments = np.linalg.eigh(base.system.inertia.reshape(-1, 3, 3))[0]
+        self.masses, self.moments, self.inertias = {}, {}, {}  # by body, of each case
+
+    def follow(self, body):
+        """Look after a body whose mass or inertia differs."""
+        if body.dimension == 7:
+            self._far[body.index] = float(levers(self._base)[body.index] ** 2)
+            self._thin |= body.index in lean_bodies(self._base)
+
+    def fit(self, count):
+        """Which of so many cases do not."""
+        fits = np.full(count, not self._thin)
+        if self._thin or not (self.masses or self.inertias):
+            return fits
+        for i, far in self._far.items():
+            m, moments = self.masses.get(i, self._base.system.mass[i]), self.moments.get(i, self._moments[i : i + 1])
+            fits &= ~(moments[:, 0] < THIN * np.maximum(moments[:, 2], m * far))
+        return fits & (self._are_unequal(count) == self._is_unequal)
+
+    def _are_unequal(self, count):
+        """As `taylor.run_memory.are_unequal`, of each case."""
+        system, found = self._base.system, np.zeros(count, bool)
+        for own, varied in ((system.mass, self.masses), (np.abs(system.inertia).max(axis=1), self.inertias)):
+            others = own > 0.0  # zero for the inertia of a point mass
+            others[list(varied)] = False
+            every = [own[others][None], *(column[:, None] for column in varied.values())]
+            every = np.hstack([np.broadcast_to(columns, (count, columns.shape[1])) for columns in every])
+            if every.size:
+                found |= every.max(axis=1) > LIGHT * every.min(axis=1)
+        return found

@@ -15,7 +15,9 @@ from ..validation import counted
 from .keeping import TIMES
 
 if TYPE_CHECKING:
-    from ..hints import Bools, Floats, Integers, Solution
+    from pathlib import Path
+
+    from ..hints import Bools, Floats, Integers, Place, Solution
 
 COORDINATES = ("x", "y", "z", "e0", "e1", "e2", "e3")
 
@@ -92,7 +94,7 @@ class Ensemble:
     @property
     def t(self) -> Floats:
         """The times of t_eval (k,), or those reached (cases,), s."""
-        return self._study.options.times if self._study.keep == TIMES else self.reached
+        return self.times if self._study.keep == TIMES else self.reached
 
     @property
     def q(self) -> Floats:
@@ -117,6 +119,104 @@ class Ensemble:
         """The table of parameters: name -> (cases, ...)."""
         return self._study.cases.table
 
+    @property
+    def times(self) -> Floats:
+        """The times of t_eval (k,), s; empty if none were given."""
+        return self._study.options.times
+
+    def reductions(self) -> dict[str, Floats]:
+        """What a function `keep` made of each solution, (cases, ...) by name; an array without a name as "kept"."""
+        if not callable(self._study.keep):
+            return {}
+        kept = self.kept
+        return dict(kept) if isinstance(kept, Mapping) else {"kept": kept}
+
+    def unit(self, name: str) -> str:
+        """The unit of a parameter; "" where the class of a plug-in doesn't describe it."""
+        field = self._study.family.fields.get(name)
+        return field.unit if field is not None else ""
+
+    def save(self, path: Place) -> Path:
+        """Write parameters, results, options and the scene to a file, from which `ts.load` returns the ensemble.
+
+        Parameters
+        ----------
+        path : str or PathLike
+            Ends in .h5, .hdf5, .nc or .zarr. A saved ensemble that is there is replaced.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        InvalidArgument
+            If a parameter has values that are no numbers, or the path doesn't say the format.
+        MissingDependency
+            If the library of the format is not installed.
+        StorageError
+            If the file can't be written.
+
+        Notes
+        -----
+        A file holds no code: `case(i)` of the loaded ensemble needs a scene of data, or `ts.load(path, scene=scene)`,
+        and options that are numbers and words.
+
+        Examples
+        --------
+        >>> from tempfile import mkdtemp
+        >>> import tsdyn as ts
+        >>> stone = (scene := ts.Scene()).add_point_mass(mass=1.0, name="stone")
+        >>> throws = ts.ensemble(scene, {"stone.velocity": [(1, 0, 5), (2, 0, 5)]}, (0, 1))
+        >>> ts.load(throws.save(mkdtemp() + "/throws.h5"))
+        <Ensemble of 2 cases: 2 success>
+        """
+        from .saving import save
+
+        return save(self, path)
+
+    def plot(self, what: str | None = None, path: Place | None = None) -> Any:
+        """Draw quantiles of a series over time, or else a map of one value over the parameters that vary.
+
+        Parameters
+        ----------
+        what : str, optional
+            As for `ts.plots.quantile_bands` and `ts.plots.final_map`; default the first result of a function `keep`,
+            else the first coordinate.
+        path : str or Path, optional
+            A file to write the figure to, in the format of its suffix.
+
+        Returns
+        -------
+        matplotlib Axes
+
+        Raises
+        ------
+        MissingDependency
+            If matplotlib is not installed.
+        InvalidArgument
+            If there is no such value, or no parameter varies.
+
+        Examples
+        --------
+        >>> import matplotlib
+        >>> import tsdyn as ts
+        >>> matplotlib.use("agg")
+        >>> stone = (scene := ts.Scene()).add_point_mass(mass=1.0, name="stone")
+        >>> throws = ts.ensemble(scene, {"stone.velocity": [(1, 0, 5), (2, 0, 5)]}, (0, 1))
+        >>> throws.plot("stone.x").get_xlabel()
+        'stone.velocity[0] (m/s)'
+        """
+        from ..figures.ensembles import overview
+
+        return overview(self, what, path)
+
+    def _number_of(self, i):
+        """The number of a case, counted from the start; raises InvalidArgument."""
+        if isinstance(i, bool) or not isinstance(i, (int, np.integer)) or not -len(self) <= i < len(self):
+            raise InvalidArgument(f"the ensemble has cases 0 to {len(self) - 1}, got {i!r}.")
+        return int(i) % len(self)
+
     def case(self, i: int) -> Solution:
         """Run a case again and return its Solution, of the bits of the ensemble.
 
@@ -127,13 +227,11 @@ class Ensemble:
         TsdynError
             If a value of the case is inadmissible.
         """
-        if isinstance(i, bool) or not isinstance(i, (int, np.integer)) or not -len(self) <= i < len(self):
-            raise InvalidArgument(f"the ensemble has cases 0 to {len(self) - 1}, got {i!r}.")
         from ..simulation.simulate import simulate
 
-        study = self._study
+        study, i = self._study, self._number_of(i)
         given = {name: value for name, value in study.given.items() if name != "scene"}
-        return simulate(study.scene.with_parameters(study.cases.values(int(i) % len(self))), **given)
+        return simulate(study.scene.with_parameters(study.values(i)), **given)
 
     @property
     def coordinates(self) -> list[str]:
@@ -150,10 +248,9 @@ class Ensemble:
         found = {"status": ("case", self.status), "reached": ("case", self.reached, {"units": "s"})}
         for name, units in (("q", "m or 1"), ("qd", "m/s or 1/s")):
             found[name] = (("case", *grid, "coordinate"), getattr(self, name), {"units": units})
-        known = self._study.family.fields
-        for name, values in (*self.parameters.items(), *self._named()):
+        for name, values in (*self.parameters.items(), *self.reductions().items()):
             dimensions = ("case", *(f"axis {i} of {name}" for i in range(np.ndim(values) - 1)))
-            attributes = {"units": known[name].unit} if name in known else {}
+            attributes = {"units": self.unit(name)} if name in self.parameters else {}
             found[name] = (dimensions, np.asarray(values), attributes)
         coordinates = {"case": np.arange(len(self)), "coordinate": self.coordinates}
         coordinates |= {"time": ("time", self.t, {"units": "s"})} if grid else {}
@@ -166,7 +263,7 @@ class Ensemble:
         except ImportError as error:
             raise MissingDependency("to_dataframe() needs pandas: pip install 'tsdyn[data]'.") from error
         columns = {}
-        for name, values in (*self.parameters.items(), *self._named()):
+        for name, values in (*self.parameters.items(), *self.reductions().items()):
             columns |= _flat(name, values)
         columns |= {"status": [str(Status(code)) for code in self.status.tolist()], "message": self.message}
         columns["reached"] = self.reached
@@ -180,13 +277,6 @@ class Ensemble:
         if self._study.keep == TIMES:
             return pandas.DataFrame(columns, index=[index, np.tile(self.t, len(self))]).rename_axis(["case", "time"])
         return pandas.DataFrame(columns, index=index).rename_axis("case")
-
-    def _named(self):
-        """What a function made of each case, by name."""
-        if not callable(self._study.keep):
-            return ()
-        kept = self.kept
-        return tuple(kept.items()) if isinstance(kept, Mapping) else (("kept", kept),)
 
     def _facts(self):
         count = Counter(self.status.tolist())

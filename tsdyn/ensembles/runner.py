@@ -9,7 +9,7 @@ from ..errors import Status, TsdynError
 from ..simulation.options import checked
 from ..simulation.simulate import run_from
 from ..simulation.solution import Solution
-from ..simulation.variants import family_of, of_numbers, packed_anew
+from ..simulation.variants import family_of, of_numbers, packed_anew, start_names, start_of
 from .arena import Arena, method_of
 from .first_slice import Finished
 from .keeping import demand_keep, record_of, reduced
@@ -37,6 +37,8 @@ class Study:
     given : dict
         The arguments of `simulate` by name; scene and progress among them are not used.
     keep : str or callable
+    free : sequence of str, optional
+        Names of the bodies by which each start is made consistent; None takes starts as they are.
 
     Raises
     ------
@@ -44,8 +46,9 @@ class Study:
         As `simulate` does for its options.
     """
 
-    def __init__(self, scene, cases, given, keep):
+    def __init__(self, scene, cases, given, keep, free=None):
         self.scene, self.cases, self.keep, self.given = scene, cases, keep, {**given, "progress": None}
+        self.free = free
         self.options = options = checked(self.given)
         demand_keep(keep, options.times)
         self.family, self.changes = family_of(scene)
@@ -54,12 +57,23 @@ class Study:
         self.method, self.n = method_of(self.kept, options, default), self.kept.n
         self.stops = self.kept.stops(*options.span)
         self.names = None if cases.names is None else {*self.changes, *cases.names}
+        if self.names is not None and free is not None:
+            self.names |= start_names(self.kept.packed)
         self.has_arena = settings.drop and serves(self.family, self.kept, self.names)
-        self.stopped, self.idle = False, []  # runners of the threads of an executor
+        self.halt, self.idle = np.zeros(1, np.int64), []  # runners of the threads of an executor
+
+    @property
+    def stopped(self):
+        """Whether the ensemble ends: loops of cases see it, too."""
+        return bool(self.halt[0])
+
+    @stopped.setter
+    def stopped(self, whether):
+        self.halt[0] = whether
 
     def __reduce__(self):
         """What is analysed is analysed again in another process."""
-        return Study, (self.scene, self.cases, self.given, self.keep)
+        return Study, (self.scene, self.cases, self.given, self.keep, self.free)
 
     def twin(self, cases):
         """The same for some of the cases."""
@@ -67,10 +81,28 @@ class Study:
         vars(other).update(vars(self), cases=cases)
         return other
 
+    def values(self, i):
+        """Values of case i by name, with those of a consistent start."""
+        values = self.cases.values(i)
+        if self.free is None:
+            return values
+        scene = self.scene.with_parameters(values)
+        scene.assemble(t=self.options.span[0], free=self.free)
+        return {**values, **start_of(scene)}
+
     def report(self, fraction, *more):
         """Of a run: end it if the ensemble has been stopped."""
         if self.stopped and fraction is not None:
             raise KeyboardInterrupt
+
+
+class Room(NamedTuple):
+    """A chunk of cases, and arrays for their results."""
+
+    first: int
+    values: dict  # name -> (k, ...); None where arenas take none
+    status: np.ndarray
+    arrays: dict
 
 
 class Runner:
@@ -79,20 +111,35 @@ class Runner:
     def __init__(self, study):
         self.study, self._arenas = study, []
 
-    def run(self, i):
-        """The `Record` of case i."""
+    def room(self, first, status, arrays):
+        """The `Room` of the cases from `first` on."""
+        study, values = self.study, None
+        if study.has_arena and study.names is not None and study.free is None:
+            given = {**study.changes, **study.cases.fixed}
+            values = {name: _repeated(value, len(status)) for name, value in given.items()}
+            part = slice(first, first + len(status))
+            values |= {name: column[part] for name, column in study.cases.columns.items()}
+        return Room(first, values, status, arrays)
+
+    def run_many(self, room, k):
+        """Run cases from k on that need no Python; the first that was not run."""
+        return self._arenas[0].run_cases(room, k) if self._arenas else k
+
+    def run(self, room, k):
+        """The `Record` of case k of a chunk."""
         try:
-            return self._run(self.study.cases.values(i))
+            return self._run(room, k)
         except TsdynError as error:
             return Record(Status.CASE_FAILED, str(error), {})
         except Exception as error:  # of a user's function: the other cases go on
             return Record(Status.CASE_FAILED, f"{type(error).__name__}: {error}", {})
 
-    def _run(self, values):
+    def _run(self, room, k):
         study = self.study
+        values = study.values(room.first + k)
         changes = {**study.changes, **values} if study.changes else values
         if study.has_arena:
-            ran = self._in_arena(lambda arena: arena.run_values(changes, lambda: self._scene(changes)))
+            ran = self._in_arena(lambda arena: arena.run_case(room, k, lambda: self._scene(changes)))
             if ran is not None:
                 return self._record(changes, *ran)
         found = study.family.numbers(changes)
@@ -157,6 +204,13 @@ class Runner:
         if callable(study.keep):
             arrays |= reduced(study.keep, solution)
         return Record(status, message, arrays)
+
+
+def _repeated(value, count):
+    """A value for all cases as a column."""
+    array = np.asarray(value)
+    array = array.astype(float) if array.dtype.kind in "iuf" else array
+    return np.broadcast_to(array, (count, *array.shape))
 
 
 class _Rows:

@@ -53,6 +53,10 @@ class Starts:
         self._known = q, found
         return found
 
+    def kernel(self):
+        """As of `RegularStarts`, once a start has been checked."""
+        return self._regular.kernel()
+
     def _started(self, q, qd, t, tol):
         """A start as `consistent` returns it; None if it must be looked at in a scene of its own."""
         arena, derived = self._arena, self._arena.packed.derived
@@ -63,8 +67,7 @@ class Starts:
         if arena.kept.packed.coordinates is not arena.base.coordinates:
             return None
         if derived.redundant is None:
-            started = consistent(arena.scene, arena.packed.system, q, qd, t, tol, True)
-            return None if derived.redundant is None else started
+            return consistent(arena.scene, arena.packed.system, q, qd, t, tol, True)
         if self._redundant is None:
             self.others = [self._with_redundant(rows) for rows in (None, np.zeros(0, np.int64))]
             self._redundant = RedundantStarts([*self.others, arena.scene], q, qd, t, tol)

@@ -241,6 +241,7 @@ def digest_of(study):
         repr((sorted(plain.items()), sources_of(functions), study.keep if not callable(study.keep) else "")).encode()
     )
     digest.update(study.options.times.tobytes())
+    digest.update(b"" if study.free is None else repr(study.free).encode())
     state = given["state"]
     digest.update(b"" if state is None else np.asarray(state.q).tobytes() + np.asarray(state.qd).tobytes())
     return digest.hexdigest()

@@ -6,7 +6,7 @@ import time
 
 from .chunks import run_chunk
 from .runner import Runner
-from .tolerances import CHUNK_SECONDS, LOOK, MOST_CASES, SHORT_CASE
+from .tolerances import ALONE_SECONDS, CHUNK_SECONDS, GROWTH, LOOK, MOST_CASES
 
 
 class Queue:
@@ -25,7 +25,7 @@ class Queue:
     def timed(self, count, seconds):
         """Adapt the size of the next chunks to the time that one has taken."""
         wanted = count * self.seconds / max(seconds, 1e-9)
-        self.size = max(1, min(int(wanted), 2 * count, MOST_CASES))
+        self.size = max(1, min(int(wanted), GROWTH * count, MOST_CASES))
 
 
 def processors():
@@ -36,21 +36,19 @@ def processors():
 def run_threads(study, sink, threads, report):
     """Run the cases of a study on threads, which give their chunks to the sink; the number of threads.
 
-    None: one thread where cases are so short that threads wait for each other, else as many as there are processors.
-    `report(cases)` is told of progress. Ctrl-C ends it: whether it did.
+    None: this thread alone where all cases together are short, else as many as there are processors. `report(cases)` is
+    told of progress. Ctrl-C ends it: whether it did.
     """
     queue = Queue(sink.first, study.cases.count)
-    runner = Runner(study)
-    for _ in range(2 if threads is None else 0):  # the first makes what all have in common
+    runner, began = Runner(study), time.perf_counter()
+    while threads is None:  # the first case makes what all have in common
         pair = queue.take()
         if pair is None:
             return 1, False
-        began = time.perf_counter()
         if _run(runner, pair, queue, sink, report):
             return 1, True
-        seconds = time.perf_counter() - began
-    if threads is None:
-        threads = processors() if seconds > SHORT_CASE else 1
+        if time.perf_counter() - began > ALONE_SECONDS:
+            threads = processors()
     if threads == 1:
         return 1, _run_here(runner, queue, sink, report)
     return threads, _Pool(study, queue, sink, threads).run(report)

@@ -6,8 +6,10 @@ CHUNK_SECONDS = 0.02
 SENT_SECONDS = 0.5
 # cases of a chunk at most
 MOST_CASES = 4096
-# s: a case that is shorter runs no faster on threads, which wait for each other's Python part
-SHORT_CASE = 1.0e-4
+# of a chunk to the next at most: the first cases are no measure of the others
+GROWTH = 8
+# s: an ensemble that takes less is run without threads of its own, each of which makes arrays of its own
+ALONE_SECONDS = 0.02
 # s: between looks at the progress
 LOOK = 0.1
 # chunks in the hands of an executor for each of its workers: none waits for the next
@@ -22,3 +24,5 @@ FLUSH = 1.0
 ARENAS = 8
 # studies whose runners a worker keeps
 STUDIES = 4
+# cases after which it is asked whether they are long; the loop of cases runs them if fewer than one in FEW_LONG are
+TRIED, FEW_LONG = 16, 8

@@ -64,7 +64,7 @@ def _encode_motion(motion):
 def _encode_signal(signal):
     if isinstance(signal.source, Table):
         return encode(signal.source)
-    if not signal.motions:
+    if signal.is_function:
         raise Unwritable(f"the function {_name_of(signal.source)}")
     found = [_encode_smooth(motion) for motion in signal.motions]
     return found[0] if signal.width == 1 else found

@@ -79,7 +79,7 @@ def _law(x, xd, par, t, out):
     for i in range(3):
         s += x[i] * (x[6 + i] - x[3 + i])
         rate += x[i] * (xd[6 + i] - xd[3 + i]) + xd[i] * (x[6 + i] - x[3 + i])
-    force = load_at(t, s, rate)
+    force = load_at(t, s, rate, par)
     for i in range(3):
         out[i], out[3 + i], out[6 + i] = force * (x[6 + i] - x[3 + i]), -force * x[i], force * x[i]
 
@@ -91,7 +91,7 @@ class _ContinuousForce(ByState, JointForce):
     template = staticmethod(_law)
     memory, remember = 0, None
     arguments, slots, place = (1, 1, 1), 13, 12
-    check = JointLoad.check
+    check, parameters = JointLoad.check, ByState.parameters
 
     @staticmethod
     def inputs(x, xd, par, k, first, s):
@@ -101,6 +101,8 @@ class _ContinuousForce(ByState, JointForce):
             s[6 + i, k], s[9 + i, k] = xd[i], xd[6 + i] - xd[3 + i]
         s[first, k] = dot(s, 0, 3, k)
         s[first + 1, k] = dot(s, 0, 9, k) + dot(s, 6, 3, k)
+        for i in range(par.size):
+            s[first + 2 + i, k] = par[i] if k == 0 else 0.0
 
     @staticmethod
     def series(x, xd, par, k, s, out):

@@ -99,9 +99,9 @@ class JointTorque(JointLoad, Force):
 
 
 def _law(x, xd, par, t, out):
-    turned = angle_about(x, par[0])
+    turned = angle_about(x, par[par.size - 1])
     rate = x[0] * (xd[12] - xd[9]) + x[1] * (xd[13] - xd[10]) + x[2] * (xd[14] - xd[11])
-    torque = load_at(t, turned, rate)
+    torque = load_at(t, turned, rate, par)
     for i in range(9):
         out[i] = 0.0
     for i in range(3):
@@ -116,7 +116,7 @@ class _ContinuousTorque(ByState, JointTorque):
     given = "function"
     template = staticmethod(_law)
     arguments, slots, place = (1, 1, 1), 20, 19
-    check = JointLoad.check
+    check, parameters = JointLoad.check, ByState.parameters
 
     @staticmethod
     def directions(geometry):
@@ -130,9 +130,11 @@ class _ContinuousTorque(ByState, JointTorque):
             s[i, k] = x[i]
         for i in range(3):
             s[12 + i, k] = xd[12 + i] - xd[9 + i]
-        angle_series(par[0], k, s)
+        angle_series(par[par.size - 1], k, s)
         s[first, k] = s[18, k]
         s[first + 1, k] = dot(s, 0, 12, k)
+        for i in range(par.size - 1):
+            s[first + 2 + i, k] = par[i] if k == 0 else 0.0
 
     @staticmethod
     def series(x, xd, par, k, s, out):
@@ -143,4 +145,4 @@ class _ContinuousTorque(ByState, JointTorque):
     @staticmethod
     def remember(x, xd, par, t):
         """The angle."""
-        return angle_about(x, par[0])
+        return angle_about(x, par[par.size - 1])

@@ -27,6 +27,7 @@ from ..plugins import (
     fill_state,
     fill_state_series,
     floats,
+    numbers_of,
     stack,
 )
 
@@ -135,10 +136,10 @@ class UserForce(ByState, Force):
 
     def check(self):
         """Refuse all but plain functions of five arguments."""
-        if arguments_of(self.function) != 5:
+        if arguments_of(self.function) != 5 or numbers_of(self.function):
             raise self.error(
                 f"{self.name}: function must be a plain Python function of five arguments (t, a, b, par, out), got "
-                f"{self.function!r}."
+                f"{self.function!r}; numbers that vary are parameters=, which it gets as par."
             )
 
     def parameters(self):

@@ -119,6 +119,11 @@ class Handles:
         """The `BodyMotion` of the two bodies of a geometry; levels are q, qd, qdd."""
         return [BodyMotion(*self.where(body), levels) for body in (geometry.own, geometry.other)]
 
+    @property
+    def begin_at_zero(self):
+        """Whether counting begins at zero wherever the bodies are."""
+        return not self._begins
+
     def angles_at_start(self, t, q):
         """The angles (count,) near which counting begins at q (n,)."""
         near = np.zeros(self.count)

@@ -19,8 +19,16 @@ def has_lengths(primitive):
 
 def size_of(primitives, coordinates):
     """Size of a scene: the largest number among the coordinates of markers; of a small one, the largest length, m."""
-    items = zip(primitives, coordinates, strict=True)
-    pairs = (pair for item, places in items for pair in zip(item.markers, places, strict=True))
-    sizes = [(marker.code, np.abs(s).max()) for marker, s in pairs]
-    length = max((size for code, size in sizes if code == POINT), default=0.0)
-    return float(length if is_small(length) else max((size for _, size in sizes), default=0.0))
+    return size_of_reaches([reaches_of(*pair) for pair in zip(primitives, coordinates, strict=True)])
+
+
+def reaches_of(primitive, places):
+    """The largest numbers among the coordinates of points, and of all markers, of a primitive."""
+    sizes = [(marker.code, float(np.abs(s).max())) for marker, s in zip(primitive.markers, places, strict=True)]
+    return max((size for code, size in sizes if code == POINT), default=0.0), max((s for _, s in sizes), default=0.0)
+
+
+def size_of_reaches(reaches):
+    """The same as `size_of`, from those of each primitive."""
+    length = max((each[0] for each in reaches), default=0.0)
+    return length if is_small(length) else max((each[1] for each in reaches), default=0.0)

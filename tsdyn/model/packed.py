@@ -266,7 +266,7 @@ def user_functions(packed):
                 yield value, value.given
     for load in packed.loads:
         for value in load.parameters:
-            if isinstance(value, Signal) and not value.motions:
+            if isinstance(value, Signal) and value.is_function:
                 yield value, (value.source,)
         if hasattr(load.force, "function_of_state"):
             yield load.force, (load.force.function_of_state,)

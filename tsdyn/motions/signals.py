@@ -13,6 +13,7 @@ from ..jit.kernels import Callback, caller, kernel, specialised, vector
 from ..validation import floats, number
 from .elementary import Constant, Piecewise, Polynomial
 from .expressions import Smooth
+from .keywords import numbers_of
 from .knots import demand_covered
 from .program import run_program
 from .tables import is_data
@@ -60,6 +61,19 @@ class Signal:
                 "lambda t: ..."
             )
         self.value(0.0)
+        self._trace_numbers()
+
+    def _trace_numbers(self):
+        """A function with keyword arguments is run as motions: other numbers compile nothing."""
+        if not numbers_of(self.source):
+            return
+        try:
+            self.motions = of_time(self.source, self.width)
+        except Untraceable as reason:
+            raise self.error(
+                f"{self.what}: keyword arguments are numbers that may vary, so the function must consist of arithmetic "
+                f"and functions of NumPy, without branches ({reason}). Write the numbers into the function instead."
+            ) from None
 
     @classmethod
     def wrap(cls, value, width, what, error):
@@ -135,6 +149,11 @@ class Signal:
         return self._smooth
 
     @property
+    def is_function(self):
+        """Whether it is a user's function."""
+        return isinstance(getattr(self.source, "py_func", self.source), FunctionType)
+
+    @property
     def entire(self):
         """Whether the values are piecewise polynomials of time, which a series can't be short of."""
         return bool(self.motions) and all(isinstance(motion, (Piecewise, Polynomial)) for motion in self.motions)
@@ -155,6 +174,7 @@ class Signal:
     def forget(self):
         """Drop the compiled function and what it was traced to; both are made again on demand."""
         self._callback = self._smooth = None
+        self._trace_numbers()
 
     @property
     def address(self):

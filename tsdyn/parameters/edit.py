@@ -5,7 +5,7 @@ from ..elements.element import checked_parameters
 from ..elements.joint import Joint
 from ..model.derived import Derived
 from ..model.handles import handles_of
-from ..model.lengths import size_of
+from ..model.lengths import reaches_of, size_of_reaches
 from ..model.packed import checked_motions
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
@@ -20,7 +20,7 @@ class Edit:
     def __init__(self, family):
         self.family, self.packed = family, family.packed
         self._arrays, self._start = {}, None
-        self._coordinates = self._parameters = self._loads = self._members = self._constraints = None
+        self._coordinates = self._parameters = self._loads = self._members = self._constraints = self._reaches = None
 
     def _array(self, name):
         if name not in self._arrays:
@@ -85,8 +85,10 @@ class Edit:
         self._write(self.family.begins[i], owner, other, given)
         if self._parameters is None:
             self._parameters, self._coordinates = list(self.packed.parameters), list(self.packed.coordinates)
+            self._reaches = list(self.family.reaches)
         self._parameters[i] = tuple(old if isinstance(old, Motion) else new for old, new in _pairs(before, given))
         self._coordinates[i] = other.coordinates
+        self._reaches[i] = reaches_of(other, other.coordinates)
         return True
 
     def _enter_force(self, i, owner, other):
@@ -125,7 +127,7 @@ class Edit:
         if self._coordinates is not None:
             coordinates = tuple(self._coordinates)
             changes |= {"parameters": tuple(self._parameters), "coordinates": coordinates}
-            changes["size"] = size_of(packed.constraints, coordinates)
+            changes["size"] = size_of_reaches(self._reaches)
         if self._loads is not None:
             changes["loads"] = tuple(self._loads)
         if self._members is not None:

@@ -9,6 +9,7 @@ from ..elements.joint import Joint
 from ..errors import InvalidArgument
 from ..jit.code_hash import is_ours
 from ..model.handles import handles_of
+from ..model.lengths import reaches_of
 from ..model.packed import classes
 from ..validation import nearest
 from .edit import Edit
@@ -37,6 +38,7 @@ class Family:
         self.loads = {id(force): i for i, force in enumerate(template._forces)}
         self._structural = {}
         self.begins = self._find_begins()
+        self.reaches = [reaches_of(*pair) for pair in zip(packed.constraints, packed.coordinates, strict=True)]
 
     def _find_begins(self):
         """Where the reals of each primitive begin."""
@@ -91,7 +93,9 @@ class Family:
         edit, groups = Edit(self), {}
         for name, value in values.items():
             field = self.field(name)
-            groups.setdefault(id(field.owner), (field.owner, {}))[1][field.attribute] = value
+            owner, changes = groups.setdefault(id(field.owner), (field.owner, {}))
+            present = changes.get(field.attribute) if field.attribute in changes else getattr(owner, field.attribute)
+            changes[field.attribute] = field.entered(value, present)
         for owner, changes in groups.values():
             if not edit.enter(owner, changes):
                 return None

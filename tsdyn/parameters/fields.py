@@ -3,13 +3,16 @@
 import inspect
 import math
 from functools import cache
+from types import FunctionType
 from typing import NamedTuple
 
 import numpy as np
 
 from ..elements.bodies import Attribute, PointMass
 from ..motions.elementary import Constant
+from ..motions.keywords import numbers_of, with_number
 from ..motions.prescribed import Motion
+from ..motions.signals import Signal
 from ..validation import number
 from .units import units_of
 
@@ -17,19 +20,30 @@ GRAVITY = "gravity"
 
 
 class Field(NamedTuple):
-    """An attribute of the scene (gravity), a body, a constraint or a force."""
+    """An attribute of the scene (gravity), a body, a constraint or a force; or a number of a function that it is."""
 
     owner: object
     attribute: str
     unit: str  # "" if it is described nowhere
+    keyword: str = ""  # of the function
 
     @property
     def value(self):
         """The present value: a float, a read-only array, or what else the attribute is."""
         value = getattr(self.owner, self.attribute)
+        if self.keyword:
+            return numbers_of(function_of(value))[self.keyword]
         if isinstance(value, Motion) and isinstance(value.smooth, Constant):
             return value.value(0.0)[0]
         return float(value) if isinstance(value, np.floating) else value
+
+    def entered(self, value, present):
+        """The attribute with this value; `present`: what it is now."""
+        if not self.keyword:
+            return value
+        what = f"{self.owner.name}.{self.attribute}.{self.keyword}"
+        function = present if isinstance(present, FunctionType) else function_of(present)
+        return with_number(function, self.keyword, value, what)
 
     @property
     def is_numeric(self):
@@ -52,7 +66,18 @@ def fields_of(scene):
             if name in found:
                 several.add(name)
             found[name] = Field(owner, attribute, units.get(attribute, ""))
+            for keyword in numbers_of(function_of(getattr(owner, attribute))):
+                found[f"{name}.{keyword}"] = Field(owner, attribute, "", keyword)
     return {name: field for name, field in found.items() if name not in several}
+
+
+def function_of(value):
+    """The user's function that a motion or load is; None for anything else."""
+    if isinstance(value, Motion):
+        return value.given[0] if len(value.given) == 1 else None
+    if isinstance(value, Signal):
+        return value.source if value.is_function else None
+    return value if isinstance(value, FunctionType) else None
 
 
 @cache

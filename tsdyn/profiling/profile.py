@@ -20,6 +20,7 @@ from ..simulation import method_choice
 from ..simulation.scene import Scene
 from ..simulation.scene_cache import prepared
 from ..simulation.simulate import DRIVERS, simulate
+from ..simulation.turns import implicit
 from .advice import advise
 from .instrumentation import Stopwatch, Timekeeper
 from .micro_benchmarks import prices
@@ -104,7 +105,7 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     outside = [Phase("Python", "arguments, slices, the solution", 1, max(least["plain"] - least["driver"], 0.0))]
     outside += _outputs(asked, least, chosen, solution)
     if "chosen" in least:
-        outside.append(Phase("choice of the method", "an attempt, and a pilot", 1, max(least["asked"] - chosen, 0.0)))
+        outside.append(Phase("choice of the method", "steps by the other one", 1, max(least["asked"] - chosen, 0.0)))
     once = _once(scene, method, options, start)
     result = Profile(
         scene, solution, method, (start, end), least["asked"], least["driver"], (*found, *outside), once, loaded,
@@ -139,11 +140,11 @@ def _first(scene, options):
 
 
 def _method(scene, solution, options):
-    """Return the method of a solution."""
+    """Return the method of a solution, of most of its time if it has turned."""
     if options.get("integrator") is not None:
         return method_of(options["integrator"], options.get("rtol"), options.get("atol"))
     method = _first(scene, options)
-    return method if repr(method) == solution.method else method_choice.implicit(method)
+    return method if solution.method.startswith(repr(method)) else implicit(method)
 
 
 def _observed(method, observer):

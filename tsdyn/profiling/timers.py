@@ -210,11 +210,12 @@ def _correct(context, g, k):
     return size
 
 
-def _expand(context, k):
-    notes = integers(_before(context), ANY)
-    _enter(notes, FIRST_ORDER + min(k, ORDERS - 1), ROLE)
-    status = call_expand(notes[TARGETS + ROLE], context, k)
-    _leave(notes)
+def _expand(context, start, end):
+    notes, status = integers(_before(context), ANY), 0
+    for k in range(start, end):
+        _enter(notes, FIRST_ORDER + min(k, ORDERS - 1), ROLE)
+        status = call_expand(notes[TARGETS + ROLE], context, k, k + 1)
+        _leave(notes)
     return status
 
 
@@ -276,7 +277,7 @@ TIMERS = {
     RESIDUAL: _timer(_residual, "pddppp", "residual", ROLE=RESIDUAL),
     CORRECT: _timer(_correct, "pdp", "correct", "d", ROLE=CORRECT),
     DISTANCE: _timer(_norm, NORM_SIGNATURE, "distance", "d", ROLE=DISTANCE),
-    EXPAND: _timer(_expand, "pi", "expand", ROLE=EXPAND),
+    EXPAND: _timer(_expand, "pii", "expand", ROLE=EXPAND),
     REACH: _timer(_reach, "pdd", "reach", ROLE=REACH),
 }
 # by column

@@ -42,7 +42,15 @@ from .redundant_rows import (
     save_selection,
 )
 from .reselection import factorise_rows, select_rows, selection_serves
-from .row_memory import allocate_rows, allocate_tangent, redundancy, redundant_of, reset_selection, set_selection
+from .row_memory import (
+    allocate_rows,
+    allocate_tangent,
+    redundancy,
+    redundant_of,
+    reset_selection,
+    selection_parts,
+    set_selection,
+)
 from .row_workspace import Rows, TangentWorkspace
 from .saddle_matrix import factorise_saddle, solve_saddle, write_saddle_rows
 from .schur_complement import (
@@ -134,6 +142,7 @@ __all__ = [
     "rotate_rate",
     "save_selection",
     "select_rows",
+    "selection_parts",
     "selection_serves",
     "self_stress",
     "set_selection",

@@ -62,6 +62,12 @@ def reset_selection(graph, tangent):
     indicator.start = indicator.end = indicator.largest = 0.0
 
 
+def selection_parts(tangent):
+    """The arrays and the records that `reset_selection` sets."""
+    friction = tangent.friction
+    return [friction.lam, friction.load, tangent.dropped, *tangent.left], [tangent.selection, tangent.indicator]
+
+
 def set_selection(tangent, redundant):
     """Drop these rows, int64 (k,), in the order of the graph."""
     tangent.dropped[0] = count = len(redundant)

@@ -28,10 +28,10 @@ DYNAMICS, METRIC = 0, 1
 def weigh(weights, at, values, i, out, o):
     """Set out[o : o + 8] to values[i : i + 8] times 1 / m and J'^-1, or m and J', of one body."""
     w = at * WEIGHTS
-    f = times(four(weights, w + W_ROTATION), splat(values[i + 4]))
-    f = fma(four(weights, w + W_ROTATION + 4), splat(values[i + 5]), f)
-    f = fma(four(weights, w + W_ROTATION + 8), splat(values[i + 6]), f)
-    put(out, o, times(four(values, i), splat(weights[w + W_MASS])))
+    f = times(four(weights, w + W_ROTATION), splat(get(values, i + 4)))
+    f = fma(four(weights, w + W_ROTATION + 4), splat(get(values, i + 5)), f)
+    f = fma(four(weights, w + W_ROTATION + 8), splat(get(values, i + 6)), f)
+    put(out, o, times(four(values, i), splat(get(weights, w + W_MASS))))
     put(out, o + 4, f)
 
 

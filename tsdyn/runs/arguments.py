@@ -36,7 +36,11 @@ def output_times(t_eval, t0, t1):
     if t_eval is None:
         return NO_TIMES
     times = floats(t_eval)
-    increasing = times.ndim == 1 and _increase(times)
+    if times.ndim == 1 and 0 < times.size < FEW:
+        listed = times.tolist()
+        if t0 <= listed[0] and listed[-1] <= t1 and all(map(lt, listed, listed[1:])):
+            return times
+    increasing = times.ndim == 1 and (times[1:] > times[:-1]).all()
     if increasing and times.size and t0 <= times[0] and times[-1] <= t1:
         return times
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
@@ -48,14 +52,6 @@ def output_times(t_eval, t0, t1):
             f"t_eval must lie within t_span, ({t0:g}, {t1:g}); it runs from {times[0]:g} to {times[-1]:g}."
         )
     return times
-
-
-def _increase(times):
-    """Whether each of times (k,) is later than the one before."""
-    if times.size < FEW:
-        listed = times.tolist()
-        return all(map(lt, listed, listed[1:]))
-    return (times[1:] > times[:-1]).all()
 
 
 def step_count(t0, t1, step):

@@ -88,6 +88,7 @@ class Watch:
                     self.tracks = [Track(self._value(i, self.t, self.state)) for i in range(len(self.events))]
                 except Failed as failure:
                     raise InvalidArgument(f"events: {failure}") from failure.__cause__
+        stiff = run.numbers.stiff
         for _ in range(most):
             done = run.numbers.steps
             status = memory.advance(log, 1)
@@ -98,7 +99,8 @@ class Watch:
                     return Status.EVENT_FAILED, str(failure)
                 if last is not None:
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
-            if status != Status.SLICE_DONE or run.numbers.chart_rows + 2 >= len(log.charts):
+            full = run.numbers.chart_rows + 2 >= len(log.charts)
+            if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # what has been found stiff is told
                 return status, ""
         return status, ""
 

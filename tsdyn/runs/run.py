@@ -32,9 +32,9 @@ NOT_FINITE = Status.NOT_FINITE
 def run(task, engine, observe=None, relay=None, past=None):
     """Run a `Task` by a kind of engine; the `Outcome`.
 
-    `observe` is given the memory before the run: one of its own. With a `Relay` the run is a segment of one, and ends
-    with Status.PASSAGE next to a singular configuration that there is a way past. `past(memory)` makes what is advanced
-    in place of the memory.
+    `observe` is given the memory before the run: one of its own. With a `Relay` the run is a segment of one; where
+    there is a way past singular configurations, it ends with Status.PASSAGE next to one. `past(memory)` makes what is
+    advanced in place of the memory.
     """
     prepared = task.prepared
     engine = prepared.engine(engine, task.method, task.form, task.within)
@@ -42,7 +42,7 @@ def run(task, engine, observe=None, relay=None, past=None):
     if memory is None or not engine.serves(memory):
         with CollectionsDeferred():
             memory = engine.memory(prepared)
-    memory.enter(engine, task, relay is not None)
+    memory.enter(engine, task, relay is not None and relay.passes)
     readings = None, None
     if memory.run.numbers.dense:
         readings = engine.reading(memory, prepared, task.constraint_tol)

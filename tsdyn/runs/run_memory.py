@@ -5,8 +5,8 @@ from operator import is_
 
 from ..errors import Status
 from ..jit.kernels import resident
-from ..rows.interface import reset_selection
-from ..workspaces.carving import divided
+from ..rows.interface import reset_selection, selection_parts
+from ..workspaces.carving import divided, words
 from ..workspaces.run_state import FILLED, STORED, enter_joints
 from ..workspaces.workspace import hold
 from .arguments import step_count
@@ -76,6 +76,11 @@ class Memory:
             self._remember(task)
         reset_selection(self.graph, self.context.tangent)
         self._set_out(task, may_pass)
+
+    def entered(self):
+        """The arrays that `enter` sets, laid out."""
+        arrays, records = selection_parts(self.context.tangent)
+        return [*self._laid_out, *self._scratch, self.context.system.reals, *arrays, *map(words, records)]
 
     def _lay_out(self, engine, task):
         """Enter what engine and task say, and load the driver where this process has not called it yet."""

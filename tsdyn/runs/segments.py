@@ -5,10 +5,17 @@ from .reader import Reader
 
 
 class Relay:
-    """Handed from part to part of a run: its events, and how near to a singular configuration it has come."""
+    """Handed from part to part of a run: its events, and how near to a singular configuration it has come.
 
-    def __init__(self):
-        self.watch = None
+    Parameters
+    ----------
+    passes : bool
+        Whether there is a way past singular configurations.
+    """
+
+    def __init__(self, passes=False):
+        self.watch, self.passes = None, passes
+        self.h = 0.0  # s, of the first step of the next part; zero for its own choice
         self.share = self.largest = (
             0.0  # of the weakest row, where the last part ended, and at most; see singularity.py
         )
@@ -16,11 +23,13 @@ class Relay:
     def enter(self, memory):
         """Let a part begin where the last one ended."""
         memory.context.tangent.indicator.largest = self.largest
+        if self.h > 0.0:
+            memory.run.clock.h = self.h
 
     def leave(self, memory):
         """Take over how a part ended."""
         indicator = memory.context.tangent.indicator
-        self.share, self.largest = indicator.start, indicator.largest
+        self.share, self.largest, self.h = indicator.start, indicator.largest, memory.run.clock.h
 
     def watching(self, task, reading):
         """The `Watch` of the run's events, with a reader for the steps of this part; None where there are none."""

@@ -12,7 +12,7 @@ from ..errors import InconsistentState, SingularConfiguration, Status
 from ..jit.interrupts import deferred_interrupts
 from . import snapshot
 from .recorder import Recorder
-from .tolerances import ASK_AGAIN, GETTING_ON, HOPELESS, PACED, SLICE_SECONDS
+from .tolerances import GETTING_ON, HOPELESS, PACED, SLICE_SECONDS
 
 SLICE_DONE = Status.SLICE_DONE  # which takes longer to look up than to compare
 FIRST_SLICE, FIRST_WORK = 1024, 1 << 15  # steps; coordinates stepped on, unless that is less than a step
@@ -61,7 +61,6 @@ class Slices:
     def __init__(self, memory, task, watch, recorder):
         self.memory, self.task, self.watch, self.recorder = memory, task, watch, recorder
         self.run, self.choose = memory.run, task.choose
-        self.ask = 0  # steps after which it is asked, once the motion has been found stiff
         wanted = self.run.numbers.steps_wanted
         self.limit = wanted + len(task.stops) if task.max_steps is None else task.max_steps
         self.most = min(max(FIRST_WORK // memory.weight, 1), FIRST_SLICE)
@@ -88,7 +87,8 @@ class Slices:
         """Steps of the next slice, which ends where another method is considered: that mustn't depend on the clock."""
         steps = self.run.numbers.steps
         rows = min(self.most, self.limit - steps)
-        return min(rows, self.ask - steps) if self.ask > steps else rows
+        ask = 0 if self.choose is None else self.choose.ask
+        return min(rows, ask - steps) if ask > steps else rows
 
     def _advance(self, rows):
         """One slice; the seconds that it has taken."""
@@ -115,8 +115,8 @@ class Slices:
     def _look_up(self):
         """Between slices: whether another method takes over, the progress bar, the pace."""
         run, task, (start, end) = self.run, self.task, self.task.span
-        if self.choose is not None and self.status is SLICE_DONE and run.numbers.stiff:
-            self._consider(run.numbers)
+        if self.choose is not None and self.status is SLICE_DONE and self.choose.turns(self.memory):
+            self.status = Status.STIFF
         try:
             t = run.clock.t
             task.report((t - start) / (end - start), t, run.numbers.steps)
@@ -133,20 +133,13 @@ class Slices:
                 self.recorder.collect()
                 task.archive.look_up(self.saved)
 
-    def _consider(self, numbers):
-        """Ask whether another method takes over; where not, again later, as the implicit one's steps grow."""
-        if numbers.steps >= self.ask:
-            if numbers.at_limit > 0 and self.choose(self.run):
-                self.status = Status.STIFF
-            self.ask = ASK_AGAIN * numbers.steps
-
     def saved(self):
         """The state between two slices: numbers, and arrays by name."""
         outputs, arrays = self.recorder.saved()
         numbers = {
             "t": self.run.clock.t,
             "outputs": outputs,
-            "ask": self.ask,
+            "turns": None if self.choose is None else self.choose.saved(),
             "pace": vars(self.pace),
             "memory": self.memory.saved(),
         }
@@ -159,7 +152,8 @@ class Slices:
         """Begin between two slices of a run that was left there."""
         snapshot.restore(self.memory, arrays)
         self.recorder.restore(numbers["outputs"], arrays)
-        self.ask = numbers["ask"]
+        if self.choose is not None:
+            self.choose.restore(numbers["turns"])
         vars(self.pace).update(numbers["pace"])
         self.memory.restore(numbers["memory"])
         if self.watch is not None:
@@ -169,7 +163,7 @@ class Slices:
 def drive(memory, task, watch):
     """Drive a run to its end; Status, what there is to say of it, and the closed `Recorder`.
 
-    `task.choose(run)` is asked when the motion is found stiff; where it says so the run ends with Status.STIFF.
+    Where `task.choose` says that another method goes on, the run ends with Status.STIFF.
     """
     recorder = Recorder(task, memory.run)
     slices = Slices(memory, task, watch, recorder)

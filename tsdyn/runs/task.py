@@ -16,8 +16,10 @@ from .history import ChartLog, StepLog
 
 def between(times, span):
     """Whether there are times between the ends of a span."""
-    start, end = span
-    return times.size > 2 or any([start < t < end for t in times.tolist()])  # a list: faster for two
+    if times.size > 2:
+        return True
+    (start, end), listed = span, times.tolist()  # a list: faster for two
+    return bool(listed) and (start < listed[0] < end or start < listed[-1] < end)
 
 
 class Task(NamedTuple):
@@ -38,7 +40,7 @@ class Task(NamedTuple):
     interval: int  # steps between charts that are forced; 0 for none
     report: object  # a function of the fraction done (None at the end), the time, s, and the steps of the segment
     history: bool  # whether the histories of steps and charts are kept
-    choose: object  # a function of the `Run`, asked when the motion is found stiff; or None
+    choose: object  # says after how many steps, and whether, another method goes on: see simulation/turns.py; or None
     stops: np.ndarray = NO_STOPS  # times at which a step ends, s, and whether a function is asked there
     sampling: object = None  # a `sampling.Sampling`, or None
     archive: object = None  # a `storage.archive.Archive` that outputs and histories go to, or None
@@ -51,8 +53,7 @@ class Task(NamedTuple):
     @property
     def within(self):
         """True if output between the ends of steps is requested."""
-        times = self.times
-        return self.dense_output or self.events is not None or (times.size > 0 and between(times, self.span))
+        return self.dense_output or self.events is not None or between(self.times, self.span)
 
 
 class Outcome(NamedTuple):
@@ -70,3 +71,4 @@ class Outcome(NamedTuple):
     trajectory: object  # a `trajectory.Trajectory`, or None
     events: tuple  # times, positions, velocities of each event; or None
     began: float  # time.perf_counter() when the driver began, prepared
+    method: str = ""  # the methods of a run that has turned from one to another

@@ -85,9 +85,6 @@ SLICE_SECONDS = 0.1
 # within it: they take 5 ms (Nystrom4) to 60 ms (SDIRK54) a step, the thread of a slice 0.1 ms.
 LONG_STEPS = 1 << 13
 
-# Steps after which an implicit method is considered again, over those of the last time.
-ASK_AGAIN = 4
-
 # Steps tried over which the pace of a run is taken; a run with HOPELESS as many to go would take days.
 PACED, HOPELESS = 1000, 1e10
 

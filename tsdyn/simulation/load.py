@@ -17,21 +17,21 @@ if TYPE_CHECKING:
     from ..hints import Place
 
 SCENES = (".toml", ".urdf", ".xml", ".mjcf", ".sdf", ".world")
-
-READS = ".toml, .urdf, .xml, .mjcf, .sdf or .world (a scene), .h5, .hdf5, .nc or .zarr (a solution)"
+READS = f"{', '.join(SCENES)} (a scene), .h5, .hdf5, .nc or .zarr (a solution or an ensemble)"
+LOADERS = {}  # of files of packages above: by the name of the format, a function of path, scene and allow_code
 
 
 @fitting
 def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, free_base: bool = False) -> Any:
-    """Return the scene or the solution of a file; nothing in it is executed.
+    """Return the scene, solution or ensemble of a file; nothing in it is executed.
 
     Parameters
     ----------
     path : str or PathLike
-        A scene file (.toml); a URDF, MJCF or SDF file (.urdf, .xml, .mjcf, .sdf, .world); or a solution (.h5, .hdf5,
-        .nc, .zarr) that `Solution.save` has written.
+        A scene file (.toml); a URDF, MJCF or SDF file (.urdf, .xml, .mjcf, .sdf, .world); or a solution or ensemble
+        (.h5, .hdf5, .nc, .zarr) that its method `save` has written.
     scene : Scene, optional
-        That of a solution whose file holds none, because the scene has functions or classes of your own.
+        That of a solution or ensemble whose file holds none, because the scene has functions or classes of your own.
     allow_code : bool
         Whether modules that a file names as those of plug-ins may be imported. Plug-ins that have been imported
         before are found anyway.
@@ -40,7 +40,7 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, f
 
     Returns
     -------
-    Scene or Solution
+    Scene, Solution or Ensemble
 
     Raises
     ------
@@ -81,10 +81,14 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, f
     if suffix == ".xacro":
         raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
     from ..storage.formats import SUFFIXES
+    from ..storage.saved_file import kind_of
     from .saved_solutions import load as load_solution
 
     if suffix not in SUFFIXES:
         raise InvalidArgument(f"load reads files that end in {READS}, got {str(path)!r}.")
+    loader = LOADERS.get(kind_of(Path(path)))
+    if loader is not None:
+        return loader(path, scene, allow_code)
     return load_solution(path, scene, allow_code, (Scene, Solution))
 
 

@@ -30,14 +30,38 @@ def origin_of(packed, q):
     return origin
 
 
-def _origin(packed, q):
+def are_near(packed, q):
+    """Which of many positions (k, n) are such that the scene's origin serves: `origin_of` is None."""
+    grounded, longest = _grounded(packed)
+    near = np.abs(q).max(axis=1) <= FAR_ORIGIN * longest
+    if near.all():
+        return near
+    low, high = _box(packed, q, grounded)
+    size = np.maximum((high - low).max(axis=-1), longest)
+    near |= ~((size > 0.0) & (np.abs(0.5 * (low + high)).max(axis=-1) > FAR_ORIGIN * size))
+    return near
+
+
+def _grounded(packed):
     if packed.derived.grounded is None:
         packed.derived.grounded = _points(packed)
-    grounded, longest = packed.derived.grounded
+    return packed.derived.grounded
+
+
+def _box(packed, q, grounded):
+    """The corners of boxes around all bodies at q (..., n), and ground points."""
+    places = q[..., packed.system.bodies[:, :1] + np.arange(3)]
+    low, high = places.min(axis=-2), places.max(axis=-2)
+    if len(grounded):
+        low, high = np.minimum(low, grounded[0]), np.maximum(high, grounded[1])
+    return low, high
+
+
+def _origin(packed, q):
+    grounded, longest = _grounded(packed)
     if np.maximum.reduce(np.abs(q)) <= FAR_ORIGIN * longest:
         return None
-    places = np.concatenate((q[packed.system.bodies[:, :1] + np.arange(3)], grounded))
-    low, high = places.min(axis=0), places.max(axis=0)
+    low, high = _box(packed, q, grounded)
     size, centre = max(float((high - low).max()), longest), 0.5 * (low + high)
     if not (size > 0.0 and np.abs(centre).max() > FAR_ORIGIN * size and _sees_differences(packed)):
         return None
@@ -84,15 +108,7 @@ def run_near(driver, task, scene, origin, tol):
     if task.archive is not None:
         task.archive.shift = shift
     watched = task.events and [each._replace(function=_away(each.function, packed, shift)) for each in task.events]
-    outcome = driver(
-        task._replace(
-            prepared=local,
-            q=q,
-            qd=qd,
-            events=watched,
-            choose=task.choose and (lambda run: task.choose(run._replace(now=run.now + [[1.0], [0.0], [0.0]] * shift))),
-        )
-    )
+    outcome = driver(task._replace(prepared=local, q=q, qd=qd, events=watched))
     rows, last, events = outcome.rows, outcome.last.copy(), outcome.events
     if task.archive is None:
         rows = rows.copy()

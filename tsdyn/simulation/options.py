@@ -43,11 +43,7 @@ class Options(NamedTuple):
     history: bool
     within: bool  # whether output between the ends of steps is requested
     settings: Settings
-
-    @property
-    def series(self):
-        """True if the default method may be Taylor."""
-        return self.settings.form.name == "tangent" and self.settings.chart_interval is None
+    series: bool  # whether the default method may be Taylor
 
 
 _of_settings = itemgetter(
@@ -58,17 +54,18 @@ _of_settings = itemgetter(
 
 def checked(given):
     """The `Options` of the arguments of `simulate`, by name; raises InvalidArgument."""
-    span, settings = interval(given["t_span"]), _settings(*_of_settings(given))
+    span, settings, integrator = interval(given["t_span"]), _settings(*_of_settings(given)), given["integrator"]
     times, events = output_times(given["t_eval"], *span), prepare(given["events"])
     return Options(
         span,
-        _method(given["integrator"], given["rtol"], given["atol"], settings.form),
+        None if integrator is None else _method(integrator, given["rtol"], given["atol"], settings.form),
         times,
         events,
         reporter(given["progress"]),
         given["store"] is None if settings.history is None else settings.history,
-        settings.dense_output or events is not None or (times.size > 0 and between(times, span)),
+        settings.dense_output or events is not None or between(times, span),
         settings,
+        settings.form.name == "tangent" and settings.chart_interval is None,
     )
 
 
@@ -93,9 +90,7 @@ def _settings(  # nine: each is an argument of `simulate`
 
 
 def _method(integrator, rtol, atol, form):
-    """Return the requested method, None for the default."""
-    if integrator is None:
-        return None
+    """Return the requested method."""
     method = frozen(method_of(integrator, rtol, atol))
     if method.implicit and form.first_order:
         others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)

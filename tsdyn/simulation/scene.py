@@ -39,6 +39,7 @@ from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
 from .variants import HANDLES, make_handles
 from .variants import parameters as _parameters
+from .variants import place as _place
 from .variants import with_parameters as _with_parameters
 
 if TYPE_CHECKING:
@@ -298,6 +299,15 @@ class Scene:
         """Discard the packed numbers after a change."""
         self._packed = self._start = self._prepared = None
 
+    def touch_start(self) -> None:
+        """Discard what depends on the start, after a change of it: rows that are redundant, bodies that turn there."""
+        known = None if self._packed is None else self._packed.derived
+        if known is not None and (known.redundant is not None or known.turning):
+            self.touch()
+        elif known is not None:
+            known.family = None
+        self._start = None
+
     @property
     def packed(self) -> Packed:
         """The scene as a `Packed`; packed anew only after a change."""
@@ -360,13 +370,7 @@ class Scene:
             names += [f"{title}{again}{label}" for label in constraint.row_labels]
         return names
 
-    def place(self, q: Floats, qd: Floats) -> None:
-        """Make q (n,) and qd (n,) the initial values of the bodies."""
-        at = 0
-        for body in self._bodies:
-            span = slice(at, at := at + body.dimension)
-            body.place(q[span], qd[span])
-
+    place = _place
     evaluate = _evaluate
     assemble = _assemble
     mobility = _mobility

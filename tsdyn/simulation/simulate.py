@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import time
-from functools import partial
 from typing import TYPE_CHECKING
 
 from ..ahead.first_run import prepare_first_run
 from ..calls import fitting
 from ..configuration.holonomic import demand_holonomic
 from ..elements.membership import warn_of_waiting
-from ..errors import InvalidArgument, Status
+from ..errors import InvalidArgument
 from ..methods.integrator import frozen
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
-from ..runs.run import run
 from ..runs.sampling import Sampling
 from ..runs.task import Task
-from ..taylor.series_engine import SeriesEngine
 from . import method_choice, stored_runs
 from .local_origin import origin_of, run_near
 from .options import checked
 from .rounding_limit import within_rounding
 from .scene import Scene
 from .scene_cache import prepared
-from .singularity_crossing import run_past
+from .segments import run_segments
 from .solution import Solution
 
 if TYPE_CHECKING:
@@ -32,8 +29,7 @@ if TYPE_CHECKING:
 
     from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Span, State
 
-STIFF = Status.STIFF
-DRIVERS = {"steps": run_past, "series": partial(run, engine=SeriesEngine)}  # by Integrator.driver; see task.py
+DRIVERS = dict.fromkeys(("steps", "series"), run_segments)  # by Integrator.driver; see task.py
 
 
 @fitting
@@ -69,8 +65,8 @@ def simulate(  # many arguments, by name: each is an option of a run
         Start and end, start < end.
     integrator : Integrator or str, optional
         A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor; DOP853 if a part of the
-        scene has no series, or series fail where a law is not analytic; SDIRK54, restarted from t_span[0], if the
-        motion is found stiff and SDIRK54 needs fewer evaluations.
+        scene has no series, or series fail where a law is not analytic. Where the motion is found stiff SDIRK54 goes on
+        from there, as long as it needs less work; `solution.message` says so.
     rtol, atol : float, optional
         Tolerances of the default method, or of an adaptive method given by name; default 1e-8. An instance has its own
         tolerances; rtol or atol beside an instance is refused.
@@ -169,9 +165,7 @@ def run_from(given, numbers=None, arrays=None, archive=None):
         method = frozen(method.bounded(settings.max_step))
 
     started = time.perf_counter()
-    choose = None
-    if given["integrator"] is None:
-        choose = partial(method_choice.implicit_is_faster, simulate, given, method, options.span[1])
+    choose = method_choice.turns_of(scene, kept, method, options) if given["integrator"] is None else None
     task = _request(scene, kept, method, options, given["state"], choose)
     if given["store"] is not None:
         return _run_stored(task, given, options, (numbers, arrays), archive)
@@ -234,6 +228,6 @@ def run_task(task, scene, initial_tol):
         return run_near(driver, task, scene, origin, initial_tol)
     limited, said = within_rounding(task.method, packed, task.q)
     outcome = driver(task if limited is task.method else task._replace(method=limited))
-    if said and outcome.status is not STIFF:
+    if said:
         outcome = outcome._replace(reason=" ".join(part for part in (outcome.reason, said) if part))
     return outcome

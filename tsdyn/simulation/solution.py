@@ -98,11 +98,12 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
     t_events: list[Floats] | Any  # None without events
     q_events: list[Floats] | Any
     qd_events: list[Floats] | Any
+    _turned = ""  # the methods of a run that turned
 
     def __init__(self, scene: Scene, task: Any, outcome: Any, seconds: dict[str, float]) -> None:
         self.scene, self.packed = scene, task.prepared.packed
         self.formulation, self.span = task.form.name, task.span
-        self._method = task.method if is_plain(task.method) else repr(task.method)
+        self._method, self._turned = task.method if is_plain(task.method) else repr(task.method), outcome.method
         self.system = self.packed.system
         self.status, self._trajectory = outcome.status, outcome.trajectory
         self.t_events, self.q_events, self.qd_events = outcome.events or (None, None, None)
@@ -124,8 +125,8 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
 
     @property
     def method(self) -> str:
-        """The method with its settings."""
-        return self._method if isinstance(self._method, str) else repr(self._method)
+        """The method with its settings; the methods of a run that turned, that of most of the motion first."""
+        return self._turned or (self._method if isinstance(self._method, str) else repr(self._method))
 
     @cached_property
     def stats(self) -> SimpleNamespace:

@@ -107,6 +107,7 @@ def _stored(archive):
 def _ending(outcome, seconds):
     """The numbers and arrays of a checkpoint at the end of a run."""
     numbers = {"ended": True, "t": outcome.reached, "status": outcome.status, "reason": outcome.reason}
+    numbers["method"] = outcome.method
     arrays = {"last": outcome.last, "remembered": outcome.remembered}
     if outcome.events is not None:
         numbers["watched"] = len(outcome.events[0])
@@ -122,7 +123,7 @@ def ended_outcome(numbers, arrays, archive):
         events = tuple([arrays[f"event {i}.{name}"] for i in range(numbers["watched"])] for name in ("t", "q", "qd"))
     return Outcome(
         Status(numbers["status"]), numbers["reason"], *_stored(archive), numbers["t"], arrays["last"],
-        arrays["remembered"], numbers["statistics"], None, events, 0.0,
+        arrays["remembered"], numbers["statistics"], None, events, 0.0, numbers["method"],
     )  # fmt: skip
 
 

@@ -1,9 +1,17 @@
 """Limits of the preparation and assessment of runs; dimensionless unless a unit is named."""
 
 # --- choice of the method ---
-# Steps of the pilot runs of an implicit method, and how many times less it must cost to be chosen after so many: steps
-# are short at first.
-PILOTS = (20, 2.0), (60, 1.0)
+# Steps of the implicit method that what is left of a run must be worth.
+TRIAL = 20
+# Steps over which work is measured first; each measurement takes as many steps as there were before. Up to SETTLED
+# steps the implicit method may take (SETTLED / steps)^2 times the work of the explicit one: its steps are short until
+# fast modes have decayed, which steps at the limit of stability have kept alive.
+FIRST_WINDOW, SETTLED = 10, 80
+# Implicit steps after which the explicit method is tried, and its steps in such a trial.
+PATIENCE, TRIED = 100, 20
+# Factor of the steps until a method that did not pay is considered again, and until the explicit one is tried though
+# the Jacobian has served all the time; of the work, with which a trial ends early.
+AGAIN = 4
 # The cost of an evaluation within an implicit stage, its share of the matrices included, in evaluations of an explicit
 # one and in orders of a series: stiff chains of 4 to 64 links and a stiff joint take 0.8 to 1.7, and 4 to 9, overdamped
 # springs of particles up to 3 and 13.

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 from ..calls import fitting
+from ..elements.bodies import START
 from ..errors import InvalidArgument
 from ..model.handles import handles_of
 from ..model.packed import classes
@@ -132,6 +133,38 @@ def of_numbers(scene, family, changes, packed, start):
     return other
 
 
+def place(scene, q, qd):
+    """Make q (n,) and qd (n,) the initial values of the bodies."""
+    if "_later" in vars(scene):
+        family, changes = scene._later
+        changes = {**changes, **_start_values(family.packed, q, qd)}
+        vars(scene).update(vars(of_numbers(scene, family, changes, *family.numbers(changes))))
+        return
+    for body, (at, length) in zip(scene._bodies, scene.system.bodies.tolist(), strict=True):
+        body.place(q[at : at + length], qd[at : at + length])
+
+
+def _start_values(packed, q, qd):
+    """The parameters of a start q (n,), qd (n,), by name."""
+    found = {}
+    for body, (at, length) in zip(packed.bodies, packed.system.bodies.tolist(), strict=True):
+        values = body.values_at(q[at : at + length], qd[at : at + length])
+        found |= {f"{body.name}.{name}": value for name, value in values.items()}
+    return found
+
+
+def start_of(scene):
+    """The parameters of the start by name, with the bits that were given; other changes of the scene beside them."""
+    if "_later" in vars(scene):
+        return scene._later[1]
+    return {f"{body.name}.{name}": body.values[name] for body in scene._bodies for name in START if name in body.values}
+
+
+def start_names(packed):
+    """The names of these parameters."""
+    return {f"{body.name}.{name}" for body in packed.bodies for name in START if name in body.values}
+
+
 def packed_anew(family, changes):
     """Return a scene with other values, and handles of its own."""
     with _making:
@@ -165,8 +198,9 @@ def _made(family, changes):
     template, packed = family.template, family.packed
     twin = template.copy()
     for name, value in changes.items():
-        owner, attribute, _ = family.field(name)
-        setattr(twin if owner is template else twin[owner], attribute, value)
+        field = family.field(name)
+        owner = twin if field.owner is template else twin[field.owner]
+        setattr(owner, field.attribute, field.entered(value, getattr(owner, field.attribute)))
     known = (*packed.bodies, *(member.constraint for member in packed.members), *(load.force for load in packed.loads))
     owners = (*template.bodies, *template.constraints, *template.forces)
     pairs = {one: twin[owner] for one, owner in zip(known, owners, strict=True)}

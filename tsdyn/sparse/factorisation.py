@@ -9,6 +9,7 @@ diagonal block is read. The diagonal before elimination is stored after the pane
 """
 
 from ..jit.kernels import kernel
+from ..jit.simd import get, let
 from .block_operations import eliminate, eliminate_lu, link, link_lu, subtract_products
 
 
@@ -140,17 +141,13 @@ def solve_lu(pattern, lower, upper, b):
     columns, segments = pattern.columns, pattern.segments
     for j in range(heads.size):
         first, width, head = starts[j], widths[j], heads[j]
-        size, own, u = starts[j + 1] - first, b[first:], lower[head:]
-        one = columns[j + 1] - columns[j] == 1
+        size = starts[j + 1] - first
+        if width == 6 and size == 3 and columns[j + 1] - columns[j] == 1:
+            _forward_link(lower, head, b, first, segments[2 * columns[j]])
+            continue
+        own, u = b[first:], lower[head:]
         while True:
             _forward(size, width, u, own)
-            if one and width == 6 and size == 3:
-                v, w, out = u[6:], u[12:], b[segments[2 * columns[j]] :]
-                x, y, z = own[0], own[1], own[2]
-                out[0] -= x * u[3] + y * v[3] + z * w[3]
-                out[1] -= x * u[4] + y * v[4] + z * w[4]
-                out[2] -= x * u[5] + y * v[5] + z * w[5]
-                break
             _forward_rest(size, width, u, own, b, columns[j], columns[j + 1], segments)
             if size <= 3:
                 break
@@ -158,22 +155,42 @@ def solve_lu(pattern, lower, upper, b):
     for j in range(heads.size - 1, -1, -1):
         first, width, head = starts[j], widths[j], heads[j]
         size = starts[j + 1] - first
-        one = columns[j + 1] - columns[j] == 1
+        if width == 6 and size == 3 and columns[j + 1] - columns[j] == 1:
+            _backward_link(upper, head, b, first, segments[2 * columns[j]])
+            continue
         k = (size - 1) // 3 * 3
         while k >= 0:
             own, u = b[first + k :], upper[head + k * (width + 1) :]
-            if one and width == 6 and size == 3:
-                v, w, out = u[6:], u[12:], b[segments[2 * columns[j]] :]
-                e, f, g = out[0], out[1], out[2]
-                x, y, z = (
-                    e * u[3] + f * u[4] + g * u[5],
-                    e * v[3] + f * v[4] + g * v[5],
-                    e * w[3] + f * w[4] + g * w[5],
-                )
-            else:
-                x, y, z = _backward_rest(size - k, width, u, own, b, columns[j], columns[j + 1], segments)
+            x, y, z = _backward_rest(size - k, width, u, own, b, columns[j], columns[j + 1], segments)
             _backward(size - k, width, u, own, x, y, z)
             k -= 3
+
+
+@kernel
+def _forward_link(u, h, b, i, o):
+    """Three unknowns, at b[i], of a block as `link` eliminates, at u[h]; taken from the three rows at b[o]."""
+    x = get(b, i) * get(u, h)
+    y = (get(b, i + 1) - x * get(u, h + 1)) * get(u, h + 7)
+    z = (get(b, i + 2) - x * get(u, h + 2) - y * get(u, h + 8)) * get(u, h + 14)
+    let(b, i, x)
+    let(b, i + 1, y)
+    let(b, i + 2, z)
+    for c in range(3):
+        let(b, o + c, get(b, o + c) - (x * get(u, h + 3 + c) + y * get(u, h + 9 + c) + z * get(u, h + 15 + c)))
+
+
+@kernel
+def _backward_link(u, h, b, i, o):
+    """The same, backwards."""
+    e, f, g = get(b, o), get(b, o + 1), get(b, o + 2)
+    x = e * get(u, h + 3) + f * get(u, h + 4) + g * get(u, h + 5)
+    y = e * get(u, h + 9) + f * get(u, h + 10) + g * get(u, h + 11)
+    z = get(b, i + 2) - get(u, h + 14) * (e * get(u, h + 15) + f * get(u, h + 16) + g * get(u, h + 17))
+    x += get(u, h + 2) * z
+    y = get(b, i + 1) - get(u, h + 7) * (y + get(u, h + 8) * z)
+    let(b, i, get(b, i) - get(u, h) * (x + get(u, h + 1) * y))
+    let(b, i + 1, y)
+    let(b, i + 2, z)
 
 
 @kernel

@@ -21,15 +21,15 @@ GROUP, RECORD = "run", "record"
 ROWS = 1 << 14  # at a time
 
 
-def format_at(path):
-    """The module of the format of a path; raises InvalidArgument or MissingDependency."""
+def format_at(path, what="a solution"):
+    """The module of the format of a path; raises InvalidArgument or MissingDependency. `what` is to be saved."""
     if Path(path).suffix.lower() not in SUFFIXES:
         ends = f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
-        raise InvalidArgument(f"a solution is saved to a path that ends in {ends}, got {str(path)!r}.")
+        raise InvalidArgument(f"{what} is saved to a path that ends in {ends}, got {str(path)!r}.")
     return format_of(path)
 
 
-def write(path, tables, rows_of, attributes, content):
+def write(path, tables, rows_of, attributes, content, kind=FORMAT):
     """Write a file as a whole, in place of a saved solution that is there.
 
     Parameters
@@ -42,6 +42,8 @@ def write(path, tables, rows_of, attributes, content):
     attributes : dict
     content : (dict, dict)
         Numbers for the record, arrays by name.
+    kind : str
+        What is saved: the format's name.
 
     Raises
     ------
@@ -49,10 +51,10 @@ def write(path, tables, rows_of, attributes, content):
         If there is something else at the path, or it can't be written.
     """
     form, (record, arrays) = format_at(path), content
-    _demand_replaceable(path, form)
+    _demand_replaceable(path, form, kind)
     partial = path.with_name(f"{path.stem}-partial-{os.getpid()}{path.suffix}")
     try:
-        store = form.Store.create(partial, tables, {"format": FORMAT, "format_version": VERSION, **attributes})
+        store = form.Store.create(partial, tables, {"format": kind, "format_version": VERSION, **attributes})
         sums = {name: _write_table(store, name, rows_of) for name in tables}
         store.close()
         sums = {**{c: s for found in sums.values() for c, s in found.items()}, **_sums(arrays)}
@@ -86,18 +88,20 @@ def _columns(tables):
     return {name: [column.name for column in table.columns] for name, table in tables.items()}
 
 
-def _demand_replaceable(path, form):
-    """Raise StorageError unless a path is free, or that of a saved solution."""
+def _demand_replaceable(path, form, kind):
+    """Raise StorageError unless a path is free, or that of a saved solution, or what `kind` says."""
     if not path.parent.is_dir():
         raise StorageError(f"there is no folder {path.parent} to write {path.name} to.")
     if not path.exists():
         return
     try:
-        known = form.attributes(path).get("format") == FORMAT
+        known = form.attributes(path).get("format") == kind
     except StorageError:
         known = False
     if not known:
-        raise StorageError(f"{path} exists, and is no saved solution. Delete it, or take another name.")
+        raise StorageError(
+            f"{path} exists, and is no saved {kind.rpartition(' ')[2]}. Delete it, or take another name."
+        )
 
 
 def _write_table(store, name, rows_of):
@@ -119,7 +123,15 @@ def _sums(arrays):
     return {name: hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest() for name, values in arrays.items()}
 
 
-def read(path):
+def kind_of(path):
+    """What is saved at a path, by the name of its format; "" if it doesn't say, or can't be read."""
+    try:
+        return str(format_at(path).attributes(path).get("format", "")) if path.exists() else ""
+    except StorageError:
+        return ""
+
+
+def read(path, kind=FORMAT):
     """The record and the arrays of a file, all its content checked; the columns of its tables are read when asked for.
 
     Raises
@@ -131,11 +143,11 @@ def read(path):
     if not path.exists():
         raise StorageError(f"there is no file {path}.")
     attributes = form.attributes(path)
-    if attributes.get("format") != FORMAT:
-        raise StorageError(f"{path} is no saved solution{_hint(attributes, path)}.")
+    if attributes.get("format") != kind:
+        raise StorageError(f"{path} is no saved {kind.rpartition(' ')[2]}{_hint(attributes, path)}.")
     if attributes.get("format_version") != VERSION:
         raise StorageError(
-            f"{path} has the format {FORMAT} {attributes.get('format_version')}, and this tsdyn reads {VERSION}: "
+            f"{path} has the format {kind} {attributes.get('format_version')}, and this tsdyn reads {VERSION}: "
             f"{attributes.get('source', 'another tsdyn')} has written it. Install that, or a later one."
         )
     arrays = form.get(path, GROUP)

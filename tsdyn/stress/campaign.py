@@ -20,8 +20,9 @@ from .gallery.cases import CASES
 from .judgement import FAULT, Outcome, judge_scene
 from .random_calls import judge_calls
 
-LIMIT = 300.0  # s, of a job: also of those that compile kernels
-GALLERY_LIMIT = 1200.0  # s, of a case
+LIMIT = 300.0  # s of processor time, of a job: also of those that compile kernels
+GALLERY_LIMIT = 1200.0  # s of processor time, of a case
+BEAT = 0.5  # s between two looks of a process at its processor time
 BLOCK = 40  # calls of a job
 BLAS_THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
 
@@ -119,7 +120,7 @@ def work(plan, processes, limit=LIMIT):
                 yield worker.job, worker.outcomes()
                 if worker.alive:
                     idle.append(worker)
-            for connection in [c for c, worker in busy.items() if worker.until <= time.monotonic()]:
+            for connection in [c for c, worker in busy.items() if worker.is_overdue()]:
                 worker = busy.pop(connection)
                 worker.end()
                 yield worker.job, [worker.fault("silent", f"for {limit:g} s")]
@@ -134,16 +135,26 @@ class Worker:
     def __init__(self):
         context = multiprocessing.get_context("spawn")
         self.connection, other = context.Pipe()
-        self.process = context.Process(target=serve, args=(other,), daemon=True)
+        self.spent = context.Value("d", 0.0, lock=False)  # s of processor time
+        self.process = context.Process(target=serve, args=(other, self.spent), daemon=True)
         with ignoring_interrupts(), _one_blas_thread():
             self.process.start()
         other.close()
-        self.alive, self.job, self.until = True, None, 0.0
+        self.alive, self.job, self.until, self.looked, self.left = True, None, 0.0, 0.0, 0.0
 
     def begin(self, job, limit):
         """Send a job."""
-        self.job, self.until = job, time.monotonic() + limit
+        self.job, self.until, self.looked, self.left = job, time.monotonic() + limit, self.spent.value, limit
         self.connection.send(job)
+
+    def is_overdue(self):
+        """Whether the job has used its processor time up, or none since the last look: a busy machine is no fault."""
+        if time.monotonic() < self.until:
+            return False
+        used, self.looked = self.spent.value - self.looked, self.spent.value
+        self.left -= used
+        self.until = time.monotonic() + max(self.left, 20.0 * BEAT)
+        return used <= 0.0 or self.left <= 0.0
 
     def outcomes(self):
         """Receive the outcomes of the job; of a process that has ended, that."""
@@ -195,9 +206,10 @@ def _one_blas_thread():
                 os.environ[name] = value
 
 
-def serve(connection):
-    """Do the jobs that come in."""
+def serve(connection, spent):
+    """Do the jobs that come in, and tell the processor time."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_beat, args=(spent,), daemon=True).start()
     warnings.simplefilter("ignore")
     while True:
         try:
@@ -205,6 +217,12 @@ def serve(connection):
         except EOFError:
             return
         connection.send(WAYS[job.kind](job))
+
+
+def _beat(spent):
+    while True:
+        spent.value = time.process_time()
+        time.sleep(BEAT)
 
 
 WAYS = {

@@ -118,7 +118,7 @@ def degenerate(d, n):
         for _ in range(1 + int(d.rng.random() < 0.2)):
             join(d, last, body, axis=axis / np.linalg.norm(axis))
         last = body if body.dimension != 3 else last
-    if d.rng.random() < 0.3:
+    if d.rng.random() < 0.3 and n > 1:
         join(d, d.scene.bodies[0], d.scene.bodies[-1], ("Distance",))
 
 

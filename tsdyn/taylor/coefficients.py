@@ -16,7 +16,7 @@ import numpy as np
 from ..elements.loops.body_poses import OMEGA, POSE, RD, R
 from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R, S_SPIN, call_series
 from ..jit.kernels import kernel
-from ..jit.simd import add, cross, fetch, first, fma, four, lanes, put, second, splat, sub, third, times
+from ..jit.simd import add, cross, fetch, first, fma, four, get, lanes, put, second, splat, sub, third, times
 from ..maths.dense_linalg import copy
 from ..rows.interface import add_products, note_loads, solve_series, weigh
 from .compensation import put_sum
@@ -61,9 +61,9 @@ def _spin(graph, b, bodies, at, orders, k):
     torque = splat(0.0)
     if graph.spins[b] != 0:
         w, o, spins = 16 * b + 4, at + S_OMEGA * orders, at + S_SPIN * orders
-        f = times(four(graph.mass, w), splat(bodies[o + 4 * k]))
-        f = fma(four(graph.mass, w + 4), splat(bodies[o + 4 * k + 1]), f)
-        put(bodies, spins + 4 * k, fma(four(graph.mass, w + 8), splat(bodies[o + 4 * k + 2]), f))
+        f = times(four(graph.mass, w), splat(get(bodies, o + 4 * k)))
+        f = fma(four(graph.mass, w + 4), splat(get(bodies, o + 4 * k + 1)), f)
+        put(bodies, spins + 4 * k, fma(four(graph.mass, w + 8), splat(get(bodies, o + 4 * k + 2)), f))
         for j in range(k + 1):
             torque = add(torque, cross(four(bodies, spins + 4 * (k - j)), four(bodies, o + 4 * j)))
     return torque
@@ -96,7 +96,7 @@ def _turn_ahead(bodies, at, orders, k, exact):
     o = at + S_OMEGA * orders + 4 * (k - 1)
     for c in range(at + 12, at + 12 * (k + 1), 12):
         a0, a1, a2 = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8)
-        w0, w1, w2 = splat(bodies[o]), splat(bodies[o + 1]), splat(bodies[o + 2])
+        w0, w1, w2 = splat(get(bodies, o)), splat(get(bodies, o + 1)), splat(get(bodies, o + 2))
         x, u = fma(a1, w2, x), fma(a2, w1, u)  # six sums, since each waits for its last
         y, v = fma(a2, w0, y), fma(a0, w2, v)
         z, w = fma(a0, w1, z), fma(a1, w0, w)

@@ -163,8 +163,9 @@ def _motions(graph, packed, orders, places, constraints):
 def masks(graph, packed):
     """Write into the graph's table which markers' columns vary along a motion, and which are on the ground.
 
-    Directions of bodies that never turn are as good as those of the ground. Columns are constant where the primitive's
-    own series says so for a random motion; returns of how many markers.
+    Directions of bodies that never turn are as good as those of the ground: their columns are never used, and count as
+    constant. So do columns that the primitive's own series leaves constant in a random motion. Returns how many markers
+    have constant columns.
     """
     constant, lengths = 0, np.append(graph.bodies[:, 1], 0)
     for row, (kind, members) in zip(graph.kinds, instances(packed, graph), strict=True):
@@ -205,6 +206,6 @@ def _mask(kind, series, par, grounded, motion):
             varies |= out.any(axis=0)
             if varies.all():
                 break
-    bits = [bool(varies[3 * j : 3 * j + 3].any()) << j for j in range(len(kind.markers))]
+    bits = [bool(varies[3 * j : 3 * j + 3].any() and not on) << j for j, on in enumerate(grounded)]
     bits += [bool(on) << (GROUND + j) for j, on in enumerate(grounded)]
     return sum(bits)

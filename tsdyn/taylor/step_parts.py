@@ -34,27 +34,27 @@ from .workspace import load_series
 
 NOT_FINITE, SINGULAR, UNHELD = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.UNHELD)
 LAWS = "pdddd"
-call_expand, call_reach, call_laws = caller("pi"), caller("pdd"), caller(LAWS)
+call_expand, call_reach, call_laws = caller("pii"), caller("pdd"), caller(LAWS)
 
 
-@callback("pi")
-def expand_series(context, k):
-    """Order k of everything, in turn; order zero begins the series at the poses, and gives qdd."""
-    return _expand(context, k, False)
+@callback("pii")
+def expand_series(context, start, end):
+    """Orders from start to end - 1 of everything; order zero begins the series at the poses, and gives qdd."""
+    return _expand(context, start, end, False)
 
 
-@callback("pi")
-def expand_far_series(context, k):
+@callback("pii")
+def expand_far_series(context, start, end):
     """The same for series that are too long for the caches near by."""
-    return _expand(context, k, True)
+    return _expand(context, start, end, True)
 
 
 @kernel
-def _expand(context, k, ahead):
+def _expand(context, start, end, ahead):
     c = load_series(context)
     w, x, f = c.work, c.expansion, c.tangent
     orders = x.order.room
-    if k == 0:
+    if start == 0:
         expand_motions(c.system, x)
         keep_start(c.graph, f.poses, x.start)
         begin(c.graph, c.system, f.poses, orders, x.bodies, f.Z)
@@ -63,8 +63,9 @@ def _expand(context, k, ahead):
     sweeps = refinements(f.indicator.start)
     if sweeps > 0 and not near:
         refine, x.order.sweeps = max(refine, ILL_ORDERS), sweeps
-    expand(c.graph, c.system, k, k > 0 and k + 1 == x.order.top, ahead, refine, x, f)
-    if k == 0:
+    for k in range(start, end):
+        expand(c.graph, c.system, k, k > 0 and k + 1 == x.order.top, ahead, refine, x, f)
+    if start == 0:
         for b in range(c.graph.bodies.shape[0]):
             at = b * orders * BODY_ROW
             put(f.a, 8 * b, times(four(x.bodies, at + S_R * orders + 8), splat(2.0)))

@@ -45,7 +45,7 @@ def _stand(context, c, r, log, t):
     copy(c.expansion.low_end, c.expansion.low)
     status = 0
     if c.trial.singular == 0:
-        call_expand(r.kernels.expand, context, 0)
+        call_expand(r.kernels.expand, context, 0, 1)
         status = hold_accelerations(c, t)
     if not is_finite(w.qdd):
         return NOT_FINITE
@@ -81,8 +81,7 @@ def _expand(context, c, r):
     """The series of the next step, order by order."""
     order = c.expansion.order
     order.top = order.next
-    for k in range(1, order.top):
-        call_expand(r.kernels.expand, context, k)
+    call_expand(r.kernels.expand, context, 1, order.top)
     c.work.counters.evaluations += order.top
 
 
@@ -168,7 +167,12 @@ def _move_on(context, c, r, log, t1):
 @entry("pp", no_log(), "i")
 def advance_series(context, run, log, most):
     """Make up to `most` steps, as `stepper.advance` does; context is the address of a `SeriesContext`. Status."""
-    c, r = load_series(context), load_run(run)
+    return advance_by_series(context, load_series(context), load_run(run), log, most)
+
+
+@kernel
+def advance_by_series(context, c, r, log, most):
+    """As `advance_series`, for kernels that call it."""
     adaptive, status = r.numbers.adaptive == 1, 0
     if r.numbers.begun == 0 and most != 0:
         status = _enter(context, c, r, log)

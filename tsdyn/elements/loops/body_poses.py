@@ -11,7 +11,7 @@ do rigid bodies with locked orientation (length STILL in the graph), whose orien
 """
 
 from ...jit.kernels import kernel
-from ...jit.simd import add, cross, fma, four, lanes, put, splat, times
+from ...jit.simd import add, cross, fma, four, get, lanes, let, put, splat, times
 from ..markers import PARAMETERS, POINT
 
 A, R, RD, OMEGA, P, POSE = 0, 12, 16, 20, 24, 28
@@ -140,11 +140,11 @@ def write_accelerations(bodies, poses, accelerations, qdd):
 @kernel
 def _turn(poses, at, x, y, z, out, i):
     """out[i : i + 4] = G(p)^T (x, y, z)."""
-    e0, e1, e2, e3 = poses[at + P], poses[at + P + 1], poses[at + P + 2], poses[at + P + 3]
-    out[i] = -e1 * x - e2 * y - e3 * z
-    out[i + 1] = e0 * x - e3 * y + e2 * z
-    out[i + 2] = e3 * x + e0 * y - e1 * z
-    out[i + 3] = -e2 * x + e1 * y + e0 * z
+    e0, e1, e2, e3 = get(poses, at + P), get(poses, at + P + 1), get(poses, at + P + 2), get(poses, at + P + 3)
+    let(out, i, -e1 * x - e2 * y - e3 * z)
+    let(out, i + 1, e0 * x - e3 * y + e2 * z)
+    let(out, i + 2, e3 * x + e0 * y - e1 * z)
+    let(out, i + 3, -e2 * x + e1 * y + e0 * z)
 
 
 @kernel
@@ -155,20 +155,20 @@ def turned(poses, at, s0, s1, s2):
 
 
 @kernel
-def marker_position(code, poses, at, s, x, i):
-    """x[i : i + 3] of a marker (of Parameters 4), and whatever is after it."""
+def marker_position(code, poses, at, reals, s, x, i):
+    """x[i : i + 3] of a marker (of Parameters 4) with coordinates at reals[s], and whatever is after it."""
     if code == PARAMETERS:
         put(x, i, four(poses, at + P))
         return
-    f = turned(poses, at, s[0], s[1], s[2])
+    f = turned(poses, at, get(reals, s), get(reals, s + 1), get(reals, s + 2))
     if code == POINT:
         f = add(f, four(poses, at + R))
     put(x, i, f)
 
 
 @kernel
-def marker_motion(code, poses, at, s, x, xd, xdd, i):
-    """x, xd, and xdd at r'' = omega'' = 0, of a marker."""
+def marker_motion(code, poses, at, reals, s, x, xd, xdd, i):  # nine: the pose, the marker, what it is written to
+    """x, xd, and xdd at r'' = omega'' = 0, of a marker with coordinates at reals[s]."""
     if code == PARAMETERS:
         p, w = poses[at + P : at + P + 4], poses[at + OMEGA : at + OMEGA + 3]
         square = -0.25 * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
@@ -176,8 +176,8 @@ def marker_motion(code, poses, at, s, x, xd, xdd, i):
             x[i + c], xdd[i + c] = p[c], square * p[c]
         _turn(poses, at, 0.5 * w[0], 0.5 * w[1], 0.5 * w[2], xd, i)
         return
-    b = turned(poses, at, s[0], s[1], s[2])
-    w0, w1, w2 = poses[at + OMEGA], poses[at + OMEGA + 1], poses[at + OMEGA + 2]
+    b = turned(poses, at, get(reals, s), get(reals, s + 1), get(reals, s + 2))
+    w0, w1, w2 = get(poses, at + OMEGA), get(poses, at + OMEGA + 1), get(poses, at + OMEGA + 2)
     w = turned(poses, at, w0, w1, w2)
     bd = cross(w, b)
     put(xdd, i, cross(w, bd))
@@ -188,8 +188,11 @@ def marker_motion(code, poses, at, s, x, xd, xdd, i):
 
 
 @kernel
-def add_gradient(code, poses, at, s, f, i, H, h):
-    """H[h : h + 8] += f x_(r, pi') of a marker, f = f[i : i + 3] (of Parameters 4); a force, then a body torque."""
+def add_gradient(code, poses, at, reals, s, f, i, H, h):  # nine: the pose, the marker, its gradient, the row
+    """H[h : h + 8] += f x_(r, pi') of a marker with coordinates at reals[s]: a force, then a body torque.
+
+    f = f[i : i + 3], of Parameters 4.
+    """
     if code == PARAMETERS:
         e0, e1, e2, e3 = 0.5 * poses[at + P], 0.5 * poses[at + P + 1], 0.5 * poses[at + P + 2], 0.5 * poses[at + P + 3]
         f0, f1, f2, f3 = f[i], f[i + 1], f[i + 2], f[i + 3]
@@ -199,12 +202,13 @@ def add_gradient(code, poses, at, s, f, i, H, h):
         return
     f0, f1, f2 = f[i], f[i + 1], f[i + 2]
     if code == POINT:
-        H[h] += f0
-        H[h + 1] += f1
-        H[h + 2] += f2
-    y0 = poses[at] * f0 + poses[at + 1] * f1 + poses[at + 2] * f2  # A^T f
-    y1 = poses[at + 4] * f0 + poses[at + 5] * f1 + poses[at + 6] * f2
-    y2 = poses[at + 8] * f0 + poses[at + 9] * f1 + poses[at + 10] * f2
-    H[h + 4] += s[1] * y2 - s[2] * y1
-    H[h + 5] += s[2] * y0 - s[0] * y2
-    H[h + 6] += s[0] * y1 - s[1] * y0
+        let(H, h, get(H, h) + f0)
+        let(H, h + 1, get(H, h + 1) + f1)
+        let(H, h + 2, get(H, h + 2) + f2)
+    y0 = get(poses, at) * f0 + get(poses, at + 1) * f1 + get(poses, at + 2) * f2  # A^T f
+    y1 = get(poses, at + 4) * f0 + get(poses, at + 5) * f1 + get(poses, at + 6) * f2
+    y2 = get(poses, at + 8) * f0 + get(poses, at + 9) * f1 + get(poses, at + 10) * f2
+    s0, s1, s2 = get(reals, s), get(reals, s + 1), get(reals, s + 2)
+    let(H, h + 4, get(H, h + 4) + (s1 * y2 - s2 * y1))
+    let(H, h + 5, get(H, h + 5) + (s2 * y0 - s0 * y2))
+    let(H, h + 6, get(H, h + 6) + (s0 * y1 - s1 * y0))

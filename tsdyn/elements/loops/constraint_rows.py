@@ -5,6 +5,7 @@ row. A row of H holds the entries of body a, then of body b, each as (force, 0, 
 """
 
 from ...jit.kernels import ANY, caller, integers, part, stack, stack2, vector
+from ...jit.simd import get, let, put, splat
 from .body_poses import POSE, add_gradient, marker_motion, marker_position
 from .template import (
     CODES,
@@ -27,10 +28,10 @@ BODY, ROW, MASK, INTS = 0, 2, 3, 4
 
 
 @part
-def _place_markers(poses, own, real, x):
+def _place_markers(table, own, reals, real, poses, x):
     """Set x (ROOM,) from the poses."""
     for j in range(MARKERS):
-        marker_position(CODES[j], poses, own[OWNERS[j]] * POSE, real[3 * j : 3 * j + 3], x, STARTS[j])
+        marker_position(CODES[j], poses, get(table, own + OWNERS[j]) * POSE, reals, real + 3 * j, x, STARTS[j])
 
 
 def values(count, stride, table, reals, poses, unused, t, out, H):
@@ -38,11 +39,12 @@ def values(count, stride, table, reals, poses, unused, t, out, H):
     table, reals, poses, out = integers(table, ANY), vector(reals, ANY), vector(poses, ANY), vector(out, ANY)
     x, f = stack(ROOM), stack(ROWS)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        _place_markers(poses, own, real, x)
-        kernel_value(x, real[3 * MARKERS :], t, f)
+        own, real = i * INTS, i * stride
+        _place_markers(table, own, reals, real, poses, x)
+        kernel_value(x, reals[real + 3 * MARKERS :], t, f)
+        row = get(table, own + ROW)
         for r in range(ROWS):
-            out[own[ROW] + r] = f[r]
+            let(out, row + r, f[r])
     return 0
 
 
@@ -52,18 +54,20 @@ def reduced(count, stride, table, reals, poses, unused, t, out, H):
     H = vector(H, ANY)
     x, f, g = stack(ROOM), stack(ROWS), stack2(ROWS, SIZE)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        _place_markers(poses, own, real, x)
-        kernel_phi(x, real[3 * MARKERS :], t, f)
-        differentiate(x, real[3 * MARKERS :], t, g)
+        own, real = i * INTS, i * stride
+        _place_markers(table, own, reals, real, poses, x)
+        par = reals[real + 3 * MARKERS :]
+        kernel_phi(x, par, t, f)
+        differentiate(x, par, t, g)
+        row = get(table, own + ROW)
         for r in range(ROWS):
-            out[own[ROW] + r] = f[r]
-            h = 16 * (own[ROW] + r)
-            for c in range(16):
-                H[h + c] = 0.0
+            let(out, row + r, f[r])
+            h = 16 * (row + r)
+            for c in range(0, 16, 4):
+                put(H, h + c, splat(0.0))
             for j in range(MARKERS):
-                k, s = OWNERS[j], real[3 * j : 3 * j + 3]
-                add_gradient(CODES[j], poses, own[k] * POSE, s, g[r], STARTS[j], H, h + 8 * k)
+                k, at = OWNERS[j], get(table, own + OWNERS[j]) * POSE
+                add_gradient(CODES[j], poses, at, reals, real + 3 * j, g[r], STARTS[j], H, h + 8 * k)
     return 0
 
 
@@ -73,8 +77,10 @@ def bias(count, stride, table, reals, poses, unused, t, out, H):
     x, xd, xdd = stack(ROOM), stack(ROOM), stack(ROOM)
     f, g = stack2(ROWS, SIZE), stack(ROWS)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = i * INTS, i * stride
         for j in range(MARKERS):
-            marker_motion(CODES[j], poses, own[OWNERS[j]] * POSE, real[3 * j : 3 * j + 3], x, xd, xdd, STARTS[j])
-        acceleration_bias(x, xd, xdd, real[3 * MARKERS :], t, f, g, out[own[ROW] :])
+            at = get(table, own + OWNERS[j]) * POSE
+            marker_motion(CODES[j], poses, at, reals, real + 3 * j, x, xd, xdd, STARTS[j])
+        row = get(table, own + ROW)
+        acceleration_bias(x, xd, xdd, reals[real + 3 * MARKERS :], t, f, g, out[row:])
     return 0

@@ -14,12 +14,14 @@ a marker), lam (1 a row), x and Phi_x, and its scratch. A marker with constant c
 Spherical, drops out of (1) beyond order zero and out of (2); a marker on the ground has no force. If all markers of a
 kind are of these sorts, an instance ends with f.
 
+`own`, `real` and `at` are where the table, the numbers and the series of an instance begin.
+
 A prescribed quantity (a length that is a motion) adds the coefficients of Phi_t to (1), by the kernel `series_t`. The
 series of the motions are the last rows of the scratch, written at the start of a step.
 """
 
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, stack2, vector
-from ...jit.simd import add, cross, fetch, fma, four, lanes, put, splat, times, total
+from ...jit.simd import add, cross, fetch, fma, four, get, lanes, let, put, splat, times, total
 from ..markers import POINT
 from .body_poses import turned
 from .constraint_rows import INTS, MASK, ROW
@@ -95,101 +97,103 @@ def _offsets(orders):
 
 
 @part
-def _place(j, k, orders, own, real, bodies):
+def _place(j, k, orders, table, own, reals, real, bodies):
     """Coefficient k of x of a marker."""
-    body, s = own[OWNERS[j]] * BODY_ROW * orders, real[3 * j : 3 * j + 3]
-    x = turned(bodies, body + 12 * k, s[0], s[1], s[2])
+    body, s = get(table, own + OWNERS[j]) * BODY_ROW * orders, real + 3 * j
+    x = turned(bodies, body + 12 * k, get(reals, s), get(reals, s + 1), get(reals, s + 2))
     return add(x, four(bodies, body + S_R * orders + 4 * k)) if CODES[j] == POINT else x
 
 
 @part
-def _fetch_next(mode, k, orders, table, bodies, values):
+def _fetch_next(mode, k, orders, table, own, bodies, values, at):
     """Bring the numbers of the next instance into the cache; its table and its series are given."""
     wide, (F, _L, _X, _J, _scratch) = 4 * orders, _offsets(orders)
-    fetch(values, 0, F)
+    fetch(values, at, F)
     for j in range(MARKERS):
-        body = table[OWNERS[j]] * BODY_ROW * orders
+        body = get(table, own + OWNERS[j]) * BODY_ROW * orders
         if mode == ADVANCE:
             fetch(bodies, body, 12 * (k + 1))
-            fetch(values, F + j * wide, 4 * (k + 1))
+            fetch(values, at + F + j * wide, 4 * (k + 1))
         else:
             fetch(bodies, body + 12 * (k + 2), 12)
             fetch(bodies, body + S_R * orders + 4 * (k + 2), 4)
 
 
 @part
-def _differentiate(k, orders, own, real, bodies, values, x, f, g):
+def _differentiate(k, orders, table, own, reals, real, bodies, values, at, x, f, g):  # twelve: series are arrays
     """Store x_k, and (Phi_x)_k where columns of it vary."""
-    wide, (_F, _L, X, J, own_scratch) = 4 * orders, _offsets(orders)
-    places, gradients, step = 0, 4 * MARKERS, 4
+    wide, (_F, _L, X, J, own_scratch), mask = 4 * orders, _offsets(orders), get(table, own + MASK)
+    places, gradients, step = at, at + 4 * MARKERS, 4
     if k > 0:
-        places, gradients, step = X + 4 * k, J + 4 * k, wide
+        places, gradients, step = at + X + 4 * k, at + J + 4 * k, wide
     for j in range(MARKERS):
-        place = _place(j, k, orders, own, real, bodies)
+        place = _place(j, k, orders, table, own, reals, real, bodies)
         put(values, places + j * step, place)
         put(x, STARTS[j], place)
     for r in range(ROWS):
         for c in range(SIZE):
             f[r, c] = 0.0
-    scratch = matrix(data_of(values[own_scratch:]), SLOTS, orders)
-    kernel_series(x, real[3 * MARKERS :], k, scratch, f)
+    scratch, par = matrix(data_of(values[at + own_scratch :]), SLOTS, orders), reals[real + 3 * MARKERS :]
+    kernel_series(x, par, k, scratch, f)
     if DRIVEN:
-        kernel_series_t(x, real[3 * MARKERS :], k, scratch, g)
+        kernel_series_t(x, par, k, scratch, g)
         for r in range(ROWS):
-            values[own_scratch + SLOTS * orders + r] = g[r]
+            let(values, at + own_scratch + SLOTS * orders + r, g[r])
     for j in range(MARKERS):
-        if k == 0 or own[MASK] >> j & 1:
+        if k == 0 or mask >> j & 1:
             for r in range(ROWS):
-                c, at = STARTS[j], gradients + (r * MARKERS + j) * step
-                put(values, at, lanes(f[r, c], f[r, c + 1], f[r, c + 2]))
+                c, o = STARTS[j], gradients + (r * MARKERS + j) * step
+                put(values, o, lanes(f[r, c], f[r, c + 1], f[r, c + 2]))
 
 
 @part
-def _push(k, orders, own, real, bodies, values, b, Z):
+def _push(k, orders, table, own, reals, real, bodies, values, at, b, Z):
     """f_{k-1} whole, by lam_{k-1} of b; f_k without lam_k, Eq. (2), and its torque, Eq. (3), onto the bodies' Z."""
-    wide, (F, L, _X, J, _scratch) = 4 * orders, _offsets(orders)
+    wide, (F, L, _X, J, _scratch), mask = 4 * orders, _offsets(orders), get(table, own + MASK)
+    row = get(table, own + ROW)
     for j in range(MARKERS):
-        if own[MASK] >> (GROUND + j) & 1:
+        if mask >> (GROUND + j) & 1:
             continue
-        forces, force = F + j * wide, splat(0.0)
+        forces, force = at + F + j * wide, splat(0.0)
         done = four(values, forces + 4 * k - 4) if k > 1 else splat(0.0)
         for r in range(ROWS):
-            at = 4 * (MARKERS + r * MARKERS + j)
-            done = fma(four(values, at), splat(-b[own[ROW] + r]), done)
-            if own[MASK] >> j & 1:
-                at, multipliers = J + (r * MARKERS + j) * wide, L + r * orders + k
+            o = at + 4 * (MARKERS + r * MARKERS + j)
+            done = fma(four(values, o), splat(-get(b, row + r)), done)
+            if mask >> j & 1:
+                o, multipliers = at + J + (r * MARKERS + j) * wide, at + L + r * orders + k
                 for l in range(1, k + 1):
-                    force = fma(four(values, at + 4 * l), splat(-values[multipliers - l]), force)
+                    force = fma(four(values, o + 4 * l), splat(-get(values, multipliers - l)), force)
         put(values, forces + 4 * k - 4, done)
         put(values, forces + 4 * k, force)
-        body, s = own[OWNERS[j]], real[3 * j : 3 * j + 3]
-        if own[MASK] >> (UNTURNED + j) & 1 == 0:
+        body, s = get(table, own + OWNERS[j]), real + 3 * j
+        if mask >> (UNTURNED + j) & 1 == 0:
             y = torque(bodies, body * BODY_ROW * orders, k, values, forces)
-            put(Z, 8 * body + 4, add(four(Z, 8 * body + 4), cross(lanes(s[0], s[1], s[2]), y)))
+            arm = lanes(get(reals, s), get(reals, s + 1), get(reals, s + 2))
+            put(Z, 8 * body + 4, add(four(Z, 8 * body + 4), cross(arm, y)))
         if CODES[j] == POINT:
             put(Z, 8 * body, add(four(Z, 8 * body), force))
 
 
 @part
-def _residual(k, orders, own, real, bodies, values, b, x):
+def _residual(k, orders, table, own, reals, real, bodies, values, at, b, x):
     """b = (k + 1)(k + 2) Phi_{k+2}, Eq. (1)."""
-    wide, (_F, _L, X, J, own_scratch) = 4 * orders, _offsets(orders)
+    wide, (_F, _L, X, J, own_scratch), mask = 4 * orders, _offsets(orders), get(table, own + MASK)
     for j in range(MARKERS):
-        if own[MASK] >> (GROUND + j) & 1 == 0:
-            put(x, STARTS[j], _place(j, k + 2, orders, own, real, bodies))
+        if mask >> (GROUND + j) & 1 == 0:
+            put(x, STARTS[j], _place(j, k + 2, orders, table, own, reals, real, bodies))
     for r in range(ROWS):
         highest, lower = splat(0.0), splat(0.0)
         for j in range(MARKERS):
-            if own[MASK] >> (GROUND + j) & 1:
+            if mask >> (GROUND + j) & 1:
                 continue
-            highest = fma(four(values, 4 * (MARKERS + r * MARKERS + j)), four(x, STARTS[j]), highest)
-            if own[MASK] >> j & 1:
-                places, gradients = X + j * wide, J + (r * MARKERS + j) * wide + 4 * (k + 2)
+            highest = fma(four(values, at + 4 * (MARKERS + r * MARKERS + j)), four(x, STARTS[j]), highest)
+            if mask >> j & 1:
+                places, gradients = at + X + j * wide, at + J + (r * MARKERS + j) * wide + 4 * (k + 2)
                 for l in range(1, k + 2):
                     gradient = times(four(values, gradients - 4 * l), splat(float(l)))
                     lower = fma(gradient, four(values, places + 4 * l), lower)
-        drift = values[own_scratch + SLOTS * orders + r] if DRIVEN else 0.0
-        b[own[ROW] + r] = (k + 1.0) * ((k + 2.0) * total(highest) + total(lower) + drift)
+        drift = get(values, at + own_scratch + SLOTS * orders + r) if DRIVEN else 0.0
+        let(b, get(table, own + ROW) + r, (k + 1.0) * ((k + 2.0) * total(highest) + total(lower) + drift))
 
 
 def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b, Z):
@@ -201,17 +205,17 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b
     values, b, Z = vector(values, ANY), vector(b, ANY), vector(Z, ANY)
     x, f, g = stack(ROOM), stack2(ROWS, SIZE), stack(ROWS)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        series_of, varies = values[i * size :], own[MASK] & ((1 << GROUND) - 1) != 0
+        own, real, at = i * INTS, i * stride, i * size
         if AHEAD and i + 1 < count:
-            _fetch_next(mode, k, orders, table[(i + 1) * INTS :], bodies, values[(i + 1) * size :])
+            _fetch_next(mode, k, orders, table, own + INTS, bodies, values, at + size)
         if mode == RESIDUAL:
-            _residual(k, orders, own, real, bodies, series_of, b, x)
+            _residual(k, orders, table, own, reals, real, bodies, values, at, b, x)
             continue
+        varies = get(table, own + MASK) & ((1 << GROUND) - 1) != 0
         for r in range(ROWS if k > 0 and varies else 0):
-            series_of[_offsets(orders)[1] + r * orders + k - 1] = b[own[ROW] + r]
+            let(values, at + _offsets(orders)[1] + r * orders + k - 1, get(b, get(table, own + ROW) + r))
         for now in range(0 if k == 0 else k + 1, k + 2 if varies or DRIVEN else 1):
-            _differentiate(now, orders, own, real, bodies, series_of, x, f, g)
+            _differentiate(now, orders, table, own, reals, real, bodies, values, at, x, f, g)
         if k > 0:
-            _push(k, orders, own, real, bodies, series_of, b, Z)
+            _push(k, orders, table, own, reals, real, bodies, values, at, b, Z)
     return 0

@@ -1,0 +1,145 @@
+"""The compiled loop over cases: no Python between them, and the bits of runs alone."""
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from tsdyn.ensembles import batch, first_slice, runner
+
+RNG = np.random.default_rng(11)
+SPAN = (0.0, 0.05)
+CASES = 24
+
+
+def chain():
+    """Two rods, the first on a spring."""
+    scene, last = ts.Scene(gravity=(0, 0, -10)), None
+    for i in range(2):
+        rod = scene.add_body(1.0, (0.1, 0.1, 0.05), position=(i + 0.5, 0, 0), name=f"rod {i}")
+        ends = {"point_a": (0.5, 0, 0) if last else (0, 0, 0), "point_b": (-0.5, 0, 0)}
+        scene.add(ts.constraints.Spherical(last or scene.ground, rod, **ends, name=f"joint {i}"))
+        last = rod
+    scene.add(ts.forces.Spring(scene.bodies[0], scene.ground, stiffness=20.0, damping=0.1, name="spring"))
+    return scene
+
+
+def swung(off=0.0):
+    """The chain swung about the y-axis, positions off by so much."""
+    angle, table = RNG.uniform(0, 2, CASES), {}
+    zero = 0 * angle
+    for i in range(2):
+        position = np.stack([np.cos(angle), zero, -np.sin(angle)], 1) * (i + 0.5)
+        table[f"rod {i}.position"] = position + off * RNG.normal(size=position.shape)
+        table[f"rod {i}.orientation"] = np.stack([np.cos(angle / 2), zero, np.sin(angle / 2), zero], 1)
+    return table
+
+
+def uniform(*shape):
+    return RNG.uniform(0.9, 1.0, (CASES, *shape))
+
+
+TABLES = {
+    "gravity": lambda: {"gravity": RNG.normal(size=(CASES, 3))},
+    "masses": lambda: {"rod 0.mass": uniform(), "rod 1.inertia": 0.1 * uniform(3)},
+    "starts": swung,
+    "starts that are projected": lambda: swung(1e-11) | {"rod 1.mass": uniform()},
+    "matrices and spins": lambda: {"rod 1.inertia": uniform(1, 1) * np.diag((1, 2, 2)), "rod 0.mass": uniform()},
+    "forces": lambda: {"spring.stiffness": uniform(), "spring.point_b": uniform(3), "spring.damping": uniform()},
+}
+
+
+@pytest.fixture
+def by_python(monkeypatch):
+    """The cases that were run one by one."""
+    run, cases = runner.Runner.run, []
+    monkeypatch.setattr(runner.Runner, "run", lambda self, room, k: cases.append(room.first + k) or run(self, room, k))
+    return cases
+
+
+def compare(scene, table, found, **options):
+    for i in range(CASES):
+        case = scene.with_parameters({name: array[i] for name, array in table.items()})
+        solution = ts.simulate(case, SPAN, **options)
+        assert found.q[i].tobytes() == solution.state.q.tobytes(), i
+        assert found.qd[i].tobytes() == solution.state.qd.tobytes(), i
+        assert (found.message[i], found.reached[i]) == (solution.message, solution.reached)
+
+
+@pytest.mark.parametrize("which", TABLES)
+def test_cases_after_the_first_need_no_python(which, by_python):
+    scene, table = chain(), TABLES[which]()
+    found = ts.ensemble(scene, table, SPAN, threads=1)
+    assert len(by_python) <= 2
+    compare(scene, table, found)
+
+
+def test_outputs_at_times(by_python):
+    scene, table, times = chain(), TABLES["masses"](), [0.0, 0.01, 0.03, 0.05]
+    found = ts.ensemble(scene, table, SPAN, t_eval=times, keep="t_eval", threads=1)
+    assert len(by_python) <= 2
+    for i in range(0, CASES, 5):
+        values = {name: array[i] for name, array in table.items()}
+        solution = ts.simulate(scene.with_parameters(values), SPAN, t_eval=times)
+        assert found.q[i].tobytes() == solution.q.tobytes()
+        assert found.qd[i].tobytes() == solution.qd.tobytes()
+
+
+def test_inadmissible_cases_are_told_and_end_no_other(by_python):
+    scene, table = chain(), swung() | {name: array for t in ("masses", "forces") for name, array in TABLES[t]().items()}
+    table["rod 0.mass"][5] = -1.0
+    table["rod 0.mass"][6] = np.nan
+    table["rod 1.inertia"][7] = (1.0, 1.0, 3.0)
+    table["rod 1.inertia"][8] = np.inf
+    table["rod 1.inertia"][9] = 0.0
+    table["rod 0.position"][10] += 1e-3
+    table["rod 0.orientation"][11] *= 1.01
+    table["spring.stiffness"][12] = np.nan
+    found = ts.ensemble(scene, table, SPAN, threads=1)
+    assert np.flatnonzero(~found.success).tolist() == list(range(5, 13))
+    assert len(by_python) == 10
+    for i in range(CASES):
+        other = scene.with_parameters
+        values = {name: array[i] for name, array in table.items()}
+        if found.success[i]:
+            assert found.q[i].tobytes() == ts.simulate(other(values), SPAN).state.q.tobytes()
+        else:
+            with pytest.raises(ts.TsdynError) as refused:
+                ts.simulate(other(values), SPAN)
+            assert found.message[i] == str(refused.value)
+
+
+def test_thin_bodies_and_unequal_masses_are_run_as_scenes_of_their_own(by_python):
+    scene, table = chain(), {"rod 0.mass": uniform(), "rod 1.inertia": 0.1 * uniform(3)}
+    table["rod 1.inertia"][4] = (1e-12, 0.1, 0.1)
+    table["rod 0.mass"][6] = 1e6
+    found = ts.ensemble(scene, table, SPAN, threads=1)
+    assert {4, 6} < {*by_python}
+    assert len(by_python) == 4
+    compare(scene, table, found)
+
+
+def test_a_thin_body_that_gains_inertia():
+    scene = chain()
+    scene["rod 1"].inertia = (0.1, 0.1, 1e-12)
+    table = {"rod 1.inertia": 0.1 * uniform(3)}
+    compare(scene, table, ts.ensemble(scene, table, SPAN, threads=1))
+
+
+def test_long_cases_are_run_once(by_python, monkeypatch):
+    """A case that doesn't end within the steps of the loop is run by Python; where most are, all of them."""
+    monkeypatch.setattr(first_slice, "FIRST_SLICE", 40)
+    monkeypatch.setattr(batch, "TRIED", 2)
+    scene, table = chain(), {"rod 0.angular_velocity": np.zeros((CASES, 3)), "rod 0.mass": uniform()}
+    found = ts.ensemble(scene, table, SPAN, threads=1, max_step=np.diff(SPAN)[0] / 50)
+    assert len(by_python) == CASES
+    compare(scene, table, found, max_step=np.diff(SPAN)[0] / 50)
+
+
+def test_motions_that_turn_stiff_or_singular_are_left_to_python():
+    scene = ts.Scene(gravity=(0, 0, -10))
+    bob = scene.add_point_mass(1.0, position=(1, 0, 0), name="bob")
+    scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    wall = scene.add(ts.forces.Spring(bob, scene.ground, point_b=(1, 0, 1), stiffness=1.0, damping=0.0, name="spring"))
+    table = {f"{wall.name}.damping": np.geomspace(1e-3, 1e7, CASES)}
+    found = ts.ensemble(scene, table, SPAN, threads=1)
+    compare(scene, table, found)

@@ -1,0 +1,138 @@
+"""Runs of the default method that turn to the implicit method and back: one run, whoever makes its steps."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from benchmarks.stiff import jointed
+from tests.helpers.tolerances import CLOSE, NEAR
+from tsdyn.runs import slices
+from tsdyn.simulation import segments
+
+pytestmark = pytest.mark.slow  # kernels of implicit methods
+OPTIONS = {"rtol": 1e-6, "atol": 1e-6}
+END = 0.6  # s: Taylor, SDIRK54, and so on, five or more segments
+
+
+def level(t, state):
+    return state.q[2] + 0.5
+
+
+@pytest.fixture(scope="module")
+def turned():
+    return ts.simulate(jointed(), (0.0, END), dense_output=True, events=level, **OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def fine():
+    method = ts.integrators.SDIRK54(1e-9, 1e-9)
+    return ts.simulate(jointed(), (0.0, END), dense_output=True, events=level, integrator=method)
+
+
+def test_every_step_is_an_output_once(turned):
+    assert turned.success
+    assert "SDIRK54 took over 3 times, first at t = 0.0" in turned.message
+    assert turned.t.size == turned.stats.steps + 1
+    assert (np.diff(turned.t) > 0.0).all()
+    np.testing.assert_array_equal(turned.steps.t[turned.steps.accepted], turned.t[:-1])
+    assert turned.charts.steps.sum() == turned.stats.steps
+
+
+def test_the_motion_and_its_events_are_those_of_one_method(turned, fine):
+    t = np.linspace(0.0, END, 301)
+    np.testing.assert_allclose(turned.at(t).q, fine.at(t).q, rtol=0.0, atol=NEAR)
+    assert turned.constraint_error.position.max() < CLOSE
+    assert len(turned.t_events[0]) == len(fine.t_events[0])
+    np.testing.assert_allclose(turned.t_events[0], fine.t_events[0], rtol=0.0, atol=NEAR)
+    np.testing.assert_allclose(turned.at(turned.t).q, turned.q, rtol=0.0, atol=CLOSE)
+
+
+def test_times_asked_for_are_outputs_once(turned):
+    """At turns, too, and without a change of steps."""
+    times = np.unique(np.concatenate((np.linspace(0.0, END, 50), turned.t[35:60])))
+    asked = ts.simulate(jointed(), (0.0, END), t_eval=times, **OPTIONS)
+    np.testing.assert_array_equal(asked.t, times)
+    np.testing.assert_array_equal(asked.q[np.isin(times, turned.t)], turned.q[np.isin(turned.t, times)])
+    assert asked.stats.steps == turned.stats.steps
+
+
+def test_what_the_solution_says(turned, tmp_path):
+    methods = [f"{name}(rtol=1e-06, atol=1e-06)" for name in ("Taylor", "SDIRK54")]
+    assert sorted(turned.method.split(" and ")) == sorted(methods)
+    assert turned.stats.stiff
+    assert turned.stats.iteration_matrices > 0
+    assert turned.stats.charts == turned.charts.t.size
+    assert turned.provenance["rtol"] == 1e-6
+    assert turned.method in str(turned)
+    twin = pickle.loads(pickle.dumps(turned))
+    assert twin.method == turned.method
+    np.testing.assert_array_equal(twin.at(turned.t).q, turned.at(turned.t).q)
+    pytest.importorskip("h5py")
+    again = ts.load(turned.save(tmp_path / "run.h5"))
+    assert (again.method, again.message) == (turned.method, turned.message)
+    np.testing.assert_array_equal(again.at(turned.t).q, turned.at(turned.t).q)
+
+
+def test_turns_do_not_depend_on_slices(turned, monkeypatch):
+    monkeypatch.setattr(slices, "FIRST_SLICE", 3)
+    np.testing.assert_array_equal(ts.simulate(jointed(), (0.0, END), **OPTIONS).q, turned.q)
+
+
+def test_steps_in_all_segments_count(turned):
+    count = turned.stats.steps - 5
+    cut = ts.simulate(jointed(), (0.0, END), max_steps=count, **OPTIONS)
+    assert (cut.status, cut.stats.steps) == (ts.Status.MAX_STEPS, count)
+    np.testing.assert_array_equal(cut.q, turned.q[: count + 1])
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.8])
+def test_an_interrupted_run_has_what_it_had(share, turned, monkeypatch):
+    monkeypatch.setattr(slices, "FIRST_SLICE", 3)
+    seen = []
+
+    def stop(fraction):
+        seen.append(fraction)
+        if fraction > share:
+            raise KeyboardInterrupt
+
+    cut = ts.simulate(jointed(), (0.0, END), progress=stop, **OPTIONS)
+    assert cut.status == ts.Status.INTERRUPTED
+    assert (np.diff(seen) >= 0.0).all()
+    np.testing.assert_array_equal(cut.q, turned.q[: len(cut.t)])
+
+
+def test_the_explicit_method_goes_on_where_the_implicit_one_cannot(monkeypatch):
+    def refuse(*given):
+        raise ts.InvalidConstraint("no")
+
+    monkeypatch.setattr(segments, "demand_holonomic", refuse)
+    solution = ts.simulate(jointed(), (0.0, 0.05), **OPTIONS).raise_if_failed()
+    assert solution.method == "Taylor(rtol=1e-06, atol=1e-06)"
+    assert solution.t.size == solution.stats.steps + 1
+    assert solution.stats.iteration_matrices == 0
+
+
+def held(until):
+    """A pendulum of 1 m, held level by an overdamped spring that fades, and its rod."""
+    scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
+    bob = scene.add_point_mass(1.0, position=(1.0, 0.0, 0.0), name="bob")
+    scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+
+    def hold(t, state):
+        return 0.0, 0.0, -(1e7 * state[2] + 1e5 * state[9]) / (1.0 + (t / until) ** 40)
+
+    scene.add(ts.forces.PointForce(bob, force=hold))
+    return scene
+
+
+def test_the_explicit_method_goes_on_where_stiffness_has_gone():
+    """Most steps of the implicit method come before, and the swing is made of a few steps of series."""
+    solution = ts.simulate(held(0.5), (0.0, 20.0), **OPTIONS).raise_if_failed()
+    assert solution.method.startswith("Taylor")
+    assert "SDIRK54 took over" in solution.message
+    h = solution.steps.h[solution.steps.accepted]
+    assert h[solution.t[:-1] > 10.0].mean() > 0.05
+    fine = ts.simulate(held(0.5), (0.0, 20.0), integrator=ts.integrators.DOP853(1e-10, 1e-10), t_eval=(0.0, 20.0))
+    np.testing.assert_allclose(solution.q[-1], fine.q[-1], rtol=0.0, atol=1e-4)

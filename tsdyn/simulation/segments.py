@@ -1,0 +1,224 @@
+"""Segments of a run, each by one method: what a segment begins with, and how all of them make one outcome.
+
+A segment ends with Status.STIFF where the default method turns to its implicit method, or back (turns.py), and with
+Status.PASSAGE where series go on past a singular configuration, or have done so (singularity_crossing.py). All other
+runs have one segment.
+"""
+
+import time
+from itertools import pairwise
+
+import numpy as np
+
+from ..configuration.holonomic import demand_holonomic
+from ..errors import Status, TsdynError
+from ..runs.history import ChartLog, StepLog
+from ..runs.run import run
+from ..runs.segments import Relay
+from ..runs.step_engine import StepEngine
+from ..runs.task import Outcome
+from ..runs.trajectory import Pieces
+from ..taylor.series_engine import SeriesEngine
+from .rounding_limit import within_rounding
+from .singularity_crossing import Carrier, by_series, crossings
+
+PASSAGE, STIFF = Status.PASSAGE, Status.STIFF
+ENGINES = {"steps": StepEngine, "series": SeriesEngine}  # by Integrator.driver
+METHOD, IMPLICIT, CROSSING = range(3)  # who makes a segment: the task's method, the implicit one, series
+GIVEN_UP = (  # by the implicit method: the explicit one goes on
+    Status.NEWTON_FAILED, Status.SINGULAR, Status.MASS_SINGULAR, Status.CHART_LOST, Status.STEP_COLLAPSED,
+    Status.STAGE_FAILED, Status.JAMMED,
+)  # fmt: skip
+
+
+def run_segments(task, observe=None):
+    """Run a `Task`; return the `Outcome`. An observed run has one segment."""
+    engine = ENGINES[task.method.driver]
+    passes = engine is StepEngine and not task.form.first_order
+    if observe is not None or not (task.choose or (passes and not task.prepared.refusal)):
+        return run(task, engine, observe)
+    relay = Relay(not task.form.first_order and not task.prepared.refusal)
+    passed = task.archive.passed if task.archive else []
+    try:
+        if passed:  # a run that goes on in a later segment
+            relay.share, relay.largest, relay.h = passed[-1]["relay"]
+            if task.choose:
+                task.choose.restore(passed[-1]["turns"])
+            return _Segments(task, relay, [_recalled(known) for known in passed]).go_on()
+        outcome = run(task._replace(report=_until_its_end(task.report)), engine, relay=relay)
+        return _Segments(task, relay, [outcome]).go_on() if outcome.status in (PASSAGE, STIFF) else outcome
+    finally:
+        task.report(None)
+
+
+def _until_its_end(report):
+    """Return a progress report without the end: further segments may follow."""
+    return lambda fraction, *more: None if fraction is None else report(fraction, *more)
+
+
+def _recalled(known):
+    """The `Outcome` of a segment that had ended when a checkpoint was written."""
+    return Outcome(
+        Status(known["status"]), "", range(known["rows"]), None, None, known["reached"], np.array(known["last"]),
+        np.array(known["remembered"]), known["counts"], None, None, time.perf_counter(),
+    )  # fmt: skip
+
+
+class _Segments:
+    """A run whose first segments have ended.
+
+    Parameters
+    ----------
+    task : Task
+        The whole run's.
+    relay : Relay
+    parts : list of Outcome
+    """
+
+    def __init__(self, task, relay, parts):
+        self.task, self.relay, self.parts, self.turns = task, relay, parts, task.choose
+        self.roles, self.raised = [METHOD], ""
+        self.passed = [] if task.archive is None else task.archive.passed
+        if self.passed:
+            self.roles += [known["next"] for known in self.passed[:-1]]
+            if self.passed[-1]["turns"] is None:
+                self.turns = None
+
+    def go_on(self):
+        """Complete the run; its `Outcome`."""
+        parts, role = self.parts, self.passed[-1]["next"] if self.passed else self._pass()
+        try:
+            while role is not None:
+                rest = self._rest()
+                if rest.max_steps == 0:
+                    parts[-1] = parts[-1]._replace(status=Status.MAX_STEPS)
+                    break
+                try:
+                    parts.append(self._run(rest, role))
+                except TsdynError as error:
+                    if role != IMPLICIT:  # the partial result is returned
+                        parts[-1] = parts[-1]._replace(status=Status.SINGULAR, reason=str(error))
+                        break
+                    role = self._pass(gives_up=True)
+                else:
+                    self.roles.append(role)
+                    role = self._pass()
+        except KeyboardInterrupt:
+            parts[-1] = parts[-1]._replace(status=Status.INTERRUPTED)
+        return self._outcome()
+
+    def _pass(self, gives_up=False):
+        """Who makes the next segment, None for nobody; the archive knows of it, and of the one that has ended.
+
+        Its per-step outputs begin with the row that the segment before ends with.
+        """
+        part, archive, relay = self.parts[-1], self.task.archive, self.relay
+        if gives_up or (self.roles[-1] == IMPLICIT and part.status in GIVEN_UP):
+            self.turns, role = None, METHOD
+        else:
+            role = self._next(part.status)
+        if archive is not None and role is not None:
+            if gives_up:
+                self.passed.pop()
+            numbers = {"status": part.status, "reached": part.reached, "counts": dict(part.counts), "next": role}
+            arrays = {"rows": len(part.rows), "last": part.last.tolist(), "remembered": part.remembered.tolist()}
+            turns = None if self.turns is None else self.turns.saved()
+            self.passed.append(
+                {**numbers, **arrays, "turns": turns, "relay": [relay.share, relay.largest, float(relay.h)]}
+            )
+            archive.skips = self.task.times.size == 0
+        return role
+
+    def _next(self, status):
+        role = self.roles[-1]
+        if status is PASSAGE:
+            return CROSSING if role != CROSSING else self.roles[-2]
+        return None if status is not STIFF else METHOD if role == IMPLICIT else IMPLICIT
+
+    def _run(self, rest, role):
+        """The `Outcome` of the next segment."""
+        task, relay, turned = self.task, self.relay, self.roles[-1] != CROSSING
+        if role == CROSSING:
+            relay.h = 0.0
+            return run(
+                by_series(rest), SeriesEngine, relay=relay, past=lambda memory: Carrier(memory, task, relay.share)
+            )
+        if self.turns is not None:
+            self.turns.begin(role == IMPLICIT, rest.span[0], turned)
+        if role == METHOD or not turned:
+            relay.h = 0.0
+        if role == IMPLICIT:
+            demand_holonomic(rest.prepared.packed, rest.q, rest.span[0], rest.form.name)
+            method, self.raised = within_rounding(self.turns.implicit, rest.prepared.packed, rest.q)
+            rest = rest._replace(method=method)
+        return run(rest._replace(choose=self.turns), ENGINES[rest.method.driver], relay=relay)
+
+    def _rest(self):
+        """The remaining task, by the task's method."""
+        task, parts, last = self.task, self.parts, self.parts[-1]
+        times, left, done = task.times, task.max_steps, sum(part.counts["steps"] for part in parts)
+        if times.size:
+            times = times[sum(len(part.rows) for part in parts) :]
+            times = times if times.size else np.array([np.inf])  # an empty array would ask for every step
+        if left is not None:
+            left = max(left - done, 0)
+        (start, end), reached = task.span, last.reached
+
+        def report(fraction, t, steps):
+            task.report((reached + fraction * (end - reached) - start) / (end - start), t, done + steps)
+
+        return task._replace(
+            span=(reached, end), q=last.last[0], qd=last.last[1], remembered=last.remembered, times=times,
+            max_steps=left, report=_until_its_end(report),
+        )  # fmt: skip
+
+    def _outcome(self):
+        task, parts, last = self.task, self.parts, self.parts[-1]
+        logs = task.history and not task.archive
+        said = last.reason, self._turned(), crossings(self._who(CROSSING)), self.raised
+        return last._replace(
+            reason=" ".join(part for part in said if part),
+            rows=self._rows(),
+            steps=StepLog([part.steps for part in parts]) if logs else None,
+            charts=ChartLog([part.charts for part in parts]) if logs else None,
+            counts=_summed([part.counts for part in parts]),
+            trajectory=Pieces([part.trajectory for part in parts]) if task.dense_output else None,
+            began=parts[0].began,
+            method=self._methods(),
+        )
+
+    def _who(self, role):
+        """The segments that somebody has made, each with the one before."""
+        return [pair for pair, who in zip(pairwise(self.parts), self.roles[1:], strict=False) if who == role]
+
+    def _rows(self):
+        """The output rows of all segments; every step's begin with the row that the segment before ends with."""
+        task = self.task
+        if task.archive is not None:
+            return range(task.archive.counts["outputs"])
+        first, *others = (part.rows for part in self.parts)
+        return np.concatenate([first, *(rows[1:] if task.times.size == 0 else rows for rows in others)])
+
+    def _turned(self):
+        """Say how often the implicit method took over, and when first."""
+        found = [before.reached for before, _ in self._who(IMPLICIT)]
+        if not found:
+            return ""
+        name, times = type(self.task.choose.implicit).__name__, "" if len(found) == 1 else f" {len(found)} times, first"
+        return f"The motion is stiff: {name} took over{times} at t = {found[0]:.6g} s."
+
+    def _methods(self):
+        """The methods of a run that has turned, that of most of the time first; else nothing."""
+        implicit = self._who(IMPLICIT)
+        if not implicit:
+            return ""
+        within = sum(part.reached - before.reached for before, part in implicit)
+        first = self.task.method, self.task.choose.implicit
+        most = 2.0 * within > self.parts[-1].reached - self.task.span[0]
+        return " and ".join(repr(method) for method in (first[::-1] if most else first))
+
+
+def _summed(counts):
+    """Return the counts of the whole run."""
+    ways = {"stiff": any, "largest_landing": max}
+    return {name: ways.get(name, sum)(each[name] for each in counts) for name in counts[0]}

@@ -1,0 +1,135 @@
+"""Turns of the default method: from its explicit method to the implicit one where the motion is stiff, and back.
+
+Each goes on from where the other stands. Work for a second of motion decides, in evaluations, and after numbers of
+steps: no clock. The explicit method turns where it finds the motion stiff (runs/step_control.py, taylor/stepper.py).
+The implicit method turns back where it takes more work than the explicit one did. Otherwise the explicit one is tried
+for some steps, at growing intervals, and earlier where the derivatives of the forces had to be taken anew: as long as
+old ones serve, the motion is as stiff as it was.
+"""
+
+from ..integrators import SDIRK54, Taylor
+from ..methods.integrator import frozen
+from .tolerances import (
+    AGAIN,
+    COST,
+    FIRST_WINDOW,
+    PATIENCE,
+    SERIES_COST,
+    SETTLED,
+    SHARP_COST,
+    STEP_EVALUATIONS,
+    TRIAL,
+    TRIED,
+)
+
+KEPT = "known", "patience", "taken", "tried", "ask", "window", "jacobians", "began", "lasted"
+
+
+def implicit(method):
+    """Return the implicit method of the same tolerances."""
+    return frozen(SDIRK54(method.rtol, method.atol, max_step=method.max_step))
+
+
+class Turns:
+    """The turns of one run.
+
+    Parameters
+    ----------
+    method : Integrator
+        The explicit method.
+    sharp : bool
+        Whether a force changes sharply.
+    end : float, s
+        Of the run.
+    prepare : Callable
+        Has the kernels of a method compiled ahead.
+
+    Attributes
+    ----------
+    ask : int
+        Steps of the segment after which it is asked; of an explicit method not before it has found the motion stiff.
+    """
+
+    def __init__(self, method, sharp, end, prepare):
+        self.method, self.implicit, self.end, self._prepare = method, implicit(method), end, prepare
+        series = isinstance(method, Taylor)
+        self._cost = SERIES_COST if series else COST
+        self._share = SHARP_COST if series and sharp else 1.0
+        self.known = 0.0  # work of the method before for a second of motion
+        self.patience = PATIENCE  # implicit steps before the explicit method is tried
+        self.taken, self.tried = 0, False  # explicit steps so far; whether the explicit method is on trial
+        self.ask, self.window = 0, (0.0, 0.0)  # where the steps that are judged begin: time, work
+        self.jacobians = 0  # of the implicit method's first steps
+        self.began = self.lasted = 0.0  # s: of the segment, and length of the one before
+
+    def begin(self, to_implicit, t, turned):
+        """A segment begins at t: after a turn, or after a singular configuration."""
+        self.window, self.ask = (t, 0.0), FIRST_WINDOW
+        if to_implicit:
+            self._prepare(self.implicit)
+        elif not self.tried:
+            self.ask = (AGAIN - 1) * self.taken
+        if turned:
+            self.lasted, self.began = t - self.began, t
+
+    def turns(self, memory):
+        """Whether the run turns to the other method where its memory is."""
+        run = memory.run
+        steps, t = run.numbers.steps, run.clock.t
+        if steps < self.ask:
+            return False
+        to_explicit = memory.engine.method.implicit
+        work = (
+            self._cost * memory.work.counters.evaluations if to_explicit else self._share * self.method.stages * steps
+        )
+        (before, done), self.window = self.window, (t, work)
+        rate = (work - done) / (t - before) if t > before else 0.0
+        if to_explicit:
+            return self._back(memory, steps, min(rate, work / steps / run.clock.h))
+        if self.tried:
+            return self._tried(steps, rate)
+        return bool(run.numbers.stiff) and self._to_implicit(run, steps, t)
+
+    def _to_implicit(self, run, steps, t):
+        """Whether the implicit method is to go on; not for what little is left."""
+        self.ask = AGAIN * steps
+        ours = self._share * self.method.stages / run.clock.h
+        if run.numbers.at_limit == 0 or ours * (self.end - t) < self._cost * TRIAL * STEP_EVALUATIONS:
+            return False
+        self.known, self.taken = ours, self.taken + steps
+        if self.lasted > 0.0:  # the implicit method has been left for longer than it had lasted, or in vain
+            self.patience = PATIENCE if t - self.began > self.lasted else AGAIN * self.patience
+        return True
+
+    def _back(self, memory, steps, rate):
+        """Whether the explicit method is to go on: it takes less work, or is to be tried."""
+        jacobians = memory.work.counters.jacobians
+        if steps <= FIRST_WINDOW:
+            self.jacobians = jacobians
+        patience = self.patience if jacobians > self.jacobians else AGAIN * self.patience
+        left = rate * (self.end - memory.run.clock.t)
+        self.tried = steps >= patience and left > self._cost * TRIAL * STEP_EVALUATIONS
+        if self.tried:
+            self.known = rate
+        self.ask = 2 * steps if steps >= self.patience else min(2 * steps, self.patience)
+        return self.tried or rate > max(SETTLED / steps, 1.0) ** 2 * self.known
+
+    def _tried(self, steps, rate):
+        """Whether the explicit method, after some steps, has failed to take less work."""
+        self.ask = 2 * steps
+        if steps < TRIED and rate < AGAIN * self.known:
+            return False
+        self.tried = False
+        if rate < self.known:
+            self.ask = 0
+            return False
+        self.patience, self.taken, self.known = AGAIN * self.patience, self.taken + steps, rate
+        return True
+
+    def saved(self):
+        """Its state, for a checkpoint."""
+        return {name: getattr(self, name) for name in KEPT}
+
+    def restore(self, numbers):
+        """As it was when it was saved."""
+        vars(self).update(numbers)

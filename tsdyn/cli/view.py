@@ -35,6 +35,6 @@ def _solution(parsed):
         return load(parsed.scene)
     from ..simulation.simulate import simulate
 
-    scene, given = load_run(parsed.scene, parsed.allow_code)
+    scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
     span, options = options_of(parsed, given)
     return simulate(scene, span, **options, dense_output=True)

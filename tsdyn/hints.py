@@ -21,7 +21,6 @@ from .elements.joint import Joint
 from .elements.primitive import Primitive
 from .ensembles.results import Ensemble
 from .errors import TsdynError
-from .importing.report import ImportReport
 from .methods.integrator import Integrator
 from .model.handles import Handles
 from .model.packed import Packed, System

@@ -107,7 +107,7 @@ def _reason(item, links):
         fits = any(move.kind == "hinge" and np.linalg.norm(np.cross(move.axis, own)) < ALONG for move in link.moves)
         return "" if fits else "no hinge of the tree is along its axis"
     kinds = [move.kind for move in link.moves]
-    fits = kinds in (["hinge"], ["ball"]) and not item.damping or kinds == ["slide"] and item.damping
+    fits = (kinds in (["hinge"], ["ball"]) and not item.damping) or (kinds == ["slide"] and item.damping)
     return "" if fits else "it damps more than one joint"
 
 

@@ -23,6 +23,7 @@ class MujocoScene:
 
         self.mj, self.scene = mujoco, scene
         self.spec = mujoco.MjSpec()
+        self.spec.compiler.degree = False
         self.spec.option.gravity = scene.gravity
         self.spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         self.links, loops = spanning_tree(scene)

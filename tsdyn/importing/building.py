@@ -42,7 +42,7 @@ def build(description, make, report):
                 stiffness=spring.stiffness, damping=spring.damping, free_length=spring.free_length, name=unused(scene, spring.name),
             )
         )  # fmt: skip
-    couple(scene, description, report)
+    couple(scene, description, bodies, report)
     for name, (owner, at) in description.frames.items():
         body = bodies[owner]
         centroid = np.zeros(3) if owner == GROUND else description.links[owner].centroid

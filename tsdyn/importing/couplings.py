@@ -3,14 +3,13 @@
 import numpy as np
 
 from ..constraints.gear import Gear
-from ..constraints.revolute import Revolute
 from ..errors import InvalidConstraint
 from .tolerances import PARALLEL
 
 WHAT = "joint that mimics another one"
 
 
-def couple(scene, description, report):
+def couple(scene, description, bodies, report):
     """Add what can be a gear pair; list the rest."""
     joints = {joint.name: joint for joint in description.joints}
     for coupling in description.couplings:
@@ -18,10 +17,9 @@ def couple(scene, description, report):
         reason = _reason(one, other, coupling)
         if not reason:
             parallel = float(np.sign(one.axis @ other.axis))
-            wheels = [scene[joint.name] for joint in (one, other)]
             try:
                 gear = Gear.at(
-                    wheels[0].b, wheels[1].b, point_a=one.point, point_b=other.point, axis_a=one.axis,
+                    bodies[one.b], bodies[other.b], point_a=one.point, point_b=other.point, axis_a=one.axis,
                     ratio=coupling.ratio * parallel, name=coupling.name,
                 )  # fmt: skip
                 scene.add(gear)
@@ -44,6 +42,3 @@ def _reason(one, other, coupling):
     if not coupling.ratio:
         return "a gear pair needs a ratio"
     return ""
-
-
-__all__ = ["Revolute", "couple"]

@@ -5,14 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import InvalidArgument, TsdynError
+from ..observables.diagnostics import constraint_error
 from . import mjcf, sdf, urdf
 from .building import build
 from .massless import complete
 from .merging import merge
 from .report import ImportReport
 from .slides import gather
-from .tolerances import NO_MASS
+from .tolerances import NO_MASS, OPEN
 from .xml_file import read
 
 if TYPE_CHECKING:
@@ -65,5 +68,21 @@ def _scene(description: Any, make: Any, report: ImportReport, mistakes: Any) -> 
     except TsdynError as error:
         mistakes.add((1, 1), str(error))
         mistakes.demand_none()
+    if any(joint.loop for joint in description.joints):
+        _close(scene, report)
     report.warn()
     return scene
+
+
+def _close(scene: Scene, report: ImportReport) -> None:
+    """Assemble a scene whose loops are open at the start."""
+    q, qd = scene.start
+    rest = np.zeros((1, q.size))
+    gap = float(constraint_error(scene.packed, np.zeros(1), q[None], qd[None], rest).position[0])
+    if gap <= OPEN:
+        return
+    try:
+        scene.assemble()
+        report.note(f"loops that were open by up to {gap:.2g} are closed by assembly")
+    except TsdynError as error:
+        report.note(f"loops are open by up to {gap:.2g}, and can't be closed: {error}")

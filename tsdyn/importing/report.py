@@ -52,7 +52,7 @@ class ImportReport:
     True
     """
 
-    def __init__(self, source: str, format: str) -> None:  # noqa: A002  the word for it
+    def __init__(self, source: str, format: str) -> None:
         self.source, self.format = source, format
         self.left_out: tuple[LeftOut, ...] = ()
         self.notes: tuple[str, ...] = ()

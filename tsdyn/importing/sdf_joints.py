@@ -120,7 +120,7 @@ def _dynamics(axis, joint, tag, report):
             report.leave(f"spring and damper of a {joint.kind} joint", joint.name, f"{stiffness:g}, {damping:g}")
     if limit is not None:
         found = [f"{what} {value:g}" for what in ("lower", "upper", "effort", "velocity")
-                 if abs(value := limit.scalar(what, 1e16)) < 1e16 and value != -1.0]  # fmt: skip
+                 if abs(value := limit.scalar(what, 1e16)) < 1e16 and (value != -1.0 or what in ("lower", "upper"))]  # fmt: skip
         for what in ("stiffness", "dissipation"):
             limit.all(what)
         if found:

@@ -1,6 +1,7 @@
 """`ts.compare`: errors of other engines, and scenes that they can't have."""
 
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def pendulum():
 def four_bar():
     """A loop, closed by a ball."""
     scene, points, last = ts.Scene(), np.array([(0, 0, 0), (0, 0, 1), (2, 0, 1.5), (2, 0, 0)], float), None
-    for i, (one, other) in enumerate(zip(points[:-1], points[1:], strict=True)):
+    for i, (one, other) in enumerate(pairwise(points)):
         bar = scene.add_body(mass=1.0 + i, inertia=(0.1, 0.1, 0.1), position=(one + other) / 2, name=f"bar{i}")
         scene.add(C.Revolute.at(last or scene.ground, bar, point=one, axis=(0, 1, 0), name=f"pin{i}"))
         last = bar

@@ -11,7 +11,7 @@ FOLDER = Path(__file__).parents[1] / "references"
 
 
 class LinkMotion(NamedTuple):
-    """A link: its frame, velocity and angular velocity in its own axes, acceleration of its origin in those of the ground."""
+    """Frame of a link and its motion: velocities in its own axes, acceleration of its origin in those of the ground."""
 
     p: Any  # (3,), m
     quaternion: Any  # (4,), scalar first

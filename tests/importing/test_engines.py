@@ -36,7 +36,7 @@ def pinocchio_motions(path, names, rng, free_base, scene=None):
     return link_motions.of_pinocchio(model, q, v, qdd, names)
 
 
-def mujoco_motions(path, names, rng, spread=0.5):
+def mujoco_motions(path, names, rng, actuated=True):
     """A random state by MuJoCo: contacts, limits, friction and equality constraints off, armature zero."""
     mujoco = pytest.importorskip("mujoco")
     spec = mujoco.MjSpec.from_file(str(path))
@@ -44,9 +44,11 @@ def mujoco_motions(path, names, rng, spread=0.5):
     model, off = spec.compile(), mujoco.mjtDisableBit
     model.dof_armature[:] = model.body_gravcomp[:] = model.opt.density = model.opt.viscosity = 0.0
     model.opt.disableflags |= off.mjDSBL_CONTACT | off.mjDSBL_LIMIT | off.mjDSBL_FRICTIONLOSS | off.mjDSBL_EQUALITY
+    if not actuated:
+        model.opt.disableflags |= off.mjDSBL_ACTUATION
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = model.qpos0, rng.normal(size=model.nv)
-    mujoco.mj_integratePos(model, data.qpos, spread * rng.normal(size=model.nv), 1.0)
+    mujoco.mj_integratePos(model, data.qpos, 0.5 * rng.normal(size=model.nv), 1.0)
     mujoco.mj_forward(model, data)
     mujoco.mj_rnePostConstraint(model, data)
     return link_motions.of_mujoco(model, data, names)
@@ -146,6 +148,7 @@ SUITE = (
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:compiler attribute")  # of MuJoCo
 @pytest.mark.parametrize("model", SUITE)
 def test_public_trees_of_mujoco(model):
     import sys
@@ -156,7 +159,37 @@ def test_public_trees_of_mujoco(model):
     assert "dm_control" not in sys.modules  # its files alone are read
     path = Path(found.submodule_search_locations[0]) / "suite" / f"{model}.xml"
     scene = load(path)
+    for force in [force for force in scene.forces if force.name.endswith(" actuator")]:
+        scene.remove(force)
     for seed in range(3):
-        motions = mujoco_motions(path, names_of(scene), np.random.default_rng(seed))
+        motions = mujoco_motions(path, names_of(scene), np.random.default_rng(seed), actuated=False)
         link_motions.place(scene, motions)
+        assert link_motions.acceleration_error(scene, motions) < CLOSE
+
+
+@pytest.mark.slow
+def test_closed_loops_of_cassie(tmp_path):
+    """Its rods have balls at both ends here, as the robot has: the hinges of the file hold what the loop holds too."""
+    from tests.helpers import sdf_in_pinocchio
+
+    source = (robots() / "cassie_description/robots/cassie_v2.sdf").read_text()
+    import pinocchio as pin
+
+    for joint in ("achilles-spring-joint", "crank-rod-joint"):
+        for side in ("left", "right"):
+            hinge = f'name="{side}-{joint}" type="revolute"'
+            assert hinge in source
+            source = source.replace(hinge, hinge.replace("revolute", "ball"))
+    path = tmp_path / "cassie.sdf"
+    path.write_text(source)
+    scene, rng = without_forces(load(path)), np.random.default_rng(0)
+    assert len(scene.mobility().redundant) == 0
+    model, loops = sdf_in_pinocchio.model_of(path)
+    for _ in range(3):
+        start = pin.integrate(model, pin.neutral(model), 0.2 * rng.normal(size=model.nv))
+        q, v = sdf_in_pinocchio.closed(model, loops, start, rng)
+        qdd = sdf_in_pinocchio.accelerations(model, loops, q, v)
+        motions = link_motions.of_pinocchio(model, q, v, qdd, names_of(scene))
+        link_motions.place(scene, motions)
+        assert np.abs(scene.evaluate().Phi).max() < FINE
         assert link_motions.acceleration_error(scene, motions) < CLOSE

@@ -230,15 +230,12 @@ def four_bar_by_hand():
 
 
 def test_screws_and_universal_joints_of_sdf(tmp_path):
-    link = "<link name='{0}'><inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial></link>"
-    screw = "<joint name='s' type='screw'><parent>world</parent><child>a</child><axis><xyz>0 0 1</xyz></axis><screw_thread_pitch>0.02</screw_thread_pitch></joint>"
-    cross = "<joint name='u' type='universal'><parent>a</parent><child>b</child><axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2></joint>"
-    bent = (
-        cross.replace("'u'", "'v'")
-        .replace("<child>b", "<child>c")
-        .replace("0 1 0", "1 1 0")
-        .replace("universal", "revolute2")
-    )
+    link = "<link name='{0}'><inertial><mass>1</mass></inertial></link>"
+    joint = "<joint name='{0}' type='{1}'><parent>{2}</parent><child>{3}</child><axis><xyz>{4}</xyz></axis>{5}</joint>"
+    axis2, pitch = "<axis2><xyz>{}</xyz></axis2>", "<screw_thread_pitch>0.02</screw_thread_pitch>"
+    screw = joint.format("s", "screw", "world", "a", "0 0 1", pitch)
+    cross = joint.format("u", "universal", "a", "b", "1 0 0", axis2.format("0 1 0"))
+    bent = joint.format("v", "revolute2", "a", "c", "1 0 0", axis2.format("1 1 0"))
     content = "".join(link.format(name) for name in "abc") + screw + cross + bent
     scene = load(text(tmp_path, f"<sdf version='1.10'><model name='m'>{content}</model></sdf>", "m.sdf"))
     assert np.isclose(scene["s"].lead, 0.02 / (2 * np.pi))

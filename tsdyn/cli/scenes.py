@@ -149,8 +149,8 @@ def _new(parsed):
 def _convert(parsed):
     """Write a scene, or a solution, in another format.
 
-    A scene (.toml, URDF, MJCF, SDF, or a Python file) becomes .toml, without comments and expressions of parameters; a solution (.h5,
-    .nc, .zarr) becomes another of these, or .csv.
+    A scene (.toml, URDF, MJCF, SDF, or a Python file) becomes .toml, without comments, expressions of parameters, and
+    shapes; a solution (.h5, .nc, .zarr) becomes another of these, or .csv.
     """
     source, target = Path(parsed.scene).suffix.lower(), Path(parsed.target).suffix.lower()
     if source in SOLUTIONS:

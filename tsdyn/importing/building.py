@@ -39,7 +39,8 @@ def build(description, make, report):
         scene.add(
             Spring.at(
                 bodies[spring.a], bodies[spring.b], point_a=spring.point_a, point_b=spring.point_b,
-                stiffness=spring.stiffness, damping=spring.damping, free_length=spring.free_length, name=unused(scene, spring.name),
+                stiffness=spring.stiffness, damping=spring.damping, free_length=spring.free_length,
+                name=unused(scene, spring.name),
             )
         )  # fmt: skip
     couple(scene, description, bodies, report)

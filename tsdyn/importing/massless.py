@@ -75,8 +75,10 @@ def _endow(description, link, least):
     for joint in _joints_of(description, link):
         name = joint.a if joint.b == link.name else joint.b
         donor = None if name == GROUND else description.links[name]
+        if donor is not None and is_poor(donor, least):
+            continue
         common = _common(joint, link, donor)
-        if common is None or (donor is not None and is_poor(donor, least)):
+        if common is None:
             continue
         if donor is None:
             share, size = common, _usual_mass(description)

@@ -4,6 +4,7 @@ So defaults, included files, units of angles, Euler sequences, inertia from geom
 mean what they mean in MuJoCo. A body with several joints becomes as many links, of which the last one has the mass.
 """
 
+import warnings
 from contextlib import contextmanager
 
 import numpy as np
@@ -64,9 +65,12 @@ def _warnings(mujoco, report):
     before = mujoco.get_mju_user_warning() if hasattr(mujoco, "get_mju_user_warning") else None
     mujoco.set_mju_user_warning(lambda text: report.note(f"MuJoCo: {text}"))
     try:
-        yield
+        with warnings.catch_warnings(record=True, action="always") as said:
+            yield
     finally:
         mujoco.set_mju_user_warning(before)
+    for one in said:
+        report.note(f"MuJoCo: {one.message}")
 
 
 def _compiled(mujoco, root, path, report):

@@ -6,7 +6,7 @@ the ground frame alone.
 
 import numpy as np
 
-from .description import GROUND, Description, Link
+from .description import GROUND, Description, JointItem, Link
 from .frames import HERE
 from .sdf_frames import Frames
 from .sdf_joints import add_joints
@@ -49,16 +49,14 @@ def _add_model(found, model, outer, prefix, folder, report):
         names[node.get("name")] = name
     for inner in model.all("model"):
         here = f"{inner.demand('name')}::"
-        names |= {here + one: name for one, name in
-                  _add_model(found, inner, frames.resolve(inner.get("name")), prefix + here, folder, report).items()}  # fmt: skip
+        within = _add_model(found, inner, frames.resolve(inner.get("name")), prefix + here, folder, report)
+        names |= {here + one: name for one, name in within.items()}
     for node in model.all("frame"):
         name, owner = node.get("name"), frames.link_of(node.get("name"))
         if owner in names and name not in found.links:
             found.frames[prefix + name] = names[owner], found.links[names[owner]].frame.inverse @ frames.resolve(name)
     add_joints(found, model, frames, names, prefix, report)
     if static:
-        from .description import JointItem
-
         found.joints += [JointItem(f"{name} static", "fixed", GROUND, name) for name in names.values()]
     return names
 

@@ -15,6 +15,7 @@ KINDS = {
     "universal": "universal",
     "revolute2": "universal",
 }
+UNLIMITED = 1e16  # of a limit, by the specification
 
 
 def add_joints(found, model, frames, names, prefix, report):
@@ -119,8 +120,9 @@ def _dynamics(axis, joint, tag, report):
         elif stiffness or damping:
             report.leave(f"spring and damper of a {joint.kind} joint", joint.name, f"{stiffness:g}, {damping:g}")
     if limit is not None:
-        found = [f"{what} {value:g}" for what in ("lower", "upper", "effort", "velocity")
-                 if abs(value := limit.scalar(what, 1e16)) < 1e16 and (value != -1.0 or what in ("lower", "upper"))]  # fmt: skip
+        given = {what: limit.scalar(what, UNLIMITED) for what in ("lower", "upper")}
+        given |= {what: value for what in ("effort", "velocity") if (value := limit.scalar(what, UNLIMITED)) != -1.0}
+        found = [f"{what} {value:g}" for what, value in given.items() if abs(value) < UNLIMITED]
         for what in ("stiffness", "dissipation"):
             limit.all(what)
         if found:

@@ -32,8 +32,8 @@ from .editing import copy as _copy
 from .editing import remove as _remove
 from .inverse_dynamics import inverse_dynamics as _inverse_dynamics
 from .kinematics import kinematics as _kinematics
+from .scene_imported import OfFile
 from .scene_saving import save as _save
-from .scene_shapes import drawn_shapes
 from .scene_table import summary, table
 from .statics import equilibrium as _equilibrium
 from .statics import linearise as _linearise
@@ -43,11 +43,11 @@ from .variants import place as _place
 from .variants import with_parameters as _with_parameters
 
 if TYPE_CHECKING:
-    from ..hints import AnyBody, ArrayLike, Floats, ImportReport, Item, Orientation, Packed, System
+    from ..hints import AnyBody, ArrayLike, Floats, Item, Orientation, Packed, System
 
 
 @fitting_methods
-class Scene:
+class Scene(OfFile):
     """Bodies, constraints, forces and gravity.
 
     Parameters
@@ -65,10 +65,6 @@ class Scene:
         The primitives in the order of their rows, those of joints included.
     forces : tuple
         In the order added.
-    shapes : dict
-        Name of a body, or "ground" -> list of shapes that `solution.view` draws for it; from an imported file.
-    imported : ImportReport or None
-        What was left out of an imported file, and where its frames are.
 
     Notes
     -----
@@ -103,8 +99,6 @@ class Scene:
         self.gravity = gravity
 
     ground: AnyBody
-    imported: ImportReport | None = None
-    shapes = drawn_shapes
 
     def __setattr__(self, name: str, value: Never) -> None:
         """Set an existing attribute; refuse a misspelt one."""

@@ -1,11 +1,12 @@
-"""Draw the pictures of architecture.md from the code: packages with their imports, and the way of the data.
+"""Draw the pictures of architecture.md from the code, and those of the gallery from its examples.
 
-Packages, imports and captions are read with ast; nothing is imported from tsdyn. matplotlib is needed.
+Packages, imports and captions of functions are read with ast, without importing tsdyn. matplotlib is needed.
 
-Run it: python -m docs.draw
+Run it: python -m docs.draw [packages] [step] [tutorial] [gallery] [name of an example]
 """
 
 import ast
+import sys
 import textwrap
 from pathlib import Path
 
@@ -133,11 +134,35 @@ def _save(figure, path):
         figure.savefig(path, metadata={"Date": None, "Creator": None})
 
 
-def main():
-    """Write both pictures."""
-    draw_packages(IMAGES / "packages.svg")
-    draw_step(IMAGES / "step.svg")
+def draw_gallery(names=()):
+    """Draw the pictures of the gallery, or of some of its examples."""
+    from docs.gallery import ENTRIES
+    from docs.gallery_pages import draw
+
+    for entry in ENTRIES:
+        if not names or entry.name in names:
+            draw(entry)
+
+
+def draw_tutorial():
+    """Draw the picture of the tutorial."""
+    from docs.gallery_pages import draw_tutorial as draw
+
+    draw()
+
+
+def main(words):
+    """Draw all pictures, or those that are named."""
+    if not words or "packages" in words:
+        draw_packages(IMAGES / "packages.svg")
+    if not words or "step" in words:
+        draw_step(IMAGES / "step.svg")
+    if not words or "tutorial" in words:
+        draw_tutorial()
+    examples = {*words} - {"packages", "step", "tutorial", "gallery"}
+    if not words or "gallery" in words or examples:
+        draw_gallery(examples)
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -21,9 +21,8 @@ REFINED = 3  # orders of the multipliers that are refined where rounding counts
 class Taylor(Integrator):
     """The method for smooth scenes: the higher the accuracy asked for, the longer its steps against any other's.
 
-    Serves every scene whose constraints and forces give their series, as all built-in ones do but friction in
-    proportion to a reaction. Functions of time, and of time and state, have one if they are arithmetic and NumPy
-    functions without branches; others are refused by name.
+    Serves every scene whose constraints and forces give their series, as all built-in ones do. Functions of time, and
+    of time and state, have one if they are arithmetic and NumPy functions without branches; others are refused by name.
 
     Parameters
     ----------

@@ -25,6 +25,7 @@ from .elements.joint_coordinates import Angle, Displacement, angles, displacemen
 from .elements.joint_friction import AXIS, JointFriction, optional
 from .elements.joint_load import JointLoad
 from .elements.markers import Parameters, Point, Turn, Vector
+from .elements.normal_series import BEARING_ROWS, bearing_series, coefficient_series, magnitude
 from .elements.primitive import Primitive
 from .elements.tolerances import PARALLEL
 from .elements.user_functions import (
@@ -79,6 +80,7 @@ from .validation import finite, floats, not_negative, number, positive, vector3,
 
 __all__ = [
     "AXIS",
+    "BEARING_ROWS",
     "DOP853_INTERPOLANT",
     "PARALLEL",
     "STATE",
@@ -126,11 +128,13 @@ __all__ = [
     "angle_series",
     "angles",
     "arguments_of",
+    "bearing_series",
     "beside",
     "call_accelerate",
     "call_place",
     "carried",
     "coefficient",
+    "coefficient_series",
     "cross",
     "direction_series",
     "displacements",
@@ -152,6 +156,7 @@ __all__ = [
     "linear_second",
     "load",
     "load_at",
+    "magnitude",
     "not_negative",
     "number",
     "numbers_of",

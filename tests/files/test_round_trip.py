@@ -1,44 +1,40 @@
 """Scenes go to a file and back to the same bits."""
 
+import importlib
+import pkgutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
+import examples
 import tsdyn as ts
-from examples import (
-    bead_on_surface,
-    door,
-    driven_pivot,
-    four_bar,
-    geared_pair,
-    hooke_joint,
-    pendulum_chain,
-    plug_in_integrator,
-    sarrus,
-    screw_press,
-    slider_crank,
-    stick_slip,
-    top,
-    two_body_pendulum,
-)
+from examples import driven_pivot, parallel_runs, top
+from tests.helpers import closed_loops, driven, hanging_chains, locked_scenes
 from tests.helpers.built_in import FORCES, JOINTS, PRIMITIVES, by_name
 from tests.helpers.plug_ins import Rod
 from tests.helpers.scene_marks import outcome, there_and_back
+from tests.helpers.sketched_mechanisms import MECHANISMS
 from tsdyn.files import types
 from tsdyn.simulation.load import scene_file
 from tsdyn.stress.gallery.cases import CASES
 from tsdyn.stress.random_scenes import generate
 
 ROOT = Path(__file__).parents[2]
-MODULES = (
-    bead_on_surface, door, four_bar, geared_pair, hooke_joint, pendulum_chain, plug_in_integrator, sarrus, screw_press,
-    slider_crank, stick_slip, top, two_body_pendulum,
-)  # fmt: skip
-SCENES = {module.__name__.partition(".")[2]: module.build for module in MODULES}
+MODULES = [importlib.import_module(f"examples.{module.name}") for module in pkgutil.iter_modules(examples.__path__)]
+FUNCTIONS = {"drive_train": "torque"}  # of users: what is a function in build()
+SCENES = {module.__name__.partition(".")[2]: module.build for module in MODULES if hasattr(module, "build")}
+SCENES = {name: build for name, build in SCENES.items() if name not in FUNCTIONS}
 GALLERY = {case.name: case.build for case in CASES if "500" not in case.name}
-SCENES |= {"driven_pivot": driven_pivot.build_driven} | GALLERY
+SCENES |= {"driven_pivot": driven_pivot.build_driven, "sleeping top": top.build_sleeping} | GALLERY
+SCENES["parallel_runs"] = lambda: parallel_runs.build(3.0)
+OF_TESTS = {name: (lambda make=make: make(np.random.default_rng(5)).scene) for name, make in MECHANISMS.items()}
+OF_TESTS |= {name: locked_scenes.SCENES[name][0] for name in locked_scenes.SCENES}
+OF_TESTS |= {
+    "loop": lambda: closed_loops.four_bar(planar=True), "ring": lambda: closed_loops.ring(12),
+    "pendulums": lambda: hanging_chains.pendulums([0.4, 0.3, 0.2]), "everything driven": driven.everything,
+}  # fmt: skip
 PULSE = 0.1 * np.exp(-ts.motions.time) * np.sin(3.0 * ts.motions.time) ** 2
 MOTIONS = {
     "constant": ts.motions.Constant(0.4),
@@ -61,6 +57,18 @@ MOTIONS = {
 @pytest.mark.parametrize("name", SCENES)
 def test_scenes_of_examples_and_gallery(name, tmp_path):
     there_and_back(SCENES[name](), tmp_path / "scene.toml")
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_examples_with_functions_are_refused(name, tmp_path):
+    build = importlib.import_module(f"examples.{name}").build
+    with pytest.raises(ts.InvalidArgument, match=rf"{FUNCTIONS[name]} is the function"):
+        build().save(tmp_path / "scene.toml")
+
+
+@pytest.mark.parametrize("name", OF_TESTS)
+def test_scenes_of_tests(name, tmp_path):
+    there_and_back(OF_TESTS[name](), tmp_path / "scene.toml")
 
 
 @pytest.mark.parametrize("name", ["four_bar", "screw_press", "top"])

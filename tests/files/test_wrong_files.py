@@ -1,12 +1,18 @@
 """Wrong scene files: every mistake at once, each with its line and what to write; fuzzed files never crash."""
 
+import os
 import re
+import signal
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tsdyn as ts
 from tsdyn.files.starting_file import TEXT
+
+ROOT = Path(__file__).parents[2]
 
 RIGHT = """\
 version = 1
@@ -49,7 +55,16 @@ assemble = true
 [run]
 end = 1.0
 method = { type = "RK45", rtol = 1e-9 }
+[ensemble]
+cases = 3
+assemble = ["bob"]
+[ensemble.parameters]
+"arm.mass" = { uniform = [1, "4 * length"] }
+"hinge.point_a" = [0, 0, 0]
+[output]
+files = ["a.h5"]
 """
+SPREAD, POINT = 'uniform = [1, "4 * length"]', '"hinge.point_a" = [0, 0, 0]'
 INERTIA = "mass = 2\ninertia = [0.1, 0.2, 0.1]"
 WRONG = {  # name: (what is replaced, by what, line, words of the message)
     "no TOML": ("[[body]]\nname = \"arm\"", "[[body]\nname = \"arm\"", 5, ("no TOML",)),
@@ -120,6 +135,27 @@ WRONG = {  # name: (what is replaced, by what, line, words of the message)
     "unknown method": ('"RK45"', '"RK54"', 40, ("RK45",)),
     "argument of a method": ("rtol = 1e-9", "rtoll = 1e-9", 40, ("rtoll", "did you mean rtol")),
     "tolerance of a method": ("rtol = 1e-9", "rtol = -1e-9", 40, ("positive",)),
+    "unknown parameter": ('"arm.mass" =', '"arm.mas" =', 45, ("did you mean arm.mass")),
+    "unknown spread": ("uniform", "unifrm", 45, ("{ uniform = [low, high] }",)),
+    "spread of three": (SPREAD, "uniform = [1, 2, 3]", 45, ("two values",)),
+    "spread of text": (SPREAD, 'uniform = [1, "two"]', 45, ("unknown name", "'two'")),
+    "negative deviation": (SPREAD, "normal = [1, -1]", 45, ("must not be negative",)),
+    "spread of a motion": (SPREAD, 'uniform = [1, "2 + t"]', 45, ("depends on the time",)),
+    "shape of a parameter": (POINT, '"hinge.point_a" = [0, 0]', 46, ("(3,)",)),
+    "ragged cases": (POINT, '"hinge.point_a" = [[0, 0, 0], [0, 0]]', 46, ("different lengths",)),
+    "infinite case": (POINT, '"bob.mass" = [1, inf, 2]', 46, ("finite",)),
+    "numbers of cases": (POINT, '"bob.mass" = [1, 2]', 41, ("bob.mass 2", "cases 3")),
+    "no cases": ("cases = 3\n", "", 41, ("cases = 100",)),
+    "cases is text": ("cases = 3", 'cases = "3"', 42, ("whole number from 1 on",)),
+    "too many cases": ("cases = 3", "cases = 100000000", 42, ("at most",)),
+    "body to assemble": ('["bob"]', '["bobb"]', 43, ("names of bodies",)),
+    "grid is a number": ("cases = 3", "grid = 3", 42, ("true or false",)),
+    "keep": ("cases = 3", 'keep = "last"', 42, ("'t_eval'",)),
+    "nothing varies": ("[ensemble.parameters]", "[ensemble.parmeters]", 44, ("'parmeters'", "parameters?")),
+    "output above": ('["a.h5"]', '["../a.h5"]', 48, ("below the working folder",)),
+    "output elsewhere": ('["a.h5"]', '["/etc/a.h5"]', 48, ("below the working folder",)),
+    "output is text": ('["a.h5"]', '"a.h5"', 48, ("list of paths",)),
+    "key of the output": ("files =", "file =", 48, ("'file'", "files")),
     "unknown option": ("end = 1.0\n", "end = 1.0\nto = 3\n", 40, ("'to'",)),
 }  # fmt: skip
 
@@ -238,24 +274,62 @@ def fuzzed(rng, text):
     return bytes(data)
 
 
+FORBIDDEN = ("os.system", "subprocess.Popen", "os.exec", "os.posix_spawn", "os.remove", "os.rename", "socket.connect")
+watched = []  # the folder that files are read from, while they are
+
+
+def watch(event, arguments):
+    """An audit hook: while a file is read, nothing is started, removed or written."""
+    if watched and (event in FORBIDDEN or (event == "open" and isinstance(arguments[1], str) and "w" in arguments[1])):
+        raise AssertionError(f"{event} {arguments}")
+
+
+def hanging(number, frame):
+    raise AssertionError("a file takes a minute")
+
+
+@pytest.fixture
+def watching():
+    if not hasattr(watch, "added"):
+        watch.added = sys.addaudithook(watch)
+    yield
+    watched.clear()
+
+
 def fuzz(seeds, folder):
-    wrong = 0
+    """How many of the files are refused; every error but a TsdynError, and every side effect, fails."""
+    wrong, texts = 0, (RIGHT, TEXT, (ROOT / "examples" / "four_bar.toml").read_text())
+    path, before = folder / "scene.toml", signal.signal(signal.SIGALRM, hanging)
     for seed in seeds:
-        rng = np.random.default_rng(seed)
-        text = fuzzed(rng, RIGHT if seed % 2 else TEXT)
+        text = fuzzed(np.random.default_rng(seed), texts[seed % len(texts)])
+        path.write_bytes(text)
+        watched.append(folder)
+        signal.alarm(60)
         try:
-            load(text, folder)
+            ts.load(path)
         except ts.TsdynError:
             wrong += 1
         except BaseException as error:
             raise AssertionError(f"seed {seed}: {type(error).__name__}: {error}\n{text!r}") from error
+        finally:
+            signal.alarm(0)
+            watched.clear()
+    signal.signal(signal.SIGALRM, before)
     return wrong
 
 
-def test_fuzzed_files(tmp_path):
+def test_the_watch_sees_what_a_file_must_not_do(watching, tmp_path):
+    watched.append(tmp_path)
+    with pytest.raises(AssertionError, match=r"os\.system"):
+        os.system("true")
+    with pytest.raises(AssertionError, match="open"):
+        (tmp_path / "made").write_text("")
+
+
+def test_fuzzed_files(watching, tmp_path):
     assert fuzz(range(150), tmp_path) > 75
 
 
 @pytest.mark.slow
-def test_many_fuzzed_files(tmp_path):
+def test_many_fuzzed_files(watching, tmp_path):
     assert fuzz(range(1000, 11000), tmp_path) > 5000

@@ -1,4 +1,4 @@
-"""Friction of joints where it is not unique, jams, has no series, or is given wrongly."""
+"""Friction of joints where it is not unique, jams, is a plug-in, or is given wrongly."""
 
 import pickle
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.rough_joints import PRECISE, demand_balance, four_bar, pendulum, rod
+from tests.helpers.rough_joints import PRECISE, BallFriction, demand_balance, four_bar, pendulum, rod
 from tests.helpers.tolerances import CLOSE, ROUGH
 
 C, F = ts.constraints, ts.forces
@@ -52,39 +52,6 @@ def test_jamming_on_the_way_ends_the_run():
         assert len(numbers) > 3
 
 
-class BallFriction(ts.JointFriction, ts.Force):
-    """Friction of a ball joint in all directions: a plug-in."""
-
-    joints = (C.Spherical,)
-    markers = (ts.Point("a"), ts.Turn("a"), ts.Point("b"), ts.Turn("b"))
-    quantities = {**ts.JointFriction.quantities, "radius": lambda value, *where: float(value)}  # noqa: RUF012
-
-    def geometry(self):
-        return (self.radius,)
-
-    @staticmethod
-    def law(x, xd, par, t, out):
-        w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
-        v = par[5] * np.sqrt(w0 * w0 + w1 * w1 + w2 * w2 + (par[3] / par[5]) ** 2)
-        n = -par[-1] * par[5] * par[5] * par[0] / v
-        out[3], out[4], out[5] = n * w0, n * w1, n * w2
-        out[9], out[10], out[11] = -n * w0, -n * w1, -n * w2
-
-    @staticmethod
-    def normal_load(x, f, par):
-        return np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
-
-    @staticmethod
-    def dissipation(x, xd, par, t):
-        w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
-        ww = w0 * w0 + w1 * w1 + w2 * w2
-        return par[-1] * par[5] * par[0] * ww / np.sqrt(ww + (par[3] / par[5]) ** 2)
-
-    @classmethod
-    def sizes(cls, rng):
-        return {"radius": rng.uniform(0.5, 1.0)}
-
-
 @pytest.mark.slow
 def test_a_plug_in():
     ts.testing.check_force(BallFriction)
@@ -97,14 +64,6 @@ def test_a_plug_in():
     np.testing.assert_allclose(ends[0].q[-1], ends[1].q[-1], atol=CLOSE)
     assert (ends[0].dissipation > 0).all()
     demand_balance(scene, ends[0], (ball, friction))
-
-
-@pytest.mark.slow
-def test_taylor_refuses_by_name_and_the_default_takes_another():
-    scene, *_ = pendulum()
-    with pytest.raises(ts.InvalidArgument, match=r"RevoluteFriction\(pin\): its magnitude depends on a reaction"):
-        ts.simulate(scene, (0.0, 1.0), integrator="taylor")
-    assert "DOP853" in ts.simulate(scene, (0.0, 0.05)).method
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 import numpy as np
 
 import tsdyn as ts
+from tsdyn.plugins import direction_series, dot, root
 
 C, F = ts.constraints, ts.forces
 G = 9.81
@@ -124,3 +125,59 @@ def rod(angle, mu, kind=F.ContactFriction):
     contact = scene.add(C.PlaneContact(body, scene.ground, point_a=(-1, 0, 0), normal_b=(0, 0, 1)))
     scene.add(kind(contact, kinetic=mu, slip_velocity=1e-4))
     return scene
+
+
+class BallFriction(ts.JointFriction, ts.Force):
+    """Friction of a ball joint in all directions: a plug-in."""
+
+    joints = (C.Spherical,)
+    markers = (ts.Point("a"), ts.Turn("a"), ts.Point("b"), ts.Turn("b"))
+    quantities = {**ts.JointFriction.quantities, "radius": lambda value, *where: float(value)}  # noqa: RUF012
+
+    def geometry(self):
+        return (self.radius,)
+
+    @staticmethod
+    def law(x, xd, par, t, out):
+        w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
+        v = par[5] * np.sqrt(w0 * w0 + w1 * w1 + w2 * w2 + (par[3] / par[5]) ** 2)
+        n = -par[-1] * par[5] * par[5] * par[0] / v
+        out[3], out[4], out[5] = n * w0, n * w1, n * w2
+        out[9], out[10], out[11] = -n * w0, -n * w1, -n * w2
+
+    @staticmethod
+    def normal_load(x, f, par):
+        return np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
+
+    @staticmethod
+    def dissipation(x, xd, par, t):
+        w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
+        ww = w0 * w0 + w1 * w1 + w2 * w2
+        return par[-1] * par[5] * par[0] * ww / np.sqrt(ww + (par[3] / par[5]) ** 2)
+
+    @classmethod
+    def sizes(cls, rng):
+        return {"radius": rng.uniform(0.5, 1.0)}
+
+
+class SmoothBall(BallFriction):
+    """The same with series."""
+
+    slots = 10
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        for i in range(3):
+            s[i, k] = xd[3 + i] - xd[9 + i]
+        n0, n1, n2 = direction_series(s, 0, 3, par[3] / par[5], k)
+        f = -par[5] * par[0]
+        out[3], out[4], out[5] = f * n0, f * n1, f * n2
+        out[9], out[10], out[11] = -f * n0, -f * n1, -f * n2
+
+    @staticmethod
+    def normal_series(x, f, par, k, s):
+        for i in range(3):
+            s[5 + i, k] = f[i]
+        s[8, k] = dot(s, 5, 5, k)
+        s[9, k] = root(s[8], s[9], k)
+        return s[9, k]

@@ -55,7 +55,6 @@ SCENES = {
     "friction": stick_slip.build,
     "loop": slider_crank.build,
 }
-SMOOTH = [name for name in SCENES if name != "friction"]
 
 
 def options(index):
@@ -71,7 +70,7 @@ def options(index):
 
 def runs():
     """Method, form, scene, options: every method with every scene, the options in turn."""
-    cases = [(m, "tangent", s) for m in METHODS for s in SCENES if s != "friction" or m != "taylor"]
+    cases = [(m, "tangent", s) for m in METHODS for s in SCENES]
     explicit = [m for m in METHODS if m not in (None, "taylor", "sdirk54", "implicittrapezoid")]
     cases += [(m, f, s) for f in FORMS[1:] for m, s in zip(itertools.cycle(explicit), SCENES, strict=False)]
     return [(*case, 3 * i + i // 16) for i, case in enumerate(cases)]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from examples import pendulum_chain, two_body_pendulum
+from examples import pendulum_chain, top, two_body_pendulum
 from tests.helpers.processes import REPORT, run
 from tests.helpers.reference import load
 from tests.helpers.tolerances import ALGEBRA, COARSE, HELD
@@ -65,6 +65,8 @@ def test_forces_that_are_absent(name):
 def test_constant_columns_of_series():
     joints = counts(pendulum_chain.build(3), METHODS["taylor"])
     assert joints["columns_skipped"] == 2 * 3 * joints["evaluations"]  # both markers of each Spherical
+    tip = counts(top.build(), METHODS["taylor"])
+    assert tip["columns_skipped"] == 3 * tip["evaluations"]  # that of the normal varies, and belongs to the ground
     scene = ts.Scene()
     one, two = scene.add_body(1.0, (0.1, 0.1, 0.1)), scene.add_body(1.0, (0.1, 0.1, 0.1), position=(0.0, 0.0, 1.0))
     scene.add(C.Distance(one, two))

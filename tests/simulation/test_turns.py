@@ -103,15 +103,24 @@ def test_an_interrupted_run_has_what_it_had(share, turned, monkeypatch):
     np.testing.assert_array_equal(cut.q, turned.q[: len(cut.t)])
 
 
-def test_the_explicit_method_goes_on_where_the_implicit_one_cannot(monkeypatch):
+def test_the_explicit_method_goes_on_where_the_implicit_one_cannot(monkeypatch, tmp_path):
     def refuse(*given):
         raise ts.InvalidConstraint("no")
 
+    def stop(fraction):
+        if fraction > 0.5:
+            raise KeyboardInterrupt
+
     monkeypatch.setattr(segments, "demand_holonomic", refuse)
+    monkeypatch.setattr(slices, "FIRST_SLICE", 3)
     solution = ts.simulate(jointed(), (0.0, 0.05), **OPTIONS).raise_if_failed()
     assert solution.method == "Taylor(rtol=1e-06, atol=1e-06)"
     assert solution.t.size == solution.stats.steps + 1
     assert solution.stats.iteration_matrices == 0
+    pytest.importorskip("h5py")
+    path = tmp_path / "run.h5"
+    ts.simulate(jointed(), (0.0, 0.05), store=path, checkpoint=0.0, progress=stop, **OPTIONS)
+    np.testing.assert_array_equal(ts.resume(path).q, solution.q)
 
 
 def held(until):

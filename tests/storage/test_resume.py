@@ -160,7 +160,7 @@ def test_runs_that_turn_to_an_implicit_method(count, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("short_slices")
-@pytest.mark.parametrize("method", ["dop853", "sdirk54"])
+@pytest.mark.parametrize("method", ["taylor", "dop853", "sdirk54"])
 def test_friction_of_joints(method, tmp_path):
     def build():
         scene = ts.Scene(gravity=(0.0, 0.0, -10.0))

@@ -219,8 +219,16 @@ def follow(t, state):
     return abs(state[0]), 0.0, 0.0
 
 
+class DoubleFriction(F.ContactFriction):
+    """Whose law is another than that of the series."""
+
+    @staticmethod
+    def normal_load(x, f, par):
+        return par[4] + 2.0 * np.sqrt(f[2] * f[2])
+
+
 def rub(a, b, name):
-    return F.ContactFriction(a.scene.add(C.PlaneContact(a, b, normal_b=(0, 0, 1))), kinetic=0.1, name=name)
+    return DoubleFriction(a.scene.add(C.PlaneContact(a, b, normal_b=(0, 0, 1))), kinetic=0.1, name=name)
 
 
 REFUSED = {
@@ -230,7 +238,10 @@ REFUSED = {
     ),
     "of state": (lambda a, b: F.PointForce(a, force=follow), r"PointForce\(body1\): its force is .* absolute value"),
     "user": (lambda a, b: F.UserForce(a, b, function=drag, name="u"), "UserForce 'u': its function .* compares values"),
-    "friction": (lambda a, b: rub(a, b, "rub"), "ContactFriction 'rub': its magnitude depends on a reaction"),
+    "friction": (
+        lambda a, b: rub(a, b, "rub"),
+        "DoubleFriction 'rub': DoubleFriction has no kernel `series` and `normal_series`",
+    ),
     "plug-in force": (
         lambda a, b: NoForceSeries(a, name="f"),
         "NoForceSeries 'f': NoForceSeries has no kernel `series`",

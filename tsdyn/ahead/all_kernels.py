@@ -29,7 +29,8 @@ def compile_kernels(everything=False):
 
 def _default():
     form = FORMULATIONS["tangent"]
-    yield from of_method(Taylor(1e-8), form, True)
+    for rough in (False, True):
+        yield from of_method(Taylor(1e-8), form, True, rough=rough)
     for kind in _built_in(primitive.registered()):
         for moving in (False, *[True] * ("phi_t" in kind.kernels)):
             yield from of_constraint(kind, moving)

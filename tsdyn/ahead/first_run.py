@@ -12,10 +12,11 @@ from ..runs.arguments import adaptive
 from ..runs.stepper import advance
 from ..taylor import step_parts
 from ..taylor.layout import FAR, no_series, pays, room
+from ..taylor.series_engine import accelerating, expanding
 from ..taylor.stepper import advance_series
 from .workers import compile_ahead
 
-_known = set()  # what this process has made sure of: methods and forms, each with or without what is between steps
+_known = set()  # what this process has made sure of: method, form, whether there is anything between steps, friction
 
 
 def prepare_first_run(scene, method, form, within, default):
@@ -24,13 +25,15 @@ def prepare_first_run(scene, method, form, within, default):
     method may be None: `default` is then (rtol, atol, whether Taylor may be chosen). within: whether anything is asked
     for between the steps.
     """
-    key = type(method), form.name, within
-    if (key in _known and scene._packed is not None) or DEBUG or not scene.bodies:
+    packed = scene._packed
+    key = type(method), form.name, within, packed is not None and packed.system.normals.size > 0
+    if (key in _known and packed is not None) or DEBUG or not scene.bodies:
         return
     method = method or _default_method(scene, *default)
+    rough = any("normal_load" in force.kernels for force in scene.forces)
     far = isinstance(method, Taylor) and len(scene.bodies) * room(method.orders()[2]) > FAR
-    compile_ahead(dict.fromkeys([*of_scene(scene, method, form, far), *of_method(method, form, within, far)]))
-    _known.add(key)
+    compile_ahead(dict.fromkeys([*of_scene(scene, method, form, far), *of_method(method, form, within, far, rough)]))
+    _known.add((*key[:3], rough))
 
 
 def of_scene(scene, method, form, far):
@@ -62,20 +65,22 @@ def of_constraint(kind, moving, series=True, far=False, implicit=False):
 def of_force(kernels, series=True, implicit=False, form=FORMULATIONS["tangent"], driven=""):
     """The loops over forces that have these kernels; driven: "driven_" for the series of those with loads of time."""
     names = ["force", "remember", "normal_load", "unit_friction", *["jacobian"] * implicit]
-    names += [driven + "series", driven + "check"] * series
+    names += [driven + "series", driven + "check", "load_slope"] * series
     found = [kernels[name] for name in names if name in kernels]
-    if "normal_load" in kernels:
+    if "normal_load" in kernels and not series:
         found.append((friction_solve if form.basis_free else friction_basis).rub)
     return found
 
 
-def of_method(method, form, within, far=False):
-    """The kernels of a start, of the method and of the form; far: of series that are too long for caches near by."""
+def of_method(method, form, within, far=False, rough=False):
+    """The kernels of a start, of the method and of the form.
+
+    far: of series that are too long for caches near by; rough: of a scene with joint friction.
+    """
     yield start_kernels.evaluate_start
     if isinstance(method, Taylor):
-        yield from (step_parts.expand_far_series if far else step_parts.expand_series, step_parts.reach)
-        yield advance_series
-        yield from (step_parts.accelerate_here, step_parts.pass_singular) if within else ()
+        yield from (expanding(rough, far), step_parts.reach, advance_series)
+        yield from (accelerating(rough), step_parts.pass_singular) if within else ()
         return
     form = form.serving(method)
     kernels = form.kernels

@@ -1,7 +1,6 @@
 """The command `tsdyn run`: a run of a scene file, its summary, results in files."""
 
 import csv
-import json
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,7 +10,8 @@ import numpy as np
 from ..errors import InvalidArgument
 from ..files import run_table
 from ..storage.formats import SUFFIXES as SOLUTIONS
-from .scene_file import load_run
+from .output import print_json
+from .scene_file import load_document
 
 TABLES = (".csv",)
 
@@ -62,18 +62,22 @@ def _run(parsed):
     """
     from ..simulation.simulate import simulate
 
-    _demand_writable(parsed)
-    scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
-    span, options = options_of(parsed, given)
+    demand_writable(parsed.output, parsed.plot)
+    document = load_document(parsed.scene, parsed.allow_code, free_base=parsed.free_base)
+    scene, (span, options) = document.scene, options_of(parsed, document.run)
+    outputs, plot = parsed.output or document.output["files"], parsed.plot
+    if plot is None:
+        plot = document.output["plot"]
+    demand_writable(outputs, plot)
     if not parsed.json:
         print(f"{parsed.scene}: {scene!r}", flush=True)
     show = sys.stderr.isatty() and not parsed.json and find_spec("tqdm") is not None
     solution = simulate(scene, span, progress=show or None, **options)
-    written = [str(write(solution, path)) for path in parsed.output]
-    if parsed.plot is not None:
-        written.append(str(_draw(solution, parsed.plot or Path(parsed.scene).with_suffix(".png").name)))
+    written = [str(write(solution, path)) for path in outputs]
+    if plot is not None:
+        written.append(str(_draw(solution, plot or Path(parsed.scene).with_suffix(".png").name)))
     if parsed.json:
-        print(json.dumps({**summary(solution), "written": written}, indent=1))
+        print_json({**summary(solution), "written": written})
     else:
         print("\n".join([str(solution), *_lines(solution), *(f"  written   {path}" for path in written)]))
     if not solution.success:
@@ -98,14 +102,14 @@ def options_of(parsed, given):
     return (start, end), given
 
 
-def _demand_writable(parsed):
+def demand_writable(outputs, plot):
     """Refuse at once, not after the run, what can't be written at its end."""
-    for path in (*parsed.output, *([parsed.plot] if parsed.plot else [])):
+    for path in (*outputs, *([plot] if plot else [])):
         if not Path(path).resolve().parent.is_dir():
             raise InvalidArgument(f"there is no folder {Path(path).resolve().parent} to write {Path(path).name} to.")
-    for path in parsed.output:
+    for path in outputs:
         demand_format(path)
-    if parsed.plot is not None:
+    if plot is not None:
         from ..drawing import demand_matplotlib
 
         demand_matplotlib()

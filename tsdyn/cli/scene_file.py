@@ -26,6 +26,18 @@ def load_run(where, allow_code=False, free_base=False):
     return load_scene(where), {}
 
 
+def load_document(where, allow_code=False, study=None, free_base=False):
+    """What a file holds, as `scene_text.Document`; `study`: keys of its table ensemble that others replace."""
+    from ..files.scene_text import Document
+
+    if Path(where).suffix.lower() == ".toml" and not free_base:
+        from ..simulation.load import document_of
+
+        return document_of(where, allow_code, study)
+    scene, given = load_run(where, allow_code, free_base)
+    return Document(scene, given, {}, {"files": [], "plot": None})
+
+
 def load_scene(where, allow_code=False, free_base=False):
     """The scene of a TOML, URDF, MJCF or SDF file; or, of a Python file, that of its `build()`, or its `scene`.
 

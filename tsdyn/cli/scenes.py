@@ -1,9 +1,10 @@
 """The commands on scene files: check, info, new, convert."""
 
-import json
+import textwrap
 from pathlib import Path
 
 from ..errors import InvalidArgument, TsdynError
+from .output import print_json
 from .run import SOLUTIONS, add_json, add_scene, demand_format, write
 from .scene_file import load_run, load_scene
 
@@ -19,18 +20,21 @@ def add_check_options(parser):
 def add_info_options(parser):
     """Add the options of `tsdyn info`."""
     add_scene(parser, "FILE")
+    parser.add_argument("--parameters", action="store_true", help="what may vary from run to run, too, with units")
     add_json(parser)
 
 
 def add_new_options(parser):
     """Add the options of `tsdyn new`."""
     parser.add_argument("path", nargs="?", default="scene.toml", metavar="PATH", help="default scene.toml")
+    add_json(parser)
 
 
 def add_convert_options(parser):
     """Add the options of `tsdyn convert`."""
     add_scene(parser, "FROM")
     parser.add_argument("target", metavar="TO", help="where to write; the suffix is the format")
+    add_json(parser)
 
 
 def _check(parsed):
@@ -55,7 +59,7 @@ def _check(parsed):
                  for line, column, said in getattr(error, "mistakes", ())]  # fmt: skip
         found |= {"ok": False, "mistakes": lines, "message": str(error)}
     if parsed.json:
-        print(json.dumps(found, indent=1))
+        print_json(found)
     else:
         print(f"{parsed.scene}: {scene!r}\nIt can start: positions and velocities satisfy the constraints.")
         if report:
@@ -73,13 +77,15 @@ def _info(parsed):
     scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
     mobility, why = scene.mobility(), reason(prepared(scene))
     if parsed.json:
-        print(json.dumps(_facts(scene, mobility, why, given), indent=1))
+        print_json(_facts(scene, mobility, why, given))
         return 0
     print(f"{parsed.scene}: {scene!r}")
     _print_table("bodies", [(body.name, type(body).__name__, f"{body.mass:g} kg") for body in scene.bodies])
     items = [(item.name, type(item).__name__, f"{item.rows} rows") for item in scene._added]
     _print_table("constraints", items)
     _print_table("forces", [(force.name, force._kind(), "") for force in scene.forces])
+    if parsed.parameters:
+        print(f"parameters:\n{textwrap.indent(str(scene.parameters()), '  ')}")
     print(mobility)
     print(f"Method: {why}")
     if given:
@@ -98,6 +104,8 @@ def _print_table(title, rows):
 
 def _facts(scene, mobility, why, given):
     """What `info` tells of a scene, for JSON."""
+    parameters = scene.parameters()
+    units = parameters.units
     return {
         "bodies": [{"name": body.name, "type": type(body).__name__, "mass": float(body.mass)} for body in scene.bodies],
         "constraints": [{"name": it.name, "type": type(it).__name__, "rows": it.rows} for it in scene._added],
@@ -108,19 +116,28 @@ def _facts(scene, mobility, why, given):
         "degrees_of_freedom": mobility.degrees_of_freedom,
         "redundant_rows": [row.name for row in mobility.redundant],
         "singular": bool(mobility.singular),
+        "parameters": {name: {"value": value, "unit": units[name]} for name, value in parameters.items()},
         "method": why,
         "run": {name: str(value) for name, value in given.items() if name != "t_eval"},
     }
 
 
 def _solution_info(parsed):
-    """Print the facts of a solution in a file."""
+    """Print the facts of a solution or ensemble in a file."""
+    from ..ensembles.results import Ensemble
     from ..simulation.load import load
+    from .ensemble import facts, table_lines
     from .run import summary
 
     solution = load(parsed.scene)
+    if isinstance(solution, Ensemble):
+        if parsed.json:
+            print_json(facts(solution))
+        else:
+            print("\n".join([repr(solution), *table_lines(solution)]))
+        return 0
     if parsed.json:
-        print(json.dumps(summary(solution), indent=1))
+        print_json(summary(solution))
         return 0
     print(f"{solution}\nProvenance")
     for name, value in solution.provenance.items():
@@ -142,7 +159,10 @@ def _new(parsed):
         raise InvalidArgument(f"{path} exists; choose another name: tsdyn new other.toml.") from None
     except OSError as error:
         raise InvalidArgument(f"{path} can't be written: {error.strerror}.") from error
-    print(f"{path} is written. Run it: tsdyn run {path}")
+    if parsed.json:
+        print_json({"written": path})
+    else:
+        print(f"{path} is written. Run it: tsdyn run {path}")
     return 0
 
 
@@ -150,20 +170,26 @@ def _convert(parsed):
     """Write a scene, or a solution, in another format.
 
     A scene (.toml, URDF, MJCF, SDF, or a Python file) becomes .toml, without comments, expressions of parameters, and
-    shapes; a solution (.h5, .nc, .zarr) becomes another of these, or .csv.
+    shapes; a solution or ensemble (.h5, .nc, .zarr) becomes another of these, or .csv.
     """
     source, target = Path(parsed.scene).suffix.lower(), Path(parsed.target).suffix.lower()
     if source in SOLUTIONS:
+        from ..ensembles.results import Ensemble
         from ..simulation.load import load
+        from .ensemble import write as write_ensemble
 
         demand_format(parsed.target)
-        written = write(load(parsed.scene), parsed.target)
+        found = load(parsed.scene)
+        written = (write_ensemble if isinstance(found, Ensemble) else write)(found, parsed.target)
     elif target in SCENES:
         scene = load_scene(parsed.scene, parsed.allow_code, parsed.free_base)
         written = scene.save(parsed.target)
-        if scene.imported:
+        if scene.imported and not parsed.json:
             print(scene.imported)
     else:
         raise InvalidArgument(f"a scene is written to .toml, got {parsed.target!r}; tsdyn run --output runs it.")
-    print(f"{written} is written.")
+    if parsed.json:
+        print_json({"written": written})
+    else:
+        print(f"{written} is written.")
     return 0

@@ -3,7 +3,9 @@
 import sys
 from pathlib import Path
 
-from .run import SOLUTIONS, add_method, add_scene, options_of
+from ..errors import InvalidArgument
+from .output import print_json
+from .run import SOLUTIONS, add_json, add_method, add_scene, options_of
 from .scene_file import load_run
 
 
@@ -12,6 +14,7 @@ def add_view_options(parser):
     add_scene(parser)
     add_method(parser)
     parser.add_argument("--output", metavar="PATH", help="where to write the page (default: the browser opens it)")
+    add_json(parser)
 
 
 def _view(parsed):
@@ -22,7 +25,10 @@ def _view(parsed):
     """
     solution = _solution(parsed)
     path = solution.view(parsed.output)
-    print(f"Animation: {path}")
+    if parsed.json:
+        print_json({"success": solution.success, "message": solution.message, "written": path})
+    else:
+        print(f"Animation: {path}")
     if not solution.success:
         print(f"tsdyn: {solution.message}", file=sys.stderr)
     return 0 if solution.success else 1
@@ -32,7 +38,12 @@ def _solution(parsed):
     if Path(parsed.scene).suffix.lower() in SOLUTIONS:
         from ..simulation.load import load
 
-        return load(parsed.scene)
+        found = load(parsed.scene)
+        if not hasattr(found, "view"):
+            raise InvalidArgument(
+                f"{parsed.scene} is an ensemble; show a case: ts.load({parsed.scene!r}).case(0).view()"
+            )
+        return found
     from ..simulation.simulate import simulate
 
     scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)

@@ -9,6 +9,7 @@ A force works on marker coordinates x and their rates xd (ground frame) and neve
     series(x, xd, par, k, s, out)  optional; out[len(x)]  coefficient k of the law's Taylor series, see recurrences.py
     driven_series                  optional; the same with the series of par in the rows of s from `slots` on
     normal_load(x, f, par)         optional, of friction: what par[-1] is, from a reaction f, see joint_friction.py
+    normal_series(x, f, par, k, s) optional, of friction: coefficient k of that; series is for par[-1] = 1 then
 
 x is the concatenation of the force's markers, par the floats that `parameters()` returns, functions of time among them
 evaluated at t. A Point is conjugate to a force, a Turn to a torque, both in the ground frame. Work that belongs to
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
 _registry = {}
 _KERNELS = {"law": 5}  # and their numbers of arguments
 _OPTIONAL = {"potential": 3, "dissipation": 4, "remember": 4, "normal_load": 3}
-_SERIES = {"series": 6, "driven_series": 6, "inputs": 6}
+_SERIES = {"series": 6, "driven_series": 6, "inputs": 6, "normal_series": 5}
 
 
 class Force(Attachment):
@@ -124,7 +125,7 @@ class Force(Attachment):
         check_slots(cls, where, InvalidForce)
         functions = {}
         for name, arguments in {**_KERNELS, **_OPTIONAL, **_SERIES}.items():
-            if name not in _KERNELS and getattr(cls, name, None) is None:
+            if name not in _KERNELS and (getattr(cls, name, None) is None or _is_superseded(cls, name)):
                 continue
             functions[name] = static_kernel(cls, name, arguments, where, InvalidForce)
         try:
@@ -157,6 +158,13 @@ class Force(Attachment):
         """Return a random valid instance between two bodies, for tests."""
         places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code not in (PARAMETERS, TURN)}
         return cls(a, b, **places) if any(m.body == "b" for m in cls.markers) else cls(a, **places)
+
+
+def _is_superseded(cls, name):
+    """Whether a kernel is the series of a law that a subclass has written anew."""
+    by_class = [name in vars(each) for each in cls.__mro__]
+    laws = [{"law", "normal_load"} & vars(each).keys() for each in cls.__mro__]
+    return name in _SERIES and any(laws[: by_class.index(True)])
 
 
 def load(value, what, error):
@@ -196,15 +204,26 @@ def callbacks(cls, functions, owner=None):
         home = getattr(functions["remember"], "py_func", functions["remember"])
         names["kernel_remember"] = inlined(functions["remember"])
         result["remember"] = Callback(specialised(loops.remembers, f"{label}.remember_loop", home, **names), SIGNATURE)
-    if owner is None:
-        result |= _series_callbacks(cls, label, names, functions)
     if "normal_load" in functions:
-        home = getattr(functions["normal_load"], "py_func", functions["normal_load"])
-        names["kernel_normal_load"] = inlined(functions["normal_load"])
-        for name in ("unit_friction", "normal_load"):
-            copy = specialised(getattr(friction, name), f"{label}.{name}_loop", home, **names)
-            result[name] = Callback(copy, getattr(friction, name.upper()))
+        result |= _friction_callbacks(cls, label, names, functions)
+    if owner is None and ("normal_series" in functions or "normal_load" not in functions):
+        result |= _series_callbacks(cls, label, names, functions)
     return MappingProxyType(result)
+
+
+def _friction_callbacks(cls, label, names, functions):
+    """The loops of friction in proportion to a normal load; its kernels are added to `names`."""
+    result, loops = {}, ["unit_friction", "normal_load"]
+    names["kernel_normal_load"] = inlined(functions["normal_load"])
+    if "normal_series" in functions:
+        names |= {"kernel_normal_series": inlined(functions["normal_series"]), "SLOTS": cls.slots}
+        loops.append("load_slope")
+    for name in loops:
+        function = functions["normal_series" if name == "load_slope" else "normal_load"]
+        home = getattr(function, "py_func", function)
+        copy = specialised(getattr(friction, name), f"{label}.{name}_loop", home, **names)
+        result[name] = Callback(copy, getattr(friction, name.upper()))
+    return result
 
 
 def _series_callbacks(cls, label, names, functions):
@@ -218,7 +237,7 @@ def _series_callbacks(cls, label, names, functions):
             continue
         function, sharp = functions[before + "series"], cls.sharp or driven
         own = {**names, "kernel_series": inlined(function), "SLOTS": cls.slots, "SHARP": sharp}
-        own |= {"DRIVEN": driven, "TRACED": traced}
+        own |= {"DRIVEN": driven, "TRACED": traced, "RUBS": "normal_series" in functions}
         home = getattr(function, "py_func", function)
         copy = specialised(force_series.series, f"{label}.{before}series_loop", home, **own)
         result[before + "series"] = Callback(copy, constraint_series.SIGNATURE)

@@ -4,6 +4,9 @@
     par[-1]         = normal_load(x, f, par), f (6,) the force and torque that the constraint exerts
 
 The normal load depends on the multipliers and they on the friction: both are solved for together (friction_solve.py).
+Taylor series take two more kernels: `series`, of `law` for par[-1] = 1, and normal_series(x, f, par, k, s), which
+returns coefficient k of the normal load from coefficients k of x and f. It may be called twice for an order, each time
+with all lower orders known; what it leaves out as negligible, it does so by order zero (normal_series.py).
 """
 
 from __future__ import annotations
@@ -80,7 +83,7 @@ class JointFriction:
     joints: tuple[type, ...] = ()
     markers: tuple[Marker, ...] = ()
     particles = True
-    no_series = "its magnitude depends on a reaction, and its direction reverses too sharply for a series"
+    sharp = True  # at rest, and where a part of the normal load passes zero
     quantities: Mapping[str, Callable[..., Any]] = MappingProxyType(
         {
             "kinetic": not_negative,

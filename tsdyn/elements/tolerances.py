@@ -34,3 +34,7 @@ FORCE_QUOTIENT = 7e-4
 # tolerance of a step; least of it, m/s or rad/s, below which terms that cancel within a law count. Rounding of a law,
 # relative to the terms of its series.
 OFF, LAW_TOLERANCE, LAW_NOISE = 1000.0, 1e-12, 1e-13
+
+# Part of a normal load, relative to the whole: below it a part is rounding of the reactions, in a mechanism in a plane
+# for instance, and so are all its coefficients.
+NEGLIGIBLE_LOAD = 1e-13

@@ -13,7 +13,19 @@ from .start_table import carry_out_start
 from .values import decode_array, decode_number
 
 SHAPED = ("mass", "inertia")  # what a shape gives
-KEYS = ("version", "title", "gravity", "parameters", "body", "constraint", "force", "start", "run")
+KEYS = (
+    "version",
+    "title",
+    "gravity",
+    "parameters",
+    "body",
+    "constraint",
+    "force",
+    "start",
+    "run",
+    "ensemble",
+    "output",
+)
 
 
 def build(document, make, mistakes, allow_code=False):

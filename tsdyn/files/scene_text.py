@@ -1,12 +1,13 @@
 """A scene as TOML text, and the text as a scene."""
 
 import tomllib
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..elements.force import Force
 from ..errors import InvalidArgument, InvalidFile
-from . import run_table, toml_text
+from . import run_table, study_tables, toml_text
 from .build import build
 from .describe import describe
 from .mistakes import Mistakes
@@ -34,8 +35,22 @@ def write(scene, make):
     return text
 
 
+class Document(NamedTuple):
+    """What a scene file holds."""
+
+    scene: Any
+    run: dict  # arguments of `simulate`
+    ensemble: dict  # arguments of `ts.ensemble`
+    output: dict  # files, and where to draw
+
+
 def read(text, name, make, simulate, allow_code=False):
-    """The scene of a text, and the arguments of `simulate` that its table `run` asks for; `name` is that of the file.
+    """The scene of a text, and the arguments of `simulate` that its table `run` asks for; as of `read_all`."""
+    return read_all(text, name, make, simulate, allow_code)[:2]
+
+
+def read_all(text, name, make, simulate, allow_code=False, study=None):
+    """The `Document` of a text; `name` is that of the file, `study` has other values of keys of the table ensemble.
 
     Raises
     ------
@@ -45,8 +60,15 @@ def read(text, name, make, simulate, allow_code=False):
     document, mistakes = parsed(text, name)
     scene, names = build(document, make, mistakes, allow_code)
     given = run_table.options(document["run"], simulate, mistakes, names) if "run" in document else {}
+    cases = {}
+    if "ensemble" in document:
+        table = document["ensemble"]
+        if isinstance(table, dict):
+            table = table | {key: value for key, value in (study or {}).items() if value is not None}
+        cases = study_tables.ensemble(table, scene, mistakes, names)
+    output = study_tables.output(document.get("output", {}), mistakes)
     mistakes.demand_none()
-    return scene, given
+    return Document(scene, given, cases, output)
 
 
 def parsed(text, name):

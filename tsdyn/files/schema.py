@@ -3,7 +3,7 @@
 import inspect
 import json
 
-from . import run_table, types
+from . import run_table, study_tables, types
 from .build import KEYS
 from .describe import BUILT, VERSION
 
@@ -65,6 +65,8 @@ def schema(scene, simulate):
         "force": _items(types.forces()),
         "start": _start(scene),
         "run": {"type": "object", "additionalProperties": False, "properties": {**own, **run}},
+        "ensemble": _ensemble(),
+        "output": _closed({"files": {"type": "array", "items": {"type": "string"}}, "plot": {"type": "string"}}),
     }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -75,6 +77,22 @@ def schema(scene, simulate):
         "properties": {key: properties[key] for key in KEYS},
         "$defs": DEFINITIONS,
     }
+
+
+def _closed(properties):
+    return {"type": "object", "additionalProperties": False, "properties": properties}
+
+
+def _ensemble():
+    pair = {"type": "array", "items": {"$ref": "#/$defs/array"}, "minItems": 2}
+    spread = {kind: {**pair, "maxItems": most} for kind, most in study_tables.SPREADS.items()}
+    value = {"anyOf": [{"$ref": "#/$defs/array"}, {**_closed(spread), "minProperties": 1, "maxProperties": 1}]}
+    whole = {key: {"type": "integer", "minimum": least} for key, least in study_tables.LEAST.items()}
+    names = {"type": "array", "items": {"type": "string"}}
+    others = {"grid": {"type": "boolean"}, "keep": {"enum": list(study_tables.KEEPS)}}
+    others |= {"assemble": {"anyOf": [{"type": "boolean"}, names]}}
+    parameters = {"type": "object", "additionalProperties": value, "minProperties": 1}
+    return {**_closed({"parameters": parameters, **whole, **others}), "required": ["parameters"]}
 
 
 def _property(argument):

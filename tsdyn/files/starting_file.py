@@ -58,4 +58,16 @@ end = 10.0
 every = 0.01 # outputs; without it one a step
 # method = "dop853"
 # rtol = 1e-9
+
+# Results of `tsdyn run` and `tsdyn ensemble`, below the working folder.
+# [output]
+# files = ["arm.h5", "arm.csv"]
+# plot = "arm.png"
+
+# Many runs, by `tsdyn ensemble`: what differs from case to case. `tsdyn info --parameters` lists them.
+# [ensemble]
+# cases = 100
+# [ensemble.parameters]
+# "arm.mass" = { normal = [2.0, 0.05] }
+# "spring.stiffness" = { uniform = [15, 25] }
 """

@@ -11,7 +11,22 @@ F is the force that the contact exerts; mu is given by friction_laws.coefficient
 import numpy as np
 
 from ..constraints.plane_contact import PlaneContact
-from ..plugins import Force, JointFriction, Point, Turn, Vector, act, coefficient, slip
+from ..plugins import (
+    Force,
+    JointFriction,
+    Point,
+    Turn,
+    Vector,
+    act,
+    act_series,
+    coefficient,
+    coefficient_series,
+    dot,
+    magnitude,
+    scaled,
+    slip,
+    slip_series,
+)
 
 
 class ContactFriction(JointFriction, Force):
@@ -39,6 +54,7 @@ class ContactFriction(JointFriction, Force):
 
     joints = (PlaneContact,)
     markers = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("b", "normal_b"))
+    slots = 30
 
     @staticmethod
     def law(x, xd, par, t, out):
@@ -54,6 +70,29 @@ class ContactFriction(JointFriction, Force):
         """Eq. (1)."""
         along = x[12] * f[0] + x[13] * f[1] + x[14] * f[2]
         return par[4] + np.sqrt(along * along)
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eq. (2) for a load of one; rows of x_a - x_b, omega_b, slip, n, n.v, v, v^2, five, -mu / v, F."""
+        slip_series(x, xd, k, s)
+        for i in range(3):
+            s[9 + i, k] = x[12 + i]
+        s[12, k] = dot(s, 9, 6, k)
+        off = scaled(s, 9, 12, k)
+        for i in range(3):
+            s[13 + i, k] = s[6 + i, k] - off[i]
+        s[16, k] = dot(s, 13, 13, k)
+        s[22, k] = -coefficient_series(s, 16, 17, par, k)
+        s[23, k], s[24, k], s[25, k] = scaled(s, 13, 22, k)
+        act_series(s, 23, k, out)
+
+    @staticmethod
+    def normal_series(x, f, par, k, s):
+        """Of Eq. (1)."""
+        for i in range(3):
+            s[9 + i, k], s[26 + i, k] = x[12 + i], f[i]
+        s[29, k] = dot(s, 9, 26, k)
+        return magnitude(s, 29, k, abs(s[29, 0]) > 0.0) + (par[4] if k == 0 else 0.0)
 
     @staticmethod
     def dissipation(x, xd, par, t):

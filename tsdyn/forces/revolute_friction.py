@@ -17,7 +17,23 @@ from typing import Any
 import numpy as np
 
 from ..constraints.revolute import Revolute
-from ..plugins import AXIS, Force, JointFriction, along_and_across, coefficient, not_negative, optional, positive
+from ..plugins import (
+    AXIS,
+    BEARING_ROWS,
+    Force,
+    JointFriction,
+    along_and_across,
+    bearing_series,
+    coefficient,
+    coefficient_series,
+    dot,
+    not_negative,
+    optional,
+    positive,
+    product,
+    scaled,
+    square,
+)
 
 
 class RevoluteFriction(JointFriction, Force):
@@ -49,6 +65,7 @@ class RevoluteFriction(JointFriction, Force):
 
     joints = (Revolute,)
     markers = AXIS
+    slots = 15 + BEARING_ROWS
     quantities = MappingProxyType(
         {
             **JointFriction.quantities,
@@ -88,6 +105,26 @@ class RevoluteFriction(JointFriction, Force):
         """Eq. (1)."""
         along, _, across, tilt = along_and_across(x, f)
         return par[4] + across + par[6] * np.sqrt(along * along) + par[7] * tilt
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eq. (2) for a load of one; rows of n, omega_a - omega_b, v, v^2, five, mu / v, -R mu."""
+        for i in range(3):
+            s[i, k], s[3 + i, k] = x[12 + i], xd[3 + i] - xd[9 + i]
+        s[6, k] = par[5] * dot(s, 0, 3, k)
+        s[7, k] = square(s[6], k)
+        s[13, k] = coefficient_series(s, 7, 8, par, k)
+        s[14, k] = -par[5] * product(s[13], s[6], k)
+        n0, n1, n2 = scaled(s, 0, 14, k)
+        out[3], out[4], out[5] = n0, n1, n2
+        out[9], out[10], out[11] = -n0, -n1, -n2
+
+    @staticmethod
+    def normal_series(x, f, par, k, s):
+        """Of Eq. (1)."""
+        for i in range(3):
+            s[i, k] = x[12 + i]
+        return bearing_series(f, k, s, 0, 15, par[4], False, par[6], par[7])
 
     @staticmethod
     def dissipation(x, xd, par, t):

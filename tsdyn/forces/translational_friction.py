@@ -18,7 +18,26 @@ from typing import Any
 import numpy as np
 
 from ..constraints.translational import Translational
-from ..plugins import AXIS, Force, JointFriction, act, along_and_across, coefficient, optional, positive, slip
+from ..plugins import (
+    AXIS,
+    BEARING_ROWS,
+    Force,
+    JointFriction,
+    act,
+    act_series,
+    along_and_across,
+    bearing_series,
+    coefficient,
+    coefficient_series,
+    dot,
+    optional,
+    positive,
+    product,
+    scaled,
+    slip,
+    slip_series,
+    square,
+)
 
 
 class TranslationalFriction(JointFriction, Force):
@@ -47,6 +66,7 @@ class TranslationalFriction(JointFriction, Force):
 
     joints = (Translational,)
     markers = AXIS
+    slots = 24 + BEARING_ROWS
     quantities = MappingProxyType(
         {**JointFriction.quantities, "length": optional(positive), "width": optional(positive)}
     )
@@ -79,6 +99,26 @@ class TranslationalFriction(JointFriction, Force):
         """Eq. (1)."""
         _, turn, across, tilt = along_and_across(x, f)
         return par[4] + across + par[5] * np.sqrt(turn * turn) + par[6] * tilt
+
+    @staticmethod
+    def series(x, xd, par, k, s, out):
+        """Of Eq. (2) for a load of one; rows of x_a - x_b, omega_b, slip, n, v, v^2, five, mu / v, -mu, F."""
+        slip_series(x, xd, k, s)
+        for i in range(3):
+            s[9 + i, k] = x[12 + i]
+        s[12, k] = dot(s, 9, 6, k)
+        s[13, k] = square(s[12], k)
+        s[19, k] = coefficient_series(s, 13, 14, par, k)
+        s[20, k] = -product(s[19], s[12], k)
+        s[21, k], s[22, k], s[23, k] = scaled(s, 9, 20, k)
+        act_series(s, 21, k, out)
+
+    @staticmethod
+    def normal_series(x, f, par, k, s):
+        """Of Eq. (1)."""
+        for i in range(3):
+            s[9 + i, k] = x[12 + i]
+        return bearing_series(f, k, s, 9, 24, par[4], True, par[5], par[6])
 
     @staticmethod
     def dissipation(x, xd, par, t):

@@ -7,7 +7,7 @@ in terms of (r'', omega''): Q_A + Q_v is the force and the body torque less omeg
 
 from ..elements.loops.body_poses import OMEGA, POSE, P, add_torque, write_accelerations
 from ..jit.kernels import kernel
-from ..jit.simd import cross, fma, four, put, splat, sub, times
+from ..jit.simd import cross, fma, four, get, lanes, let, put, splat, sub, times
 from ..model.equations import applied_forces
 from ..rows.interface import constrain_accelerations, evaluate_bias, note_loads, weigh_bodies
 
@@ -21,19 +21,19 @@ def body_forces(graph, system, w, f, t):
             f.Q[i] = 0.0
         applied_forces(system, w.q, w.qd, t, f.Q)
     for b in range(graph.bodies.shape[0]):
-        z, at, m = 8 * b, b * POSE, graph.mass[16 * b]
+        z, at, m = 8 * b, b * POSE, get(graph.mass, 16 * b)
         i = graph.bodies[b, 0]
-        for c in range(3):
-            f.Z[z + c] = m * system.gravity[c]
-            if has_forces:
-                f.Z[z + c] += f.Q[i + c]
+        put(f.Z, z, lanes(m * system.gravity[0], m * system.gravity[1], m * system.gravity[2]))
+        if has_forces:
+            for c in range(3):
+                let(f.Z, z + c, get(f.Z, z + c) + get(f.Q, i + c))
         torque = splat(0.0)
         if graph.bodies[b, 1] == 7:
             if graph.spins[b] != 0:
                 o = 16 * b + 4
-                spin = times(four(graph.mass, o), splat(f.poses[at + OMEGA]))
-                spin = fma(four(graph.mass, o + 4), splat(f.poses[at + OMEGA + 1]), spin)
-                spin = fma(four(graph.mass, o + 8), splat(f.poses[at + OMEGA + 2]), spin)
+                spin = times(four(graph.mass, o), splat(get(f.poses, at + OMEGA)))
+                spin = fma(four(graph.mass, o + 4), splat(get(f.poses, at + OMEGA + 1)), spin)
+                spin = fma(four(graph.mass, o + 8), splat(get(f.poses, at + OMEGA + 2)), spin)
                 torque = sub(torque, cross(four(f.poses, at + OMEGA), spin))
             put(f.Z, z + 4, torque)
             if has_forces:

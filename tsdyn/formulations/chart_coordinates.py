@@ -9,7 +9,7 @@ import math
 
 from ..elements.loops.body_poses import OMEGA, POSE, RD, R, orient
 from ..jit.kernels import kernel
-from ..jit.simd import add, cross, first, fma, four, lanes, put, second, splat, third, times, total
+from ..jit.simd import add, cross, first, fma, four, get, lanes, larger, let, put, second, splat, third, times, total
 from ..rows.interface import factorise_chart_matrix, rotate_rate
 from .tolerances import FARTHEST
 
@@ -21,7 +21,7 @@ def displace(graph, l, poses):
         at, o = b * POSE, 8 * b
         put(poses, at + R, fma(four(l.x, o), splat(1.0), four(l.base, o)))
         if graph.bodies[b, 1] == 7:
-            x, y, z = 0.5 * l.x[o + 4], 0.5 * l.x[o + 5], 0.5 * l.x[o + 6]
+            x, y, z = 0.5 * get(l.x, o + 4), 0.5 * get(l.x, o + 5), 0.5 * get(l.x, o + 6)
             square = x * x + y * y + z * z
             if not square < FARTHEST:
                 return False
@@ -29,9 +29,9 @@ def displace(graph, l, poses):
                 1.0 + math.sqrt(1.0 - square)
             )  # d0 - 1, not d0: its rounding would be the same in every step
             put(l.d, 4 * b, lanes(x, y, z))
-            l.d[4 * b + 3] = w
+            let(l.d, 4 * b + 3, w)
             # p = p0 o (d0, d)
-            e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
+            e0, e1, e2, e3 = get(l.base, o + 4), get(l.base, o + 5), get(l.base, o + 6), get(l.base, o + 7)
             p0 = e0 + (w * e0 - e1 * x - e2 * y - e3 * z)
             p1 = e1 + (w * e1 + e0 * x - e3 * y + e2 * z)
             p2 = e2 + (w * e2 + e3 * x + e0 * y - e1 * z)
@@ -65,7 +65,7 @@ def write_back(graph, l, poses, Z, out):
         o, at = 8 * b, b * POSE
         put(out, o, four(Z, o))
         if graph.bodies[b, 1] == 7:
-            x, y, z, w = l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2], l.d[4 * b + 3]
+            x, y, z, w = get(l.d, 4 * b), get(l.d, 4 * b + 1), get(l.d, 4 * b + 2), get(l.d, 4 * b + 3)
             d, omega, change = lanes(x, y, z), four(poses, at + OMEGA), four(Z, o + 4)
             square = -0.5 * total(times(omega, omega))
             put(out, o + 4, add(change, fma(d, splat(square), fma(change, splat(w), cross(d, change)))))
@@ -94,12 +94,10 @@ def to_bodies(graph, l, x, Z):
 @kernel
 def largest_rates(graph, poses):
     """Return the largest entries of |rd| and |omega'|."""
-    r, w = 0.0, 0.0
+    r, w = splat(0.0), splat(0.0)
     for b in range(graph.bodies.shape[0]):
-        f, g = four(poses, b * POSE + RD), four(poses, b * POSE + OMEGA)
-        r = max(r, max(abs(first(f)), max(abs(second(f)), abs(third(f)))))
-        w = max(w, max(abs(first(g)), max(abs(second(g)), abs(third(g)))))
-    return r, w
+        r, w = larger(four(poses, b * POSE + RD), r), larger(four(poses, b * POSE + OMEGA), w)
+    return max(first(r), max(second(r), third(r))), max(first(w), max(second(w), third(w)))
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Joint friction, shared by all forms: forces for unit normal load, normal loads, convergence of the loads."""
 
 from ..elements.loops.forces import INTS
-from ..elements.loops.friction import call_normal_load, call_unit_friction
+from ..elements.loops.friction import call_load_slope, call_normal_load, call_unit_friction
 from ..jit.kernels import caller, kernel
 from .tolerances import DAMPED, DAMPED_SHARE
 
@@ -38,6 +38,13 @@ def normal_load(system, friction, q, qd, t, derive, reaction, out):
         friction.normal, stride, system.table[own:], system.reals[real:], q, qd, t, friction.on, derive,
         reaction, out,
     )  # fmt: skip
+
+
+@kernel
+def load_slope(system, slope, friction, q, qd, t, reaction, out):
+    """out (13,) = the same by the series of the load, whose kernel is at `slope`; then the reaction about the point."""
+    stride, own, real = _instance(system, friction)
+    call_load_slope(slope, stride, system.table[own:], system.reals[real:], q, qd, t, friction.on, reaction, out)
 
 
 @kernel

@@ -59,19 +59,25 @@ def _weigh_units(graph, system, f, q, qd, t):
 
 
 @kernel
+def body_reaction(graph, f, friction, lam, out):
+    """out (6,) = what the joint of a friction exerts: force, ground frame; torque about the centroid, body frame."""
+    for c in range(6):
+        out[c] = 0.0
+    for j in range(friction.first, friction.first + friction.count):
+        e, side = graph.friction_rows[j]
+        at = 16 * e + 8 * side
+        for c in range(3):
+            out[c] -= f.rows.H[at + c] * lam[e]
+            out[3 + c] -= f.rows.H[at + 4 + c] * lam[e]
+
+
+@kernel
 def _find_loads(graph, system, f, q, qd, t, derive):
     """Normal loads and, with derive = 1, their derivatives at the multipliers r.lam."""
     r, reaction = f.friction, stack(6)
     for i in range(graph.frictions.shape[0]):
         friction = graph.frictions[i]
-        for c in range(6):
-            reaction[c] = 0.0
-        for j in range(friction.first, friction.first + friction.count):
-            e, side = graph.friction_rows[j]
-            at = 16 * e + 8 * side
-            for c in range(3):
-                reaction[c] -= f.rows.H[at + c] * r.lam[e]
-                reaction[3 + c] -= f.rows.H[at + 4 + c] * r.lam[e]
+        body_reaction(graph, f, friction, r.lam, reaction)
         normal_load(system, friction, q, qd, t, derive, reaction, r.load[7 * i :])
 
 
@@ -90,7 +96,7 @@ def _rub_bodies(graph, f):
 
 
 @kernel
-def _factorise(graph, f, cold):
+def factorise_loads(graph, f, cold):
     """Factorise N~, or S if `cold`; False if the matrix is singular."""
     r, change = f.friction, stack(8)
     copy(f.rows.Y, r.X)
@@ -136,7 +142,7 @@ def find_reactions(graph, system, f, q, qd, t):
             return True
         acceleration_residuals(graph, f.rows, f.gamma, f.Z, f.b)
         add_axis_multipliers(graph, r.lam, f.b)
-        if anew and not _factorise(graph, f, size == 0.0):
+        if anew and not factorise_loads(graph, f, size == 0.0):
             return False
         solve_product(graph, r.lower, r.upper, f.b)
         change, share = largest(f.b), step_share(sweep)
@@ -151,17 +157,23 @@ def find_reactions(graph, system, f, q, qd, t):
     return False
 
 
-@callback(RUB)
-def rub(context, t, unused):
-    """Solve for accelerations as accelerations.solve_accelerations, with joint friction. Status."""
-    c = load(context)
-    system, w, f, graph = c.system, c.work, c.tangent, c.graph
+@kernel
+def accelerate_with_friction(graph, system, w, f, t):
+    """Z = (r'', omega'') with joint friction, as `find_reactions`; f.friction.lam is where Newton's method starts."""
     forget_loads(system)
     body_forces(graph, system, w, f, t)
     weigh_bodies(graph, f.Z)
     note_loads(f)
     evaluate_bias(graph, system, f, t)
-    found = find_reactions(graph, system, f, w.q, w.qd, t)
+    return find_reactions(graph, system, f, w.q, w.qd, t)
+
+
+@callback(RUB)
+def rub(context, t, unused):
+    """Solve for accelerations as accelerations.solve_accelerations, with joint friction. Status."""
+    c = load(context)
+    system, f, graph = c.system, c.tangent, c.graph
+    found = accelerate_with_friction(graph, system, c.work, f, t)
     for i in range(system.normals.size):
         system.reals[system.normals[i]] = f.friction.load[7 * i]
     copy(f.friction.lam, f.b)

@@ -3,16 +3,20 @@
 import math
 
 from ..jit.kernels import kernel
+from ..jit.simd import first, fma, four, fourth, larger, second, splat, third, total
 from .tolerances import CONVERGED, ORTHOGONAL
 
 
 @kernel
 def is_finite(x):
     """Return True if all numbers of a vector are finite."""
-    total = 0.0
-    for i in range(x.size):
-        total += abs(x[i])
-    return total < math.inf
+    fours, off = x.size // 4 * 4, splat(0.0)  # zero times what isn't finite is no number
+    for i in range(0, fours, 4):
+        off = fma(four(x, i), splat(0.0), off)
+    rest = total(off)
+    for i in range(fours, x.size):
+        rest += 0.0 * x[i]
+    return rest == 0.0
 
 
 @kernel
@@ -240,10 +244,12 @@ def largest_of(values, marked, weight):
 @kernel
 def largest(values):
     """Return the largest magnitude; infinity if an entry is not finite."""
-    worst = 0.0
-    for i in range(values.size):
-        size = abs(values[i])
-        if not size < math.inf:
-            return math.inf
-        worst = max(worst, size)
-    return worst
+    fours, most, off = values.size // 4 * 4, splat(0.0), splat(0.0)
+    for i in range(0, fours, 4):
+        f = four(values, i)
+        most, off = larger(f, most), fma(f, splat(0.0), off)
+    worst = max(max(first(most), second(most)), max(third(most), fourth(most)))
+    rest = total(off)
+    for i in range(fours, values.size):
+        worst, rest = max(worst, abs(values[i])), rest + 0.0 * values[i]
+    return worst if rest == 0.0 else math.inf

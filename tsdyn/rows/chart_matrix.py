@@ -51,7 +51,7 @@ def _multiply_both(graph, H, X, lower, upper):
 @kernel
 def rotate_rate(l, b, rate):
     """Return C rate of body b, rate in four lanes."""
-    x, y, z, w = l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2], l.d[4 * b + 3]
+    x, y, z, w = get(l.d, 4 * b), get(l.d, 4 * b + 1), get(l.d, 4 * b + 2), get(l.d, 4 * b + 3)
     d = lanes(x, y, z)
     along = total(times(d, rate)) / (1.0 + w)
     return add(rate, sub(fma(d, splat(along), times(rate, splat(w))), cross(d, rate)))

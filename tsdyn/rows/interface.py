@@ -20,6 +20,7 @@ Solve:
     balance_loads           lam = S^-1 H W F, F <- F - H^T lam
     take_reactions          F <- F - H^T lam
     solve_series            the same for one order of a Taylor series
+    solve_friction_series   the same with joint friction, by N~ of friction_solve.py
 Ask:
     redundant_rows_hold, rates_hold, accelerations_hold       of redundant rows
     mark_redundant, self_stress                               of redundant rows
@@ -75,7 +76,7 @@ from .schur_complement import (
     weigh_bodies,
 )
 from .self_stress import count_self_stresses, self_stress
-from .series import solve_series
+from .series import solve_friction_series, solve_series
 from .singularity import (
     is_near_singular,
     is_next_to_singular,
@@ -147,6 +148,7 @@ __all__ = [
     "self_stress",
     "set_selection",
     "singularity_indicator",
+    "solve_friction_series",
     "solve_product",
     "solve_rows",
     "solve_saddle",

@@ -196,6 +196,12 @@ def apply_multipliers(graph, rows, lam, Z):
 
 
 @kernel
+def apply_columns(graph, X, lam, Z):
+    """Z <- Z - X^T lam, X being of the layout of Y."""
+    _scatter(graph, X, lam, Z)
+
+
+@kernel
 def take_reactions(graph, rows, lam, F):
     """F <- F - H^T lam, loads on bodies."""
     _scatter(graph, rows.H, lam, F)

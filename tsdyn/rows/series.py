@@ -2,9 +2,10 @@
 
 from ..jit.kernels import kernel
 from .axis_rows import add_axis_multipliers, gather_axes
+from .chart_matrix import solve_product
 from .evaluation import clear_welds
 from .redundant_rows import clear_redundant
-from .schur_complement import find_correction
+from .schur_complement import apply_columns, find_correction
 
 
 @kernel
@@ -16,9 +17,29 @@ def solve_series(graph, f, omega, at, stride, k, correction):
     Order k + 1 of omega' of body i is at omega[at + stride * i]. With `correction` f.b becomes what f.gamma, a first
     solution, lacks.
     """
+    _complete(graph, f, omega, at, stride, k, correction)
+    find_correction(graph, f.rows, f.b, f.Z)
+
+
+@kernel
+def solve_friction_series(graph, f, omega, at, stride, k):
+    """The same with joint friction, as a correction of f.gamma.
+
+    N~ lam = f.b,    f.Z = -X^T lam,    N~ = H X^T as of friction_solve.py
+    """
+    r = f.friction
+    _complete(graph, f, omega, at, stride, k, True)
+    solve_product(graph, r.lower, r.upper, f.b)
+    for i in range(f.Z.size):
+        f.Z[i] = 0.0
+    apply_columns(graph, r.X, f.b, f.Z)
+
+
+@kernel
+def _complete(graph, f, omega, at, stride, k, correction):
+    """The residuals f.b of all rows, from those of the primitives."""
     clear_welds(graph, f.b)
     gather_axes(graph, omega, at, stride, k + 1.0, f.b)
     if correction:
         add_axis_multipliers(graph, f.gamma, f.b)
     clear_redundant(f, f.b)
-    find_correction(graph, f.rows, f.b, f.Z)

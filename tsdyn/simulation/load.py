@@ -14,6 +14,8 @@ from .solution import Solution
 from .stored_runs import demand_path
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from ..hints import Place
 
 SCENES = (".toml", ".urdf", ".xml", ".mjcf", ".sdf", ".world")
@@ -100,6 +102,14 @@ def scene_file(path: Place, allow_code: bool = False, free_base: bool = False) -
         return imported(path, Scene, free_base), {}
     if free_base:
         raise InvalidArgument("free_base= is for URDF files.")
+    return document_of(path, allow_code)[:2]
+
+
+def document_of(path: Place, allow_code: bool = False, study: Mapping[str, Any] | None = None) -> Any:
+    """Return the `Document` of a TOML file: its scene, and what its tables run, ensemble and output ask for.
+
+    `study` has keys of the table ensemble, such as cases, in place of those of the file, where they are not None.
+    """
     from ..files import scene_text
 
     try:
@@ -110,4 +120,4 @@ def scene_file(path: Place, allow_code: bool = False, free_base: bool = False) -
         raise StorageError(f"{path} is no text in UTF-8: {error}.") from error
     except OSError as error:
         raise StorageError(f"{path} can't be read: {error.strerror or error}.") from error
-    return scene_text.read(text, os.fspath(path), Scene, simulate, allow_code)
+    return scene_text.read_all(text, os.fspath(path), Scene, simulate, allow_code, study)

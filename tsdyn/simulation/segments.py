@@ -23,7 +23,6 @@ from .rounding_limit import within_rounding
 from .singularity_crossing import Carrier, by_series, crossings
 
 PASSAGE, STIFF = Status.PASSAGE, Status.STIFF
-ENGINES = {"steps": StepEngine, "series": SeriesEngine}  # by Integrator.driver
 METHOD, IMPLICIT, CROSSING = range(3)  # who makes a segment: the task's method, the implicit one, series
 GIVEN_UP = (  # by the implicit method: the explicit one goes on
     Status.NEWTON_FAILED, Status.SINGULAR, Status.MASS_SINGULAR, Status.CHART_LOST, Status.STEP_COLLAPSED,
@@ -31,9 +30,8 @@ GIVEN_UP = (  # by the implicit method: the explicit one goes on
 )  # fmt: skip
 
 
-def run_segments(task, observe=None):
-    """Run a `Task`; return the `Outcome`. An observed run has one segment."""
-    engine = ENGINES[task.method.driver]
+def run_segments(task, engine, observe=None):
+    """Run a `Task` by the engine of its method; return the `Outcome`. An observed run has one segment."""
     passes = engine is StepEngine and not task.form.first_order
     if observe is not None or not (task.choose or (passes and not task.prepared.refusal)):
         return run(task, engine, observe)
@@ -42,11 +40,11 @@ def run_segments(task, observe=None):
     try:
         if passed:  # a run that goes on in a later segment
             relay.share, relay.largest, relay.h = passed[-1]["relay"]
-            if task.choose:
+            if passed[-1]["turns"] is not None:
                 task.choose.restore(passed[-1]["turns"])
-            return _Segments(task, relay, [_recalled(known) for known in passed]).go_on()
+            return _Segments(task, engine, relay, [_recalled(known) for known in passed]).go_on()
         outcome = run(task._replace(report=_until_its_end(task.report)), engine, relay=relay)
-        return _Segments(task, relay, [outcome]).go_on() if outcome.status in (PASSAGE, STIFF) else outcome
+        return _Segments(task, engine, relay, [outcome]).go_on() if outcome.status in (PASSAGE, STIFF) else outcome
     finally:
         task.report(None)
 
@@ -71,12 +69,14 @@ class _Segments:
     ----------
     task : Task
         The whole run's.
+    engine : type
+        Of its method.
     relay : Relay
     parts : list of Outcome
     """
 
-    def __init__(self, task, relay, parts):
-        self.task, self.relay, self.parts, self.turns = task, relay, parts, task.choose
+    def __init__(self, task, engine, relay, parts):
+        self.task, self.engine, self.relay, self.parts, self.turns = task, engine, relay, parts, task.choose
         self.roles, self.raised = [METHOD], ""
         self.passed = [] if task.archive is None else task.archive.passed
         if self.passed:
@@ -151,7 +151,7 @@ class _Segments:
             demand_holonomic(rest.prepared.packed, rest.q, rest.span[0], rest.form.name)
             method, self.raised = within_rounding(self.turns.implicit, rest.prepared.packed, rest.q)
             rest = rest._replace(method=method)
-        return run(rest._replace(choose=self.turns), ENGINES[rest.method.driver], relay=relay)
+        return run(rest._replace(choose=self.turns), StepEngine if role == IMPLICIT else self.engine, relay=relay)
 
     def _rest(self):
         """The remaining task, by the task's method."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..ahead.first_run import prepare_first_run
@@ -14,7 +15,9 @@ from ..methods.integrator import frozen
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
 from ..runs.sampling import Sampling
+from ..runs.step_engine import StepEngine
 from ..runs.task import Task
+from ..taylor.series_engine import SeriesEngine
 from . import method_choice, stored_runs
 from .local_origin import origin_of, run_near
 from .options import checked
@@ -29,7 +32,8 @@ if TYPE_CHECKING:
 
     from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Span, State
 
-DRIVERS = dict.fromkeys(("steps", "series"), run_segments)  # by Integrator.driver; see task.py
+ENGINES = {"steps": StepEngine, "series": SeriesEngine}
+DRIVERS = {name: partial(run_segments, engine=engine) for name, engine in ENGINES.items()}  # by Integrator.driver
 
 
 @fitting

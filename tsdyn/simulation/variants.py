@@ -19,7 +19,7 @@ from ..model.packed import classes
 from .scene_cache import prepared
 
 if TYPE_CHECKING:
-    from ..hints import ParameterList, Scene
+    from ..hints import Floats, ParameterList, Scene
 
 _making = threading.RLock()  # handles are made by one thread at a time: their aliases are shared
 HANDLES = ("ground", "_bodies", "_added", "_forces", "_normalisations")  # attributes of a scene
@@ -133,7 +133,7 @@ def of_numbers(scene, family, changes, packed, start):
     return other
 
 
-def place(scene, q, qd):
+def place(scene: Scene, q: Floats, qd: Floats) -> None:
     """Make q (n,) and qd (n,) the initial values of the bodies."""
     if "_later" in vars(scene):
         family, changes = scene._later

@@ -8,6 +8,7 @@ that failed, or -1. `kept` holds the diagonal before elimination; its sign is th
 import math
 
 from ..jit.kernels import kernel
+from ..jit.simd import get, let
 
 
 @kernel
@@ -104,42 +105,66 @@ def subtract_products(pivots, size, width, left, right, out, stride, rows, n, di
 
 
 @kernel
-def link(u, values, record, kept, limit):
-    """Eliminate a 3 x 3 block that updates one other, as in a chain; which row fails, or -1."""
-    stride = record[5]
-    v, w = u[6:], u[12:]
-    o = values[record[4] :]
-    p, q = o[stride:], o[2 * stride :]
-    u00, u01, u02 = u[0], u[1], u[2]
-    if not limit * kept[0] * kept[0] < u00 * kept[0] < math.inf:
+def link(values, u, target, stride, kept, limit):
+    """Eliminate a 3 x 3 block at values[u] that updates one other, as in a chain; which row fails, or -1.
+
+    The other is at values[target], rows `stride` apart; the diagonal before elimination is at values[kept].
+    """
+    v, w, p, q = u + 6, u + 12, target + stride, target + 2 * stride
+    k0, k1, k2 = get(values, kept), get(values, kept + 1), get(values, kept + 2)
+    u00, u01, u02 = get(values, u), get(values, u + 1), get(values, u + 2)
+    if not limit * k0 * k0 < u00 * k0 < math.inf:
         return 0
     d0 = 1.0 / u00
     f01, f02 = u01 * d0, u02 * d0
-    u11, u12 = v[1] - f01 * u01, v[2] - f01 * u02
-    if not limit * kept[1] * kept[1] < u11 * kept[1] < math.inf:
+    u11, u12 = get(values, v + 1) - f01 * u01, get(values, v + 2) - f01 * u02
+    if not limit * k1 * k1 < u11 * k1 < math.inf:
         return 1
     d1 = 1.0 / u11
     f12 = u12 * d1
-    u22 = w[2] - f02 * u02 - f12 * u12
-    if not limit * kept[2] * kept[2] < u22 * kept[2] < math.inf:
+    u22 = get(values, w + 2) - f02 * u02 - f12 * u12
+    if not limit * k2 * k2 < u22 * k2 < math.inf:
         return 2
     d2 = 1.0 / u22
-    a0, a1, a2 = u[3], u[4], u[5]
-    b0, b1, b2 = v[3] - f01 * a0, v[4] - f01 * a1, v[5] - f01 * a2
-    c0, c1, c2 = w[3] - f02 * a0 - f12 * b0, w[4] - f02 * a1 - f12 * b1, w[5] - f02 * a2 - f12 * b2
-    u[0], v[1], v[2], w[2] = d0, d1, u12, d2
-    v[3], v[4], v[5] = b0, b1, b2
-    w[3], w[4], w[5] = c0, c1, c2
+    a0, a1, a2 = get(values, u + 3), get(values, u + 4), get(values, u + 5)
+    b0, b1, b2 = get(values, v + 3) - f01 * a0, get(values, v + 4) - f01 * a1, get(values, v + 5) - f01 * a2
+    c0 = get(values, w + 3) - f02 * a0 - f12 * b0
+    c1 = get(values, w + 4) - f02 * a1 - f12 * b1
+    c2 = get(values, w + 5) - f02 * a2 - f12 * b2
+    _store_pivots(values, u, d0, d1, u12, d2)
+    _store(values, v + 3, b0, b1, b2)
+    _store(values, w + 3, c0, c1, c2)
     x, y, z = a0 * d0, b0 * d1, c0 * d2
-    o[0] -= x * a0 + y * b0 + z * c0
-    o[1] -= x * a1 + y * b1 + z * c1
-    o[2] -= x * a2 + y * b2 + z * c2
+    _take(values, target, x * a0 + y * b0 + z * c0)
+    _take(values, target + 1, x * a1 + y * b1 + z * c1)
+    _take(values, target + 2, x * a2 + y * b2 + z * c2)
     x, y, z = a1 * d0, b1 * d1, c1 * d2
-    p[1] -= x * a1 + y * b1 + z * c1
-    p[2] -= x * a2 + y * b2 + z * c2
+    _take(values, p + 1, x * a1 + y * b1 + z * c1)
+    _take(values, p + 2, x * a2 + y * b2 + z * c2)
     x, y, z = a2 * d0, b2 * d1, c2 * d2
-    q[2] -= x * a2 + y * b2 + z * c2
+    _take(values, q + 2, x * a2 + y * b2 + z * c2)
     return -1
+
+
+@kernel
+def _store(values, i, x, y, z):
+    let(values, i, x)
+    let(values, i + 1, y)
+    let(values, i + 2, z)
+
+
+@kernel
+def _store_pivots(values, u, d0, d1, beside, d2):
+    """The reciprocal pivots of the block at values[u], and what is beside the second."""
+    let(values, u, d0)
+    let(values, u + 7, d1)
+    let(values, u + 8, beside)
+    let(values, u + 14, d2)
+
+
+@kernel
+def _take(values, i, x):
+    let(values, i, get(values, i) - x)
 
 
 @kernel
@@ -187,50 +212,52 @@ def eliminate_lu(l, u, size, width, n, kept, limit):
 
 
 @kernel
-def link_lu(l, u, lower, upper, record, kept, limit):
-    """Eliminate a 3 x 3 block that updates one other, as in a chain; which row fails, or -1."""
-    target, stride = record[4], record[5]
-    v, w, m, n = u[6:], u[12:], l[6:], l[12:]
-    u00, u01, u02, l01, l02 = u[0], u[1], u[2], l[1], l[2]
-    if not limit * abs(kept[0]) < abs(u00) < math.inf:
+def link_lu(lower, upper, u, target, stride, kept, limit):
+    """The same of an unsymmetric matrix; the diagonal before elimination is at upper[kept]."""
+    v, w, p, q = u + 6, u + 12, target + stride, target + 2 * stride
+    u00, u01, u02, l01, l02 = get(upper, u), get(upper, u + 1), get(upper, u + 2), get(lower, u + 1), get(lower, u + 2)
+    if not limit * abs(get(upper, kept)) < abs(u00) < math.inf:
         return 0
     d0 = 1.0 / u00
     f01, f02, g01, g02 = l01 * d0, l02 * d0, u01 * d0, u02 * d0
-    u11, u12, l12 = v[1] - f01 * u01, v[2] - f01 * u02, m[2] - g01 * l02
-    if not limit * abs(kept[1]) < abs(u11) < math.inf:
+    u11, u12 = get(upper, v + 1) - f01 * u01, get(upper, v + 2) - f01 * u02
+    l12 = get(lower, v + 2) - g01 * l02
+    if not limit * abs(get(upper, kept + 1)) < abs(u11) < math.inf:
         return 1
     d1 = 1.0 / u11
     f12, g12 = l12 * d1, u12 * d1
-    u22 = w[2] - f02 * u02 - f12 * u12
-    if not limit * abs(kept[2]) < abs(u22) < math.inf:
+    u22 = get(upper, w + 2) - f02 * u02 - f12 * u12
+    if not limit * abs(get(upper, kept + 2)) < abs(u22) < math.inf:
         return 2
     d2 = 1.0 / u22
-    u[0], v[1], v[2], w[2] = d0, d1, u12, d2
-    l[0], m[1], m[2], n[2] = d0, d1, l12, d2
-    a0, a1, a2 = u[3], u[4], u[5]
-    b0, b1, b2 = v[3] - f01 * a0, v[4] - f01 * a1, v[5] - f01 * a2
-    c0, c1, c2 = w[3] - f02 * a0 - f12 * b0, w[4] - f02 * a1 - f12 * b1, w[5] - f02 * a2 - f12 * b2
-    v[3], v[4], v[5] = b0, b1, b2
-    w[3], w[4], w[5] = c0, c1, c2
-    x0, x1, x2 = l[3], l[4], l[5]
-    y0, y1, y2 = m[3] - g01 * x0, m[4] - g01 * x1, m[5] - g01 * x2
-    z0, z1, z2 = n[3] - g02 * x0 - g12 * y0, n[4] - g02 * x1 - g12 * y1, n[5] - g02 * x2 - g12 * y2
-    m[3], m[4], m[5] = y0, y1, y2
-    n[3], n[4], n[5] = z0, z1, z2
+    _store_pivots(upper, u, d0, d1, u12, d2)
+    _store_pivots(lower, u, d0, d1, l12, d2)
+    a0, a1, a2, b0, b1, b2, c0, c1, c2 = _rest_of_link(upper, u, f01, f02, f12)
+    x0, x1, x2, y0, y1, y2, z0, z1, z2 = _rest_of_link(lower, u, g01, g02, g12)
     a0, a1, a2 = a0 * d0, a1 * d0, a2 * d0
     b0, b1, b2 = b0 * d1, b1 * d1, b2 * d1
     c0, c1, c2 = c0 * d2, c1 * d2, c2 * d2
-    o = upper[target:]
-    p, q = o[stride:], o[2 * stride :]
-    o[0] -= x0 * a0 + y0 * b0 + z0 * c0
-    o[1] -= x0 * a1 + y0 * b1 + z0 * c1
-    o[2] -= x0 * a2 + y0 * b2 + z0 * c2
-    p[1] -= x1 * a1 + y1 * b1 + z1 * c1
-    p[2] -= x1 * a2 + y1 * b2 + z1 * c2
-    q[2] -= x2 * a2 + y2 * b2 + z2 * c2
-    o = lower[target:]
-    p = o[stride:]
-    o[1] -= x1 * a0 + y1 * b0 + z1 * c0
-    o[2] -= x2 * a0 + y2 * b0 + z2 * c0
-    p[2] -= x2 * a1 + y2 * b1 + z2 * c1
+    _take(upper, target, x0 * a0 + y0 * b0 + z0 * c0)
+    _take(upper, target + 1, x0 * a1 + y0 * b1 + z0 * c1)
+    _take(upper, target + 2, x0 * a2 + y0 * b2 + z0 * c2)
+    _take(upper, p + 1, x1 * a1 + y1 * b1 + z1 * c1)
+    _take(upper, p + 2, x1 * a2 + y1 * b2 + z1 * c2)
+    _take(upper, q + 2, x2 * a2 + y2 * b2 + z2 * c2)
+    _take(lower, target + 1, x1 * a0 + y1 * b0 + z1 * c0)
+    _take(lower, target + 2, x2 * a0 + y2 * b0 + z2 * c0)
+    _take(lower, p + 2, x2 * a1 + y2 * b1 + z2 * c1)
     return -1
+
+
+@kernel
+def _rest_of_link(values, u, f01, f02, f12):
+    """The columns beside the block at values[u], eliminated: three rows."""
+    v, w = u + 6, u + 12
+    a0, a1, a2 = get(values, u + 3), get(values, u + 4), get(values, u + 5)
+    b0, b1, b2 = get(values, v + 3) - f01 * a0, get(values, v + 4) - f01 * a1, get(values, v + 5) - f01 * a2
+    c0 = get(values, w + 3) - f02 * a0 - f12 * b0
+    c1 = get(values, w + 4) - f02 * a1 - f12 * b1
+    c2 = get(values, w + 5) - f02 * a2 - f12 * b2
+    _store(values, v + 3, b0, b1, b2)
+    _store(values, w + 3, c0, c1, c2)
+    return a0, a1, a2, b0, b1, b2, c0, c1, c2

@@ -40,13 +40,15 @@ def factor(pattern, values, limit):
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     keep_diagonal(pattern, values)
     for j in range(heads.size):
-        first, width, panel = starts[j], widths[j], values[heads[j] :]
+        first, width = starts[j], widths[j]
         size = starts[j + 1] - first
         if size == 3 and width == 6 and updates[j + 1] - updates[j] == 1:
-            failed = link(panel, values, pattern.records[6 * updates[j] :], kept[first:], limit)
+            target, stride = place_of_products(pattern, updates[j])
+            failed = link(values, heads[j], target, stride, pattern.shape[1] + first, limit)
             if failed >= 0:
                 return first + failed
             continue
+        panel = values[heads[j] :]
         for k in range(0, size, 3):
             u = panel[k * (width + 1) :]
             failed = eliminate(u, size - k, width, width - k, kept[first + k :], limit)
@@ -77,6 +79,12 @@ def record(pattern, e):
 
 
 @kernel
+def place_of_products(pattern, e):
+    """Place and row length of what the products change."""
+    return pattern.records[6 * e + 4], pattern.records[6 * e + 5]
+
+
+@kernel
 def factor_lu(pattern, lower, upper, limit):
     """Factor N in place, without pivoting.
 
@@ -90,13 +98,15 @@ def factor_lu(pattern, lower, upper, limit):
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     keep_diagonal(pattern, upper)
     for j in range(heads.size):
-        first, width, below, above = starts[j], widths[j], lower[heads[j] :], upper[heads[j] :]
+        first, width = starts[j], widths[j]
         size = starts[j + 1] - first
         if size == 3 and width == 6 and updates[j + 1] - updates[j] == 1:
-            failed = link_lu(below, above, lower, upper, pattern.records[6 * updates[j] :], kept[first:], limit)
+            target, stride = place_of_products(pattern, updates[j])
+            failed = link_lu(lower, upper, heads[j], target, stride, pattern.shape[1] + first, limit)
             if failed >= 0:
                 return first + failed
             continue
+        below, above = lower[heads[j] :], upper[heads[j] :]
         for k in range(0, size, 3):
             l, u = below[k * (width + 1) :], above[k * (width + 1) :]
             failed = eliminate_lu(l, u, size - k, width, width - k, kept[first + k :], limit)

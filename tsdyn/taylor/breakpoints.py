@@ -17,7 +17,9 @@ def cross_stop(context, c, r, log):
     take_pieces(c.system, r, log)
     status = call_reach(r.kernels.reach, context, r.clock.t, -1.0)
     if status == 0:
-        call_expand(r.kernels.expand, context, 0, 1)
+        status = call_expand(r.kernels.expand, context, 0, 1)
+        if status != 0:
+            return status
         if not is_finite(w.qdd):
             return NOT_FINITE
         store_now(w, r)

@@ -50,13 +50,13 @@ def begin(graph, system, poses, orders, bodies, Z):
             put(bodies, at + 12, splat(0.0))
             put(bodies, at + 16, splat(0.0))
             put(bodies, at + 20, splat(0.0))
-            _turn(bodies, at, 1, four(poses, p + OMEGA))
-            _turn_ahead(bodies, at, orders, 1, False)
-            put(Z, 8 * b + 4, _spin(graph, b, bodies, at, orders, 0))
+            turn(bodies, at, 1, four(poses, p + OMEGA))
+            turn_ahead(bodies, at, orders, 1, False)
+            put(Z, 8 * b + 4, spin(graph, b, bodies, at, orders, 0))
 
 
 @kernel
-def _spin(graph, b, bodies, at, orders, k):
+def spin(graph, b, bodies, at, orders, k):
     """(J' omega')_k and the gyroscopic torque of order k; the body's series begins at bodies[at]."""
     torque = splat(0.0)
     if graph.spins[b] != 0:
@@ -79,7 +79,7 @@ def _fetch_next(bodies, at, orders, count, k):
 
 
 @kernel
-def _turn(bodies, at, k, change):
+def turn(bodies, at, k, change):
     """A_k += A_0 change~, the part of (1) that is linear in the last omega'."""
     w0, w1, w2, o = splat(first(change)), splat(second(change)), splat(third(change)), at + 12 * k
     a0, a1, a2 = four(bodies, at), four(bodies, at + 4), four(bodies, at + 8)
@@ -89,7 +89,7 @@ def _turn(bodies, at, k, change):
 
 
 @kernel
-def _turn_ahead(bodies, at, orders, k, exact):
+def turn_ahead(bodies, at, orders, k, exact):
     """A_{k+1} of (1) but for omega'_k."""
     x, y, z = splat(0.0), splat(0.0), splat(0.0)
     u, v, w = splat(0.0), splat(0.0), splat(0.0)
@@ -105,9 +105,9 @@ def _turn_ahead(bodies, at, orders, k, exact):
     x, y, z = sub(x, u), sub(y, v), sub(z, w)
     if exact:
         low = splat(ONE_INTEGRAL[k, 1])
-        put(bodies, o, _product(x, f, low))
-        put(bodies, o + 4, _product(y, f, low))
-        put(bodies, o + 8, _product(z, f, low))
+        put(bodies, o, exact_product(x, f, low))
+        put(bodies, o + 4, exact_product(y, f, low))
+        put(bodies, o + 8, exact_product(z, f, low))
     else:
         put(bodies, o, times(x, f))
         put(bodies, o + 4, times(y, f))
@@ -115,18 +115,27 @@ def _turn_ahead(bodies, at, orders, k, exact):
 
 
 @kernel
-def _product(x, f, low):
+def exact_product(x, f, low):
     """x (f + low), rounded once where the processor can."""
     return fma(x, f, times(x, low))
 
 
 @kernel
-def _put_product(array, o, x, f, low, exact):
+def put_product(array, o, x, f, low, exact):
     """array[o : o + 4] = x (f + low), low being zero unless `exact`."""
     if exact:
-        put(array, o, _product(x, f, low))
+        put(array, o, exact_product(x, f, low))
     else:
         put(array, o, times(x, f))
+
+
+@kernel
+def inverses(k, exact):
+    """g + g_low = 1 / (k + 1) and h + h_low = 1 / ((k + 1) (k + 2)) as g, h, g_low, h_low, low parts only if exact."""
+    g, h, g_low, h_low = splat(ONE_INTEGRAL[k, 0]), splat(TWO_INTEGRALS[k, 0]), splat(0.0), splat(0.0)
+    if exact:
+        g_low, h_low = splat(ONE_INTEGRAL[k, 1]), splat(TWO_INTEGRALS[k, 1])
+    return g, h, g_low, h_low
 
 
 @kernel
@@ -174,19 +183,16 @@ def expand(graph, system, k, last, ahead, refine, x, f):
     run_loops(graph, system.reals, ADVANCE, k, x, f)
     run_forces(system.reals, x, k, f)
     exact = refine > 1
-    g, h, g_low, h_low = splat(ONE_INTEGRAL[k, 0]), splat(TWO_INTEGRALS[k, 0]), splat(0.0), splat(0.0)
-    if exact:
-        g_low, h_low = splat(ONE_INTEGRAL[k, 1]), splat(TWO_INTEGRALS[k, 1])
-    inverse = g, h, g_low, h_low
+    inverse = g, h, g_low, h_low = inverses(k, exact)
     for b in range(nb):
         at = b * size
         if ahead:
             _fetch_next(bodies, at + size, orders, 12, k + 2)
         weigh(graph.inverse, b, Z, 8 * b, Z, 8 * b)
-        _put_product(bodies, at + S_R * orders + 4 * (k + 2), four(Z, 8 * b), h, h_low, exact)
+        put_product(bodies, at + S_R * orders + 4 * (k + 2), four(Z, 8 * b), h, h_low, exact)
         if graph.bodies[b, 1] == 7:
-            _put_product(bodies, at + S_OMEGA * orders + 4 * (k + 1), four(Z, 8 * b + 4), g, g_low, exact)
-            _turn(bodies, at, k + 2, _product(four(Z, 8 * b + 4), h, h_low))
+            put_product(bodies, at + S_OMEGA * orders + 4 * (k + 1), four(Z, 8 * b + 4), g, g_low, exact)
+            turn(bodies, at, k + 2, exact_product(four(Z, 8 * b + 4), h, h_low))
     if k == 0:
         x.low_r2[:] = 0.0
         note_loads(f)
@@ -200,7 +206,7 @@ def expand(graph, system, k, last, ahead, refine, x, f):
                 for e in range(f.b.size):
                     f.gamma[e] += f.b[e]
             for b in range(nb):
-                _change(graph, b, x, k, inverse, exact, Z)
+                change(graph, b, x, k, inverse, exact, Z)
     _solve(graph, system, k, x, f, refined, exact)
     if refined:
         for e in range(f.b.size):
@@ -211,11 +217,11 @@ def expand(graph, system, k, last, ahead, refine, x, f):
             _fetch_next(bodies, at + size, orders, 12 * (k + 3), k + 2)
             fetch(bodies, at + size + S_OMEGA * orders, 4 * (k + 1))
             fetch(bodies, at + size + S_SPIN * orders, 4 * (k + 2))
-        _change(graph, b, x, k, inverse, exact, Z)
+        change(graph, b, x, k, inverse, exact, Z)
         put(Z, 8 * b, splat(0.0))
         if graph.bodies[b, 1] == 7 and not last:
-            put(Z, 8 * b + 4, _spin(graph, b, bodies, at, orders, k + 1))
-            _turn_ahead(bodies, at, orders, k + 2, exact)
+            put(Z, 8 * b + 4, spin(graph, b, bodies, at, orders, k + 1))
+            turn_ahead(bodies, at, orders, k + 2, exact)
 
 
 @kernel
@@ -235,11 +241,8 @@ def _solve(graph, system, k, x, f, refined, exact):
 
 
 @kernel
-def _change(graph, b, x, k, inverse, exact, Z):
-    """Add what Z makes of a body's r_{k+2}, omega'_{k+1} and A_{k+2}.
-
-    inverse: g + g_low = 1 / (k + 1), h + h_low = 1 / ((k + 1) (k + 2)); `exact`: the low parts are not zero.
-    """
+def change(graph, b, x, k, inverse, exact, Z):
+    """Add what Z makes of a body's r_{k+2}, omega'_{k+1} and A_{k+2}; inverse and exact as of `inverses`."""
     g, h, g_low, h_low = inverse
     bodies, orders = x.bodies, x.order.room
     at = b * orders * BODY_ROW
@@ -249,13 +252,13 @@ def _change(graph, b, x, k, inverse, exact, Z):
         put_sum(bodies, o, four(bodies, o), times(push, h), x.low_r2, 4 * b)
         put(x.low_r2, 4 * b, add(four(x.low_r2, 4 * b), low))
     elif exact:
-        put(bodies, o, add(four(bodies, o), _product(push, h, h_low)))
+        put(bodies, o, add(four(bodies, o), exact_product(push, h, h_low)))
     else:
         put(bodies, o, fma(push, h, four(bodies, o)))
     if graph.bodies[b, 1] == 7:
         change, o = four(Z, 8 * b + 4), at + S_OMEGA * orders + 4 * (k + 1)
         if exact:
-            put(bodies, o, add(four(bodies, o), _product(change, g, g_low)))
+            put(bodies, o, add(four(bodies, o), exact_product(change, g, g_low)))
         else:
             put(bodies, o, fma(change, g, four(bodies, o)))
-        _turn(bodies, at, k + 2, _product(change, h, h_low))
+        turn(bodies, at, k + 2, exact_product(change, h, h_low))

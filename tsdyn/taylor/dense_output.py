@@ -10,6 +10,7 @@ from ..rows.interface import allocate_tangent
 from ..runs.dense_output import put_state, recall
 from ..workspaces.run_state import B_DATA, B_START, lay_out, load_run
 from ..workspaces.workspace import plain_work
+from .friction_layout import kept_multipliers
 from .step_end import keep_start
 from .step_parts import set_floor, state_within
 from .workspace import SeriesContext, Trial, load_series, no_series
@@ -43,5 +44,5 @@ def reading_workspace(system, graph, orders, size):
     n = int(own.bodies[:, 1].sum())
     work = plain_work(n)
     work.control.size = size
-    expansion = no_series(orders, np.zeros((len(graph.bodies) + 1) * BODY_ROW * orders))
+    expansion = no_series(orders, np.zeros((len(graph.bodies) + 1) * BODY_ROW * orders), kept_multipliers(graph))
     return SeriesContext(own, work, graph, allocate_tangent(graph, n), expansion, Trial()), lay_out(n, 0, 0, 0, 0)

@@ -26,6 +26,9 @@ class ForceLayout(NamedTuple):
     drives: np.ndarray
 
 
+FRICTION_ROWS = 7  # of the scratch of a friction of a joint, beside its kernels' and as many as x has
+
+
 class _Kind(NamedTuple):
     """How the series of some instances of a kind are run."""
 
@@ -75,6 +78,9 @@ def _kind(members):
     if hasattr(force.kernels, "program"):
         program = force.kernels.program(len(load.parameters))
         return _Kind(("series", "check"), int(program[ROWS]), program)
+    if load.normal >= 0:
+        size = sum(marker.size for marker in force.markers)
+        return _Kind(("series", "check"), force.slots + size + FRICTION_ROWS, [])
     if not _is_driven(load):
         return _Kind(("series", "check" if force.sharp else None), force.slots, [])
     signals = [value for each in members for value in each.parameters if isinstance(value, Signal)]

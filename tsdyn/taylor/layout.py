@@ -18,6 +18,7 @@ from ..motions.signals import Signal
 from ..motions.tables import is_data
 from ..motions.tracing import Untraceable
 from .force_layout import lay_out_forces
+from .friction_layout import kept_multipliers, lay_out_frictions
 from .tables import ConstraintSeries, MotionSeries
 from .tolerances import FAR
 from .workspace import LOW, Expansion, Orders
@@ -78,7 +79,10 @@ def no_series(force, parameters):
         return f"{what} that can't be traced, {reason}"
     if signals and "driven_series" not in force.kernels:
         return f"{_given_by(force, Signal)}, and {kind} has no kernel `driven_series`"
-    return "" if "series" in force.kernels else force.no_series or f"{kind} has no kernel `series`"
+    if "series" in force.kernels:
+        return ""
+    needed = "`series` and `normal_series`" if "normal_load" in force.kernels else "`series`"
+    return force.no_series or f"{kind} has no kernel {needed}"
 
 
 def pays(constraints, forces):
@@ -126,7 +130,7 @@ def allocate_expansion(graph, kinds, packed, highest):
         rows.append([address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint), total, width])
         total += count * width
     places = records(ConstraintSeries, rows)
-    constraints = zeros(total + 4)
+    constraints, forces = zeros(total + 4), lay_out_forces(packed, orders)
     return Expansion(
         order=Orders(top=highest, room=orders, next=highest, lowest=highest, highest=highest),
         bodies=bodies,
@@ -137,7 +141,9 @@ def allocate_expansion(graph, kinds, packed, highest):
         constraints=constraints,
         places=places,
         motions=_motions(graph, packed, orders, places, constraints),
-        **lay_out_forces(packed, orders)._asdict(),
+        **forces._asdict(),
+        **lay_out_frictions(packed, graph, places, forces.forces, orders)._asdict(),
+        kept=zeros(kept_multipliers(graph)),
     )
 
 

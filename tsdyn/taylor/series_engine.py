@@ -3,6 +3,7 @@
 from ..errors import InvalidArgument
 from ..runs.reader import Reading
 from .dense_output import read_series, reading_workspace
+from .joint_friction import accelerate_with_friction_here, expand_friction_series
 from .layout import is_far, refusal, room
 from .run_memory import Series, SeriesMemory
 from .step_parts import accelerate_here, expand_far_series, expand_series, pass_singular, reach
@@ -40,7 +41,7 @@ class SeriesEngine:
         order.refined = max(method.refined, self.series.refined)
         if method.step is not None:  # the order follows from tolerances even so
             memory.run.clock.rtol, memory.run.clock.atol = method.step_tolerances()
-        _set_kernels(memory.run, is_far(graph, self.highest), self.within)
+        _set_kernels(memory.run, graph, self.highest, self.within)
 
     def reading(self, memory, prepared, constraint_tol):
         """A `Reading` of the steps; a function and its arguments that make it in another process."""
@@ -56,16 +57,26 @@ def read_again(packed, highest):
 def _reading(packed, graph, highest):
     def workspace():
         context, run = reading_workspace(system, graph, room(highest), packed.size)
-        _set_kernels(run, is_far(graph, highest), True)
+        _set_kernels(run, graph, highest, True)
         return context, run
 
     system = packed.system
     return Reading(read_series, workspace, system, shift=0, degree=16)
 
 
-def _set_kernels(run, far, within):
+def expanding(rough, far):
+    """What expands the series; rough: of a scene with joint friction, far: of many bodies."""
+    return expand_friction_series if rough else expand_far_series if far else expand_series
+
+
+def accelerating(rough):
+    """What gives accelerations between the steps."""
+    return accelerate_with_friction_here if rough else accelerate_here
+
+
+def _set_kernels(run, graph, highest, within):
     """Addresses that the driver and readers call; within: whether anything is asked for between the steps."""
-    kernels = run.kernels
-    kernels.expand, kernels.reach = (expand_far_series if far else expand_series).address, reach.address
+    kernels, rough = run.kernels, len(graph.frictions) > 0
+    kernels.expand, kernels.reach = expanding(rough, is_far(graph, highest)).address, reach.address
     if within:
-        kernels.accelerate_here, kernels.pass_singular = accelerate_here.address, pass_singular.address
+        kernels.accelerate_here, kernels.pass_singular = accelerating(rough).address, pass_singular.address

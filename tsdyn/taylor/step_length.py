@@ -88,7 +88,7 @@ def longest(c, r, tol, most):
     x, nb = c.expansion, c.graph.bodies.shape[0]
     far, fast, _ = weights(c, r)
     h = 0.0
-    for k in range(most, LEAST_ORDER, -1):
+    for k in range(most, min(LEAST_ORDER, most - 1), -1):
         longer = radius(x.bodies, nb, x.order.room, k, far, fast) * tol ** (1.0 / (k + 2))
         if longer > h:
             h, x.order.top = longer, k

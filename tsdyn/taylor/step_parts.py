@@ -52,7 +52,18 @@ def expand_far_series(context, start, end):
 @kernel
 def _expand(context, start, end, ahead):
     c = load_series(context)
-    w, x, f = c.work, c.expansion, c.tangent
+    x, refine = c.expansion, begin_orders(c, start)
+    for k in range(start, end):
+        expand(c.graph, c.system, k, k > 0 and k + 1 == x.order.top, ahead, refine, x, c.tangent)
+    if start == 0:
+        write_qdd(c)
+    return 0
+
+
+@kernel
+def begin_orders(c, start):
+    """Begin the series where `start` is zero; how many orders of lam are refined."""
+    x, f = c.expansion, c.tangent
     orders = x.order.room
     if start == 0:
         expand_motions(c.system, x)
@@ -63,15 +74,18 @@ def _expand(context, start, end, ahead):
     sweeps = refinements(f.indicator.start)
     if sweeps > 0 and not near:
         refine, x.order.sweeps = max(refine, ILL_ORDERS), sweeps
-    for k in range(start, end):
-        expand(c.graph, c.system, k, k > 0 and k + 1 == x.order.top, ahead, refine, x, f)
-    if start == 0:
-        for b in range(c.graph.bodies.shape[0]):
-            at = b * orders * BODY_ROW
-            put(f.a, 8 * b, times(four(x.bodies, at + S_R * orders + 8), splat(2.0)))
-            put(f.a, 8 * b + 4, four(x.bodies, at + S_OMEGA * orders + 4))
-        write_accelerations(c.graph.bodies, f.poses, f.a, w.qdd)
-    return 0
+    return refine
+
+
+@kernel
+def write_qdd(c):
+    """Qdd of the series at order zero."""
+    x, f, orders = c.expansion, c.tangent, c.expansion.order.room
+    for b in range(c.graph.bodies.shape[0]):
+        at = b * orders * BODY_ROW
+        put(f.a, 8 * b, times(four(x.bodies, at + S_R * orders + 8), splat(2.0)))
+        put(f.a, 8 * b + 4, four(x.bodies, at + S_OMEGA * orders + 4))
+    write_accelerations(c.graph.bodies, f.poses, f.a, c.work.qdd)
 
 
 @kernel

@@ -192,7 +192,8 @@ def make_step(context, c, r, log, stop):
         s.failed = status = _attempt(context, c, r)
         if status == PASSAGE:  # back to where the run is
             status = stand_at(context, c, r, r.clock.t)
-            call_expand(r.kernels.expand, context, 0, 1)
+            if status == 0:
+                status = call_expand(r.kernels.expand, context, 0, 1)
             return PASSAGE if status == 0 else status
         landed = status == 0 and (not adaptive or f.landing.residual <= MISSED * (s.tol + c.work.control.floor))
         if landed:

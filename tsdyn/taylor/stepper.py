@@ -45,8 +45,9 @@ def _stand(context, c, r, log, t):
     copy(c.expansion.low_end, c.expansion.low)
     status = 0
     if c.trial.singular == 0:
-        call_expand(r.kernels.expand, context, 0, 1)
-        status = hold_accelerations(c, t)
+        status = call_expand(r.kernels.expand, context, 0, 1)
+        if status == 0:
+            status = hold_accelerations(c, t)
     if not is_finite(w.qdd):
         return NOT_FINITE
     if status != 0:

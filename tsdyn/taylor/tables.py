@@ -25,6 +25,25 @@ class ForceSeries(Record):
     run: int  # address of what runs the program of a traced function; 0 for none
 
 
+class FrictionSeries(Record):
+    """A friction of a joint, in the order of ConstraintGraph.frictions."""
+
+    slope: int  # address of friction.load_slope
+    reaction: int  # where the series of its reaction begins in Expansion.loads: force and torque, one after the other
+    point: int  # where the body-frame coordinates of the joint's point begin in System.reals
+    first: int  # of its rows of Expansion.sources
+    count: int
+
+
+class ReactionSource(Record):
+    """A marker of a joint, whose force is a part of the reaction that a friction depends on."""
+
+    forces: int  # where the series of the force begins in Expansion.constraints
+    coordinates: int  # where its body-frame coordinates begin in System.reals
+    is_point: int  # 1 for a Point, 0 for a Vector
+    body: int
+
+
 class MotionSeries(Record):
     """A prescribed motion, or a number of a load."""
 

@@ -10,7 +10,7 @@ from ..model.packed import System
 from ..rows.interface import TangentWorkspace
 from ..sparse.constraint_graph import ConstraintGraph
 from ..workspaces.workspace import Work, plain_context
-from .tables import ConstraintSeries, ForceSeries, MotionSeries
+from .tables import ConstraintSeries, ForceSeries, FrictionSeries, MotionSeries, ReactionSource
 
 # floats of a body in Expansion.low, and where those of its parts begin
 LOW, L_R, L_RD, L_OMEGA, L_P = 16, 0, 4, 8, 12
@@ -45,6 +45,9 @@ class Expansion(NamedTuple):
     loads: np.ndarray  # each kind of force's instances
     motions: np.ndarray  # (motions,) of tables.MotionSeries
     drives: np.ndarray  # (numbers of loads,) of tables.MotionSeries
+    frictions: np.ndarray  # (frictions,) of tables.FrictionSeries
+    sources: np.ndarray  # of tables.ReactionSource
+    kept: np.ndarray  # (m,)  multipliers of the step's start, in scenes with joint friction; joint_friction.py
 
 
 class Trial(Record):
@@ -81,14 +84,14 @@ class SeriesContext(NamedTuple):
     trial: Trial
 
 
-def no_series(orders, bodies):
-    """An `Expansion` with the series of bodies alone, and room for so many orders."""
+def no_series(orders, bodies, kept=0):
+    """An `Expansion` with the series of bodies alone, and room for so many orders; kept: size of that array."""
     count = bodies.size // (orders * BODY_ROW)
     low, start, low_r2 = np.zeros((2, LOW * count)), *np.zeros((2, 4 * count))
     none, kinds = np.zeros(0), (records(kind, []) for kind in (ConstraintSeries, ForceSeries))
     return Expansion(
         Orders(room=orders), bodies, *low, start, low_r2, none, *kinds, np.zeros(0, np.int64), none,
-        records(MotionSeries, []), records(MotionSeries, []),
+        *(records(kind, []) for kind in (MotionSeries, MotionSeries, FrictionSeries, ReactionSource)), np.zeros(kept),
     )  # fmt: skip
 
 

@@ -77,7 +77,7 @@ def check_constraint_series(scene, constraint, name, rng):
         return
     if any(isinstance(p, Motion) and p.smooth is None for part in moved for p in part.parameters()):
         return
-    q, t = random_motion(scene, rng), _time(rng)
+    q, t = random_motion(scene, rng), random_time(rng)
     Phi = np.concatenate([_check_rows(scene, part, name, q, t) for part in parts])
     packed = scene.packed
     graph, kinds = build(packed)
@@ -89,7 +89,7 @@ def check_constraint_series(scene, constraint, name, rng):
     for k in range(ORDER - 1):
         constraint_coefficients(where, k)
         value = context.tangent.b / ((k + 1) * (k + 2))
-        _compare(name, k + 2, [f"compiled Phi[{i}]" for i in graph.row], value, Phi)
+        compare(name, k + 2, [f"compiled Phi[{i}]" for i in graph.row], value, Phi)
 
 
 def _check_rows(scene, primitive, name, q, t):
@@ -99,20 +99,20 @@ def _check_rows(scene, primitive, name, q, t):
     numbers = [entry.c[0] if isinstance(entry, Truncated) else entry for entry in par]
     rows = [_series(par[3 * i]).c for i in range(len(kind.quantities()) if "driven_series" in kind.kernels else 0)]
     x, _ = along(scene, primitive, primitive.coordinates, q)
-    Phi, Phi_x = _zeros(kind.rows), _zeros((kind.rows, len(x)))
-    _run(kind, "phi", name, x, par, t, Phi)
-    _run(kind, "jacobian", name, x, par, t, Phi_x)
-    columns = _labels(kind)
+    Phi, Phi_x = zeros(kind.rows), zeros((kind.rows, len(x)))
+    run_truncated(kind, "phi", name, x, par, t, Phi)
+    run_truncated(kind, "jacobian", name, x, par, t, Phi_x)
+    columns = labels_of(kind)
     labels = [[f"jacobian[{i}, {j}] (d phi[{i}] / d {c})" for j, c in enumerate(columns)] for i in range(kind.rows)]
-    Phi_t = _zeros(kind.rows)
+    Phi_t = zeros(kind.rows)
     if rows:
-        _run(kind, "phi_t", name, x, par, t, Phi_t)
-    for k, f, scratch in _coefficients(kind, name, (x,), numbers, (kind.rows, len(x)), rows):
-        _compare(name, k, labels, f, Phi_x)
+        run_truncated(kind, "phi_t", name, x, par, t, Phi_t)
+    for k, f, scratch in coefficients_of(kind, name, (x,), numbers, (kind.rows, len(x)), rows):
+        compare(name, k, labels, f, Phi_x)
         if rows:
             drift = np.zeros(kind.rows)
             twin(kind.series_t)(np.array([c.c[k] for c in x]), numbers, k, scratch, drift)
-            _compare(name, k, [f"phi_t[{i}], by series_t," for i in range(kind.rows)], drift, Phi_t)
+            compare(name, k, [f"phi_t[{i}], by series_t," for i in range(kind.rows)], drift, Phi_t)
     return Phi
 
 
@@ -130,33 +130,33 @@ def check_force_series(scene, force, name, rng):
     (load,), kind = packed.loads, type(force)
     if no_series(force, load.parameters):
         return
-    q, t = random_motion(scene, rng), _time(rng, 0.8)
+    q, t = random_motion(scene, rng), random_time(rng, 0.8)
     x, xd = along(scene, force, load.coordinates, q)
     par = [number for value in load.parameters for number in _numbers(value, t)]
     par += [*rng.normal(scale=10.0, size=force.memory)]
-    f = _zeros(len(x))
+    f = zeros(len(x))
     if hasattr(force.kernels, "program"):
         _law_of(force)(x, xd, par, t, f)
     else:
-        _run(kind, "law", name, x, xd, par, t, f)
+        run_truncated(kind, "law", name, x, xd, par, t, f)
         numbers = [_series(number).c[0] for number in par]
         driven = any(isinstance(value, Signal) for value in load.parameters)
         rows, what = ([_series(number).c for number in par], "driven_series") if driven else ((), "series")
-        labels = [f"out[{j}] (conjugate to {c})" for j, c in enumerate(_labels(kind))]
-        for k, out, _ in _coefficients(kind, name, (x, xd), numbers, (len(x),), rows, what):
-            _compare(name, k, labels, out, f)
+        labels = [f"out[{j}] (conjugate to {c})" for j, c in enumerate(labels_of(kind))]
+        for k, out, _ in coefficients_of(kind, name, (x, xd), numbers, (len(x),), rows, what):
+            compare(name, k, labels, out, f)
 
     graph, kinds = build(packed)
     context, (where, *_keep) = series_context(packed, graph, kinds)
     context.tangent.poses[:] = write_bodies(scene, q, context.expansion).ravel()
     context.system.reals[packed.system.memory] = par[len(par) - force.memory :]
     begin_motions(where, t.c[0])
-    expected = _carried_back(scene, load, q, f)
+    expected = carried_back(scene, load, q, f)
     labels = [f"{what} {axis} of {b.name}" for b in scene.bodies for what in ("force", "body torque") for axis in _AXES]
     for k in range(ORDER):
         force_coefficients(where, k)
         got = context.tangent.Z.reshape(-1, 2, 4)[:-1, :, :3].ravel()
-        _compare(name, k, [f"compiled {label}" for label in labels], got, expected)
+        compare(name, k, [f"compiled {label}" for label in labels], got, expected)
 
 
 def _numbers(value, t):
@@ -168,7 +168,7 @@ def _law_of(force):
     """The law of a force that is given by a user's function, for any numbers."""
     function = force.function_of_state
     plain = getattr(function, "py_func", function)
-    others = {"make": lambda f: f, "stack": _zeros, "float": lambda number: number}
+    others = {"make": lambda f: f, "stack": zeros, "float": lambda number: number}
     return twin(force._wrap(retold(plain), plain, **others))
 
 
@@ -183,19 +183,19 @@ def random_motion(scene, rng):
         p = series[3:]
         length = np.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3])
         q += [*series[:3], *(e / length for e in p)]
-    return _objects(q)
+    return objects(q)
 
 
 def along(scene, attachment, coordinates, q):
     """x and xd of an attachment's markers as Truncated series."""
-    starts, qd = starts_of(scene.packed), _objects([c.rate for c in q])
+    starts, qd = starts_of(scene.packed), objects([c.rate for c in q])
     x, xd = [], []
     for marker, s in zip(attachment.markers, coordinates, strict=True):
-        body, place, rate = attachment.body_of(marker), _zeros(marker.size), _zeros(marker.size)
+        body, place, rate = attachment.body_of(marker), zeros(marker.size), zeros(marker.size)
         twin(state)(marker.code, body.dimension, starts.get(body, 0), q, qd, s, place, rate)
         x += [q[0].of(c) for c in place]
         xd += [q[0].of(c) for c in rate]
-    return _objects(x), _objects(xd)
+    return objects(x), objects(xd)
 
 
 def write_bodies(scene, q, expansion):
@@ -217,7 +217,7 @@ def write_bodies(scene, q, expansion):
 
 def _columns(p):
     """The columns of A(p)."""
-    columns = [_zeros(3) for _ in range(3)]
+    columns = [zeros(3) for _ in range(3)]
     for column, axis in zip(columns, np.eye(3), strict=True):
         twin(rotate)(p, axis, column)
     return columns
@@ -234,9 +234,9 @@ def _omega(p):
     ]
 
 
-def _carried_back(scene, load, q, f):
+def carried_back(scene, load, q, f):
     """Forces and body torques about the centroids that a force's f is to each body, (b, 6) series in a row."""
-    total, at = _zeros((len(scene.bodies), 2, 3)), 0
+    total, at = zeros((len(scene.bodies), 2, 3)), 0
     for marker, s in zip(load.force.markers, load.coordinates, strict=True):
         part, body = f[at : at + marker.size], load.force.body_of(marker)
         at += marker.size
@@ -250,14 +250,14 @@ def _carried_back(scene, load, q, f):
             torque[1] += 0.5 * (e0 * f2 - e2 * f0 - e3 * f1 + e1 * f3)
             torque[2] += 0.5 * (e0 * f3 - e3 * f0 + e2 * f1 - e1 * f2)
             continue
-        y = _objects([sum(a * b for a, b in zip(column, part, strict=True)) for column in _columns(p)])
+        y = objects([sum(a * b for a, b in zip(column, part, strict=True)) for column in _columns(p)])
         if marker.code == POINT:
             force += part
         torque += y if marker.code == TURN else np.cross(s, y)
     return total.ravel()
 
 
-def _coefficients(kind, name, coordinates, par, shape, rows=(), what="series"):
+def coefficients_of(kind, name, coordinates, par, shape, rows=(), what="series"):
     """Yield k, what the Python `series` writes, and its scratch, which holds nothing yet but the rows prescribed."""
     scratch, series = np.full((kind.slots + len(rows), ORDER + 2), np.nan), twin(getattr(kind, what))
     for i, row in enumerate(rows):
@@ -274,7 +274,8 @@ def _coefficients(kind, name, coordinates, par, shape, rows=(), what="series"):
         yield k, out, scratch
 
 
-def _run(kind, what, name, *arguments):
+def run_truncated(kind, what, name, *arguments):
+    """Run a kernel on truncated series."""
     try:
         twin(getattr(kind, what))(*arguments)
     except TypeError as error:
@@ -284,13 +285,14 @@ def _run(kind, what, name, *arguments):
         ) from error
 
 
-def _labels(kind):
+def labels_of(kind):
+    """What the coordinates of a kind's markers are called."""
     return [
         f"{m.argument}, component {_AXES[i] if m.size == 3 else f'e{i}'}" for m in kind.markers for i in range(m.size)
     ]
 
 
-def _compare(name, k, labels, got, expected):
+def compare(name, k, labels, got, expected):
     """Coefficient k of each against those of series; all of one shape."""
     scale = max(1.0, *(np.abs(_series(e).c[: k + 1]).max() for e in np.ravel(expected)))
     for label, value, series in zip(np.ravel(labels), np.ravel(got), np.ravel(expected), strict=True):
@@ -303,15 +305,18 @@ def _series(value):
     return value if isinstance(value, Truncated) else Truncated([value, *[0.0] * (ORDER + 1)])
 
 
-def _time(rng, last=2.0):
+def random_time(rng, last=2.0):
+    """The time t as a Truncated series."""
     return Truncated([rng.uniform(0.1, last), 1.0, *[0.0] * ORDER])
 
 
-def _zeros(shape):
+def zeros(shape):
+    """Zeros that may become series."""
     return np.full(shape, 0.0, dtype=object)
 
 
-def _objects(entries):
+def objects(entries):
+    """An array (k,) of series."""
     result = np.empty(len(entries), object)
     result[:] = entries
     return result

@@ -14,6 +14,8 @@ REAL_STEP, NOT_ANALYTIC = 1e-5, 1e-4
 SPACING, QUOTIENT = 4e-3, 1e-8
 # Series: order up to which coefficients are compared, and the share of the motion's coefficients from order to order.
 ORDER, SHRINK = 8, 0.5
+# Reactions that the series of a normal load is tried with: next to a part's zero rounding grows.
+DRAWN = 8
 
 # Constraint errors of an integrator, in roundings: position, velocity, acceleration.
 LEVELS = (50.0, 500.0, 5000.0)

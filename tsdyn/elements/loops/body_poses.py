@@ -46,7 +46,10 @@ def orient(poses, at, e0, e1, e2, e3):
     put(poses, at, fma(e, splat(2.0 * e1), lanes(a, twice * e3, -twice * e2)))
     put(poses, at + 4, fma(e, splat(2.0 * e2), lanes(-twice * e3, a, twice * e1)))
     put(poses, at + 8, fma(e, splat(2.0 * e3), lanes(twice * e2, -twice * e1, a)))
-    poses[at + P], poses[at + P + 1], poses[at + P + 2], poses[at + P + 3] = e0, e1, e2, e3
+    let(poses, at + P, e0)
+    let(poses, at + P + 1, e1)
+    let(poses, at + P + 2, e2)
+    let(poses, at + P + 3, e3)
 
 
 @kernel
@@ -75,9 +78,9 @@ def place_bodies(bodies, q, poses):
     """The poses at q (n,)."""
     for b in range(bodies.shape[0]):
         at, i = b * POSE, bodies[b, 0]
-        put(poses, at + R, lanes(q[i], q[i + 1], q[i + 2]))
+        put(poses, at + R, lanes(get(q, i), get(q, i + 1), get(q, i + 2)))
         if bodies[b, 1] == 7 or bodies[b, 1] == STILL:
-            set_pose(poses, at, q[i + 3 : i + 7])
+            orient(poses, at, get(q, i + 3), get(q, i + 4), get(q, i + 5), get(q, i + 6))
         if bodies[b, 1] == STILL:
             put(poses, at + OMEGA, splat(0.0))
 
@@ -103,10 +106,9 @@ def write_positions(bodies, poses, q):
     for b in range(bodies.shape[0]):
         at, i = b * POSE, bodies[b, 0]
         for c in range(3):
-            q[i + c] = poses[at + R + c]
+            let(q, i + c, get(poses, at + R + c))
         if bodies[b, 1] == 7:
-            for c in range(4):
-                q[i + 3 + c] = poses[at + P + c]
+            put(q, i + 3, four(poses, at + P))
 
 
 @kernel
@@ -115,9 +117,9 @@ def write_velocities(bodies, poses, qd):
     for b in range(bodies.shape[0]):
         at, i = b * POSE, bodies[b, 0]
         for c in range(3):
-            qd[i + c] = poses[at + RD + c]
+            let(qd, i + c, get(poses, at + RD + c))
         if bodies[b, 1] == 7:
-            x, y, z = poses[at + OMEGA], poses[at + OMEGA + 1], poses[at + OMEGA + 2]
+            x, y, z = get(poses, at + OMEGA), get(poses, at + OMEGA + 1), get(poses, at + OMEGA + 2)
             _turn(poses, at, 0.5 * x, 0.5 * y, 0.5 * z, qd, i + 3)
 
 
@@ -127,14 +129,14 @@ def write_accelerations(bodies, poses, accelerations, qdd):
     for b in range(bodies.shape[0]):
         at, i, k = b * POSE, bodies[b, 0], 8 * b
         for c in range(3):
-            qdd[i + c] = accelerations[k + c]
+            let(qdd, i + c, get(accelerations, k + c))
         if bodies[b, 1] == 7:
-            x, y, z = accelerations[k + 4], accelerations[k + 5], accelerations[k + 6]
+            x, y, z = get(accelerations, k + 4), get(accelerations, k + 5), get(accelerations, k + 6)
             _turn(poses, at, 0.5 * x, 0.5 * y, 0.5 * z, qdd, i + 3)
-            x, y, z = poses[at + OMEGA], poses[at + OMEGA + 1], poses[at + OMEGA + 2]
+            x, y, z = get(poses, at + OMEGA), get(poses, at + OMEGA + 1), get(poses, at + OMEGA + 2)
             f = 0.25 * (x * x + y * y + z * z)
             for c in range(4):
-                qdd[i + 3 + c] -= f * poses[at + P + c]
+                let(qdd, i + 3 + c, get(qdd, i + 3 + c) - f * get(poses, at + P + c))
 
 
 @kernel

@@ -65,6 +65,11 @@ def scratch_at(markers, rows, orders, varies):
     return width + (4 * ((rows * orders + 3) // 4) + 4 * (markers + markers * rows) * orders if varies else 0)
 
 
+def force_at(marker, markers, rows, orders):
+    """Where the series f of a marker begins in an instance."""
+    return 4 * markers * (1 + rows) + 4 * marker * orders
+
+
 @kernel
 def torque(bodies, at, k, forces, first):
     """sum_j A_j^T f_{k-j}; A_0 is at bodies[at], f_0 at forces[first]."""

@@ -17,6 +17,8 @@ law are: x and xd follow the last orders, for `law_check`.
 Of a force driven by loads, the rows of its scratch from SLOTS on are the series of par, written at the start of a step.
 Of a traced function they are those of its arguments, t first, and then the program's own; the program, one for all
 instances, stands before the first of them.
+
+Of friction in proportion to a normal load, see friction_series.py.
 """
 
 from ...jit.kernels import ANY, data_of, integers, kernel, matrix, part, stack, vector
@@ -25,12 +27,14 @@ from ...motions.state_program import LENGTH, ROWS, T, call_order
 from ..markers import PARAMETERS, POINT, TURN
 from .body_poses import POSE, P, turned
 from .constraint_series import BODY_ROW, S_OMEGA, S_R, torque
+from .friction_series import REACTION, rub
 from .template import (
     CODES,
     DRIVEN,
     MARKERS,
     OWNERS,
     ROOM,
+    RUBS,
     SHARP,
     SIZE,
     SLOTS,
@@ -101,6 +105,8 @@ def scratch_rows(stride, values):
     """Rows of an instance's scratch; the values of its kind."""
     if TRACED:
         return int(values[ROWS])
+    if RUBS:
+        return SLOTS + SIZE + REACTION + 6
     return SLOTS + (stride - 3 * MARKERS if DRIVEN else 0)
 
 
@@ -145,6 +151,9 @@ def series(run, k, orders, count, stride, size, table, reals, bodies, values, po
         if TRACED:
             run_traced(run, values, x, xd, real[3 * MARKERS :], k, rows, orders, values[first + own_scratch :])
         kernel_series(x, xd, real[3 * MARKERS :], k, scratch, f)
+        if RUBS:
+            kept = values[first + own_scratch + rows * orders + MARKERS :]
+            rub(k, wide, x, real[3 * MARKERS :], kept, scratch, values[first + MARKERS * wide :], f)
         if SHARP:
             kept = first + own_scratch + rows * orders + MARKERS + 2 * SIZE * k
             for c in range(SIZE):
@@ -158,8 +167,8 @@ def series(run, k, orders, count, stride, size, table, reals, bodies, values, po
             ends = first + own_scratch + rows * orders + j
             wider = CODES[j] == PARAMETERS
             some = f[c] != 0.0 or f[c + 1] != 0.0 or f[c + 2] != 0.0 or (wider and f[c + 3] != 0.0)
-            if some or k == 0:
-                values[ends] = float(k) if some else -1.0
+            if some or RUBS or k == 0:
+                values[ends] = float(k) if some or RUBS else -1.0
             put(values, forces + 4 * k, four(f, c) if wider else lanes(f[c], f[c + 1], f[c + 2]))
             last = int(values[ends])
             if last < 0:

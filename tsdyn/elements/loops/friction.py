@@ -1,6 +1,6 @@
 """Kernels of one friction for the solver: its generalised force for unit normal load, and its normal load."""
 
-from ...jit.kernels import ANY, caller, complex_stack, integers, kernel, stack, stack2, vector
+from ...jit.kernels import ANY, caller, complex_stack, integers, kernel, part, stack, stack2, vector
 from ...maths.euler_parameters import matrix_a
 from ..tolerances import FORCE_STEP
 from .marker_jacobians import carry_back
@@ -11,15 +11,18 @@ from .template import (
     MARKERS,
     OWNERS,
     SIZE,
+    SLOTS,
     STARTS,
     force_markers,
     kernel_law,
     kernel_normal_load,
+    kernel_normal_series,
 )
 
 UNIT_FRICTION = "ippppdp"  # floats of the instance, its table, its floats, q, qd, t, out
 NORMAL_LOAD = "ippppdiipp"  # the same to t, the side that f is on, whether to derive, f, out
-call_unit_friction, call_normal_load = caller(UNIT_FRICTION), caller(NORMAL_LOAD)
+LOAD_SLOPE = "ippppdipp"  # the same without whether to derive
+call_unit_friction, call_normal_load, call_load_slope = caller(UNIT_FRICTION), caller(NORMAL_LOAD), caller(LOAD_SLOPE)
 
 
 def unit_friction(stride, own, real, q, qd, t, out):
@@ -53,6 +56,29 @@ def _about_point(A, s, f, out):
     out[5] -= s[0] * f[1] - s[1] * f[0]
 
 
+@kernel
+def _about_centroid(A, s, g, out):
+    """out (6,) = the derivative by a force and a body torque, from that by force and torque about the point."""
+    for i in range(3):
+        out[3 + i] = A[0, i] * g[3] + A[1, i] * g[4] + A[2, i] * g[5]
+    out[0] = g[0] - (g[4] * s[2] - g[5] * s[1])
+    out[1] = g[1] - (g[5] * s[0] - g[3] * s[2])
+    out[2] = g[2] - (g[3] * s[1] - g[4] * s[0])
+
+
+@part
+def _stand(own, real, q, qd, side, x, s, A):
+    """Set x; of the body of a side the arm s from the centroid to the point, and the orientation A."""
+    xd, at = stack(SIZE), own[AT + side]
+    force_markers(q, qd, own, real, x, xd)
+    for i in range(3):
+        s[i] = x[6 * side + i] - q[at + i]
+        for j in range(3):
+            A[i, j] = 1.0 if i == j else 0.0
+    if own[DIMENSION + side] == 7:
+        matrix_a(q[at + 3 : at + 7], A)
+
+
 def normal_load(stride, own, real, q, qd, t, side, derive, f, out):
     """out (7,) = the normal load of a reaction and, with derive = 1, what it changes by with that.
 
@@ -60,15 +86,8 @@ def normal_load(stride, own, real, q, qd, t, side, derive, f, out):
     """
     own, real, f, out = integers(own, ANY), vector(real, ANY), vector(f, ANY), vector(out, ANY)
     q, qd = vector(q, ANY), vector(qd, ANY)
-    x, xd, s, g, z, A = stack(SIZE), stack(SIZE), stack(3), stack(6), complex_stack(6), stack2(3, 3)
-    force_markers(q, qd, own, real, x, xd)
-    at = own[AT + side]
-    for i in range(3):
-        s[i] = x[6 * side + i] - q[at + i]
-        for j in range(3):
-            A[i, j] = 1.0 if i == j else 0.0
-    if own[DIMENSION + side] == 7:
-        matrix_a(q[at + 3 : at + 7], A)
+    x, s, g, z, A = stack(SIZE), stack(3), stack(6), complex_stack(6), stack2(3, 3)
+    _stand(own, real, q, qd, side, x, s, A)
     _about_point(A, s, f, g)
     for i in range(6):
         z[i] = g[i]
@@ -81,9 +100,29 @@ def normal_load(stride, own, real, q, qd, t, side, derive, f, out):
         load = kernel_normal_load(x, z, par)
         out[0], g[i] = load.real, load.imag / FORCE_STEP
         z[i] = z[i].real
-    for i in range(3):
-        out[4 + i] = A[0, i] * g[3] + A[1, i] * g[4] + A[2, i] * g[5]
-    out[1] = g[0] - (g[4] * s[2] - g[5] * s[1])
-    out[2] = g[1] - (g[5] * s[0] - g[3] * s[2])
-    out[3] = g[2] - (g[3] * s[1] - g[4] * s[0])
+    _about_centroid(A, s, g, out[1:])
+    return 0
+
+
+def load_slope(stride, own, real, q, qd, t, side, f, out):
+    """out (13,) = as normal_load with derive = 1, by the series of the load; then the reaction about the point.
+
+    What `normal_series` leaves out as negligible is left out here, too.
+    """
+    own, real, f, out = integers(own, ANY), vector(real, ANY), vector(f, ANY), vector(out, ANY)
+    q, qd = vector(q, ANY), vector(qd, ANY)
+    x, s, A, scratch = stack(SIZE), stack(3), stack2(3, 3), stack2(SLOTS, 2)
+    unit, slope, par = stack(6), stack(6), real[3 * MARKERS : stride]
+    _stand(own, real, q, qd, side, x, s, A)
+    _about_point(A, s, f, out[7:])
+    out[0] = kernel_normal_series(x, out[7:], par, 0, scratch)
+    for c in range(SIZE):
+        x[c] = 0.0
+    for i in range(6):  # coefficient one is linear in that of the reaction
+        unit[i] = 0.0
+    for i in range(6):
+        unit[i] = 1.0
+        slope[i] = kernel_normal_series(x, unit, par, 1, scratch)
+        unit[i] = 0.0
+    _about_centroid(A, s, slope, out[1:])
     return 0

@@ -16,7 +16,8 @@ from ...motions.state_program import T
 from ..markers import PARAMETERS, POINT, TURN
 from ..tolerances import LAW_NOISE, LAW_TOLERANCE, OFF
 from .force_series import BODY, INTS, MASK, run_traced, scratch_rows
-from .template import CODES, MARKERS, OWNERS, ROOM, SIZE, STARTS, TRACED, kernel_law, kernel_series
+from .friction_series import load_at
+from .template import CODES, MARKERS, OWNERS, ROOM, RUBS, SIZE, STARTS, TRACED, kernel_law, kernel_series
 
 # what runs a program, count, reals and floats per instance, orders, how many are known, limits, table, reals, values,
 # inverse
@@ -83,6 +84,9 @@ def check(run, count, stride, size, orders, known, limits, table, reals, values,
             run_traced(run, values, x, xd, par, 0, rows, 1, own_scratch)
             kernel_series(x, xd, par, 0, matrix(data_of(own_scratch), rows, 1), f)
         else:
+            if RUBS:
+                scratch = matrix(data_of(values[first + 2 * MARKERS * wide :]), rows, orders)
+                par[stride - 3 * MARKERS - 1] = load_at(limits[TAU], known, x, par, scratch)
             kernel_law(x, xd, par, limits[TIME], f)
         for j in range(MARKERS):
             forces = first + (MARKERS + j) * wide

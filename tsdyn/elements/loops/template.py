@@ -19,10 +19,12 @@ AHEAD = False  # whether each instance has the next one's numbers brought into t
 DRIVEN = False  # whether the series depend on time
 TRACED = False  # whether a force is given by a program
 SHARP = False  # whether the series of a force are checked against its law
+RUBS = False  # whether a force is in proportion to a normal load
 KEPT = 1  # floats of a force's derivatives kept from step to step
 ALONG = -1  # where in x the direction ends that a force's frame follows, or -1: the frame of a body
 kernel_phi = kernel_value = kernel_jacobian = kernel_gamma = kernel_series = kernel_series_t = None
-kernel_law = kernel_derivatives = kernel_remember = kernel_normal_load = kernel_inputs = None
+kernel_law = kernel_derivatives = kernel_remember = kernel_inputs = None
+kernel_normal_load = kernel_normal_series = None
 
 # what the table of a kind holds for each instance: where its two bodies' coordinates begin, and how many they are
 AT, DIMENSION = 0, 2

@@ -1,0 +1,157 @@
+"""The command `tsdyn ensemble`: many runs of a scene, with the parameters of its file or of a table."""
+
+import csv
+import sys
+import time
+from collections import Counter
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InvalidArgument, Status
+from .output import print_json
+from .run import add_json, add_method, add_scene, demand_writable, options_of
+from .scene_file import load_document
+
+SHOWN, LOW, HIGH = 12, 0.05, 0.95  # coordinates in the summary; its quantiles
+REASONS = 10  # failed cases that are told
+
+
+def add_ensemble_options(parser):
+    """Add the options of `tsdyn ensemble` to its parser."""
+    add_scene(parser)
+    add_method(parser)
+    parser.add_argument("--parameters", metavar="CSV", help="a table: a row a case, a column a parameter, "
+                        'such as bob.mass or bob.velocity[2]; in place of [ensemble.parameters]')  # fmt: skip
+    parser.add_argument("--cases", type=int, metavar="N", help="number of cases (default: that of the file)")
+    parser.add_argument("--seed", type=int, metavar="N", help="of random parameters (default: that of the file, or 0)")
+    parser.add_argument("--assemble", action="store_true", help="make each start consistent, by moving any body")
+    parser.add_argument("--threads", type=int, metavar="N", help="threads (default: one a processor)")
+    parser.add_argument("--store", metavar="PATH", help="stream results to .zarr or .h5, in constant memory")
+    parser.add_argument("--resume", action="store_true", help="go on with the cases that are missing in the store")
+    parser.add_argument(
+        "--output", action="append", default=[], metavar="PATH",
+        help="where to write results, again for more: .h5, .nc or .zarr (ts.load reads them), or .csv",
+    )  # fmt: skip
+    parser.add_argument("--plot", nargs="?", const="", metavar="PATH", help="draw the first coordinate (default PNG)")
+    add_json(parser)
+
+
+def _ensemble(parsed):
+    """Run a scene many times, with other parameters each time.
+
+    What varies says the table [ensemble] of the file, or a table of numbers. The exit code is 0 only if every case
+    reached its end.
+    """
+    from ..ensembles.ensemble import ensemble
+
+    table = None if parsed.parameters is None else table_of(parsed.parameters)
+    document = load_document(
+        parsed.scene, parsed.allow_code, {"cases": parsed.cases, "seed": parsed.seed}, parsed.free_base
+    )
+    study = {"parameters": table, "cases": parsed.cases} if table is not None else dict(document.ensemble)
+    if not study:
+        raise InvalidArgument(
+            f"{parsed.scene} has no table [ensemble], which says what differs from case to case; write one "
+            "(tsdyn new shows how), or give --parameters cases.csv."
+        )
+    span, options = options_of(parsed, document.run)
+    outputs = parsed.output or document.output["files"]
+    plot = document.output["plot"] if parsed.plot is None else parsed.plot or _picture(parsed.scene)
+    demand_writable(outputs, plot)
+    if parsed.assemble:
+        study["assemble"] = True
+    show = sys.stderr.isatty() and not parsed.json and find_spec("tqdm") is not None
+    began = time.perf_counter()
+    found = ensemble(document.scene, study.pop("parameters"), span, threads=parsed.threads, store=parsed.store,
+                     resume=parsed.resume, progress=show or None, **study, **options)  # fmt: skip
+    seconds = time.perf_counter() - began
+    written = [str(write(found, path)) for path in outputs] + ([str(_draw(found, plot))] if plot else [])
+    if parsed.json:
+        print_json({**facts(found), "seconds": seconds, "written": written})
+    else:
+        rate = f"  {len(found)} cases in {seconds:.3g} s, {len(found) / max(seconds, 1e-9):.4g} a second"
+        lines = [repr(found), rate, *table_lines(found), *(f"  written   {path}" for path in written)]
+        print("\n".join(lines))
+    return 0 if found.success.all() else 1
+
+
+def _picture(scene):
+    return Path(scene).with_suffix(".png").name
+
+
+def table_of(path):
+    """Parameters of a CSV file: name -> array (cases, ...)."""
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            head, *rows = [row for row in csv.reader(file) if row] or [[]]
+    except (OSError, UnicodeError, csv.Error) as error:
+        raise InvalidArgument(f"{path} can't be read: {getattr(error, 'strerror', None) or error}.") from error
+    if not rows or len(set(head)) < len(head):
+        raise InvalidArgument(f"{path} must have a row of different names, and a row of numbers for each case.")
+    columns = np.empty((len(rows), len(head)))
+    for i, row in enumerate(rows):
+        try:
+            columns[i] = [float(word) for word in row]
+        except ValueError as error:
+            raise InvalidArgument(f"{path}: row {i + 2} must be {len(head)} numbers ({error}).") from error
+    found = {}
+    for j, word in enumerate(head):
+        found.setdefault(word.strip().partition("[")[0], []).append(columns[:, j])
+    whole = {name for name in head if "[" not in name}
+    return {name: parts[0] if name in whole else np.stack(parts, axis=1) for name, parts in found.items()}
+
+
+def write(found, path):
+    """Write an ensemble to a file, in the format of its suffix; the path."""
+    if Path(path).suffix.lower() != ".csv":
+        return found.save(path)
+    try:
+        found.to_dataframe().to_csv(path)
+    except OSError as error:
+        raise InvalidArgument(f"{path} can't be written: {error.strerror}.") from error
+    return path
+
+
+def _draw(found, path):
+    from matplotlib import pyplot
+
+    pyplot.switch_backend("agg")
+    found.plot(path=path)
+    pyplot.close("all")
+    return path
+
+
+def facts(found):
+    """Figures of an ensemble, for JSON."""
+    counts = Counter(found.status.tolist())
+    return {
+        "success": bool(found.success.all()),
+        "cases": len(found),
+        "ended": {Status(code).name.lower(): many for code, many in sorted(counts.items())},
+        "failed": [[int(i), found.message[i]] for i in np.flatnonzero(~found.success)[:REASONS]],
+        "threads": found.threads,
+        "lanes": found.lanes,
+        "parameters": {name: list(np.shape(values)) for name, values in found.parameters.items()},
+        "final": {name: dict(zip(("5 %", "50 %", "95 %"), values, strict=True)) for name, *values in _quantiles(found)},
+    }
+
+
+def _quantiles(found):
+    """Name, and quantiles over the cases, of each coordinate at its end."""
+    last = found.q if found.q.ndim == 2 else found.q[:, -1]
+    for name, column in zip(found.coordinates, last.T, strict=True):
+        known = column[np.isfinite(column)]
+        yield (name, *(np.quantile(known, (LOW, 0.5, HIGH)).tolist() if known.size else [np.nan] * 3))
+
+
+def table_lines(found):
+    """Quantiles and failures, for people."""
+    rows, lines = list(_quantiles(found)), [f"  {'at the end':20} {'5 %':>12} {'median':>12} {'95 %':>12}"]
+    lines += [f"  {name:20} {low:12.6g} {middle:12.6g} {high:12.6g}" for name, low, middle, high in rows[:SHOWN]]
+    if len(rows) > SHOWN:
+        lines.append(f"  and {len(rows) - SHOWN} coordinates more")
+    failed = np.flatnonzero(~found.success)
+    lines += [f"  case {i}: {found.message[i]}" for i in failed[:REASONS]]
+    return [*lines, f"  and {failed.size - REASONS} cases more"] if failed.size > REASONS else lines

@@ -1,0 +1,187 @@
+"""The tables `ensemble` and `output` of a scene file: the cases of a study, and the files that results go to."""
+
+from pathlib import PurePath
+
+import numpy as np
+
+from ..validation import nearest
+from .expressions import Misread
+from .reading import known_keys
+from .values import decode_array
+
+SPREADS = {"uniform": 2, "normal": 2, "linspace": 3}  # how many values each has; the count of a linspace may be missing
+KEYS = ("parameters", "cases", "seed", "grid", "keep", "assemble")
+KEEPS = ("final", "t_eval")
+MOST = 10_000_000  # cases
+LEAST = {"cases": 1, "seed": 0}
+OUTPUT = ("files", "plot")
+HINT = (
+    "a value, a list with one for each case, { uniform = [low, high] }, { normal = [mean, deviation] } or "
+    "{ linspace = [first, last] }"
+)
+
+
+def ensemble(table, scene, mistakes, names):
+    """The arguments of `ts.ensemble` that a table asks for: parameters (arrays by name), keep and assemble."""
+    path = ("ensemble",)
+    if not isinstance(table, dict):
+        mistakes.add_value(path, "ensemble", table, "it must be a table: [ensemble].")
+        return {}
+    known_keys(path, table, KEYS, mistakes)
+    counts = {"cases": None, "seed": 0}
+    for key in counts:
+        value = table.get(key, counts[key])
+        if key in table and (isinstance(value, bool) or not isinstance(value, int) or value < LEAST[key]):
+            reason = f"it must be a whole number from {LEAST[key]} on."
+            mistakes.add_value((*path, key), f"ensemble: {key}", value, reason)
+        elif value is not None and value > MOST:
+            mistakes.add_value((*path, key), f"ensemble: {key}", value, f"it must be at most {MOST}.")
+        else:
+            counts[key] = value
+    grid, keep, assemble = table.get("grid", False), table.get("keep", KEEPS[0]), table.get("assemble", False)
+    if not isinstance(grid, bool):
+        mistakes.add_value((*path, "grid"), "ensemble: grid", grid, "it must be true or false.")
+    if keep not in KEEPS:
+        mistakes.add_value((*path, "keep"), "ensemble: keep", keep, "it must be 'final' or 't_eval'.")
+    bodies = [body.name for body in scene.bodies] if scene is not None else None
+    if not isinstance(assemble, bool) and not (
+        isinstance(assemble, list) and all(isinstance(name, str) and name in (bodies or [name]) for name in assemble)
+    ):
+        hint = f'names of bodies such as ["{bodies[0] if bodies else "crank"}"].'
+        mistakes.add_value((*path, "assemble"), "ensemble: assemble", assemble, f"it must be true, false or {hint}")
+    given = table.get("parameters", {})
+    if not isinstance(given, dict) or not given:
+        mistakes.add((*path, "parameters"), 'ensemble: write [ensemble.parameters], with lines such as "crank.mass" = '
+                     "[1, 2, 3].")  # fmt: skip
+    if scene is None or mistakes.found:
+        return {}
+    cases = _Cases(scene.parameters(), counts["cases"], np.random.default_rng(counts["seed"]), grid)
+    for name, value in given.items():
+        try:
+            cases.add(name, value, names)
+        except Misread as error:
+            mistakes.add_value((*path, "parameters", name), name, value, str(error))
+    try:
+        found = cases.table() if not mistakes.found else {}
+    except Misread as error:
+        mistakes.add(path, f"ensemble: {error}")
+        return {}
+    return {"parameters": found, "cases": cases.count, "keep": keep, "assemble": assemble}
+
+
+class _Cases:
+    """Parameters of the cases, as a table gives them."""
+
+    def __init__(self, known, count, rng, grid):
+        self.known, self.count, self.rng, self.grid = known, count, rng, grid
+        self.columns, self.fixed, self.spread = {}, {}, {}
+
+    def add(self, name, value, names):
+        """Add a parameter."""
+        if name not in self.known:
+            raise Misread(
+                f"the scene has no such parameter{nearest(name, self.known)} tsdyn info --parameters lists them."
+            )
+        shape = np.shape(self.known[name])
+        if isinstance(value, dict):
+            self.spread[name] = self._spread(value, names), shape
+            return
+        array = _array(value, names)
+        if array.shape == shape or (shape == (3, 3) and array.shape == (3,)):
+            self.fixed[name] = array
+        elif array.shape[1:] == shape or (shape == (3, 3) and array.ndim == 2):
+            self.columns[name] = array
+        else:
+            raise Misread(f"it must be {HINT}; one value has shape {shape}." if shape else f"it must be {HINT}.")
+
+    def _spread(self, value, names):
+        kind = next(iter(value), None)
+        if len(value) != 1 or kind not in SPREADS or not isinstance(value[kind], list):
+            raise Misread(f"it must be {HINT}.")
+        numbers = [_array(part, names) for part in value[kind]]
+        if len(numbers) not in (2, SPREADS[kind]):
+            raise Misread(f"{kind} has two values{' and, if you like, their number' if kind == 'linspace' else ''}.")
+        if kind == "normal" and (numbers[1] < 0.0).any():
+            raise Misread("the deviation must not be negative.")
+        return kind, numbers
+
+    def table(self):
+        """Name -> array (cases, ...), or one value for all."""
+        columns = {name: column for name, column in self.columns.items()}
+        for name, ((kind, numbers), shape) in self.spread.items():
+            if kind == "linspace" and (len(numbers) == 3 or self.grid):
+                columns[name] = self._steps(name, numbers, shape)
+        if self.grid:
+            columns = _grid(columns)
+        lengths = {name: len(column) for name, column in columns.items()}
+        if self.count is not None and lengths:
+            lengths["cases"] = self.count
+        if len(set(lengths.values())) > 1:
+            raise Misread(f"numbers of cases differ: {', '.join(f'{name} {n}' for name, n in lengths.items())}.")
+        count = self.count = next(iter(lengths.values()), self.count or None)
+        left = [name for name in self.spread if name not in columns]
+        if count is None or count > MOST:
+            raise Misread(f"say how many cases there are: cases = 100{'' if count is None else f', at most {MOST}'}.")
+        for name in left:
+            (kind, numbers), shape = self.spread[name]
+            columns[name] = self._drawn(kind, numbers, (count, *shape))
+        return {**columns, **self.fixed}
+
+    def _steps(self, name, numbers, shape):
+        count = numbers[2] if len(numbers) == 3 else np.array(self.count or 0)
+        if count.shape or count < 1 or count != int(count) or count > MOST:
+            raise Misread(f"{name}: linspace in a grid needs the number of values: [first, last, 10].")
+        first, last = (np.broadcast_to(one, shape) for one in numbers[:2])
+        return np.linspace(first, last, int(count))
+
+    def _drawn(self, kind, numbers, size):
+        if kind == "linspace":
+            return np.linspace(*(np.broadcast_to(one, size[1:]) for one in numbers[:2]), size[0])
+        draw = self.rng.normal if kind == "normal" else self.rng.uniform
+        return draw(numbers[0], numbers[1], size)
+
+
+def _array(value, names):
+    """An array of plain data."""
+    try:
+        array = np.array(decode_array(value, names), float)
+    except ValueError as error:
+        raise Misread(f"it must be {HINT}; its lists have different lengths.") from error
+    if not array.size or not np.isfinite(array).all():
+        raise Misread("it must be finite numbers.")
+    return array
+
+
+def _grid(columns):
+    """All combinations of the values of columns, the last one fastest."""
+    if not columns:
+        return {}
+    if np.prod([float(len(column)) for column in columns.values()]) > MOST:
+        raise Misread(f"the grid has more than {MOST} cases.")
+    places = np.meshgrid(*(np.arange(len(column)) for column in columns.values()), indexing="ij")
+    return {name: column[at.ravel()] for (name, column), at in zip(columns.items(), places, strict=True)}
+
+
+def output(table, mistakes):
+    """Where results go: {"files": list of paths, "plot": path or None}; beside the working folder, not above it."""
+    path, found = ("output",), {"files": [], "plot": None}
+    if not isinstance(table, dict):
+        mistakes.add_value(path, "output", table, "it must be a table: [output].")
+        return found
+    known_keys(path, table, OUTPUT, mistakes)
+    files = table.get("files", [])
+    if not isinstance(files, list):
+        mistakes.add_value((*path, "files"), "output: files", files, 'it must be a list of paths such as ["run.h5"].')
+        files = []
+    for key, values in (("files", files), ("plot", [table["plot"]] if "plot" in table else [])):
+        for value in values:
+            if not isinstance(value, str) or not value or "\0" in value or _leaves(value):
+                reason = "it must be a path below the working folder, such as 'results/run.h5'."
+                mistakes.add_value((*path, key), f"output: {key}", value, reason)
+    return {"files": files, "plot": table.get("plot")}
+
+
+def _leaves(path):
+    """Whether a path may lead out of the folder that it is relative to."""
+    parts = PurePath(path.replace("\\", "/"))
+    return parts.is_absolute() or ".." in parts.parts or ":" in path

@@ -159,7 +159,8 @@ def test_wrong_usage(words, code, said, folder, capsys):
 def test_robots(folder, capsys):
     pytest.importorskip("lxml")
     link = "<inertial><mass value='2'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
-    joint = "<joint name='hinge' type='revolute'><parent link='base'/><child link='arm'/><limit lower='0' upper='1'/></joint>"
+    joint = "<joint name='hinge' type='revolute'><parent link='base'/><child link='arm'/>{}</joint>"
+    joint = joint.format("<limit lower='0' upper='1'/>")
     (folder / "arm.urdf").write_text(
         f"<robot name='r'><link name='base'/><link name='arm'>{link}</link>{joint}</robot>"
     )

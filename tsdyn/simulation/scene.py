@@ -293,9 +293,9 @@ class Scene(OfFile):
         self._packed = self._start = self._prepared = None
 
     def touch_start(self) -> None:
-        """Discard what depends on the start, after a change of it: rows that are redundant, bodies that turn there."""
+        """Discard what depends on the start, after a change of it: redundant rows, bodies that turn, a local origin."""
         known = None if self._packed is None else self._packed.derived
-        if known is not None and (known.redundant is not None or known.turning):
+        if known is not None and (known.redundant is not None or known.turning or known.local is not None):
             self.touch()
         elif known is not None:
             known.family = None

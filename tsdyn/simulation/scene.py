@@ -68,8 +68,7 @@ class Scene(OfFile):
 
     Notes
     -----
-    `simulate` never changes a scene, so a scene may be run repeatedly. After an attribute of a body (mass, inertia,
-    position, orientation, velocity) is set, the next run updates the changed numbers only.
+    `simulate` never changes a scene. After an attribute of a body is set, the next run updates changed numbers only.
 
     Examples
     --------

@@ -290,12 +290,14 @@ class Scene:
 
     def touch(self) -> None:
         """Discard the packed numbers after a change."""
+        if "_later" in self.__dict__:
+            make_handles(self)
         self._packed = self._start = self._prepared = None
 
     def touch_start(self) -> None:
         """Discard what depends on the start, after a change of it: redundant rows, bodies that turn, a local origin."""
         known = None if self._packed is None else self._packed.derived
-        if known is not None and (known.redundant is not None or known.turning or known.local is not None):
+        if known is not None and known.is_of_start:
             self.touch()
         elif known is not None:
             known.family = None

@@ -32,6 +32,7 @@ from .editing import copy as _copy
 from .editing import remove as _remove
 from .inverse_dynamics import inverse_dynamics as _inverse_dynamics
 from .kinematics import kinematics as _kinematics
+from .scene_imported import OfFile
 from .scene_saving import save as _save
 from .scene_table import summary, table
 from .statics import equilibrium as _equilibrium
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
 
 
 @fitting_methods
-class Scene:
+class Scene(OfFile):
     """Bodies, constraints, forces and gravity.
 
     Parameters

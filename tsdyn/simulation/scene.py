@@ -188,14 +188,8 @@ class Scene(OfFile):
         >>> print(top, top.inertia.diagonal())
         <Body 'body1'> [90. 90. 30.]
         """
-        values = {
-            "mass": mass,
-            "inertia": inertia,
-            "position": position,
-            "orientation": orientation,
-            "velocity": velocity,
-            "angular_velocity": angular_velocity,
-        }
+        values = {"mass": mass, "inertia": inertia, "position": position, "orientation": orientation}
+        values |= {"velocity": velocity, "angular_velocity": angular_velocity}
         body = self._admit(Body, name, values)
         self._normalisations[body] = EulerNormalization(body, name=f"EulerNormalization({body.name})")
         settle(self._normalisations[body])
@@ -334,11 +328,9 @@ class Scene(OfFile):
 
     def _initial(self):
         """The same, until the scene changes the same arrays, not to be written to."""
-        start = self._start
-        if start is None:
-            start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
-            self._start = start
-        return start
+        if self._start is None:
+            self._start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
+        return self._start
 
     def body(self, name: str) -> Body | Any:
         """Return the body of this name."""

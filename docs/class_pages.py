@@ -5,6 +5,7 @@ Classes are found through the registries that plug-ins use, so a plug-in that is
     python -m docs.class_pages folder [module ...]
 """
 
+import argparse
 import inspect
 import re
 import sys
@@ -168,7 +169,16 @@ def write_text(path, text):
         path.write_text(text, encoding="utf-8")
 
 
-if __name__ == "__main__":
-    for name in sys.argv[2:]:
+def main():
+    """Write the pages into a folder, with those of modules that are named."""
+    parser = argparse.ArgumentParser(prog="python -m docs.class_pages", description=__doc__.partition("\n")[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("module", nargs="*", help="modules that define plug-ins")
+    given = parser.parse_args()
+    for name in given.module:
         import_module(name)
-    write(sys.argv[1])
+    write(given.folder)
+
+
+if __name__ == "__main__":
+    main()

@@ -134,34 +134,24 @@ def _save(figure, path):
         figure.savefig(path, metadata={"Date": None, "Creator": None})
 
 
-def draw_gallery(names=()):
-    """Draw the pictures of the gallery, or of some of its examples."""
-    from docs.gallery import ENTRIES
-    from docs.gallery_pages import draw
-
-    for entry in ENTRIES:
-        if not names or entry.name in names:
-            draw(entry)
-
-
-def draw_tutorial():
-    """Draw the picture of the tutorial."""
-    from docs.gallery_pages import draw_tutorial as draw
-
-    draw()
-
-
 def main(words):
     """Draw all pictures, or those that are named."""
-    if not words or "packages" in words:
-        draw_packages(IMAGES / "packages.svg")
-    if not words or "step" in words:
-        draw_step(IMAGES / "step.svg")
-    if not words or "tutorial" in words:
-        draw_tutorial()
-    examples = {*words} - {"packages", "step", "tutorial", "gallery"}
-    if not words or "gallery" in words or examples:
-        draw_gallery(examples)
+    from docs.gallery import ENTRIES
+    from docs.gallery_pages import draw, draw_tutorial
+
+    pictures = {
+        "packages": lambda: draw_packages(IMAGES / "packages.svg"),
+        "step": lambda: draw_step(IMAGES / "step.svg"),
+        "tutorial": draw_tutorial,
+    }
+    pictures |= {entry.name: lambda entry=entry: draw(entry) for entry in ENTRIES}
+    words = [*words, *(entry.name for entry in ENTRIES)] if "gallery" in words else words or pictures
+    unknown = {*words} - pictures.keys() - {"gallery"}
+    if unknown:
+        raise SystemExit(f"no picture {', '.join(sorted(unknown))}; there are gallery, {', '.join(pictures)}")
+    for name in words:
+        if name != "gallery":
+            pictures[name]()
 
 
 if __name__ == "__main__":

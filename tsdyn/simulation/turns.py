@@ -7,6 +7,8 @@ for some steps, at growing intervals, and earlier where the derivatives of the f
 old ones serve, the motion is as stiff as it was.
 """
 
+from functools import cached_property
+
 from ..integrators import SDIRK54, Taylor
 from ..methods.integrator import frozen
 from .tolerances import (
@@ -51,7 +53,7 @@ class Turns:
     """
 
     def __init__(self, method, sharp, end, prepare):
-        self.method, self.implicit, self.end, self._prepare = method, implicit(method), end, prepare
+        self.method, self.end, self._prepare = method, end, prepare
         series = isinstance(method, Taylor)
         self._cost = SERIES_COST if series else COST
         self._share = SHARP_COST if series and sharp else 1.0
@@ -61,6 +63,11 @@ class Turns:
         self.ask, self.window = 0, (0.0, 0.0)  # where the steps that are judged begin: time, work
         self.jacobians = 0  # of the implicit method's first steps
         self.began = self.lasted = 0.0  # s: of the segment, and length of the one before
+
+    @cached_property
+    def implicit(self):
+        """The implicit method, which most runs never ask for."""
+        return implicit(self.method)
 
     def begin(self, to_implicit, t, turned):
         """A segment begins at t: after a turn, or after a singular configuration."""

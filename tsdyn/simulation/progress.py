@@ -6,7 +6,7 @@ import time
 from ..errors import InvalidArgument, MissingDependency
 
 
-def _silent(fraction, *more):
+def silent(fraction, *more):
     """Report nothing."""
 
 
@@ -28,7 +28,7 @@ def bar_class(progress):
 def reporter(progress):
     """Return a function that receives the fraction done (None at the end), the time reached, s, and the steps."""
     if progress is None or progress is False:
-        return _silent
+        return silent
     if callable(progress):
         return lambda fraction, *more: None if fraction is None else progress(min(max(float(fraction), 0.0), 1.0))
     tqdm = bar_class(progress)

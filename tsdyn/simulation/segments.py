@@ -19,6 +19,7 @@ from ..runs.step_engine import StepEngine
 from ..runs.task import Outcome
 from ..runs.trajectory import Pieces
 from ..taylor.series_engine import SeriesEngine
+from .progress import silent
 from .rounding_limit import within_rounding
 from .singularity_crossing import Carrier, by_series, crossings
 
@@ -43,7 +44,8 @@ def run_segments(task, engine, observe=None):
             if passed[-1]["turns"] is not None:
                 task.choose.restore(passed[-1]["turns"])
             return _Segments(task, engine, relay, [_recalled(known) for known in passed]).go_on()
-        outcome = run(task._replace(report=_until_its_end(task.report)), engine, relay=relay)
+        first = task if task.report is silent else task._replace(report=_until_its_end(task.report))
+        outcome = run(first, engine, relay=relay)
         return _Segments(task, engine, relay, [outcome]).go_on() if outcome.status in (PASSAGE, STIFF) else outcome
     finally:
         task.report(None)

@@ -1,7 +1,7 @@
-"""Cases a second of `ts.ensemble`: efficiency of threads, and what a case costs beside the compiled driver.
+"""Cases a second of `ts.ensemble`: efficiency of threads, and what a case costs beside the compiled loop.
 
 Each case has another mass. Rounds of one thread, two threads and a loop over `simulate` are interleaved; medians. The
-overhead is the processor's time of one more case in one thread, less that in the compiled driver.
+overhead is the processor's time of one more case in one thread, less that in the compiled loop over cases.
 
 Run it: python -m benchmarks.ensemble
 """
@@ -15,7 +15,7 @@ import numpy as np
 import tsdyn as ts
 from benchmarks.call_overhead import Clocked
 from benchmarks.scenes import SCENES
-from tsdyn.taylor.run_memory import SeriesMemory
+from tsdyn.ensembles import batch
 
 SPANS = {"sliding top": (1e-4, 1.0, 10.0), "two-body pendulum": (1e-4, 0.5, 5.0), "chain of 4": (1e-4, 0.2, 1.0)}
 CASES, ROUNDS, LOOPED = 1500, 5, 30  # cases of the longest span: a tenth
@@ -35,17 +35,17 @@ def seconds(call, count):
 
 
 def overhead(scene, span, count):
-    """Seconds that a case takes outside the compiled driver: of an ensemble of twice as many less those of one."""
-    plain = SeriesMemory.advance_kernel
-    SeriesMemory.advance_kernel = clock = Clocked(plain, time.process_time)
+    """Seconds that a case takes outside the compiled loop: of an ensemble of six times as many less those of one."""
+    plain = batch.run_cases
+    batch.run_cases = clock = Clocked(plain, time.process_time)
     outside = []
-    for many in (count, 2 * count):
+    for many in (count, 6 * count):
         values, clock.seconds = table(scene, many), 0.0
         began = time.process_time()
         ts.ensemble(scene, values, span, threads=1)
         outside.append(time.process_time() - began - clock.seconds)
-    SeriesMemory.advance_kernel = staticmethod(plain)
-    return (outside[1] - outside[0]) / count
+    batch.run_cases = plain
+    return (outside[1] - outside[0]) / (5 * count)
 
 
 def looped(scene, values, span):

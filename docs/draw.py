@@ -1,11 +1,12 @@
-"""Draw the pictures of architecture.md from the code: packages with their imports, and the way of the data.
+"""Draw the pictures of architecture.md from the code, and those of the gallery from its examples.
 
-Packages, imports and captions are read with ast; nothing is imported from tsdyn. matplotlib is needed.
+Packages, imports and captions of functions are read with ast, without importing tsdyn. matplotlib is needed.
 
-Run it: python -m docs.draw
+Run it: python -m docs.draw [packages] [step] [tutorial] [gallery] [name of an example]
 """
 
 import ast
+import sys
 import textwrap
 from pathlib import Path
 
@@ -133,11 +134,25 @@ def _save(figure, path):
         figure.savefig(path, metadata={"Date": None, "Creator": None})
 
 
-def main():
-    """Write both pictures."""
-    draw_packages(IMAGES / "packages.svg")
-    draw_step(IMAGES / "step.svg")
+def main(words):
+    """Draw all pictures, or those that are named."""
+    from docs.gallery import ENTRIES
+    from docs.gallery_pages import draw, draw_tutorial
+
+    pictures = {
+        "packages": lambda: draw_packages(IMAGES / "packages.svg"),
+        "step": lambda: draw_step(IMAGES / "step.svg"),
+        "tutorial": draw_tutorial,
+    }
+    pictures |= {entry.name: lambda entry=entry: draw(entry) for entry in ENTRIES}
+    words = [*words, *(entry.name for entry in ENTRIES)] if "gallery" in words else words or pictures
+    unknown = {*words} - pictures.keys() - {"gallery"}
+    if unknown:
+        raise SystemExit(f"no picture {', '.join(sorted(unknown))}; there are gallery, {', '.join(pictures)}")
+    for name in words:
+        if name != "gallery":
+            pictures[name]()
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

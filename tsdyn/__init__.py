@@ -19,6 +19,7 @@ from .elements.joint_friction import JointFriction  # noqa: E402
 from .elements.markers import Parameters, Point, Turn, Vector  # noqa: E402
 from .elements.primitive import Primitive  # noqa: E402
 from .errors import (  # noqa: E402
+    ImportLosses,
     InconsistentState,
     InvalidArgument,
     InvalidBody,
@@ -77,6 +78,7 @@ __all__ = [
     "ExplicitRungeKutta",
     "Force",
     "ImplicitTableau",
+    "ImportLosses",
     "InconsistentState",
     "Integrator",
     "InvalidArgument",
@@ -110,6 +112,7 @@ __all__ = [
     "UnknownAttribute",
     "Vector",
     "benchmark",
+    "compare",
     "constraints",
     "ensemble",
     "forces",
@@ -129,6 +132,7 @@ __all__ = [
 if TYPE_CHECKING:
     from . import plots, testing
     from .benchmarking.benchmark import benchmark
+    from .comparison.compare import compare
     from .ensembles.ensemble import ensemble
     from .ensembles.results import Ensemble
     from .profiling.profile import profile
@@ -136,6 +140,7 @@ else:
     _LATER = {
         "Ensemble": ".ensembles.results",
         "benchmark": ".benchmarking.benchmark",
+        "compare": ".comparison.compare",
         "ensemble": ".ensembles.ensemble",
         "plots": ".plots",
         "profile": ".profiling.profile",

@@ -191,6 +191,17 @@ class StorageError(TsdynError, OSError):
     """
 
 
+class ImportLosses(UserWarning):
+    """What a file of another program describes and the scene lacks; `scene.imported` lists each.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> issubclass(ts.ImportLosses, UserWarning)
+    True
+    """
+
+
 class InvalidFile(TsdynError, ValueError):
     r"""A scene file has mistakes; the message lists all, with line and column.
 

@@ -46,6 +46,22 @@ def integrator(definition, **options):
     """The sliding top's `taylor_adaptive`."""
     import heyoka as hy
 
+    return hy.taylor_adaptive(equations(definition), start_of(definition), **options)
+
+
+def batch(definition, **options):
+    """As many tops at once as fit into a SIMD register, with a common step: `taylor_adaptive_batch`; and how many."""
+    import heyoka as hy
+
+    lanes = hy.recommended_simd_size()
+    starts = np.tile(start_of(definition)[:, None], (1, lanes))
+    return hy.taylor_adaptive_batch(equations(definition), starts, **options), lanes
+
+
+def equations(definition):
+    """Derivatives of e0 to e3 and of omega', in heyoka's expressions."""
+    import heyoka as hy
+
     body, gravity = definition["bodies"][0], -definition["gravity"][2]
     m, J = body["mass"], np.diag(body["inertia"])
     e0, e1, e2, e3, a, b, c = hy.make_vars("e0", "e1", "e2", "e3", "a", "b", "c")
@@ -54,7 +70,7 @@ def integrator(definition, **options):
     ga, gb = (J[0] - J[2]) / J[0] * b * c, (J[2] - J[0]) / J[0] * a * c
     bias = (ny * c - nz * b) * b - (nz * a - nx * c) * a + nx * gb - ny * ga
     lam = (bias + gravity) / (1.0 / m + (nx * nx + ny * ny) / J[0])
-    system = [
+    return [
         (e0, -0.5 * (e1 * a + e2 * b + e3 * c)),
         (e1, 0.5 * (e0 * a - e3 * b + e2 * c)),
         (e2, 0.5 * (e3 * a + e0 * b - e1 * c)),
@@ -63,4 +79,3 @@ def integrator(definition, **options):
         (b, gb - lam / J[0] * nx),
         (c, 0.0 * c),
     ]
-    return hy.taylor_adaptive(system, start_of(definition), **options)

@@ -1,4 +1,4 @@
-"""Snippets and commands of README, CONTRIBUTING and docs run as they are printed."""
+"""Snippets and commands of README, CONTRIBUTING and docs run as they are printed, and print what is printed there."""
 
 import os
 import re
@@ -10,30 +10,35 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.documents import README, pages, python_blocks
+
 ROOT = Path(__file__).parents[2]
 
 
 def snippets():
     """Python of README and docs, by file: later blocks may use names of earlier ones."""
-    for file in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
-        blocks = re.findall(r"```python\n(.*?)```", file.read_text(), re.DOTALL)
+    for file in (README, *pages()):
+        blocks = python_blocks(file)
         if blocks:
             yield pytest.param(blocks, id=file.stem)
 
 
-@pytest.mark.slow_but("README", "parallel")
+@pytest.mark.slow_but("README", "parallel", "closed-loop", "events")
 @pytest.mark.parametrize("blocks", list(snippets()))
-def test_snippets_run(blocks, request, tmp_path, monkeypatch):
+def test_snippets_run(blocks, request, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     name = f"snippets_of_{request.node.callspec.id.replace('-', '_')}"
-    (tmp_path / f"{name}.py").write_text("\n\n".join(blocks))
+    (tmp_path / f"{name}.py").write_text("\n\n".join(code for code, _ in blocks))
     import_module(name)
+    printed = capsys.readouterr().out
+    for _, output in blocks:
+        assert output in printed
 
 
 def commands():
     """Commands that README, CONTRIBUTING and docs show, inline or in blocks, without the folder of an environment."""
-    for file in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))):
+    for file in (README, ROOT / "CONTRIBUTING.md", *pages()):
         blocks = re.findall(r"```sh\n(.*?)```", file.read_text(), re.DOTALL)
         lines = [part for block in blocks for line in block.splitlines() for part in line.split("&&")]
         for command in (*re.findall(r"`([^`\n]+)`", file.read_text()), *lines):
@@ -42,6 +47,7 @@ def commands():
 
 # verbs and modules that the pages name, and that run in seconds and offline; installs, the suite itself and benchmarks,
 # which take minutes to hours, have tests of their own
+WRITTEN = ("linkage.py",)  # by the reader of the tutorial
 RUN = ("python examples/", "tsdyn tables", "tsdyn compile", "tsdyn profile")
 
 
@@ -73,10 +79,10 @@ def test_commands_of_the_docs_exist():
     seen = set()
     for command in commands():
         words = shlex.split(command, comments=True) if command.startswith(("python", "tsdyn")) else []
-        if words[:2] == ["python", "-m"] and words[2] not in ("pytest", "venv"):
+        if words[:2] == ["python", "-m"] and words[2] not in ("pytest", "venv", "sphinx"):
             module = ROOT.joinpath(*words[2].split("."))
             assert module.with_suffix(".py").exists() or (module / "__main__.py").exists(), command
-        elif words[:1] == ["python"] and words[1].endswith(".py"):
+        elif words[:1] == ["python"] and words[1].endswith(".py") and words[1] not in WRITTEN:
             assert (ROOT / words[1]).exists(), command
         elif words[:1] == ["tsdyn"] and len(words) > 1 and words[1] not in seen:
             with pytest.raises(SystemExit) as ended:

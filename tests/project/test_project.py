@@ -9,9 +9,10 @@ import pytest
 
 import tsdyn as ts
 from docs import draw
+from tests.helpers.documents import pages
 
 ROOT = Path(__file__).parents[2]
-PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+PAGES = [*ROOT.glob("*.md"), *pages()]
 
 
 def anchors(page):

@@ -47,7 +47,9 @@ def _ensemble(parsed):
     from ..ensembles.ensemble import ensemble
 
     table = None if parsed.parameters is None else table_of(parsed.parameters)
-    document = load_document(parsed.scene, parsed.allow_code, {"cases": parsed.cases, "seed": parsed.seed})
+    document = load_document(
+        parsed.scene, parsed.allow_code, {"cases": parsed.cases, "seed": parsed.seed}, parsed.free_base
+    )
     study = {"parameters": table, "cases": parsed.cases} if table is not None else dict(document.ensemble)
     if not study:
         raise InvalidArgument(

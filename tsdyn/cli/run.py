@@ -41,8 +41,11 @@ def add_method(parser):
 def add_scene(parser, metavar="SCENE"):
     """Add the file of a scene, and whether it may import plug-ins."""
     parser.add_argument(
-        "scene", metavar=metavar, help="a TOML file; or a Python file with a function build(), which is then executed"
+        "scene",
+        metavar=metavar,
+        help="a TOML, URDF, MJCF or SDF file; or a Python file with a function build(), which is then executed",
     )
+    parser.add_argument("--free-base", action="store_true", help="the root link of a URDF is free to move")
     parser.add_argument("--allow-code", action="store_true", help="import modules that the file names for plug-ins")
 
 
@@ -60,7 +63,7 @@ def _run(parsed):
     from ..simulation.simulate import simulate
 
     demand_writable(parsed.output, parsed.plot)
-    document = load_document(parsed.scene, parsed.allow_code)
+    document = load_document(parsed.scene, parsed.allow_code, free_base=parsed.free_base)
     scene, (span, options) = document.scene, options_of(parsed, document.run)
     outputs, plot = parsed.output or document.output["files"], parsed.plot
     if plot is None:

@@ -2,35 +2,44 @@
 
 import importlib.util
 import sys
+import warnings
 from pathlib import Path
 
-from ..errors import InvalidArgument
+from ..errors import ImportLosses, InvalidArgument
+from ..simulation.load import SCENES
 from ..simulation.scene import Scene
 
 
-def load_run(where, allow_code=False):
+def load_run(where, allow_code=False, free_base=False):
     """The scene of a file, and the arguments of `simulate` that it asks for; arguments as for `load_scene`."""
-    if Path(where).suffix.lower() == ".toml":
+    if Path(where).suffix.lower() in SCENES:
         from ..simulation.load import scene_file
 
-        return scene_file(where, allow_code)
+        with warnings.catch_warnings(action="ignore", category=ImportLosses):
+            scene, given = scene_file(where, allow_code, free_base)
+        if scene.imported and scene.imported.left_out:
+            lost = scene.imported.summary()
+            print(f"tsdyn: {where}: not carried over: {lost}; tsdyn check lists each.", file=sys.stderr)
+        return scene, given
+    if free_base:
+        raise InvalidArgument("--free-base is for URDF files.")
     return load_scene(where), {}
 
 
-def load_document(where, allow_code=False, study=None):
+def load_document(where, allow_code=False, study=None, free_base=False):
     """What a file holds, as `scene_text.Document`; `study`: keys of its table ensemble that others replace."""
     from ..files.scene_text import Document
 
-    if Path(where).suffix.lower() == ".toml":
+    if Path(where).suffix.lower() == ".toml" and not free_base:
         from ..simulation.load import document_of
 
         return document_of(where, allow_code, study)
-    scene, given = load_run(where, allow_code)
+    scene, given = load_run(where, allow_code, free_base)
     return Document(scene, given, {}, {"files": [], "plot": None})
 
 
-def load_scene(where, allow_code=False):
-    """The scene of a TOML file; or, of a Python file, that of its `build()`, or its `scene`.
+def load_scene(where, allow_code=False, free_base=False):
+    """The scene of a TOML, URDF, MJCF or SDF file; or, of a Python file, that of its `build()`, or its `scene`.
 
     Parameters
     ----------
@@ -38,14 +47,16 @@ def load_scene(where, allow_code=False):
         A path, or the name of an example; a name behind a colon is of another function, or scene, in the file.
     allow_code : bool
         Whether a TOML file may import modules of plug-ins.
+    free_base : bool
+        Whether the root link of a URDF is free to move.
 
     Raises
     ------
     InvalidArgument
         If there is no such file or name, it can't be run, or what it gives is no scene.
     """
-    if Path(where).suffix.lower() == ".toml":
-        return load_run(where, allow_code)[0]
+    if Path(where).suffix.lower() in SCENES:
+        return load_run(where, allow_code, free_base)[0]
     path, _, name = where.partition(":") if not Path(where).exists() else (where, "", "")
     file = _file(path)
     module = _module(file)

@@ -47,8 +47,11 @@ def _check(parsed):
 
     found = {"file": parsed.scene, "ok": True, "mistakes": [], "message": "It can start."}
     try:
-        scene, given = load_run(parsed.scene, parsed.allow_code)
+        scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
         demand_startable(scene, given)
+        report = scene.imported
+        if report:
+            found |= {"not_carried_over": [list(entry) for entry in report.left_out], "notes": list(report.notes)}
     except TsdynError as error:
         if not parsed.json:
             raise
@@ -59,6 +62,8 @@ def _check(parsed):
         print_json(found)
     else:
         print(f"{parsed.scene}: {scene!r}\nIt can start: positions and velocities satisfy the constraints.")
+        if report:
+            print(report)
     return 0 if found["ok"] else 1
 
 
@@ -69,7 +74,7 @@ def _info(parsed):
     from ..simulation.method_choice import reason
     from ..simulation.scene_cache import prepared
 
-    scene, given = load_run(parsed.scene, parsed.allow_code)
+    scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
     mobility, why = scene.mobility(), reason(prepared(scene))
     if parsed.json:
         print_json(_facts(scene, mobility, why, given))
@@ -164,8 +169,8 @@ def _new(parsed):
 def _convert(parsed):
     """Write a scene, or a solution, in another format.
 
-    A scene (.toml, or a Python file) becomes .toml, without comments and expressions of parameters; a solution or
-    ensemble (.h5, .nc, .zarr) becomes another of these, or .csv.
+    A scene (.toml, URDF, MJCF, SDF, or a Python file) becomes .toml, without comments, expressions of parameters, and
+    shapes; a solution or ensemble (.h5, .nc, .zarr) becomes another of these, or .csv.
     """
     source, target = Path(parsed.scene).suffix.lower(), Path(parsed.target).suffix.lower()
     if source in SOLUTIONS:
@@ -177,7 +182,10 @@ def _convert(parsed):
         found = load(parsed.scene)
         written = (write_ensemble if isinstance(found, Ensemble) else write)(found, parsed.target)
     elif target in SCENES:
-        written = load_scene(parsed.scene, parsed.allow_code).save(parsed.target)
+        scene = load_scene(parsed.scene, parsed.allow_code, parsed.free_base)
+        written = scene.save(parsed.target)
+        if scene.imported and not parsed.json:
+            print(scene.imported)
     else:
         raise InvalidArgument(f"a scene is written to .toml, got {parsed.target!r}; tsdyn run --output runs it.")
     if parsed.json:

@@ -46,6 +46,6 @@ def _solution(parsed):
         return found
     from ..simulation.simulate import simulate
 
-    scene, given = load_run(parsed.scene, parsed.allow_code)
+    scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
     span, options = options_of(parsed, given)
     return simulate(scene, span, **options, dense_output=True)

@@ -106,13 +106,13 @@ class RegularStarts:
         return regular
 
     def kernel(self):
-        """What `start_kernels.take_start` is called with but for q and qd, and the arrays that it finds as they are."""
+        """What `start_kernels.take_start` is called with but for q and qd, and its workspace, entered."""
         start = self._start
         workspace = start.workspace
         workspace.enter(self._system.reals, start.packed.size, start.q, start.tol)
         self._at = np.ascontiguousarray(workspace.first_parameters, np.int64)
         addresses = start.context, start.rates.ctypes.data, self._at.ctypes.data, len(self._at)
-        return (take_start.address, *addresses, start.t, start.tol), workspace.entered()
+        return (take_start.address, *addresses, start.t, start.tol), workspace
 
 
 class RedundantStarts:

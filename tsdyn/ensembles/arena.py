@@ -50,8 +50,8 @@ class Arena:
         )  # fmt: skip
         self.is_unequal = are_unequal(system)
         self.written, self.starts = set(), Starts(self)
-        self.pen = None if study.names is None else pen_of(self, study.names)
         self._slice = FirstSlice(study) if FirstSlice.serves(study) else None
+        self.pen = None if study.names is None else pen_of(self, study.names)
         self._chunk, self._batch = None, None
 
     def systems(self):
@@ -83,6 +83,11 @@ class Arena:
         self.written = {*names}
         self.kept.packed = self.scene.packed = packed._replace(system=own.system, derived=own.derived)
         return True
+
+    @property
+    def is_brief(self):
+        """Whether nothing is asked of runs that end within a slice but their states."""
+        return self._slice is not None
 
     @property
     def has_other_rows(self):
@@ -139,13 +144,15 @@ class Arena:
         self.starts.has_other_rows = False
         if not self._takes(chunk):
             return None
-        if self.kept.packed is not self.packed:
-            self.kept.packed = self.scene.packed = self.packed
+        start, size = self.pen.write(k), self.pen.size(k)
         self.written |= self.pen.written
-        start = self.pen.write(k)
         if start is None:
             return None
-        ran = self._run(start, scene)
+        self.kept.packed = self.scene.packed = self.packed
+        if size is not None:
+            self.kept.packed = self.scene.packed = self.packed._replace(size=size)
+            start = start[0].copy(), start[1].copy()  # of another size, if of the same numbers
+        ran = self._run(start, scene, size is not None)
         if self._batch is None and ran is not None and isinstance(ran[1], Finished) and Batch.serves(self):
             self._batch = Batch(self, ran[0], self._slice)
             self._batch.enter(chunk.arrays, chunk.status)
@@ -163,13 +170,17 @@ class Arena:
             start = tuple(np.array(array) for array in start)  # of another size, if of the same numbers
         return self._run(start, scene)
 
-    def _run(self, start, scene):
+    def _run(self, start, scene, is_resized=False):
         if self.written & OF_ROWS and are_unequal(self.packed.system) != self.is_unequal:
             return None
         found = self.starts.start(start)
         if found is None:
             return None
         study, (memory, (q, qd)) = self.study, found
+        if is_resized:  # what is packed beside the arrays is that of the base
+            if self.packed.derived.redundant is not None:
+                return None
+            self.packed.derived.origin = q, None  # the pen has looked
         options, settings, method = study.options, study.options.settings, study.method
         choose = None
         if study.given["integrator"] is None:
@@ -182,6 +193,8 @@ class Arena:
         outcome = None if self._slice is None or self.is_immobile else self._slice.run(task)
         if outcome is not None:
             return task, outcome
+        if is_resized:
+            return None
         outcome = run_task(task, self.scene, settings.initial_tol)
         return None if method_choice.instead(task, outcome.status) is not None else (task, outcome)
 

@@ -8,8 +8,10 @@ from ..formulations.locked_orientations import still
 from ..jit.kernels import DEBUG, resident
 from ..simulation.local_origin import are_near
 from ..taylor.series_engine import SeriesEngine
+from ..workspaces.carving import words
 from .case_loop import Chunk, LoopNumbers, Plan, run_cases
 from .keeping import TIMES
+from .pen import Place
 from .starts import OF_ROWS
 from .tolerances import FEW_LONG, TRIED
 
@@ -31,9 +33,9 @@ class Batch:
         self._arena, self._task, self._slice = arena, task, first_slice
         self._numbers = LoopNumbers(most=first_slice.rows, moves=arena.pen.moves, grid=arena.study.keep == TIMES)
         self._long, self._cases, self._memory, self._places, self._chunk = 0, 0, None, None, None
-        self._entered = []
-        if arena.pen.moves or arena.pen.written & OF_ROWS:
-            numbers, (arguments, self._entered) = self._numbers, arena.starts.kernel()
+        self._start = None
+        if arena.pen.moves or arena.pen.written & OF_ROWS or arena.pen.geometry is not None:
+            numbers, (arguments, self._start) = self._numbers, arena.starts.kernel()
             (
                 numbers.take_start, numbers.start_context, numbers.start_rates, numbers.start_at, numbers.start_count,
                 numbers.start_t, numbers.start_tol,
@@ -46,7 +48,8 @@ class Batch:
         packed, pen, state = arena.packed, arena.pen, arena.study.given["state"]
         if DEBUG or pen is None:
             return False
-        if packed.derived.redundant is not None and (pen.moves or pen.written & OF_ROWS):  # they are selected anew
+        selects = pen.moves or pen.written & OF_ROWS or pen.geometry is not None  # redundant rows, in each case
+        if packed.derived.redundant is not None and selects:
             return False
         moved = still(packed).bodies.size or packed.system.memory.size or not arena.kept.handles.begin_at_zero
         return not (pen.moves and (moved or state is not None))
@@ -87,12 +90,28 @@ class Batch:
     def _lay_out(self, memory, engine, places):
         memory.enter(engine, self._task, False)
         self._memory, self._places = memory, places
-        arrays = [array for array in (*memory.entered(), *self._entered) if array.size]
+        arrays = [*memory.entered(), *([] if self._start is None else self._start.entered())]
+        arrays = [array for array in arrays if array.size]
         self._images = [(array, array.copy() if array.any() else None) for array in arrays]
         images = [[a.ctypes.data, 0 if b is None else b.ctypes.data, a.nbytes // 8] for a, b in self._images]
-        targets = [[place.to.ctypes.data, place.column, place.to.size] for place in places]
+        targets = [[place.to.ctypes.data, place.column, place.to.size] for place in (*places, *self._own(memory))]
         start = np.zeros((2, self._arena.study.n))
         self._plan, *self._kept = resident(Plan(self._numbers, _words(images), _words(targets), start, self._slice.log))
+
+    def _own(self, memory):
+        """Places of numbers that follow from points of constraints, in the memory of runs and of starts."""
+        pen = self._arena.pen
+        if pen.geometry is None:
+            return []
+        at, found, control = pen.geometry.column, pen.places_in(self._start.reals), memory.work.control
+        found += [Place(_number(each, "size"), at) for each in (control, self._start.work.control)]
+        return [*found, Place(_number(control, "u_tol"), at + 1)]
+
+
+def _number(record, name):
+    """A number of a record as an array."""
+    at = getattr(type(record), name).offset // 8
+    return words(record).view(float)[at : at + 1]
 
 
 def _words(rows):

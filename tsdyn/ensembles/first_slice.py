@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import Status
+from ..jit.interrupts import CollectionsDeferred
 from ..runs.recorder import CHART_ROOM, NO_ROWS
 from ..runs.run_log import RunLog
 from ..runs.slices import FIRST_SLICE, FIRST_WORK
@@ -54,7 +55,8 @@ class FirstSlice:
         engine = kept.engine(SeriesEngine, task.method, task.form, task.within)
         memory = kept.take(engine.kind)
         if memory is None or not engine.serves(memory):
-            return None
+            with CollectionsDeferred():
+                memory = engine.memory(kept)
         memory.enter(engine, task, False)
         status, run = memory.advance(self.log, self.rows), memory.run
         if status is not SUCCESS or run.numbers.near_steps:

@@ -4,6 +4,7 @@ A value that is not admissible, or asks for more than numbers, makes its case on
 packed scene, which says what is wrong with it.
 """
 
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,8 @@ from ..sparse.massless_axes import lean_bodies, levers
 from ..sparse.tolerances import THIN
 from ..taylor.tolerances import LIGHT
 from .columns import inertias, masses, orientations, parameter_rates, vectors
-from .force_columns import ForceColumns
+from .copied_columns import ConstraintColumns, ForceColumns
+from .geometry_columns import GeometryColumns
 
 WEIGHTS = {"mass", "inertia"}
 
@@ -33,10 +35,19 @@ def pen_of(arena, names):
         if field.keyword:
             return None
         owners.setdefault(id(field.owner), (field.owner, {}))[1][field.attribute] = name
-    bodies = (PointMass, type(family.template))
-    if any(not isinstance(owner, bodies) and family.load_of(owner) is None for owner, _ in owners.values()):
+    constraints = [(owner, changed) for owner, changed in owners.values() if id(owner) in family.members]
+    if not owners or (constraints and not _are_numbers(arena, constraints)):
         return None
-    return Pen(arena, owners.values()) if owners else None
+    pen = Pen(arena, owners.values())
+    return pen if all(columns.serves for columns in pen.constraints) else None
+
+
+def _are_numbers(arena, constraints):
+    """Whether no more than numbers can follow from what differs of constraints, and runs need none of it beside."""
+    family, kept = arena.study.family, arena.kept
+    if not arena.is_brief or kept.packed.system.memory.size or not kept.handles.begin_at_zero:
+        return False
+    return not any(family.is_structural(owner, changed) for owner, changed in constraints)
 
 
 class Pen:
@@ -60,7 +71,13 @@ class Pen:
         self._weights = Weights(arena.base, arena.is_unequal)
         for owner, names in owners:
             self._parts += self._parts_of(owner, names)
-        at = 0
+        self.constraints = [part for part in self._parts if isinstance(part, ConstraintColumns)]
+        self.geometry, at = None, 0
+        if self.constraints:
+            self._follow_levers(owners)
+            tol = arena.study.options.settings.constraint_tol
+            self.geometry = GeometryColumns(arena.study.family, self.constraints, self._weights, tol)
+            self._parts.append(self.geometry)
         for part in self._parts:
             part.column, at = at, at + part.width
         self.width, self.written = at, {name for part in self._parts for name in part.written}
@@ -71,7 +88,8 @@ class Pen:
         if owner is family.template:
             return [GravityColumns(names["gravity"])]
         if not isinstance(owner, PointMass):
-            return [ForceColumns(family, owner, names)]
+            kind = ConstraintColumns if family.load_of(owner) is None else ForceColumns
+            return [kind(family, owner, names)]
         parts = []
         if "mass" in names:
             parts.append(MassColumns(owner, names["mass"], self._weights))
@@ -92,7 +110,29 @@ class Pen:
             for part in self._parts:
                 columns = slice(part.column, part.column + part.width)
                 self.fits &= part.fill(values, self.numbers[:, columns], self.starts)
+            if self.geometry is not None:
+                self._weights.far = dict(self._far)
+                columns = slice(self.geometry.column, self.geometry.column + 2)
+                self.fits &= self.geometry.fit(self.numbers[:, columns], self.numbers, self.starts)
             self.fits &= self._weights.fit(count)
+
+    def _follow_levers(self, owners):
+        """Look after the inertia of all bodies that a point of a constraint is on."""
+        for columns in self.constraints:
+            for body, _ in columns.points:
+                if isinstance(body, PointMass):
+                    self._weights.follow(body)
+        self._far = dict.fromkeys(self._weights.far, 0.0)
+
+    def size(self, k):
+        """The size of the scene in case k of the chunk; None where it is that of the base."""
+        return None if self.geometry is None else float(self.numbers[k, self.geometry.column])
+
+    def places_in(self, reals):
+        """Those of numbers of constraints, in an array like `System.reals`."""
+        system = SimpleNamespace(reals=reals)
+        found = [(part, place) for part in self.constraints for place in part.places([system], [])]
+        return [Place(to[begin : begin + words], part.column + at) for part, (to, begin, words, at) in found]
 
     def places(self):
         """All `Place`s, in the arrays of the arena and of its runs."""
@@ -242,22 +282,22 @@ class Weights:
     """
 
     def __init__(self, base, is_unequal):
-        self._base, self._is_unequal, self._far, self._thin = base, is_unequal, {}, False
+        self._base, self._is_unequal, self.far, self._thin = base, is_unequal, {}, False
         self._moments = np.linalg.eigh(base.system.inertia.reshape(-1, 3, 3))[0]
         self.masses, self.moments, self.inertias = {}, {}, {}  # by body, of each case
 
     def follow(self, body):
         """Look after a body whose mass or inertia differs."""
         if body.dimension == 7:
-            self._far[body.index] = float(levers(self._base)[body.index] ** 2)
+            self.far[body.index] = float(levers(self._base)[body.index] ** 2)
             self._thin |= body.index in lean_bodies(self._base)
 
     def fit(self, count):
         """Which of so many cases do not."""
         fits = np.full(count, not self._thin)
-        if self._thin or not (self.masses or self.inertias):
+        if self._thin or not self.far.keys() | self.masses.keys():
             return fits
-        for i, far in self._far.items():
+        for i, far in self.far.items():
             m, moments = self.masses.get(i, self._base.system.mass[i]), self.moments.get(i, self._moments[i : i + 1])
             fits &= ~(moments[:, 0] < THIN * np.maximum(moments[:, 2], m * far))
         return fits & (self._are_unequal(count) == self._is_unequal)

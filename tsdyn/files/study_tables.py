@@ -12,7 +12,7 @@ from .values import decode_array
 SPREADS = {"uniform": 2, "normal": 2, "linspace": 3}  # how many values each has; the count of a linspace may be missing
 KEYS = ("parameters", "cases", "seed", "grid", "keep", "assemble")
 KEEPS = ("final", "t_eval")
-MOST = 10_000_000  # cases
+MOST = 1_000_000  # cases
 LEAST = {"cases": 1, "seed": 0}
 OUTPUT = ("files", "plot")
 HINT = (
@@ -28,34 +28,15 @@ def ensemble(table, scene, mistakes, names):
         mistakes.add_value(path, "ensemble", table, "it must be a table: [ensemble].")
         return {}
     known_keys(path, table, KEYS, mistakes)
-    counts = {"cases": None, "seed": 0}
-    for key in counts:
-        value = table.get(key, counts[key])
-        if key in table and (isinstance(value, bool) or not isinstance(value, int) or value < LEAST[key]):
-            reason = f"it must be a whole number from {LEAST[key]} on."
-            mistakes.add_value((*path, key), f"ensemble: {key}", value, reason)
-        elif value is not None and value > MOST:
-            mistakes.add_value((*path, key), f"ensemble: {key}", value, f"it must be at most {MOST}.")
-        else:
-            counts[key] = value
-    grid, keep, assemble = table.get("grid", False), table.get("keep", KEEPS[0]), table.get("assemble", False)
-    if not isinstance(grid, bool):
-        mistakes.add_value((*path, "grid"), "ensemble: grid", grid, "it must be true or false.")
-    if keep not in KEEPS:
-        mistakes.add_value((*path, "keep"), "ensemble: keep", keep, "it must be 'final' or 't_eval'.")
-    bodies = [body.name for body in scene.bodies] if scene is not None else None
-    if not isinstance(assemble, bool) and not (
-        isinstance(assemble, list) and all(isinstance(name, str) and name in (bodies or [name]) for name in assemble)
-    ):
-        hint = f'names of bodies such as ["{bodies[0] if bodies else "crank"}"].'
-        mistakes.add_value((*path, "assemble"), "ensemble: assemble", assemble, f"it must be true, false or {hint}")
+    count, seed = (_whole(table, key, default, mistakes) for key, default in (("cases", None), ("seed", 0)))
+    grid, keep, assemble = _choices(table, scene, mistakes)
     given = table.get("parameters", {})
     if not isinstance(given, dict) or not given:
         mistakes.add((*path, "parameters"), 'ensemble: write [ensemble.parameters], with lines such as "crank.mass" = '
                      "[1, 2, 3].")  # fmt: skip
     if scene is None or mistakes.found:
         return {}
-    cases = _Cases(scene.parameters(), counts["cases"], np.random.default_rng(counts["seed"]), grid)
+    cases = _Cases(scene.parameters(), count, np.random.default_rng(seed), grid)
     for name, value in given.items():
         try:
             cases.add(name, value, names)
@@ -67,6 +48,34 @@ def ensemble(table, scene, mistakes, names):
         mistakes.add(path, f"ensemble: {error}")
         return {}
     return {"parameters": found, "cases": cases.count, "keep": keep, "assemble": assemble}
+
+
+def _whole(table, key, default, mistakes):
+    """A whole number of a table, within its limits."""
+    value = table.get(key, default)
+    if key not in table:
+        return default
+    if isinstance(value, bool) or not isinstance(value, int) or not LEAST[key] <= value <= MOST:
+        reason = f"it must be a whole number from {LEAST[key]} to {MOST}."
+        mistakes.add_value(("ensemble", key), f"ensemble: {key}", value, reason)
+    return value
+
+
+def _choices(table, scene, mistakes):
+    """The values of grid, keep and assemble."""
+    grid, keep, assemble = table.get("grid", False), table.get("keep", KEEPS[0]), table.get("assemble", False)
+    bodies = [] if scene is None else [body.name for body in scene.bodies]
+    listed = isinstance(assemble, list) and all(isinstance(name, str) for name in assemble)
+    known = isinstance(assemble, bool) or (listed and (scene is None or all(name in bodies for name in assemble)))
+    example = f'["{bodies[0] if bodies else "crank"}"]'
+    for key, value, right, reason in (
+        ("grid", grid, isinstance(grid, bool), "it must be true or false."),
+        ("keep", keep, keep in KEEPS, "it must be 'final' or 't_eval'."),
+        ("assemble", assemble, known, f"it must be true, false or names of bodies such as {example}."),
+    ):
+        if not right:
+            mistakes.add_value(("ensemble", key), f"ensemble: {key}", value, reason)
+    return grid, keep, assemble
 
 
 class _Cases:

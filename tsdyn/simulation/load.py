@@ -18,23 +18,27 @@ if TYPE_CHECKING:
 
     from ..hints import Place
 
-READS = ".toml (a scene), .h5, .hdf5, .nc or .zarr (a solution or an ensemble)"
+SCENES = (".toml", ".urdf", ".xml", ".mjcf", ".sdf", ".world")
+READS = f"{', '.join(SCENES)} (a scene), .h5, .hdf5, .nc or .zarr (a solution or an ensemble)"
 LOADERS = {}  # of files of packages above: by the name of the format, a function of path, scene and allow_code
 
 
 @fitting
-def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -> Any:
+def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, free_base: bool = False) -> Any:
     """Return the scene, solution or ensemble of a file; nothing in it is executed.
 
     Parameters
     ----------
     path : str or PathLike
-        A scene file (.toml), or a solution or ensemble (.h5, .hdf5, .nc, .zarr) that its method `save` has written.
+        A scene file (.toml); a URDF, MJCF or SDF file (.urdf, .xml, .mjcf, .sdf, .world); or a solution or ensemble
+        (.h5, .hdf5, .nc, .zarr) that its method `save` has written.
     scene : Scene, optional
         That of a solution or ensemble whose file holds none, because the scene has functions or classes of your own.
     allow_code : bool
         Whether modules that a file names as those of plug-ins may be imported. Plug-ins that have been imported
         before are found anyway.
+    free_base : bool
+        Whether the root link of a URDF is free to move; else it is fixed to the ground.
 
     Returns
     -------
@@ -46,6 +50,13 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
         If a scene file has mistakes; lists all with their lines.
     StorageError
         If a file can't be read, is damaged, foreign, or of a later version.
+    MissingDependency
+        If the parser of a format is not installed: `pip install 'tsdyn[import]'`.
+
+    Warns
+    -----
+    ImportLosses
+        If a URDF, MJCF or SDF file has what can't be carried over; `scene.imported` lists each.
 
     Examples
     --------
@@ -60,11 +71,17 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
     demand_path(path, "path")
     if not isinstance(allow_code, bool):
         raise InvalidArgument(f"allow_code must be True or False, got {allow_code!r}.")
+    if not isinstance(free_base, bool):
+        raise InvalidArgument(f"free_base must be True or False, got {free_base!r}.")
     suffix = Path(path).suffix.lower()
-    if suffix == ".toml":
+    if suffix in SCENES:
         if scene is not None:
             raise InvalidArgument("scene= is for solutions; a scene file holds its own.")
-        return scene_file(path, allow_code)[0]
+        return scene_file(path, allow_code, free_base)[0]
+    if free_base:
+        raise InvalidArgument("free_base= is for URDF files.")
+    if suffix == ".xacro":
+        raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
     from ..storage.formats import SUFFIXES
     from ..storage.saved_file import kind_of
     from .saved_solutions import load as load_solution
@@ -77,8 +94,14 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False) -
     return load_solution(path, scene, allow_code, (Scene, Solution))
 
 
-def scene_file(path: Place, allow_code: bool = False) -> tuple[Scene, dict[str, Any]]:
-    """Return the scene of a TOML file, and the arguments of `simulate` that its table `run` asks for."""
+def scene_file(path: Place, allow_code: bool = False, free_base: bool = False) -> tuple[Scene, dict[str, Any]]:
+    """Return the scene of a file, and the arguments of `simulate` that the table `run` of a TOML file asks for."""
+    if Path(path).suffix.lower() != ".toml":
+        from ..importing.reading import load as imported
+
+        return imported(path, Scene, free_base), {}
+    if free_base:
+        raise InvalidArgument("free_base= is for URDF files.")
     return document_of(path, allow_code)[:2]
 
 

@@ -33,13 +33,19 @@ def origin_of(packed, q):
 def are_near(packed, q):
     """Which of many positions (k, n) are such that the scene's origin serves: `origin_of` is None."""
     grounded, longest = _grounded(packed)
+    return are_within(packed, q, [corner[None] for corner in grounded], longest)
+
+
+def are_within(packed, q, grounded, longest):
+    """The same with other ground points, (k, 3) or (1, 3) each, and other longest levers (k,)."""
     near = np.abs(q).max(axis=1) <= FAR_ORIGIN * longest
     if near.all():
         return near
-    low, high = _box(packed, q, grounded)
+    low, high = _box(packed, q, ())
+    for points in grounded:
+        low, high = np.minimum(low, points), np.maximum(high, points)
     size = np.maximum((high - low).max(axis=-1), longest)
-    near |= ~((size > 0.0) & (np.abs(0.5 * (low + high)).max(axis=-1) > FAR_ORIGIN * size))
-    return near
+    return near | ~((size > 0.0) & (np.abs(0.5 * (low + high)).max(axis=-1) > FAR_ORIGIN * size))
 
 
 def _grounded(packed):

@@ -32,6 +32,7 @@ from .editing import copy as _copy
 from .editing import remove as _remove
 from .inverse_dynamics import inverse_dynamics as _inverse_dynamics
 from .kinematics import kinematics as _kinematics
+from .scene_imported import OfFile
 from .scene_saving import save as _save
 from .scene_table import summary, table
 from .statics import equilibrium as _equilibrium
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
 
 
 @fitting_methods
-class Scene:
+class Scene(OfFile):
     """Bodies, constraints, forces and gravity.
 
     Parameters
@@ -293,9 +294,9 @@ class Scene:
         self._packed = self._start = self._prepared = None
 
     def touch_start(self) -> None:
-        """Discard what depends on the start, after a change of it: rows that are redundant, bodies that turn there."""
+        """Discard what depends on the start, after a change of it: redundant rows, bodies that turn, a local origin."""
         known = None if self._packed is None else self._packed.derived
-        if known is not None and (known.redundant is not None or known.turning):
+        if known is not None and (known.redundant is not None or known.turning or known.local is not None):
             self.touch()
         elif known is not None:
             known.family = None

@@ -35,7 +35,8 @@ def run_data(solution: Any, shapes: Any = None, trails: Any = None) -> dict[str,
         raise InvalidArgument("view: the solution has no outputs, so there is nothing to show.")
     packed = solution.packed
     constraints, forces = attached(packed)
-    user = by_body({} if shapes is None else shapes, solution.handles, solution.scene.ground)
+    user = by_body(solution.scene.shapes, solution.handles, solution.scene.ground)
+    user |= by_body({} if shapes is None else shapes, solution.handles, solution.scene.ground)
     per_frame = 20 * len(packed.bodies) + 6 * 2 * (len(constraints) + len(forces))
     frames = resample(solution, int(np.clip(ROOM // per_frame, FEWEST, FRAMES)))
     points = joint_points([*constraints, *forces], len(packed.bodies))

@@ -1,19 +1,33 @@
 """A ts.Scene in Exudyn: bodies with Euler parameters, joints by multipliers, generalised-alpha of index 3 or trapezoid.
 
-It takes the constraints and forces of the gallery of hard cases and of stiff scenes.
+`refused` names what it has no counterpart for.
 """
 
 import time
 
 import numpy as np
 
-from tsdyn.elements.bodies import rotation_matrix
+from ..elements.bodies import rotation_matrix
 
 LOCKED = {  # displacements along and rotations about the axes of a joint, the last of which is its own
     "Revolute": (1, 1, 1, 1, 1, 0),
+    "Cylindrical": (1, 1, 0, 1, 1, 0),
+    "Planar": (0, 0, 1, 1, 1, 0),
+    "Fixed": (1, 1, 1, 1, 1, 1),
     "Translational": (1, 1, 0, 1, 1, 1),
     "PlaneContact": (0, 0, 1, 0, 0, 0),
 }
+TAKEN = (
+    *LOCKED,
+    "EulerNormalization",
+    "Spherical",
+    "Distance",
+    "Spring",
+    "TorsionalSpring",
+    "Bushing",
+    "Torque",
+    "PointForce",
+)
 OUTPUTS = 200
 MANY = 100  # bodies from which on the sparse solver is the faster one
 
@@ -24,6 +38,30 @@ def frame(z, x=None):
     x = np.cross(np.eye(3)[np.abs(z).argmin()], z) if x is None else np.asarray(x, float)
     x = x / np.linalg.norm(x)
     return np.stack((x, np.cross(z, x), z), axis=1)
+
+
+def refused(scene):
+    """Constraints and forces of a scene that have no counterpart, with the reason."""
+    found = [(item, f"{item._kind()} has no counterpart") for item in (*scene.constraints, *scene.forces)
+             if item._kind() not in TAKEN]  # fmt: skip
+    for item in scene.forces:
+        load = {"Torque": "torque", "PointForce": "force", "Spring": "actuator", "TorsionalSpring": "actuator"}.get(
+            item._kind()
+        )
+        if load and not _is_plain(item, load):
+            found.append((item, f"{load} must be constant, in ground axes"))
+        elif load == "actuator" and getattr(item, load):
+            found.append((item, "an actuator has no counterpart"))
+    return found
+
+
+def _is_plain(item, load):
+    """Whether a load is constant, in the ground frame."""
+    try:
+        value = np.asarray(getattr(item, load), float)
+    except (TypeError, ValueError):
+        return False
+    return bool(np.isfinite(value).all()) and getattr(item, "frame", "ground") == "ground"
 
 
 class ExudynScene:
@@ -44,8 +82,10 @@ class ExudynScene:
             getattr(self, f"_{type(item).__name__.lower()}", self._joint)(item)
         output = exu.OutputVariableType
         kinds = output.Position, output.RotationMatrix, output.Velocity, output.AngularVelocityLocal
-        kinds = kinds[:1] if self.particles else kinds
-        self.sensors = [[self._sensor(body, kind) for body in scene.bodies] for kind in kinds]
+        self.sensors = [
+            [self._sensor(body, kind) for body in scene.bodies if not i % 2 or body not in self.particles]
+            for i, kind in enumerate(kinds)
+        ]
         self.mbs.Assemble()
 
     def _particle(self, body):
@@ -73,6 +113,10 @@ class ExudynScene:
         return self.mbs.AddSensor(
             self.ex.SensorBody(bodyNumber=self.bodies[body], storeInternal=True, outputVariableType=kind)
         )
+
+    def _pointforce(self, load):
+        one = self._marker(load.a, load.coordinates[0])
+        self.mbs.AddLoad(self.ex.LoadForceVector(markerNumber=one, loadVector=list(load.force)))
 
     def _eulernormalization(self, _):
         """Exudyn has its own."""
@@ -111,7 +155,7 @@ class ExudynScene:
         pair = [self._marker(b, (0.0, 0.0, 0.0), A) for b, A in zip((spring.a, spring.b), turns, strict=True)]
         self.mbs.AddObject(
             self.ex.ObjectConnectorTorsionalSpringDamper(
-                markerNumbers=pair, stiffness=spring.stiffness, damping=spring.damping
+                markerNumbers=pair, stiffness=spring.stiffness, damping=spring.damping, offset=spring.free_angle
             )
         )
 
@@ -134,7 +178,7 @@ class ExudynScene:
         self.mbs.AddLoad(self.ex.LoadTorqueVector(markerNumber=one, loadVector=list(motor.torque)))
 
     def run(self, end, step, outputs=OUTPUTS, dependent=False, solver=None):
-        """((r, A, v, omega) at the outputs, seconds), r alone where there are particles; None where the solver gave up.
+        """((r, A, v, omega) at the outputs, seconds); None where the solver gave up. Particles have no A and omega.
 
         With dependent rows by a dense solver that allows for these. solver: the name of a DynamicSolverType.
         """
@@ -157,9 +201,12 @@ class ExudynScene:
         seconds = time.perf_counter() - begun
         if not done:
             return None
-        found = [
-            np.stack([np.asarray(self.mbs.GetSensorStoredData(one))[:, 1:] for one in row], axis=1)
-            for row in self.sensors
-        ]
-        found[1:2] = [A.reshape(*A.shape[:2], 3, 3) for A in found[1:2]]
+        self.times = np.asarray(self.mbs.GetSensorStoredData(self.sensors[0][0]))[:, 0]
+        found = [self._stored(row) for row in self.sensors]
+        found[1] = found[1].reshape(*found[1].shape[:2], 3, 3)
         return tuple(found), seconds
+
+    def _stored(self, row):
+        """What sensors have stored, (outputs, sensors, numbers)."""
+        stored = [np.asarray(self.mbs.GetSensorStoredData(one))[:, 1:] for one in row]
+        return np.stack(stored, axis=1) if stored else np.zeros((len(self.times), 0, 9))

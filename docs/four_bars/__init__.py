@@ -1,0 +1,1 @@
+"""The same four-bar in other programs; data.py has its numbers."""

@@ -1,0 +1,195 @@
+"""Imported files against the engines that the formats come from: accelerations at random states."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from tests.helpers import link_motions
+from tests.helpers.tolerances import CLOSE, FINE
+
+MODELS = Path(__file__).parent / "models"
+
+
+def load(path, **options):
+    with warnings.catch_warnings(action="ignore", category=ts.ImportLosses):
+        return ts.load(path, **options)
+
+
+def without_forces(scene):
+    for force in scene.forces:
+        scene.remove(force)
+    return scene
+
+
+def pinocchio_motions(path, names, rng, free_base, scene=None):
+    """A random state of a tree without damping, by Pinocchio."""
+    pin = pytest.importorskip("pinocchio")
+    base = (pin.JointModelFreeFlyer(),) if free_base else ()
+    model = pin.buildModelFromUrdf(str(path), *base)
+    model.armature[:] = model.damping[:] = model.friction[:] = 0.0
+    q = pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq))
+    v = rng.normal(size=model.nv)
+    qdd = pin.aba(model, model.createData(), q, v, np.zeros(model.nv))
+    return link_motions.of_pinocchio(model, q, v, qdd, names)
+
+
+def mujoco_motions(path, names, rng, actuated=True):
+    """A random state by MuJoCo: contacts, limits, friction and equality constraints off, armature zero."""
+    mujoco = pytest.importorskip("mujoco")
+    spec = mujoco.MjSpec.from_file(str(path))
+    spec.compiler.fusestatic = False
+    model, off = spec.compile(), mujoco.mjtDisableBit
+    model.dof_armature[:] = model.body_gravcomp[:] = model.opt.density = model.opt.viscosity = 0.0
+    model.opt.disableflags |= off.mjDSBL_CONTACT | off.mjDSBL_LIMIT | off.mjDSBL_FRICTIONLOSS | off.mjDSBL_EQUALITY
+    if not actuated:
+        model.opt.disableflags |= off.mjDSBL_ACTUATION
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = model.qpos0, rng.normal(size=model.nv)
+    mujoco.mj_integratePos(model, data.qpos, 0.5 * rng.normal(size=model.nv), 1.0)
+    mujoco.mj_forward(model, data)
+    mujoco.mj_rnePostConstraint(model, data)
+    return link_motions.of_mujoco(model, data, names)
+
+
+def names_of(scene):
+    return [body.name for body in scene.bodies]
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_urdf_has_the_accelerations_of_pinocchio(free):
+    pytest.importorskip("lxml")
+    scene = without_forces(load(MODELS / "arm.urdf", free_base=free))
+    motions = link_motions.read("imported_arm_free" if free else "imported_arm")
+    link_motions.place(scene, motions)
+    assert np.abs(scene.evaluate().Phi).max() < FINE
+    assert link_motions.acceleration_error(scene, motions) < FINE
+
+
+def test_mjcf_has_the_accelerations_of_mujoco():
+    pytest.importorskip("lxml")
+    pytest.importorskip("mujoco")
+    scene = load(MODELS / "leg.xml")
+    motions = link_motions.read("imported_leg")
+    link_motions.place(scene, motions)
+    assert np.abs(scene.evaluate().Phi).max() < FINE
+    assert link_motions.acceleration_error(scene, motions) < FINE
+
+
+@pytest.mark.slow
+def test_references_are_those_of_the_engines():
+    pytest.importorskip("pinocchio")
+    for name, free in (("imported_arm", False), ("imported_arm_free", True)):
+        scene = without_forces(load(MODELS / "arm.urdf", free_base=free))
+        motions = pinocchio_motions(MODELS / "arm.urdf", names_of(scene), np.random.default_rng(1), free)
+        link_motions.place(scene, motions)
+        assert link_motions.acceleration_error(scene, motions) < FINE, name
+    scene = load(MODELS / "leg.xml")
+    motions = mujoco_motions(MODELS / "leg.xml", names_of(scene), np.random.default_rng(1))
+    link_motions.place(scene, motions)
+    assert link_motions.acceleration_error(scene, motions) < FINE
+
+
+TREES = {  # of example-robot-data: whether the base is free
+    "ur_description/urdf/ur5_robot.urdf": False,
+    "panda_description/urdf/panda.urdf": False,
+    "kinova_description/robots/kinova.urdf": False,
+    "z1_description/urdf/z1.urdf": False,
+    "xarm_description/urdf/xarm7.urdf": False,
+    "go2_description/urdf/go2.urdf": True,
+    "anymal_c_simple_description/urdf/anymal.urdf": True,
+    "solo_description/robots/solo12.urdf": True,
+    "hyq_description/robots/hyq_no_sensors.urdf": True,
+    "g1_description/urdf/g1_29dof_rev_1_0.urdf": True,
+    "human_description/robots/human.urdf": True,
+    "allegro_hand_description/urdf/allegro_right_hand.urdf": False,
+}
+
+
+def robots():
+    """The folder of example-robot-data, from the registry."""
+    pytest.importorskip("pinocchio")
+    from importlib.metadata import PackageNotFoundError, files
+
+    try:
+        found = next(path for path in files("example-robot-data") if path.name == "ur5_robot.urdf")
+    except PackageNotFoundError:
+        pytest.skip("pip install example-robot-data")
+    return Path(found.locate()).resolve().parents[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", TREES)
+def test_public_trees(model):
+    path, free = robots() / model, TREES[model]
+    scene = without_forces(load(path, free_base=free))
+    for item in [item for item in scene.constraints if type(item) is ts.constraints.Gear]:
+        scene.remove(item)
+    for seed in range(3):
+        motions = pinocchio_motions(path, names_of(scene), np.random.default_rng(seed), free)
+        link_motions.place(scene, motions)
+        assert link_motions.acceleration_error(scene, motions) < CLOSE
+
+
+SUITE = (
+    "humanoid",
+    "humanoid_CMU",
+    "dog",
+    "quadruped",
+    "cheetah",
+    "walker",
+    "hopper",
+    "stacker",
+    "cartpole",
+    "reacher",
+)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:compiler attribute")  # of MuJoCo
+@pytest.mark.parametrize("model", SUITE)
+def test_public_trees_of_mujoco(model):
+    import sys
+    from importlib.util import find_spec
+
+    pytest.importorskip("mujoco")
+    found = find_spec("dm_control") or pytest.skip("pip install --no-deps dm-control")
+    assert "dm_control" not in sys.modules  # its files alone are read
+    path = Path(found.submodule_search_locations[0]) / "suite" / f"{model}.xml"
+    scene = load(path)
+    for force in [force for force in scene.forces if force.name.endswith(" actuator")]:
+        scene.remove(force)
+    for seed in range(3):
+        motions = mujoco_motions(path, names_of(scene), np.random.default_rng(seed), actuated=False)
+        link_motions.place(scene, motions)
+        assert link_motions.acceleration_error(scene, motions) < CLOSE
+
+
+@pytest.mark.slow
+def test_closed_loops_of_cassie(tmp_path):
+    """Its rods have balls at both ends here, as the robot has: the hinges of the file hold what the loop holds too."""
+    from tests.helpers import sdf_in_pinocchio
+
+    source = (robots() / "cassie_description/robots/cassie_v2.sdf").read_text()
+    import pinocchio as pin
+
+    for joint in ("achilles-spring-joint", "crank-rod-joint"):
+        for side in ("left", "right"):
+            hinge = f'name="{side}-{joint}" type="revolute"'
+            assert hinge in source
+            source = source.replace(hinge, hinge.replace("revolute", "ball"))
+    path = tmp_path / "cassie.sdf"
+    path.write_text(source)
+    scene, rng = without_forces(load(path)), np.random.default_rng(0)
+    assert len(scene.mobility().redundant) == 0
+    model, loops = sdf_in_pinocchio.model_of(path)
+    for _ in range(3):
+        start = pin.integrate(model, pin.neutral(model), 0.2 * rng.normal(size=model.nv))
+        q, v = sdf_in_pinocchio.closed(model, loops, start, rng)
+        qdd = sdf_in_pinocchio.accelerations(model, loops, q, v)
+        motions = link_motions.of_pinocchio(model, q, v, qdd, names_of(scene))
+        link_motions.place(scene, motions)
+        assert np.abs(scene.evaluate().Phi).max() < FINE
+        assert link_motions.acceleration_error(scene, motions) < CLOSE

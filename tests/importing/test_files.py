@@ -1,0 +1,242 @@
+"""URDF, MJCF and SDF files as scenes: bodies, joints, forces, frames, shapes, and what is left out."""
+
+import pickle
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from tests.helpers.tolerances import ALGEBRA, CLOSE, ROUNDING
+
+pytest.importorskip("lxml")
+MODELS = Path(__file__).parent / "models"
+BODY = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
+
+TRIANGLE = "solid a\nfacet\nouter loop\nvertex 0 0 0\nvertex 1000 0 0\nvertex 0 1000 0\nendloop\nendfacet\nendsolid\n"
+
+
+def load(path, **options):
+    with warnings.catch_warnings(action="ignore", category=ts.ImportLosses):
+        return ts.load(path, **options)
+
+
+def text(folder, content, name="robot.urdf"):
+    path = folder / name
+    path.write_text(content)
+    return path
+
+
+def mujoco():
+    return pytest.importorskip("mujoco")
+
+
+def left_out(scene):
+    return {what: [entry.where for entry in entries] for what, entries in scene.imported.groups().items()}
+
+
+def test_urdf():
+    with pytest.warns(ts.ImportLosses, match="limits of a joint"):
+        scene = ts.load(MODELS / "arm.urdf")
+    assert [body.name for body in scene.bodies] == ["table", "cross", "arm", "ram"]
+    assert [type(item).__name__ for item in scene.constraints[:4]] == [
+        "Revolute",
+        "Revolute",
+        "Revolute",
+        "Translational",
+    ]
+    assert scene["turn spring"].damping == 0.4
+    assert scene.mobility().degrees_of_freedom == 4
+    assert np.isclose(sum(body.mass for body in scene.bodies), 4.0 + 2.5 + 0.8 + 0.3, rtol=ROUNDING)
+    assert scene.imported.format == "URDF"
+    lost = left_out(scene)
+    assert lost["limits of a joint"] == ["lift", "roll", "push"]
+    assert lost["mesh that is not found"] == ["arm"]
+    assert lost["friction of a joint"] == ["turn"]
+    assert "element <transmission>" in lost
+    assert "merged into ram" in str(scene.imported)
+    assert "limits of a joint (3): lift [-1, 2]" in str(scene.imported)
+
+
+def test_frames_of_merged_links():
+    scene = load(MODELS / "arm.urdf")
+    tool, camera = scene.imported.frames["tool"], scene.imported.frames["camera"]
+    assert tool.body == camera.body == "ram"
+    assert np.allclose(camera.position - tool.position, tool.rotation @ (0, 0.1, 0), atol=ROUNDING)
+
+
+def test_free_base():
+    scene = load(MODELS / "arm.urdf", free_base=True)
+    assert scene.mobility().degrees_of_freedom == 10
+    with pytest.raises(ts.InvalidArgument, match="free_base is for URDF"):
+        ts.load(MODELS / "four_bar.sdf", free_base=True)
+
+
+def test_joint_angles_have_the_signs_of_the_file():
+    scene = load(MODELS / "arm.urdf")
+    scene.set("turn", rate=2.0)
+    solution = ts.simulate(scene, (0.0, 1e-3))
+    assert solution.angle("turn")[-1] > 0.0
+
+
+def test_shapes():
+    scene = load(MODELS / "arm.urdf")
+    found = scene.shapes
+    assert [type(shape).__name__ for shape in found["ground"]] == ["Box"]
+    cylinder = found["table"][0]
+    assert (cylinder.radius, cylinder.length, cylinder.colour) == (0.1, 0.2, "#3366cc")
+    centroid = -scene.imported.frames["table"].position
+    assert np.allclose(cylinder.position, (0, 0, 0.1) - centroid, atol=ROUNDING)
+    assert ts.Scene().shapes == {}
+
+
+def test_the_viewer_draws_them(tmp_path):
+    scene = load(MODELS / "arm.urdf")
+    page = ts.simulate(scene, (0.0, 0.01)).view(tmp_path / "arm.html")
+    assert "#3366cc" in page.read_text()
+
+
+def test_meshes_are_found(tmp_path):
+    (tmp_path / "arm" / "meshes").mkdir(parents=True)
+    (tmp_path / "arm" / "meshes" / "arm.stl").write_text(TRIANGLE)
+    (tmp_path / "arm" / "urdf").mkdir()
+    scene = load(text(tmp_path / "arm" / "urdf", (MODELS / "arm.urdf").read_text()))
+    assert "mesh that is not found" not in left_out(scene)
+    assert np.isclose(scene.shapes["arm"][0].vertices.max(), 1.0)
+
+
+def test_a_scene_goes_to_toml_and_back(tmp_path):
+    scene = load(MODELS / "arm.urdf")
+    again = ts.load(scene.save(tmp_path / "arm.toml"))
+    assert (again.evaluate().qdd == scene.evaluate().qdd).all()
+
+
+def test_copies_keep_the_report():
+    scene = load(MODELS / "arm.urdf")
+    for twin in (scene.copy(), pickle.loads(pickle.dumps(scene)), scene.with_parameters({"table.mass": 5.0})):
+        assert str(twin.imported) == str(scene.imported)
+        assert twin.shapes.keys() == scene.shapes.keys()
+
+
+def test_mimicking_joints_are_gears(tmp_path):
+    links = "".join(f"<link name='{name}'>{BODY}</link>" for name in ("base", "one", "two", "three"))
+    joint = (
+        "<joint name='{0}' type='revolute'><parent link='base'/><child link='{0}'/><origin xyz='{1} 0 0'/>"
+        "<axis xyz='{2}'/>{3}</joint>"
+    )
+    mimic = "<mimic joint='one' multiplier='-2' offset='0.3'/>"
+    joints = joint.format("one", 0, "0 0 1", "") + joint.format("two", 1, "0 0 -1", mimic)
+    joints += joint.format("three", 2, "0 1 0", mimic)
+    scene = load(text(tmp_path, f"<robot name='r'>{links}{joints}</robot>"))
+    assert left_out(scene) == {"joint that mimics another one": ["three mimics one"]}
+    scene.body("one").angular_velocity = (0, 0, 1)
+    scene.assemble(fixed=["one"])
+    state = ts.simulate(scene, (0.0, 0.5)).state
+    assert np.isclose(state.angle("two"), -2.0 * state.angle("one"), rtol=CLOSE)
+
+
+def test_links_without_mass_at_the_end_are_held(tmp_path):
+    joint = "<joint name='{0}' type='continuous'><parent link='{1}'/><child link='{2}'/></joint>"
+    content = f"<link name='base'/><link name='arm'>{BODY}</link><link name='tip'/><link name='nail'/>"
+    content += joint.format("a", "base", "arm") + joint.format("b", "arm", "tip") + joint.format("c", "tip", "nail")
+    scene = load(text(tmp_path, f"<robot name='r'>{content}</robot>"))
+    assert [body.name for body in scene.bodies] == ["arm"]
+    assert sorted(left_out(scene)["joint of a link without mass, held"]) == ["b", "c"]
+    assert scene.imported.frames["nail"].body == "arm"
+
+
+def test_inertia_of_no_solid_is_carried_over(tmp_path):
+    body = BODY.replace("izz='1'", "izz='5'")
+    scene = load(text(tmp_path, f"<robot name='r'><link name='arm'>{body}</link></robot>"), free_base=True)
+    assert scene.body("arm").inertia.diagonal().tolist() == [1, 1, 5]
+    assert "the largest exceeds the sum" in str(scene.imported)
+
+
+def test_mjcf():
+    mujoco()
+    scene = load(MODELS / "leg.xml")
+    assert [body.name for body in scene.bodies] == ["ball", "trunk", "thigh/hip_x", "thigh", "body4", "rod"]
+    assert scene.gravity.tolist() == [0, 0, -9.5]
+    assert type(scene["rooty"]).__name__ == "Planar"
+    assert np.isclose(scene["hip_y spring"].free_angle, np.deg2rad(20 - 15), rtol=ROUNDING)
+    assert (scene["servo"].stiffness, scene["servo"].damping) == (30.0, 0.5)
+    assert (scene["cord"].stiffness, scene["cord"].free_length) == (40.0, 0.3)
+    lost = left_out(scene)
+    assert lost["armature of a joint"] == ["hip_x", "hip_y"]
+    assert lost["motor"] == ["drive"]
+    assert lost["equality that is not active"] == ["loop"]
+    assert len(lost["contact shape"]) == 6
+    assert [type(shape).__name__ for shape in scene.shapes["ball"]] == ["Sphere"]
+
+
+def test_the_kind_of_an_xml_is_told_by_its_root(tmp_path):
+    mujoco()
+    kinds = [load(text(tmp_path, (MODELS / name).read_text(), "file.xml")).imported.format
+             for name in ("arm.urdf", "four_bar.sdf")]  # fmt: skip
+    assert kinds == ["URDF", "SDF"]
+    assert load(MODELS / "leg.xml").imported.format == "MJCF"
+
+
+def test_loops_of_mjcf(tmp_path):
+    mujoco()
+    content = (
+        (MODELS / "leg.xml").read_text().replace('active="false"', "").replace("ball.xml", str(MODELS / "ball.xml"))
+    )
+    scene = load(text(tmp_path, content, "leg.xml"))
+    assert type(scene["loop"]).__name__ == "Spherical"
+    assert "are closed by assembly" in str(scene.imported)
+    assert np.abs(scene.evaluate().Phi).max() < CLOSE
+
+
+def test_sdf():
+    scene = load(MODELS / "four_bar.sdf")
+    assert scene.mobility().degrees_of_freedom == 1
+    assert left_out(scene) == {
+        "contact shape": ["coupler"], "friction of a joint": ["motor"], "limits of a joint": ["bearing"],
+        "element <plugin>": ["line 30"],
+    }  # fmt: skip
+    twin = four_bar_by_hand()
+    assert np.abs(scene.evaluate().qdd - twin.evaluate().qdd).max() < ALGEBRA
+
+
+def four_bar_by_hand():
+    """The mechanism of four_bar.sdf."""
+    scene, C = ts.Scene(), ts.constraints
+
+    def about_y(angle):
+        return np.array([np.cos(angle / 2), 0, np.sin(angle / 2), 0])
+
+    def link(origin, angle, name, mass, inertia, centroid):
+        c, s = np.cos(angle), np.sin(angle)
+        A = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+        body = scene.add_body(mass, inertia, origin + A @ centroid, about_y(angle), name=name)
+        return body, A
+
+    crank, A = link(np.zeros(3), np.deg2rad(-30), "crank", 1.2, (0.003, 0.02, 0.02), np.array([0.2, 0, 0]))
+    pin = A @ (0.4, 0, 0)
+    turned = np.array([[1, 0, 0], [0, np.cos(0.1), -np.sin(0.1)], [0, np.sin(0.1), np.cos(0.1)]])
+    J = turned @ np.array([[0.01, 0, 0.004], [0, 0.2, 0], [0.004, 0, 0.2]]) @ turned.T
+    coupler, _ = link(pin, np.deg2rad(-30) + 0.4, "coupler", 2.0, J, np.array([0.6, 0.01, 0]))
+    rocker, A = link(np.array([1.5, 0, 0]), -1.3, "rocker", 1.5, (0.004, 0.08, 0.08), np.array([0.4, 0, 0]))
+    hinge = np.array([1.5, 0, 0]) + A @ (0.8, 0, 0)
+    scene.add(C.Revolute.at("ground", crank, point=(0, 0, 0), axis=(0, 1, 0)))
+    scene.add(C.Spherical.at(crank, coupler, point=pin))
+    scene.add(C.Revolute.at("ground", rocker, point=(1.5, 0, 0), axis=(0, 1, 0)))
+    scene.add(C.Revolute.at(coupler, rocker, point=hinge, axis=(0, 1, 0)))
+    spring = {"stiffness": 2.0, "free_angle": 0.1}
+    scene.add(ts.forces.TorsionalSpring.at(coupler, rocker, axis=(0, 1, 0), **spring))
+    return scene
+
+
+def test_screws_and_universal_joints_of_sdf(tmp_path):
+    link = "<link name='{0}'><inertial><mass>1</mass></inertial></link>"
+    joint = "<joint name='{0}' type='{1}'><parent>{2}</parent><child>{3}</child><axis><xyz>{4}</xyz></axis>{5}</joint>"
+    axis2, pitch = "<axis2><xyz>{}</xyz></axis2>", "<screw_thread_pitch>0.02</screw_thread_pitch>"
+    screw = joint.format("s", "screw", "world", "a", "0 0 1", pitch)
+    cross = joint.format("u", "universal", "a", "b", "1 0 0", axis2.format("0 1 0"))
+    bent = joint.format("v", "revolute2", "a", "c", "1 0 0", axis2.format("1 1 0"))
+    content = "".join(link.format(name) for name in "abc") + screw + cross + bent
+    scene = load(text(tmp_path, f"<sdf version='1.10'><model name='m'>{content}</model></sdf>", "m.sdf"))
+    assert np.isclose(scene["s"].lead, 0.02 / (2 * np.pi))
+    assert scene.mobility().degrees_of_freedom == 1 + 2 + 2

@@ -1,0 +1,10 @@
+"""Files of robots and mechanisms in URDF, MJCF and SDF, read as scenes. Nothing of a file is executed.
+
+Imports constraints, forces, shapes and what lies below them, and the mistakes of `files`; the class of the scene is
+passed in.
+
+Begin with reading.py: the kind of a file, and the way from a file to a scene. urdf.py, sdf.py and mjcf.py each make a
+`Description` (description.py) in the ground frame; merging.py joins links that are fixed to each other; massless.py
+gives massless links a share of their neighbours' mass; building.py adds bodies, joints and forces to a scene.
+report.py lists what can't be carried over.
+"""

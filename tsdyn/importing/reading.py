@@ -1,0 +1,88 @@
+"""A scene of a file of another program; the kind of an .xml is told by its root element."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InvalidArgument, TsdynError
+from ..observables.diagnostics import constraint_error
+from . import mjcf, sdf, urdf
+from .building import build
+from .massless import complete
+from .merging import merge
+from .report import ImportReport
+from .slides import gather
+from .tolerances import NO_MASS, OPEN
+from .xml_file import read
+
+if TYPE_CHECKING:
+    from ..hints import Callable, Place, Scene
+
+SUFFIXES = (".urdf", ".xml", ".mjcf", ".sdf", ".world")
+FORMATS = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF", "gazebo": "SDF"}
+
+
+def load(path: Place, make: Callable[..., Scene], free_base: bool) -> Scene:
+    """The scene of a URDF, MJCF or SDF file; arguments and errors as of `ts.load`.
+
+    Parameters
+    ----------
+    path : str or PathLike
+    make : callable
+        Of an empty scene: `Scene`.
+    free_base : bool
+        Whether the root link of a URDF is free.
+    """
+    root, mistakes = read(path)
+    kind, folder = FORMATS.get(root.tag), Path(path).parent
+    if kind is None:
+        known = "<robot> of URDF, <mujoco> of MJCF, <sdf> of SDF"
+        root.wrong(f"the root element <{root.tag}> is of no known format; there are {known}.")
+        mistakes.demand_none()
+    if free_base and kind != "URDF":
+        raise InvalidArgument(f"free_base is for URDF, where the file doesn't say it; {path} is {kind}.")
+    report = ImportReport(str(path), kind)
+    if kind == "URDF":
+        description = urdf.describe(root, folder, report, free_base)
+    elif kind == "SDF":
+        description = sdf.describe(root, folder, report)
+    else:
+        description = mjcf.describe(root, Path(path), report)
+    mistakes.demand_none()
+    return _scene(description, make, report, mistakes)
+
+
+def _scene(description: Any, make: Any, report: ImportReport, mistakes: Any) -> Scene:
+    """Merge, complete and build; a body or joint that can't be built is a mistake of the file."""
+    merge(description, report)
+    gather(description, report)
+    complete(description, report)
+    if not description.links or not any(link.mass > NO_MASS for link in description.links.values()):
+        mistakes.add((1, 1), "no link moves: all are fixed to the ground, or have no mass.")
+    mistakes.demand_none()
+    try:
+        scene = build(description, make, report)
+    except TsdynError as error:
+        mistakes.add((1, 1), str(error))
+        mistakes.demand_none()
+    if any(joint.loop for joint in description.joints):
+        _close(scene, report)
+    report.warn()
+    return scene
+
+
+def _close(scene: Scene, report: ImportReport) -> None:
+    """Assemble a scene whose loops are open at the start."""
+    q, qd = scene.start
+    rest = np.zeros((1, q.size))
+    gap = float(constraint_error(scene.packed, np.zeros(1), q[None], qd[None], rest).position[0])
+    if gap <= OPEN:
+        return
+    try:
+        scene.assemble()
+        report.note(f"loops that were open by up to {gap:.2g} are closed by assembly")
+    except TsdynError as error:
+        report.note(f"loops are open by up to {gap:.2g}, and can't be closed: {error}")

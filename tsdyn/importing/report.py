@@ -1,0 +1,112 @@
+"""What became of a file: what was left out, what was carried over in another way, and where its frames are."""
+
+from __future__ import annotations
+
+import html
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..errors import ImportLosses
+from ..validation import counted
+
+if TYPE_CHECKING:
+    from ..hints import Any
+
+SHOWN = 8  # names of a group in a text
+
+
+class LeftOut(NamedTuple):
+    """A thing that the scene lacks: what it is, its name in the file, and its numbers or the reason."""
+
+    what: str
+    where: str
+    detail: str = ""
+
+
+class FrameOn(NamedTuple):
+    """A frame of the file on a body of the scene: in the frame of the body, which is at its centroid."""
+
+    body: str
+    position: Any  # (3,), m
+    rotation: Any  # (3, 3), from this frame to that of the body
+
+
+class ImportReport:
+    """What a file of another program became.
+
+    Attributes
+    ----------
+    source, format : str
+        The file, and "URDF", "MJCF" or "SDF".
+    left_out : tuple of (what, where, detail)
+        What the scene lacks.
+    notes : tuple of str
+        What was carried over in another way.
+    frames : dict
+        Name of a link, site or frame of the file -> (body, position, rotation) in the scene; so links that were merged
+        into another one are found again.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.Scene().imported is None
+    True
+    """
+
+    def __init__(self, source: str, format: str) -> None:
+        self.source, self.format = source, format
+        self.left_out: tuple[LeftOut, ...] = ()
+        self.notes: tuple[str, ...] = ()
+        self.frames: dict[str, FrameOn] = {}
+
+    def leave(self, what: str, where: str, detail: str = "") -> None:
+        """Note what is left out, once."""
+        entry = LeftOut(what, where, detail)
+        if entry not in self.left_out:
+            self.left_out += (entry,)
+
+    def note(self, text: str) -> None:
+        """Note what is carried over in another way, once."""
+        if text not in self.notes:
+            self.notes += (text,)
+
+    def groups(self) -> dict[str, list[LeftOut]]:
+        """What is left out, by what it is."""
+        found: dict[str, list[LeftOut]] = {}
+        for entry in self.left_out:
+            found.setdefault(entry.what, []).append(entry)
+        return found
+
+    def summary(self) -> str:
+        """What is left out in one line; empty if nothing is."""
+        parts = [f"{len(entries)} x {what}" for what, entries in self.groups().items()]
+        return "; ".join(parts)
+
+    def warn(self) -> None:
+        """Warn where something is left out."""
+        if self.left_out:
+            import warnings
+
+            said = f"{self.source}: not carried over: {self.summary()}. print(scene.imported) lists each."
+            warnings.warn(ImportLosses(said), stacklevel=6)
+
+    def __str__(self) -> str:
+        lines = [f"{self.source} ({self.format})"]
+        if not self.left_out:
+            lines.append("everything is carried over")
+        else:
+            lines.append(f"not carried over: {counted(len(self.left_out), 'entry', 'entries')}")
+        for what, entries in self.groups().items():
+            lines.append(f"  {what} ({len(entries)}): {_listed(entries)}")
+        return "\n".join([*lines, *(f"  note: {text}" for text in self.notes)])
+
+    def __repr__(self) -> str:
+        return f"<ImportReport of {self.source}: {self.summary() or 'everything is carried over'}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(str(self))}</pre>"
+
+
+def _listed(entries):
+    parts = [f"{entry.where} {entry.detail}".strip() for entry in entries[:SHOWN]]
+    more = f", and {len(entries) - SHOWN} more" if len(entries) > SHOWN else ""
+    return ", ".join(parts) + more

@@ -1,0 +1,215 @@
+"""URDF: links, joints between them in a tree, and what ROS adds.
+
+The joint's frame is the child's at zero; it turns or slides by q about its axis, in this frame. The specification is at
+https://wiki.ros.org/urdf/XML.
+"""
+
+import numpy as np
+
+from .description import GROUND, Coupling, Description, JointItem, Link
+from .frames import HERE, Frame, roll_pitch_yaw, shifted, turned
+from .urdf_shapes import add_shapes, colours
+
+KINDS = {
+    "revolute": "revolute",
+    "continuous": "revolute",
+    "prismatic": "prismatic",
+    "fixed": "fixed",
+    "floating": "free",
+    "planar": "planar",
+    "spherical": "spherical",
+    "ball": "spherical",
+}
+WORLD = "world"  # a root link of this name is the ground
+
+
+def describe(root, folder, report, free_base):
+    """The `Description` of a root element <robot>.
+
+    Parameters
+    ----------
+    root : Node
+    folder : Path
+        Of the file, for meshes.
+    report : ImportReport
+    free_base : bool
+        Whether the root link is free to move.
+    """
+    found = Description(root.get("name") or "robot")
+    root.get("version")
+    materials = colours(root)
+    nodes = {}
+    for node in root.all("link"):
+        _add_link(found, nodes, node, folder, report, materials)
+    joints = _joints(root, found, report)
+    order = _placed(found, joints, root)
+    _couple(found, order, report)
+    base = [name for name in found.links if not any(joint.b == name for joint in found.joints)]
+    if base and (not free_base or base[0] == WORLD):
+        found.joints.insert(0, JointItem("base", "fixed", GROUND, base[0]))
+    _leave_rest(root, report)
+    return found
+
+
+def _add_link(found, nodes, node, folder, report, materials):
+    name = node.demand("name")
+    if name in found.links:
+        node.wrong(f"there are two links named {name!r}; rename one.")
+        return
+    link = found.links[name] = Link(name, line=node.line)
+    nodes[name] = node
+    node.get("type")
+    inertial = node.one("inertial")
+    if inertial is not None:
+        link.mass, link.centroid, link.inertia = mass_of(inertial, name)
+    add_shapes(link, node, folder, report, materials)
+
+
+def mass_of(node, name):
+    """Mass, centroid and inertia in the frame of the link, of an element <inertial>."""
+    at = origin(node)
+    mass, inertia = node.one("mass"), node.one("inertia")
+    if mass is None:
+        node.wrong(f"link {name!r}: <inertial> lacks <mass value=...>.")
+    m = 0.0 if mass is None else mass.number("value")
+    if m < 0.0:
+        mass.wrong(f"link {name!r}: the mass {m:g} kg is negative.")
+    J = np.zeros((3, 3))
+    if inertia is not None:
+        xx, xy, xz, yy, yz, zz = (inertia.number(f"i{axes}") for axes in ("xx", "xy", "xz", "yy", "yz", "zz"))
+        J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return m, at.p, at.R @ J @ at.R.T
+
+
+def origin(node):
+    """The frame of a child <origin>."""
+    child = node.one("origin")
+    if child is None:
+        return HERE
+    if child.get("quat_xyzw") is not None:
+        child.wrong("<origin quat_xyzw>: write rpy.")
+    return Frame(child.attribute("xyz", 3, np.zeros(3)), roll_pitch_yaw(child.attribute("rpy", 3, np.zeros(3))))
+
+
+def _joints(root, found, report):
+    """(JointItem, frame in that of the parent, axis, mimicked joint, factor, offset) of each joint."""
+    joints, names = [], set()
+    for node in root.all("joint"):
+        name, kind = node.demand("name"), node.demand("type")
+        if name in names:
+            node.wrong(f"there are two joints named {name!r}; rename one.")
+        names.add(name)
+        if kind not in KINDS:
+            node.wrong(f"joint {name!r}: unknown type {kind!r}; there are {', '.join(KINDS)}.")
+        ends = [_end(node, tag, name, found) for tag in ("parent", "child")]
+        if None in ends or kind not in KINDS:
+            continue
+        joint, axis = JointItem(name, KINDS[kind], *ends), node.one("axis")
+        u = np.array([1.0, 0.0, 0.0]) if axis is None else axis.attribute("xyz", 3, [1.0, 0.0, 0.0])
+        if kind not in ("fixed", "floating", "spherical", "ball") and not np.linalg.norm(u) > 0.0:
+            axis.wrong(f"joint {name!r}: the axis has length zero.")
+            u = np.array([1.0, 0.0, 0.0])
+        _dynamics(node, joint, kind, report)
+        joints.append((joint, origin(node), u, *_mimic(node, report)))
+    return joints
+
+
+def _end(node, tag, name, found):
+    """The name of a link of a joint; None if there is none."""
+    child = node.one(tag)
+    link = None if child is None else child.demand("link")
+    if child is None:
+        node.wrong(f"joint {name!r} lacks <{tag} link=...>.")
+    elif link not in found.links:
+        child.wrong(f"joint {name!r}: there is no link {link!r}.")
+        link = None
+    return link
+
+
+def _dynamics(node, joint, kind, report):
+    """Damping; friction and limits are left out."""
+    dynamics, limit = node.one("dynamics"), node.one("limit")
+    if dynamics is not None and joint.kind != "fixed":
+        joint.damping = dynamics.number("damping")
+        if joint.damping < 0.0:
+            dynamics.wrong(f"joint {joint.name!r}: the damping is negative.")
+        if friction := dynamics.number("friction"):
+            report.leave("friction of a joint", joint.name, f"{friction:g}")
+    elif dynamics is not None:
+        dynamics.skip()  # of no joint that moves
+    if limit is not None:
+        lower, upper = limit.number("lower"), limit.number("upper")
+        if kind in ("revolute", "prismatic"):
+            report.leave("limits of a joint", joint.name, f"[{lower:g}, {upper:g}]")
+        for what in ("effort", "velocity"):
+            if largest := limit.number(what):
+                report.leave(f"limit of {what}", joint.name, f"{largest:g}")
+    for tag in ("calibration", "safety_controller"):
+        for one in node.all(tag):
+            one.skip()
+            report.leave(f"<{tag}>", joint.name)
+
+
+def _mimic(node, report):
+    mimic = node.one("mimic")
+    if mimic is None:
+        return None, 1.0, 0.0
+    return mimic.demand("joint"), mimic.number("multiplier", 1.0), mimic.number("offset")
+
+
+def _placed(found, joints, root):
+    """Place links from the root on; joints that mimic another one begin at their offset."""
+    parents = {}
+    for entry in joints:
+        joint = entry[0]
+        if joint.b in parents:
+            root.wrong(f"link {joint.b!r} has two parents, by the joints {parents[joint.b]!r} and {joint.name!r}.")
+        parents[joint.b] = joint.name
+    roots = [name for name in found.links if name not in parents]
+    if not found.links:
+        root.wrong("<robot> has no links.")
+    elif len(roots) != 1:
+        root.wrong(
+            f"a robot has one root link, this one has {len(roots)}: {', '.join(roots[:5])}."
+            if roots else "the joints form a circle: no link is without a parent."
+        )  # fmt: skip
+    order, placed, waiting = [], set(roots), joints
+    while waiting:
+        ready = [entry for entry in waiting if entry[0].a in placed]
+        if not ready:
+            root.wrong(f"the joints form a circle at {waiting[0][0].name!r}.")
+            break
+        for joint, at, u, *mimicked in ready:
+            frame = found.links[joint.a].frame @ at
+            axis = u / (np.linalg.norm(u) or 1.0)
+            start = mimicked[2] if mimicked[0] else 0.0
+            moved = {"revolute": turned(start * axis), "prismatic": shifted(start * axis)}.get(joint.kind, HERE)
+            joint.point, joint.axis = frame.p, frame.R @ axis
+            found.links[joint.b].frame = frame @ moved
+            placed.add(joint.b)
+            order.append((joint, *mimicked))
+        waiting = [entry for entry in waiting if entry not in ready]
+    found.joints = [joint for joint, *_ in sorted(order, key=lambda pair: _index(joints, pair[0]))]
+    return order
+
+
+def _index(joints, joint):
+    return next(i for i, entry in enumerate(joints) if entry[0] is joint)
+
+
+def _couple(found, order, report):
+    """Joints that mimic others."""
+    names = {joint.name for joint, *_ in order}
+    for joint, driver, ratio, _ in order:
+        if driver is None:
+            continue
+        if driver not in names or driver == joint.name:
+            report.leave("joint that mimics another one", joint.name, f"there is no other joint {driver!r}")
+        else:
+            found.couplings.append(Coupling(f"{joint.name} mimics {driver}", driver, joint.name, ratio))
+
+
+def _leave_rest(root, report):
+    """List what nobody has read."""
+    for name, line in root.unread():
+        report.leave(f"element {name}" if " " not in name else f"attribute {name}", f"line {line}")

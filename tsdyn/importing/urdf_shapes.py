@@ -1,0 +1,130 @@
+"""Shapes to draw of URDF: visuals, and collisions where a link has no visual that can be drawn."""
+
+import numpy as np
+
+from .frames import Frame, roll_pitch_yaw
+from .meshes import DrawnShape, hexadecimal, mesh
+
+
+def colours(root):
+    """Colours of materials by name."""
+    found = {}
+    for node in root.all("material"):
+        found[node.get("name") or ""] = _colour(node, {})
+    return found
+
+
+def _colour(node, known):
+    """The colour of an element <material>."""
+    named, colour = node.get("name") or "", node.one("color")
+    for texture in node.all("texture"):
+        texture.skip()
+    return known.get(named, "") if colour is None else hexadecimal(colour.attribute("rgba", 4, [0.5, 0.5, 0.5, 1.0]))
+
+
+def add_shapes(link, node, folder, report, materials):
+    """Add the shapes of an element <link>; contact shapes are listed."""
+    collisions = node.all("collision")
+    drawn = [_shape(one, link.name, folder, report, materials) for one in node.all("visual")]
+    link.shapes = [shape for shape in drawn if shape is not None]
+    for one in collisions:
+        shape = _shape(one, link.name, folder, report if not link.shapes else None, materials)
+        report.leave("contact shape", link.name)
+        if shape is not None and not any(drawn):
+            link.shapes.append(shape)
+
+
+def _shape(node, name, folder, report, materials):
+    """The `DrawnShape` of an element <visual> or <collision>, or None."""
+    node.get("name")
+    at, geometry, material = node.one("origin"), node.one("geometry"), node.one("material")
+    colour = "" if material is None else _colour(material, materials)
+    if geometry is None or not geometry.nodes:
+        node.wrong(f"link {name!r}: <{node.tag}> lacks <geometry> with a shape.")
+        return None
+    place = Frame(np.zeros(3), np.eye(3))
+    if at is not None:
+        place = Frame(at.attribute("xyz", 3, np.zeros(3)), roll_pitch_yaw(at.attribute("rpy", 3, np.zeros(3))))
+    shape = geometry.nodes[0]
+    geometry.all(shape.tag)
+    made = _primitive(shape, name, folder, report)
+    return None if made is None else DrawnShape(*made, place, colour)
+
+
+def _primitive(shape, name, folder, report):
+    """Kind and arguments of a shape."""
+    if shape.tag == "mesh":
+        uri, scale = shape.demand("filename"), shape.attribute("scale", 3, np.ones(3))
+        return None if report is None else mesh(uri, scale, folder, report, name)
+    if shape.tag == "box":
+        kind, sizes = "Box", shape.attribute("size", 3, np.ones(3))
+        arguments = (sizes,)
+    elif shape.tag in ("cylinder", "capsule"):
+        kind, sizes = "Cylinder", np.array([shape.number("radius", 1.0), shape.number("length", 1.0)])
+        arguments = tuple(sizes.tolist())
+    elif shape.tag == "sphere":
+        kind, sizes = "Sphere", np.array([shape.number("radius", 1.0)])
+        arguments = tuple(sizes.tolist())
+    else:
+        shape.skip()
+        if report is not None:
+            report.leave(f"shape <{shape.tag}>", name)
+        return None
+    if not (sizes > 0.0).all():
+        if report is not None:
+            report.leave("shape without extent", name)
+        return None
+    return kind, arguments
+
+
+def add_sdf_shapes(link, node, frames, folder, report):
+    """Add the shapes of an SDF element <link>."""
+    drawn = [_sdf_shape(one, link.name, frames, folder, report) for one in node.all("visual")]
+    link.shapes = [shape for shape in drawn if shape is not None]
+    for one in node.all("collision"):
+        shape = _sdf_shape(one, link.name, frames, folder, report if not link.shapes else None)
+        report.leave("contact shape", link.name)
+        one.skip()
+        if shape is not None and not any(drawn):
+            link.shapes.append(shape)
+
+
+def _sdf_shape(node, name, frames, folder, report):
+    node.get("name")
+    place, geometry, material = frames.pose(node), node.one("geometry"), node.one("material")
+    colour = ""
+    if material is not None:
+        for tag in ("diffuse", "ambient"):
+            child = material.one(tag)
+            if child is not None and not colour:
+                colour = hexadecimal(child.numbers(" ".join(child.text.split()[:3]), 3, np.full(3, 0.5), f"<{tag}>"))
+        material.skip()
+    if geometry is None or not geometry.nodes:
+        return None
+    shape = geometry.nodes[0]
+    geometry.all(shape.tag)
+    made = _sdf_primitive(shape, name, folder, report)
+    return None if made is None else DrawnShape(*made, place, colour)
+
+
+def _sdf_primitive(shape, name, folder, report):
+    """Kind and arguments of a shape; capsules are drawn as cylinders."""
+    if shape.tag == "mesh":
+        uri, scale = shape.one("uri"), shape.value("scale", 3, np.ones(3))
+        shape.skip()
+        return None if report is None or uri is None else mesh(uri.text, scale, folder, report, name)
+    sizes = {
+        "box": lambda: (shape.value("size", 3, np.ones(3)),),
+        "cylinder": lambda: (shape.scalar("radius", 1.0), shape.scalar("length", 1.0)),
+        "capsule": lambda: (shape.scalar("radius", 0.5), shape.scalar("length", 1.0)),
+        "sphere": lambda: (shape.scalar("radius", 1.0),),
+    }.get(shape.tag)
+    if sizes is None:
+        shape.skip()
+        if report is not None:
+            report.leave(f"shape <{shape.tag}>", name)
+        return None
+    found = sizes()
+    if not all(np.all(size > 0.0) for size in found):
+        return None
+    return {"box": "Box", "sphere": "Sphere"}.get(shape.tag, "Cylinder"), found

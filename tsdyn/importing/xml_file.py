@@ -1,0 +1,177 @@
+"""XML as it is read by lxml, without entities and network; elements note what has been read of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import MissingDependency, StorageError
+from ..files.mistakes import Mistakes
+
+LARGEST = 1 << 26  # bytes of a file
+
+
+class Lines:
+    """Places of mistakes: they are (line, column) already."""
+
+    @staticmethod
+    def line_and_column(path: Any) -> Any:
+        """Line and column."""
+        return path
+
+
+def read(path: Any, data: bytes | None = None) -> tuple[Node, Mistakes]:
+    """The root element of a file, and the `Mistakes` to be found in it.
+
+    Raises
+    ------
+    InvalidFile
+        If it is no XML, or has a document type, which could define entities.
+    StorageError
+        If it can't be read or is too large.
+    MissingDependency
+        If lxml is not installed.
+    """
+    try:
+        from lxml import etree
+    except ImportError as error:
+        raise MissingDependency("URDF, MJCF and SDF files need lxml: pip install 'tsdyn[import]'.") from error
+    mistakes = Mistakes(str(path), Lines)
+    data = content(path) if data is None else data
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=True, remove_pis=True
+    )
+    try:
+        root = etree.fromstring(data, parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        place = getattr(error, "position", None) or (1, 1)
+        mistakes.add((max(place[0], 1), max(place[1], 1)), f"this is no XML: {getattr(error, 'msg', None) or error}.")
+        mistakes.demand_none()
+    if root.getroottree().docinfo.doctype:
+        mistakes.add((1, 1), "the file has a DOCTYPE, which could define entities; remove it.")
+        mistakes.demand_none()
+    return Node(root, mistakes), mistakes
+
+
+def content(path: Any) -> bytes:
+    """The bytes of a file of admissible size."""
+    try:
+        with open(path, "rb") as file:
+            data = file.read(LARGEST + 1)
+    except OSError as error:
+        raise StorageError(f"{path} can't be read: {error.strerror or error}.") from error
+    if len(data) > LARGEST:
+        raise StorageError(f"{path} is too large for a description of a robot: more than {LARGEST} bytes.")
+    return data
+
+
+class Node:
+    """An element; attributes and children that are asked for count as read."""
+
+    def __init__(self, element: Any, mistakes: Mistakes) -> None:
+        self.element, self.mistakes = element, mistakes
+        self.tag = element.tag if isinstance(element.tag, str) else ""
+        self.line = element.sourceline or 1
+        self._read: set[str] = set()
+        self._nodes: list[Node] | None = None
+        self._whole = False
+
+    @property
+    def nodes(self) -> list[Node]:
+        """All children."""
+        if self._nodes is None:
+            self._nodes = [Node(one, self.mistakes) for one in self.element if isinstance(one.tag, str)]
+        return self._nodes
+
+    def all(self, *tags: str) -> list[Node]:
+        """The children of some tags."""
+        self._read.update(f"<{tag}>" for tag in tags)
+        return [node for node in self.nodes if node.tag in tags]
+
+    def one(self, tag: str) -> Node | None:
+        """The child of a tag; the first one, where there are more, which is a mistake."""
+        found = self.all(tag)
+        if len(found) > 1:
+            found[1].wrong(f"<{self.tag}> has more than one <{tag}>; keep one.")
+        return found[0] if found else None
+
+    def get(self, name: str, default: str | None = None) -> str | None:
+        """An attribute."""
+        self._read.add(name)
+        value = self.element.get(name)
+        return default if value is None else value.strip()
+
+    def demand(self, name: str) -> str:
+        """An attribute that must be there."""
+        value = self.get(name)
+        if not value:
+            self.wrong(f"<{self.tag}> lacks {name}.")
+        return value or ""
+
+    @property
+    def text(self) -> str:
+        """The text between its tags."""
+        return (self.element.text or "").strip()
+
+    def numbers(self, text: str | None, count: int, default: Any, what: str) -> Any:
+        """Numbers of a text, (count,); the default where it is left out or wrong."""
+        if text is None:
+            return np.array(default, float)
+        try:
+            found = np.array(text.split(), float)
+        except ValueError:
+            found = np.zeros(0)
+        if found.shape != (count,) or not np.isfinite(found).all():
+            self.wrong(f"{what} = {text[:60]!r}: it must be {count} finite number{'s' if count > 1 else ''}.")
+            return np.array(default, float)
+        return found
+
+    def attribute(self, name: str, count: int, default: Any) -> Any:
+        """Numbers of an attribute, (count,)."""
+        return self.numbers(self.get(name), count, default, f"<{self.tag}> {name}")
+
+    def number(self, name: str, default: float = 0.0) -> float:
+        """The number of an attribute."""
+        return float(self.attribute(name, 1, [default])[0])
+
+    def value(self, tag: str, count: int, default: Any) -> Any:
+        """Numbers in the text of a child, (count,)."""
+        child = self.one(tag)
+        return np.array(default, float) if child is None else child.numbers(child.text, count, default, f"<{tag}>")
+
+    def scalar(self, tag: str, default: float = 0.0) -> float:
+        """The number in the text of a child."""
+        return float(self.value(tag, 1, [default])[0])
+
+    def flag(self, tag: str, default: bool = False) -> bool:
+        """Whether the text of a child is true."""
+        child = self.one(tag)
+        return default if child is None else child.text.lower() in ("1", "true")
+
+    def skip(self) -> None:
+        """Take all of it as read: what is left out has been said."""
+        self._whole = True
+
+    def wrong(self, message: str) -> None:
+        """Add a mistake at this element."""
+        self.mistakes.add((self.line, 1), message)
+
+    def unread(self) -> list[tuple[str, int]]:
+        """What nobody has asked for: (name, line), attributes as element@attribute."""
+        if self._whole:
+            return []
+        found = [(f"<{self.tag} {name}>", self.line) for name in self.element.keys() if name not in self._read]  # noqa: SIM118
+        for node in self.nodes:
+            known = f"<{node.tag}>" in self._read
+            found += node.unread() if known else [(f"<{node.tag}>", node.line)]
+        return found
+
+
+def exists(path: Path) -> bool:
+    """Whether there is such a file."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False

@@ -1,7 +1,7 @@
 """Ensembles beside other engines: milliseconds a case and core to an error, in one interleaved run.
 
 Times are the processor's, of one thread each. tsdyn: `ts.ensemble`, all of its cost counted. heyoka: its batch mode,
-compiled for the top alone. MuJoCo and Exudyn: the loop of one case, which `rollout` and a process pool run on each core.
+compiled for the top alone. MuJoCo and Exudyn: the loop of one case, which `rollout` and a process pool run a core.
 
 Run it: python -m benchmarks.ensemble_peers
 """

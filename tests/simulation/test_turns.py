@@ -145,3 +145,21 @@ def test_the_explicit_method_goes_on_where_stiffness_has_gone():
     assert h[solution.t[:-1] > 10.0].mean() > 0.05
     fine = ts.simulate(held(0.5), (0.0, 20.0), integrator=ts.integrators.DOP853(1e-10, 1e-10), t_eval=(0.0, 20.0))
     np.testing.assert_allclose(solution.q[-1], fine.q[-1], rtol=0.0, atol=1e-4)
+
+
+def sprung(x):
+    """A level rod on a stiff, damped torsional spring, which counts turns, at (x, 0, 0)."""
+    scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
+    rod = scene.add_body(1.0, (1e-3, 0.01, 0.01), position=(x + 0.5, 0.0, 0.0), name="rod")
+    scene.add(ts.constraints.Revolute.at(scene.ground, rod, point=(x, 0.0, 0.0), axis=(0, 1, 0)))
+    axes = {"axis_a": (0, 1, 0), "reference_a": (1, 0, 0), "reference_b": (1, 0, 0)}
+    scene.add(ts.forces.TorsionalSpring(scene.ground, rod, stiffness=2e4, damping=500.0, **axes))
+    return scene
+
+
+def test_far_from_the_origin_runs_turn_as_there():
+    """Turns that forces count were cut off twice: scenes with them, so far away, raised ValueError."""
+    near, far = (ts.simulate(sprung(x), (0.0, 1.0), dense_output=True, **OPTIONS) for x in (0.0, 2.0**20))
+    assert near.method == far.method
+    assert "SDIRK54" in far.method
+    np.testing.assert_allclose(far.at(0.5).q[:3] - [2.0**20, 0.0, 0.0], near.at(0.5).q[:3], rtol=0.0, atol=CLOSE)

@@ -26,7 +26,7 @@ from .slices import drive
 from .task import Outcome
 from .trajectory import Trajectory
 
-NOT_FINITE = Status.NOT_FINITE
+NOT_FINITE, PASSAGE, STIFF = Status.NOT_FINITE, Status.PASSAGE, Status.STIFF
 
 
 def run(task, engine, observe=None, relay=None, past=None):
@@ -56,7 +56,7 @@ def run(task, engine, observe=None, relay=None, past=None):
     began = time.perf_counter()
     advanced = memory if task.sampling is None else Sampled(memory, task.sampling)
     driven = drive(advanced if past is None else past(advanced), task, watch)
-    if relay is not None:
+    if relay is not None and driven[0] in (PASSAGE, STIFF):
         relay.leave(memory)
     outcome = _outcome(task, engine, memory, driven, readings, watch, began)
     if observe is None and outcome.status is not NOT_FINITE:  # NaN may be left in what a run takes as its own

@@ -109,8 +109,7 @@ def run_near(driver, task, scene, origin, tol):
         packed=local.packed, system=local.packed.system, bodies=scene.bodies, constraints=scene.constraints,
         row_names=scene.row_names,
     )  # fmt: skip
-    memory = task.remembered[task.prepared.handles.count :]
-    q, qd = local.start(stand_in, (q, task.qd), task.span[0], tol, memory, True)
+    q, qd = local.start(stand_in, (q, task.qd), task.span[0], tol, task.remembered, True)
     if task.archive is not None:
         task.archive.shift = shift
     watched = task.events and [each._replace(function=_away(each.function, packed, shift)) for each in task.events]

@@ -4,9 +4,6 @@ Taylor steps with sharp forces are shorter, and no quicker than those of DOP853 
 series fail, the run begins again with DOP853. Where the motion is found stiff, SDIRK54 goes on: turns.py.
 """
 
-from functools import partial
-
-from ..ahead.first_run import prepare_first_run
 from ..errors import Status
 from ..integrators import DOP853, Taylor
 from ..runs.arguments import adaptive
@@ -29,11 +26,7 @@ def reason(prepared):
 
 def turns_of(scene, prepared, method, options):
     """The `Turns` of a run by the initial method; None in a form that no implicit method serves."""
-    form = options.settings.form
-    if form.first_order:
-        return None
-    prepare = partial(prepare_first_run, scene, form=form, within=options.within, default=None)
-    return Turns(method, prepared.sharp, options.span[1], prepare)
+    return None if options.settings.form.first_order else Turns(scene, prepared, method, options)
 
 
 def instead(task, status):

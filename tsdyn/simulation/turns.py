@@ -9,6 +9,7 @@ old ones serve, the motion is as stiff as it was.
 
 from functools import cached_property
 
+from ..ahead.first_run import prepare_first_run
 from ..integrators import SDIRK54, Taylor
 from ..methods.integrator import frozen
 from .tolerances import (
@@ -37,14 +38,13 @@ class Turns:
 
     Parameters
     ----------
+    scene : Scene
+    prepared : Prepared
+        Of the scene.
     method : Integrator
         The explicit method.
-    sharp : bool
-        Whether a force changes sharply.
-    end : float, s
+    options : Options
         Of the run.
-    prepare : Callable
-        Has the kernels of a method compiled ahead.
 
     Attributes
     ----------
@@ -52,28 +52,37 @@ class Turns:
         Steps of the segment after which it is asked; of an explicit method not before it has found the motion stiff.
     """
 
-    def __init__(self, method, sharp, end, prepare):
-        self.method, self.end, self._prepare = method, end, prepare
-        series = isinstance(method, Taylor)
-        self._cost = SERIES_COST if series else COST
-        self._share = SHARP_COST if series and sharp else 1.0
-        self.known = 0.0  # work of the method before for a second of motion
-        self.patience = PATIENCE  # implicit steps before the explicit method is tried
-        self.taken, self.tried = 0, False  # explicit steps so far; whether the explicit method is on trial
-        self.ask, self.window = 0, (0.0, 0.0)  # where the steps that are judged begin: time, work
-        self.jacobians = 0  # of the implicit method's first steps
-        self.began = self.lasted = 0.0  # s: of the segment, and length of the one before
+    ask, window = 0, (0.0, 0.0)  # where the steps that are judged begin: time, work
+    known = 0.0  # work of the method before for a second of motion
+    patience = PATIENCE  # implicit steps before the explicit method is tried
+    taken, tried = 0, False  # explicit steps so far; whether the explicit method is on trial
+    jacobians = 0  # of the implicit method's first steps
+    began = lasted = 0.0  # s: of the segment, and length of the one before
+
+    def __init__(self, scene, prepared, method, options):
+        self.scene, self.prepared, self.method, self.options = scene, prepared, method, options
 
     @cached_property
     def implicit(self):
-        """The implicit method, which most runs never ask for."""
+        """The implicit method."""
         return implicit(self.method)
+
+    @cached_property
+    def _cost(self):
+        """Of an evaluation by the implicit method."""
+        return SERIES_COST if isinstance(self.method, Taylor) else COST
+
+    @cached_property
+    def _step(self):
+        """Work of a step of the explicit method."""
+        series = isinstance(self.method, Taylor)
+        return self.method.stages * (SHARP_COST if series and self.prepared.sharp else 1.0)
 
     def begin(self, to_implicit, t, turned):
         """A segment begins at t: after a turn, or after a singular configuration."""
         self.window, self.ask = (t, 0.0), FIRST_WINDOW
         if to_implicit:
-            self._prepare(self.implicit)
+            prepare_first_run(self.scene, self.implicit, self.options.settings.form, self.options.within, None)
         elif not self.tried:
             self.ask = (AGAIN - 1) * self.taken
         if turned:
@@ -86,9 +95,7 @@ class Turns:
         if steps < self.ask:
             return False
         to_explicit = memory.engine.method.implicit
-        work = (
-            self._cost * memory.work.counters.evaluations if to_explicit else self._share * self.method.stages * steps
-        )
+        work = self._cost * memory.work.counters.evaluations if to_explicit else self._step * steps
         (before, done), self.window = self.window, (t, work)
         rate = (work - done) / (t - before) if t > before else 0.0
         if to_explicit:
@@ -100,13 +107,17 @@ class Turns:
     def _to_implicit(self, run, steps, t):
         """Whether the implicit method is to go on; not for what little is left."""
         self.ask = AGAIN * steps
-        ours = self._share * self.method.stages / run.clock.h
-        if run.numbers.at_limit == 0 or ours * (self.end - t) < self._cost * TRIAL * STEP_EVALUATIONS:
+        ours = self._step / run.clock.h
+        if run.numbers.at_limit == 0 or not self._pays(ours, t):
             return False
         self.known, self.taken = ours, self.taken + steps
         if self.lasted > 0.0:  # the implicit method has been left for longer than it had lasted, or in vain
             self.patience = PATIENCE if t - self.began > self.lasted else AGAIN * self.patience
         return True
+
+    def _pays(self, rate, t):
+        """Whether what is left at this rate is worth a turn."""
+        return rate * (self.options.span[1] - t) > self._cost * TRIAL * STEP_EVALUATIONS
 
     def _back(self, memory, steps, rate):
         """Whether the explicit method is to go on: it takes less work, or is to be tried."""
@@ -114,8 +125,7 @@ class Turns:
         if steps <= FIRST_WINDOW:
             self.jacobians = jacobians
         patience = self.patience if jacobians > self.jacobians else AGAIN * self.patience
-        left = rate * (self.end - memory.run.clock.t)
-        self.tried = steps >= patience and left > self._cost * TRIAL * STEP_EVALUATIONS
+        self.tried = steps >= patience and self._pays(rate, memory.run.clock.t)
         if self.tried:
             self.known = rate
         self.ask = 2 * steps if steps >= self.patience else min(2 * steps, self.patience)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-FOLDER = Path(__file__).parents[1] / "references"
+FOLDER = Path(__file__).parents[1] / "importing" / "references"
 
 
 class LinkMotion(NamedTuple):

@@ -62,7 +62,7 @@ def names_of(scene):
 def test_urdf_has_the_accelerations_of_pinocchio(free):
     pytest.importorskip("lxml")
     scene = without_forces(load(MODELS / "arm.urdf", free_base=free))
-    motions = link_motions.read("imported_arm_free" if free else "imported_arm")
+    motions = link_motions.read("arm_free" if free else "arm")
     link_motions.place(scene, motions)
     assert np.abs(scene.evaluate().Phi).max() < FINE
     assert link_motions.acceleration_error(scene, motions) < FINE
@@ -72,7 +72,7 @@ def test_mjcf_has_the_accelerations_of_mujoco():
     pytest.importorskip("lxml")
     pytest.importorskip("mujoco")
     scene = load(MODELS / "leg.xml")
-    motions = link_motions.read("imported_leg")
+    motions = link_motions.read("leg")
     link_motions.place(scene, motions)
     assert np.abs(scene.evaluate().Phi).max() < FINE
     assert link_motions.acceleration_error(scene, motions) < FINE
@@ -81,7 +81,7 @@ def test_mjcf_has_the_accelerations_of_mujoco():
 @pytest.mark.slow
 def test_references_are_those_of_the_engines():
     pytest.importorskip("pinocchio")
-    for name, free in (("imported_arm", False), ("imported_arm_free", True)):
+    for name, free in (("arm", False), ("arm_free", True)):
         scene = without_forces(load(MODELS / "arm.urdf", free_base=free))
         motions = pinocchio_motions(MODELS / "arm.urdf", names_of(scene), np.random.default_rng(1), free)
         link_motions.place(scene, motions)

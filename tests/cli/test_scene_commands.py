@@ -154,3 +154,23 @@ def test_wrong_usage(words, code, said, folder, capsys):
     assert found == code
     assert said in err
     assert sorted(folder.iterdir()) == before
+
+
+def test_robots(folder, capsys):
+    pytest.importorskip("lxml")
+    link = "<inertial><mass value='2'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
+    joint = "<joint name='hinge' type='revolute'><parent link='base'/><child link='arm'/>{}</joint>"
+    joint = joint.format("<limit lower='0' upper='1'/>")
+    (folder / "arm.urdf").write_text(
+        f"<robot name='r'><link name='base'/><link name='arm'>{link}</link>{joint}</robot>"
+    )
+    code, out, err = called(capsys, "convert", "arm.urdf", "arm.toml")
+    assert (code, ts.load("arm.toml").mobility().degrees_of_freedom) == (0, 1)
+    assert "limits of a joint (1): hinge [0, 1]" in out
+    assert "not carried over: 1 x limits of a joint" in err
+    code, out, _ = called(capsys, "check", "arm.urdf", "--json")
+    assert (code, json.loads(out)["not_carried_over"]) == (0, [["limits of a joint", "hinge", "[0, 1]"]])
+    code, out, _ = called(capsys, "info", "arm.urdf", "--free-base", "--json")
+    assert (code, json.loads(out)["degrees_of_freedom"]) == (0, 6)
+    assert called(capsys, "run", "arm.urdf", "--to", "0.1")[0] == 0
+    assert "is for URDF files" in called(capsys, "run", "bars.toml", "--free-base")[2]

@@ -55,7 +55,15 @@ def joints():
     return scene
 
 
-@pytest.mark.parametrize("build", [pendulum, four_bar, beads, joints])
+def needle():
+    """A slender rod, without inertia about its axis."""
+    scene = ts.Scene()
+    bar = scene.add_body(**ts.shapes.rod(1.0, axis="x", mass=3.0), position=(0.5, 0, 0), name="bar")
+    scene.add(C.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    return scene
+
+
+@pytest.mark.parametrize("build", [pendulum, four_bar, beads, joints, needle])
 def test_mujoco_with_small_steps_agrees(build):
     pytest.importorskip("mujoco")
     found = ts.compare(build(), (0.0, 0.2), with_="mujoco", step=2e-4, method="rk4", outputs=20)

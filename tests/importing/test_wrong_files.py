@@ -72,6 +72,8 @@ def test_all_mistakes_at_once(tmp_path):
         (FOUR_BAR.replace("<mass>1.2", "<mass>-1"), "negative"),
         (FOUR_BAR.replace("<xyz>0 1 0", "<xyz>0 0 0", 1), "length zero"),
         ("<sdf version='1.9'/>", "no <model>"),
+        (FOUR_BAR.replace('<link name="coupler">', "<link>"), "<link> lacks name"),
+        (FOUR_BAR.replace('<joint name="pin" ', "<joint "), "<joint> lacks name"),
     ],
 )
 def test_sdf(wrong, message, tmp_path):

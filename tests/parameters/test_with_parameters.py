@@ -100,6 +100,15 @@ def test_the_original_may_change_afterwards():
     assert later.bodies[0].mass == 30.0
 
 
+def test_it_may_be_changed_itself():
+    scene = four_bar.build()
+    other = scene.with_parameters({"gravity": (0, 0, -1.0)})
+    other.gravity = (0, -2.0, 0)
+    built = scene.copy()
+    built.gravity = (0, -2.0, 0)
+    assert outcome(lambda: other) == outcome(lambda: built)
+
+
 def test_handles_of_the_original_serve_for_joints_made_anew():
     scene = four_bar.build()
     joint = next(item for item in scene.constraints if isinstance(item, ts.constraints.Revolute))

@@ -9,9 +9,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..elements.bodies import rotation_matrix
+from ..errors import InvalidArgument
 from .mujoco_forces import add_forces
 from .mujoco_tree import spanning_tree
 
+LEAST = 1e-9  # of the largest principal moment of inertia: MuJoCo takes none that is zero, as that of a slender rod
+PARTICLE = 1e-6  # kg m^2, of a particle, which doesn't turn
 INTEGRATORS = {"euler": "EULER", "rk4": "RK4", "implicit": "IMPLICIT", "implicitfast": "IMPLICITFAST"}
 
 
@@ -33,7 +36,10 @@ class MujocoScene:
         for item in loops:
             getattr(self, f"_{type(item).__name__.lower()}")(item, softness)
         self.loads = add_forces(self)
-        self.model = self.spec.compile()
+        try:
+            self.model = self.spec.compile()
+        except ValueError as error:
+            raise InvalidArgument(f"compare: MuJoCo can't have this scene: {' '.join(str(error).split())}") from error
         self.ids = [self.model.body(self.names[body]).id for body in scene.bodies]
 
     def _add_body(self, link):
@@ -45,8 +51,9 @@ class MujocoScene:
         made = self.made[parent].add_body(name=name, pos=at, quat=turn)
         self.made[body], self.names[body] = made, name
         made.mass, made.ipos, made.explicitinertial = float(body.mass), (0, 0, 0), True
-        J = np.asarray(getattr(body, "inertia", 1e-6 * np.eye(3)))
-        made.fullinertia = J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        moments, axes = np.linalg.eigh(np.asarray(getattr(body, "inertia", PARTICLE * np.eye(3))))
+        made.inertia = np.maximum(moments, LEAST * moments[2])
+        made.iquat = np.roll(Rotation.from_matrix(axes * np.linalg.det(axes)).as_quat(), 1)
         self.joints[body] = []
         for i, move in enumerate(link.moves):
             kind = getattr(self.mj.mjtJoint, f"mjJNT_{move.kind.upper()}")

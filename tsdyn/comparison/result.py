@@ -41,7 +41,7 @@ class Comparison(Drawn):
     theirs, ours : Levels
         Of the engine, and of tsdyn: `position`, `velocity` (largest constraint residuals), `energy` (J), (k,) each.
     seconds, reference_seconds : float, s
-        Of the steps of the engine, and of tsdyn's run at 1e-12, compiling included if there was any.
+        Of the steps of the engine, and of tsdyn's run at 1e-12.
     reached : bool
         Whether the engine's run remained finite up to its end.
     """

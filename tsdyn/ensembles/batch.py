@@ -6,10 +6,11 @@ from ..configuration.mirrored_branches import are_aligned
 from ..errors import Status
 from ..formulations.locked_orientations import still
 from ..jit.kernels import DEBUG, resident
+from ..runs.tolerances import LONG_STEPS
 from ..simulation.local_origin import are_near
 from ..taylor.series_engine import SeriesEngine
 from ..workspaces.carving import words
-from .case_loop import Chunk, LoopNumbers, Plan, run_cases
+from .case_loop import CaseArrays, LoopNumbers, Plan, run_cases
 from .keeping import TIMES
 from .pen import Place
 from .starts import OF_ROWS
@@ -46,7 +47,7 @@ class Batch:
     def serves(arena):
         """Whether Python has nothing to do between the cases of an arena."""
         packed, pen, state = arena.packed, arena.pen, arena.study.given["state"]
-        if DEBUG or pen is None:
+        if DEBUG or pen is None or arena.kept.n >= LONG_STEPS:
             return False
         selects = pen.moves or pen.written & OF_ROWS or pen.geometry is not None  # redundant rows, in each case
         if packed.derived.redundant is not None and selects:
@@ -60,10 +61,10 @@ class Batch:
         fits, packed = pen.fits, self._arena.packed
         if pen.moves:
             q = pen.starts[:, 0]
-            fits = fits & are_near(packed, q)
+            fits = fits & are_near(packed, q) if pen.geometry is None else fits.copy()
             fits[fits] = are_aligned(packed, q[fits], study.options.span[0])
         count = len(status)
-        self._at, *self._chunk = resident(Chunk(
+        self._at, *self._chunk = resident(CaseArrays(
             pen.numbers, pen.starts, fits.astype(np.int64), arrays["t"], arrays["q"].reshape(count, -1),
             arrays["qd"].reshape(count, -1), status, study.halt,
         ))  # fmt: skip

@@ -45,7 +45,7 @@ class Plan(NamedTuple):
     log: RunLog
 
 
-class Chunk(NamedTuple):
+class CaseArrays(NamedTuple):
     """The cases of a chunk, and their results."""
 
     table: np.ndarray  # (k, width)
@@ -62,7 +62,7 @@ def _example():
     integers_, none = np.zeros((0, 3), np.int64), np.zeros((0, 1))
     ones = np.zeros(0, np.int64)
     plan = Plan(LoopNumbers(), integers_, integers_, none, no_log())
-    return plan, Chunk(none, np.zeros((0, 2, 1)), ones, np.zeros(0), none, none, ones, ones)
+    return plan, CaseArrays(none, np.zeros((0, 2, 1)), ones, np.zeros(0), none, none, ones, ones)
 
 
 load_plan, load_chunk = map(loader, _example())

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import html
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 from ..errors import ImportLosses
 from ..validation import counted
-
-if TYPE_CHECKING:
-    from ..hints import Any
 
 SHOWN = 8  # names of a group in a text
 

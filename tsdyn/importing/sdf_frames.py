@@ -56,6 +56,7 @@ class Frames:
 
     def resolve(self, name, node=None):
         """A frame, by name, in the ground frame."""
+        name = name or ""  # of what lacks one, which is a mistake already
         if name in self._at:
             return self._at[name]
         if name in ("world", "") or (name not in self._known and "::" in name):

@@ -35,6 +35,11 @@ class Derived:
     family: object = None  # a parameters.family.Family: variants.family_of
     shared: dict = None  # of a family: what numbers don't change, by the functions that find it; None for one scene
 
+    @property
+    def is_of_start(self):
+        """Whether some of it holds where runs have started: redundant rows, bodies that turn, a local origin."""
+        return self.redundant is not None or bool(self.turning) or self.local is not None
+
     def forget_graphs(self):
         """The constraint graph is another."""
         self.graph = None

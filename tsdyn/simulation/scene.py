@@ -68,8 +68,7 @@ class Scene(OfFile):
 
     Notes
     -----
-    `simulate` never changes a scene, so a scene may be run repeatedly. After an attribute of a body (mass, inertia,
-    position, orientation, velocity) is set, the next run updates the changed numbers only.
+    `simulate` never changes a scene. After an attribute of a body is set, the next run updates changed numbers only.
 
     Examples
     --------
@@ -188,14 +187,8 @@ class Scene(OfFile):
         >>> print(top, top.inertia.diagonal())
         <Body 'body1'> [90. 90. 30.]
         """
-        values = {
-            "mass": mass,
-            "inertia": inertia,
-            "position": position,
-            "orientation": orientation,
-            "velocity": velocity,
-            "angular_velocity": angular_velocity,
-        }
+        values = {"mass": mass, "inertia": inertia, "position": position, "orientation": orientation}
+        values |= {"velocity": velocity, "angular_velocity": angular_velocity}
         body = self._admit(Body, name, values)
         self._normalisations[body] = EulerNormalization(body, name=f"EulerNormalization({body.name})")
         settle(self._normalisations[body])
@@ -291,12 +284,14 @@ class Scene(OfFile):
 
     def touch(self) -> None:
         """Discard the packed numbers after a change."""
+        if "_later" in self.__dict__:
+            make_handles(self)
         self._packed = self._start = self._prepared = None
 
     def touch_start(self) -> None:
         """Discard what depends on the start, after a change of it: redundant rows, bodies that turn, a local origin."""
         known = None if self._packed is None else self._packed.derived
-        if known is not None and (known.redundant is not None or known.turning or known.local is not None):
+        if known is not None and known.is_of_start:
             self.touch()
         elif known is not None:
             known.family = None
@@ -332,11 +327,9 @@ class Scene(OfFile):
 
     def _initial(self):
         """The same, until the scene changes the same arrays, not to be written to."""
-        start = self._start
-        if start is None:
-            start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
-            self._start = start
-        return start
+        if self._start is None:
+            self._start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
+        return self._start
 
     def body(self, name: str) -> Body | Any:
         """Return the body of this name."""

@@ -136,9 +136,13 @@ def of_numbers(scene, family, changes, packed, start):
 def place(scene: Scene, q: Floats, qd: Floats) -> None:
     """Make q (n,) and qd (n,) the initial values of the bodies."""
     if "_later" in vars(scene):
-        family, changes = scene._later
-        changes = {**changes, **_start_values(family.packed, q, qd)}
-        vars(scene).update(vars(of_numbers(scene, family, changes, *family.numbers(changes))))
+        (family, changes), values, known = scene._later, _start_values(scene._packed, q, qd), scene._packed.derived
+        changes = {**changes, **values}
+        if known.is_of_start:
+            vars(scene).update(vars(of_numbers(scene, family, changes, *family.numbers(changes))))
+            return
+        known.family = family, changes, scene._prepared
+        vars(scene).update(_start=family.numbers(values)[1], _later=(family, changes))
         return
     for body, (at, length) in zip(scene._bodies, scene.system.bodies.tolist(), strict=True):
         body.place(q[at : at + length], qd[at : at + length])

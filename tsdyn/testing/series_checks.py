@@ -15,6 +15,7 @@ from ..jit.kernels import entry, resident, twin
 from ..maths.euler_parameters import rotate
 from ..maths.power_series import Truncated
 from ..model.equations import set_time
+from ..motions.keywords import numbers_of
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tracing import retold
@@ -168,8 +169,14 @@ def _law_of(force):
     """The law of a force that is given by a user's function, for any numbers."""
     function = force.function_of_state
     plain = getattr(function, "py_func", function)
+    told, names = retold(plain), list(numbers_of(plain))
+
+    def call(*given):
+        *arguments, par = given
+        return told(*arguments, **dict(zip(names, par[force.begin :], strict=False)))
+
     others = {"make": lambda f: f, "stack": zeros, "float": lambda number: number}
-    return twin(force._wrap(retold(plain), plain, **others))
+    return twin(force._wrap(told if force.has_numbers else call, plain, **others))
 
 
 def random_motion(scene, rng):

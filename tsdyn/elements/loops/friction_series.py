@@ -13,7 +13,8 @@ about the joint's point, ground frame.
 """
 
 from ...jit.kernels import part, stack
-from .template import MARKERS, SIZE, SLOTS, STARTS, kernel_normal_load, kernel_normal_series
+from ..markers import PARAMETERS
+from .template import CODES, MARKERS, SIZE, SLOTS, STARTS, kernel_normal_load, kernel_normal_series
 
 REACTION = 1  # row of the reaction behind that of N
 
@@ -30,7 +31,7 @@ def _complete(k, wide, par, kept, s, forces):
     change = load - s[N, k]
     s[N, k] = load
     for j in range(MARKERS):
-        for c in range(3):
+        for c in range(4 if CODES[j] == PARAMETERS else 3):
             forces[j * wide + 4 * k + c] += s[SLOTS + STARTS[j] + c, 0] * change
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tsdyn.cli import main
+from tests.helpers.commands import called
 from tsdyn.cli.output import plain
 
 STUDY = """\
@@ -35,15 +35,6 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study.toml").write_text(STUDY)
     return tmp_path
-
-
-def called(capsys, *words):
-    """Exit code, stdout and stderr of a command."""
-    try:
-        code = main(list(words))
-    except SystemExit as ended:
-        code = ended.code
-    return code, *capsys.readouterr()
 
 
 def test_a_study_of_a_file(folder, capsys):

@@ -7,7 +7,7 @@ import pytest
 
 import tsdyn as ts
 from examples import four_bar
-from tsdyn.cli import main
+from tests.helpers.commands import called
 
 FALL = 'version = 1\n[[body]]\nname = "stone"\ntype = "PointMass"\nmass = 1.0\nposition = [0, 0, 5]\n'
 
@@ -18,15 +18,6 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "fall.toml").write_text(FALL)
     four_bar.build().save("bars.toml")
     return tmp_path
-
-
-def called(capsys, *words):
-    """Exit code, stdout and stderr of a command."""
-    try:
-        code = main(list(words))
-    except SystemExit as ended:
-        code = ended.code
-    return code, *capsys.readouterr()
 
 
 def test_run(folder, capsys):

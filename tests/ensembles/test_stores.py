@@ -39,6 +39,24 @@ def test_a_store_has_the_same_numbers(suffix, options, tmp_path):
 
 
 @pytest.mark.parametrize("suffix", ["h5", "zarr"])
+@pytest.mark.parametrize("heavy", [slice(0, 4), slice(9, 12)], ids=["first", "last"])
+def test_what_is_kept_is_known_where_cases_before_or_after_have_failed(heavy, suffix, tmp_path):
+    scene, failing = top.build(), set(MASSES[heavy])
+
+    def keep(solution):
+        if solution.scene.bodies[0].mass in failing:
+            raise ValueError("too heavy")
+        return {"last": solution.state.q}
+
+    options = {"keep": keep, "threads": 1, "store": tmp_path / f"study.{suffix}"}
+    for count in (1, 9):  # ends within the first four, and with a few to go
+        ts.ensemble(scene, TABLE, SPAN, progress=stop_at(count), resume=True, **options)
+    resumed, whole = ts.ensemble(scene, TABLE, SPAN, resume=True, **options), ts.ensemble(scene, TABLE, SPAN, keep=keep)
+    np.testing.assert_array_equal(resumed.kept["last"], whole.kept["last"])
+    np.testing.assert_array_equal(resumed.status, whole.status)
+
+
+@pytest.mark.parametrize("suffix", ["h5", "zarr"])
 def test_a_study_goes_on_where_it_was_stopped(suffix, tmp_path):
     scene, path, seen = top.build(), tmp_path / f"study.{suffix}", []
 

@@ -6,6 +6,7 @@ Messages are beside the store, a line of JSON for each case that has one of its 
 import contextlib
 import hashlib
 import json
+import shutil
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -47,16 +48,22 @@ class StoredResults:
         if self.path.exists() and not resume:
             raise StorageError(f"{self.path} exists. Delete it, take another name, or go on with it: resume=True.")
         self.first = self._found() if self.path.exists() else 0
-        if not self.first:
-            self._said.unlink(missing_ok=True)
+        if not self.first:  # a store of this ensemble may be there, without results
+            for path in (self.path, self._said):
+                _remove(path)
 
     def _found(self):
-        """How many cases are in the store; raises StorageError if they are of another ensemble."""
+        """How many cases are in the store; raises StorageError if they are of another ensemble.
+
+        Cases of a store without arrays of `keep` have all failed, and run again: the shapes are still to be known.
+        """
         attributes = self._format.attributes(self.path)
         if attributes.get(DIGEST) != digest_of(self.study):
             raise StorageError(
                 f"{self.path} is the store of another ensemble: scene, parameters, options or functions differ."
             )
+        if callable(self.study.keep) and not any(map(_is_kept, self._format.names(self.path))):
+            return 0
         return self._format.count(self.path, [CASE, "status", "q", "qd"])
 
     def __getstate__(self):
@@ -85,14 +92,18 @@ class StoredResults:
             self._flush()
 
     def _kept(self):
-        return [column for column in self._table.columns if column.name.startswith("kept")]
+        return [column for column in self._table.columns if _is_kept(column.name)]
+
+    def _names(self):
+        """What is kept in a store that is there."""
+        return filter(_is_kept, self._format.names(self.path)) if self.first else ()
 
     def _open(self, chunk, last=False):
         """Make or open the store; False if the shapes of what is kept aren't known yet."""
-        known = {name for each in self._waiting.values() for name in each.arrays}
-        if callable(self.study.keep) and len(known) == 3 and not last:  # t, q, qd: all cases have failed so far
-            return False
         kept = {name: array for each in self._waiting.values() for name, array in each.arrays.items()}
+        kept |= {name: self._format.read(self.path, name, slice(0, 1)) for name in self._names()}
+        if callable(self.study.keep) and not any(map(_is_kept, kept)) and not last:  # all cases have failed so far
+            return False
         parameters = self.study.cases.part(slice(chunk.first, chunk.first + 1)).table
         self._table = table_of(self.study, parameters, kept)
         attributes = {"source": f"tsdyn {__version__}", DIGEST: digest_of(self.study)}
@@ -179,11 +190,9 @@ class _StoredArrays(Mapping):
 
     def __iter__(self):
         names = ("t", "q", "qd")
-        if self.results._table is not None:
-            names += tuple(column.name for column in self.results._table.columns if column.name.startswith("kept"))
-        elif self.results.first:
-            names += tuple(name for name in self.results._format.names(self.results.path) if name.startswith("kept"))
-        return iter(dict.fromkeys(names))
+        results = self.results
+        kept = results._names() if results._table is None else [column.name for column in results._kept()]
+        return iter(dict.fromkeys((*names, *kept)))
 
     def __len__(self):
         return len([*iter(self)])
@@ -205,12 +214,24 @@ def table_of(study, parameters, kept):
         columns.append(Column(name, (*grid, "coordinate"), _said(name, units)))
     others = [(_column(name), array, study.family.fields[name].unit) for name, array in parameters.items()
               if np.asarray(array).dtype.kind in "iuf"]  # fmt: skip
-    others += [(name, array, "") for name, array in kept.items() if name.startswith("kept")]
+    others += [(name, array, "") for name, array in kept.items() if _is_kept(name)]
     for name, array, units in others:
         dimensions = tuple(f"axis {i} of {name}" for i in range(np.ndim(array) - 1))
         labels |= {each: [str(i) for i in range(size)] for each, size in zip(dimensions, array.shape[1:], strict=True)}
         columns.append(Column(name, dimensions, _said(name, units)))
     return Table(CASE, tuple(columns), labels)
+
+
+def _remove(path):
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _is_kept(name):
+    """Whether an array is what a function `keep` returned."""
+    return name.startswith("kept")
 
 
 def _said(text, units):

@@ -86,6 +86,29 @@ def test_a_cluster_whose_worker_is_killed_loses_nothing(tmp_path, monkeypatch):
     assert np.array_equal(by_address.q, expected().q)
 
 
+def test_an_address_without_a_scheduler():
+    pytest.importorskip("distributed")
+    from dask.config import set as settings
+
+    refused = pytest.raises(ts.InvalidArgument, match=r"no scheduler of Dask at 'tcp://127\.0\.0\.1:9'")
+    with settings({"distributed.comm.timeouts.connect": "0.1s"}), refused:
+        ts.ensemble(top.build(), TABLE, SPAN, executor="tcp://127.0.0.1:9")
+
+
+def test_a_handshake_that_fails_is_tried_again(monkeypatch):
+    distributed, tries = pytest.importorskip("distributed"), []
+
+    def connect(address):
+        tries.append(address)
+        assert len(tries) > 1
+        raise OSError("no route")
+
+    monkeypatch.setattr(distributed, "Client", connect)
+    with pytest.raises(ts.InvalidArgument, match="no route"):
+        ts.ensemble(top.build(), TABLE, SPAN, executor="tcp://127.0.0.1:9")
+    assert len(tries) == 2
+
+
 def test_what_is_no_executor():
     with pytest.raises(ts.InvalidArgument, match=r"an Executor of concurrent\.futures"):
         ts.ensemble(top.build(), TABLE, SPAN, executor=3)

@@ -55,7 +55,8 @@ def runnable():
     """Each such command once; `file.py` stands for a file of the reader's."""
     found = (command.partition("#")[0].strip() for command in commands())
     named = (command.replace("file.py", "examples/top.py") for command in found if command.startswith(RUN))
-    return sorted({command for command in named if command not in ("tsdyn profile", "tsdyn compile --all")})
+    kept = (command for command in named if command not in ("tsdyn profile", "tsdyn compile --all"))
+    return sorted({command for command in kept if not re.search(r"\[|[A-Z]{2}", command)})  # nor forms, as SCENE
 
 
 @pytest.mark.slow

@@ -170,6 +170,8 @@ def test_checker_sees_scratch_memory_that_is_too_small_or_read_too_early():
 @pytest.mark.slow
 def test_checker_sees_a_law_that_depends_on_time():
     class Timed(Soft):
+        series = staticmethod(Soft.series)
+
         @staticmethod
         def law(x, xd, par, t, out):
             for i in range(10):

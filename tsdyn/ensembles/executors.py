@@ -70,7 +70,7 @@ def _opened(executor):
             from distributed import Client
         except ImportError as error:
             raise MissingDependency("an address of a scheduler needs Dask: pip install 'tsdyn[cluster]'.") from error
-        client = Client(executor) if isinstance(executor, str) else executor
+        client = _connected(Client, executor) if isinstance(executor, str) else executor
         pool = client.get_executor(pure=False, retries=RETRIES)
         try:
             yield pool, sum(client.nthreads().values()) or 1, True
@@ -85,6 +85,17 @@ def _opened(executor):
             "executor must be an Executor of concurrent.futures, a dask.distributed.Client or the address of its "
             f"scheduler, got {executor!r}."
         )
+
+
+def _connected(kind, address):
+    """A client of the scheduler at an address; the handshake can fail while a worker joins, and is tried again."""
+    try:
+        for _ in range(RETRIES):
+            with contextlib.suppress(AssertionError):
+                return kind(address)
+        return kind(address)
+    except (OSError, ValueError) as error:
+        raise InvalidArgument(f"executor: there is no scheduler of Dask at {address!r} ({error}).") from error
 
 
 class _Sender:

@@ -1,6 +1,7 @@
-"""A run that is stopped after its first slice and goes on from its checkpoint."""
+"""A run that is stopped at its first checkpoint and goes on from there."""
 
 from importlib.util import find_spec
+from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
@@ -12,14 +13,13 @@ SELDOM = 1e9  # s between checkpoints: the first, after a slice, is the only one
 
 
 class _Stop:
-    """Ctrl-C after the first slice."""
+    """Ctrl-C as soon as there is a checkpoint: after the first slice, or a later one where the first ends a segment."""
 
-    def __init__(self):
-        self.seen = 0
+    def __init__(self, path):
+        self.checkpoint = Path(f"{path}.checkpoint")
 
     def __call__(self, fraction):
-        self.seen += 1
-        if self.seen == 2:
+        if self.checkpoint.exists():
             raise KeyboardInterrupt
 
 
@@ -29,7 +29,7 @@ def resumed_is_same(scene, span, solution, **options):
         return None
     with TemporaryDirectory() as folder:
         path = f"{folder}/run.h5"
-        simulate(scene, span, progress=_Stop(), store=path, checkpoint=SELDOM, **options)
+        simulate(scene, span, progress=_Stop(path), store=path, checkpoint=SELDOM, **options)
         return same_bits(solution, resume(path, scene=scene))
 
 

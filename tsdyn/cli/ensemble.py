@@ -1,17 +1,15 @@
 """The command `tsdyn ensemble`: many runs of a scene, with the parameters of its file or of a table."""
 
 import csv
-import sys
 import time
 from collections import Counter
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InvalidArgument, Status
 from .output import print_json
-from .run import add_json, add_method, add_scene, demand_writable, options_of
+from .run import add_json, add_method, add_scene, destinations, options_of, progress_of
 from .scene_file import load_document
 
 SHOWN, LOW, HIGH = 12, 0.05, 0.95  # coordinates in the summary; its quantiles
@@ -57,15 +55,12 @@ def _ensemble(parsed):
             "(tsdyn new shows how), or give --parameters cases.csv."
         )
     span, options = options_of(parsed, document.run)
-    outputs = parsed.output or document.output["files"]
-    plot = document.output["plot"] if parsed.plot is None else parsed.plot or _picture(parsed.scene)
-    demand_writable(outputs, plot)
+    outputs, plot = destinations(parsed, document)
     if parsed.assemble:
         study["assemble"] = True
-    show = sys.stderr.isatty() and not parsed.json and find_spec("tqdm") is not None
     began = time.perf_counter()
     found = ensemble(document.scene, study.pop("parameters"), span, threads=parsed.threads, store=parsed.store,
-                     resume=parsed.resume, progress=show or None, **study, **options)  # fmt: skip
+                     resume=parsed.resume, progress=progress_of(parsed), **study, **options)  # fmt: skip
     seconds = time.perf_counter() - began
     written = [str(write(found, path)) for path in outputs] + ([str(_draw(found, plot))] if plot else [])
     if parsed.json:
@@ -75,10 +70,6 @@ def _ensemble(parsed):
         lines = [repr(found), rate, *table_lines(found), *(f"  written   {path}" for path in written)]
         print("\n".join(lines))
     return 0 if found.success.all() else 1
-
-
-def _picture(scene):
-    return Path(scene).with_suffix(".png").name
 
 
 def table_of(path):

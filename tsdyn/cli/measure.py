@@ -13,13 +13,7 @@ TOLERANCES = "1e-4,1e-6,1e-8,1e-10"
 
 def add_profile_options(parser):
     """Add the options of `tsdyn profile`."""
-    parser.add_argument(
-        "scene",
-        metavar="SCENE",
-        help="a scene file (.toml); a Python file with a function build(), or a scene; file.py:name takes another one; "
-        "or an example's name",
-    )
-    parser.add_argument("--allow-code", action="store_true", help="import modules that the file names for plug-ins")
+    add_scene(parser)
     parser.add_argument("--t-start", type=float, default=0.0, metavar="S", help="start of the run (default 0)")
     parser.add_argument("--t-end", "--to", type=float, default=10.0, metavar="S", help="end of the run (default 10)")
     parser.add_argument("--method", metavar="NAME", help="an integrator, such as dop853")
@@ -68,7 +62,7 @@ def _profile(parsed):
     from .scene_file import load_scene
 
     began = time.perf_counter()
-    scene = load_scene(parsed.scene, parsed.allow_code)
+    scene = load_scene(parsed.scene, parsed.allow_code, parsed.free_base)
     if not parsed.json:
         print(f"{scene!r}, built in {1e3 * (time.perf_counter() - began):.3g} ms", flush=True)
     span, count = (parsed.t_start, parsed.t_end), whole(parsed.outputs, "--outputs")
@@ -97,7 +91,7 @@ def _benchmark(parsed):
 
     tolerances, steps = _numbers(parsed.tolerances, "--tolerances"), _numbers(parsed.steps, "--steps")
     methods = None if parsed.methods is None else [word.strip() for word in parsed.methods.split(",")]
-    scene = load_scene(parsed.scene, parsed.allow_code)
+    scene = load_scene(parsed.scene, parsed.allow_code, parsed.free_base)
     if not parsed.json:
         print(f"{parsed.scene}: {scene!r}", flush=True)
     found = benchmark(scene, methods, tolerances, (0.0, parsed.to), steps=steps, repeats=parsed.repeats,

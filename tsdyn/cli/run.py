@@ -43,7 +43,8 @@ def add_scene(parser, metavar="SCENE"):
     parser.add_argument(
         "scene",
         metavar=metavar,
-        help="a TOML, URDF, MJCF or SDF file; or a Python file with a function build(), which is then executed",
+        help="a TOML, URDF, MJCF or SDF file; or a Python file with a function build(), or a scene, which is then "
+        "executed; file.py:name takes another one; or an example's name",
     )
     parser.add_argument("--free-base", action="store_true", help="the root link of a URDF is free to move")
     parser.add_argument("--allow-code", action="store_true", help="import modules that the file names for plug-ins")
@@ -62,20 +63,15 @@ def _run(parsed):
     """
     from ..simulation.simulate import simulate
 
-    demand_writable(parsed.output, parsed.plot)
     document = load_document(parsed.scene, parsed.allow_code, free_base=parsed.free_base)
     scene, (span, options) = document.scene, options_of(parsed, document.run)
-    outputs, plot = parsed.output or document.output["files"], parsed.plot
-    if plot is None:
-        plot = document.output["plot"]
-    demand_writable(outputs, plot)
+    outputs, plot = destinations(parsed, document)
     if not parsed.json:
         print(f"{parsed.scene}: {scene!r}", flush=True)
-    show = sys.stderr.isatty() and not parsed.json and find_spec("tqdm") is not None
-    solution = simulate(scene, span, progress=show or None, **options)
+    solution = simulate(scene, span, progress=progress_of(parsed), **options)
     written = [str(write(solution, path)) for path in outputs]
     if plot is not None:
-        written.append(str(_draw(solution, plot or Path(parsed.scene).with_suffix(".png").name)))
+        written.append(str(_draw(solution, plot)))
     if parsed.json:
         print_json({**summary(solution), "written": written})
     else:
@@ -102,7 +98,21 @@ def options_of(parsed, given):
     return (start, end), given
 
 
-def demand_writable(outputs, plot):
+def progress_of(parsed):
+    """True where somebody sees a progress bar, else None."""
+    return (sys.stderr.isatty() and not parsed.json and find_spec("tqdm") is not None) or None
+
+
+def destinations(parsed, document):
+    """Files of the results, and where to draw, by the options, else by the file; refused at once if not writable."""
+    outputs, plot = parsed.output or document.output["files"], document.output["plot"]
+    if parsed.plot is not None:
+        plot = parsed.plot or Path(parsed.scene).with_suffix(".png").name
+    _demand_writable(outputs, plot)
+    return outputs, plot
+
+
+def _demand_writable(outputs, plot):
     """Refuse at once, not after the run, what can't be written at its end."""
     for path in (*outputs, *([plot] if plot else [])):
         if not Path(path).resolve().parent.is_dir():

@@ -11,6 +11,7 @@ import numpy as np
 from ..calls import fitting
 from ..errors import InvalidArgument
 from ..observables import diagnostics, power
+from ..runs.arguments import interval
 from ..simulation.simulate import simulate
 from ..validation import positive, whole
 from . import engines
@@ -83,7 +84,7 @@ def compare(
     ...     print(error)
     compare: with_='mojoco' is no engine that is known; did you mean mujoco? There are mujoco, exudyn.
     """
-    start, end = _span(t_span)
+    start, end = interval(t_span)
     step, outputs = positive(step, "compare: step (s)"), whole(outputs, "compare: outputs") or 200
     if options is not None and not isinstance(options, dict):
         raise InvalidArgument(f"compare: options must be a dictionary, got {options!r}.")
@@ -105,20 +106,9 @@ def compare(
     )  # fmt: skip
 
 
-def _span(t_span):
-    """Start and end."""
-    try:
-        start, end = (float(t) for t in t_span)
-    except (TypeError, ValueError) as error:
-        raise InvalidArgument(f"compare: t_span must be (start, end) in s, got {t_span!r}.") from error
-    if not (np.isfinite([start, end]).all() and start < end):
-        raise InvalidArgument(f"compare: t_span must be two finite times, the first one smaller, got {t_span!r}.")
-    return start, end
-
-
 def _columns(scene):
     """Where the coordinates of each body begin."""
-    return np.cumsum([0, *(body.dimension for body in scene.bodies)])[:-1]
+    return scene.system.bodies[:, 0].tolist()
 
 
 def _apart(scene, q, reference):

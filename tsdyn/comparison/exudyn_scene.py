@@ -8,6 +8,7 @@ import time
 import numpy as np
 
 from ..elements.bodies import rotation_matrix
+from .loads import is_constant
 
 LOCKED = {  # displacements along and rotations about the axes of a joint, the last of which is its own
     "Revolute": (1, 1, 1, 1, 1, 0),
@@ -57,11 +58,7 @@ def refused(scene):
 
 def _is_plain(item, load):
     """Whether a load is constant, in the ground frame."""
-    try:
-        value = np.asarray(getattr(item, load), float)
-    except (TypeError, ValueError):
-        return False
-    return bool(np.isfinite(value).all()) and getattr(item, "frame", "ground") == "ground"
+    return is_constant(getattr(item, load)) and getattr(item, "frame", "ground") == "ground"
 
 
 class ExudynScene:

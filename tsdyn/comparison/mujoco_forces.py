@@ -4,6 +4,7 @@ import numpy as np
 
 from ..elements.bodies import rotation_matrix
 from ..elements.joint_coordinates import angles
+from .loads import is_constant
 
 ALONG = 1e-9  # sine between the axis of a spring and that of its joint
 
@@ -90,10 +91,10 @@ def _reason(item, links):
     kind = item._kind()
     if kind in ("Torque", "PointForce"):
         given = getattr(item, "torque" if kind == "Torque" else "force")
-        if item.frame != "ground" or not _is_number(given):
+        if item.frame != "ground" or not is_constant(given):
             return f"{kind} must be constant, in ground axes"
         return "PointForce must act at the centroid" if kind == "PointForce" and np.any(item.coordinates[0]) else ""
-    if kind in ("Spring", "TorsionalSpring") and not (_is_number(item.actuator) and not item.actuator):
+    if kind in ("Spring", "TorsionalSpring") and not (is_constant(item.actuator) and not item.actuator):
         return "an actuator has no counterpart"
     if kind == "Spring":
         return ""
@@ -109,10 +110,3 @@ def _reason(item, links):
     kinds = [move.kind for move in link.moves]
     fits = (kinds in (["hinge"], ["ball"]) and not item.damping) or (kinds == ["slide"] and item.damping)
     return "" if fits else "it damps more than one joint"
-
-
-def _is_number(value):
-    try:
-        return bool(np.isfinite(np.asarray(value, float)).all())
-    except (TypeError, ValueError):
-        return False

@@ -5,7 +5,7 @@ import math
 from ..elements.loops.body_poses import move_bodies, place_bodies, write_positions, write_velocities
 from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
 from ..jit.kernels import callback, entry, integers, kernel, vector
-from ..maths.dense_linalg import copy, is_finite
+from ..maths.dense_linalg import copy, is_finite, largest
 from ..model.equations import set_time
 from ..model.lengths import SMALL
 from ..rows.interface import (
@@ -156,7 +156,7 @@ def take_start(context, q, qd, velocity, at, count, t, tol):  # eight: addresses
     if _hold(f.b, rates, f.rows.H, x, xd, at, min(ROUNDING, tol)) == 1:
         return PLAIN
     far, fast = _residuals(c, rates, x, xd, at)
-    whole, rate = 1.0 + _largest(x), 1.0 + _largest(xd)
+    whole, rate = 1.0 + largest(x), 1.0 + largest(xd)
     if not (far <= tol * whole and fast <= tol * rate and is_finite(f.rows.H)):
         return 0
     if far > ROUNDING * whole:
@@ -178,7 +178,7 @@ def take_start(context, q, qd, velocity, at, count, t, tol):  # eight: addresses
 @kernel
 def _set_floor(control, q, at):
     """As `StartWorkspace.enter` sets it."""
-    far, scale = _largest(q), 1.0
+    far, scale = largest(q), 1.0
     if 0.0 < control.size < SMALL:
         far, scale, last = 0.0, control.size, 0
         for i in range(q.size):
@@ -187,14 +187,6 @@ def _set_floor(control, q, at):
             if turns and i == at[last] + 3:
                 last += 1
     control.floor = ROUNDING * (control.size + far)
-
-
-@kernel
-def _largest(x):
-    found = 0.0
-    for i in range(x.size):
-        found = max(found, abs(x[i]))
-    return found
 
 
 @kernel

@@ -9,6 +9,7 @@ import numpy as np
 from ..elements.bodies import Body
 from ..errors import InvalidArgument
 from ..parameters.fields import fields_of
+from ..simulation.variants import start_of
 from ..validation import counted, nearest
 
 MATRIX = 2  # dimensions of an inertia
@@ -145,6 +146,15 @@ def _column(name, given, field):
         )
     array.setflags(write=False)
     return (array, True) if array.ndim > whole else (float(array) if whole == 0 else array, False)
+
+
+def started(scene, values, t, free):
+    """Values of a case of a scene by name, with those of its start at t; free: names of the bodies that may move."""
+    if free is None:
+        return values
+    case = scene.with_parameters(values)
+    case.assemble(t=t, free=free)
+    return {**values, **start_of(case)}
 
 
 def _array(given):

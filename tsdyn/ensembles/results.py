@@ -231,7 +231,11 @@ class Ensemble:
 
         study, i = self._study, self._number_of(i)
         given = {name: value for name, value in study.given.items() if name != "scene"}
-        return simulate(study.scene.with_parameters(study.values(i)), **given)
+        return simulate(study.scene.with_parameters(self._values(i)), **given)
+
+    def _values(self, i):
+        """Values of a case by name, with those of its start."""
+        return self._study.values(i)
 
     @property
     def coordinates(self) -> list[str]:

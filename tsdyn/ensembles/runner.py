@@ -9,8 +9,9 @@ from ..errors import Status, TsdynError
 from ..simulation.options import checked
 from ..simulation.simulate import run_from
 from ..simulation.solution import Solution
-from ..simulation.variants import family_of, of_numbers, packed_anew, start_names, start_of
+from ..simulation.variants import family_of, of_numbers, packed_anew, start_names
 from .arena import Arena, method_of
+from .cases import started
 from .first_slice import Finished
 from .keeping import demand_keep, record_of, reduced
 from .sharing import serves
@@ -83,12 +84,7 @@ class Study:
 
     def values(self, i):
         """Values of case i by name, with those of a consistent start."""
-        values = self.cases.values(i)
-        if self.free is None:
-            return values
-        scene = self.scene.with_parameters(values)
-        scene.assemble(t=self.options.span[0], free=self.free)
-        return {**values, **start_of(scene)}
+        return started(self.scene, self.cases.values(i), self.options.span[0], self.free)
 
     def report(self, fraction, *more):
         """Of a run: end it if the ensemble has been stopped."""

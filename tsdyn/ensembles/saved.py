@@ -10,7 +10,7 @@ from ..errors import InvalidArgument, InvalidFile, StorageError, TsdynError
 from ..files import scene_text
 from ..simulation.scene import Scene
 from ..simulation.stored_runs import hash_of
-from .cases import Cases
+from .cases import Cases, started
 from .results import Ensemble
 from .saving import FORMAT, REDUCED
 
@@ -85,15 +85,14 @@ class SavedEnsemble(Ensemble):
                 f"a case can't be run again: {', '.join(self._record['lacking'])} of the ensemble is no data, and a "
                 "file holds no code."
             )
-        from ..simulation.simulate import simulate
-
-        i = self._number_of(i)
+        self._number_of(i)
         if self._study.scene is None:
             self._study.scene = self._scene()
-        case = self._study.scene.with_parameters(self._study.cases.values(i))
-        if self._study.free is not None:
-            case.assemble(t=self._study.given["t_span"][0], free=self._study.free)
-        return simulate(case, **self._study.given)
+        return super().case(i)
+
+    def _values(self, i):
+        study = self._study
+        return started(study.scene, study.cases.values(i), study.given["t_span"][0], study.free)
 
 
 def _lost(solution):

@@ -116,7 +116,7 @@ class _Cases:
 
     def table(self):
         """Name -> array (cases, ...), or one value for all."""
-        columns = {name: column for name, column in self.columns.items()}
+        columns = dict(self.columns)
         for name, ((kind, numbers), shape) in self.spread.items():
             if kind == "linspace" and (len(numbers) == 3 or self.grid):
                 columns[name] = self._steps(name, numbers, shape)

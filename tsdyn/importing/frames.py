@@ -33,6 +33,16 @@ class Frame(NamedTuple):
 HERE = Frame(np.zeros(3), np.eye(3))
 
 
+def posed(p, wxyz):
+    """A frame of a place and a quaternion, scalar first."""
+    return Frame(np.array(p), of_quaternion(wxyz))
+
+
+def of_body(data, i):
+    """The frame of a body of MuJoCo's, in the ground frame."""
+    return Frame(data.xpos[i].copy(), data.xmat[i].reshape(3, 3).copy())
+
+
 def turned(rotation_vector):
     """A rotation about the origin."""
     return Frame(np.zeros(3), Rotation.from_rotvec(rotation_vector).as_matrix())

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import MissingDependency
 from . import mjcf_forces, mjcf_joints, mjcf_loops, mjcf_rest, mjcf_shapes
 from .description import GROUND, Description, Link
-from .frames import Frame, of_quaternion
+from .frames import of_body, of_quaternion, posed
 
 
 def describe(root, path, report):
@@ -31,7 +31,7 @@ def describe(root, path, report):
         found.links[names.body(i)] = _link(model, data, i, names)
     mjcf_joints.add_joints(mujoco, model, data, found, names, report)
     for i in range(model.nsite):
-        at = Frame(model.site_pos[i].copy(), of_quaternion(model.site_quat[i]))
+        at = posed(model.site_pos[i], model.site_quat[i])
         found.frames[names.of("site", i)] = names.body(int(model.site_bodyid[i])), at
     mjcf_forces.add_forces(mujoco, model, data, found, names, report)
     mjcf_loops.add_loops(mujoco, model, data, found, names, report)
@@ -102,6 +102,6 @@ def _gravity(mujoco, model):
 def _link(model, data, i, names):
     """A body at qpos0; its inertia is given about principal axes."""
     R = of_quaternion(model.body_iquat[i])
-    frame = Frame(data.xpos[i].copy(), data.xmat[i].reshape(3, 3).copy())
     inertia = R @ np.diag(model.body_inertia[i]) @ R.T
-    return Link(names.body(i), frame, float(model.body_mass[i]), model.body_ipos[i].copy(), (inertia + inertia.T) / 2.0)
+    inertia = (inertia + inertia.T) / 2.0
+    return Link(names.body(i), of_body(data, i), float(model.body_mass[i]), model.body_ipos[i].copy(), inertia)

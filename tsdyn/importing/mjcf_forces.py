@@ -6,6 +6,7 @@ force = gain u + b0 + b1 l + b2 ld,  l = gear q,  torque = gear force     u: 0, 
 import numpy as np
 
 from .description import Servo, SpringItem
+from .frames import of_body
 
 PLAIN = ("mjGAIN_FIXED", "mjGAIN_AFFINE")
 BIAS = ("mjBIAS_NONE", "mjBIAS_AFFINE")
@@ -113,5 +114,4 @@ def _add_tendon(mujoco, model, data, i, found, names, report):
 
 def _place(model, data, site):
     """A site in the ground frame."""
-    body = int(model.site_bodyid[site])
-    return data.xpos[body] + data.xmat[body].reshape(3, 3) @ model.site_pos[site]
+    return of_body(data, int(model.site_bodyid[site])).point(model.site_pos[site])

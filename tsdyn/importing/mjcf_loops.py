@@ -8,7 +8,7 @@ joint      q_1 - q_1(0) = a1 (q_2 - q_2(0))
 import numpy as np
 
 from .description import Coupling, JointItem
-from .frames import Frame, of_quaternion
+from .frames import of_body, posed, shifted
 
 
 def add_loops(mujoco, model, data, found, names, report):
@@ -33,17 +33,16 @@ def _add_loop(mujoco, model, data, i, found, names, report):
     if int(model.eq_objtype[i]) == int(mujoco.mjtObj.mjOBJ_SITE):
         bodies = [int(model.site_bodyid[s]) for s in pair]
         frames = [
-            _frame(data, body) @ Frame(model.site_pos[s].copy(), of_quaternion(model.site_quat[s]))
+            of_body(data, body) @ posed(model.site_pos[s], model.site_quat[s])
             for body, s in zip(bodies, pair, strict=True)
         ]
     else:
         bodies, numbers = pair, model.eq_data[i]
-        one, other = (_frame(data, body) for body in bodies)
+        one, other = (of_body(data, body) for body in bodies)
         if kind == int(mujoco.mjtEq.mjEQ_WELD):
-            at = Frame(numbers[3:6].copy(), of_quaternion(numbers[6:10]))
-            frames = [one @ at, other @ Frame(numbers[0:3].copy(), np.eye(3))]
+            frames = [one @ posed(numbers[3:6], numbers[6:10]), other @ shifted(numbers[0:3])]
         else:
-            frames = [frame @ Frame(numbers[k : k + 3].copy(), np.eye(3)) for k, frame in ((0, one), (3, other))]
+            frames = [frame @ shifted(numbers[k : k + 3]) for k, frame in ((0, one), (3, other))]
     weld = kind == int(mujoco.mjtEq.mjEQ_WELD)
     if weld and not model.eq_data[i, 10]:
         weld = False
@@ -55,10 +54,6 @@ def _add_loop(mujoco, model, data, i, found, names, report):
         )
     )  # fmt: skip
     report.note("equality constraints are held exactly: their solref and solimp are those of a soft one")
-
-
-def _frame(data, body):
-    return Frame(data.xpos[body].copy(), data.xmat[body].reshape(3, 3).copy())
 
 
 def _add_coupling(model, i, found, names, report):

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from .description import GROUND
-from .frames import Frame, of_quaternion, shifted
+from .frames import posed, shifted
 from .meshes import DrawnShape, hexadecimal
 from .xml_file import exists
 
@@ -58,7 +58,7 @@ def add_shapes(mujoco, model, found, names, report):
 
 def _shapes(model, i, kind):
     """`DrawnShape`s of a geom: a capsule is a cylinder and two spheres."""
-    at, size = Frame(model.geom_pos[i].copy(), of_quaternion(model.geom_quat[i])), model.geom_size[i].tolist()
+    at, size = posed(model.geom_pos[i], model.geom_quat[i]), model.geom_size[i].tolist()
     rgba = model.mat_rgba[model.geom_matid[i]] if model.geom_matid[i] >= 0 else model.geom_rgba[i]
     colour = hexadecimal(rgba)
     if kind == "sphere":

@@ -21,7 +21,6 @@ from .xml_file import read
 if TYPE_CHECKING:
     from ..hints import Callable, Place, Scene
 
-SUFFIXES = (".urdf", ".xml", ".mjcf", ".sdf", ".world")
 FORMATS = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF", "gazebo": "SDF"}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import warnings
 from typing import Any, NamedTuple
 
 from ..errors import ImportLosses
@@ -66,6 +67,11 @@ class ImportReport:
         if text not in self.notes:
             self.notes += (text,)
 
+    def leave_unread(self, root: Any) -> None:
+        """Note what nobody has asked a root element for."""
+        for name, line in root.unread():
+            self.leave(f"element {name}" if " " not in name else f"attribute {name}", f"line {line}")
+
     def groups(self) -> dict[str, list[LeftOut]]:
         """What is left out, by what it is."""
         found: dict[str, list[LeftOut]] = {}
@@ -81,8 +87,6 @@ class ImportReport:
     def warn(self) -> None:
         """Warn where something is left out."""
         if self.left_out:
-            import warnings
-
             said = f"{self.source}: not carried over: {self.summary()}. print(scene.imported) lists each."
             warnings.warn(ImportLosses(said), stacklevel=6)
 

@@ -31,8 +31,7 @@ def describe(root, folder, report):
     for model in models:
         prefix = f"{model.get('name')}::" if len(models) > 1 else ""
         _add_model(found, model, HERE, prefix, folder, report)
-    for name, line in root.unread():
-        report.leave(f"element {name}" if " " not in name else f"attribute {name}", f"line {line}")
+    report.leave_unread(root)
     return found
 
 

@@ -7,8 +7,8 @@ https://wiki.ros.org/urdf/XML.
 import numpy as np
 
 from .description import GROUND, Coupling, Description, JointItem, Link
-from .frames import HERE, Frame, roll_pitch_yaw, shifted, turned
-from .urdf_shapes import add_shapes, colours
+from .frames import HERE, shifted, turned
+from .urdf_shapes import add_shapes, colours, placed
 
 KINDS = {
     "revolute": "revolute",
@@ -47,7 +47,7 @@ def describe(root, folder, report, free_base):
     base = [name for name in found.links if not any(joint.b == name for joint in found.joints)]
     if base and (not free_base or base[0] == WORLD):
         found.joints.insert(0, JointItem("base", "fixed", GROUND, base[0]))
-    _leave_rest(root, report)
+    report.leave_unread(root)
     return found
 
 
@@ -88,7 +88,7 @@ def origin(node):
         return HERE
     if child.get("quat_xyzw") is not None:
         child.wrong("<origin quat_xyzw>: write rpy.")
-    return Frame(child.attribute("xyz", 3, np.zeros(3)), roll_pitch_yaw(child.attribute("rpy", 3, np.zeros(3))))
+    return placed(child)
 
 
 def _joints(root, found, report):
@@ -207,9 +207,3 @@ def _couple(found, order, report):
             report.leave("joint that mimics another one", joint.name, f"there is no other joint {driver!r}")
         else:
             found.couplings.append(Coupling(f"{joint.name} mimics {driver}", driver, joint.name, ratio))
-
-
-def _leave_rest(root, report):
-    """List what nobody has read."""
-    for name, line in root.unread():
-        report.leave(f"element {name}" if " " not in name else f"attribute {name}", f"line {line}")

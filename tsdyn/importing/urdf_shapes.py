@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .frames import Frame, roll_pitch_yaw
+from .frames import HERE, Frame, roll_pitch_yaw
 from .meshes import DrawnShape, hexadecimal, mesh
 
 
@@ -24,11 +24,15 @@ def _colour(node, known):
 
 def add_shapes(link, node, folder, report, materials):
     """Add the shapes of an element <link>; contact shapes are listed."""
-    collisions = node.all("collision")
-    drawn = [_shape(one, link.name, folder, report, materials) for one in node.all("visual")]
+    _add(link, node, report, lambda one, report: _shape(one, link.name, folder, report, materials))
+
+
+def _add(link, node, report, shape_of):
+    """Add the shapes of <visual>, or of <collision>: `shape_of(node, report)`, None where it can't be drawn."""
+    drawn = [shape_of(one, report) for one in node.all("visual")]
     link.shapes = [shape for shape in drawn if shape is not None]
-    for one in collisions:
-        shape = _shape(one, link.name, folder, report if not link.shapes else None, materials)
+    for one in node.all("collision"):
+        shape = shape_of(one, report if not link.shapes else None)
         report.leave("contact shape", link.name)
         if shape is not None and not any(drawn):
             link.shapes.append(shape)
@@ -42,13 +46,15 @@ def _shape(node, name, folder, report, materials):
     if geometry is None or not geometry.nodes:
         node.wrong(f"link {name!r}: <{node.tag}> lacks <geometry> with a shape.")
         return None
-    place = Frame(np.zeros(3), np.eye(3))
-    if at is not None:
-        place = Frame(at.attribute("xyz", 3, np.zeros(3)), roll_pitch_yaw(at.attribute("rpy", 3, np.zeros(3))))
-    shape = geometry.nodes[0]
+    place, shape = HERE if at is None else placed(at), geometry.nodes[0]
     geometry.all(shape.tag)
     made = _primitive(shape, name, folder, report)
     return None if made is None else DrawnShape(*made, place, colour)
+
+
+def placed(node):
+    """The frame of an element <origin>."""
+    return Frame(node.attribute("xyz", 3, np.zeros(3)), roll_pitch_yaw(node.attribute("rpy", 3, np.zeros(3))))
 
 
 def _primitive(shape, name, folder, report):
@@ -79,14 +85,9 @@ def _primitive(shape, name, folder, report):
 
 def add_sdf_shapes(link, node, frames, folder, report):
     """Add the shapes of an SDF element <link>."""
-    drawn = [_sdf_shape(one, link.name, frames, folder, report) for one in node.all("visual")]
-    link.shapes = [shape for shape in drawn if shape is not None]
+    _add(link, node, report, lambda one, report: _sdf_shape(one, link.name, frames, folder, report))
     for one in node.all("collision"):
-        shape = _sdf_shape(one, link.name, frames, folder, report if not link.shapes else None)
-        report.leave("contact shape", link.name)
         one.skip()
-        if shape is not None and not any(drawn):
-            link.shapes.append(shape)
 
 
 def _sdf_shape(node, name, frames, folder, report):

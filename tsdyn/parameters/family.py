@@ -94,7 +94,7 @@ class Family:
         for name, value in values.items():
             field = self.field(name)
             owner, changes = groups.setdefault(id(field.owner), (field.owner, {}))
-            present = changes.get(field.attribute) if field.attribute in changes else getattr(owner, field.attribute)
+            present = changes[field.attribute] if field.attribute in changes else getattr(owner, field.attribute)
             changes[field.attribute] = field.entered(value, present)
         for owner, changes in groups.values():
             if not edit.enter(owner, changes):

@@ -126,14 +126,8 @@ def link(values, u, target, stride, kept, limit):
     if not limit * k2 * k2 < u22 * k2 < math.inf:
         return 2
     d2 = 1.0 / u22
-    a0, a1, a2 = get(values, u + 3), get(values, u + 4), get(values, u + 5)
-    b0, b1, b2 = get(values, v + 3) - f01 * a0, get(values, v + 4) - f01 * a1, get(values, v + 5) - f01 * a2
-    c0 = get(values, w + 3) - f02 * a0 - f12 * b0
-    c1 = get(values, w + 4) - f02 * a1 - f12 * b1
-    c2 = get(values, w + 5) - f02 * a2 - f12 * b2
     _store_pivots(values, u, d0, d1, u12, d2)
-    _store(values, v + 3, b0, b1, b2)
-    _store(values, w + 3, c0, c1, c2)
+    a0, a1, a2, b0, b1, b2, c0, c1, c2 = _rest_of_link(values, u, f01, f02, f12)
     x, y, z = a0 * d0, b0 * d1, c0 * d2
     _take(values, target, x * a0 + y * b0 + z * c0)
     _take(values, target + 1, x * a1 + y * b1 + z * c1)

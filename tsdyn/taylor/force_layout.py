@@ -7,6 +7,7 @@ import numpy as np
 
 from ..elements.element import address
 from ..elements.loops import force_series
+from ..elements.loops.friction_series import FRICTION_ROWS
 from ..errors import InvalidForce
 from ..jit.aligned_arrays import zeros
 from ..jit.kernels import records
@@ -24,9 +25,6 @@ class ForceLayout(NamedTuple):
     table: np.ndarray
     loads: np.ndarray
     drives: np.ndarray
-
-
-FRICTION_ROWS = 7  # of the scratch of a friction of a joint, beside its kernels' and as many as x has
 
 
 class _Kind(NamedTuple):

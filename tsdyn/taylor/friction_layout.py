@@ -6,6 +6,7 @@ import numpy as np
 
 from ..elements.element import address
 from ..elements.loops.constraint_series import force_at
+from ..elements.loops.friction_series import REACTION
 from ..elements.markers import POINT
 from ..errors import InvalidForce
 from ..formulations.locked_orientations import instances
@@ -44,7 +45,9 @@ def lay_out_frictions(packed, graph, places, forces, orders):
         slope = address(force.kernels, "load_slope", force.name, InvalidForce)
         for part in packed.constraints[members[id(force.joint)].parts]:
             sources += _sources(part, body, index[id(body)], *where[id(part)], orders)
-        frictions.append([slope, scratch + (force.slots + size + 1) * orders, point, first, len(sources) - first])
+        frictions.append(
+            [slope, scratch + (force.slots + size + REACTION) * orders, point, first, len(sources) - first]
+        )
     return FrictionLayout(records(FrictionSeries, frictions), records(ReactionSource, sources))
 
 

@@ -27,7 +27,7 @@ from ...motions.state_program import LENGTH, ROWS, T, call_order
 from ..markers import PARAMETERS, POINT, TURN
 from .body_poses import POSE, P, turned
 from .constraint_series import BODY_ROW, S_OMEGA, S_R, torque
-from .friction_series import REACTION, rub
+from .friction_series import FRICTION_ROWS, rub
 from .template import (
     CODES,
     DRIVEN,
@@ -106,7 +106,7 @@ def scratch_rows(stride, values):
     if TRACED:
         return int(values[ROWS])
     if RUBS:
-        return SLOTS + SIZE + REACTION + 6
+        return SLOTS + SIZE + FRICTION_ROWS
     return SLOTS + (stride - 3 * MARKERS if DRIVEN else 0)
 
 

@@ -17,6 +17,7 @@ from ..markers import PARAMETERS
 from .template import CODES, MARKERS, SIZE, SLOTS, STARTS, kernel_normal_load, kernel_normal_series
 
 REACTION = 1  # row of the reaction behind that of N
+FRICTION_ROWS = REACTION + 6  # of the scratch, beside its kernels' and as many as x has
 
 
 @part

@@ -4,6 +4,7 @@ Each law takes a `Solution` and yields what it found as `Finding`s: a size, and 
 lists those of a single run; agreement.py compares runs.
 """
 
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -134,18 +135,41 @@ def _row_name(packed, row):
 
 
 def newton_euler(solution):
-    """Rates of linear and angular momentum of every body are its weight and the loads of all its neighbours."""
+    """Rates of linear and angular momentum of every body are its weight and the loads of all its neighbours.
+
+    What rounding of positions changes is not judged: loads of hard springs between distant points.
+    """
     bodies = solution.scene.bodies
     if not solution.success or not bodies:
         return
-    around = _neighbours(solution.scene)
-    sums = [_loads(solution, bodies[i], around[id(bodies[i])]) for i in some(len(bodies), BODIES)]
-    largest, limit = max(one.size_of_force.max() for one in sums), _balance_limit(solution)
-    for one in sums:
-        yield _balance("force balance", one.force, one.size_of_force, largest, limit, one.body)
+    around, picked = _neighbours(solution.scene), [bodies[i] for i in some(len(bodies), BODIES)]
+    found = _balances(solution, picked, around)
+    if any(one.broken for one in found):
+        shaken = _shaken(solution)
+        found = _balances(solution, picked, around, [_loads(shaken, body, around[id(body)]) for body in picked])
+    yield from found
+
+
+def _balances(solution, bodies, around, shaken=None):
+    sums = [_loads(solution, body, around[id(body)]) for body in bodies]
+    largest, limit, found = max(one.size_of_force.max() for one in sums), _balance_limit(solution), []
+    for one, other in zip(sums, shaken or sums, strict=True):
+        found.append(_balance("force balance", one.force, other.force, one.size_of_force, largest, limit, one.body))
         if one.body.dimension == 7:
             floor = max(one.size_of_torque.max(), largest * extent(solution))
-            yield _balance("torque balance", one.torque, one.size_of_torque, floor, limit, one.body)
+            parts = one.torque, other.torque, one.size_of_torque
+            found.append(_balance("torque balance", *parts, floor, limit, one.body))
+    return found
+
+
+def _shaken(solution):
+    """A copy of a solution, whose positions are off by one rounding of the largest."""
+    other = copy(solution)
+    for name in ("multipliers", "_memory"):
+        vars(other).pop(name, None)
+    signs = np.random.default_rng(0).choice((-1.0, 1.0), solution.q.shape)
+    other.q = solution.q + EPS * np.abs(solution.q).max() * signs
+    return other
 
 
 class Loads(NamedTuple):
@@ -220,9 +244,10 @@ def _balance_limit(solution):
     return BALANCE * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + rounding_of_places(solution)
 
 
-def _balance(law, left, sizes, largest, limit, body):
+def _balance(law, left, shaken, sizes, largest, limit, body):
     """Relative to the body's own terms; what is rounding of the largest terms in the scene doesn't count."""
-    share = np.linalg.norm(left, axis=1) / (sizes + (FLOOR / BALANCE * largest or 1.0))
+    left = np.maximum(np.linalg.norm(left, axis=1) - np.linalg.norm(left - shaken, axis=1).max(), 0.0)
+    share = left / (sizes + (FLOOR / BALANCE * largest or 1.0))
     return Finding(law, float(share.max(initial=0.0)), limit, body.name)
 
 

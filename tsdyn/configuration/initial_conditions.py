@@ -29,6 +29,7 @@ from .tolerances import (
     LEAST_NEIGHBOURHOOD,
     LEAST_SIZE,
     LISTED_ENTRIES,
+    MANY_ROWS,
     NEIGHBOURHOOD,
     REDUNDANT_SHARES,
     ROUNDING,
@@ -245,11 +246,13 @@ class _Start:
         which = ", ".join(names[i] for i in sorted(row[rows])[:8])
         count = int((row >= 0).sum())
         free = int(np.where(self.graph.bodies[:, 1] == 7, 6, 3).sum()) - count + rows.size
+        straight = " Long straight chains look so, too: their rows depend on each other to rounding; a bent one does not."
         raise SingularConfiguration(
             f"Phi_q has lost rank in this configuration, and has full rank nearby: of {count} rows of the joints "
             f"{count - rows.size} are independent here ({which} depend{'s' if rows.size == 1 else ''} on the "
             f"others), so {free} directions are free at this point and fewer next to it. Branches of the motion meet "
             "here, and its branch is not determined: start from another configuration, on the intended branch."
+            + (straight if count > MANY_ROWS else "")
         )
 
     def chosen_of_all(self):

@@ -23,6 +23,8 @@ REDUNDANT_SHARES = 1e-3, 1e-6, 1e-9, 1e-12
 # Share below which rounding may hide a redundant row from elimination without pivoting: a pivot p leaves rounding of
 # 1e-16 / p in later ones, so the smaller of the two is at most 1e-8; ten times as much for sums.
 DOUBTFUL_SHARE = 1e-7
+# Rows of a straight chain from which the share of its weakest one, an inverse cube of its links, may be rounding.
+MANY_ROWS = 50_000
 # How far a dropped row must hold on the way from the start, and at least: rad, or share of the scene's size. A row that
 # is dependent at the start alone is violated by the square of the distance: 1e-4 at 1e-2, far above rounding.
 NEIGHBOURHOOD, LEAST_NEIGHBOURHOOD = 1e-2, 1e-3

@@ -23,7 +23,7 @@ from tsdyn.stress.gallery.governor import governor
 OUTPUTS = 50
 LEVELS = 10.0 ** -np.arange(3, 11)
 DIVISIONS = tuple(2**k for k in range(17))  # steps an output
-TOLERANCES = tuple(10.0 ** (-k / 2) for k in range(4, 22))
+TOLERANCES = tuple(10.0 ** (-k / 2) for k in range(2, 22))
 LOOSE = tuple(10.0 ** (-k / 2) for k in range(-2, 22))
 
 

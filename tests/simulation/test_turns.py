@@ -12,7 +12,7 @@ from tsdyn.runs import slices
 from tsdyn.simulation import segments
 
 pytestmark = pytest.mark.slow  # kernels of implicit methods
-OPTIONS = {"rtol": 1e-6, "atol": 1e-6}
+OPTIONS = {"rtol": 1e-7, "atol": 1e-7}
 END = 0.6  # s: Taylor, SDIRK54, and so on, five or more segments
 
 
@@ -59,12 +59,12 @@ def test_times_asked_for_are_outputs_once(turned):
 
 
 def test_what_the_solution_says(turned, tmp_path):
-    methods = [f"{name}(rtol=1e-06, atol=1e-06)" for name in ("Taylor", "SDIRK54")]
+    methods = [f"{name}(rtol=1e-07, atol=1e-07)" for name in ("Taylor", "SDIRK54")]
     assert sorted(turned.method.split(" and ")) == sorted(methods)
     assert turned.stats.stiff
     assert turned.stats.iteration_matrices > 0
     assert turned.stats.charts == turned.charts.t.size
-    assert turned.provenance["rtol"] == 1e-6
+    assert turned.provenance["rtol"] == 1e-7
     assert turned.method in str(turned)
     twin = pickle.loads(pickle.dumps(turned))
     assert twin.method == turned.method
@@ -114,7 +114,7 @@ def test_the_explicit_method_goes_on_where_the_implicit_one_cannot(monkeypatch, 
     monkeypatch.setattr(segments, "demand_holonomic", refuse)
     monkeypatch.setattr(slices, "FIRST_SLICE", 3)
     solution = ts.simulate(jointed(), (0.0, 0.05), **OPTIONS).raise_if_failed()
-    assert solution.method == "Taylor(rtol=1e-06, atol=1e-06)"
+    assert solution.method == "Taylor(rtol=1e-07, atol=1e-07)"
     assert solution.t.size == solution.stats.steps + 1
     assert solution.stats.iteration_matrices == 0
     pytest.importorskip("h5py")

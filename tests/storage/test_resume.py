@@ -147,7 +147,7 @@ def test_singular_configurations(method, count, tmp_path):
 @pytest.mark.parametrize("count", [2, 5, 12, 14, 20, 24])
 def test_runs_that_turn_to_an_implicit_method(count, tmp_path):
     """Stopped in segments of either method, of which there are five."""
-    path, options = tmp_path / "run.h5", {"rtol": 1e-6, "atol": 1e-6, "history": True}
+    path, options = tmp_path / "run.h5", {"rtol": 1e-7, "atol": 1e-7, "history": True}
     whole = ts.simulate(jointed(), (0.0, 0.6), **options)
     assert "SDIRK54 took over 3 times" in whole.message
     stopped = ts.simulate(jointed(), (0.0, 0.6), store=path, checkpoint=0.0, progress=Stop(count), **options)

@@ -34,6 +34,12 @@ def start_chart(context, t, x, y, yd, xd):
     return INTERRUPTED
 
 
+@callback("pddppp")
+def residual(context, t, g, x, y, k):
+    """In place of `residual`, with which a stage begins and goes on."""
+    return INTERRUPTED
+
+
 @callback("pd")
 def factorise(context, g):
     """In place of `reduce` and `factorise` of implicit methods."""
@@ -55,6 +61,7 @@ def reach(context, t, h):
 STAND_INS = {
     "place": place, "accelerate": accelerate, "start_chart": start_chart, "reach": reach, "accelerate_here": reach,
     "pass_singular": reach, "expand": expand, "linearise": place, "reduce": factorise, "factorise": factorise,
+    "residual": residual,
 }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from ..workspaces.workspace import hold
 from .arguments import step_count
 from .interrupted import advance
 from .run_log import no_log
-from .tolerances import LONG_STEPS
+from .tolerances import LONG_STEPS, PIECE
 
 UNLIMITED = 2**62  # steps wanted of an adaptive run
 STATUSES = {int(status): status for status in Status}
@@ -61,7 +61,10 @@ class Memory:
     def enter(self, engine, task, may_pass):
         """As if it were new, for an engine and a task: what a run before has left behind is gone."""
         for array in self._scratch:
-            array.fill(0)
+            if array.size < PIECE:
+                array.fill(0)
+            else:
+                _clear(array)
         start = task.q, task.qd, task.constraint_tol
         if self.engine is not engine:
             self._lay_out(engine, task)
@@ -156,3 +159,9 @@ class Memory:
     def called(self):
         """The records of addresses that the driver calls."""
         return (self.run.kernels,)
+
+
+def _clear(array):
+    """Zero in pieces: between them Ctrl-C is answered. New memory takes a second for a gigabyte."""
+    for first in range(0, array.size, PIECE):
+        array[first : first + PIECE].fill(0)

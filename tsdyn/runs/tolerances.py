@@ -85,6 +85,9 @@ SLICE_SECONDS = 0.1
 # within it: they take 5 ms (Nystrom4) to 60 ms (SDIRK54) a step, the thread of a slice 0.1 ms.
 LONG_STEPS = 1 << 13
 
+# Numbers that are set to zero at once, so that Ctrl-C is answered: new memory takes up to 1 ns a byte.
+PIECE = 1 << 22
+
 # Steps tried over which the pace of a run is taken; a run with HOPELESS as many to go would take days.
 PACED, HOPELESS = 1000, 1e10
 

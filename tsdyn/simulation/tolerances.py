@@ -17,6 +17,8 @@ AGAIN = 4
 # springs of particles up to 3 and 13.
 COST, SERIES_COST = 1.4, 6.5
 STEP_EVALUATIONS = 16  # of a step of SDIRK54, about
+# Safety factor between tolerances and step errors of SDIRK54 where it goes on: fast modes decay, and with them errors.
+STIFF_MARGIN = 50.0
 # Cost of an order of a series in scenes with sharp forces, where steps are as short as they are for a while only, over
 # that of an evaluation: chains of four with friction, slip velocities of 1e-3 to 1e-1.
 SHARP_COST = 0.1

@@ -21,6 +21,7 @@ from .tolerances import (
     SETTLED,
     SHARP_COST,
     STEP_EVALUATIONS,
+    STIFF_MARGIN,
     TRIAL,
     TRIED,
 )
@@ -30,7 +31,9 @@ KEPT = "known", "patience", "taken", "tried", "ask", "window", "jacobians", "beg
 
 def implicit(method):
     """Return the implicit method of the same tolerances."""
-    return frozen(SDIRK54(method.rtol, method.atol, max_step=method.max_step))
+    found = SDIRK54(method.rtol, method.atol, max_step=method.max_step)
+    found.margin = STIFF_MARGIN
+    return frozen(found)
 
 
 class Turns:

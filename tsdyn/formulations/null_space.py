@@ -179,8 +179,7 @@ def accelerate(context, t, vd, vdd, unused):
     c = load(context)
     system, w = c.system, c.work
     velocities(system, w, t, vector(vd, w.v.size))
-    if c.linear.K.size > 0:  # of implicit methods, whose long steps leave B less exact
-        _refine_velocities(system, w)
+    _refine_velocities(system, w)
     return frictional_acceleration(context, c, t, vector(vdd, w.v.size))
 
 

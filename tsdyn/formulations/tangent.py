@@ -16,7 +16,7 @@ import math
 from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
-from ..maths.dense_linalg import copy, is_finite
+from ..maths.dense_linalg import copy, is_finite, largest
 from ..methods.explicit import ACCELERATE, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
@@ -52,6 +52,8 @@ from .tangent_error import error_norm
 from .tolerances import (
     CONTRACTION_LOST,
     CURVATURE,
+    EXACT,
+    REFINEMENTS,
     RENEWALS,
     ROUNDING_AT_MOST,
     SLOW,
@@ -228,7 +230,7 @@ def accelerate(context, t, y, yd, unused):
 
 @callback("pp")
 def complete(context, yd):
-    """Write q, qd and qdd after `accelerate`, the accelerations refined once by H (rdd, omega'd) + gamma."""
+    """Write q, qd and qdd after `accelerate`, the accelerations refined by H (rdd, omega'd) + gamma."""
     c = load(context)
     write_state(c.graph, c.work, c.tangent)
     return OK
@@ -238,7 +240,10 @@ def complete(context, yd):
 def write_state(graph, w, f):
     """Write q, qd and qdd of the poses and of accelerations Z, projected onto H (rdd, omega'd) + gamma = 0."""
     if f.b.size > 0:
-        constrain(graph, f.rows, f.gamma, f.Z, f.b)
+        far = largest(f.Z)
+        for _ in range(REFINEMENTS):  # more than one where masses are unequal by 1e10
+            if constrain(graph, f.rows, f.gamma, f.Z, f.b) <= EXACT * far:
+                break
     write_positions(graph.bodies, f.poses, w.q)
     write_velocities(graph.bodies, f.poses, w.qd)
     write_accelerations(graph.bodies, f.poses, f.Z, w.qdd)

@@ -23,6 +23,10 @@ BASIS_LOAD_ROUNDING = 4e-16
 # Two digits: rounding grows along closed loops and with the distance from the origin.
 ROUNDING_AT_MOST = 100.0
 
+# Residual of the rows over the largest acceleration, up to which one correction of accelerations leaves rounding; and
+# corrections at most. Masses that are unequal by 1e10 need two.
+EXACT, REFINEMENTS = 1e-11, 3
+
 # m and rad: a correction of positions above it has changed H by more than rounding, so S is made anew.
 LEAST_MOVE = 1e-15
 

@@ -232,15 +232,18 @@ def project(graph, rows, Z, lam):
 
 @kernel
 def constrain(graph, rows, c, Z, lam):
-    """Project Z onto H Z + c = 0.
+    """Project Z onto H Z + c = 0; the largest residual that it had.
 
     lam = S^-1 (H Z + c),    Z <- Z - Y^T lam
     """
     _gather(graph, rows.H, Z, lam)
+    worst = 0.0
     for e in range(lam.size):
         lam[e] += c[e]
+        worst = max(worst, abs(lam[e]))
     solve(graph.pattern, rows.S, lam)
     _scatter(graph, rows.Y, lam, Z)
+    return worst
 
 
 @kernel

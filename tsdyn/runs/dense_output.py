@@ -11,6 +11,7 @@ from ..methods.explicit import call_accelerate, call_place
 from ..methods.interpolants import call_value
 from ..workspaces.run_state import B_CHART, B_DATA, B_H, B_START, load_run
 from ..workspaces.workspace import load
+from .tolerances import FEW, LEGS
 
 NOT_FINITE = int(Status.NOT_FINITE)
 
@@ -37,14 +38,28 @@ def between(context, w, r, t, block):
 
     Placed twice: Newton's method comes from further away than in a run, and ends nearer to rounding from nearby.
     """
-    h, n, nx, ny, data = block[B_H], w.q.size, r.xs.size, r.ys.size, block[B_DATA:]
-    s = (t - block[B_START]) / h
-    call_value(r.kernels.value, s, h, n, nx, ny, data, r.xs, r.ys)
-    status = call_place(r.kernels.place, context, t, r.xs)
-    if status == 0:
-        status = evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
+    status = _place(context, w, r, t, t, 1.0, block)
+    return _evaluate_there(context, w, r, t, block) if status == 0 else status
+
+
+@kernel
+def _place(context, w, r, t, when, share, block):
+    """Place a share of the coordinates at t, at another time if the share is not all; x and y of the step. Status."""
+    s = (t - block[B_START]) / block[B_H]
+    call_value(r.kernels.value, s, block[B_H], w.q.size, r.xs.size, r.ys.size, block[B_DATA:], r.xs, r.ys)
+    if share != 1.0:
+        for j in range(r.xs.size):
+            r.xs[j] *= share
+    return call_place(r.kernels.place, context, when, r.xs)
+
+
+@kernel
+def _evaluate_there(context, w, r, t, block):
+    h, data = block[B_H], block[B_DATA:]
+    status = evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
     if status == 0 and r.kernels.second != 0:  # what f would amplify in a stiff scene
-        call_value(r.kernels.second, s, h, n, nx, ny, data, r.xs, r.yds)
+        s = (t - block[B_START]) / h
+        call_value(r.kernels.second, s, h, w.q.size, r.xs.size, r.ys.size, data, r.xs, r.yds)
         call_complete(r.kernels.complete, context, r.yds)
     return status
 
@@ -144,8 +159,29 @@ def read(context, run, t, rows, blocks, charts, points, out):
                 return status
             keep(c, r.warm)
         recall(c.system, block)
-        status = between(context, w, r, t[i], block)
+        status = _go_to(context, c, r, t[i], charts[chart, 0], block)
         if status != 0:
             return status
         put_state(w, out[i])
     return 0
+
+
+@kernel
+def _go_to(context, c, r, t, began, block):
+    """`between`, from where the chart began, in so many legs that none of them needs new matrices again. Status.
+
+    Where branches are close, Newton's method from far away may end on another one than that of the run.
+    """
+    w, status = c.work, 0
+    for legs in LEGS:
+        if legs > 1:
+            bring_back(c, r.warm)
+        status, most = 0, 0
+        for leg in range(1, legs + 1):
+            if status == 0:
+                made, share = w.counters.factorizations, leg / legs
+                status = _place(context, w, r, t, began + share * (t - began) if leg < legs else t, share, block)
+                most = max(most, w.counters.factorizations - made)
+        if status == 0 and most <= FEW:
+            break
+    return _evaluate_there(context, w, r, t, block) if status == 0 else status

@@ -99,3 +99,8 @@ SAME_COUNT = 1e-12
 
 # Tries of a Taylor step, at most, that are kept in the history of a slice beyond one for each of its steps.
 TRIES = 32
+
+# --- dense output ----------------------------------------------------------------------------------------------------
+# Legs in which a place between two steps is reached from the start of its chart: more, where one of them takes more
+# than FEW factorisations. From nearby there is one of N, and one of S or of the masses.
+LEGS, FEW = (1, 4, 16), 2

@@ -246,7 +246,7 @@ class _Start:
         which = ", ".join(names[i] for i in sorted(row[rows])[:8])
         count = int((row >= 0).sum())
         free = int(np.where(self.graph.bodies[:, 1] == 7, 6, 3).sum()) - count + rows.size
-        straight = " Long straight chains look so, too: their rows depend on each other to rounding; a bent one does not."
+        straight = " Long straight chains look so, too: their rows depend on each other to rounding. Bend them."
         raise SingularConfiguration(
             f"Phi_q has lost rank in this configuration, and has full rank nearby: of {count} rows of the joints "
             f"{count - rows.size} are independent here ({which} depend{'s' if rows.size == 1 else ''} on the "

@@ -1,9 +1,9 @@
 """Measure again what the pages have as tables, and write it between their marks.
 
-    python -m docs.measure [methods] [benchmarks] [stress] [--quick]
+    python -m docs.measure [methods] [benchmarks] [stiff] [stress] [--quick]
 
-methods: choosing-a-method.md; benchmarks: benchmarks.md; stress: stress.md and its figure. All of them take an hour or
-two, with --quick some minutes. Milliseconds are those of your machine: compare ratios.
+methods: choosing-a-method.md; benchmarks, stiff: benchmarks.md; stress: stress.md and its figure. All of them take an
+hour or two, with --quick some minutes. Milliseconds are those of your machine: compare ratios.
 """
 
 import argparse
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import tsdyn as ts
-from benchmarks import provenance, stiff, work_precision
+from benchmarks import provenance, stiff, stiff_peers, work_precision
 from examples import drive_train, four_bar, stick_slip, top
 from tsdyn.benchmarking.reference_solution import agreed
 from tsdyn.cli import main as tsdyn
@@ -27,6 +27,7 @@ TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 ERRORS = (1e-4, 1e-6, 1e-10)
 MOST = 20_000  # steps of a run; one that needs more is left out
 CALLS, LONGEST = 8, 1.5  # calls that are timed, as far as they take no longer than so many seconds together
+LONGEST_STIFF = 4.0  # s: settings of a contender end with one that takes longer
 SCENES = {  # name: scene, end, s
     "sliding top": (top.build, 2.0),
     "chain of 16 rods": (lambda: rods.build(rods.chain(16)), 1.0),
@@ -94,6 +95,19 @@ def benchmarks(quick):
     return "\n".join([*lines, f"Milliseconds to an error; {provenance.line()}"])
 
 
+def stiff_scenes(quick):
+    """The table of benchmarks.md: milliseconds to an error of stiff scenes, of tsdyn and other programs."""
+    scenes = {"chain of 4": stiff_peers.SCENES["chain of 4"]} if quick else stiff_peers.SCENES
+    errors, lines = [f"{level:.0e}" for level in stiff_peers.LEVELS], []
+    for scene, case in scenes.items():
+        lines += [f"**{scene}, {case.end:g} s**", "", f"| | {' | '.join(errors)} |", "|---|" + "---:|" * len(errors)]
+        for name, points in stiff_peers.measure(case, LONGEST_STIFF).items():
+            lines.append(f"| {name} | {' | '.join(_cell(1e3 * s, False) for s in stiff_peers.times(*points))} |")
+        lines.append("")
+        print("\n".join(lines[-len(stiff_peers.CONTENDERS) - 3 :]), flush=True)
+    return "\n".join([*lines, f"Milliseconds to an error of positions, m; {provenance.line()}"])
+
+
 def stress(quick):
     """The table and the figure of stress.md, by its own command."""
     words = ["squeezer", "governor"] if quick else ["--figure", str(DOCS / "images" / "stress.png")]
@@ -111,18 +125,24 @@ def marked(page, name, text):
     return f"{before}{begin}\n{text}\n{end}{after}"
 
 
-TABLES = {"methods": (methods, "choosing-a-method.md"), "benchmarks": (benchmarks, "benchmarks.md")}
+TABLES = {
+    "methods": (methods, "choosing-a-method.md"),
+    "benchmarks": (benchmarks, "benchmarks.md"),
+    "stiff": (stiff_scenes, "benchmarks.md"),
+}
 
 
 def main():
     """Measure what is named, or everything."""
     parser = argparse.ArgumentParser(prog="python -m docs.measure", description=__doc__.partition("\n")[0])
-    parser.add_argument("parts", nargs="*", metavar="part", help="methods, benchmarks, stress; all where none is named")
+    parser.add_argument(
+        "parts", nargs="*", metavar="part", help="methods, benchmarks, stiff, stress; all where none is named"
+    )
     parser.add_argument("--quick", action="store_true", help="few scenes and settings")
     given = parser.parse_args()
     unknown = {*given.parts} - {*TABLES, "stress"}
     if unknown:
-        parser.error(f"no part {', '.join(sorted(unknown))}; there are methods, benchmarks, stress")
+        parser.error(f"no part {', '.join(sorted(unknown))}; there are methods, benchmarks, stiff, stress")
     for name, (measure, page) in TABLES.items():
         if not given.parts or name in given.parts:
             text = measure(given.quick)

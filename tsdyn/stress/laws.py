@@ -23,10 +23,14 @@ from .tolerances import (
     HELD,
     ILL_CONDITIONED,
     NEAR_SINGULAR,
+    NEAR_SINGULAR_ENDS,
     OUTPUTS,
+    REDUNDANT,
+    ROUNDED_ROWS,
     ROUNDINGS,
     ROW_SHARE,
     SAME,
+    SMALL_SCENE,
     TIME,
 )
 
@@ -262,18 +266,33 @@ def _first_point(solution, item, body):
 
 
 def dense_output(solution):
-    """Dense output at the outputs of a run gives the outputs."""
+    """Dense output at the outputs of a run gives the outputs, to what the rows there do to rounding."""
     if solution._trajectory is None or not solution.success:
         return
     at = some(solution.t.size, OUTPUTS)
     state = solution.at(solution.t[at])
     limit = off_steps(solution)
+    amplified = np.minimum(ROUNDED_ROWS * EPS / weakest_rows(solution, at) ** 2, NEAR_SINGULAR_ENDS)
     rounding = TIME * EPS * np.abs(solution.t).max()  # of an instant
     for name, rate in (("q", "qd"), ("qd", "qdd")):
         given, change = getattr(solution, name)[at], rounding * np.abs(getattr(solution, rate)[at])
-        off = np.abs(getattr(state, name) - given) - change
         size = 1.0 + np.abs(given).max(initial=0.0)
-        yield Finding(f"dense output, {name}", float(off.max(initial=0.0) / size), limit)
+        off = (np.abs(getattr(state, name) - given) - change).max(axis=1, initial=0.0) / size - amplified
+        yield Finding(f"dense output, {name}", float(off.max(initial=0.0)), limit)
+
+
+def weakest_rows(solution, at):
+    """Smallest singular value of independent unit rows at outputs, (k,); 1 in large scenes."""
+    scene, found = solution.scene, np.ones(len(at))
+    if not 0 < solution.q.shape[1] <= SMALL_SCENE:
+        return found
+    for i, k in enumerate(at):
+        rows = constraint_arrays(scene.system, solution.q[k], solution.qd[k], solution.t[k])[1]
+        if len(rows):
+            sizes = np.linalg.norm(rows, axis=1)
+            values = np.linalg.svd(rows / np.where(sizes > 0.0, sizes, 1.0)[:, None], compute_uv=False)
+            found[i] = values[values > REDUNDANT].min(initial=1.0)
+    return found
 
 
 def off_steps(solution):

@@ -29,5 +29,8 @@ HELD = 1e-14
 # Next to a singular configuration, where a chart has a condition of ILL_CONDITIONED or more, rounding is amplified by
 # so much.
 NEAR_SINGULAR, ILL_CONDITIONED = 1e3, 1e8
+# Velocities change by a rounding of positions over the square of the smallest singular value of unit rows; so many
+# roundings. Smaller values than REDUNDANT are those of redundant rows. Coordinates up to which they are computed.
+ROUNDED_ROWS, REDUNDANT, SMALL_SCENE = 10.0, 1e-12, 200
 # Outputs of a run that are judged, and bodies whose balance is: the first, the last, and some between.
 OUTPUTS, BODIES = 25, 12

@@ -31,7 +31,7 @@ def write(store, numbers, arrays):
     newest, before = place(store)
     payload = io.BytesIO()
     words = np.frombuffer(json.dumps(numbers).encode(), np.uint8)
-    np.savez(payload, allow_pickle=False, **{NUMBERS: words}, **arrays)
+    np.savez(payload, **{NUMBERS: words}, **arrays)
     content = payload.getbuffer()
     partial = newest.with_name(f"{newest.name}-partial")
     try:

@@ -27,9 +27,9 @@ def work(solution, trajectory, item=None):
 
 
 def _integrals(solution, trajectory, item, a, b, depth):
-    """Return the work from each a to its b, by bisection until halves agree: drives may oscillate within a step."""
+    """Return the work from each a to its b, by bisection until halves agree: steps of series are long."""
     done, size = _quadrature(solution, trajectory, item, a, b)
-    if not solution.system.rheonomic[0] or depth == DEEPEST or not a.size:
+    if depth == DEEPEST or not a.size:
         return done
     middle = 0.5 * (a + b)
     halves = sum(_quadrature(solution, trajectory, item, *ends)[0] for ends in ((a, middle), (middle, b)))

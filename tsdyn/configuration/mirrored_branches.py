@@ -56,7 +56,7 @@ def _pairs(packed):
             (_, first), (_, second) = pair
             if callable(first):
                 moving.append((len(directions), first))
-                first = first(0.0)
+                first = np.zeros(3)  # of another time each time
             directions.append([first, second])
     places = np.array(places, np.int64).reshape(-1, 2).T[..., None] + np.arange(4)
     return titles, places, np.array(directions).reshape(-1, 2, 3).swapaxes(0, 1), moving

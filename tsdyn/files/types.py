@@ -10,6 +10,7 @@ from .. import shapes
 from ..constraints.euler_normalization import EulerNormalization
 from ..elements import force, joint, primitive
 from ..elements.bodies import Body, PointMass
+from ..elements.element import Attachment
 from ..validation import close
 from . import values
 from .expressions import Misread
@@ -125,7 +126,7 @@ def _named(registered):
 
 def type_name(cls):
     """The name of a class in files: its own, or with its module, for a plug-in."""
-    cls = next(base for base in cls.__mro__ if not base.__name__.startswith("_"))
+    cls = next(base for base in cls.__mro__ if issubclass(base, Attachment) and not base.__name__.startswith("_"))
     built_in = f"{cls.__module__}.".startswith(BUILT_IN)
     return cls.__name__ if built_in else f"{cls.__module__}.{cls.__qualname__}"
 

@@ -8,8 +8,10 @@ in terms of (r'', omega''): Q_A + Q_v is the force and the body torque less omeg
 from ..elements.loops.body_poses import OMEGA, POSE, P, add_torque, write_accelerations
 from ..jit.kernels import kernel
 from ..jit.simd import cross, fma, four, get, lanes, let, put, splat, sub, times
+from ..maths.dense_linalg import largest
 from ..model.equations import applied_forces
-from ..rows.interface import constrain_accelerations, evaluate_bias, note_loads, weigh_bodies
+from ..rows.interface import constrain, constrain_accelerations, evaluate_bias, note_loads, weigh_bodies
+from .tolerances import EXACT, REFINEMENTS
 
 
 @kernel
@@ -44,7 +46,18 @@ def body_forces(graph, system, w, f, t):
 def accelerate_bodies(graph, system, w, f, t):
     """Set Z = (r'', omega'') and b = lam; H, Y and the factors of S are those of the poses, w.q and w.qd."""
     solve_accelerations(graph, system, w, f, t)
+    refine_accelerations(graph, f)
     write_accelerations(graph.bodies, f.poses, f.Z, w.qdd)
+
+
+@kernel
+def refine_accelerations(graph, f):
+    """Project Z onto H Z + gamma = 0 until it holds: more than once where masses are unequal by 1e10."""
+    if f.b.size > 0:
+        far = largest(f.Z)
+        for _ in range(REFINEMENTS):
+            if constrain(graph, f.rows, f.gamma, f.Z, f.b) <= EXACT * far:
+                break
 
 
 @kernel

@@ -16,13 +16,12 @@ import math
 from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
-from ..maths.dense_linalg import copy, is_finite, largest
+from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import ACCELERATE, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
     DYNAMICS,
     apply_multipliers,
-    constrain,
     evaluate_drift,
     evaluate_residuals,
     evaluate_rows,
@@ -38,7 +37,7 @@ from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..workspaces.workspace import (
     load,
 )
-from .accelerations import solve_accelerations
+from .accelerations import refine_accelerations, solve_accelerations
 from .chart_coordinates import (
     displace,
     factorise_normal,
@@ -52,8 +51,6 @@ from .tangent_error import error_norm
 from .tolerances import (
     CONTRACTION_LOST,
     CURVATURE,
-    EXACT,
-    REFINEMENTS,
     RENEWALS,
     ROUNDING_AT_MOST,
     SLOW,
@@ -239,11 +236,7 @@ def complete(context, yd):
 @kernel
 def write_state(graph, w, f):
     """Write q, qd and qdd of the poses and of accelerations Z, projected onto H (rdd, omega'd) + gamma = 0."""
-    if f.b.size > 0:
-        far = largest(f.Z)
-        for _ in range(REFINEMENTS):  # more than one where masses are unequal by 1e10
-            if constrain(graph, f.rows, f.gamma, f.Z, f.b) <= EXACT * far:
-                break
+    refine_accelerations(graph, f)
     write_positions(graph.bodies, f.poses, w.q)
     write_velocities(graph.bodies, f.poses, w.qd)
     write_accelerations(graph.bodies, f.poses, f.Z, w.qdd)

@@ -38,9 +38,11 @@ from .redundant_rows import (
     keep_every_row,
     list_redundant,
     mark_redundant,
+    note_selection,
     restore_selection,
     return_to_selection,
     save_selection,
+    take_noted_selection,
 )
 from .reselection import factorise_rows, select_rows, selection_serves
 from .row_memory import (
@@ -130,6 +132,7 @@ __all__ = [
     "multiply_rows",
     "note_indicator",
     "note_loads",
+    "note_selection",
     "pivot_loss",
     "project",
     "rates_hold",
@@ -153,6 +156,7 @@ __all__ = [
     "solve_rows",
     "solve_saddle",
     "solve_series",
+    "take_noted_selection",
     "take_reactions",
     "weigh",
     "weigh_bodies",

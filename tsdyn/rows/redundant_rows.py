@@ -104,6 +104,24 @@ def return_to_selection(f):
 
 
 @kernel
+def note_selection(f, out):
+    """Write the redundant rows to out, -1 if it holds another number of them."""
+    known = f.dropped[0] == out.size
+    for i in range(out.size):
+        out[i] = f.dropped[1 + i] if known else -1.0
+
+
+@kernel
+def take_noted_selection(f, given):
+    """Select the rows of `note_selection`, which no others are to replace now."""
+    if given.size == 0 or given[0] < 0.0:
+        return
+    f.dropped[0], f.selection.weakest = given.size, 0.0
+    for i in range(given.size):
+        f.dropped[1 + i] = int(given[i])
+
+
+@kernel
 def list_redundant(graph, f, out):
     """out[0] = number of redundant rows, then their places among the rows of Phi."""
     out[0] = f.dropped[0]

@@ -5,7 +5,7 @@ from ..formulations.chart_coordinates import turned_most
 from ..formulations.chart_validity import AT_START
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import copy
-from ..rows.interface import is_next_to_singular, note_indicator
+from ..rows.interface import is_next_to_singular, note_indicator, note_selection
 from .dense_output import call_chart
 from .run_log import close_chart, open_chart
 from .tolerances import HARDLY_TURNED
@@ -24,9 +24,12 @@ def begin_chart(context, c, r, log, reason):
         r.x_low[j] = 0.0
     for j in range(r.y.size):
         r.y_low[j] = 0.0
-    if log.points.shape[0] > 0:
+    kept = log.points.shape[0] > 0
+    if kept:
         copy(w.q, log.points[r.numbers.chart_rows])
     status = call_chart(r.kernels.start_chart, context, r.clock.t, r.x, r.y, r.yd, r.xd)
+    if kept:
+        note_selection(c.tangent, log.points[r.numbers.chart_rows, w.q.size :])
     if r.numbers.may_pass == 1:
         note_indicator(c.graph, c.tangent, c.chart.rows0)
         if status == 0 and reason != AT_START and is_next_to_singular(c.tangent):

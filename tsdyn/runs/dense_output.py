@@ -1,7 +1,8 @@
 """Dense output of step methods: v and vd are interpolated in the chart, then positions and velocities are solved for.
 
 The driver uses it at the times of t_eval, in its own workspace. `Solution.at` and events use it through `read` and a
-workspace of their own (reader.py), where the chart of a step is rebuilt: q0 and the time determine it.
+workspace of their own (reader.py), where the chart of a step is rebuilt: q0, the time and the selection of rows
+determine it.
 """
 
 from ..errors import Status
@@ -9,6 +10,7 @@ from ..jit.kernels import caller, entry, kernel
 from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import call_accelerate, call_place
 from ..methods.interpolants import call_value
+from ..rows.interface import take_noted_selection
 from ..workspaces.run_state import B_CHART, B_DATA, B_H, B_START, load_run
 from ..workspaces.workspace import load
 from .tolerances import FEW, LEGS
@@ -151,7 +153,8 @@ def read(context, run, t, rows, blocks, charts, points, out):
             bring_back(c, r.warm)
         else:
             chart = int(block[B_CHART])
-            copy(points[chart], w.q)
+            copy(points[chart, : w.q.size], w.q)
+            take_noted_selection(c.tangent, points[chart, w.q.size :])
             c.tangent.friction.lam[:] = 0.0
             c.tangent.friction.load[:] = 0.0
             status = call_chart(r.kernels.start_chart, context, charts[chart, 0], r.xs, r.ys, r.yds, r.dx)

@@ -30,13 +30,14 @@ class Recorder:
         Steps of a slice at most.
     """
 
-    def __init__(self, task, run):
+    def __init__(self, task, run, redundant):
         self.run, self.times, self.stops, self.archive = run, task.times, task.stops, task.archive
         self.per_step, self.dense = task.times.size == 0, run.numbers.dense == STORED
         self.steps, self.passed = (StepLog(), ChartLog()) if task.history and not self.archive else (None, None)
         self.most = max(BLOCK_ROOM // run.block.size, 1) if self.dense else LARGEST_SLICE
         n, rooms = run.now.shape[1], 2 * CHART_ROOM
-        self.charts, self.points = np.empty((rooms, 5)), np.empty((rooms, n)) if run.numbers.dense else NO_ROWS
+        self.charts = np.empty((rooms, 5))
+        self.points = np.empty((rooms, n + redundant)) if run.numbers.dense else NO_ROWS
         self._width = 1 + 3 * n + run.remembered.size
         self.out = NO_ROWS if self.per_step else np.empty((task.times.size, self._width))
         self.blocks, self.log = NO_ROWS, None

@@ -15,7 +15,7 @@ class RunLog(NamedTuple):
     out: np.ndarray  # (rows, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
     history: np.ndarray  # (rows, 3)  of each step tried: t, h, whether it was accepted
     charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left
-    points: np.ndarray  # (rows, n)  q0 of each chart, or (0, n) where nothing asks for it
+    points: np.ndarray  # (rows, n + redundant rows)  q0 of each chart and its selection, or (0, n) where nothing asks
     blocks: np.ndarray  # (rows, block)  those of accepted steps
 
 

@@ -165,7 +165,7 @@ def drive(memory, task, watch):
 
     Where `task.choose` says that another method goes on, the run ends with Status.STIFF.
     """
-    recorder = Recorder(task, memory.run)
+    recorder = Recorder(task, memory.run, int(memory.context.tangent.dropped[0]))
     slices = Slices(memory, task, watch, recorder)
     if task.archive is not None and task.archive.resumed is not None:
         slices.restore(*task.archive.resumed)

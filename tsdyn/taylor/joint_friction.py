@@ -13,6 +13,7 @@ linear: Newton's method gives lam_0 (friction_solve.py), and (2) what it lacks t
 from ..elements.loops.body_poses import turned, write_accelerations
 from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R
 from ..errors import Status
+from ..formulations.accelerations import refine_accelerations
 from ..formulations.friction_loads import load_slope
 from ..formulations.friction_solve import accelerate_with_friction, body_reaction, factorise_loads, find_reactions
 from ..jit.kernels import callback, kernel, stack
@@ -174,6 +175,7 @@ def accelerate_with_friction_here(context, t, h):
     for e in range(r.lam.size):
         r.lam[e] = 0.0
     found = accelerate_with_friction(c.graph, c.system, c.work, f, t)
+    refine_accelerations(c.graph, f)
     write_accelerations(c.graph.bodies, f.poses, f.Z, c.work.qdd)
     copy(kept, r.lam)
     return 0 if found else JAMMED

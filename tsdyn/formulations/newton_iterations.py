@@ -18,7 +18,8 @@ def solve_positions(system, w, t, v):
     """Find u and q = q0 + V v - U u with Phi(q, t) = 0, Eqs. 19, 20 and 29. Status.
 
     The start is u + T dv, T = du/dv being left over from the place before. Sweeps go on until |Phi| <= u_tol and what
-    the last correction, which costs no further evaluation, is expected to leave is below u_tol^(3/2) or rounding.
+    the last correction, which costs no further evaluation, is expected to leave is below u_tol^(3/2) or rounding, or
+    is rounding since it falls no more.
     """
     n, m, k = w.q.size, w.u.size, v.size
     for i in range(m):
@@ -61,7 +62,8 @@ def solve_positions(system, w, t, v):
             w.z[i] = d
         if before < math.inf:
             w.control.rate = worst / before
-        if worst <= floor or (worst <= tol and worst * w.control.rate <= left):
+        rounding = STALLED * before < worst <= ROUNDING_AT_MOST * floor
+        if worst <= floor or (worst <= tol and (rounding or worst * w.control.rate <= left)):
             subtract_normal(w, w.z, w.q)  # q itself, not all of the sum again: a digit less is lost
             return OK
         before = worst

@@ -216,6 +216,6 @@ def test_loads_in_body_axes(tmp_path):
     scene = ts.Scene()
     body = scene.add_body(mass=1.0, inertia=(1, 1, 1), name="body")
     scene.add(ts.forces.Torque(body, frame="body", torque=(1, 2, 3)))
-    scene.add(ts.forces.PointForce(body, frame="body", force=(1, 2, 3), point=(0, 0, 1)))
+    scene.add(ts.forces.PointForce(body, frame="body", force=(1, 2, 3), point_a=(0, 0, 1)))
     again = ts.load(scene.save(tmp_path / "scene.toml"))
     np.testing.assert_array_equal(ts.simulate(again, (0, 1)).q, ts.simulate(scene, (0, 1)).q)

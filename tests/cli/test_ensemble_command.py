@@ -103,7 +103,7 @@ WRONG = {
     "did you mean --cases": ("ensemble", "study.toml", "--casse", "3"),
     "no folder": ("ensemble", "study.toml", "--output", "missing/a.h5"),
     "results are written to": ("ensemble", "study.toml", "--output", "a.txt"),
-    "row 3 must be 1 numbers": ("ensemble", "study.toml", "--parameters", "bad.csv"),
+    "line 3, column 1 (stone.mass)": ("ensemble", "study.toml", "--parameters", "bad.csv"),
     "can't be read": ("ensemble", "study.toml", "--parameters", "missing.csv"),
     "--tolerances must be numbers": ("benchmark", "study.toml", "--tolerances", "fine"),
     "invalid choice: 'fish'": ("completion", "fish"),

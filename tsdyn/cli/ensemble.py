@@ -1,6 +1,5 @@
 """The command `tsdyn ensemble`: many runs of a scene, with the parameters of its file or of a table."""
 
-import csv
 import time
 from collections import Counter
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidArgument, Status
+from .case_table import table_of
 from .output import print_json
 from .run import add_json, add_method, add_scene, destinations, options_of, progress_of
 from .scene_file import load_document
@@ -44,11 +44,13 @@ def _ensemble(parsed):
     """
     from ..ensembles.ensemble import ensemble
 
-    table = None if parsed.parameters is None else table_of(parsed.parameters)
     document = load_document(
         parsed.scene, parsed.allow_code, {"cases": parsed.cases, "seed": parsed.seed}, parsed.free_base
     )
-    study = {"parameters": table, "cases": parsed.cases} if table is not None else dict(document.ensemble)
+    if parsed.parameters is None:
+        study = dict(document.ensemble)
+    else:
+        study = {"parameters": table_of(parsed.parameters, document.scene), "cases": parsed.cases}
     if not study:
         raise InvalidArgument(
             f"{parsed.scene} has no table [ensemble], which says what differs from case to case; write one "
@@ -70,28 +72,6 @@ def _ensemble(parsed):
         lines = [repr(found), rate, *table_lines(found), *(f"  written   {path}" for path in written)]
         print("\n".join(lines))
     return 0 if found.success.all() else 1
-
-
-def table_of(path):
-    """Parameters of a CSV file: name -> array (cases, ...)."""
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            head, *rows = [row for row in csv.reader(file) if row] or [[]]
-    except (OSError, UnicodeError, csv.Error) as error:
-        raise InvalidArgument(f"{path} can't be read: {getattr(error, 'strerror', None) or error}.") from error
-    if not rows or len(set(head)) < len(head):
-        raise InvalidArgument(f"{path} must have a row of different names, and a row of numbers for each case.")
-    columns = np.empty((len(rows), len(head)))
-    for i, row in enumerate(rows):
-        try:
-            columns[i] = [float(word) for word in row]
-        except ValueError as error:
-            raise InvalidArgument(f"{path}: row {i + 2} must be {len(head)} numbers ({error}).") from error
-    found = {}
-    for j, word in enumerate(head):
-        found.setdefault(word.strip().partition("[")[0], []).append(columns[:, j])
-    whole = {name for name in head if "[" not in name}
-    return {name: parts[0] if name in whole else np.stack(parts, axis=1) for name, parts in found.items()}
 
 
 def write(found, path):

@@ -10,6 +10,7 @@ from functools import cached_property
 
 from ..errors import InconsistentState, SingularConfiguration, Status
 from ..jit.interrupts import deferred_interrupts
+from ..rows.interface import redundant_of
 from . import snapshot
 from .recorder import Recorder
 from .tolerances import GETTING_ON, HOPELESS, PACED, SLICE_SECONDS
@@ -165,7 +166,7 @@ def drive(memory, task, watch):
 
     Where `task.choose` says that another method goes on, the run ends with Status.STIFF.
     """
-    recorder = Recorder(task, memory.run, int(memory.context.tangent.dropped[0]))
+    recorder = Recorder(task, memory.run, len(redundant_of(memory.context.tangent)))
     slices = Slices(memory, task, watch, recorder)
     if task.archive is not None and task.archive.resumed is not None:
         slices.restore(*task.archive.resumed)

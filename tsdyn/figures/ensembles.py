@@ -9,7 +9,7 @@ import numpy as np
 from ..drawing import BLUE, save
 from ..errors import InvalidArgument
 from ..validation import nearest
-from .axes import axes_of, bare
+from .axes import axes_of, bare, figure_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +22,7 @@ PLANE = 2  # parameters of a map at most
 DARKEST = 0.45  # opacity of all bands together
 
 
+@figure_of("reductions")
 def quantile_bands(
     ensemble: Ensemble, what: str, ax: Any = None, *, quantiles: Sequence[float] = QUANTILES, unit: str | None = None
 ) -> Any:
@@ -90,6 +91,7 @@ def quantile_bands(
     return ax
 
 
+@figure_of("reductions")
 def final_map(
     ensemble: Ensemble, what: str, over: str | Sequence[str], ax: Any = None, *, unit: str | None = None
 ) -> Any:

@@ -36,6 +36,7 @@ from .errors import (  # noqa: E402
     StorageError,
     TsdynError,
     UnknownAttribute,
+    UnknownParameter,
 )
 from .jit.kernels import kernel  # noqa: E402
 from .methods.integrator import (  # noqa: E402
@@ -110,6 +111,7 @@ __all__ = [
     "TsdynError",
     "Turn",
     "UnknownAttribute",
+    "UnknownParameter",
     "Vector",
     "benchmark",
     "compare",

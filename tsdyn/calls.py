@@ -66,6 +66,12 @@ def fitting_methods(cls: Class) -> Class:
     return cls
 
 
+def fitting_constructor(cls: Class) -> Class:
+    """Decorate a dataclass: `fitting` for its `__init__`."""
+    cls.__init__ = fitting(cls.__init__)
+    return cls
+
+
 def misfit_of(title, signature, arguments, keywords):
     """Return the InvalidCall of a call that doesn't fit a signature, or None."""
     try:

@@ -78,6 +78,8 @@ def save(figure: Any, path: str | Path) -> Path:
     ...     print(ts.plots.save(Figure(), Path(folder) / "errors").name)
     errors.png
     """
+    if not hasattr(figure, "savefig"):
+        raise InvalidArgument(f"save: figure must be a matplotlib Figure, such as axes.figure, got {figure!r}.")
     from matplotlib import style
 
     try:

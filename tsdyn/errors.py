@@ -169,6 +169,21 @@ class UnknownAttribute(TsdynError, AttributeError):
     """
 
 
+class UnknownParameter(InvalidArgument, KeyError):
+    """A scene has no parameter of this name.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> body = ts.Scene().add_body(mass=1.0, inertia=(1, 1, 1), name="bob")
+    >>> body.scene.parameters()["bob.mas"]
+    Traceback (most recent call last):
+    tsdyn.errors.UnknownParameter: the scene has no parameter 'bob.mas'; did you mean bob.mass?
+    """
+
+    __str__ = Exception.__str__  # KeyError's quotes the message
+
+
 class MissingDependency(TsdynError, ImportError):
     """A feature needs an optional package that is not installed.
 

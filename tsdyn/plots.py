@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from .benchmarking.haug_tables import DURATION, LEVELS
 from .drawing import BLUE, GREY, VERMILION, new_figure, save
+from .errors import InvalidArgument
 from .figures.axes import ZERO, largest
 from .figures.ensembles import final_map, quantile_bands
 from .figures.errors import constraint_error
@@ -53,6 +54,8 @@ def tables_figure(tables: Sequence[Any]) -> Any:
     >>> figure = ts.plots.tables_figure(reproduce())  # doctest: +SKIP
     >>> ts.plots.save(figure, "tables.png")  # doctest: +SKIP
     """
+    if not isinstance(tables, (list, tuple)) or not all(hasattr(table, "experiment") for table in tables):
+        raise InvalidArgument(f"tables_figure: tables must be what haug_tables.reproduce() returns, got {tables!r}.")
     with new_figure(9.0, 6.8) as figure:
         figure.suptitle(
             "Constraint error: Maggi/Kane drifts, the tangent-space ODE stays at rounding",

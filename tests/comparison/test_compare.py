@@ -123,6 +123,8 @@ def test_wrong_arguments(monkeypatch):
         ts.compare(pendulum(), with_="mujoco", step=-1)
     with pytest.raises(ts.InvalidArgument, match="t_span"):
         ts.compare(pendulum(), (1, 0), with_="mujoco")
+    with pytest.raises(ts.InvalidBody, match="no bodies"):
+        ts.compare(ts.Scene(), (0, 1), with_="mujoco")
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(ts.MissingDependency, match="pip install mujoco"):
         ts.compare(pendulum(), with_="mujoco")

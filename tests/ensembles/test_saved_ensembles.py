@@ -167,6 +167,10 @@ def test_an_ensemble_plots_itself(tmp_path):
     ax = throws(keep=heights, t_eval=TIMES).plot(path=tmp_path / "bands.png")
     assert ax.get_ylabel() == "height (1)"
     assert (tmp_path / "bands.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(ts.InvalidArgument, match=r"To write the figure to it: ensemble\.plot\(path='ens\.png'\)"):
+        throws().plot("ens.png")
+    with pytest.raises(ts.InvalidArgument, match="To write the figure"):
+        throws().plot(tmp_path / "ens.png")
     assert throws().plot("stone.z").get_xlabel() == "stone.velocity[0] (m/s)"
     with pytest.raises(ts.InvalidArgument, match="nothing to draw"):
         ts.ensemble(stones(), {"stone.mass": 1.0}, (0.0, 0.1), cases=2).plot()

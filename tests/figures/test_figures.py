@@ -134,6 +134,23 @@ def test_wrong_arguments_are_refused(run):
         run.plot("nowhere/run.png")
 
 
+@pytest.mark.parametrize("name", ts.plots.__all__)
+def test_what_cannot_be_drawn_is_refused(name):
+    """Neither a raw AttributeError for what is no solution, nor a raw TypeError for a call that doesn't fit."""
+    others = {"reaction": ("h",), "phase_portrait": ("h",), "poincare_section": ("h", [0.1])}
+    others |= {"quantile_bands": ("x",), "final_map": ("x", "y"), "save": ("x.png",)}
+    for wrong in (3, ts.Scene(), None):
+        with pytest.raises(ts.InvalidArgument, match=f"{name}: .* must be .*, got"):
+            getattr(ts.plots, name)(wrong, *others.get(name, ()))
+
+
+def test_calls_of_figures_that_do_not_fit(run):
+    with pytest.raises(ts.InvalidCall, match="did you mean solution"):
+        ts.plots.energy(soluton=run)
+    with pytest.raises(ts.InvalidArgument, match=r"which ts\.simulate returns, got 3"):
+        ts.plots.energy(solution=3)
+
+
 def test_without_matplotlib_figures_say_what_to_install(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     for draw in (run.plot, lambda: ts.plots.energy(run), lambda: ts.plots.phase_portrait(run, "pin 0")):

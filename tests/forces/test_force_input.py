@@ -51,6 +51,11 @@ CASES = {
     "nothing in a bushing": (lambda w: F.Bushing(w.a, w.b), "torsional_stiffness or torsional_damping"),
     "bushing of two": (lambda w: F.Bushing(w.a, w.b, stiffness=(1, 2)), "a number or three numbers"),
     "negative bushing": (lambda w: F.Bushing(w.a, w.b, damping=(1, -2, 1)), "not negative"),
+    "parameters of text": (
+        lambda w: F.UserForce(w.a, function=five, parameters="abc"),
+        "parameters must be a list of finite numbers, got 'abc'",
+    ),
+    "one parameter": (lambda w: F.UserForce(w.a, function=five, parameters=5.0), "parameters must be a list"),
     "no force": (lambda w: F.PointForce(w.a), "no force given"),
     "zero force": (lambda w: F.PointForce(w.a, force=(0, 0, 0)), "zero at all times; set force"),
     "force of two": (lambda w: F.PointForce(w.a, force=(1, 2)), "force must be three finite numbers"),

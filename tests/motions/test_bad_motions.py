@@ -46,6 +46,7 @@ MOTIONS = [
         for i, m in enumerate([(zero, 3.0, zero), (zero, zero), branch, (zero, None, zero), (zero,) * 4, "sin"])
     ),
     case("Motion of numbers", lambda w: ts.Motion(1.0, 2.0, 3.0), ts.InvalidConstraint, "(f, fd, fdd)"),
+    case("one coefficient", lambda w: ts.motions.Polynomial(0.4), ts.InvalidArgument, "c_0 first: Polynomial([0.4])"),
     case("nan at first", lifted((lambda t: NAN, zero, zero)), ts.InvalidConstraint, "lift", "not finite", "t = 0"),
     case("inf at first", lifted((zero, zero, lambda t: INF)), ts.InvalidConstraint, "lift", "not finite", "t = 0"),
     case("raises", lifted((raising, zero, zero)), ts.InvalidConstraint, "lift", "not yet", "t = 0"),

@@ -120,6 +120,22 @@ BAD = {
 }
 
 
+CALLS = {
+    "nothing": (lambda: S.box(), "box.*size"),
+    "misspelt": (lambda: S.box((1, 1, 1), densty=3), "did you mean density"),
+    "a file": (lambda: S.from_mesh("x.stl", density=1), "from_mesh.*faces"),
+    "by position": (lambda: S.sphere(1.0, 0.5), "takes radius by position"),
+    "to draw": (lambda: S.Box((1, 1, 1), color="red"), r"Box\(\) has no argument color; did you mean colour"),
+    "mesh": (lambda: S.Mesh(), "Mesh.*source"),
+}
+
+
+@pytest.mark.parametrize(("call", "words"), CALLS.values(), ids=CALLS)
+def test_calls_that_do_not_fit(call, words):
+    with pytest.raises(ts.InvalidCall, match=words):
+        call()
+
+
 @pytest.mark.parametrize(("call", "words"), BAD.values(), ids=BAD)
 def test_bad_shapes(call, words):
     with pytest.raises(ts.InvalidArgument, match=words):

@@ -69,6 +69,22 @@ def test_reaction_at_rest_is_the_weight(kind, ground_first):
     np.testing.assert_allclose(solution.position(body), np.tile(body.position, (101, 1)), atol=10 * EPS)
 
 
+def test_bodies_of_another_scene_are_said_to_be():
+    (scene, body, constraint, _), (other, stranger, _, _) = at_rest("Distance", False), at_rest("Distance", False)
+    scene.add(constraint)
+    solution = run(scene, 0.1)
+    unlike = other.add_point_mass(1.0, name="unlike")
+    assert stranger.name == body.name
+    for ask in (solution.position, lambda body: solution.reaction(constraint, on=body)):
+        with pytest.raises(ts.InvalidBody, match=f"another scene. The name '{body.name}' stands for the body here"):
+            ask(stranger)
+        with pytest.raises(ts.InvalidBody, match=r"it belongs to another scene\.$"):
+            ask(unlike)
+    loose = scene.add_point_mass(1.0, position=(3, 3, 3), name="loose")  # after the run
+    with pytest.raises(ts.InvalidBody, match=r"not a body of this solution's scene\.$"):
+        solution.position(loose)
+
+
 def test_reaction_torque_of_a_cantilever():
     """A beam held at its end: the joint carries the weight and the moment m g L; Dot1 rows give pure torques."""
     scene = ts.Scene(gravity=(0.0, 0.0, -GRAVITY))

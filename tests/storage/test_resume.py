@@ -111,6 +111,28 @@ def test_events(tmp_path):
 
 
 @pytest.mark.usefixtures("short_slices")
+def test_the_message_says_how_to_go_on(tmp_path):
+    def low(t, state):
+        return state.q[2] - 0.9
+
+    for i, (build, options, more) in enumerate(
+        (
+            (top.build, {"checkpoint": 0.0}, ""),
+            (top.build, {"checkpoint": 0.0, "events": low}, ", events=events"),
+            (driven_pivot.build, {"checkpoint": 0.0}, ", scene=scene"),
+        )
+    ):
+        path = tmp_path / f"run {i}.h5"
+        stopped = ts.simulate(build(), (0.0, 1.0), integrator="dop853", store=path, progress=Stop(2), **options)
+        assert f"Continue with ts.resume({str(path)!r}{more})." in stopped.message
+        assert "simulate(" not in stopped.message
+    again = ts.resume(tmp_path / "run 0.h5", progress=Stop(2))
+    assert "Continue with ts.resume(" in again.message
+    plain = ts.simulate(top.build(), (0.0, 1.0), integrator="dop853", store=tmp_path / "plain.h5", progress=Stop(2))
+    assert "state=solution.state" in plain.message
+
+
+@pytest.mark.usefixtures("short_slices")
 def test_scenes_with_code_are_passed_again(tmp_path):
     path, scene = tmp_path / "run.h5", driven_pivot.build()
     stop_and_go_on(driven_pivot.build, 0.5, path, again=scene, integrator="dop853")
@@ -269,7 +291,11 @@ def test_stopped_again_before_the_first_checkpoint(suffix, tmp_path, short_slice
 
 
 def test_no_checkpoint(tmp_path):
-    refuse(lambda: ts.resume(tmp_path / "run.h5"), ts.StorageError, ("doesn't exist",))
+    refuse(lambda: ts.resume(tmp_path / "run.h5"), ts.StorageError, ("run.h5 doesn't exist.",))
+    refuse(lambda: ts.resume(tmp_path / "nowhere/run.h5"), ts.StorageError, ("run.h5 doesn't exist.",))
+    ts.simulate(top.build(), (0.0, 0.1), store=tmp_path / "runs.h5")
+    refuse(lambda: ts.resume(tmp_path / "run.h5"), ts.StorageError, ("doesn't exist; did you mean runs.h5?",))
+    refuse(lambda: ts.resume(tmp_path / "runs.h5"), ts.StorageError, ("was written without checkpoint=seconds",))
     refuse(lambda: ts.resume(3), ts.InvalidArgument, ("path must be a path", "3"))
 
 

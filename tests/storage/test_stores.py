@@ -1,6 +1,8 @@
 """Outputs in a store are those of a run without one, to the bit, whole or in slices."""
 
 import errno
+import os
+import re
 import subprocess
 import sys
 
@@ -120,6 +122,54 @@ def test_nothing_is_overwritten(tmp_path):
     path = tmp_path / "run.h5"
     run(store=path)
     refuse(lambda: run(store=path), ts.StorageError, ("exists", "ts.resume"))
+
+
+def savers():
+    """What writes a store or a file as a whole, by name."""
+    (scene := ts.Scene()).add_point_mass(mass=1.0, name="stone")
+    values = {"stone.velocity": [(1, 0, 5), (2, 0, 5)]}
+    solution, study = ts.simulate(scene, (0, 1)), ts.ensemble(scene, values, (0, 1))
+    return {
+        "run": lambda path: ts.simulate(scene, (0, 1), store=path),
+        "solution": solution.save,
+        "ensemble": study.save,
+        "cases": lambda path: ts.ensemble(scene, values, (0, 1), store=path),
+    }
+
+
+HDF5_REFUSES = (  # its words
+    "[Errno 13] Unable to synchronously create file (unable to open file: name = 'run-partial-7.h5', errno = 13, "
+    "error message = 'Permission denied', flags = 15, o_flags = c2)"
+)
+
+
+@pytest.mark.parametrize("error", [PermissionError(HDF5_REFUSES), OSError(errno.EROFS, "x", "run-partial-7.h5")])
+def test_a_folder_that_cannot_be_written_to(error, tmp_path, monkeypatch):
+    def fail(*arguments):
+        raise error
+
+    monkeypatch.setattr(format_of("run.h5").Store, "create", fail)
+    for name, save in savers().items():
+        with pytest.raises(
+            ts.StorageError, match=f"the folder {re.escape(str(tmp_path))} can't be written to"
+        ) as caught:
+            save(tmp_path / "run.h5")
+        message = str(caught.value)
+        assert "Take another path, or change the permissions." in message, name
+        assert not [word for word in ("flags", "errno", "partial", "Free space") if word in message], message
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_folder_without_permissions(suffix, tmp_path):
+    (folder := tmp_path / "closed").mkdir()
+    for mode in (0o500, 0o000):
+        folder.chmod(mode)
+        if os.access(folder, os.W_OK):
+            pytest.skip("root may write anywhere")
+        for name, save in savers().items():
+            words = ("run.", "can't be written", "Permission denied", "change the permissions")
+            refuse(lambda save=save: save(folder / f"run.{suffix}"), ts.StorageError, words, name)
+    folder.chmod(0o700)
 
 
 def test_a_missing_library_is_named(tmp_path, monkeypatch):

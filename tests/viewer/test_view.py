@@ -239,6 +239,9 @@ def test_wrong_shapes_and_paths_are_refused(run, tmp_path):
         run.view(tmp_path / "a", trails=7)
     with pytest.raises(ts.InvalidArgument, match="can't be written"):
         run.view(tmp_path / "nowhere" / "a.html")
+    for name in ("a.png", "a.html.gz"):
+        with pytest.raises(ts.InvalidArgument, match=r"must end in \.html, got"):
+            run.view(tmp_path / name)
     with pytest.raises(ts.InvalidCall, match="did you mean shapes"):
         run.view(shape={})
     assert not list(tmp_path.iterdir())

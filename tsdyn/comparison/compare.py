@@ -88,6 +88,7 @@ def compare(
     step, outputs = positive(step, "compare: step (s)"), whole(outputs, "compare: outputs") or 200
     if options is not None and not isinstance(options, dict):
         raise InvalidArgument(f"compare: options must be a dictionary, got {options!r}.")
+    _ = scene.packed  # refuses a scene without bodies
     found = engines.run(scene, with_, end - start, min(step, end - start), outputs, method, options or {})
     finite = np.isfinite(found.q).all(axis=1) & np.isfinite(found.qd).all(axis=1)
     kept = len(finite) if finite.all() else int(finite.argmin())

@@ -3,7 +3,6 @@
 Messages are beside the store, a line of JSON for each case that has one of its own.
 """
 
-import contextlib
 import hashlib
 import json
 import shutil
@@ -17,9 +16,12 @@ from .._version import __version__
 from ..errors import Status, StorageError
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
 from ..storage.formats import Column, Table, format_of
+from ..storage.write_errors import writing
 from .chunks import empty, fitted
 from .keeping import TIMES
 from .tolerances import FLUSH, WAITING
+
+GO_ON = "Free space there, and go on: resume=True."
 
 CASE, DIGEST = "case", "ensemble"
 
@@ -43,11 +45,13 @@ class StoredResults:
         self._format, self._store, self._table = format_of(self.path), None, None
         self._said = self.path.with_name(f"{self.path.name}.messages")
         self._waiting, self._due = {}, time.perf_counter() + FLUSH
-        if not self.path.parent.is_dir():
+        with writing(self.path):
+            has_folder, taken = self.path.parent.is_dir(), self.path.exists()
+        if not has_folder:
             raise StorageError(f"there is no folder {self.path.parent} to write {self.path.name} to.")
-        if self.path.exists() and not resume:
+        if taken and not resume:
             raise StorageError(f"{self.path} exists. Delete it, take another name, or go on with it: resume=True.")
-        self.first = self._found() if self.path.exists() else 0
+        self.first = self._found() if taken else 0
         if not self.first:  # a store of this ensemble may be there, without results
             for path in (self.path, self._said):
                 _remove(path)
@@ -109,7 +113,7 @@ class StoredResults:
         attributes = {"source": f"tsdyn {__version__}", DIGEST: digest_of(self.study)}
         attributes |= {"cases": self.study.cases.count, "times": json.dumps(self.study.options.times.tolist())}
         make = self._format.Store
-        with _writing(self.path):
+        with writing(self.path, GO_ON):
             if self.first:
                 self._store = make.reopen(self.path, {CASE: self._table}, attributes, {CASE: self.first}, 0)
             else:
@@ -126,7 +130,7 @@ class StoredResults:
             shape = self._table.shapes(column)[0][1:]
             rows[column.name] = arrays.get(column.name, np.full((chunk.count, *shape), np.nan))
         rows[CASE] = np.arange(chunk.first, end, dtype=float)  # last, for readers who count by it
-        with _writing(self.path):
+        with writing(self.path, GO_ON):
             self._store.write(chunk.first, rows)
             if chunk.messages:
                 with open(self._said, "a", encoding="utf-8") as file:
@@ -134,7 +138,7 @@ class StoredResults:
         self.first = end
 
     def _flush(self):
-        with _writing(self.path):
+        with writing(self.path, GO_ON):
             self._store.flush()
         self._due = time.perf_counter() + FLUSH
 
@@ -145,7 +149,7 @@ class StoredResults:
             while self.first in self._waiting:
                 self._write(self._waiting.pop(self.first))
         if self._store is not None:
-            with _writing(self.path):
+            with writing(self.path, GO_ON):
                 self._store.flush()
                 self._store.close()
             self._store = None
@@ -266,16 +270,3 @@ def digest_of(study):
     state = given["state"]
     digest.update(b"" if state is None else np.asarray(state.q).tobytes() + np.asarray(state.qd).tobytes())
     return digest.hexdigest()
-
-
-@contextlib.contextmanager
-def _writing(path):
-    """A block in which an OSError is the store's."""
-    try:
-        yield
-    except StorageError:
-        raise
-    except OSError as error:
-        raise StorageError(
-            f"{path} can't be written: {type(error).__name__}: {error}. Free space there, and go on: resume=True."
-        ) from error

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
+import inspect
+from functools import wraps
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..calls import fitting
 from ..drawing import demand_matplotlib
+from ..errors import InvalidArgument
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..hints import Function
 
 ZERO = 1e-17  # what an error of exactly zero is drawn as: below any other
+SHOWN = {  # first argument: what it must be
+    "solution": "a Solution, which ts.simulate returns",
+    "linearisation": "a Linearisation, which scene.linearise() returns",
+    "ensemble": "an Ensemble, which ts.ensemble returns",
+}
 POINTS = 400  # stretches of time, the largest error of each of which is drawn
 
 
@@ -20,6 +34,25 @@ def axes_of(ax: Any, rows: int = 1, columns: int = 1, **options: Any) -> Any:
     from matplotlib import pyplot
 
     return pyplot.subplots(rows, columns, layout="constrained", **options)[1]
+
+
+def figure_of(*needed: str) -> Callable[[Function], Function]:
+    """Decorate what draws: a wrong call is refused, as is a first argument without the attributes that it needs."""
+
+    def decorate(draw):
+        name = next(iter(inspect.signature(draw).parameters))
+
+        @wraps(draw)
+        def checked(*arguments, **keywords):
+            given = arguments[:1] or [keywords[name] for _ in range(name in keywords)]
+            for shown in given:  # by `dir`, since `hasattr` computes properties
+                if not {*needed} <= {*dir(shown)} or isinstance(shown, type):
+                    raise InvalidArgument(f"{draw.__name__}: {name} must be {SHOWN[name]}, got {shown!r}.")
+            return draw(*arguments, **keywords)
+
+        return fitting(checked)
+
+    return decorate
 
 
 def bare(ax: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ..drawing import BLUE, save
 from ..errors import InvalidArgument
 from ..validation import nearest
-from .axes import axes_of, bare
+from .axes import axes_of, bare, figure_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,10 +19,12 @@ if TYPE_CHECKING:
     from ..hints import Ensemble
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".eps", ".ps", ".tif", ".tiff", ".webp", ".pgf")
 PLANE = 2  # parameters of a map at most
 DARKEST = 0.45  # opacity of all bands together
 
 
+@figure_of("reductions")
 def quantile_bands(
     ensemble: Ensemble, what: str, ax: Any = None, *, quantiles: Sequence[float] = QUANTILES, unit: str | None = None
 ) -> Any:
@@ -90,6 +93,7 @@ def quantile_bands(
     return ax
 
 
+@figure_of("reductions")
 def final_map(
     ensemble: Ensemble, what: str, over: str | Sequence[str], ax: Any = None, *, unit: str | None = None
 ) -> Any:
@@ -156,6 +160,11 @@ def final_map(
 
 def overview(ensemble: Ensemble, what: str | None, path: str | Path | None) -> Any:
     """What `Ensemble.plot` draws: bands of a series, else a map over the first one or two parameters that vary."""
+    if _is_picture(what) and what not in ensemble.reductions():
+        raise InvalidArgument(
+            f"plot: what must be a value of the ensemble, got the path {str(what)!r}. To write the figure to it: "
+            f"ensemble.plot(path={str(what)!r})."
+        )
     what = what or next(iter(ensemble.reductions()), None) or ensemble.coordinates[0]
     if value_of(ensemble, what)[0].ndim > 1:
         ax = quantile_bands(ensemble, what)
@@ -167,6 +176,11 @@ def overview(ensemble: Ensemble, what: str | None, path: str | Path | None) -> A
     if path is not None:
         save(ax.figure, path)
     return ax
+
+
+def _is_picture(what):
+    """Whether a value is a path, and no name."""
+    return isinstance(what, os.PathLike) or (isinstance(what, str) and what.lower().endswith(PICTURES))
 
 
 def value_of(ensemble, what, last=False):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..drawing import BLUE, GREEN, VERMILION
-from .axes import axes_of, largest
+from .axes import axes_of, figure_of, largest
 
 if TYPE_CHECKING:
     from ..hints import Solution
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 LEVELS = {"position": ("m", BLUE), "velocity": ("m/s", VERMILION), "acceleration": ("m/s²", GREEN)}
 
 
+@figure_of("constraint_error")
 def constraint_error(solution: Solution, ax: Any = None) -> Any:
     """Draw the constraint errors of a solution over time: position, velocity and acceleration, log scale.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..drawing import BLUE, GREEN, GREY, VERMILION
-from .axes import axes_of, bare
+from .axes import axes_of, bare, figure_of
 
 if TYPE_CHECKING:
     from ..hints import ItemLike, Solution
@@ -16,6 +16,7 @@ COLOURS = (BLUE, VERMILION, GREEN)
 MARKERS = "os^Dv"
 
 
+@figure_of("kinetic_energy", "potential_energy")
 def energy(solution: Solution, ax: Any = None) -> Any:
     """Draw kinetic, potential and total energy over time, J. Arguments and errors as for `constraint_error`.
 
@@ -38,6 +39,7 @@ def energy(solution: Solution, ax: Any = None) -> Any:
     return _finished(ax, "energy (J)")
 
 
+@figure_of("reaction")
 def reaction(solution: Solution, item: ItemLike, axes: Any = None) -> Any:
     """Draw force (N) and torque (N m) that a constraint, joint or force exerts, in the ground frame, over time.
 
@@ -80,6 +82,7 @@ def reaction(solution: Solution, item: ItemLike, axes: Any = None) -> Any:
     return axes
 
 
+@figure_of("steps", "charts")
 def steps(solution: Solution, ax: Any = None) -> Any:
     """Draw the length of every step over time, s; rejected steps are crosses. Arguments as for `constraint_error`.
 
@@ -107,6 +110,7 @@ def steps(solution: Solution, ax: Any = None) -> Any:
     return _finished(ax, "step (s)")
 
 
+@figure_of("steps", "charts")
 def charts(solution: Solution, ax: Any = None) -> Any:
     """Draw the condition of every chart at its end, by the reason of the chart. As for `steps`.
 

@@ -10,7 +10,7 @@ from ..drawing import GREY, VERMILION
 from ..elements.bodies import rotation_matrix
 from ..errors import InvalidArgument
 from ..viewer.sizes import attached, joint_points
-from .axes import axes_of
+from .axes import axes_of, figure_of
 
 if TYPE_CHECKING:
     from ..hints import Linearisation
@@ -19,6 +19,7 @@ SHOWN = 0.25  # largest displacement, per extent of the scene
 NO_EXTENT = 1.0  # m, of a scene that is a point
 
 
+@figure_of("modes")
 def mode_shapes(linearisation: Linearisation, count: int = 4) -> Any:
     """Draw the first modes of a linearisation: centroids and joints at rest in grey, and displaced by each mode.
 

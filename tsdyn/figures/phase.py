@@ -8,7 +8,7 @@ import numpy as np
 
 from ..drawing import BLUE, VERMILION
 from ..errors import InvalidArgument
-from .axes import axes_of, bare
+from .axes import axes_of, bare, figure_of
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, ItemLike, Solution
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 KINDS = {"angle": "rad", "displacement": "m"}
 
 
+@figure_of("handles")
 def phase_portrait(solution: Solution, joint: ItemLike, ax: Any = None, *, wrap: bool = False) -> Any:
     """Draw the rate of a joint's angle (rad) or displacement (m) over it; the start is a dot.
 
@@ -61,6 +62,7 @@ def phase_portrait(solution: Solution, joint: ItemLike, ax: Any = None, *, wrap:
     return _labelled(ax, solution, joint, kind)
 
 
+@figure_of("handles", "at")
 def poincare_section(
     solution: Solution, joint: ItemLike, times: ArrayLike, ax: Any = None, *, wrap: bool = True
 ) -> Any:

@@ -130,7 +130,7 @@ class UserForce(ByState, Force):
         if b is None:
             b = getattr(getattr(a, "scene", None), "ground", None)
         super().__init__(a, b, **places)
-        self.values = parameters
+        self.values = _numbers(parameters, f"{self.name}: parameters", self.error)
         self.function = function
         self.check()
 

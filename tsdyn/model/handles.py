@@ -79,8 +79,15 @@ class Handles:
             return named(self.bodies, body, "body", InvalidBody)
         body = self.own(body)
         if not isinstance(body, PointMass) or body not in self._where:
-            raise InvalidBody(f"{body!r} is not a body of this solution's scene.")
+            raise InvalidBody(f"{body!r} is not a body of this solution's scene{self._elsewhere(body)}.")
         return body
+
+    def _elsewhere(self, body):
+        """The end of a sentence on a body of another scene."""
+        if not isinstance(body, PointMass) or body.scene is self.bodies[0].scene:
+            return ""
+        same = any(own.name == body.name for own in self.bodies)
+        return f"; it belongs to another scene{f'. The name {body.name!r} stands for the body here' if same else ''}"
 
     def item(self, item):
         """A constraint or force of the scene, by name; a handle as it is."""

@@ -41,6 +41,11 @@ class Polynomial(Smooth):
     @fitting
     def __init__(self, coefficients: ArrayLike) -> None:
         c = floats(coefficients)
+        if c.ndim == 0 and np.isfinite(c):
+            raise InvalidArgument(
+                f"{type(self).__name__}: coefficients must be a list of finite numbers, c_0 first: "
+                f"Polynomial([{coefficients!r}]), got {coefficients!r}."
+            )
         if c.ndim != 1 or not c.size or not np.isfinite(c).all():
             raise InvalidArgument(
                 f"{type(self).__name__}: coefficients must be finite numbers, c_0 first, got {coefficients!r}."

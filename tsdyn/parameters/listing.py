@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..validation import counted
+from ..errors import UnknownParameter
+from ..validation import counted, nearest
 
 if TYPE_CHECKING:
     from ..hints import Floats
@@ -47,7 +48,18 @@ class ParameterList(Mapping[str, "float | Floats"]):
         self._values, self.units = values, units
 
     def __getitem__(self, name: str) -> float | Floats:
-        return self._values[name]
+        try:
+            return self._values[name]
+        except (KeyError, TypeError):
+            known = nearest(name, self._values)
+            raise UnknownParameter(f"the scene has no parameter {name!r}{known}") from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._values
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """The value of a parameter, or a default where there is none."""
+        return self._values.get(name, default)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._values)

@@ -176,7 +176,7 @@ def drive(memory, task, watch):
     except OSError as error:
         if task.archive is None:
             raise
-        slices.status, slices.reason = Status.STORE_FAILED, f"{type(error).__name__}: {error}."
+        slices.status, slices.reason = Status.STORE_FAILED, f"{error.strerror or error}."
     except KeyboardInterrupt:
         if not memory.run.numbers.begun:  # there is nothing to return
             raise

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from ..calls import fitting_constructor
 from ..errors import InvalidArgument
 from ..validation import floats, positive, vector3
 from .mesh_files import read
@@ -63,6 +64,7 @@ class Geometry:
         return replace(self, position=A @ self.position, rotation=A @ self.rotation)
 
 
+@fitting_constructor
 @dataclass(frozen=True, eq=False)
 class Box(Geometry):
     """A cuboid to draw; size (3,), m: its edges along x, y, z. `position`, `rotation`, `colour`: see below.
@@ -100,6 +102,7 @@ class Box(Geometry):
         self._set(size=size)
 
 
+@fitting_constructor
 @dataclass(frozen=True, eq=False)
 class Sphere(Geometry):
     """A ball to draw; radius, m. Other arguments and errors as for `Box`.
@@ -118,6 +121,7 @@ class Sphere(Geometry):
         self._set(radius=positive(self.radius, "Sphere: radius (m)"))
 
 
+@fitting_constructor
 @dataclass(frozen=True, eq=False)
 class Cylinder(Geometry):
     """A cylinder to draw, about its centre along the axis "x", "y" or "z". Other arguments and errors as for `Box`.
@@ -142,6 +146,7 @@ class Cylinder(Geometry):
         self._set(length=positive(self.length, "Cylinder: length (m)"))
 
 
+@fitting_constructor
 @dataclass(frozen=True, eq=False)
 class Mesh(Geometry):
     """A triangle mesh to draw. `position`, `rotation`, `colour` and errors as for `Box`.

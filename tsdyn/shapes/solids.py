@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..calls import fitting
 from ..errors import InvalidArgument
 from ..maths.mesh_integrals import moments
 from ..validation import number, positive, vector3
@@ -79,6 +80,7 @@ class Shape:
         return Shape(mass, inertia, centroid, self.pieces + other.pieces)
 
 
+@fitting
 def box(size: ArrayLike, *, mass: float | None = None, density: float | None = None) -> Shape:
     """A cuboid about its centre, edges along the axes.
 
@@ -114,6 +116,7 @@ def box(size: ArrayLike, *, mass: float | None = None, density: float | None = N
     return _shape(m, (m / 12.0) * (squares.sum() - squares), Box(edges))
 
 
+@fitting
 def sphere(radius: float, *, inner: float = 0.0, mass: float | None = None, density: float | None = None) -> Shape:
     """A ball about its centre; with an inner radius, m, a hollow one. Other arguments and errors as for `box`.
 
@@ -130,6 +133,7 @@ def sphere(radius: float, *, inner: float = 0.0, mass: float | None = None, dens
     return _shape(m, np.full(3, 0.4 * m * a * a * share), Sphere(a))
 
 
+@fitting
 def cylinder(
     radius: float,
     length: float,
@@ -155,6 +159,7 @@ def cylinder(
     return _round(m, a * a + b * b, Cylinder(a, length, _axis("cylinder", axis)))
 
 
+@fitting
 def rod(length: float, *, axis: Axis = "z", mass: float) -> Shape:
     """A slender rod about its centre, along the axis "x", "y" or "z".
 
@@ -176,6 +181,7 @@ def rod(length: float, *, axis: Axis = "z", mass: float) -> Shape:
     return _round(positive(mass, "rod: mass (kg)"), 0.0, drawn)
 
 
+@fitting
 def from_mesh(
     vertices: ArrayLike, faces: ArrayLike, *, mass: float | None = None, density: float | None = None
 ) -> Shape:

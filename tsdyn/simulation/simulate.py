@@ -204,7 +204,8 @@ def _run_stored(task, given, options, found, archive):
         outcome = stored_runs.ended(archive, outcome, seconds)
     finally:
         archive.close()
-    return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": seconds})
+    timed = {"prepare": outcome.began - started, "run": seconds}
+    return Solution(scene, task, outcome, timed, stored_runs.call_to_go_on(archive))
 
 
 def _request(scene, kept, method, options, state, choose):

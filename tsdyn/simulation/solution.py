@@ -100,7 +100,7 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
     qd_events: list[Floats] | Any
     _turned = ""  # the methods of a run that turned
 
-    def __init__(self, scene: Scene, task: Any, outcome: Any, seconds: dict[str, float]) -> None:
+    def __init__(self, scene: Scene, task: Any, outcome: Any, seconds: dict[str, float], goes_on: str = "") -> None:
         self.scene, self.packed = scene, task.prepared.packed
         self.formulation, self.span = task.form.name, task.span
         self._method, self._turned = task.method if is_plain(task.method) else repr(task.method), outcome.method
@@ -117,7 +117,7 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
         self._energy_error = energy_error(self, task) if near else None
         self._reason, self._message, self._made = outcome.reason, None, time.time()
         if near or outcome.status not in SUCCESSES or self.packed.derived.redundant is not None:
-            self._message = account(self, scene, self._reason)  # written now, since the scene may change
+            self._message = account(self, scene, self._reason, goes_on)  # written now, since the scene may change
 
     def __setstate__(self, state):
         """Restore a pickled solution; the packed scene looks its kernels up."""
@@ -317,6 +317,8 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
             if on.dimension:
                 return on
             raise InvalidBody(f"{item.name}: the load on the ground is the opposite of the load on {item.on.name!r}.")
+        if getattr(on, "dimension", 0):
+            on = self.handles.body(on)  # refuses one of another scene
         raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
 
     def _facts(self):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import inspect
 import os
@@ -47,6 +46,7 @@ def demand_path(path, name):
 def archive_of(given, kept, history, numbers, arrays):
     """The `Archive` of a run, made or, with the numbers and arrays of a checkpoint, gone on with."""
     from ..storage.archive import Archive, tables_of
+    from ..storage.write_errors import writing
 
     facts = _facts(given, kept)
     if numbers is not None:
@@ -55,7 +55,7 @@ def archive_of(given, kept, history, numbers, arrays):
     tables = tables_of(kept.packed.bodies, remembered, history)
     attributes = {"source": f"tsdyn {__version__}", "scene": facts["scene"]}
     archive = Archive(Path(given["store"]).absolute(), tables, attributes, facts["interval"], _request(given), facts)
-    with _writing(archive.path):
+    with writing(archive.path):
         if numbers is None:
             archive.begin()
         elif not numbers.get("ended"):
@@ -63,21 +63,11 @@ def archive_of(given, kept, history, numbers, arrays):
     return archive
 
 
-@contextlib.contextmanager
-def _writing(path):
-    """A block in which an OSError is the store's."""
-    try:
-        yield
-    except StorageError:
-        raise
-    except OSError as error:
-        reason = f"{type(error).__name__}: {error}"
-        raise StorageError(f"{path} can't be written: {reason}. Free space there, or take another path.") from error
-
-
 def begin_again(archive, given):
     """Let another method begin at the start; the archive."""
-    with _writing(archive.path):
+    from ..storage.write_errors import writing
+
+    with writing(archive.path):
         archive.begin_again(_request(given))
     return archive
 
@@ -91,9 +81,20 @@ def ended(archive, outcome, seconds):
         if archive.has_checkpoints and outcome.status not in (Status.INTERRUPTED, Status.STORE_FAILED):
             archive.checkpoint(*_ending(outcome, seconds))
     except OSError as error:
-        outcome = outcome._replace(status=Status.STORE_FAILED, reason=f"{type(error).__name__}: {error}.")
+        outcome = outcome._replace(status=Status.STORE_FAILED, reason=f"{error.strerror or error}.")
     rows, steps, charts = _stored(archive)
     return outcome._replace(rows=rows, steps=steps, charts=charts)
+
+
+def call_to_go_on(archive):
+    """The call of `resume` that goes on with a run; "" where there is no checkpoint."""
+    from ..storage.checkpoint import place
+
+    if not any(path.exists() for path in place(archive.path)):
+        return ""
+    needs_scene = archive.facts["functions"] or "scene" not in archive.request
+    passed = {"scene": needs_scene, "events": archive.facts["events"]}
+    return f"ts.resume({', '.join([repr(str(archive.path)), *(f'{name}={name}' for name in passed if passed[name])])})"
 
 
 def _stored(archive):

@@ -14,8 +14,8 @@ from .tolerances import BLOW_UP, MOST_SINGULAR, NEARLY_SINGULAR
 FEW = 3  # items named in a message
 
 
-def account(solution, scene, reason):
-    """Return the termination message of a run."""
+def account(solution, scene, reason, goes_on=""):
+    """Return the termination message of a run; `goes_on` is the call that continues it from a checkpoint."""
     reason = " ".join(part for part in (reason, _kept(solution.stats)) if part)
     if solution.success:
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
@@ -23,6 +23,8 @@ def account(solution, scene, reason):
     where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
     found = suspect(solution, scene)
     remedy = Status.SINGULAR.remedy if found else solution.status.remedy
+    if solution.status == Status.INTERRUPTED and goes_on:
+        remedy = f"Continue with {goes_on}."
     lacking = without_series(solution.packed)[:FEW] if found else ()
     if lacking:
         remedy += f" Without a series: {'; '.join(lacking)}."

@@ -78,7 +78,7 @@ class Archive:
 
     def __init__(self, path, tables, attributes, interval, request, facts):
         self.path, self._tables, self._attributes = path, tables, attributes
-        self._interval, self._request, self._facts = interval, request, facts
+        self._interval, self.request, self.facts = interval, request, facts
         self._format = format_of(path)
         self.shift, self.skips, self.passed = 0.0, False, []  # of positions; a first row; segments that have ended
         self.resumed = None  # what a run that goes on begins with: numbers, arrays
@@ -101,7 +101,7 @@ class Archive:
 
     def begin_again(self, request):
         """Forget what has been written: another method begins at the start."""
-        self._request = request
+        self.request = request
         checkpoint.remove(self.path)
         self._store.close()
         self._reopen(self._none(), 0)
@@ -151,8 +151,8 @@ class Archive:
         """Write a checkpoint of this state."""
         self._write()
         self._store.sync()
-        facts = {**self._facts, "counts": self.counts, "passed": self.passed, "size": self._store.size}
-        checkpoint.write(self.path, {**facts, **numbers}, {**self._request, **arrays})
+        facts = {**self.facts, "counts": self.counts, "passed": self.passed, "size": self._store.size}
+        checkpoint.write(self.path, {**facts, **numbers}, {**self.request, **arrays})
         self._written = time.perf_counter()
         self._due = self._written + READERS
 

@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import StorageError
+from ..validation import nearest
+from .formats import SUFFIXES
 
 FORMAT = b"tsdyn checkpoint 1\n"
 NUMBERS = "numbers"  # the array of the JSON
@@ -61,6 +63,7 @@ def read(store):
     newest, before = place(store)
     if not newest.exists():
         if not before.exists():
+            _demand_store(Path(store))
             raise StorageError(
                 f"{newest} doesn't exist: {store} was written without checkpoint=seconds, stopped before the "
                 "first one, or moved without it."
@@ -78,6 +81,13 @@ def read(store):
         raise StorageError(
             f"{error} The one before it, of t = {numbers['t']:.9g} s, is whole: delete {newest} to go on from there."
         ) from None
+
+
+def _demand_store(path):
+    """Raise StorageError if there is no store; names those of its folder that are called much the same."""
+    if not path.exists():
+        others = [other.name for other in path.parent.glob("*") if other.suffix.lower() in SUFFIXES]
+        raise StorageError(f"{path} doesn't exist{nearest(path.name, others)}")
 
 
 def remove(store):

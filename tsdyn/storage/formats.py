@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import InvalidArgument, MissingDependency, StorageError
+from .write_errors import writing
 
 HDF5, ZARR = (".h5", ".hdf5", ".nc"), (".zarr",)  # suffixes of paths
 SUFFIXES = *HDF5, *ZARR
@@ -94,7 +95,9 @@ def format_of(path):
 def demand_free(path):
     """Raise StorageError where there is something already, or no folder to write to."""
     path = Path(path)
-    if path.exists():
+    with writing(path):
+        taken, has_folder = path.exists(), path.parent.is_dir()
+    if taken:
         raise StorageError(f"{path} exists. Delete it, take another name, or go on with it: ts.resume({str(path)!r}).")
-    if not path.parent.is_dir():
+    if not has_folder:
         raise StorageError(f"there is no folder {path.parent} to write {path.name} to.")

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import StorageError
 from .formats import CHUNK, demand_rows, reading
+from .write_errors import code_of
 
 BUFFER = CHUNK
 COPIED = 1 << 16  # rows at a time
@@ -95,7 +96,8 @@ class Store:
             if os.name == "posix":
                 with open(os.devnull, "r+b") as nowhere:
                     os.dup2(nowhere.fileno(), self._file.id.get_vfd_handle())
-            raise OSError(str(error)) from error
+            code = code_of(error)
+            raise (OSError(code, os.strerror(code)) if code else OSError(str(error))) from error
 
 
 def _room_of(tables):

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import InvalidArgument, StorageError
 from .formats import SUFFIXES, format_of
+from .write_errors import unwritable, writing
 
 FORMAT, VERSION = "tsdyn solution", 1
 GROUP, RECORD = "run", "record"
@@ -69,7 +70,7 @@ def write(path, tables, rows_of, attributes, content, kind=FORMAT):
             partial.unlink(missing_ok=True)
         if isinstance(error, StorageError):
             raise
-        raise StorageError(f"{path} can't be written: {type(error).__name__}: {error}.") from error
+        raise unwritable(path, error) from error
 
 
 def _sealed(words):
@@ -90,10 +91,11 @@ def _columns(tables):
 
 def _demand_replaceable(path, form, kind):
     """Raise StorageError unless a path is free, or that of a saved solution, or what `kind` says."""
-    if not path.parent.is_dir():
-        raise StorageError(f"there is no folder {path.parent} to write {path.name} to.")
-    if not path.exists():
-        return
+    with writing(path):
+        if not path.parent.is_dir():
+            raise StorageError(f"there is no folder {path.parent} to write {path.name} to.")
+        if not path.exists():
+            return
     try:
         known = form.attributes(path).get("format") == kind
     except StorageError:

@@ -17,6 +17,7 @@ from ..errors import InvalidArgument
 from .run_data import run_data
 
 SCRIPTS = ("poses.js", "instances.js", "stage.js", "player.js")
+SUFFIXES = (".html", ".htm")
 HEIGHT = 520  # of the frame in a notebook, pixels
 
 
@@ -47,6 +48,7 @@ class View:
 
 def show(solution: Any, path: str | Path | None, shapes: Any, trails: Any) -> Path | View:
     """What `Solution.view` does."""
+    path = None if path is None else page_path(path)
     page = page_of(run_data(solution, shapes, trails))
     if path is not None:
         return write(page, path)
@@ -87,15 +89,29 @@ def write(page: str, path: str | Path) -> Path:
     Raises
     ------
     InvalidArgument
-        If the file can't be written.
+        If the file can't be written, or has another suffix than .html or .htm.
     """
+    path = page_path(path)
+    try:
+        path.write_text(page, encoding="utf-8")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidArgument(f"view: the page can't be written to {path}: {reason}.") from error
+    return path
+
+
+def page_path(path: str | Path) -> Path:
+    """The path of a page, of suffix .html if it has none; raises InvalidArgument for another one than .html or .htm."""
     try:
         path = Path(path)
         path = path if path.suffix else path.with_suffix(".html")
-        path.write_text(page, encoding="utf-8")
-    except (OSError, TypeError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InvalidArgument(f"view: the page can't be written to {path}: {reason}.") from error
+    except (TypeError, ValueError) as error:
+        raise InvalidArgument(f"view: the page can't be written to {path}: {error}.") from error
+    if path.suffix.lower() not in SUFFIXES:
+        raise InvalidArgument(
+            f"view: the animation is an HTML page; its path must end in .html, got {str(path)!r}. solution.plot(path) "
+            "writes a figure."
+        )
     return path
 
 

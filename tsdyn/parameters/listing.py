@@ -35,13 +35,12 @@ class ParameterList(Mapping[str, "float | Floats"]):
     >>> parameters["rod.length"], parameters.units["rod.length"]
     (1.0, 'm')
     >>> print(parameters)
-    gravity      [0, 0, -10]  m/s^2
-    bob.mass             1.5  kg
-    bob.position   [1, 0, 0]  m
-    bob.velocity   [0, 0, 0]  m/s
-    rod.point_a    [0, 0, 0]  m
-    rod.point_b    [0, 0, 0]  m
-    rod.length             1  m
+    gravity       [0, 0, -10]  m/s^2
+    bob.mass              1.5  kg
+    bob.position    [1, 0, 0]  m
+    bob.velocity    [0, 0, 0]  m/s
+    rod.point_b     [0, 0, 0]  m
+    rod.length              1  m
     """
 
     def __init__(self, values: dict[str, Any], units: dict[str, str]) -> None:

@@ -225,6 +225,13 @@ def test_all_mistakes_at_once(tmp_path):
     assert [line for _, _, line, _ in several] == [line for line, _, _ in caught.value.mistakes]
 
 
+def test_bodies_of_an_item_of_unknown_type(tmp_path):
+    text = "version = 1\n[[constraint]]\ntype = 'Revolut'\na = 'ground'\nb = 'am'\n"
+    with pytest.raises(ts.InvalidFile) as caught:
+        load(text, tmp_path)
+    assert [line for line, _, _ in caught.value.mistakes] == [3, 5]
+
+
 def test_a_start_that_cannot_be_assembled(tmp_path):
     with pytest.raises(ts.InvalidFile, match="arm, bob held fixed"):
         load(RIGHT.replace("1.2 + 0.0", "9.0 + 0.0").replace("[start]", '[start]\nfixed = ["arm", "bob"]'), tmp_path)

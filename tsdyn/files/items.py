@@ -25,6 +25,9 @@ def add_item(reading, scene, path, table, kinds):
         reading.items[name] = None
     cls = _class(reading, path, table, what, kinds)
     if cls is None:
+        for side in types.BODIES:
+            if side in table:
+                referred(reading, path, table, (what, side, "body", reading.bodies))
         return
     arguments, bodies = types.of_class(cls), types.bodies_of(cls)
     known_keys(path, table, (*KEYS, *bodies, *arguments), reading.mistakes)

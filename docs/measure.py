@@ -100,11 +100,12 @@ def stiff_scenes(quick):
     scenes = {"chain of 4": stiff_peers.SCENES["chain of 4"]} if quick else stiff_peers.SCENES
     errors, lines = [f"{level:.0e}" for level in stiff_peers.LEVELS], []
     for scene, case in scenes.items():
+        begin = len(lines)
         lines += [f"**{scene}, {case.end:g} s**", "", f"| | {' | '.join(errors)} |", "|---|" + "---:|" * len(errors)]
         for name, points in stiff_peers.measure(case, LONGEST_STIFF).items():
             lines.append(f"| {name} | {' | '.join(_cell(1e3 * s, False) for s in stiff_peers.times(*points))} |")
         lines.append("")
-        print("\n".join(lines[-len(stiff_peers.CONTENDERS) - 3 :]), flush=True)
+        print("\n".join(lines[begin:]), flush=True)
     return "\n".join([*lines, f"Milliseconds to an error of positions, m; {provenance.line()}"])
 
 

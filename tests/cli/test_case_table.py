@@ -26,34 +26,41 @@ SKEW = SCENE.replace("[2, 3, 4]", "[[2, 0.5, 0], [0.5, 3, 0], [0, 0, 4]]")
 
 
 @pytest.fixture
-def found(tmp_path, monkeypatch, capsys):
-    """A function of a table, and of a scene, that gives the parameters of the ensemble."""
+def ensemble(tmp_path, monkeypatch, capsys):
+    """A function that gives what the command says with a table, a scene and options."""
     monkeypatch.chdir(tmp_path)
 
-    def run(table, scene=SCENE):
+    def run(table, scene, *options):
         (tmp_path / "scene.toml").write_text(scene)
         (tmp_path / "cases.csv").write_text(table)
-        code, _, err = called(capsys, "ensemble", "scene.toml", "--parameters", "cases.csv", "--output", "a.h5")
-        assert code == 0, err
-        return ts.load("a.h5").parameters
+        return called(capsys, "ensemble", "scene.toml", "--parameters", "cases.csv", *options)
 
     return run
 
 
 @pytest.fixture
-def refusal(tmp_path, monkeypatch, capsys):
-    """A function of a table, and of a scene, that gives the message of the refusal."""
-    monkeypatch.chdir(tmp_path)
+def found(ensemble):
+    """A function of a table, and of a scene, that gives the parameters of the ensemble."""
 
-    def run(table, scene=SCENE):
-        (tmp_path / "scene.toml").write_text(scene)
-        (tmp_path / "cases.csv").write_text(table)
-        code, out, _ = called(capsys, "ensemble", "scene.toml", "--parameters", "cases.csv", "--json")
+    def parameters(table, scene=SCENE):
+        code, _, err = ensemble(table, scene, "--output", "a.h5")
+        assert code == 0, err
+        return ts.load("a.h5").parameters
+
+    return parameters
+
+
+@pytest.fixture
+def refusal(ensemble):
+    """A function of a table, and of a scene, that gives the message of the refusal."""
+
+    def message(table, scene=SCENE):
+        code, out, _ = ensemble(table, scene, "--json")
         told = json.loads(out)
         assert (code, told["error"]) == (1, "InvalidArgument")
         return told["message"]
 
-    return run
+    return message
 
 
 def test_components_are_where_their_index_says(found):

@@ -26,17 +26,23 @@ def work(solution, trajectory, item=None):
     return np.append(0.0, np.cumsum(pieces))[np.searchsorted(edges, solution.t)]
 
 
-def _integrals(solution, trajectory, item, a, b, depth):
-    """Return the work from each a to its b, by bisection until halves agree: steps of series are long."""
-    done, size = _quadrature(solution, trajectory, item, a, b)
+def _integrals(solution, trajectory, item, a, b, depth, known=None):
+    """Return the work from each a to its b, by bisection until halves agree: steps of series are long.
+
+    known: what `_quadrature` gives for them, if it has been asked already.
+    """
+    done, size = known or _quadrature(solution, trajectory, item, a, b)
     if depth == DEEPEST or not a.size:
         return done
     middle = 0.5 * (a + b)
-    halves = sum(_quadrature(solution, trajectory, item, *ends)[0] for ends in ((a, middle), (middle, b)))
-    off = np.flatnonzero(np.abs(halves - done) > AGREE * size)
-    parts = ((a[off], middle[off]), (middle[off], b[off]))
-    halves[off] = sum(_integrals(solution, trajectory, item, *ends, depth + 1) for ends in parts)
-    return halves
+    halves = [(ends, _quadrature(solution, trajectory, item, *ends)) for ends in ((a, middle), (middle, b))]
+    found = sum(part for _, (part, _) in halves)
+    off = np.flatnonzero(np.abs(found - done) > AGREE * size)
+    found[off] = sum(
+        _integrals(solution, trajectory, item, first[off], last[off], depth + 1, (part[off], size[off]))
+        for (first, last), (part, size) in halves
+    )
+    return found
 
 
 def _quadrature(solution, trajectory, item, a, b):

@@ -93,6 +93,28 @@ def test_a_trail_goes_through_its_point(opened):
     assert reports == []
 
 
+def test_a_contact_changes_its_colour(opened):
+    scene = ts.Scene(gravity=(0, 0, -10))
+    bead = scene.add_point_mass(mass=1.0, position=(2, 0, 0))
+    scene.add(ts.constraints.PlaneContact(bead, scene.ground, normal_b=(0, 0, 1)))
+    scene.add(ts.forces.Spring(bead, scene.ground, point_b=(0, 0, 1), stiffness=20.0, free_length=0.6))
+    solution = ts.simulate(scene, (0.0, 3.0))
+    middle = float(solution.t[np.abs(solution.position(bead)[:, 0]).argmin()])
+    page, reports = opened(solution)
+    colours = []
+    for time in (0.0, middle):
+        page.evaluate(f"(tsdyn.seek({time}), draw())")
+        (contact,) = page.evaluate(
+            "contacts.map(({ mesh, place }) => [...mesh.instanceColor.array.slice(3 * place / 16, 3 * place / 16 + 3)])"
+        )
+        colours.append(contact)
+    (red, green), (red_later, green_later) = (colour[:2] for colour in colours)
+    assert red > green
+    assert green_later > red_later
+    assert "contacts: green pushes" in page.text_content("#legend")
+    assert reports == []
+
+
 def test_a_frame_of_fifty_bodies_takes_little_script(opened):
     """Instances of few meshes: as many draw calls as for two bodies."""
     from tests.helpers.hanging_chains import pendulums

@@ -1,5 +1,6 @@
 """The page of an animation: its poses and loads are those of the run, and it needs nothing from outside."""
 
+import base64
 import subprocess
 import sys
 import webbrowser
@@ -13,6 +14,7 @@ from scipy.spatial.transform import Rotation
 import tsdyn as ts
 from examples import door, four_bar
 from tests.helpers.pages import Tags, array, decoded, place
+from tsdyn.viewer.contacts import HOLDS_BACK, PUSHES
 from tsdyn.viewer.run_data import FRAMES
 
 C, S = ts.constraints, ts.shapes
@@ -113,6 +115,20 @@ def test_joints_are_drawn_where_their_points_meet():
     np.testing.assert_allclose(np.abs(axis) / np.linalg.norm(axis), (0, 1, 0), atol=SEEN)
     np.testing.assert_allclose(pin["matrix"][9:], (0, 0, 0), atol=SEEN)
     assert {arrow["layer"] for arrow in data.arrows} == {"reactions", "forces"}
+
+
+def test_contacts_show_whether_the_plane_pushes():
+    """A bead on a plane; a spring lifts it with k (1 - l0 / l) times its height, more than the weight at the ends."""
+    scene = ts.Scene(gravity=(0, 0, -10))
+    bead = scene.add_point_mass(mass=1.0, position=(2, 0, 0), name="bead")
+    scene.add(C.PlaneContact(bead, scene.ground, normal_b=(0, 0, 1), name="plane"))
+    scene.add(ts.forces.Spring(bead, scene.ground, point_b=(0, 0, 1), stiffness=20.0, free_length=0.6))
+    data = decoded(view(ts.simulate(scene, (0.0, 3.0), dense_output=True)))
+    lift = 20.0 * (1.0 - 0.6 / np.hypot(1.0, data.positions[:, 0, 0]))
+    states, clear = np.frombuffer(base64.b64decode(data.contacts["plane"]), "u1"), np.abs(lift - 10.0) > 0.3
+    np.testing.assert_array_equal(states[clear], np.where(lift < 10.0, PUSHES, HOLDS_BACK)[clear])
+    assert {*states[clear]} == {PUSHES, HOLDS_BACK}
+    assert [part["contact"] for part in data.parts if "contact" in part] == ["plane"]
 
 
 def view(solution, **options):

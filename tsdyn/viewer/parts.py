@@ -25,6 +25,7 @@ class Part(NamedTuple):
     position: Any  # (3,), m
     rotation: Any  # (3, 3)
     size: Any  # (3,), m
+    contact: str = ""  # name of the contact whose state colours the part
 
     @property
     def reach(self) -> float:
@@ -35,7 +36,8 @@ class Part(NamedTuple):
         """For the page: the columns of rotation times size, then position."""
         columns = (np.asarray(self.rotation) * np.asarray(self.size)).T
         matrix = rounded([*columns.ravel(), *self.position])
-        return {"layer": self.layer, "kind": self.kind, "body": self.body, "colour": self.colour, "matrix": matrix}
+        data = {"layer": self.layer, "kind": self.kind, "body": self.body, "colour": self.colour, "matrix": matrix}
+        return data | {"contact": self.contact} if self.contact else data
 
 
 class Link(NamedTuple):

@@ -15,6 +15,7 @@ from ..errors import InvalidArgument
 from ..shapes import Mesh
 from ..validation import sequence, vector3
 from .body_shapes import by_body, derived, drawn_solid, given
+from .contacts import contact_states
 from .frames import resample
 from .loads import UNITS, arrows, size
 from .parts import UNIT, Part, rounded
@@ -68,6 +69,7 @@ def run_data(solution: Any, shapes: Any = None, trails: Any = None) -> dict[str,
         "parts": [part.data() for part in parts if isinstance(part, Part)],
         "links": [link.data() for link in parts if not isinstance(link, Part)],
         "meshes": [{"vertices": encoded(m.vertices, "<f4"), "faces": encoded(m.faces, "<u4")} for m in meshes],
+        "contacts": {name: encoded(states, "<u1") for name, states in contact_states(frames, constraints).items()},
         **_loads(frames, constraints, forces, float(np.median(reach))),
         **_camera(packed, frames),
     }

@@ -101,6 +101,12 @@ def _plane(each, r):
     return [plate, _ball(each, 0.8 * r)]
 
 
+def _contact(each, r):
+    """A plane, and a ball that shows whether it pushes."""
+    plate, ball = _plane(each, r)
+    return [plate, ball._replace(contact=each.item.name)]
+
+
 def _line(each, r):
     """A wire on b through a ball on a."""
     return [_part(each, "b", "cylinder", each.places["axis_b"], (0.3 * r, 0.3 * r, 30.0 * r)), _ball(each, r)]
@@ -121,7 +127,7 @@ DRAWN: dict[str, Any] = {
     "Universal": _universal,
     "Fixed": _fixed,
     "Distance": _distance,
-    "PlaneContact": _plane,
+    "PlaneContact": _contact,
     "Planar": _plane,
     "PointOnLine": _line,
     "Spring": _spring,

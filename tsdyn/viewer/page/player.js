@@ -25,6 +25,9 @@ const arrows = run.arrows.map((arrow, index) => {
 });
 instantiate([...parts, ...run.links, ...arrows.flatMap((arrow) => [arrow.shaft, arrow.head])]);
 
+const contacts = parts.filter((part) => part.contact).map((part) => ({ ...part, shown: -1, states: new Uint8Array(bytes(run.contacts[part.contact])) }));
+const ofContact = ["#3f464e", "#d33a2c", "#2f9e44"].map((colour) => new THREE.Color(colour)); // open, holds back, pushes
+
 let frame = 0, playing = run.frames > 1, before = null, scriptTime = 0;
 const p = [0, 0, 0], q = [0, 0, 0], load = [0, 0, 0];
 
@@ -39,8 +42,17 @@ function drawArrow(arrow, longest) {
   stretch(arrow.head, q, tip, 2.4 * radius);
 }
 
+function drawContact(contact) {
+  const state = contact.states[Math.floor(frame)];
+  if (state === contact.shown) return;
+  contact.shown = state;
+  contact.mesh.setColorAt(contact.place / 16, ofContact[state]);
+  contact.mesh.instanceColor.needsUpdate = true;
+}
+
 function draw() {
   pose(frame);
+  contacts.forEach(drawContact);
   for (const part of parts) if (layers[part.layer].visible) follow(part);
   for (const link of run.links) stretch(link, placed(link.a, link.point_a, p), placed(link.b, link.point_b, q), link.radius);
   const longest = 0.5 * extent.radius * 2 ** field("scale").value;
@@ -86,7 +98,8 @@ function labels() {
   field("note").textContent = run.note;
   const largest = Object.entries(run.scales).filter(([, x]) => x > 0).map(([unit, x]) => `${x.toPrecision(3)} ${unit === "force" ? "N" : "N m"}`);
   field("legend").textContent = `grid ${Number(step.toPrecision(1))} m${largest.length ? `\nlongest arrows ${largest.join(", ")}` : ""}`
-    + (run.arrows.every((arrow) => arrow.unique) ? "" : "\ngrey: reactions that are not unique");
+    + (run.arrows.every((arrow) => arrow.unique) ? "" : "\ngrey: reactions that are not unique")
+    + (contacts.length ? "\ncontacts: green pushes, red holds back" : "");
   const usual = duration >= 1.5 && duration <= 60 ? 1 : Number((duration / 10).toPrecision(1)) || 1;
   for (const factor of [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10]) {
     const rate = Number((factor * usual).toPrecision(2));

@@ -144,6 +144,9 @@ def test_wrong_usage(words, code, said, folder, capsys):
     found, _, err = called(capsys, *words)
     assert found == code
     assert said in err
+    found, out, _ = called(capsys, *words, "--json")
+    assert found == code
+    assert said in json.loads(out)["message"]
     assert sorted(folder.iterdir()) == before
 
 

@@ -9,7 +9,7 @@ import numba
 import pytest
 
 import tsdyn
-from tests.helpers.processes import KERNELS, SMALL, TINY, command, finish, run
+from tests.helpers.processes import KERNELS, REPORT, SMALL, TINY, command, finish, run
 
 ROOT = Path(__file__).parents[2]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX file permissions, limits or locks")
@@ -119,6 +119,25 @@ def test_processes_starting_together_compile_once(tmp_path):
     results = [finish(process)[0] for process in [command(SMALL, environment, ROOT) for _ in range(3)]]
     assert {result["Phi"] for result in results} == {0.0}
     assert sum(result["misses"] for result in results) == KERNELS
+
+
+def test_kernels_without_readable_source_are_stored(package):
+    """Generated functions have the lines of a template in another file, which newer versions of Python don't read."""
+    (package / "generated.py").write_text(
+        "import inspect, tokenize\n"
+        "from tsdyn.jit.kernels import entry\n"
+        "def unreadable(function):\n"
+        "    raise tokenize.TokenError('EOF in multi-line string', (1, 1))\n"
+        "inspect.getsourcelines = unreadable\n"
+        "@entry\n"
+        "def half(x):\n"
+        "    return 0.5 * x\n"
+    )
+    environment = {"NUMBA_CACHE_DIR": str(package / "cache")}
+    code = REPORT + "\nfrom generated import half\nreport(value=half(3.0))\n"
+    for misses in (1, 0):
+        found, _ = run(code, environment, package)
+        assert (found["value"], found["misses"]) == (1.5, misses)
 
 
 def test_numba_settings_are_left_alone():

@@ -16,7 +16,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 def main(arguments=None):
     """Run the command line; returns the exit code (wrong arguments exit with 2, as argparse does)."""
     parser = parser_of_all()
-    parser.given = sys.argv[1:] if arguments is None else arguments
+    Parser.given = sys.argv[1:] if arguments is None else arguments
     parsed = parser.parse_args(arguments)
     parsed.parser = parser
     try:

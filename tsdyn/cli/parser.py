@@ -4,16 +4,20 @@ import argparse
 import re
 
 from ..validation import close
+from .output import print_json
 
 
 class Parser(argparse.ArgumentParser):
     """An `ArgumentParser` whose errors end with the nearest right words."""
 
-    given = ()  # arguments of the command line
+    given = ()  # arguments of the command line, of the parsers of all commands
 
     def error(self, message):
-        """Exit with code 2 after the usage, the message and what may have been meant."""
-        super().error(message + self._hint(message))
+        """Exit with code 2 after the usage, the message and what may have been meant; with --json as JSON, too."""
+        message += self._hint(message)
+        if "--json" in self.given:
+            print_json({"error": "WrongUsage", "message": message})
+        super().error(message)
 
     def _hint(self, message):
         """What may have been meant; empty if nothing is near."""

@@ -167,7 +167,8 @@ class KernelCache(_Cache):
         """Store the compiled function and let waiting processes read it."""
         try:
             if not data.lifted and not data.library.has_dynamic_globals and folder() is not None:
-                (name, kind, (code, bitcode)), *others = data._reduce()
+                plain = data._replace(type_annotation="")  # the source's text, which generated functions don't have
+                (name, kind, (code, bitcode)), *others = plain._reduce()
                 payload = dumps(((name, kind, (code, _without_bodies(bitcode))), *others))
                 _write(folder() / self._file(sig, data.codegen), payload)
                 _prune_files()

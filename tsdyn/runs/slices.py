@@ -10,6 +10,7 @@ from functools import cached_property
 
 from ..errors import InconsistentState, SingularConfiguration, Status
 from ..jit.interrupts import deferred_interrupts
+from ..observables.not_finite import not_finite
 from ..rows.interface import redundant_of
 from . import snapshot
 from .recorder import Recorder
@@ -102,9 +103,17 @@ class Slices:
         if not self.run.numbers.begun:
             singular = status in (Status.SINGULAR, Status.MASS_SINGULAR)
             kind = SingularConfiguration if singular else InconsistentState
-            raise kind(f"no step could be made from the start. {status.sentence} {status.remedy}")
+            raise kind(" ".join(filter(None, ("no step could be made from the start.", *self._why(status)))))
         self.status = status
         return seconds
+
+    def _why(self, status):
+        """What ends a run at its start: the status, forces that are not finite, the remedy."""
+        task, found = self.task, ""
+        if status is Status.NOT_FINITE:
+            slots = task.remembered[len(task.angles) :]
+            found = not_finite(task.prepared.packed, task.span[0], task.q, task.qd, slots)
+        return status.sentence, found, status.remedy
 
     def _adapt(self, rows, seconds):
         """The length of the next slice, from the time of this one."""

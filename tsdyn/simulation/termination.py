@@ -6,12 +6,14 @@ from ..configuration.rank import weakest_row
 from ..errors import Status
 from ..formulations.dependent_rows import dependent_rows
 from ..observables.evaluate import constraint_arrays
+from ..observables.not_finite import not_finite
 from ..sparse.constraint_graphs import redundant_rows
 from ..taylor.layout import without_series
 from ..validation import counted
 from .tolerances import BLOW_UP, MOST_SINGULAR, NEARLY_SINGULAR
 
 FEW = 3  # items named in a message
+AHEAD = 10.0 ** np.arange(-12, 1)  # parts of a step
 
 
 def account(solution, scene, reason, goes_on=""):
@@ -28,6 +30,8 @@ def account(solution, scene, reason, goes_on=""):
     lacking = without_series(solution.packed)[:FEW] if found else ()
     if lacking:
         remedy += f" Without a series: {'; '.join(lacking)}."
+    if not found and solution.status in (Status.NOT_FINITE, Status.STEP_COLLAPSED):
+        found = _not_finite(solution)
     if not found and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
         found = _growth(solution)
     parts = (solution.status.sentence, reason, where, found, remedy)
@@ -53,6 +57,21 @@ def _locked(solution):
     if not (still and solution._last.shape[1] == len(solution.system.segments) - redundant):
         return ""
     return "The mechanism is immobile: the constraints, some of them redundant, leave no degree of freedom."
+
+
+def _not_finite(solution):
+    """Name the forces that are not finite at the last state, or soonest ahead of it within a usual step."""
+    t, (q, qd, qdd) = solution._reached, solution._last
+    usual = (t - solution.span[0]) / max(solution.stats.steps, 1)
+    for ahead in (0.0, *usual * AHEAD):
+        with np.errstate(all="ignore"):
+            x, xd = q + ahead * qd, qd + ahead * qdd
+        if not (np.isfinite(x).all() and np.isfinite(xd).all()):
+            break
+        found = not_finite(solution.packed, t + ahead, x, xd, solution._remembered)
+        if found:
+            return found
+    return ""
 
 
 def _growth(solution):

@@ -140,6 +140,22 @@ def test_what_numba_cannot_compile_is_refused_with_the_reason():
         w.scene.evaluate()
 
 
+def test_a_function_of_the_state_that_numba_cannot_compile_is_refused_in_one_line():
+    cases = {
+        "Untyped global name 'input'": lambda t, state: input("x"),
+        "name 'missing' is not defined": lambda t, state: (missing, 0.0, 0.0),  # noqa: F821
+        "no implementation of getitem": lambda t, state: (state["x"], 0.0, 0.0),
+        "Unknown attribute 'speed'": lambda t, state: (state.speed(), 0.0, 0.0),
+    }
+    for said, law in cases.items():
+        w = World()
+        w.scene.add(F.PointForce(w.a, force=law, name="wind"))
+        with pytest.raises(ts.InvalidForce, match=rf"wind: Numba can't compile force.*Numba says: .*{said}") as caught:
+            w.scene.evaluate()
+        assert "\n" not in str(caught.value)
+        assert caught.value.__cause__ is not None
+
+
 LAW = staticmethod(lambda x, xd, par, t, out: None)
 
 

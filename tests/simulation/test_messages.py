@@ -288,3 +288,18 @@ def test_a_point_whose_square_overflows_is_refused():
     body = scene.add_body(1.0, (1, 1, 1))
     with pytest.raises(ts.InvalidConstraint, match=r"point_a must be within 1e\+150 m"):
         C.Distance(scene.ground, body, point_a=(1e308, 0, 0))
+
+
+@pytest.mark.parametrize(
+    "integrator", ["nystrom4", ts.integrators.Nystrom4, ts.integrators.Nystrom4(step=1e-3)], ids=repr
+)
+def test_tolerances_of_fixed_steps(integrator):
+    with pytest.raises(
+        ts.InvalidArgument, match=r"fixed steps and no use for rtol: .*Nystrom4\(step=.*integrator='rk45'"
+    ):
+        ts.simulate(pendulum(), (0.0, 1.0), integrator=integrator, rtol=1e-6)
+
+
+def test_tolerances_of_an_unknown_method():
+    with pytest.raises(ts.InvalidArgument, match="nystrom4"):
+        ts.simulate(pendulum(), (0.0, 1.0), integrator="nystrom", rtol=1e-6)

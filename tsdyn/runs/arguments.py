@@ -83,17 +83,24 @@ def _own(kind, rtol, atol):
 def method_of(integrator, rtol, atol):
     """The method that is given as an instance, a class or a name; tolerances are for a name."""
     known = registered()
+    named = isinstance(integrator, str)
+    if named and _key(integrator) not in known:
+        raise unknown_name("integrator", integrator, known)
+    kind = known[_key(integrator)] if named else integrator if isinstance(integrator, type) else type(integrator)
+    adapts = getattr(kind, "embedded_order", 0) > 0
     given = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
-    adapts = isinstance(integrator, str) and getattr(known.get(_key(integrator)), "embedded_order", 0) > 0
-    if given and not adapts:
+    if given and not adapts and kind in known.values():
+        raise InvalidArgument(
+            f"{kind.__name__} has fixed steps and no use for {' and '.join(given)}: give "
+            f"integrator=ts.integrators.{kind.__name__}(step=...) alone, or an adaptive method, such as "
+            "integrator='rk45'."
+        )
+    if given and not named:
         raise InvalidArgument(
             f"{' and '.join(given)} set the tolerances of an adaptive method given by its name, such as "
             f"integrator='rk45', not of {integrator!r}; give an instance its own, such as RK45(rtol=1e-8)."
         )
-    if isinstance(integrator, str):
-        if _key(integrator) not in known:
-            raise unknown_name("integrator", integrator, known)
-        kind = known[_key(integrator)]
+    if named:
         return adaptive(kind, rtol, atol) if adapts else kind()
     if isinstance(integrator, type) and integrator in known.values():
         return integrator()

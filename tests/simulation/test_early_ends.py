@@ -137,8 +137,10 @@ def test_interrupt_with_t_eval():
 
 @pytest.mark.parametrize("error", [ZeroDivisionError("oops"), RuntimeError("window closed"), StopIteration()], ids=repr)
 def test_progress_that_raises(error):
-    """Hours of computing are not lost to a progress bar: the solution so far comes back, and says who stopped it."""
-    solution = run(pendulum(), 20.0, 1e-3, progress=Interrupt(error, 2))
+    """Hours of computing are not lost to a progress bar: the solution so far comes back, a warning shows the error."""
+    with pytest.warns(RuntimeWarning, match=f"progress raised {type(error).__name__}") as shown:
+        solution = run(pendulum(), 20.0, 1e-3, progress=Interrupt(error, 2))
+    assert "raise self.error" in str(shown[0].message)  # the traceback, to the line
     check_every_step(check_partial(solution, {Status.INTERRUPTED}))
     assert type(error).__name__ in solution.message
     assert str(error) in solution.message

@@ -6,6 +6,8 @@ last one took.
 """
 
 import time
+import traceback
+import warnings
 from functools import cached_property
 
 from ..errors import InconsistentState, SingularConfiguration, Status
@@ -134,6 +136,7 @@ class Slices:
             if self.status is SLICE_DONE:
                 self.status = Status.INTERRUPTED
                 self.reason = f"progress raised {type(error).__name__}: {error}."
+                _warn_of(error, t)
         if self.status is not SLICE_DONE:
             return
         if task.max_steps is None and run.numbers.adaptive:
@@ -168,6 +171,17 @@ class Slices:
         self.memory.restore(numbers["memory"])
         if self.watch is not None:
             self.watch.restore(numbers["watch"], arrays)
+
+
+def _warn_of(error, t):
+    """Show an exception of a user's `progress` with its traceback: nobody reads the message of a solution unasked."""
+    told = "".join(traceback.format_exception(error)).rstrip()
+    warnings.warn(
+        f"progress raised {type(error).__name__}, which ends the run at t = {t:.9g} s; the solution so far is "
+        f"returned.\n{told}",
+        RuntimeWarning,
+        stacklevel=2,
+    )
 
 
 def drive(memory, task, watch):

@@ -112,7 +112,8 @@ def simulate(  # many arguments, by name: each is an option of a run
     checkpoint : float, s, optional
         With a store: write a state at least so often, in real time, from which `resume(store)` goes on to the bit.
     progress : bool or callable, optional
-        True shows a bar (needs tqdm); a callable receives the fraction done, 0 to 1.
+        True shows a bar (needs tqdm); a callable receives the fraction done, 0 to 1. An exception that it raises ends
+        the run with a RuntimeWarning that shows its traceback; the solution so far is returned.
     chart_interval : int, optional
         Number of steps after which a new chart is made regardless of the criteria; for experiments.
     state : State, optional

@@ -122,11 +122,44 @@ def test_a_run_in_a_store(tmp_path):
     stored = ts.simulate(top.build(), (0.0, 1.0), integrator="dop853", store=tmp_path / "store.h5")
     loaded = ts.load(stored.save(tmp_path / "run.h5"))
     np.testing.assert_array_equal(loaded.q, stored.q)
-    with pytest.raises(ts.StorageError, match=r"store of a run\. ts\.resume"):
+    with pytest.raises(ts.StorageError, match=r"store of a run and has no checkpoint.*xarray.*checkpoint=60"):
         ts.load(tmp_path / "store.h5")
     with pytest.raises(ts.StorageError, match="no saved solution"):
         stored.save(tmp_path / "store.h5")
     np.testing.assert_array_equal(loaded.q, stored.q)
+
+
+@pytest.mark.parametrize("name", ["run.h5", "run.zarr"])
+def test_the_store_of_a_run_that_has_ended_is_loaded(tmp_path, name):
+    path = tmp_path / name
+    stored = ts.simulate(top.build(), (0.0, 1.0), integrator="dop853", store=path, checkpoint=60.0)
+    loaded = ts.load(path)
+    assert loaded.reached == 1.0
+    np.testing.assert_array_equal(loaded.q, stored.q)
+
+
+def test_the_store_of_a_run_with_events_names_the_call(tmp_path):
+    def height(t, state):
+        return state.q[2] - 5.0
+
+    path = tmp_path / "run.h5"
+    ts.simulate(top.build(), (0.0, 1.0), integrator="dop853", events=height, store=path, checkpoint=60.0)
+    with pytest.raises(ts.StorageError, match=r"has events\. ts\.resume\(.*run\.h5', events=events\) returns"):
+        ts.load(path)
+
+
+def test_the_store_of_a_run_that_has_not_ended_names_the_call(tmp_path):
+    path = tmp_path / "run.h5"
+
+    def stop(fraction):
+        if (tmp_path / "run.h5.checkpoint").exists():
+            raise KeyboardInterrupt
+
+    ts.simulate(
+        top.build(), (0.0, 100.0), integrator=ts.integrators.Nystrom4(1e-3), store=path, checkpoint=0.0, progress=stop
+    )
+    with pytest.raises(ts.StorageError, match=r"run that has not ended.*ts\.resume\("):
+        ts.load(path)
 
 
 def test_scenes_with_functions_are_passed_again(tmp_path):

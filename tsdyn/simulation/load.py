@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..calls import fitting
 from ..errors import InvalidArgument, StorageError
+from .resume import ended_run
 from .scene import Scene
 from .simulate import simulate
 from .solution import Solution
@@ -31,7 +32,8 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, f
     ----------
     path : str or PathLike
         A scene file (.toml); a URDF, MJCF or SDF file (.urdf, .xml, .mjcf, .sdf, .world); or a solution or ensemble
-        (.h5, .hdf5, .nc, .zarr) that its method `save` has written.
+        (.h5, .hdf5, .nc, .zarr) that its method `save` has written, or the store of a run with checkpoints that has
+        ended.
     scene : Scene, optional
         That of a solution or ensemble whose file holds none, because the scene has functions or classes of your own.
     allow_code : bool
@@ -83,7 +85,7 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, f
     if suffix == ".xacro":
         raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
     from ..storage.formats import SUFFIXES
-    from ..storage.saved_file import kind_of
+    from ..storage.saved_file import is_store, kind_of
     from .saved_solutions import load as load_solution
 
     if suffix not in SUFFIXES:
@@ -91,6 +93,8 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, f
     loader = LOADERS.get(kind_of(Path(path)))
     if loader is not None:
         return loader(path, scene, allow_code)
+    if is_store(Path(path)):
+        return ended_run(path, scene)
     return load_solution(path, scene, allow_code, (Scene, Solution))
 
 

@@ -80,3 +80,28 @@ def resume(
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     given |= {"scene": scene, "events": events, "progress": progress, "store": path}
     return run_from(given | {"checkpoint": numbers["interval"]}, numbers, arrays)
+
+
+def ended_run(path: Place, scene: Scene | None) -> Solution:
+    """Return the solution of a store whose run has ended; raises StorageError that names the call for any other."""
+    from ..storage import checkpoint
+
+    if not any(place.exists() for place in checkpoint.place(path)):
+        raise StorageError(
+            f"{path} is the store of a run and has no checkpoint: it holds outputs, not what a solution needs beside "
+            "them. Read the outputs by xarray (xarray.open_zarr, or xarray.open_dataset with engine='h5netcdf'), or "
+            "run again with checkpoint=60.0; solution.save(path) writes a solution as a whole."
+        )
+    numbers, _ = checkpoint.read(path)
+    if numbers.get("ended") and not numbers["events"]:
+        return resume(path, scene)
+    passed = "".join(
+        f", {name}={name}"
+        for name, needed in (("scene", numbers["functions"]), ("events", numbers["events"]))
+        if needed
+    )
+    done = "has events" if numbers.get("ended") else f"has not ended: its checkpoint is of t = {numbers['t']:.9g} s"
+    raise StorageError(
+        f"{path} is the store of a run that {done}. ts.resume({str(path)!r}{passed}) returns its solution"
+        f"{'' if numbers.get('ended') else ', once it has gone on to the end'}."
+    )

@@ -133,6 +133,15 @@ def kind_of(path):
         return ""
 
 
+def is_store(path):
+    """Whether a path is that of what `simulate(store=...)` writes."""
+    try:
+        known = format_at(path).attributes(path) if path.exists() else {}
+    except StorageError:
+        return False
+    return "format" not in known and str(known.get("source", "")).startswith("tsdyn")
+
+
 def read(path, kind=FORMAT):
     """The record and the arrays of a file, all its content checked; the columns of its tables are read when asked for.
 
@@ -146,7 +155,9 @@ def read(path, kind=FORMAT):
         raise StorageError(f"there is no file {path}.")
     attributes = form.attributes(path)
     if attributes.get("format") != kind:
-        raise StorageError(f"{path} is no saved {kind.rpartition(' ')[2]}{_hint(attributes, path)}.")
+        raise StorageError(
+            f"{path} is no saved {kind.rpartition(' ')[2]} of tsdyn: it has no attribute 'format' that says so."
+        )
     if attributes.get("format_version") != VERSION:
         raise StorageError(
             f"{path} has the format {kind} {attributes.get('format_version')}, and this tsdyn reads {VERSION}: "
@@ -163,13 +174,6 @@ def read(path, kind=FORMAT):
     if wrong:
         raise StorageError(f"{path} is damaged: {', '.join(wrong[:5])} has another checksum than when it was written.")
     return record, arrays
-
-
-def _hint(attributes, path):
-    """What else a file is."""
-    if str(attributes.get("source", "")).startswith("tsdyn"):
-        return f": it is the store of a run. ts.resume({str(path)!r}) returns its solution, if it has checkpoints"
-    return " of tsdyn: it has no attribute 'format' that says so"
 
 
 def _sum_of(form, path, column):

@@ -1,6 +1,7 @@
 """Runs that end early: `max_steps`, interrupts, bodies without inertia; what they hand back, and going on from it."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -144,6 +145,12 @@ def test_progress_that_raises(error):
     check_every_step(check_partial(solution, {Status.INTERRUPTED}))
     assert type(error).__name__ in solution.message
     assert str(error) in solution.message
+
+
+def test_progress_that_raises_where_warnings_are_errors():
+    with warnings.catch_warnings(action="error"):
+        solution = run(pendulum(), 20.0, 1e-3, progress=Interrupt(RuntimeError("window closed"), 2))
+    assert "window closed" in check_partial(solution, {Status.INTERRUPTED}).message
 
 
 def test_progress_reaches_the_end():

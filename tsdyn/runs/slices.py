@@ -8,6 +8,7 @@ last one took.
 import time
 import traceback
 import warnings
+from contextlib import suppress
 from functools import cached_property
 
 from ..errors import InconsistentState, SingularConfiguration, Status
@@ -176,12 +177,13 @@ class Slices:
 def _warn_of(error, t):
     """Show an exception of a user's `progress` with its traceback: nobody reads the message of a solution unasked."""
     told = "".join(traceback.format_exception(error)).rstrip()
-    warnings.warn(
-        f"progress raised {type(error).__name__}, which ends the run at t = {t:.9g} s; the solution so far is "
-        f"returned.\n{told}",
-        RuntimeWarning,
-        stacklevel=2,
-    )
+    with suppress(RuntimeWarning):  # nor is the solution lost where warnings are errors
+        warnings.warn(
+            f"progress raised {type(error).__name__}, which ends the run at t = {t:.9g} s; the solution so far is "
+            f"returned.\n{told}",
+            RuntimeWarning,
+            stacklevel=2,
+        )
 
 
 def drive(memory, task, watch):

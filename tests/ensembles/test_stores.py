@@ -8,8 +8,10 @@ import pytest
 
 import tsdyn as ts
 from examples import top
+from tsdyn.ensembles.tolerances import CHUNK_SECONDS
 
 SPAN, MASSES = (0.0, 0.02), np.linspace(20.0, 40.0, 12)
+SLOW = CHUNK_SECONDS / 3.0
 TABLE = {"top.mass": MASSES, "top.velocity": np.linspace((0, 0, 0), (1, 1, 0), 12)}
 
 
@@ -65,7 +67,7 @@ def test_a_study_goes_on_where_it_was_stopped(suffix, tmp_path):
         if solution.scene.bodies[0].mass > 39.0:
             raise ValueError("too heavy")
         seen.append(0)
-        time.sleep(0.05 * (len(seen) > 5))  # the interruption comes within 0.1 s
+        time.sleep(SLOW)  # so that few cases are a chunk
         return {"height": solution.state.q[2], "last": solution.state.q}
 
     options = {"keep": keep, "threads": 1, "store": path}

@@ -125,10 +125,21 @@ def test_contacts_show_whether_the_plane_pushes():
     scene.add(ts.forces.Spring(bead, scene.ground, point_b=(0, 0, 1), stiffness=20.0, free_length=0.6))
     data = decoded(view(ts.simulate(scene, (0.0, 3.0), dense_output=True)))
     lift = 20.0 * (1.0 - 0.6 / np.hypot(1.0, data.positions[:, 0, 0]))
-    states, clear = np.frombuffer(base64.b64decode(data.contacts["plane"]), "u1"), np.abs(lift - 10.0) > 0.3
+    states, clear = np.frombuffer(base64.b64decode(data.contacts[0]), "u1"), np.abs(lift - 10.0) > 0.3
     np.testing.assert_array_equal(states[clear], np.where(lift < 10.0, PUSHES, HOLDS_BACK)[clear])
     assert {*states[clear]} == {PUSHES, HOLDS_BACK}
-    assert [part["contact"] for part in data.parts if "contact" in part] == ["plane"]
+    assert [part["body"] for part in data.parts if "contact" in part] == [0]
+
+
+def test_contacts_of_the_same_bodies_are_told_apart():
+    scene = ts.Scene(gravity=(0, 0, -10))
+    bead = scene.add_point_mass(mass=1.0, name="bead")
+    for normal in ((0, 0, 1), (0, 1, 0)):
+        scene.add(C.PlaneContact(bead, scene.ground, normal_b=normal))
+    scene.add(ts.forces.PointForce(bead, force=(0, 5, 0)))
+    data = decoded(view(ts.simulate(scene, (0.0, 0.1))))
+    states = [{*base64.b64decode(each)} for each in data.contacts]
+    assert states == [{PUSHES}, {HOLDS_BACK}]
 
 
 def view(solution, **options):

@@ -14,10 +14,9 @@ OPEN, HOLDS_BACK, PUSHES = 0, 1, 2  # as the page colours them
 NONE = 1e-6  # of the largest force of the contact: below it there is none
 
 
-def contact_states(frames: Frames, constraints: list[Attached]) -> dict[str, Any]:
-    """The state of each PlaneContact at each frame (k,), by name."""
-    contacts = [each.item for each in constraints if isinstance(each.item, PlaneContact)]
-    return {item.name: _states(frames, item) for item in contacts}
+def contact_states(frames: Frames, constraints: list[Attached]) -> list[Any]:
+    """The states (k,) of each PlaneContact at the frames."""
+    return [_states(frames, each.item) for each in constraints if isinstance(each.item, PlaneContact)]
 
 
 def _states(frames, item):

@@ -25,7 +25,7 @@ class Part(NamedTuple):
     position: Any  # (3,), m
     rotation: Any  # (3, 3)
     size: Any  # (3,), m
-    contact: str = ""  # name of the contact whose state colours the part
+    contact: bool = False  # whether the state of a contact colours it
 
     @property
     def reach(self) -> float:
@@ -37,7 +37,7 @@ class Part(NamedTuple):
         columns = (np.asarray(self.rotation) * np.asarray(self.size)).T
         matrix = rounded([*columns.ravel(), *self.position])
         data = {"layer": self.layer, "kind": self.kind, "body": self.body, "colour": self.colour, "matrix": matrix}
-        return data | {"contact": self.contact} if self.contact else data
+        return data | {"contact": True} if self.contact else data
 
 
 class Link(NamedTuple):

@@ -69,7 +69,7 @@ def run_data(solution: Any, shapes: Any = None, trails: Any = None) -> dict[str,
         "parts": [part.data() for part in parts if isinstance(part, Part)],
         "links": [link.data() for link in parts if not isinstance(link, Part)],
         "meshes": [{"vertices": encoded(m.vertices, "<f4"), "faces": encoded(m.faces, "<u4")} for m in meshes],
-        "contacts": {name: encoded(states, "<u1") for name, states in contact_states(frames, constraints).items()},
+        "contacts": [encoded(states, "<u1") for states in contact_states(frames, constraints)],  # of such parts in turn
         **_loads(frames, constraints, forces, float(np.median(reach))),
         **_camera(packed, frames),
     }

@@ -104,7 +104,7 @@ def _plane(each, r):
 def _contact(each, r):
     """A plane, and a ball that shows whether it pushes."""
     plate, ball = _plane(each, r)
-    return [plate, ball._replace(contact=each.item.name)]
+    return [plate, ball._replace(contact=True)]
 
 
 def _line(each, r):

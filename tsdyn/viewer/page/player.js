@@ -25,7 +25,7 @@ const arrows = run.arrows.map((arrow, index) => {
 });
 instantiate([...parts, ...run.links, ...arrows.flatMap((arrow) => [arrow.shaft, arrow.head])]);
 
-const contacts = parts.filter((part) => part.contact).map((part) => ({ ...part, shown: -1, states: new Uint8Array(bytes(run.contacts[part.contact])) }));
+const contacts = parts.filter((part) => part.contact).map((part, i) => ({ ...part, shown: -1, states: new Uint8Array(bytes(run.contacts[i])) }));
 const ofContact = ["#3f464e", "#d33a2c", "#2f9e44"].map((colour) => new THREE.Color(colour)); // open, holds back, pushes
 
 let frame = 0, playing = run.frames > 1, before = null, scriptTime = 0;

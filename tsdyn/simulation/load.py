@@ -85,16 +85,16 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, f
     if suffix == ".xacro":
         raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
     from ..storage.formats import SUFFIXES
-    from ..storage.saved_file import is_store, kind_of
+    from ..storage.saved_file import STORE, kind_of
     from .saved_solutions import load as load_solution
 
     if suffix not in SUFFIXES:
         raise InvalidArgument(f"load reads files that end in {READS}, got {str(path)!r}.")
-    loader = LOADERS.get(kind_of(Path(path)))
-    if loader is not None:
-        return loader(path, scene, allow_code)
-    if is_store(Path(path)):
+    kind = kind_of(Path(path))
+    if kind == STORE:
         return ended_run(path, scene)
+    if kind in LOADERS:
+        return LOADERS[kind](path, scene, allow_code)
     return load_solution(path, scene, allow_code, (Scene, Solution))
 
 

@@ -18,6 +18,7 @@ from .formats import SUFFIXES, format_of
 from .write_errors import unwritable, writing
 
 FORMAT, VERSION = "tsdyn solution", 1
+STORE = "store"  # what `simulate(store=...)` writes, which names no format
 GROUP, RECORD = "run", "record"
 ROWS = 1 << 14  # at a time
 
@@ -126,20 +127,13 @@ def _sums(arrays):
 
 
 def kind_of(path):
-    """What is saved at a path, by the name of its format; "" if it doesn't say, or can't be read."""
-    try:
-        return str(format_at(path).attributes(path).get("format", "")) if path.exists() else ""
-    except StorageError:
-        return ""
-
-
-def is_store(path):
-    """Whether a path is that of what `simulate(store=...)` writes."""
+    """What is saved at a path, by the name of its format; STORE, or "" if it doesn't say, or can't be read."""
     try:
         known = format_at(path).attributes(path) if path.exists() else {}
     except StorageError:
-        return False
-    return "format" not in known and str(known.get("source", "")).startswith("tsdyn")
+        return ""
+    unsaid = STORE if str(known.get("source", "")).startswith("tsdyn") else ""
+    return str(known.get("format", unsaid))
 
 
 def read(path, kind=FORMAT):

@@ -163,7 +163,7 @@ def test_the_motion_is_that_of_the_null_space_form(make, end):
 @pytest.mark.slow_but("SDIRK54")
 @pytest.mark.parametrize("method", [SDIRK54, ImplicitTrapezoid], **by_name)
 def test_iterations_and_memory_of_a_stiff_chain(method):
-    """Three corrections a stage and less, few matrices, and memory in proportion to the number of bodies.
+    """In a transient hardly more than one correction a stage, few matrices, and memory in proportion to the bodies.
 
     Factors of S are made at the ends of steps, those of N there, too, and with iteration matrices.
     """
@@ -172,9 +172,9 @@ def test_iterations_and_memory_of_a_stiff_chain(method):
         scene = chain(links)
         stats = ts.simulate(scene, (0.0, 0.1), integrator=method(1e-4, 1e-4)).raise_if_failed().stats
         tried = stats.steps + stats.rejected
-        assert stats.stage_iterations <= 3 * (len(method.tableau.c) - 1) * tried
-        assert stats.iteration_matrices < 0.6 * tried
-        assert stats.factorizations < 3 * tried
+        assert stats.stage_iterations <= 1.2 * (len(method.tableau.c) - 1) * tried
+        assert stats.iteration_matrices < 0.7 * tried
+        assert stats.factorizations - stats.iteration_matrices < 3 * tried
         assert stats.jacobians == 1
         sizes.append(max(memory.nbytes for spare in scene._prepared._spare.values() for memory in spare))
     assert sizes[1] < 2.1 * sizes[0]
@@ -204,3 +204,13 @@ def test_the_default_method_turns_to_implicit_stages_in_large_scenes():
     solution = ts.simulate(chain(110), (0.0, 0.05), rtol=1e-3, atol=1e-3, t_eval=(0.0, 0.05)).raise_if_failed()
     assert solution.method.startswith("SDIRK54")
     assert solution.formulation == "tangent"
+
+
+@pytest.mark.slow_but("SDIRK54")
+@pytest.mark.parametrize("method", [SDIRK54, ImplicitTrapezoid], **by_name)
+def test_matrices_of_a_smooth_stretch(method):
+    """One matrix serves several steps where their length hardly changes."""
+    scene = chain(8)
+    start = ts.simulate(scene, (0.0, 0.4), integrator=method(1e-4, 1e-4)).raise_if_failed().state
+    stats = ts.simulate(scene, (0.4, 1.0), state=start, integrator=method(1e-4, 1e-4)).raise_if_failed().stats
+    assert stats.iteration_matrices < 0.5 * stats.steps

@@ -8,7 +8,8 @@ Stage i of (v, vd)' = (vd, f) has the unknown k_i = vdd there:
 P is kept over iterations, stages and steps. On poor measured contraction it is rebuilt, first from the same stiffness
 and damping at the current configuration, then from new ones.
 
-The memory of a step, n = k floats each:  known part of v_i, of vd_i;  (vd, k) of each stage;  then scratch, below.
+The memory of a step, n = k floats each:  known part of v_i, of vd_i;  (vd, k) of each stage;  then scratch, below, and
+what predictions of stages keep.
 """
 
 import math
@@ -19,7 +20,9 @@ from ..maths.dense_linalg import copy
 from ..workspaces.run_state import load_run
 from ..workspaces.workspace import load
 from .explicit import ERROR, STEP, call_accelerate, call_norm, call_place, combine
+from .stage_prediction import begin_prediction, choose_points, extrapolated, predict, prediction_memory
 from .tolerances import (
+    AGEING,
     APART,
     AT_FLOOR,
     DIVERGING,
@@ -28,14 +31,17 @@ from .tolerances import (
     EAGER_STAGES,
     FIXED_ITERATIONS,
     FIXED_TOL,
+    FORGET,
     GUESS,
     ITERATIONS,
     KAPPA,
     KAPPA_SPARSE,
     LEAST,
+    LEAST_FIXED,
     MATRICES,
     RESIDUAL_FLOOR,
     SAME_G,
+    SAME_G_SPARSE,
     SLOW,
     SLOW_SPARSE,
     TOO_FAR,
@@ -58,7 +64,7 @@ call_correct = caller("pdp", "d")
 
 def memory_of(stages, n):
     """Floats of memory that `implicit_step` needs."""
-    return (stages + 1) * 2 * n + SCRATCH * n + 1
+    return (stages + 1) * 2 * n + SCRATCH * n + 1 + prediction_memory(stages, n)
 
 
 @kernel
@@ -140,6 +146,28 @@ def _is_near(context, c, g, k, guess, f, dx):
 
 
 @kernel
+def _expected(numbers, size, adaptive):
+    """What a first correction of that size is expected to leave: as last measured, and of a larger one the square."""
+    share = max(1.0, size / numbers.first)
+    return max(numbers.left * share * share, (LEAST if adaptive else LEAST_FIXED) * size)
+
+
+@kernel
+def _learn(numbers, first, second, renewed):
+    """Remember what a first correction has left, the size of the second; or, without one, how long ago one was made.
+
+    A new matrix says little of what it leaves in the stages to come.
+    """
+    if renewed:
+        numbers.left = math.inf
+    elif second < math.inf:
+        numbers.left = max(second, FORGET * numbers.left if numbers.left < math.inf else 0.0)
+        numbers.first = first
+    else:
+        numbers.left *= AGEING
+
+
+@kernel
 def _solve_stage(context, c, r, i, t, g):
     """Solve stage i at time t: k_i, predicted on entry, and v_i, vd_i. Status."""
     w, l, n, scratch = c.work, c.linear, r.x.size, r.memory[_scratch_at(r) :]
@@ -148,7 +176,7 @@ def _solve_stage(context, c, r, i, t, g):
     guess = scratch[H_BEFORE * n + 1 :][:n]
     copy(k, guess)
     floor = RESIDUAL_FLOOR / (l.numbers.rtol + l.numbers.atol)
-    before, theta, measured = math.inf, l.numbers.theta, False
+    before, theta, measured, trusted, first, second = math.inf, GUESS, False, True, 0.0, math.inf
     slow, apart, stuck, renewed = 0, 0, False, False
     eager, sparse = l.numbers.eager > 0, l.numbers.every_chart == 1
     # what stages of fixed steps leave adds up over thousands of steps
@@ -162,9 +190,9 @@ def _solve_stage(context, c, r, i, t, g):
         w.counters.stage_iterations += 1
         off_chart = not sparse and l.numbers.chart != w.counters.charts
         slow_now = measured and theta > max(limit, l.numbers.slow)
-        stale = eager or off_chart or abs(g - l.numbers.g) > SAME_G * g
+        stale = eager or off_chart or abs(g - l.numbers.g) > (SAME_G_SPARSE if sparse else SAME_G) * g
         here = eager or slow_now or not sparse or l.numbers.g == 0.0 or l.numbers.known == 0
-        eager = False
+        was_eager, eager = eager, False
         if stale or slow_now:
             if not stale:
                 if slow == 0 and not renewed:
@@ -173,11 +201,14 @@ def _solve_stage(context, c, r, i, t, g):
             renewed = True
             if _renew_matrix(context, c, t, g, f, slow == MATRICES, here) != 0:
                 return STAGE_FAILED
-            before, theta, measured = math.inf, GUESS, False
+            before, theta, measured, second = math.inf, GUESS, False, math.inf
+            trusted = trusted and not (was_eager or slow_now or off_chart)
         size = _correct(context, c, g, k, f, dx)
         if not size < math.inf:
             return STAGE_FAILED
         if before < math.inf:
+            if not measured:
+                first, second = before, size
             theta, measured = size / before, True
             if sparse and slow == MATRICES and l.numbers.slow == 0.0:  # no other matrix contracts better
                 l.numbers.slow = min(WORSE * theta, DIVERGING)
@@ -185,8 +216,11 @@ def _solve_stage(context, c, r, i, t, g):
             apart += 1 if renewed and theta > DIVERGING else 0
             if apart == APART:
                 return STAGE_FAILED
-        if size <= floor or stuck or (theta < 1.0 and size * theta <= kappa * (1.0 - theta)):
-            l.numbers.theta = min(max(theta, LEAST), GUESS)
+        left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
+        if trusted and not measured:
+            left = min(left, _expected(l.numbers, size, r.numbers.adaptive == 1))
+        if size <= floor or stuck or left <= kappa:
+            _learn(l.numbers, first, second, renewed)
             _set_stage(g, k, known, xs, ys)
             return 0 if _is_near(context, c, g, k, guess, f, dx) else STAGE_FAILED
         before = size
@@ -210,29 +244,30 @@ def implicit_step(context, run, t, h):
     n, tableau, memory, scratch = r.x.size, r.tableau, r.memory, r.memory[_scratch_at(r) :]
     stages = int(tableau[0])
     width = 2 + stages
-    predictor = tableau[1 + stages * width + stages + stages + 1 :]
     x, y, k_before = memory[:n], memory[n : 2 * n], scratch[K_BEFORE * n :]
     h_before = _see_step_before(context, c.linear, t, n, scratch)
+    own = scratch[SCRATCH * n + 1 :]
+    ratio = begin_prediction(memory, own, stages, n, t, h, float(c.work.counters.charts))
     copy(r.y, memory[2 * n : 3 * n])
     copy(r.yd, memory[3 * n : 4 * n])
     for i in range(1, stages):
         row = tableau[1 + i * width :]
         k = memory[(1 + i) * 2 * n + n :][:n]
-        # the prediction of k_i from earlier stages, then the known parts of v_i and vd_i
-        combine(predictor[i * stages :], i, 1.0, 2 * n, memory, memory)
-        copy(y, k)
+        # the prediction of k_i, then the known parts of v_i and vd_i
+        predict(tableau, memory, own, i, ratio, extrapolated(own, i), k)
         combine(row[2:], i, h, 2 * n, memory, memory)
         for j in range(n):
             x[j] += r.x[j]
             y[j] += r.y[j]
-        if i == 1 and h_before > 0.0:  # along the line through the step before
-            ratio = row[1] * h / h_before
+        if i == 1 and ratio == 0.0 and h_before > 0.0:  # along the line through the step before
             for j in range(n):
-                k[j] += ratio * (r.yd[j] - k_before[j])
+                k[j] += row[1] * h / h_before * (r.yd[j] - k_before[j])
         status = _solve_stage(context, c, r, i, t + h * row[1], h * row[2 + i])
         if status != 0:
             c.linear.numbers.rates_of = 0
             return status
+        if i == 1 and ratio > 0.0:
+            choose_points(tableau, memory, own, ratio, scratch[:n])
     combine(tableau[1 + stages * width :], stages, h, 2 * n, memory, memory)
     copy(x, r.dx)
     copy(y, r.dy)
@@ -263,6 +298,6 @@ def prepare_implicit(linear, method, addresses, every_chart):
     numbers = linear.numbers
     numbers.every_chart = int(every_chart)
     numbers.rtol, numbers.atol = (FIXED_TOL, FIXED_TOL) if method.step else method.step_tolerances()
-    numbers.theta, numbers.t_before = GUESS, -math.inf
+    numbers.left, numbers.first, numbers.t_before = math.inf, 1.0, -math.inf
     for name, address in addresses.items():
         setattr(linear.kernels, name, address)

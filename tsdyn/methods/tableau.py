@@ -136,23 +136,13 @@ class ImplicitTableau:
         a = _lower(self.a, len(self.c), "ImplicitTableau")
         return a, a[-1], np.array(self.c)
 
-    def predictor(self, points: int = 4) -> Floats:
-        """First guess of stage i from the stages before, (s, s): extrapolation through the nearest of them in time."""
-        c = np.array(self.c)
-        weights = np.zeros((len(c), len(c)))
-        for i in range(1, len(c)):
-            near = sorted(range(i), key=lambda j: abs(c[j] - c[i]))[:points]
-            for j in near:
-                weights[i, j] = np.prod([(c[i] - c[k]) / (c[j] - c[k]) for k in near if k != j])
-        return weights
-
     @cached_property
     def numbers(self) -> Floats:
-        """As `RungeKuttaTableau.numbers`, followed by the predictor."""
+        """As `RungeKuttaTableau.numbers`."""
         a, b, c = self.arrays
         stages = [[0.0, c[i], *a[i]] for i in range(len(c))]
         error = [*(self.error or np.zeros(len(c))), 0.0]
-        return np.concatenate([[len(c)], np.ravel(stages), b, error, self.predictor().ravel()])
+        return np.concatenate([[len(c)], np.ravel(stages), b, error])
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,17 @@ KAPPA, KAPPA_SPARSE = 1e-3, 3e-3
 # take a fifth more iterations in stiff chains and joints than with SLOW.
 SLOW, SLOW_SPARSE = 0.1, 0.25
 
-# Contraction assumed where none has been measured, and the least that one measurement is trusted with: a stage that
-# converges by chance at once says nothing of the next one.
-GUESS, LEAST = 0.3, 0.02
+# Contraction assumed where none has been measured, and the least that a measurement is trusted with: with fixed steps
+# what stages leave adds up over thousands of them.
+GUESS, LEAST, LEAST_FIXED = 0.3, 1e-6, 0.02
+
+# Part of the contraction known that a new measurement can fall to: a stage that converges by chance says nothing of the
+# next one. And how fast a contraction is forgotten from stage to stage, until it is measured again.
+FORGET, AGEING = 0.1, 1.3
+
+# Stages of which a prediction is made: least distance in time, over the longer of two steps; and of two times that are
+# the same, over the step.
+APART_AT_LEAST, SAME_TIME = 0.1, 1e-9
 
 # Contraction above which an iteration counts as diverging.
 DIVERGING = 0.9
@@ -42,9 +50,11 @@ WORSE = 2.0
 # one stage, but one step where iterations diverged: matrices of overdamped springs that turn serve one stage only.
 EAGER_STAGES, EAGER_SPARSE, EAGER_LOST = 30, 1, 6
 
-# Relative change of g = h a_ii up to which the factors of P are tried again: a damped stiff mode then contracts by
-# |1 - g / g_P| < 0.43. Measured contraction decides whether they are kept.
-SAME_G = 0.3
+# Relative change of g = h a_ii up to which the factors of P are tried again. A damped stiff mode contracts by
+# |1 - g / g_P|: below 0.43 with SAME_G, and measured contraction decides. In the tangent form factors cost less than
+# three iterations; with SAME_G_SPARSE the first correction of a stage is nearly always good enough: chains take half
+# the iterations that they take with 0.3. With 0.1 or 0.005 they take 10 or 2 % more.
+SAME_G, SAME_G_SPARSE = 0.3, 0.02
 
 # Correction, relative to 1 + size, that is rounding of v and vd: 18 units in the last place of f evaluated by a
 # factorised matrix. Residuals within AT_FLOOR of it that no longer contract are rounding, too.

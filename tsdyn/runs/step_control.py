@@ -21,6 +21,8 @@ from .tolerances import (
     PI_ERROR,
     ROUNDING_STRETCH,
     SAFETY,
+    SAME_FROM,
+    SAME_TO,
     SECOND_ESTIMATE,
     SHORTEST,
     SHRINK,
@@ -112,6 +114,8 @@ def accept(context, l, r, h):
     error = max(error, LEAST_ERROR)
     factor = SAFETY * error ** (-PI_ERROR * power) * r.clock.error_before ** (PI_BEFORE * power)
     factor = min(max(factor, SHRINK), 1.0 if r.numbers.rejected_last != 0 else GROW)
+    if l.numbers.g > 0.0 and SAME_FROM <= factor <= SAME_TO:
+        factor = 1.0
     r.clock.error_before = max(error, LEAST_BEFORE)
     r.clock.h = min(h * factor, r.clock.max_step)
     r.numbers.rejected_last = 0

@@ -31,6 +31,11 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 # Exponents of the PI control, times 1 / (order of the estimate + 1): Gustafsson's, as in Solving ODEs II, IV.2.
 PI_ERROR, PI_BEFORE = 0.7, 0.4
 
+# Ratio of steps within which an implicit method goes on with the same step, and so with the same matrix: chains make
+# 0.04 to 0.5 matrices a step, not 0.5 to 0.8, and as many steps. A longer one only, as in Solving ODEs II, IV.8, takes
+# a tenth more steps.
+SAME_FROM, SAME_TO = 0.9, 1.1
+
 # Errors, over the tolerance, below which the next step is not made longer still; and that the control remembers.
 LEAST_ERROR, LEAST_BEFORE = 1e-10, 1e-4
 

@@ -12,7 +12,8 @@ class StageNumbers(Record):
     chart: int  # counter of charts when P was made, for a form whose P serves one chart only
     every_chart: int  # 1 for one whose P serves every chart
     known: int  # whether there are stiffness and damping
-    theta: float  # contraction that the last stage measured
+    left: float  # error norm that the first correction of a stage left when last measured, and more with every stage since
+    first: float  # size of that correction
     slow: float  # contraction above which P is rebuilt, if no new one contracts below the usual limit; else 0
     t_before: float  # s, start of the last step; -inf for the first one
     eager: int  # stages that are still to be begun with a matrix of their own

@@ -1,0 +1,98 @@
+"""First guesses of the stages of a step, k_i = vdd, on the polynomial through stages that are known already.
+
+Known are the earlier stages of the step, and those of the step before while the chart lasts. The nearest in time are
+taken: how many, the first implicit stage of the last step has told, since a stiff transient is no polynomial.
+
+The memory of it: t, h and the counter of charts of the last attempt; h of the step before, 0 where there is none; the
+number of points; then k_i of the step before, n floats each.
+"""
+
+import math
+
+from ..jit.kernels import kernel, stack
+from ..maths.dense_linalg import copy
+from .tolerances import APART_AT_LEAST, SAME_TIME
+
+T_LAST, H_LAST, CHART_LAST, H_BEFORE, POINTS, BEFORE = range(6)
+LEAST_POINTS, MOST_POINTS = 2, 4
+
+
+def prediction_memory(stages, n):
+    """Floats of memory that predictions need."""
+    return BEFORE + stages * n
+
+
+@kernel
+def begin_prediction(memory, own, stages, n, t, h, charts):
+    """Keep the stages of the last attempt if it led to t; the ratio of their step to h, 0 where there are none.
+
+    memory is that of the stages, of which stage i has k_i at (2 i + 3) n; own is that of predictions.
+    """
+    if own[CHART_LAST] != charts:
+        own[H_BEFORE] = 0.0
+    elif own[H_LAST] > 0.0 and abs(own[T_LAST] + own[H_LAST] - t) <= SAME_TIME * h:
+        own[H_BEFORE] = own[H_LAST]
+        for i in range(stages):
+            copy(memory[(2 * i + 3) * n :][:n], own[BEFORE + i * n :])
+    elif own[T_LAST] != t:
+        own[H_BEFORE] = 0.0
+    own[T_LAST], own[H_LAST], own[CHART_LAST] = t, h, charts
+    return own[H_BEFORE] / h
+
+
+@kernel
+def predict(tableau, memory, own, i, ratio, points, k):
+    """k_i on the polynomial through the `points` nearest of the stages known, of the step before if ratio > 0."""
+    n, stages = k.size, int(tableau[0])
+    times, places = stack(MOST_POINTS), stack(MOST_POINTS)
+    found, target = 0, _time(tableau, i)
+    while found < points:
+        least, place, time = math.inf, -1, 0.0
+        for j in range(i + (stages - 1 if ratio > 0.0 else 0)):
+            tau = _time(tableau, j) if j < i else (_time(tableau, j - i) - 1.0) * ratio
+            distance = abs(tau - target)
+            for m in range(found):
+                if abs(tau - times[m]) <= (APART_AT_LEAST * max(ratio, 1.0) if ratio > 0.0 else 0.0):
+                    distance = math.inf
+            if distance < least:
+                least, place, time = distance, j, tau
+        if place < 0:
+            break
+        times[found], places[found] = time, float(place)
+        found += 1
+    for e in range(n):
+        k[e] = 0.0
+    for m in range(found):
+        weight, j = 1.0, int(places[m])
+        for l in range(found):
+            if l != m:
+                weight *= (target - times[l]) / (times[m] - times[l])
+        known = memory[(2 * j + 3) * n :] if j < i else own[BEFORE + (j - i) * n :]
+        for e in range(n):
+            k[e] += weight * known[e]
+
+
+@kernel
+def _time(tableau, i):
+    """c_i."""
+    return tableau[2 + i * (2 + int(tableau[0]))]
+
+
+@kernel
+def extrapolated(own, i):
+    """The number of points for stage i: the last of a step are within the earlier ones, or close."""
+    return max(int(own[POINTS]), LEAST_POINTS) if i < LEAST_POINTS + 1 else MOST_POINTS
+
+
+@kernel
+def choose_points(tableau, memory, own, ratio, scratch):
+    """Take the number of points that would have predicted the first implicit stage best; scratch is of n floats."""
+    n, least = scratch.size, math.inf
+    k = memory[5 * n :]
+    for points in range(LEAST_POINTS, MOST_POINTS + 1):
+        predict(tableau, memory, own, 1, ratio, points, scratch)
+        off = 0.0
+        for e in range(n):
+            off += (k[e] - scratch[e]) * (k[e] - scratch[e])
+        if off < least:
+            least, own[POINTS] = off, float(points)

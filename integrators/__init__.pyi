@@ -1,5 +1,5 @@
 # Written by tools/stubs.py: do not edit.
-from .. import DiagonallyImplicit, ExplicitNystrom, ExplicitRungeKutta
+from .. import Collocation, DiagonallyImplicit, ExplicitNystrom, ExplicitRungeKutta
 from ..hints import Integrator
 
 class Taylor(Integrator):
@@ -22,6 +22,9 @@ class ImplicitTrapezoid(DiagonallyImplicit):
 
 class RK45(ExplicitRungeKutta):
     def __init__(self, rtol: float = ..., atol: float = ..., step: float | None = ..., max_step: float | None = ..., first_step: float | None = ...) -> None: ...
+
+class Radau(Collocation):
+    def __init__(self, rtol: float = ..., atol: float = ..., step: float | None = ..., max_step: float | None = ..., first_step: float | None = ..., order: int | None = ...) -> None: ...
 
 class SDIRK54(DiagonallyImplicit):
     def __init__(self, rtol: float = ..., atol: float = ..., step: float | None = ..., max_step: float | None = ..., first_step: float | None = ...) -> None: ...

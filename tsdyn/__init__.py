@@ -39,8 +39,10 @@ from .errors import (  # noqa: E402
     UnknownParameter,
 )
 from .jit.kernels import kernel  # noqa: E402
+from .methods.collocation import CollocationTableau  # noqa: E402
 from .methods.integrator import (  # noqa: E402
     Adaptive,
+    Collocation,
     DiagonallyImplicit,
     ExplicitNystrom,
     ExplicitRungeKutta,
@@ -72,6 +74,8 @@ __all__ = [
     "Adaptive",
     "Angle",
     "Body",
+    "Collocation",
+    "CollocationTableau",
     "DiagonallyImplicit",
     "Displacement",
     "Ensemble",

@@ -57,6 +57,7 @@ from .maths.recurrences import (
     sine_cosine,
     square,
 )
+from .methods.collocation import CollocationTableau
 from .methods.diagonally_implicit import trapezoid_error
 from .methods.explicit import (
     call_accelerate,
@@ -66,7 +67,14 @@ from .methods.explicit import (
     second_embedded_error,
     vector,
 )
-from .methods.integrator import Adaptive, DiagonallyImplicit, ExplicitNystrom, ExplicitRungeKutta, Integrator
+from .methods.integrator import (
+    Adaptive,
+    Collocation,
+    DiagonallyImplicit,
+    ExplicitNystrom,
+    ExplicitRungeKutta,
+    Integrator,
+)
 from .methods.interpolants import DOP853 as DOP853_INTERPOLANT
 from .methods.interpolants import linear_second
 from .methods.plug_in import step_kernel
@@ -88,6 +96,8 @@ __all__ = [
     "Angle",
     "BodyFriction",
     "ByState",
+    "Collocation",
+    "CollocationTableau",
     "DiagonallyImplicit",
     "Displacement",
     "ExplicitNystrom",

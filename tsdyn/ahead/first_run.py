@@ -91,7 +91,7 @@ def of_method(method, form, within, far=False, rough=False):
     if method.step is None:
         yield from method.errors
     if method.implicit:
-        yield from form.stages().values()
+        yield from form.stages(method.coupled > 0).values()
     if within:
         interpolant = method.interpolant(form.first_order)
         yield from (interpolant.fill, interpolant.value)

@@ -65,8 +65,8 @@ NEAR = 0.02
 MOST_TURN, MOST_SLIDE = 0.5, 0.2
 # Steps at most: of Gauss-Newton, and of the descent along the constraints.
 MOST_CLOSING, MOST_SETTLING = 60, 60
-# Length of a step, as a share of the wish, at which a stage has converged: the last one, and those before it. Springs of
-# softness 1e-8 round steps to 1e-8 of it and more; Gauss-Newton steps and the descent go on from there.
+# Length of a step, as a share of the wish, at which a stage has converged: the last one, and those before it. Springs
+# of softness 1e-8 round steps to 1e-8 of it and more; Gauss-Newton steps and the descent go on from there.
 CONVERGED, PASSED = 1e-6, 0.03
 # What is left of the slope, as a share of the distance, when the descent ends; and the least decrease of a step.
 SETTLED, DECREASE = 1e-11, 0.9

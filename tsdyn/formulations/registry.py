@@ -7,7 +7,16 @@ from ..rows.interface import redundancy
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED
 from ..sparse.constraint_graphs import graph_of, redundant_rows
 from ..validation import unknown_name
-from . import friction_basis, friction_solve, implicit_tangent, linearisation, maggi_kane, null_space, tangent
+from . import (
+    coupled_stages,
+    friction_basis,
+    friction_solve,
+    implicit_tangent,
+    linearisation,
+    maggi_kane,
+    null_space,
+    tangent,
+)
 from .locked_orientations import moving_graph
 
 
@@ -54,13 +63,17 @@ class Formulation:
         kernels |= {"check": k.check, "start_chart": k.start_chart}
         return {name: kernel.address for name, kernel in kernels.items()}
 
-    def implicit(self):
+    def implicit(self, coupled=False):
         """Addresses that implicit methods need, by their names in `StageKernels`."""
-        return {kernel_name: kernel.address for kernel_name, kernel in self.stages().items()}
+        return {kernel_name: kernel.address for kernel_name, kernel in self.stages(coupled).items()}
 
-    def stages(self):
-        """The kernels that implicit methods need, by their names in `StageKernels`."""
+    def stages(self, coupled=False):
+        """The kernels that implicit methods need, by their names in `StageKernels`; coupled: all stages at once."""
         module = self.kernels if self.basis_free else linearisation
+        if coupled:
+            own = {name: getattr(coupled_stages, name) for name in coupled_stages.KERNELS}
+            shared = ("linearise", "reduce", "soften", "recall", "residual", "distance")
+            return own | {name: getattr(module, name) for name in shared} | {"error_norm": self.kernels.error_norm}
         names = ("linearise", "reduce", "factorise", "solve", "soften", "recall")
         names += ("residual", "correct", "distance") if self.basis_free else ()
         return {name: getattr(module, name) for name in names} | {"error_norm": self.kernels.error_norm}

@@ -134,20 +134,20 @@ def _mass(graph, b, r, c):
 
 
 @kernel
-def _write_blocks(graph, s, g):
-    """Add M - g C_b - g^2 K_b in the places of the factors."""
+def add_blocks(graph, s, upper, lower, g, masses):  # six: the graph, a matrix and what is added to it
+    """Add - g C_b - g^2 K_b, and M if asked for, in the places of the factors; g and the factors may be complex."""
     for i in range(s.graph.blocks.shape[0]):
         block, o = s.graph.blocks[i], BLOCK * i
         rows, columns = degrees(graph, block.row), degrees(graph, block.column)
         for r in range(rows):
             for c in range(columns):
                 x = -g * (s.C[o + 6 * r + c] + g * s.K[o + 6 * r + c])
-                if block.place == OWN:
+                if masses and block.place == OWN:
                     x += _mass(graph, block.row, r, c)
                 if block.place != LOWER:
-                    more(s.upper, block.target + block.stride * r + c, x)
+                    more(upper, block.target + block.stride * r + c, x)
                 if block.place != UPPER:
-                    more(s.lower, block.target + block.stride * c + r, x)
+                    more(lower, block.target + block.stride * c + r, x)
 
 
 @kernel
@@ -180,7 +180,7 @@ def factorise(context, g):
     c = load(context)
     f, s, graph = c.tangent, c.saddle, c.graph
     write_saddle_rows(graph, f, s)
-    _write_blocks(graph, s, g)
+    add_blocks(graph, s, s.upper, s.lower, g, True)
     _write_frictions(graph, f, s)
     c.work.counters.iteration_matrices += 1
     if is_direct(graph) and f.b.size > 0 and not factorise_normal(graph, c.work, f, c.chart):

@@ -144,13 +144,10 @@ def _solve_normal(c):
 @kernel
 def _take_off(c, x):
     """f.b <- N^-1 f.b and x -= Y0 f.b; s.r is the change of x."""
-    f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     _solve_normal(c)
-    for i in range(s.r.size):
-        s.r[i] = 0.0
-    apply_multipliers(graph, l.rows0, f.b, s.r)
+    spread_normal(c, c.tangent.b)
     for i in range(x.size):
-        x[i] += s.r[i]
+        x[i] += c.saddle.r[i]
 
 
 @kernel
@@ -241,7 +238,7 @@ def correct(context, g, k):
     k, n = vector(k, l.x.size - 8), w.q.size
     turn_accelerations(graph, l, f.poses, k, s.a)
     _correct_normal_part(c, g, k)
-    if not _balance(c):
+    if not find_imbalance(c):
         return math.inf
     solve_saddle(s)
     take_solution(graph, s)
@@ -260,20 +257,36 @@ def correct(context, g, k):
 def _correct_normal_part(c, g, k):
     """k += n; s.r = n. A change n moves x and xd by g^2 n and g n, which u and z take off again."""
     w, f, s = c.work, c.tangent, c.saddle
-    if f.b.size == 0:
-        for i in range(s.r.size):
-            s.r[i] = 0.0
-        return
-    multiply_rows(c.graph, f.rows, s.a, f.b)
-    _add(f.gamma, f.b)
-    _take_off(c, k)
+    find_normal_part(c)
+    for i in range(k.size):
+        k[i] += s.r[i]
     for e in range(f.b.size):
         w.u[e] -= g * g * f.b[e]
         s.z[e] -= g * f.b[e]
 
 
 @kernel
-def _balance(c):
+def find_normal_part(c):
+    """s.r = n for the accelerations s.a; f.b are its multipliers, n = -Y0 f.b."""
+    f, s = c.tangent, c.saddle
+    if f.b.size > 0:
+        multiply_rows(c.graph, f.rows, s.a, f.b)
+        _add(f.gamma, f.b)
+        _solve_normal(c)
+    spread_normal(c, f.b)
+
+
+@kernel
+def spread_normal(c, b):
+    """s.r = -Y0 b."""
+    s = c.saddle
+    for i in range(s.r.size):
+        s.r[i] = 0.0
+    apply_multipliers(c.graph, c.chart.rows0, b, s.r)
+
+
+@kernel
+def find_imbalance(c):
     """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for the rows. False if S is singular."""
     f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     to_bodies(graph, l, s.r, f.Z)

@@ -16,6 +16,7 @@ _i64, _f64 = ir.IntType(64), ir.DoubleType()
 _vector = types.Array(types.float64, 1, "C")
 _matrix = types.Array(types.float64, 2, "C")
 _integers = types.Array(types.int64, 1, "C")
+_complex = types.Array(types.complex128, 1, "C")
 
 
 def array_over(context, builder, kind, pointer, shape):
@@ -88,6 +89,7 @@ def _viewer(kind):
 vector = _viewer(_vector)
 matrix = _viewer(_matrix)
 integers = _viewer(_integers)
+complex_vector = _viewer(_complex)
 
 
 @intrinsic
@@ -144,6 +146,10 @@ if DEBUG:
         return array.reshape(-1)[: n * m].reshape(n, m)
 
     integers = vector
+
+    def complex_vector(array, n):
+        """The array, of 2 n floats, as n complex numbers."""
+        return array[: 2 * n].view(complex)
 
     def data_of(array):
         """The array itself."""

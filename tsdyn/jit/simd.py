@@ -194,7 +194,7 @@ def let(typing, array, index, value):
         builder.store(arguments[2], builder.gep(data, [arguments[1]]))
         return context.get_dummy_value()
 
-    return types.none(array, types.int64, types.float64), generate
+    return types.none(array, types.int64, array.dtype), generate
 
 
 @intrinsic

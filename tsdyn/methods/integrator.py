@@ -11,6 +11,10 @@ from ..calls import fitting
 from ..docstrings import complete_docstring
 from ..jit.code_hash import is_ours
 from ..validation import checked_once, positive
+from .collocation import CollocationTableau
+from .collocation_output import interpolant_of, second_derivative
+from .collocation_step import collocation_step
+from .collocation_step import memory_of as collocation_memory
 from .diagonally_implicit import implicit_step, memory_of
 from .explicit import embedded_error, nystrom_step, runge_kutta_step, second_embedded_error, second_order_step
 from .interpolants import HERMITE, HERMITE_FIRST_ORDER, hermite_second
@@ -63,6 +67,7 @@ class Integrator:
     order = 0
     embedded_order = 0  # of the error estimate; zero for a method that has none
     implicit = False
+    coupled = 0  # stages that an implicit method solves at once
     driver = "steps"  # which one runs it; see task.py
     stability_limit = 0.0  # h |lambda| that its last stage and the step's end, of one time, may show; 0: not watched
     rtol: float | None = None
@@ -242,6 +247,44 @@ class DiagonallyImplicit(Adaptive):
         """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
         return implicit_step, self.tableau.numbers, lambda nx, ny: memory_of(stages, nx)
+
+
+class Collocation(Adaptive):
+    """A method that is a `CollocationTableau`, for stiff scenes in the tangent form.
+
+    All stages of a step are solved at once, by one real factorised matrix and one complex one for each further pair of
+    stages, kept over iterations, steps and charts. Order reduction begins at the number of stages only.
+
+    Examples
+    --------
+    Radau IIA of order 5:
+
+    >>> import tsdyn as ts
+    >>> root = 6**0.5
+    >>> class Radau5(ts.Collocation):
+    ...     order = 5
+    ...     tableau = ts.CollocationTableau(((4 - root) / 10, (4 + root) / 10, 1), order=5)
+    >>> Radau5(rtol=1e-6)
+    Radau5(rtol=1e-06, atol=1e-08)
+    """
+
+    tableau: Any = None  # CollocationTableau, or a property that gives one
+    implicit = True
+    second = second_derivative
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        if isinstance(cls.tableau, CollocationTableau):
+            cls.embedded_order = cls.coupled = len(cls.tableau.nodes)
+
+    def kernel(self, first_order: bool) -> StepKernel:
+        """The numbers of the tableau, and the kernel that steps by it."""
+        stages = self.coupled
+        return collocation_step, self.tableau.numbers, lambda nx, ny: collocation_memory(stages, nx)
+
+    def interpolant(self, first_order: bool) -> Any:
+        """The polynomials that the stages lie on."""
+        return interpolant_of(self.coupled)
 
 
 def frozen(method: Integrator) -> Integrator:

@@ -37,7 +37,7 @@ def _lower(values, stages, what):
     return matrix
 
 
-def _demand(what, size=1.0, **conditions):
+def demand(what, size=1.0, **conditions):
     """Refuse what fails by more than rounding of coefficients of that size."""
     for name, value in conditions.items():
         if np.abs(value).max() > ORDER_CONDITION * size:
@@ -80,9 +80,9 @@ class RungeKuttaTableau:
         for weights in (self.error, self.second_error):
             if len(weights) not in (0, len(c) + 1):
                 raise InvalidArgument(f"{what[0]}: an error estimate has {len(c) + 1} weights, got {len(weights)}.")
-            _demand(*what, **{"sum of the error weights = 0": np.sum(weights)})
-        _demand(*what, **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
-        _demand(*what, **_trees(a, b, c, min(self.order, 4)))
+            demand(*what, **{"sum of the error weights = 0": np.sum(weights)})
+        demand(*what, **{"sum a = c": a @ ones - c, **quadrature(b, c, self.order)})
+        demand(*what, **_trees(a, b, c, min(self.order, 4)))
 
     @property
     def arrays(self) -> tuple[Floats, ...]:
@@ -125,10 +125,10 @@ class ImplicitTableau:
         ones, diagonal = np.ones(len(c)), np.diag(a)
         if a[0, 0] != 0.0 or np.ptp(diagonal[1:]) > 0.0 or not diagonal[1] > 0.0:
             raise InvalidArgument(f"{what}: the first row is zero, and the other diagonal entries one positive number.")
-        _demand(what, **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
+        demand(what, **{"sum a = c": a @ ones - c, **quadrature(b, c, self.order)})
         if self.error:
-            _demand(what, **_quadrature(b - np.array(self.error), c, self.embedded_order))
-        _demand(what, **_trees(a, b, c, self.order))
+            demand(what, **quadrature(b - np.array(self.error), c, self.embedded_order))
+        demand(what, **_trees(a, b, c, self.order))
 
     @property
     def arrays(self) -> tuple[Floats, ...]:
@@ -182,15 +182,15 @@ class NystromTableau:
                 f"{what}: this method ignores the velocity at its stages, but the reduced equations always depend on "
                 "it (gamma, S): it would be of order one. Use a tableau with coefficients a."
             )
-        _demand(what, **{"sum a = c": a @ ones - c, **_quadrature(b, c, self.order)})
-        _demand(what, **{"bbar 1 = 1/2": bbar @ ones - 1 / 2}, **_trees(a, b, c, min(self.order, 4)))
+        demand(what, **{"sum a = c": a @ ones - c, **quadrature(b, c, self.order)})
+        demand(what, **{"bbar 1 = 1/2": bbar @ ones - 1 / 2}, **_trees(a, b, c, min(self.order, 4)))
         if self.order >= 3:
-            _demand(
+            demand(
                 what,
                 **{"b abar 1 = 1/6": b @ abar @ ones - 1 / 6, "bbar c = 1/6": bbar @ c - 1 / 6},
             )
         if self.order >= 4:
-            _demand(
+            demand(
                 what,
                 **{"b abar c = 1/24": b @ abar @ c - 1 / 24},
                 **{"bbar c^2 = 1/12": bbar @ c**2 - 1 / 12, "bbar a c = 1/24": bbar @ a @ c - 1 / 24},
@@ -219,7 +219,8 @@ class NystromTableau:
         return np.concatenate([[len(c)], stages, bbar, b])
 
 
-def _quadrature(b, c, order):
+def quadrature(b, c, order):
+    """The conditions that quadratures meet up to an order."""
     return {f"b c^{j} = 1/{j + 1}": b @ c**j - 1 / (j + 1) for j in range(order)}
 
 

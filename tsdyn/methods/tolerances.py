@@ -68,3 +68,11 @@ TOO_FAR = 0.1
 # rtol and atol of the iteration with a fixed step, where no tolerance sets the step. What is left of the stages of
 # thousands of steps adds up: to 1e-10 of a driven pendulum at 1e-12, while a matrix serves across charts.
 FIXED_TOL = 1e-13
+
+# --- collocation methods: all stages at once (collocation_step.py) ---
+# Corrections at most; error norm that the iteration may leave; the least contraction that is remembered for the next
+# step's first correction; contraction from which the next step has new matrices.
+COUPLED_ITERATIONS, KAPPA_COUPLED, LEAST_COUPLED, SLOW_COUPLED = 12, 3e-3, 1e-3, 0.1
+
+# Relative change of the step up to which matrices are kept.
+SAME_STEP = 0.02

@@ -9,6 +9,7 @@ Factorise:
     factorise_rows          Y, S = L D L^T          factorise_chart_matrix  N = H C Y0 = L D U
     factorise_product       H X^T = L D U
     write_saddle_rows, factorise_saddle, solve_saddle         of the saddle-point matrix of implicit methods
+    factorise_complex_saddle, solve_complex_saddle            the same with complex steps
 Solve:
     solve_rows              b <- S^-1 b             solve_product           b <- N^-1 b
     multiply_rows           out = H Z               apply_multipliers       Z <- Z - Y^T lam
@@ -55,7 +56,13 @@ from .row_memory import (
     set_selection,
 )
 from .row_workspace import Rows, TangentWorkspace
-from .saddle_matrix import factorise_saddle, solve_saddle, write_saddle_rows
+from .saddle_matrix import (
+    factorise_complex_saddle,
+    factorise_saddle,
+    solve_complex_saddle,
+    solve_saddle,
+    write_saddle_rows,
+)
 from .schur_complement import (
     DYNAMICS,
     METRIC,
@@ -113,6 +120,7 @@ __all__ = [
     "evaluate_residuals",
     "evaluate_rows",
     "factorise_chart_matrix",
+    "factorise_complex_saddle",
     "factorise_product",
     "factorise_rows",
     "factorise_saddle",
@@ -151,6 +159,7 @@ __all__ = [
     "self_stress",
     "set_selection",
     "singularity_indicator",
+    "solve_complex_saddle",
     "solve_friction_series",
     "solve_product",
     "solve_rows",

@@ -3,7 +3,7 @@
 s is a `SaddleWorkspace`; the blocks of bodies are added by the caller.
 """
 
-from ..jit.kernels import kernel, stack
+from ..jit.kernels import complex_vector, data_of, kernel, stack
 from ..jit.simd import let
 from ..sparse.factorisation import factor_lu, solve_lu
 from .schur_complement import more
@@ -64,3 +64,21 @@ def factorise_saddle(s):
 def solve_saddle(s):
     """s.x <- the solution for the right-hand side s.x."""
     solve_lu(s.graph.pattern, s.lower, s.upper, s.x)
+
+
+@kernel
+def factorise_complex_saddle(s, pair):
+    """Factorise the matrix of a pair of eigenvalues; return True if it is nonsingular."""
+    size = s.graph.pattern.shape[2]
+    lower = complex_vector(data_of(s.complex_lower[pair]), size)
+    upper = complex_vector(data_of(s.complex_upper[pair]), size)
+    return factor_lu(s.graph.pattern, lower, upper, SADDLE_PIVOT) < 0
+
+
+@kernel
+def solve_complex_saddle(s, pair):
+    """s.complex_x <- the solution for the right-hand side s.complex_x, real and imaginary parts in turn."""
+    size, x = s.graph.pattern.shape[2], complex_vector(data_of(s.complex_x), s.x.size)
+    lower = complex_vector(data_of(s.complex_lower[pair]), size)
+    upper = complex_vector(data_of(s.complex_upper[pair]), size)
+    solve_lu(s.graph.pattern, lower, upper, x)

@@ -27,13 +27,13 @@ class StepEngine:
         self.system, kept = prepared.system(method.implicit)
         self.saddle = saddle_of(packed, self.graph, self.system) if method.implicit and form.basis_free else None
         rows = len(self.graph.row) if form.basis_free else None
-        self.kind = form.name, rows, method.implicit, kept, *self.sizes, *lengths
+        self.kind = form.name, rows, method.implicit, method.coupled, kept, *self.sizes, *lengths
         still = prepared.still if form.keeps_still else 0
         self.skipped = (prepared.spheres, still, 0) if form.basis_free else (0, 0, 0)
 
     def memory(self, prepared):
         """A new `StepMemory`."""
-        given = self.form.basis_free, self.method.implicit, self.sizes, self.lengths
+        given = self.method.coupled, self.form.basis_free, self.method.implicit, self.sizes, self.lengths
         return StepMemory(prepared, self.graph, self.saddle, *given)
 
     def serves(self, memory):
@@ -55,7 +55,7 @@ class StepEngine:
                 run.clock.stability_limit = method.stability_limit
                 run.numbers.last_stage = 2 * len(method.tableau.c) * nx
         if method.implicit:
-            prepare_implicit(memory.context.linear, method, form.implicit(), form.basis_free)
+            prepare_implicit(memory.context.linear, method, form.implicit(method.coupled > 0), form.basis_free)
             run.numbers.stage_at = (2 * len(method.tableau.c) + 1) * nx
 
     def reading(self, memory, prepared, constraint_tol):

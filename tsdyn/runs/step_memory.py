@@ -22,6 +22,8 @@ class StepMemory(Memory):
         Of the scene, as the form needs it.
     saddle : SaddleGraph
         Of an implicit method in a form without a basis; None for others.
+    coupled : int
+        Stages that the method solves at once.
     basis_free, implicit : bool
     sizes : tuple
         Of x and y.
@@ -31,7 +33,7 @@ class StepMemory(Memory):
 
     advance_kernel = staticmethod(advance)
 
-    def __init__(self, prepared, graph, saddle, basis_free, implicit, sizes, lengths):
+    def __init__(self, prepared, graph, saddle, coupled, basis_free, implicit, sizes, lengths):
         n, m, packed = prepared.n, prepared.m, prepared.packed
         self.implicit, self.basis_free = implicit, basis_free
         self.source, kept = prepared.system(implicit)
@@ -39,7 +41,7 @@ class StepMemory(Memory):
         rows = len(graph.row) if basis_free else None
         work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant)
         angles, slots = prepared.handles.count, system.memory.size
-        parts = basis_free_parts(graph, n, not basis_free, saddle)
+        parts = basis_free_parts(graph, n, not basis_free, saddle, coupled)
         run = lay_out(n, *sizes, angles, slots, warm=warm_size(work, *parts[1:]), **lengths)
         linear = allocate_linear(system, n, m, implicit and not basis_free, kept, redundant)
         if implicit:

@@ -92,8 +92,9 @@ def _settings(  # nine: each is an argument of `simulate`
 def _method(integrator, rtol, atol, form):
     """Return the requested method."""
     method = frozen(method_of(integrator, rtol, atol))
-    if method.implicit and form.first_order:
-        others = ", ".join(repr(name) for name, kind in registered().items() if not kind.implicit)
+    if (method.implicit and form.first_order) or (method.coupled and not form.basis_free):
+        kinds = {name: kind for name, kind in registered().items() if not kind.coupled}
+        others = ", ".join(repr(name) for name, kind in kinds.items() if not (kind.implicit and form.first_order))
         raise InvalidArgument(
             f"{type(method).__name__} solves its stages in the tangent-space form only; formulation={form.name!r} is "
             f"served by {others}."

@@ -94,6 +94,11 @@ class Prepared:
         return any(load.force.sharp for load in self.packed.loads)
 
     @cached_property
+    def rough(self):
+        """Titles of the forces that depend on reactions."""
+        return [load.force.title for load in self.packed.loads if "normal_load" in load.force.kernels]
+
+    @cached_property
     def series(self):
         """Data shared by Taylor runs, a `Series`."""
         return Series(self.packed, self.refusal)

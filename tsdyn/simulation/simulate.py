@@ -218,6 +218,11 @@ def _request(scene, kept, method, options, state, choose):
     q, qd = kept.start(scene, start, span[0], settings.initial_tol, memory, settings.drop)
     if not form.basis_free or method.implicit:
         demand_holonomic(kept.packed, q, span[0], form.name)
+    if method.coupled and kept.rough:
+        raise InvalidArgument(
+            f"{type(method).__name__} doesn't solve for reactions that friction depends on "
+            f"({', '.join(kept.rough)}): SDIRK54 does, as do all explicit methods."
+        )
     sampling = Sampling(kept, state is not None) if kept.sampled else None
     return Task(
         kept, method, form, span, q, qd, memory, options.times, settings.dense_output,

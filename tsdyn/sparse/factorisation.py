@@ -24,7 +24,8 @@ def keep_diagonal(pattern, values):
             kept[first + k] = abs(values[head + k * step])
     for i in range(pattern.negative.size):
         row = pattern.negative[i]
-        kept[row] = -kept[row] if kept[row] > 0.0 else -1.0
+        size = abs(kept[row])
+        kept[row] = -size if size > 0.0 else -1.0
 
 
 @kernel

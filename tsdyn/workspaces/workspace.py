@@ -192,9 +192,12 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
     return ImplicitWorkspace(**carve(shapes, kernels=StageKernels, numbers=StageNumbers), pivots=np.zeros(k, np.int64))
 
 
-def basis_free_parts(graph, n, basis, saddle=None):
-    """Graph and workspaces without dense matrices of a Context; saddle: a `SaddleGraph`, of implicit methods."""
-    return graph, allocate_tangent(graph, n, basis=basis), allocate_chart(graph), allocate_saddle(saddle)
+def basis_free_parts(graph, n, basis, saddle=None, coupled=0):
+    """Graph and workspaces without dense matrices of a Context; saddle: a `SaddleGraph`, of implicit methods.
+
+    coupled: how many stages they solve at once.
+    """
+    return graph, allocate_tangent(graph, n, basis=basis), allocate_chart(graph), allocate_saddle(saddle, coupled)
 
 
 @cache

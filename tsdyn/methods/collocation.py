@@ -1,0 +1,142 @@
+"""Collocation methods for stiff scenes: their nodes, and the numbers that the step kernel reads.
+
+The motion satisfies the equations at the nodes c_i of a step, the last of which is its end; the derivative between is
+the polynomial through them. In the basis P_j of shifted Legendre polynomials, with P = P_j(c_i) and Q the integrals of
+P_j from 0 to c_i, the coefficients are A = Q P^-1. Newton's matrices of all stages at once fall apart by the
+eigenvalues of A (Hairer, Wanner, Solving ODEs II, IV.8): one is real, the others come in pairs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from ..errors import InvalidArgument
+from ..jit.kernels import kernel
+from .tableau import demand, quadrature
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..hints import Floats
+
+MOST_STAGES = 9  # the interpolant's polynomials are on the stack
+
+
+@dataclass(frozen=True)
+class CollocationTableau:
+    """A collocation method: an odd number of nodes c in (0, 1], up to nine, the last one 1.
+
+    The error estimate is that of a quadrature of the order of the number of nodes, which has the step's start as a
+    node besides: Hairer and Wanner, Solving ODEs II, IV.8, Eq. (8.17).
+
+    Examples
+    --------
+    Radau IIA of order 5; a node in a wrong place is refused:
+
+    >>> import tsdyn as ts
+    >>> root = 6**0.5
+    >>> ts.CollocationTableau(((4 - root) / 10, (4 + root) / 10, 1), order=5).order
+    5
+    >>> try:
+    ...     ts.CollocationTableau((0.2, 0.6, 1), order=5)
+    ... except ts.InvalidArgument as error:
+    ...     print(error)
+    CollocationTableau: the condition b c^3 = 1/4 fails by 0.00333.
+    """
+
+    nodes: Sequence[float]
+    order: int
+
+    def __post_init__(self) -> None:
+        c, what = np.array(self.nodes, float), "CollocationTableau"
+        if not (c.ndim == 1 and c.size % 2 == 1 and 3 <= c.size <= MOST_STAGES):
+            raise InvalidArgument(f"{what}: an odd number of nodes, 3 to {MOST_STAGES}, got {self.nodes!r}.")
+        if not (c[0] > 0.0 and (np.diff(c) > 0.0).all() and c[-1] == 1.0):
+            raise InvalidArgument(f"{what}: nodes lie in (0, 1] in ascending order, the last one is 1.")
+        demand(what, **quadrature(self.coefficients[-1], c, self.order))
+        values = self.eigenvalues
+        if abs(values[0].imag) > 0.0 or not (values.real > 0.0).all() or (values[1::2].imag == 0.0).any():
+            raise InvalidArgument(f"{what}: one eigenvalue of the coefficients is to be real, all with positive parts.")
+
+    @property
+    def c(self) -> tuple[float, ...]:
+        """Times of the stages, the explicit one at the step's start included."""
+        return (0.0, *self.nodes)
+
+    @cached_property
+    def basis(self) -> Floats:
+        """P_j(c_i) (s, s)."""
+        c = np.array(self.nodes)
+        return legendre.legvander(2.0 * c - 1.0, c.size - 1)
+
+    @cached_property
+    def coefficients(self) -> Floats:
+        """A (s, s); its last row holds the weights."""
+        c, s = np.array(self.nodes), len(self.nodes)
+        integrals = [legendre.legval(2.0 * c - 1.0, legendre.legint(row, lbnd=-1)) / 2.0 for row in np.eye(s)]
+        return np.linalg.solve(self.basis.T, np.array(integrals)).T
+
+    @cached_property
+    def _eigen(self):
+        """Eigenvalues, the real one first, then one of each pair and its conjugate; eigenvectors."""
+        values, vectors = np.linalg.eig(self.coefficients)
+        order = sorted(range(values.size), key=lambda i: (abs(values[i].imag) > 0.0, -values[i].real, -values[i].imag))
+        return values[order], vectors[:, order]
+
+    @property
+    def eigenvalues(self) -> Floats:
+        """Those of A, the real one first, then pairs."""
+        return self._eigen[0]
+
+    def error_weights(self) -> Floats:
+        """Weights of the error estimate: of the step's start, then of each stage."""
+        first, s = self.eigenvalues[0].real, len(self.nodes)
+        # sum_i b_i P_j(c_i) = integral of P_j less what the start contributes, P_j(0) = (-1)^j
+        wanted = np.eye(s)[0] - first * (-1.0) ** np.arange(s)
+        return np.array([first, *np.linalg.solve(self.basis.T, wanted) - self.coefficients[-1]])
+
+    def transformations(self) -> tuple[Floats, Floats]:
+        """Stages to real and imaginary parts of their eigenvectors' coefficients, and back, (s, s) each."""
+        vectors = self._eigen[1]
+        inverse, there, back = np.linalg.inv(vectors), [], []
+        for m in range(0, vectors.shape[1], 2):  # the real one, then the first of each pair
+            at = max(m - 1, 0)
+            pair = m > 0
+            there += [inverse[at].real, inverse[at].imag][: 1 + pair]
+            back += [vectors[:, at].real * (1 + pair), -2.0 * vectors[:, at].imag][: 1 + pair]
+        return np.array(there), np.array(back).T
+
+    @cached_property
+    def numbers(self) -> Floats:
+        """As `RungeKuttaTableau.numbers` with the start as first stage; then those of `parts_of`."""
+        c, a, s = np.array(self.c), np.pad(self.coefficients, ((1, 0), (1, 0))), len(self.nodes)
+        values = self.eigenvalues
+        shifts = [values[0].real, *np.ravel([[z.real, z.imag] for z in values[1::2]])]
+        parts = a[1:, 1:], a[1:, 1:] @ a[1:, 1:], shifts, *self.transformations(), np.linalg.inv(self.basis)
+        rows = [[0.0, c[i], *a[i]] for i in range(s + 1)]
+        return np.concatenate([[s + 1], np.ravel(rows), a[-1], self.error_weights(), [0.0], *map(np.ravel, parts)])
+
+
+class Parts(NamedTuple):
+    """Where the numbers of a collocation method of s nodes begin: s s each, but s of them for `shifts`."""
+
+    a: int  # A
+    square: int  # A^2
+    shifts: int  # eigenvalues: the real one, then real and imaginary part of one of each pair
+    there: int  # stages to coefficients of eigenvectors, and back
+    back: int
+    legendre: int  # stages to coefficients of P_j
+
+
+@kernel
+def parts_of(tableau):
+    """The `Parts` of the numbers of a tableau."""
+    stages = int(tableau[0])
+    s, at = stages - 1, 1 + stages * (2 + stages) + 2 * stages + 1
+    m = s * s
+    return Parts(at, at + m, at + 2 * m, at + 2 * m + s, at + 3 * m + s, at + 4 * m + s)

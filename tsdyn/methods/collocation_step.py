@@ -1,0 +1,262 @@
+"""The step kernel of collocation methods: Newton's method for all stages of a step at once.
+
+    vd_i = vd + h sum_j a_ij k_j,    v_i = v + h sum_j a_ij vd_j,    k_i = f(t + c_i h, v_i, vd_i)
+
+The iteration is that of formulations/coupled_stages.py. Its matrices are kept over iterations, steps and charts. They
+are made anew where the step has changed by more than SAME_STEP, or contraction is poor: from the same stiffness and
+damping; in the next step, or at once where iterations diverge, from those of the present configuration; then from new
+derivatives of the forces' laws.
+
+The first guess of a step is the polynomial through the last stages of the step before; how many, that step has told.
+
+The memory of a step, n floats each: known part of v_i, of vd_i; (vd, k) of the start and of each stage; change of the
+last stage's positions, zeros; k of each stage of the step before; then the numbers below.
+"""
+
+import math
+
+from ..errors import Status
+from ..jit.kernels import callback, caller, kernel
+from ..maths.dense_linalg import copy
+from ..workspaces.run_state import load_run
+from ..workspaces.workspace import load
+from .collocation import parts_of
+from .diagonally_implicit import call_linearise, call_reduce, call_residual
+from .explicit import STEP, call_norm, combine
+from .tolerances import (
+    COUPLED_ITERATIONS,
+    DIVERGING,
+    FIXED_ITERATIONS,
+    GUESS,
+    KAPPA,
+    KAPPA_COUPLED,
+    LEAST_COUPLED,
+    MATRICES,
+    RESIDUAL_FLOOR,
+    SAME_STEP,
+    SAME_TIME,
+    SLOW_COUPLED,
+    TOO_FAR,
+)
+
+STAGE_FAILED = int(Status.STAGE_FAILED)
+T_LAST, H_LAST, CHART_LAST, H_BEFORE, POINTS, MADE_FOR, OWN = range(7)
+
+call_take = caller("pi")
+call_balance = caller("pip")
+call_factorise = caller("pdp")
+call_solve = caller("pdpp", "d")
+
+
+def memory_of(stages, n):
+    """Floats of memory that `collocation_step` needs."""
+    return (2 + stages) * 2 * n + 2 * n + stages * n + OWN
+
+
+@kernel
+def _rest(r):
+    """Where the memory behind that of the stages begins."""
+    return 2 * (int(r.tableau[0]) + 1) * r.x.size
+
+
+@kernel
+def _keep_stages(c, r, own, t, h):
+    """Keep the stages of the last attempt if it led to t; return whether there are stages to predict from."""
+    s, n, charts = c.saddle, r.x.size, float(c.work.counters.charts)
+    before = r.memory[_rest(r) + 2 * n :]
+    if own[H_LAST] > 0.0 and abs(own[T_LAST] + own[H_LAST] - t) <= SAME_TIME * h:
+        own[H_BEFORE] = own[H_LAST] if own[CHART_LAST] == charts else 0.0
+        for i in range(s.stages.shape[0]):
+            copy(r.memory[(2 * i + 5) * n :][:n], before[i * n :])
+            copy(s.stages[i], s.last[i])
+    elif own[T_LAST] != t or own[CHART_LAST] != charts:
+        own[H_BEFORE] = 0.0
+    own[T_LAST], own[H_LAST], own[CHART_LAST] = t, 0.0, charts
+    return own[H_BEFORE] > 0.0
+
+
+@kernel
+def _weight(tableau, ratio, points, i, j):
+    """Lagrange's weight at stage i of stage j of the step before, among the last `points` of its stages."""
+    stages = int(tableau[0]) - 1
+    width, target, weight = 3 + stages, 1.0 + tableau[2 + (i + 1) * (3 + stages)] / ratio, 1.0
+    own = tableau[2 + (j + 1) * width]
+    for l in range(stages - points, stages):
+        if l != j:
+            other = tableau[2 + (l + 1) * width]
+            weight *= (target - other) / (own - other)
+    return weight
+
+
+@kernel
+def _predict(c, r, own, h, known):
+    """Set k, u, z and lam of every stage."""
+    s, n, m, stages = c.saddle, r.x.size, c.saddle.z.size, c.saddle.stages.shape[0]
+    before, ratio, points = r.memory[_rest(r) + 2 * n :], own[H_BEFORE] / h, max(int(own[POINTS]), 1)
+    for i in range(stages):
+        k = r.memory[(2 * i + 5) * n :][:n]
+        if not known:
+            copy(r.yd, k)
+            copy(c.work.u, s.stages[i, :m])
+            for e in range(m):
+                s.stages[i, m + e] = 0.0
+                s.stages[i, 2 * m + e] = s.last[stages - 1, 2 * m + e]
+            continue
+        for e in range(n):
+            k[e] = 0.0
+        for e in range(3 * m):
+            s.stages[i, e] = 0.0
+        for j in range(stages - points, stages):
+            weight = _weight(r.tableau, ratio, points, i, j)
+            for e in range(n):
+                k[e] += weight * before[j * n + e]
+            for e in range(3 * m):
+                s.stages[i, e] += weight * s.last[j, e]
+
+
+@kernel
+def _choose_points(c, r, own, h):
+    """Take the number of points that would have predicted the last stage best."""
+    n, stages, least = r.x.size, c.saddle.stages.shape[0], math.inf
+    before, ratio = r.memory[_rest(r) + 2 * n :], own[H_BEFORE] / h
+    k = r.memory[(2 * stages + 3) * n :][:n]
+    scratch = r.memory[:n]
+    for points in range(1, stages + 1):
+        copy(k, scratch)
+        for j in range(stages - points, stages):
+            weight = _weight(r.tableau, ratio, points, stages - 1, j)
+            for e in range(n):
+                scratch[e] -= weight * before[j * n + e]
+        off = 0.0
+        for e in range(n):
+            off += scratch[e] * scratch[e]
+        if off < least:
+            least, own[POINTS] = off, float(points)
+
+
+@kernel
+def _renew_matrices(context, c, r, own, t, h, level):
+    """Factors for a step of h; level 1: from new stiffness and damping, level 2: from new derivatives, too. Status."""
+    l, status = c.linear, 0
+    if level > 1 or l.numbers.known == 0:
+        status = call_linearise(l.kernels.linearise, context, t, r.yd)
+        l.numbers.known = 1 if status == 0 else 0
+        level = 2
+    if status == 0 and level > 0:
+        call_reduce(l.kernels.reduce, context, t)
+    if status == 0:
+        status = call_factorise(l.kernels.factorise_stages, context, h, r.tableau)
+    own[MADE_FOR] = h if status == 0 else 0.0
+    l.numbers.g, l.numbers.slow = h * r.tableau[parts_of(r.tableau).shifts] if status == 0 else 0.0, 0.0
+    return status
+
+
+@kernel
+def _sweep(context, c, r, own, t, h, level):  # seven: as _renew_matrices
+    """Evaluate the equations of all stages; with level >= 0, matrices are made anew at the middle one. Status."""
+    l, w, n, stages = c.linear, c.work, r.x.size, c.saddle.stages.shape[0]
+    width, x = 3 + stages, r.memory[:n]
+    for i in range(stages):
+        combine(r.tableau[1 + (i + 1) * width + 2 :], stages + 1, h, 2 * n, r.memory, r.memory)
+        vd = r.memory[(2 * i + 4) * n : (2 * i + 5) * n]
+        for e in range(n):
+            vd[e] = r.y[e] + r.memory[n + e]
+    for i in range(stages):
+        row, k = r.tableau[1 + (i + 1) * width :], r.memory[(2 * i + 5) * n :][:n]
+        combine(row[2:], stages + 1, h, 2 * n, r.memory, r.memory)
+        for e in range(n):
+            x[e] += r.x[e]
+        ti = t + h * row[1]
+        call_take(l.kernels.take_stage, context, i)
+        l.numbers.rates_of, l.numbers.time = w.counters.charts, ti  # as if it had begun already
+        vd = r.memory[(2 * i + 4) * n : (2 * i + 5) * n]
+        status = call_residual(l.kernels.residual, context, ti, h * r.tableau[parts_of(r.tableau).shifts], x, vd, k)
+        if status != 0:
+            return status
+        w.counters.stage_iterations += 1
+        if level >= 0 and i == stages // 2 and _renew_matrices(context, c, r, own, ti, h, level) != 0:
+            return STAGE_FAILED
+        status = call_balance(l.kernels.balance_stage, context, i, k)
+        if status != 0:
+            return STAGE_FAILED
+    return 0
+
+
+@kernel
+def _iterate(context, c, r, own, t, h):
+    """Newton's method for the stages, predicted on entry. Status."""
+    l, s, n, numbers = c.linear, c.saddle, r.x.size, c.linear.numbers
+    moved, zeros, adaptive = r.memory[_rest(r) :][:n], r.memory[_rest(r) + n :][:n], r.numbers.adaptive == 1
+    floor = RESIDUAL_FLOOR / (numbers.rtol + numbers.atol)
+    kappa = KAPPA_COUPLED if adaptive else KAPPA
+    for e in range(n):
+        moved[e] = zeros[e] = 0.0
+    before, theta, renewals, fresh = math.inf, 0.0, 0, False
+    level = -1 if abs(h - own[MADE_FOR]) <= SAME_STEP * h else 0
+    if numbers.slow > 0.0 or own[MADE_FOR] == 0.0 or numbers.known == 0:
+        level = 1
+    for _ in range(COUPLED_ITERATIONS if adaptive else FIXED_ITERATIONS):
+        status = _sweep(context, c, r, own, t, h, level)
+        if status != 0:
+            return status
+        fresh = fresh or level > 0
+        if level >= 0:
+            before, renewals = math.inf, renewals + 1
+        level = -1
+        size = call_solve(l.kernels.solve_stages, context, h, r.tableau, r.memory)
+        if not size < math.inf:
+            return STAGE_FAILED
+        for e in range(n):
+            moved[e] += s.e[e]
+        rate = numbers.left if before == math.inf else size / before
+        if before < math.inf:
+            theta = max(theta, rate)
+            if rate > DIVERGING and size > floor:
+                if renewals == MATRICES:
+                    return STAGE_FAILED
+                level = 2 if fresh else 1
+        elif rate > DIVERGING:
+            rate = GUESS
+        if size <= floor or (level < 0 and size * rate <= kappa * (1.0 - rate)):
+            if theta > 0.0:
+                numbers.left = max(theta, LEAST_COUPLED)
+            numbers.slow = 1.0 if theta > SLOW_COUPLED else 0.0
+            if adaptive and not call_norm(l.kernels.distance, context, moved, zeros, l.now, 1.0, 1.0) < TOO_FAR:
+                return STAGE_FAILED
+            return 0
+        before = size
+    return STAGE_FAILED
+
+
+@callback(STEP)
+def collocation_step(context, run, t, h):
+    """One step of a collocation method; memory as of `memory_of`."""
+    c, r = load(context), load_run(run)
+    n, stages = r.x.size, c.saddle.stages.shape[0]
+    own = r.memory[_rest(r) + (2 + stages) * n :]
+    copy(r.y, r.memory[2 * n : 3 * n])
+    known = _keep_stages(c, r, own, t, h)
+    copy(r.yd, r.memory[3 * n : 4 * n])
+    _predict(c, r, own, h, known)
+    status = _iterate(context, c, r, own, t, h)
+    if status != 0:
+        c.linear.numbers.slow = 1.0
+        return status
+    if known:
+        _choose_points(c, r, own, h)
+    own[H_LAST] = h
+    _sweep_rates(c, r, h)
+    copy(r.memory[:n], r.dx)
+    copy(r.memory[n : 2 * n], r.dy)
+    return 0
+
+
+@kernel
+def _sweep_rates(c, r, h):
+    """vd of every stage from k; the step's increments at the start of the memory."""
+    n, stages = r.x.size, c.saddle.stages.shape[0]
+    for i in range(stages):
+        combine(r.tableau[1 + (i + 1) * (3 + stages) + 2 :], stages + 1, h, 2 * n, r.memory, r.memory)
+        for e in range(n):
+            r.memory[(2 * i + 4) * n + e] = r.y[e] + r.memory[n + e]
+    combine(r.tableau[1 + stages * (3 + stages) + 2 :], stages + 1, h, 2 * n, r.memory, r.memory)

@@ -34,7 +34,7 @@ class Radau(Collocation):
     Parameters
     ----------
     order : 5, 9 or 13, optional
-        By default 13 where both tolerances are below 1e-8, else 9.
+        By default 9, and 13 where both tolerances are below 1e-8; 5 with a fixed step.
 
     Examples
     --------
@@ -64,7 +64,7 @@ class Radau(Collocation):
         super().__init__(rtol, atol, step, max_step, first_step)
         if order is not None and order not in ORDERS:
             raise InvalidArgument(f"Radau: order must be 5, 9 or 13, got {order!r}.")
-        self.order = order or (13 if step is None and max(self.rtol, self.atol) < TIGHT else 9)
+        self.order = order or (5 if step is not None else 13 if max(self.rtol, self.atol) < TIGHT else 9)
         self.embedded_order = self.coupled = (self.order + 1) // 2
 
     def __repr__(self) -> str:

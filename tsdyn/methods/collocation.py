@@ -29,7 +29,7 @@ MOST_STAGES = 9  # the interpolant's polynomials are on the stack
 
 @dataclass(frozen=True)
 class CollocationTableau:
-    """A collocation method: an odd number of nodes c in (0, 1], up to nine, the last one 1.
+    """A collocation method: an odd number of nodes c in (0, 1], three to nine, the last one 1; its order.
 
     The error estimate is that of a quadrature of the order of the number of nodes, which has the step's start as a
     node besides: Hairer and Wanner, Solving ODEs II, IV.8, Eq. (8.17).
@@ -58,6 +58,10 @@ class CollocationTableau:
             raise InvalidArgument(f"{what}: an odd number of nodes, 3 to {MOST_STAGES}, got {self.nodes!r}.")
         if not (c[0] > 0.0 and (np.diff(c) > 0.0).all() and c[-1] == 1.0):
             raise InvalidArgument(f"{what}: nodes lie in (0, 1] in ascending order, the last one is 1.")
+        if not self.order >= c.size + 2:
+            raise InvalidArgument(
+                f"{what}: the order is to exceed the number of nodes by 2 at least, got {self.order!r}."
+            )
         demand(what, **quadrature(self.coefficients[-1], c, self.order))
         values = self.eigenvalues
         if abs(values[0].imag) > 0.0 or not (values.real > 0.0).all() or (values[1::2].imag == 0.0).any():
@@ -111,26 +115,33 @@ class CollocationTableau:
             back += [vectors[:, at].real * (1 + pair), -2.0 * vectors[:, at].imag][: 1 + pair]
         return np.array(there), np.array(back).T
 
+    def output(self) -> Floats:
+        """Values of the derivative at the start and at the nodes to its coefficients of P_j, (s + 1, s + 1).
+
+        Its integrals over a step are those by the weights: the quadrature is exact for it.
+        """
+        return np.linalg.inv(legendre.legvander(2.0 * np.array(self.c) - 1.0, len(self.nodes)))
+
     @cached_property
     def numbers(self) -> Floats:
         """As `RungeKuttaTableau.numbers` with the start as first stage; then those of `parts_of`."""
         c, a, s = np.array(self.c), np.pad(self.coefficients, ((1, 0), (1, 0))), len(self.nodes)
         values = self.eigenvalues
         shifts = [values[0].real, *np.ravel([[z.real, z.imag] for z in values[1::2]])]
-        parts = a[1:, 1:], a[1:, 1:] @ a[1:, 1:], shifts, *self.transformations(), np.linalg.inv(self.basis)
+        parts = a[1:, 1:], a[1:, 1:] @ a[1:, 1:], shifts, *self.transformations(), self.output()
         rows = [[0.0, c[i], *a[i]] for i in range(s + 1)]
         return np.concatenate([[s + 1], np.ravel(rows), a[-1], self.error_weights(), [0.0], *map(np.ravel, parts)])
 
 
 class Parts(NamedTuple):
-    """Where the numbers of a collocation method of s nodes begin: s s each, but s of them for `shifts`."""
+    """Where numbers of a collocation method of s nodes begin: s s each, but s of `shifts`, (s + 1)^2 of `output`."""
 
     a: int  # A
     square: int  # A^2
     shifts: int  # eigenvalues: the real one, then real and imaginary part of one of each pair
     there: int  # stages to coefficients of eigenvectors, and back
     back: int
-    legendre: int  # stages to coefficients of P_j
+    output: int  # what is known of a step to coefficients of P_j
 
 
 @kernel

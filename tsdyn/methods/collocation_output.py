@@ -1,7 +1,7 @@
-"""Motion inside a step of a collocation method: the polynomial x'' through the stages, and its integrals.
+"""Motion inside a step of a collocation method: a polynomial x'' and its integrals.
 
-x'' = sum_j K_j P_j, P_j the shifted Legendre polynomials; x' and x are its integrals from the step's start, which they
-leave and reach exactly. Their errors are of the order of the stages, as the error estimate is.
+x'' = sum_j K_j P_j, P_j the shifted Legendre polynomials, has the values of the step's start and of the stages. Its
+integrals reach x and x' of the step's end, since the quadrature by the stages alone is exact for them.
 """
 
 from functools import cache
@@ -12,34 +12,31 @@ from ..workspaces.run_state import B_DATA, load_run
 from .collocation import MOST_STAGES, parts_of
 from .interpolants import FILL, VALUE, Interpolant
 
-HEAD = 1 + MOST_STAGES  # the number of stages, and their times
-ROOM = MOST_STAGES + 3  # polynomials up to two orders higher
+ROOM = MOST_STAGES + 4  # polynomials, and two of higher order for the integrals
 
 
 @cache
 def interpolant_of(stages):
     """The `Interpolant` of methods with so many stages."""
-    return Interpolant(fill_collocation, collocation, lambda n, nx, ny: HEAD + (3 + stages) * nx, stages + 1)
+    return Interpolant(fill_collocation, collocation, lambda n, nx, ny: 1 + (3 + stages) * nx, stages + 2)
 
 
 @callback(FILL)
 def fill_collocation(context, run):
-    """The times of the stages; x, x' and x'' of the start, K_j."""
+    """The number of coefficients; x and x' of the start; K_j."""
     r = load_run(run)
-    stages, n, p, data = int(r.tableau[0]) - 1, r.x.size, parts_of(r.tableau), r.block[B_DATA:]
-    data[0] = stages
-    for i in range(stages):
-        data[1 + i] = r.tableau[2 + (i + 1) * (3 + stages)]
-    data = data[HEAD:]
+    size, n, data, at = int(r.tableau[0]), r.x.size, r.block[B_DATA:], parts_of(r.tableau).output
+    data[0] = size
+    data = data[1:]
     copy(r.x_old, data)
     copy(r.y_old, data[n:])
-    copy(r.yd_old, data[2 * n :])
-    for j in range(stages):
-        out = data[(3 + j) * n :]
+    for j in range(size):
+        row, out = r.tableau[at + size * j :], data[(2 + j) * n :]
         for e in range(n):
-            out[e] = 0.0
-            for i in range(stages):
-                out[e] += r.tableau[p.legendre + stages * j + i] * r.memory[(2 * i + 5) * n + e]
+            k = 0.0
+            for i in range(size):
+                k += row[i] * r.memory[(2 * i + 3) * n + e]
+            out[e] = k
     return 0
 
 
@@ -64,15 +61,15 @@ def _integrate(first, count, P, Q):
 def collocation(s, h, n, nx, ny, data, x, y):
     """x = x0 + s h x0' + h^2 sum_j K_j (second integral of P_j), and x'."""
     data, x, y = vector(data, ANY), vector(x, nx), vector(y, nx)
-    P, Q, R, stages = stack(ROOM), stack(ROOM), stack(ROOM), int(data[0])
-    _polynomials(s, stages + 2, P)
-    _integrate(s, stages + 1, P, Q)
-    _integrate(0.5 * s * s, stages, Q, R)
-    data = data[HEAD:]
+    P, Q, R, size = stack(ROOM), stack(ROOM), stack(ROOM), int(data[0])
+    _polynomials(s, size + 2, P)
+    _integrate(s, size + 1, P, Q)
+    _integrate(0.5 * s * s, size, Q, R)
+    data = data[1:]
     for e in range(nx):
         a, b = 0.0, 0.0
-        for j in range(stages - 1, -1, -1):
-            k = data[(3 + j) * nx + e]
+        for j in range(size - 1, -1, -1):
+            k = data[(2 + j) * nx + e]
             a += R[j] * k
             b += Q[j] * k
         x[e] = data[e] + h * (s * data[nx + e] + h * a)
@@ -82,19 +79,12 @@ def collocation(s, h, n, nx, ny, data, x, y):
 
 @callback(VALUE)
 def second_derivative(s, h, n, nx, ny, data, x, y):
-    """x'' as y, on the polynomial through the step's start besides; x is left alone."""
+    """x'' as y; x is left alone."""
     data, y = vector(data, ANY), vector(y, nx)
-    P, start, stages, bump = stack(ROOM), stack(ROOM), int(data[0]), 1.0
-    _polynomials(s, stages + 1, P)
-    _polynomials(0.0, stages + 1, start)
-    for i in range(stages):
-        bump *= 1.0 - s / data[1 + i]
-    data = data[HEAD:]
+    P, size = stack(ROOM), int(data[0])
+    _polynomials(s, size, P)
     for e in range(nx):
-        here, there = 0.0, 0.0
-        for j in range(stages - 1, -1, -1):
-            k = data[(3 + j) * nx + e]
-            here += P[j] * k
-            there += start[j] * k
-        y[e] = here + bump * (data[2 * nx + e] - there)
+        y[e] = 0.0
+        for j in range(size - 1, -1, -1):
+            y[e] += P[j] * data[1 + (2 + j) * nx + e]
     return 0

@@ -195,7 +195,8 @@ def _iterate(context, c, r, own, t, h):
     level = -1 if abs(h - own[MADE_FOR]) <= SAME_STEP * h else 0
     if numbers.slow > 0.0 or own[MADE_FOR] == 0.0 or numbers.known == 0:
         level = 1
-    for _ in range(COUPLED_ITERATIONS if adaptive else FIXED_ITERATIONS):
+    most = COUPLED_ITERATIONS if adaptive else FIXED_ITERATIONS
+    for left in range(most - 1, -1, -1):
         status = _sweep(context, c, r, own, t, h, level)
         if status != 0:
             return status
@@ -211,7 +212,7 @@ def _iterate(context, c, r, own, t, h):
         rate = numbers.left if before == math.inf else size / before
         if before < math.inf:
             theta = max(theta, rate)
-            if rate > DIVERGING and size > floor:
+            if size > floor and (rate > DIVERGING or size * rate**left > kappa * (1.0 - rate)):
                 if renewals == MATRICES:
                     return STAGE_FAILED
                 level = 2 if fresh else 1

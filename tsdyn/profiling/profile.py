@@ -144,7 +144,9 @@ def _method(scene, solution, options):
     if options.get("integrator") is not None:
         return method_of(options["integrator"], options.get("rtol"), options.get("atol"))
     method = _first(scene, options)
-    return method if solution.method.startswith(repr(method)) else implicit(method)
+    if solution.method.startswith(repr(method)):
+        return method
+    return implicit(method, prepared(scene), formulation(options.get("formulation", "tangent")))
 
 
 def _observed(method, observer):

@@ -30,6 +30,7 @@ from ..jit.kernels import (
     kernel,
     specialised,
 )
+from ..methods.collocation_step import call_balance, call_factorise, call_solve
 from ..methods.diagonally_implicit import call_correct, call_reduce, call_residual, call_soften
 from ..methods.explicit import ACCELERATE as ACCELERATE_SIGNATURE
 from ..methods.explicit import NORM as NORM_SIGNATURE
@@ -43,7 +44,7 @@ from ..taylor.step_parts import call_expand, call_reach
 # roles: the driver, and the kernels called by address; ROWS is any loop over constraints or forces
 DRIVER, PLACE, ACCELERATE, COMPLETE, CHECK, CHART, STEP, NORM = range(8)
 LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN, EXPAND, REACH = range(8, 15)
-RESIDUAL, CORRECT, DISTANCE, ROWS, ROLES = range(15, 20)
+RESIDUAL, CORRECT, DISTANCE, BALANCE, FACTORISE_STAGES, SOLVE_STAGES, ROWS, ROLES = range(15, 23)
 # roles of the kernels whose addresses drivers are given, by their names in `Kernels` and `StageKernels`
 OF_DRIVERS = {
     "place": PLACE,
@@ -66,6 +67,9 @@ OF_STAGES = {
     "residual": RESIDUAL,
     "correct": CORRECT,
     "distance": DISTANCE,
+    "balance_stage": BALANCE,
+    "factorise_stages": FACTORISE_STAGES,
+    "solve_stages": SOLVE_STAGES,
 }
 # the notes: the clock where the processor has none, what it is given first, what it writes, the factor of its first
 # number; the time last read; the slot and role of what runs in what; addresses that timers stand for; then the slots:
@@ -210,6 +214,30 @@ def _correct(context, g, k):
     return size
 
 
+def _balance(context, i, k):
+    notes = integers(_before(context), ANY)
+    _enter(notes, ROLE * ROLES, ROLE)
+    status = call_balance(notes[TARGETS + ROLE], context, i, k)
+    _leave(notes)
+    return status
+
+
+def _factorise_stages(context, h, tableau):
+    notes = integers(_before(context), ANY)
+    _enter(notes, ROLE * ROLES, ROLE)
+    status = call_factorise(notes[TARGETS + ROLE], context, h, tableau)
+    _leave(notes)
+    return status
+
+
+def _solve_stages(context, h, tableau, memory):
+    notes = integers(_before(context), ANY)
+    _enter(notes, ROLE * ROLES, ROLE)
+    size = call_solve(notes[TARGETS + ROLE], context, h, tableau, memory)
+    _leave(notes)
+    return size
+
+
 def _expand(context, start, end):
     notes, status = integers(_before(context), ANY), 0
     for k in range(start, end):
@@ -277,6 +305,9 @@ TIMERS = {
     RESIDUAL: _timer(_residual, "pddppp", "residual", ROLE=RESIDUAL),
     CORRECT: _timer(_correct, "pdp", "correct", "d", ROLE=CORRECT),
     DISTANCE: _timer(_norm, NORM_SIGNATURE, "distance", "d", ROLE=DISTANCE),
+    BALANCE: _timer(_balance, "pip", "balance", ROLE=BALANCE),
+    FACTORISE_STAGES: _timer(_factorise_stages, "pdp", "factorise_stages", ROLE=FACTORISE_STAGES),
+    SOLVE_STAGES: _timer(_solve_stages, "pdpp", "solve_stages", "d", ROLE=SOLVE_STAGES),
     EXPAND: _timer(_expand, "pii", "expand", ROLE=EXPAND),
     REACH: _timer(_reach, "pdd", "reach", ROLE=REACH),
 }

@@ -1,7 +1,7 @@
-"""Choice of the default method: Taylor; DOP853 where a part of the scene has no series; SDIRK54 where it is stiff.
+"""Choice of the default method: Taylor; DOP853 where a part of the scene has no series; implicit where it is stiff.
 
 Taylor steps with sharp forces are shorter, and no quicker than those of DOP853 in scenes without constraints. Where
-series fail, the run begins again with DOP853. Where the motion is found stiff, SDIRK54 goes on: turns.py.
+series fail, the run begins again with DOP853. Where the motion is found stiff, the implicit method goes on: turns.py.
 """
 
 from ..errors import Status
@@ -21,7 +21,7 @@ def reason(prepared):
         return f"DOP853. {prepared.refusal}"
     if not prepared.pays:
         return "DOP853: a force changes sharply, and without constraints series are no quicker."
-    return "Taylor: every constraint and force has a series. SDIRK54 takes over where the motion is found stiff."
+    return "Taylor: every constraint and force has a series. Radau takes over where the motion is found stiff."
 
 
 def turns_of(scene, prepared, method, options):

@@ -10,7 +10,7 @@ old ones serve, the motion is as stiff as it was.
 from functools import cached_property
 
 from ..ahead.first_run import prepare_first_run
-from ..integrators import SDIRK54, Taylor
+from ..integrators import SDIRK54, Radau, Taylor
 from ..methods.integrator import frozen
 from .tolerances import (
     AGAIN,
@@ -29,10 +29,12 @@ from .tolerances import (
 KEPT = "known", "patience", "taken", "tried", "ask", "window", "jacobians", "began", "lasted"
 
 
-def implicit(method):
-    """Return the implicit method of the same tolerances."""
-    found = SDIRK54(method.rtol, method.atol, max_step=method.max_step)
-    found.margin = STIFF_MARGIN
+def implicit(method, prepared, form):
+    """Return the implicit method of the same tolerances: Radau, or SDIRK54 where all stages at once aren't served."""
+    coupled = form.basis_free and not prepared.rough
+    found = (Radau if coupled else SDIRK54)(method.rtol, method.atol, max_step=method.max_step)
+    if not coupled:
+        found.margin = STIFF_MARGIN
     return frozen(found)
 
 
@@ -68,7 +70,7 @@ class Turns:
     @cached_property
     def implicit(self):
         """The implicit method."""
-        return implicit(self.method)
+        return implicit(self.method, self.prepared, self.options.settings.form)
 
     @cached_property
     def _cost(self):

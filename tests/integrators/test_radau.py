@@ -1,0 +1,190 @@
+"""Radau IIA: orders, agreement with other methods in every kind of scene, work at tight tolerances, what is refused."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.polynomial import legendre
+
+import tsdyn as ts
+from benchmarks.stiff import hung, jointed
+from benchmarks.stiff_chain import chain
+from tests.helpers import closed_loops, locked_scenes, rough_joints
+from tests.helpers.every_force import everything
+from tests.helpers.reference import demand_on_the_manifold
+from tests.helpers.tolerances import CLOSE, EPS
+from tsdyn.stress.gallery import governor, rods
+
+I = ts.integrators
+ORDERS = 5, 9, 13
+compiles = pytest.mark.slow  # kernels of its own, which other methods don't need
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_coefficients_are_those_of_radau_iia(order):
+    """Collocation: A is exact for powers up to the number of stages; L-stable: R(z) -> 0; order 2 s - 1."""
+    tableau, stages = I.Radau(order=order).tableau, (order + 1) // 2
+    A, c = tableau.coefficients, np.array(tableau.nodes)
+    for power in range(stages):
+        np.testing.assert_allclose(A @ c**power, c ** (power + 1) / (power + 1), rtol=0, atol=20 * EPS)
+    for power in range(order):
+        assert abs(A[-1] @ c**power - 1 / (power + 1)) < 20 * EPS
+    assert abs(1.0 - A[-1] @ np.linalg.solve(A, np.ones(stages))) < 1e4 * EPS  # R at infinity
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_stages_fall_apart_by_the_eigenvalues(order):
+    tableau = I.Radau(order=order).tableau
+    there, back = tableau.transformations()
+    values, found = tableau.eigenvalues, there @ tableau.coefficients @ back
+    expected = np.zeros_like(found)
+    expected[0, 0] = values[0].real
+    for i in range(1, len(found), 2):
+        z = values[i]
+        expected[i : i + 2, i : i + 2] = [[z.real, -z.imag], [z.imag, z.real]]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e3 * EPS)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_error_estimate_has_the_order_of_the_stages(order):
+    """With the start as a node besides, its quadrature is exact for powers below the number of stages, not beyond."""
+    tableau, stages = I.Radau(order=order).tableau, (order + 1) // 2
+    weights, c = tableau.error_weights(), np.array(tableau.c)
+    assert weights[0] == tableau.eigenvalues[0].real
+    assert max(abs(weights @ c**power) for power in range(stages)) < 100 * EPS
+    assert abs(weights @ c**stages) > 1e-6
+
+
+@pytest.mark.parametrize(("nodes", "order", "message"), [
+    ((0.5, 1.0), 3, "an odd number of nodes"),
+    ((0.2, 0.6, 0.9), 5, "the last one is 1"),
+    ((0.6, 0.2, 1.0), 5, "in ascending order"),
+    ((0.2, 0.6, 1.0), 5, "b c.3 = 1/4 fails"),
+    ((0.2, 0.6, 1.0), 3, "exceed the number of nodes by 2"),
+], ids=str)  # fmt: skip
+def test_wrong_nodes_are_refused(nodes, order, message):
+    with pytest.raises(ts.InvalidArgument, match=message):
+        ts.CollocationTableau(nodes, order)
+
+
+def test_orders_and_what_chooses_them():
+    chosen = [I.Radau(tol, tol).order for tol in (1e-2, 1e-8, 1e-9)]
+    assert (chosen, I.Radau(step=0.1).order, I.Radau(order=13).order) == ([9, 9, 13], 5, 13)
+    assert repr(I.Radau(1e-3, 1e-4, order=5)) == "Radau(rtol=0.001, atol=0.0001, order=5)"
+    with pytest.raises(ts.InvalidArgument, match="order must be 5, 9 or 13, got 7"):
+        I.Radau(order=7)
+
+
+@pytest.mark.parametrize("form", ["null-space", "maggi-kane"])
+def test_other_forms_are_refused(form):
+    scene = ts.Scene()
+    scene.add_point_mass(1.0)
+    with pytest.raises(
+        ts.InvalidArgument, match=f"Radau solves its stages .* formulation='{form}' is served by .*dop853"
+    ):
+        ts.simulate(scene, (0.0, 1.0), integrator="radau", formulation=form)
+
+
+def test_friction_by_reactions_is_refused_by_name():
+    scene = rough_joints.chain(2)[0]
+    friction = next(force for force in scene.forces if isinstance(force, ts.JointFriction))
+    with pytest.raises(
+        ts.InvalidArgument, match=f"reactions that friction depends on .*{re.escape(friction.name)}.* SDIRK54 does"
+    ):
+        ts.simulate(scene, (0.0, 1.0), integrator="radau")
+
+
+@compiles
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_observed_order(order):
+    """Of a pendulum with a spring and a damper, by fixed steps, down to rounding; between the steps, too."""
+
+    def scene():
+        found = ts.Scene(gravity=(0, 0, -9.81))
+        rod = found.add_body(1.0, (0.01, 0.02, 0.015), position=(0.5, 0, 0), name="rod")
+        found.add(ts.constraints.Spherical(found.ground, rod, point_b=(-0.5, 0, 0)))
+        found.add(ts.forces.Spring(found.ground, rod, point_a=(1, 1, 0), stiffness=20.0, damping=0.3))
+        return found
+
+    times = np.linspace(0.05, 0.95, 19)
+    exact = ts.simulate(scene(), (0, 1), t_eval=[*times, 1.0], integrator=I.Taylor(1e-15)).q
+    errors, between, counts = [], [], {5: (16, 32, 64), 9: (8, 12, 18), 13: (7, 9, 12)}[order]
+    for steps in counts:
+        found = ts.simulate(scene(), (0, 1), integrator=I.Radau(step=1 / steps, order=order), dense_output=True)
+        errors.append(np.abs(found.q[-1] - exact[-1]).max())
+        between.append(np.abs(found.at(times).q - exact[:-1]).max())
+    ratio = np.log(counts[-1] / counts[-2])
+    assert np.log(errors[-2] / errors[-1]) / ratio > order - 1.0
+    assert np.log(between[-2] / between[-1]) / ratio > (order + 1) / 2 + 1.0
+    assert errors[-2] > 1e-13  # and no rounding
+
+
+@compiles
+@pytest.mark.parametrize(("make", "end"), [
+    (jointed, 0.3), (hung, 0.05),
+    (closed_loops.four_bar, 0.5),  # with redundant rows
+    (lambda: locked_scenes.slider_crank(), 0.3),  # bodies that never turn
+    (lambda: locked_scenes.hub(8), 0.1),
+    (lambda: rods.build(rods.loop(6)), 0.2), (lambda: rods.build(rods.net(2, 2)), 0.1),
+    (governor.governor, 0.3),
+    (lambda: everything(np.random.default_rng(3))[0], 0.2),
+    (lambda: chain(5), 0.1),
+], ids=["joint", "springs", "four-bar", "slider", "hub", "loop", "net", "governor", "forces", "chain"])  # fmt: skip
+@pytest.mark.parametrize("tol", [1e-5, 1e-9])
+def test_the_motion_is_that_of_other_methods(make, end, tol):
+    """Errors below the tolerance, also between the steps, and all three levels of the constraints at rounding."""
+    scene, times = make(), np.linspace(0.0, end, 23)
+    other = ts.simulate(scene, (0.0, end), t_eval=times, integrator=I.SDIRK54(1e-11, 1e-11)).raise_if_failed()
+    own = ts.simulate(scene, (0.0, end), integrator=I.Radau(tol, tol), dense_output=True).raise_if_failed()
+    between = own.at(times)
+    np.testing.assert_allclose(between.q, other.q, rtol=tol, atol=tol)
+    np.testing.assert_allclose(between.qd, other.qd, rtol=10 * tol, atol=10 * tol)
+    demand_on_the_manifold(own, own)
+    np.testing.assert_allclose(own.at(own.t).q, own.q, rtol=0, atol=CLOSE)
+    again = ts.simulate(scene, (0.0, end), integrator=I.Radau(tol, tol), t_eval=times)
+    assert again.stats.steps == own.stats.steps  # outputs change no step
+
+
+@compiles
+def test_less_than_half_the_evaluations_of_sdirk54_at_tight_tolerances():
+    """For an error no larger; less than 0.6 matrices a step, and memory in proportion to the number of bodies."""
+
+    def run(method):
+        return ts.simulate(chain(16), (0.0, 0.5), integrator=method).raise_if_failed()
+
+    exact, own, other = (run(method) for method in (I.Radau(1e-11, 1e-11), I.Radau(1e-9, 1e-9), I.SDIRK54(1e-8, 1e-8)))
+    assert np.abs(own.q[-1] - exact.q[-1]).max() < np.abs(other.q[-1] - exact.q[-1]).max()
+    assert 2 * own.stats.evaluations < other.stats.evaluations
+    assert own.stats.iteration_matrices < 0.6 * (own.stats.steps + own.stats.rejected)
+    assert own.stats.stage_iterations < 3 * 7 * (own.stats.steps + own.stats.rejected)
+    assert own.stats.jacobians == 1
+
+
+@compiles
+def test_overdamped_bushings_take_hundreds_of_steps():
+    """Order reduction would take 39,000 of them at 1e8 N/m: the order of the stages is the order that is left."""
+    scene = ts.Scene()
+    arm = scene.add_body(
+        mass=1.0, inertia=(0.1, 0.1, 0.02), position=(0.0, 0.0, -0.5), angular_velocity=(0.5, 0.0, 0.0)
+    )
+    scene.add(ts.forces.Bushing(arm, scene.ground, point_a=(0.0, 0.0, 0.5), stiffness=1e8, damping=1e5))
+    found = ts.simulate(scene, (0.0, 2.0), integrator=I.Radau(1e-8, 1e-8)).raise_if_failed()
+    assert found.stats.steps < 400
+
+
+@compiles
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_interpolant_is_exact_for_polynomials(order):
+    """A force that is a polynomial of time of the degree of the stages: position and velocity between the steps."""
+    stages = (order + 1) // 2
+    series = legendre.leg2poly(np.eye(stages + 1)[-1])
+    scene, span = ts.Scene(gravity=(0, 0, 0)), (0.0, 1.0)
+    ball = scene.add_point_mass(1.0)
+    scene.add(ts.forces.PointForce(ball, force=(ts.motions.Polynomial(series.tolist()), 0.0, 0.0)))
+    found = ts.simulate(scene, span, integrator=I.Radau(step=0.25, order=order), dense_output=True)
+    t = np.linspace(0.0, 1.0, 41)
+    force = np.polynomial.Polynomial(series)
+    state = found.at(t)
+    np.testing.assert_allclose(state.q[:, 0], force.integ(2)(t), rtol=0, atol=1e2 * EPS)
+    np.testing.assert_allclose(state.qd[:, 0], force.integ()(t), rtol=0, atol=1e2 * EPS)
+    np.testing.assert_allclose(state.qdd[:, 0], force(t), rtol=0, atol=1e3 * EPS)

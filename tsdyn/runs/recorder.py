@@ -28,7 +28,11 @@ class Recorder:
         The charts before those of the log; or None.
     most : int
         Steps of a slice at most.
+    interrupted : bool
+        Whether Ctrl-C came when the run had ended, perhaps for another segment to go on.
     """
+
+    interrupted = False
 
     def __init__(self, task, run, redundant):
         self.run, self.times, self.stops, self.archive = run, task.times, task.stops, task.archive

@@ -58,6 +58,7 @@ def run(task, engine, observe=None, relay=None, past=None):
     driven = drive(advanced if past is None else past(advanced), task, watch)
     if relay is not None and driven[0] in (PASSAGE, STIFF):
         relay.leave(memory)
+        relay.interrupted = driven[2].interrupted
     outcome = _outcome(task, engine, memory, driven, readings, watch, began)
     if observe is None and outcome.status is not NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give(engine.kind, memory)

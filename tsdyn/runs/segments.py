@@ -15,6 +15,7 @@ class Relay:
 
     def __init__(self, passes=False):
         self.watch, self.passes = None, passes
+        self.interrupted = False  # whether Ctrl-C came when a part had just ended
         self.h = 0.0  # s, of the first step of the next part; zero for its own choice
         self.share = self.largest = (
             0.0  # of the weakest row, where the last part ended, and at most; see singularity.py

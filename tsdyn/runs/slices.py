@@ -211,6 +211,8 @@ def drive(memory, task, watch):
             slices.status = Status.SUCCESS
         elif slices.status is SLICE_DONE:
             slices.status = Status.INTERRUPTED
+        else:  # the segment had ended: the next one is not to begin
+            recorder.interrupted = True
     finally:
         task.report(None)
     recorder.close()

@@ -91,6 +91,8 @@ class _Segments:
         parts, role = self.parts, self.passed[-1]["next"] if self.passed else self._pass()
         try:
             while role is not None:
+                if self.relay.interrupted:
+                    raise KeyboardInterrupt
                 rest = self._rest()
                 if rest.max_steps == 0:
                     parts[-1] = parts[-1]._replace(status=Status.MAX_STEPS)

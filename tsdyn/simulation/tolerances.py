@@ -8,7 +8,7 @@ TRIAL = 20
 # fast modes have decayed, which steps at the limit of stability have kept alive.
 FIRST_WINDOW, SETTLED = 10, 80
 # Implicit steps after which the explicit method is tried, and its steps in such a trial.
-PATIENCE, TRIED = 100, 20
+PATIENCE, TRIED = 30, 20
 # Factor of the steps until a method that did not pay is considered again, and until the explicit one is tried though
 # the Jacobian has served all the time; of the work, with which a trial ends early.
 AGAIN = 4

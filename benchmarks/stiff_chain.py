@@ -7,7 +7,7 @@ Columns: tolerance; steps and rejected steps; iterations a stage; iteration matr
 of a warm run; the largest error of the last positions against tolerances of 1e-9, where that takes less than a minute;
 d log step / d log N; peak memory of the process.
 
-Run it: python -m benchmarks.stiff_chain [--links N ...] [--tolerances TOL ...]
+Run it: python -m benchmarks.stiff_chain [--method Radau] [--links N ...] [--tolerances TOL ...]
 """
 
 import argparse
@@ -21,7 +21,6 @@ import tsdyn as ts
 Y, X = (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
 LENGTH, MASS = 0.1, 1.0  # m, kg
 LINKS, TOLERANCES = (4, 16, 64, 256, 1024), (1e-2, 1e-4)
-STAGES = len(ts.integrators.SDIRK54.tableau.c) - 1  # implicit ones
 HEAD = " links     tol  steps  rej.   it. matr.  ms/step       s    error growth     MB"
 ROW = "{:6d} {:7.0e} {:6d} {:5d} {:5.2f} {:5.2f} {:8.3f} {:7.3f} {:8.1e} {:6.2f} {:6.0f}"
 COMPARED = 64  # links up to which a reference is computed
@@ -44,25 +43,25 @@ def chain(links):
     return scene
 
 
-def _run(scene, end, tol):
-    solution = ts.simulate(scene, (0.0, end), integrator=ts.integrators.SDIRK54(tol, tol), t_eval=(0.0, end))
-    return solution.raise_if_failed()
+def _run(scene, end, method):
+    return ts.simulate(scene, (0.0, end), integrator=method, t_eval=(0.0, end)).raise_if_failed()
 
 
 def _positions(solution):
     return np.stack([solution.position(body)[-1] for body in solution.scene.bodies])
 
 
-def measure(links, tolerances):
-    """Yield a row of each tolerance: (tolerance, stats, seconds of a warm run, error or nan)."""
+def measure(links, tolerances, kind):
+    """Yield a row of each tolerance: (tolerance, stages, stats, seconds of a warm run, error or nan)."""
     scene, end = chain(links), min(1.0, WORK / links)
-    reference = _positions(_run(scene, end, 1e-9)) if links <= COMPARED else np.nan
+    reference = _positions(_run(scene, end, kind(1e-9, 1e-9))) if links <= COMPARED else np.nan
     for tol in tolerances:
-        _run(scene, 0.01 * end, tol)
+        method = kind(tol, tol)
+        _run(scene, 0.01 * end, method)
         began = time.perf_counter()
-        solution = _run(scene, end, tol)
+        solution = _run(scene, end, method)
         seconds = time.perf_counter() - began
-        yield tol, solution.stats, seconds, np.abs(_positions(solution) - reference).max()
+        yield tol, len(method.tableau.c) - 1, solution.stats, seconds, np.abs(_positions(solution) - reference).max()
 
 
 def main():
@@ -70,17 +69,19 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--links", type=int, nargs="+", default=LINKS)
     parser.add_argument("--tolerances", type=float, nargs="+", default=TOLERANCES)
+    parser.add_argument("--method", default="SDIRK54", choices=("SDIRK54", "Radau"))
     options = parser.parse_args()
     print(HEAD)
     before = {}
     for links in options.links:
-        for tol, stats, seconds, error in measure(links, options.tolerances):
+        kind = getattr(ts.integrators, options.method)
+        for tol, stages, stats, seconds, error in measure(links, options.tolerances, kind):
             tried = stats.steps + stats.rejected
             step, growth = 1e3 * seconds / tried, np.nan
             if tol in before:
                 growth = np.log(step / before[tol][1]) / np.log(links / before[tol][0])
             before[tol] = links, step
-            iterations, matrices = stats.stage_iterations / STAGES / tried, stats.iteration_matrices / tried
+            iterations, matrices = stats.stage_iterations / stages / tried, stats.iteration_matrices / tried
             memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
             row = links, tol, stats.steps, stats.rejected, iterations, matrices, step, seconds, error, growth, memory
             print(ROW.format(*row), flush=True)

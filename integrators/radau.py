@@ -11,8 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import legendre
 
-from ..errors import InvalidArgument
-from ..plugins import Collocation, CollocationTableau
+from ..plugins import Collocation, CollocationTableau, InvalidArgument
 
 ORDERS = 5, 9, 13
 TIGHT = 1e-8  # tolerance below which order 13 takes less work than order 9

@@ -28,7 +28,7 @@ from ..rows.interface import (
 from ..workspaces.workspace import load
 from .chart_coordinates import factorise_normal, turn_accelerations
 from .saddle_point import add_blocks, turned_back
-from .stage_equations import find_imbalance, find_normal_part, spread_normal
+from .stage_balance import find_imbalance, find_normal_part, spread_normal
 from .tangent_error import weighted_square
 
 KERNELS = "take_stage", "balance_stage", "factorise_stages", "solve_stages"

@@ -21,40 +21,30 @@ import math
 from ..elements.loops.body_poses import write_positions, write_velocities
 from ..errors import Status
 from ..jit.kernels import callback, kernel, vector
-from ..jit.simd import add, four, lanes, put, splat
+from ..jit.simd import add, four, lanes, put
 from ..maths.dense_linalg import copy, largest
 from ..methods.explicit import NORM
 from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
-    DYNAMICS,
     apply_multipliers,
-    clear_redundant,
     evaluate_bias,
     evaluate_drift,
     evaluate_rows,
-    factorise_selected_rows,
     multiply_rates,
-    multiply_rows,
-    solve_product,
-    solve_rows,
     solve_saddle,
-    take_reactions,
-    weigh,
-    weigh_bodies,
 )
 from ..workspaces.workspace import load
 from .accelerations import body_forces
-from .chart_coordinates import displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
+from .chart_coordinates import displace, factorise_normal, turn_accelerations, turn_rates
 from .projection import largest_residual, velocity_floor
-from .saddle_point import degrees, take_solution, turned_back
+from .saddle_point import take_solution, turned_back
+from .stage_balance import add_to, find_imbalance, find_normal_part, solve_normal, spread_normal
 from .tangent_error import weighted_square
 from .tolerances import (
     FARTHEST_AHEAD,
     LAG,
     LEAST_LAG,
     LEFT,
-    REACTION_SWEEPS,
-    REACTIONS_LEFT,
     ROUNDING_AT_MOST,
     SLOW,
     STALLED,
@@ -127,24 +117,9 @@ def _renew_normal(c):
 
 
 @kernel
-def _add(x, out):
-    """Add x to out."""
-    for i in range(x.size):
-        out[i] += x[i]
-
-
-@kernel
-def _solve_normal(c):
-    """f.b <- N^-1 f.b, by factors that may be of an older place, such as q0 of the chart."""
-    l = c.chart
-    lower, upper = (l.lower, l.upper) if l.state.made == 1 else (l.rows0.S, l.rows0.S)
-    solve_product(c.graph, lower, upper, c.tangent.b)
-
-
-@kernel
 def _take_off(c, x):
     """f.b <- N^-1 f.b and x -= Y0 f.b; s.r is the change of x."""
-    _solve_normal(c)
+    solve_normal(c)
     spread_normal(c, c.tangent.b)
     for i in range(x.size):
         x[i] += c.saddle.r[i]
@@ -186,7 +161,7 @@ def _solve_positions(c, t, g):
                     return SINGULAR
                 renewed = True
         _take_off(c, l.x)
-        _add(f.b, w.u)
+        add_to(f.b, w.u)
         w.counters.newton += 1
         if numbers.lag * _rate_size(c, s.r) <= g * LEFT:
             return OK if displace(graph, l, f.poses) else CHART_LOST
@@ -209,7 +184,7 @@ def _solve_rates(c, t):
             floor = velocity_floor(graph, w, f)
         multiply_rates(graph, f.rows, f.poses, f.b)
         if rheonomic:
-            _add(l.drift, f.b)
+            add_to(l.drift, f.b)
         worst = largest_residual(graph, w, f)
         if not worst < math.inf:
             return NOT_FINITE
@@ -222,7 +197,7 @@ def _solve_rates(c, t):
                 return SINGULAR
             renewed = True
         _take_off(c, l.y)
-        _add(f.b, s.z)
+        add_to(f.b, s.z)
         if numbers.lag * _rate_size(c, s.r) <= LEFT:
             turn_rates(graph, l, l.y, f.poses)
             return OK
@@ -263,84 +238,6 @@ def _correct_normal_part(c, g, k):
     for e in range(f.b.size):
         w.u[e] -= g * g * f.b[e]
         s.z[e] -= g * f.b[e]
-
-
-@kernel
-def find_normal_part(c):
-    """s.r = n for the accelerations s.a; f.b are its multipliers, n = -Y0 f.b."""
-    f, s = c.tangent, c.saddle
-    if f.b.size > 0:
-        multiply_rows(c.graph, f.rows, s.a, f.b)
-        _add(f.gamma, f.b)
-        _solve_normal(c)
-    spread_normal(c, f.b)
-
-
-@kernel
-def spread_normal(c, b):
-    """s.r = -Y0 b."""
-    s = c.saddle
-    for i in range(s.r.size):
-        s.r[i] = 0.0
-    apply_multipliers(c.graph, c.chart.rows0, b, s.r)
-
-
-@kernel
-def find_imbalance(c):
-    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for the rows. False if S is singular."""
-    f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
-    to_bodies(graph, l, s.r, f.Z)
-    _add(s.a, f.Z)
-    for b in range(graph.bodies.shape[0]):
-        weigh(graph.mass, b, f.Z, 8 * b, f.Z, 8 * b)
-    for i in range(s.e.size):
-        s.e[i] = s.loads[i] - f.Z[i]
-    take_reactions(graph, f.rows, s.multipliers, s.e)
-    if f.b.size > 0 and not _settle_reactions(c):
-        return False
-    for i in range(s.x.size):
-        s.x[i] = 0.0
-    for b in range(graph.bodies.shape[0]):
-        at, o = s.graph.body_at[b], 8 * b
-        for i in range(degrees(graph, b)):
-            s.x[at + i] = s.e[o + i + i // 3]
-    return True
-
-
-@kernel
-def _settle_reactions(c):
-    """Correct lam by S^-1 H W e until H W e, e = F - M (a + C n) - H^T lam, is small; s.e = e. False if S is singular.
-
-    H of the saddle-point matrix may be that of an older place: it would take a part of what is left for a load. S is of
-    an older place, too, as long as it contracts: of the step's start at first.
-    """
-    w, f, s, graph, least, before, renewed = c.work, c.tangent, c.saddle, c.graph, 0.0, math.inf, False
-    lean = graph.axes.rows.shape[0] > 0  # S is of another metric than W
-    for sweep in range(REACTION_SWEEPS):
-        copy(s.e, f.Z)
-        put(f.Z, 8 * graph.bodies.shape[0], splat(0.0))  # the ground
-        put(f.Z, 8 * graph.bodies.shape[0] + 4, splat(0.0))
-        weigh_bodies(graph, f.Z)
-        multiply_rows(graph, f.rows, f.Z, f.b)
-        worst = largest_residual(graph, w, f)
-        if sweep == 0:
-            least = REACTIONS_LEFT * worst
-        if worst <= least:
-            return True
-        if lean:
-            _solve_normal(c)
-        else:
-            if worst > SLOW * before and not renewed:
-                w.counters.factorizations += 1
-                if factorise_selected_rows(graph, f, f.rows, DYNAMICS) >= 0:
-                    return False
-                renewed = True
-            solve_rows(graph, f.rows, f.b)
-            clear_redundant(f, f.b)  # which others may have been when S was made
-        _add(f.b, s.multipliers)
-        take_reactions(graph, f.rows, f.b, s.e)
-        before = worst
-    return True
 
 
 @callback(NORM, "d")

@@ -46,7 +46,7 @@ class CollocationTableau:
     ...     ts.CollocationTableau((0.2, 0.6, 1), order=5)
     ... except ts.InvalidArgument as error:
     ...     print(error)
-    CollocationTableau: the condition b c^3 = 1/4 fails by 0.00333.
+    CollocationTableau: the condition b c^3 = 1/4 fails by 0.01.
     """
 
     nodes: Sequence[float]

@@ -132,7 +132,7 @@ def test_no_garbage_is_collected_while_a_scene_is_packed(monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="a process can't press its own Ctrl-C")
-@pytest.mark.parametrize("method", ["taylor", "dop853", "sdirk54"])
+@pytest.mark.parametrize("method", ["taylor", "dop853", "sdirk54", "radau"])
 def test_ctrl_c(method):
     """Pressed while a large scene makes a step."""
     scene = mechanisms.build(mechanisms.chain(1500))

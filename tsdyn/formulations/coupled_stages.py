@@ -64,29 +64,29 @@ def balance_stage(context, i, k):
     return OK
 
 
-@callback("pdp")
-def factorise_stages(context, h, tableau):
-    """Factors of the matrices of all eigenvalues at the present H, K and C. Status."""
-    c = load(context)
-    f, s, graph = c.tangent, c.saddle, c.graph
-    tableau, size = vector(tableau, ANY), s.graph.pattern.shape[1]
-    shifts = tableau[parts_of(tableau).shifts :]
-    write_saddle_rows(graph, f, s)
-    add_blocks(graph, s, s.upper, s.lower, 0.0, True)
-    for pair in range(s.complex_upper.shape[0]):
-        lower = complex_vector(data_of(s.complex_lower[pair]), size)
-        upper = complex_vector(data_of(s.complex_upper[pair]), size)
-        for i in range(size):
-            lower[i], upper[i] = s.lower[i], s.upper[i]
-        g = complex(h * shifts[1 + 2 * pair], h * shifts[2 + 2 * pair])
-        add_blocks(graph, s, upper, lower, g, False)
-        if not factorise_complex_saddle(s, pair):
+@callback("pdpi")
+def factorise_stages(context, h, tableau, i):
+    """Factors of the matrix of pair i of eigenvalues at the present H, K and C, then of the real one. Status.
+
+    Called for i = 0, 1, ...: between the calls Ctrl-C is answered.
+    """
+    c, tableau = load(context), vector(tableau, ANY)
+    f, s, graph, shifts = c.tangent, c.saddle, c.graph, tableau[parts_of(tableau).shifts :]
+    if i == 0:
+        c.work.counters.iteration_matrices += 1
+        write_saddle_rows(graph, f, s)
+        add_blocks(graph, s, s.upper, s.lower, 0.0, True)
+    if i == s.complex_upper.shape[0]:
+        add_blocks(graph, s, s.upper, s.lower, h * shifts[0], False)
+        if f.b.size > 0 and not factorise_normal(graph, c.work, f, c.chart):
             return SINGULAR
-    add_blocks(graph, s, s.upper, s.lower, h * shifts[0], False)
-    c.work.counters.iteration_matrices += 1
-    if f.b.size > 0 and not factorise_normal(graph, c.work, f, c.chart):
-        return SINGULAR
-    return OK if factorise_saddle(s) else SINGULAR
+        return OK if factorise_saddle(s) else SINGULAR
+    size = s.graph.pattern.shape[1]
+    lower, upper = complex_vector(data_of(s.complex_lower[i]), size), complex_vector(data_of(s.complex_upper[i]), size)
+    for e in range(size):
+        lower[e], upper[e] = s.lower[e], s.upper[e]
+    add_blocks(graph, s, upper, lower, complex(h * shifts[1 + 2 * i], h * shifts[2 + 2 * i]), False)
+    return OK if factorise_complex_saddle(s, i) else SINGULAR
 
 
 @callback("pdpp", "d")

@@ -44,7 +44,7 @@ T_LAST, H_LAST, CHART_LAST, H_BEFORE, POINTS, MADE_FOR, OWN = range(7)
 
 call_take = caller("pi")
 call_balance = caller("pip")
-call_factorise = caller("pdp")
+call_factorise = caller("pdpi")
 call_solve = caller("pdpp", "d")
 
 
@@ -144,8 +144,9 @@ def _renew_matrices(context, c, r, own, t, h, level):
         level = 2
     if status == 0 and level > 0:
         call_reduce(l.kernels.reduce, context, t)
-    if status == 0:
-        status = call_factorise(l.kernels.factorise_stages, context, h, r.tableau)
+    for i in range(c.saddle.complex_upper.shape[0] + 1):
+        if status == 0:
+            status = call_factorise(l.kernels.factorise_stages, context, h, r.tableau, i)
     own[MADE_FOR] = h if status == 0 else 0.0
     l.numbers.g, l.numbers.slow = h * r.tableau[parts_of(r.tableau).shifts] if status == 0 else 0.0, 0.0
     return status

@@ -222,10 +222,10 @@ def _balance(context, i, k):
     return status
 
 
-def _factorise_stages(context, h, tableau):
+def _factorise_stages(context, h, tableau, i):
     notes = integers(_before(context), ANY)
     _enter(notes, ROLE * ROLES, ROLE)
-    status = call_factorise(notes[TARGETS + ROLE], context, h, tableau)
+    status = call_factorise(notes[TARGETS + ROLE], context, h, tableau, i)
     _leave(notes)
     return status
 
@@ -306,7 +306,7 @@ TIMERS = {
     CORRECT: _timer(_correct, "pdp", "correct", "d", ROLE=CORRECT),
     DISTANCE: _timer(_norm, NORM_SIGNATURE, "distance", "d", ROLE=DISTANCE),
     BALANCE: _timer(_balance, "pip", "balance", ROLE=BALANCE),
-    FACTORISE_STAGES: _timer(_factorise_stages, "pdp", "factorise_stages", ROLE=FACTORISE_STAGES),
+    FACTORISE_STAGES: _timer(_factorise_stages, "pdpi", "factorise_stages", ROLE=FACTORISE_STAGES),
     SOLVE_STAGES: _timer(_solve_stages, "pdpp", "solve_stages", "d", ROLE=SOLVE_STAGES),
     EXPAND: _timer(_expand, "pii", "expand", ROLE=EXPAND),
     REACH: _timer(_reach, "pdd", "reach", ROLE=REACH),

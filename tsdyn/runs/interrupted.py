@@ -46,6 +46,12 @@ def factorise(context, g):
     return INTERRUPTED
 
 
+@callback("pdpi")
+def factorise_stages(context, h, tableau, i):
+    """In place of `factorise_stages`."""
+    return INTERRUPTED
+
+
 @callback("pi")
 def expand(context, k):
     """In place of `expand`."""
@@ -61,7 +67,7 @@ def reach(context, t, h):
 STAND_INS = {
     "place": place, "accelerate": accelerate, "start_chart": start_chart, "reach": reach, "accelerate_here": reach,
     "pass_singular": reach, "expand": expand, "linearise": place, "reduce": factorise, "factorise": factorise,
-    "residual": residual,
+    "residual": residual, "factorise_stages": factorise_stages,
 }  # fmt: skip
 
 

@@ -55,6 +55,10 @@ class Recorder:
         history = np.empty((rows + 2 * TRIES, 3))
         self.log = RunLog(self.times, self.stops, self.out, history, self.charts, self.points, self.blocks)
 
+    def adopt(self, log):
+        """Go on from a first slice whose records are in this log."""
+        self.log, self.out, self.charts = log, log.out, log.charts
+
     def close(self):
         """Put the slices together."""
         run = self.run.numbers

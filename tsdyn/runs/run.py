@@ -18,6 +18,7 @@ import time
 
 from ..errors import Status
 from ..jit.interrupts import CollectionsDeferred
+from .brief import Brief, begin, has_ended_well, limit_of
 from .counts import Counts
 from .run_log import left_open
 from .sampling import Sampled
@@ -29,8 +30,8 @@ from .trajectory import Trajectory
 NOT_FINITE, PASSAGE, STIFF = Status.NOT_FINITE, Status.PASSAGE, Status.STIFF
 
 
-def run(task, engine, observe=None, relay=None, past=None):
-    """Run a `Task` by a kind of engine; the `Outcome`.
+def run(task, engine, observe=None, relay=None, past=None, briefly=False):  # six: three for all runs
+    """Run a `Task` by a kind of engine; the `Outcome`, or a `Brief` where a run of which little is asked allows it.
 
     `observe` is given the memory before the run: one of its own. With a `Relay` the run is a segment of one; where
     there is a way past singular configurations, it ends with Status.PASSAGE next to one. `past(memory)` makes what is
@@ -54,6 +55,8 @@ def run(task, engine, observe=None, relay=None, past=None):
     if task.events is not None:
         watch = (relay or Relay()).watching(task, readings[0])
     began = time.perf_counter()
+    if briefly:
+        return go_on(task, engine, memory, begin(memory, task.times, task.stops, limit_of(memory.run, task)), began, relay)
     advanced = memory if task.sampling is None else Sampled(memory, task.sampling)
     driven = drive(advanced if past is None else past(advanced), task, watch)
     if relay is not None and driven[0] in (PASSAGE, STIFF):
@@ -61,6 +64,21 @@ def run(task, engine, observe=None, relay=None, past=None):
     outcome = _outcome(task, engine, memory, driven, readings, watch, began)
     if observe is None and outcome.status is not NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give(engine.kind, memory)
+    return outcome
+
+
+def go_on(task, engine, memory, begun, began, relay):
+    """The outcome of a run after its first slice."""
+    if has_ended_well(memory, begun):
+        outcome = Brief(memory, begun, task.history, began)
+    else:
+        memory.room = None  # which the recorder takes
+        driven = drive(memory, task, None, begun)
+        if relay is not None and driven[0] in (PASSAGE, STIFF):
+            relay.leave(memory)
+        outcome = _outcome(task, engine, memory, driven, (None, None), None, began)
+    if outcome.status is not NOT_FINITE:
+        task.prepared.give(engine.kind, memory)
     return outcome
 
 
@@ -76,5 +94,5 @@ def _outcome(task, engine, memory, driven, readings, watch, began):
     found = None if watch is None else watch.found(task.prepared.n)
     return Outcome(
         status, reason, recorder.out, recorder.steps, recorder.chart_history(charts), run.clock.t,
-        last, run.remembered.copy(), Counts(memory, engine.skipped), trajectory, found, began,
+        last, run.remembered.copy(), Counts.of(memory), trajectory, found, began,
     )  # fmt: skip

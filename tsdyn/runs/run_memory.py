@@ -2,6 +2,7 @@
 
 import math
 from operator import is_
+from typing import NamedTuple
 
 from ..errors import Status
 from ..jit.kernels import resident
@@ -16,6 +17,15 @@ from .tolerances import LONG_STEPS, PIECE
 
 UNLIMITED = 2**62  # steps wanted of an adaptive run
 STATUSES = {int(status): status for status in Status}
+
+
+class Told(NamedTuple):
+    """What the records of a run don't say."""
+
+    n: int
+    remembered: int  # angles and slots
+    skipped: tuple  # as of an engine
+    has_forces: bool
 
 
 class Memory:
@@ -34,6 +44,7 @@ class Memory:
 
     reason = ""  # of the end of a run: told by its status
     engine = None  # that it is laid out for
+    room = None  # of a first slice: a `brief.Room`
     advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
 
     def __init__(self, prepared, graph, context, run):
@@ -42,9 +53,9 @@ class Memory:
         self.settle(context)
         self._run, *self._keep_run = resident(run)
         work, tables = context.work, (run.now, run.before, run.remembered, run.frames, run.tableau)
-        state, rest = divided(work.q.base, work.control, work.counters, work.q, work.qd, work.qdd)
-        run_state, self._run_scratch = divided(run.now.base, run.clock, run.numbers, run.kernels, *tables)
-        self._laid_out = [run_state, state]  # what a run finds as it was laid out,
+        self.state, rest = divided(work.q.base, work.control, work.counters, work.q, work.qd, work.qdd)
+        self.run_state, self._run_scratch = divided(run.now.base, run.clock, run.numbers, run.kernels, *tables)
+        self._laid_out = [self.run_state, self.state]  # what a run finds as it was laid out,
         self._scratch = [rest] if rest.size else []  # and what it finds zero
         self._images, self._start = [], ()
 
@@ -85,6 +96,10 @@ class Memory:
         arrays, records = selection_parts(self.context.tangent)
         return [*self._laid_out, *self._scratch, self.context.system.reals, *arrays, *map(words, records)]
 
+    def records(self):
+        """Copies of what a run leaves: of `Run` and of `Work` what they begin with."""
+        return self.run_state.copy(), self.state.copy()
+
     def _lay_out(self, engine, task):
         """Enter what engine and task say, and load the driver where this process has not called it yet."""
         self.engine = None
@@ -93,6 +108,7 @@ class Memory:
         self._enter_method(engine.method)
         engine.lay_out(self)
         self.engine = engine
+        self.told = Told(self.run.now.shape[1], self.run.remembered.size, engine.skipped, bool(self.packed.loads))
         self._enter_start(task)
         self.load()
 

@@ -33,9 +33,9 @@ GIVEN_UP = (  # by the implicit method: the explicit one goes on
 
 def run_segments(task, engine, observe=None):
     """Run a `Task` by the engine of its method; return the `Outcome`. An observed run has one segment."""
-    passes = engine is StepEngine and not task.form.first_order
-    if observe is not None or not (task.choose or (passes and not task.prepared.refusal)):
-        return run(task, engine, observe)
+    briefly = observe is None and asks_little(task)
+    if observe is not None or not is_relayed(task, engine):
+        return run(task, engine, observe, briefly=briefly)
     relay = Relay(not task.form.first_order and not task.prepared.refusal)
     passed = task.archive.passed if task.archive else []
     try:
@@ -45,10 +45,23 @@ def run_segments(task, engine, observe=None):
                 task.choose.restore(passed[-1]["turns"])
             return _Segments(task, engine, relay, [_recalled(known) for known in passed]).go_on()
         first = task if task.report is silent else task._replace(report=_until_its_end(task.report))
-        outcome = run(first, engine, relay=relay)
+        outcome = run(first, engine, relay=relay, briefly=briefly)
         return _Segments(task, engine, relay, [outcome]).go_on() if outcome.status in (PASSAGE, STIFF) else outcome
     finally:
         task.report(None)
+
+
+def asks_little(task):
+    """Whether nothing is asked of a run between the ends of its slices, nor the interpolants of its steps."""
+    asked = task.events is not None or task.dense_output or task.sampling is not None or task.archive is not None
+    return task.report is silent and not asked
+
+
+def is_relayed(task, engine):
+    """Whether a run may have more than one segment."""
+    return task.choose is not None or (
+        engine is StepEngine and not task.form.first_order and not task.prepared.refusal
+    )
 
 
 def _until_its_end(report):

@@ -1,0 +1,173 @@
+"""The first slice of a run, and what is kept of a run that ends well within it, as most runs of small scenes do.
+
+Its records lie in arrays that the memory keeps. A run that ends there leaves copies of them; what a solution says of it
+is made when it is asked for. A longer run goes on from there: see `slices.drive`.
+"""
+
+import ctypes
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import Status
+from ..workspaces.run_state import Clock, Kernels, Numbers
+from ..workspaces.workspace import Control, Counters
+from . import slices
+from .counts import Counts
+from .history import FEW_ROWS, ChartLog, StepLog
+from .recorder import CHART_ROOM, NO_ROWS
+from .run_log import RunLog, with_end
+from .task import Outcome
+from .tolerances import TRIES
+
+SUCCESS = Status.SUCCESS
+NUMBERS, COUNTERS = ctypes.sizeof(Clock), ctypes.sizeof(Control)  # bytes before them, as `Memory` lays them out
+NOW = sum(map(ctypes.sizeof, (Clock, Numbers, Kernels))) // 8  # numbers before q
+
+
+class Begun(NamedTuple):
+    """A run after its first slice."""
+
+    log: RunLog
+    rows: int  # steps that there was room for
+    status: Status  # None where Ctrl-C was pressed meanwhile
+    seconds: float
+
+
+class Room(NamedTuple):
+    """Where a memory keeps the records of a first slice."""
+
+    most: int  # steps
+    history: np.ndarray
+    charts: np.ndarray
+    out: np.ndarray  # of every step
+
+
+def limit_of(run, task):
+    """How many steps a run may make."""
+    return run.numbers.steps_wanted + len(task.stops) if task.max_steps is None else task.max_steps
+
+
+def begin(memory, times, stops, limit):
+    """Make the first slice of a run that has been entered; the `Begun`."""
+    most, room = slices.first_slice(memory.weight), memory.room
+    if room is None or room.most != most:
+        room = memory.room = _room_for(memory, most)
+    out = np.empty((times.size, room.out.shape[1])) if times.size else room.out
+    log, rows, started = RunLog(times, stops, out, *room[1:3], NO_ROWS, NO_ROWS), min(most, limit), time.perf_counter()
+    try:
+        status = memory.advance(log, rows)
+    except KeyboardInterrupt:
+        status = None
+    return Begun(log, rows, status, time.perf_counter() - started)
+
+
+def _room_for(memory, most):
+    run = memory.run
+    width = 1 + run.now.size + run.remembered.size
+    return Room(most, np.empty((most + 2 * TRIES, 3)), np.empty((2 * CHART_ROOM, 5)), np.empty((most + 1, width)))
+
+
+def has_ended_well(memory, begun):
+    """Whether that was all, and there is nothing more to look at."""
+    return begun.status is SUCCESS and memory.run.numbers.near_steps == 0
+
+
+class Remains:
+    """Copies of the records of a run, and what they say, as of an `Outcome`.
+
+    Parameters
+    ----------
+    memory : Memory
+        At the end of the run.
+    log : RunLog
+    keeps : bool
+        Whether the histories of steps and charts are kept.
+    """
+
+    __slots__ = ("_charts", "_run", "_steps", "_told", "_work")
+
+    def __init__(self, memory, log, keeps):
+        self._told, (self._run, self._work) = memory.told, memory.records()
+        self._steps = self._charts = None
+        if keeps:
+            run = memory.run.numbers
+            steps = log.history[: run.history]
+            self._steps = steps.copy() if len(steps) < FEW_ROWS else _logged(steps)
+            self._charts = log.charts[: run.chart_rows + 1].copy()
+
+    @property
+    def reached(self):
+        """Time, s."""
+        return float(self._run[0])
+
+    @property
+    def last(self):
+        """q, qd, qdd there, (3, n)."""
+        n = self._told.n
+        return self._run[NOW : NOW + 3 * n].reshape(3, n)
+
+    @property
+    def remembered(self):
+        """Angles of joints there, and what forces remember."""
+        at = NOW + 6 * self._told.n
+        return self._run[at : at + self._told.remembered]
+
+    @property
+    def steps(self):
+        """The `StepLog`, or None."""
+        return _logged(self._steps) if isinstance(self._steps, np.ndarray) else self._steps
+
+    @property
+    def charts(self):
+        """The `ChartLog`, or None."""
+        if self._charts is None:
+            return None
+        control, log = Control.from_buffer(self._work), ChartLog()
+        log.add(with_end(self._charts, self._numbers(), control.condition, control.contraction), None)
+        return log
+
+    @property
+    def counts(self):
+        """The `Counts`."""
+        clock, counters = Clock.from_buffer(self._run), Counters.from_buffer(self._work, COUNTERS)
+        return Counts(self._numbers(), counters, clock.largest_landing, self._told.skipped, self._told.has_forces)
+
+    def _numbers(self):
+        return Numbers.from_buffer(self._run, NUMBERS)
+
+
+def _logged(rows):
+    log = StepLog()
+    log.add(rows)
+    return log
+
+
+class Brief:
+    """The `Outcome` of a run that has ended well within its first slice.
+
+    Parameters
+    ----------
+    memory : Memory
+    begun : Begun
+    keeps : bool
+        Whether the histories of steps and charts are kept.
+    began : float
+        As of `Outcome`.
+    """
+
+    __slots__ = ("began", "remains", "rows")
+    status, reason, trajectory, events, method = SUCCESS, "", None, None, ""
+
+    def __init__(self, memory, begun, keeps, began):
+        log, count = begun.log, memory.run.numbers.rows
+        self.rows = log.out[:count] if log.t_eval.size else log.out[:count].copy()
+        self.remains, self.began = Remains(memory, log, keeps), began
+
+    def __getattr__(self, name):
+        return getattr(self.remains, name)
+
+    def _replace(self, **changes):
+        """Return it as an `Outcome`, with other values."""
+        return Outcome(*(getattr(self, name) for name in Outcome._fields))._replace(**changes)

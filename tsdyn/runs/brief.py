@@ -44,9 +44,9 @@ class Room(NamedTuple):
     out: np.ndarray  # of every step
 
 
-def limit_of(run, task):
+def limit_of(run, stops, max_steps):
     """How many steps a run may make."""
-    return run.numbers.steps_wanted + len(task.stops) if task.max_steps is None else task.max_steps
+    return run.numbers.steps_wanted + len(stops) if max_steps is None else max_steps
 
 
 def begin(memory, times, stops, limit):
@@ -72,6 +72,12 @@ def _room_for(memory, most):
 def has_ended_well(memory, begun):
     """Whether that was all, and there is nothing more to look at."""
     return begun.status is SUCCESS and memory.run.numbers.near_steps == 0
+
+
+def rows_of(memory, log):
+    """The outputs of a run that has ended, in an array of their own."""
+    rows = log.out[: memory.run.numbers.rows]
+    return rows if log.t_eval.size else rows.copy()
 
 
 class Remains:
@@ -161,9 +167,8 @@ class Brief:
     status, reason, trajectory, events, method = SUCCESS, "", None, None, ""
 
     def __init__(self, memory, begun, keeps, began):
-        log, count = begun.log, memory.run.numbers.rows
-        self.rows = log.out[:count] if log.t_eval.size else log.out[:count].copy()
-        self.remains, self.began = Remains(memory, log, keeps), began
+        self.rows, self.remains = rows_of(memory, begun.log), Remains(memory, begun.log, keeps)
+        self.began = began
 
     def __getattr__(self, name):
         return getattr(self.remains, name)

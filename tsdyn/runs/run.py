@@ -30,7 +30,7 @@ from .trajectory import Trajectory
 NOT_FINITE, PASSAGE, STIFF = Status.NOT_FINITE, Status.PASSAGE, Status.STIFF
 
 
-def run(task, engine, observe=None, relay=None, past=None, briefly=False):  # six: three for all runs
+def run(task, engine, observe=None, relay=None, past=None, briefly=False, unfinished=None):
     """Run a `Task` by a kind of engine; the `Outcome`, or a `Brief` where a run of which little is asked allows it.
 
     `observe` is given the memory before the run: one of its own. With a `Relay` the run is a segment of one; where
@@ -38,6 +38,9 @@ def run(task, engine, observe=None, relay=None, past=None, briefly=False):  # si
     advanced in place of the memory.
     """
     prepared = task.prepared
+    if unfinished is not None:
+        memory = unfinished.memory
+        return _end(task, memory, unfinished.begun, unfinished.began, relay)
     engine = prepared.engine(engine, task.method, task.form, task.within)
     memory = None if observe else prepared.take(engine.kind)
     if memory is None or not engine.serves(memory):
@@ -56,7 +59,8 @@ def run(task, engine, observe=None, relay=None, past=None, briefly=False):  # si
         watch = (relay or Relay()).watching(task, readings[0])
     began = time.perf_counter()
     if briefly:
-        return go_on(task, engine, memory, begin(memory, task.times, task.stops, limit_of(memory.run, task)), began, relay)
+        begun = begin(memory, task.times, task.stops, limit_of(memory.run, task.stops, task.max_steps))
+        return _end(task, memory, begun, began, relay)
     advanced = memory if task.sampling is None else Sampled(memory, task.sampling)
     driven = drive(advanced if past is None else past(advanced), task, watch)
     if relay is not None and driven[0] in (PASSAGE, STIFF):
@@ -67,8 +71,9 @@ def run(task, engine, observe=None, relay=None, past=None, briefly=False):  # si
     return outcome
 
 
-def go_on(task, engine, memory, begun, began, relay):
-    """The outcome of a run after its first slice."""
+def _end(task, memory, begun, began, relay):
+    """The outcome of a run that has made its first slice."""
+    engine = memory.engine
     if has_ended_well(memory, begun):
         outcome = Brief(memory, begun, task.history, began)
     else:

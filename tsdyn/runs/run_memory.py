@@ -58,6 +58,7 @@ class Memory:
         self._laid_out = [self.run_state, self.state]  # what a run finds as it was laid out,
         self._scratch = [rest] if rest.size else []  # and what it finds zero
         self._images, self._start = [], ()
+        self._mark, self._entered, self._whole = None, (None, None), []  # of the plan that has entered it last
 
     def settle(self, context, header=()):
         """Let the kernels find this context, behind the integers of a header."""
@@ -71,11 +72,8 @@ class Memory:
 
     def enter(self, engine, task, may_pass):
         """As if it were new, for an engine and a task: what a run before has left behind is gone."""
-        for array in self._scratch:
-            if array.size < PIECE:
-                array.fill(0)
-            else:
-                _clear(array)
+        self._mark = None
+        self._clear_scratch()
         start = task.q, task.qd, task.constraint_tol
         if self.engine is not engine:
             self._lay_out(engine, task)
@@ -84,17 +82,51 @@ class Memory:
             for array, image in self._images:
                 array[...] = image
             if not all(map(is_, start, self._start)):
-                self._enter_start(task)
+                self._enter_start(*start[:2])
+                self._hold(task)
         self.context.system.reals[...] = self.reals  # motions, signals and what forces remember are written there
         if task.remembered.size:
-            self._remember(task)
+            self._remember(task.remembered, task.prepared.handles)
         reset_selection(self.graph, self.context.tangent)
         self._set_out(task, may_pass)
 
+    def enter_again(self, plan, engine, stretch, start):
+        """As `enter`, for a run of a `simulation.plan.Plan`: what the plan has entered before is copied from an image.
+
+        stretch, start: as of the plan; the same objects as long as they are the same.
+        """
+        if self._mark is not plan.mark or self.engine is not engine:
+            self.enter(engine, plan.task_of(stretch, start, plan.task.choose), plan.may_pass)
+            self._whole = [(array, array.copy()) for array in self._set() if array.size]
+            self._mark, self._entered = plan.mark, (stretch, start)
+            return
+        if self._scratch:
+            self._clear_scratch()
+        for array, image in self._whole:
+            array[...] = image
+        of_stretch, of_start = self._entered
+        if stretch is not of_stretch:
+            self._enter_span(stretch.span, stretch.steps)
+        if start is not of_start:
+            self._enter_start(start.q, start.qd)
+            if start.remembered.size:
+                self._remember(start.remembered, plan.kept.handles)
+
     def entered(self):
         """The arrays that `enter` sets, laid out."""
+        return [*self._scratch, *self._set()]
+
+    def _set(self):
+        """The same, but for those that it clears."""
         arrays, records = selection_parts(self.context.tangent)
-        return [*self._laid_out, *self._scratch, self.context.system.reals, *arrays, *map(words, records)]
+        return [*self._laid_out, self.context.system.reals, *arrays, *map(words, records)]
+
+    def _clear_scratch(self):
+        for array in self._scratch:
+            if array.size < PIECE:
+                array.fill(0)
+            else:
+                _clear(array)
 
     def records(self):
         """Copies of what a run leaves: of `Run` and of `Work` what they begin with."""
@@ -109,7 +141,8 @@ class Memory:
         engine.lay_out(self)
         self.engine = engine
         self.told = Told(self.run.now.shape[1], self.run.remembered.size, engine.skipped, bool(self.packed.loads))
-        self._enter_start(task)
+        self._enter_start(task.q, task.qd)
+        self._hold(task)
         self.load()
 
     def _enter_method(self, method):
@@ -123,30 +156,38 @@ class Memory:
         else:
             clock.h = method.step
 
-    def _enter_start(self, task):
-        """Positions, velocities, and how closely the constraints are held."""
+    def _enter_start(self, q, qd):
+        """Positions and velocities."""
         work, run = self.work, self.run
-        work.q[...], work.qd[...] = task.q, task.qd
-        run.now[0], run.now[1] = task.q, task.qd
-        hold(work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
+        work.q[...], work.qd[...] = q, qd
+        run.now[0], run.now[1] = q, qd
 
-    def _remember(self, task):
+    def _hold(self, task):
+        """How closely the constraints are held."""
+        hold(self.work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
+
+    def _remember(self, remembered, handles):
         """Angles of joints, and what forces remember."""
         own, run = self.context.system, self.run
-        enter_joints(run, task.prepared.handles, task.remembered)
+        enter_joints(run, handles, remembered)
         if own.memory.size:
-            own.reals[own.memory] = task.remembered[len(run.joints) :]
+            own.reals[own.memory] = remembered[len(run.joints) :]
 
     def _set_out(self, task, may_pass):
         """The interval, and what the run is to do."""
-        method, clock, numbers = task.method, self.run.clock, self.run.numbers
-        clock.t = clock.t_origin = task.span[0]
-        clock.t_end = task.span[1]
-        if method.step is not None:
-            numbers.steps_wanted = step_count(*task.span, method.step)
+        step, numbers = task.method.step, self.run.numbers
+        self._enter_span(task.span, 0 if step is None else step_count(*task.span, step))
         numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
         numbers.may_pass, numbers.chart_interval = may_pass, task.interval
         numbers.leave_when_stiff = task.choose is not None
+
+    def _enter_span(self, span, steps):
+        """The interval, s, and how many fixed steps it takes; 0 of an adaptive method."""
+        clock = self.run.clock
+        clock.t = clock.t_origin = span[0]
+        clock.t_end = span[1]
+        if steps:
+            self.run.numbers.steps_wanted = steps
 
     def saved(self):
         """What is to be saved of it beside its arrays: nothing."""

@@ -1,55 +1,49 @@
-"""The plan of a call: what `simulate` has worked out from its arguments, for calls with the same ones.
+"""The plan of a call: what `simulate` has worked out from its arguments, for later calls with the same ones.
 
-Of a call that ends well within its first slice the plan keeps the method, the engine, what all solutions have in
-common, and the last interval and start. A later call checks an interval or a start that is another one, copies the
-image of the memory, and runs the driver. Whatever else differs, or goes wrong, is left to the ordinary way of a call.
+A later call checks an interval or a start that is not the last one, copies the image of the memory and runs the driver.
+Whatever else differs, or is refused, is left to the ordinary way of a call.
 """
 
 import time
-from math import copysign
 from typing import NamedTuple
 
 import numpy as np
 
 from ..configuration.holonomic import demand_holonomic
-from ..errors import TsdynError
 from ..observables.state import RememberingState, State, remembered
-from ..runs.arguments import interval, output_times, state_arrays, step_count
-from ..runs.brief import Remains, begin, has_ended_well, rows_of
-from ..runs.task import between
-from ..validation import floats
+from ..runs.arguments import state_arrays
+from ..runs.brief import Begun, Remains, begin, has_ended_well, limit_of, rows_of
 from .local_origin import origin_of
 from .rounding_limit import within_rounding
 from .segments import is_relayed, may_pass
 from .solution import Solution
-from .termination import account
+from .stretch import Stretch
 
 OF_ONE_RUN = {"span", "_rows", "_remains", "_seconds", "_made"}  # attributes of a solution
-FEW_TIMES = 1 << 12  # output times, or coordinates, that are kept to compare those of the next call with
-
-
-class Stretch(NamedTuple):
-    """An interval and output times that have been checked."""
-
-    given: object  # t_span and t_eval, if these can't change: tuples of floats
-    listed: object
-    span: tuple
-    times: np.ndarray
-    bits: bytes  # of the times
-    stops: np.ndarray
-    engine: object
-    steps: int  # of a fixed length; 0 for others
+FLOAT, STATES = np.dtype(float), (State, RememberingState)
 
 
 class Start(NamedTuple):
     """A start that has been checked and projected."""
 
-    given: tuple  # q, qd of the scene's bodies, or None
-    bits: tuple  # of those of a state, or None
+    given: object  # q, qd of the scene's bodies, which the scene keeps as long as they are; None for a state
+    bits: tuple  # of a state
     t: float
     remembered: np.ndarray
     q: np.ndarray
     qd: np.ndarray
+
+
+class Unfinished(NamedTuple):
+    """A run that has not ended well within its first slice."""
+
+    plan: object
+    stretch: Stretch
+    start: Start
+    memory: object
+    begun: Begun
+    called: float  # time.perf_counter()
+    began: float
 
 
 class Plan:
@@ -59,49 +53,101 @@ class Plan:
     ----------
     task : Task
         Of a run that has ended well within its first slice.
-    engine : type
-        Of the run.
+    kind : type
+        Of its engine.
     options : Options
     solution : Solution
-        Of the run.
     """
 
-    def __init__(self, task, engine, options, solution):
-        self.task, self.settings, self.kept, self.method = task, options.settings, task.prepared, task.method
-        self.engines, self.image = {}, object()  # by whether anything is asked between steps; the mark of a memory
-        self.may_pass = is_relayed(task, engine) and may_pass(task)
-        self.derived, self.current = self.kept.packed.derived, self.kept.packed.derived.engines
-        self.is_redundant = self.derived.redundant is not None
-        self.told = {name: value for name, value in vars(solution).items() if name not in OF_ONE_RUN}
-        self.stretch = self.start = None
+    def __init__(self, task, kind, options, solution):
+        self.task, self.options, self.kept, self.kind = task, options, task.prepared, kind
+        self.may_pass = is_relayed(task, kind) and may_pass(task)
+        self._engines, self._stretch, self._start = {}, None, None
+        self._derived, self._rows = self.kept.packed.derived, self.kept.packed.derived.engines
+        self.mark = object()  # of memories that the plan has entered
+        self._told = {name: value for name, value in vars(solution).items() if name not in OF_ONE_RUN}
 
     @property
     def serves(self):
         """Whether the same rows and bodies take part in the equations as at first."""
-        return self.derived.engines is self.current
+        return self._derived.engines is self._rows
 
-    def learn(self, options, engine):
-        """Take the engine of a run."""
-        self.engines[options.within] = self.kept.engine(engine, self.method, self.task.form, options.within)
+    def learn(self, within):
+        """Take the engine of runs that are asked for something, or nothing, between the ends of steps."""
+        self._engines[within] = self.kept.engine(self.kind, self.task.method, self.task.form, within)
 
     def run(self, scene, t_span, t_eval, state):
-        """Run it; a `Solution`, or what `go_on` needs of a run that is longer. None if the call goes another way."""
-        called = time.perf_counter()
-        try:
-            stretch = self._stretch(t_span, t_eval)
-            start = stretch and self._start(scene, state, stretch.span[0])
-            if start is None:
-                return None
-            memory = self.kept.take(stretch.engine.kind)
-            if memory is None or not stretch.engine.serves(memory):
-                return None
-            memory.enter_again(self, stretch, start)
-        except TsdynError:
-            return None  # which says so again
+        """Run it: a `Solution` or the `Unfinished` run; None if the call is to go the ordinary way."""
+        called, kept, stretch = time.perf_counter(), self.kept, self._stretch
+        if stretch is None or t_span is not stretch.t_span or t_eval is not stretch.t_eval:
+            stretch = self._stretch = Stretch.of(stretch, t_span, t_eval, kept, self.task.method)
+        engine = self._engines.get(stretch.within)
+        start = None if engine is None else self._start_of(scene, state, stretch.span[0])
+        memory = None if start is None else kept.take(engine.kind)
+        if memory is None or not engine.serves(memory):
+            return None
+        memory.enter_again(self, engine, stretch, start)
         began = time.perf_counter()
-        begun = begin(memory, stretch.times, stretch.stops, self._limit(stretch))
+        begun = begin(memory, stretch.times, stretch.stops, limit_of(memory.run, stretch.stops, self.task.max_steps))
         if not has_ended_well(memory, begun):
-            return Unfinished(stretch, start, memory, begun, called, began)
+            return Unfinished(self, stretch, start, memory, begun, called, began)
         rows, remains = rows_of(memory, begun.log), Remains(memory, begun.log, self.task.history)
-        self.kept.give(stretch.engine.kind, memory)
-        return self._solution(scene, stretch, rows, remains, called, began)
+        kept.give(engine.kind, memory)
+        solution = object.__new__(Solution)
+        vars(solution).update(
+            self._told, span=stretch.span, _rows=(rows, kept.n), _remains=remains, _made=time.time(),
+            _seconds={"prepare": began - called, "run": time.perf_counter() - began},
+        )  # fmt: skip
+        return solution
+
+    def task_of(self, stretch, start, choose):
+        """The `Task` of one run."""
+        return self.task._replace(
+            span=stretch.span, times=stretch.times, stops=stretch.stops, remembered=start.remembered, q=start.q,
+            qd=start.qd, choose=choose,
+        )  # fmt: skip
+
+    def _start_of(self, scene, state, t):
+        """The consistent start of a run; None if the call is to go the ordinary way."""
+        known, kept = self._start, self.kept
+        if state is None:
+            bits, given = None, scene._initial()
+            if known is not None and given is known.given and t == known.t:
+                return known
+        else:
+            bits, given = _bits_of(state, kept, t), None
+            if bits is None or (known is not None and bits == known.bits and t == known.t):
+                return known if bits else None
+        arrays = state_arrays(state, kept.n) if given is None else given
+        memory, settings = remembered(state, kept, t, arrays[0]), self.options.settings
+        q, qd = kept.start(scene, arrays, t, settings.initial_tol, memory, settings.drop)
+        if not self._takes(q, t):
+            return None
+        self._start = known = Start(given, bits, t, memory, q, qd)
+        return known
+
+    def _takes(self, q, t):
+        """Whether a start changes nothing of the plan."""
+        packed, method, form = self.kept.packed, self.task.method, self.task.form
+        if not self.serves or origin_of(packed, q) is not None:
+            return False
+        if not form.basis_free or method.implicit:
+            demand_holonomic(packed, q, t, form.name)
+        return within_rounding(method, packed, q)[0] is method
+
+
+def _bits_of(state, prepared, t):
+    """All that a run from a state knows of it, as bytes; None for a state of another kind."""
+    if type(state) not in STATES:
+        return None
+    q, qd, memory = state.q, state.qd, getattr(state, "memory", None)
+    for array in (q, qd):
+        if type(array) is not np.ndarray or array.dtype is not FLOAT or array.ndim != 1:
+            return None
+    if prepared.remembers:
+        memory = remembered(state, prepared, t, q)
+    elif memory is None:
+        return q.tobytes(), qd.tobytes()
+    elif type(memory) is not np.ndarray or memory.shape != (0,):
+        return None
+    return q.tobytes(), qd.tobytes(), memory.tobytes()

@@ -46,6 +46,7 @@ class Prepared:
         self.packed, self.motions = packed, scene.motions()
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
         self._start = (None, None), None
+        self.plans = {}  # of calls of `simulate`; see plans.py
         self.remembers = bool(packed.system.memory.size or handles_of(packed).count)
         every = scene.__dict__.setdefault("_spare", {})
         if len(every) >= KINDS:
@@ -58,7 +59,7 @@ class Prepared:
         other = copy.copy(self)
         for name in OF_NUMBERS & vars(other).keys():
             del vars(other)[name]
-        other.packed, other._start, other._spare = packed, ((None, None), None), {}
+        other.packed, other._start, other._spare, other.plans = packed, ((None, None), None), {}, {}
         other.handles = handles_of(packed)
         return other
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.holonomic import demand_holonomic
+from ..observables.kinematics import Anchor
 from ..observables.state import RememberingState, State, remembered
 from ..runs.arguments import state_arrays
 from ..runs.brief import Begun, Remains, begin, has_ended_well, limit_of, rows_of
@@ -141,13 +142,23 @@ def _bits_of(state, prepared, t):
     if type(state) not in STATES:
         return None
     q, qd, memory = state.q, state.qd, getattr(state, "memory", None)
-    for array in (q, qd):
-        if type(array) is not np.ndarray or array.dtype is not FLOAT or array.ndim != 1:
-            return None
-    if prepared.remembers:
-        memory = remembered(state, prepared, t, q)
-    elif memory is None:
-        return q.tobytes(), qd.tobytes()
-    elif type(memory) is not np.ndarray or memory.shape != (0,):
+    if not (_is_plain(q) and _is_plain(qd)):
         return None
-    return q.tobytes(), qd.tobytes(), memory.tobytes()
+    if prepared.remembers:
+        return (*_turns_of(state, prepared, t), q.tobytes(), qd.tobytes())
+    if memory is not None and not (_is_plain(memory) and memory.size == 0):
+        return None
+    return q.tobytes(), qd.tobytes()
+
+
+def _turns_of(state, prepared, t):
+    """What a state says of joints and forces beside positions and velocities."""
+    if type(state) is RememberingState and state.handles is prepared.handles and _is_plain(state.memory):
+        anchor = state.anchor
+        if type(anchor) is Anchor and type(anchor.h) is float and all(map(_is_plain, (anchor.angles, *anchor.levels))):
+            return state.memory.tobytes(), anchor.h, *(array.tobytes() for array in (anchor.angles, *anchor.levels))
+    return (remembered(state, prepared, t, state.q).tobytes(),)
+
+
+def _is_plain(array):
+    return type(array) is np.ndarray and array.dtype is FLOAT and array.ndim == 1

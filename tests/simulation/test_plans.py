@@ -108,6 +108,17 @@ def test_an_edit_of_the_scene_is_seen(edit, options):
         assert found.q.shape != before.q.shape or (found.q[-1] != before.q[-1]).any()
 
 
+def test_scenes_with_other_parameters_have_plans_of_their_own():
+    scene, values = top.build(), {"top.mass": 31.0}
+    first = [ts.simulate(scene, SPAN) for _ in range(2)][-1]
+    other, built = scene.with_parameters(values), top.build()
+    built.body("top").mass = 31.0
+    for _ in range(2):
+        same_run(ts.simulate(other, SPAN), ts.simulate(built, SPAN))
+        same_run(by_plan(scene, SPAN), first)
+        same_run(ts.simulate(scene.copy(), SPAN), first)
+
+
 PUSH = 1.0
 
 

@@ -77,7 +77,6 @@ def _end(task, memory, begun, began, relay):
     if has_ended_well(memory, begun):
         outcome = Brief(memory, begun, task.history, began)
     else:
-        memory.room = None  # which the recorder takes
         driven = drive(memory, task, None, begun)
         if relay is not None and driven[0] in (PASSAGE, STIFF):
             relay.leave(memory)

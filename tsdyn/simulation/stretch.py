@@ -28,8 +28,12 @@ class Stretch(NamedTuple):
     @classmethod
     def of(cls, known, t_span, t_eval, prepared, method):
         """The one of these arguments, `known` if they say the same; raises InvalidArgument."""
-        span = interval(t_span)
-        if known is not None and _are_same(span, known.span) and _say(t_eval, known):
+        if known is not None and t_span is known.t_span:
+            span, is_known = known.span, True
+        else:
+            span = interval(t_span)
+            is_known = known is not None and _are_same(span, known.span)
+        if is_known and _say(t_eval, known):
             return known
         times, step = output_times(t_eval, *span), method.step
         return cls(

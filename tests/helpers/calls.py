@@ -32,3 +32,9 @@ def same_run(one, two):
     for name in ("steps", "charts") if logs[0] else ():
         for a, b in zip(getattr(one, name), getattr(two, name), strict=True):
             np.testing.assert_array_equal(a, b)
+    dense = [each._trajectory is not None for each in (one, two)]
+    assert dense[0] == dense[1]
+    if dense[0]:
+        t = np.linspace(*one.span, 7)
+        for a, b in zip(one.at(t), two.at(t), strict=True):
+            np.testing.assert_array_equal(a, b)

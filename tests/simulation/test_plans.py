@@ -23,6 +23,8 @@ WAYS = {
     "short steps": {"max_step": 0.01},
     "without history": {"history": False},
     "charts": {"chart_interval": 1},
+    "dense output": {"dense_output": True},
+    "dense output of stages": {"integrator": I.DOP853(1e-8, 1e-8), "dense_output": True, "t_eval": (0.0, 0.1)},
     "no progress": {"progress": False},
 }
 SCENES = {"top": top.build, "driven": driven_pivot.build, "redundant": door.build}

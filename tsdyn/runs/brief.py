@@ -20,6 +20,7 @@ from .recorder import CHART_ROOM, NO_ROWS
 from .run_log import RunLog, with_end
 from .task import Outcome
 from .tolerances import TRIES
+from .trajectory import Trajectory
 
 SUCCESS = Status.SUCCESS
 NUMBERS, COUNTERS = ctypes.sizeof(Clock), ctypes.sizeof(Control)  # bytes before them, as `Memory` lays them out
@@ -54,13 +55,22 @@ def begin(memory, times, stops, limit):
     most, room = slices.first_slice(memory.weight), memory.room
     if room is None or room.most != most:
         room = memory.room = _room_for(memory, most)
+    rows, blocks = min(most, limit), (NO_ROWS, NO_ROWS)
+    if memory.run.numbers.dense:
+        blocks = _room_for_blocks(memory, rows)
     out = np.empty((times.size, room.out.shape[1])) if times.size else room.out
-    log, rows, started = RunLog(times, stops, out, *room[1:3], NO_ROWS, NO_ROWS), min(most, limit), time.perf_counter()
+    log, started = RunLog(times, stops, out, room.history, room.charts, *blocks), time.perf_counter()
     try:
         status = memory.advance(log, rows)
     except KeyboardInterrupt:
         status = None
     return Begun(log, rows, status, time.perf_counter() - started)
+
+
+def _room_for_blocks(memory, rows):
+    """Points and blocks of dense output, which no later run writes to."""
+    n, redundant = memory.run.now.shape[1], int(memory.context.tangent.dropped[0])
+    return np.empty((2 * CHART_ROOM, n + redundant)), np.empty((rows, memory.run.block.size))
 
 
 def _room_for(memory, most):
@@ -78,6 +88,17 @@ def rows_of(memory, log):
     """The outputs of a run that has ended, in an array of their own."""
     rows = log.out[: memory.run.numbers.rows]
     return rows if log.t_eval.size else rows.copy()
+
+
+def trajectory_of(memory, log, task):
+    """The `Trajectory` of a run that has ended; None where none is asked for."""
+    numbers, control = memory.run.numbers, memory.work.control
+    if not numbers.dense:
+        return None
+    charts = with_end(log.charts[: numbers.chart_rows + 1].copy(), numbers, control.condition, control.contraction)
+    records = log.blocks[: numbers.blocks].copy(), charts, log.points[: len(charts)].copy()
+    readings = memory.engine.reading(memory, task.prepared, task.constraint_tol)
+    return Trajectory(readings, records, task.span[0], memory.run.now.copy(), task.angles, task.stops)
 
 
 class Remains:
@@ -157,18 +178,17 @@ class Brief:
     ----------
     memory : Memory
     begun : Begun
-    keeps : bool
-        Whether the histories of steps and charts are kept.
+    task : Task
     began : float
         As of `Outcome`.
     """
 
-    __slots__ = ("began", "remains", "rows")
-    status, reason, trajectory, events, method = SUCCESS, "", None, None, ""
+    __slots__ = ("began", "remains", "rows", "trajectory")
+    status, reason, events, method = SUCCESS, "", None, ""
 
-    def __init__(self, memory, begun, keeps, began):
-        self.rows, self.remains = rows_of(memory, begun.log), Remains(memory, begun.log, keeps)
-        self.began = began
+    def __init__(self, memory, begun, task, began):
+        self.rows, self.remains = rows_of(memory, begun.log), Remains(memory, begun.log, task.history)
+        self.trajectory, self.began = trajectory_of(memory, begun.log, task), began
 
     def __getattr__(self, name):
         return getattr(self.remains, name)

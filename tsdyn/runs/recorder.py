@@ -57,7 +57,7 @@ class Recorder:
 
     def adopt(self, log):
         """Go on from a first slice whose records are in this log."""
-        self.log, self.out, self.charts = log, log.out, log.charts
+        self.log, self.out, self.charts, self.points, self.blocks = log, log.out, log.charts, log.points, log.blocks
 
     def close(self):
         """Put the slices together."""

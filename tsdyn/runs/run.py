@@ -47,9 +47,11 @@ def run(task, engine, observe=None, relay=None, past=None, briefly=False, unfini
         with CollectionsDeferred():
             memory = engine.memory(prepared)
     memory.enter(engine, task, relay is not None and relay.passes)
-    readings = None, None
-    if memory.run.numbers.dense:
-        readings = engine.reading(memory, prepared, task.constraint_tol)
+    if briefly:
+        began = time.perf_counter()
+        begun = begin(memory, task.times, task.stops, limit_of(memory.run, task.stops, task.max_steps))
+        return _end(task, memory, begun, began, relay)
+    readings = _readings(memory, task)
     if observe is not None:
         observe(memory)
     watch = None
@@ -58,9 +60,6 @@ def run(task, engine, observe=None, relay=None, past=None, briefly=False, unfini
     if task.events is not None:
         watch = (relay or Relay()).watching(task, readings[0])
     began = time.perf_counter()
-    if briefly:
-        begun = begin(memory, task.times, task.stops, limit_of(memory.run, task.stops, task.max_steps))
-        return _end(task, memory, begun, began, relay)
     advanced = memory if task.sampling is None else Sampled(memory, task.sampling)
     driven = drive(advanced if past is None else past(advanced), task, watch)
     if relay is not None and driven[0] in (PASSAGE, STIFF):
@@ -75,15 +74,22 @@ def _end(task, memory, begun, began, relay):
     """The outcome of a run that has made its first slice."""
     engine = memory.engine
     if has_ended_well(memory, begun):
-        outcome = Brief(memory, begun, task.history, began)
+        outcome = Brief(memory, begun, task, began)
     else:
         driven = drive(memory, task, None, begun)
         if relay is not None and driven[0] in (PASSAGE, STIFF):
             relay.leave(memory)
-        outcome = _outcome(task, engine, memory, driven, (None, None), None, began)
+        outcome = _outcome(task, engine, memory, driven, _readings(memory, task), None, began)
     if outcome.status is not NOT_FINITE:
         task.prepared.give(engine.kind, memory)
     return outcome
+
+
+def _readings(memory, task):
+    """How the steps of a run are read, in this process and in others, where something asks for it."""
+    return (
+        memory.engine.reading(memory, task.prepared, task.constraint_tol) if memory.run.numbers.dense else (None, None)
+    )
 
 
 def _outcome(task, engine, memory, driven, readings, watch, began):

@@ -13,14 +13,14 @@ from ..configuration.holonomic import demand_holonomic
 from ..observables.kinematics import Anchor
 from ..observables.state import RememberingState, State, remembered
 from ..runs.arguments import state_arrays
-from ..runs.brief import Begun, Remains, begin, has_ended_well, limit_of, rows_of
+from ..runs.brief import Begun, Remains, begin, has_ended_well, limit_of, rows_of, trajectory_of
 from .local_origin import origin_of
 from .rounding_limit import within_rounding
 from .segments import is_relayed, may_pass
 from .solution import Solution
 from .stretch import Stretch
 
-OF_ONE_RUN = {"span", "_rows", "_remains", "_seconds", "_made"}  # attributes of a solution
+OF_ONE_RUN = {"span", "_rows", "_remains", "_seconds", "_made", "_trajectory"}  # attributes of a solution
 FLOAT, STATES = np.dtype(float), (State, RememberingState)
 
 
@@ -82,7 +82,7 @@ class Plan:
         called, kept, stretch = time.perf_counter(), self.kept, self._stretch
         if stretch is None or t_span is not stretch.t_span or t_eval is not stretch.t_eval:
             stretch = self._stretch = Stretch.of(stretch, t_span, t_eval, kept, self.task.method)
-        engine = self._engines.get(stretch.within)
+        engine = self._engines.get(stretch.within or self.task.dense_output)
         start = None if engine is None else self._start_of(scene, state, stretch.span[0])
         memory = None if start is None else kept.take(engine.kind)
         if memory is None or not engine.serves(memory):
@@ -93,10 +93,14 @@ class Plan:
         if not has_ended_well(memory, begun):
             return Unfinished(self, stretch, start, memory, begun, called, began)
         rows, remains = rows_of(memory, begun.log), Remains(memory, begun.log, self.task.history)
+        trajectory = None
+        if self.task.dense_output:
+            trajectory = trajectory_of(memory, begun.log, self.task_of(stretch, start, None))
         kept.give(engine.kind, memory)
         solution = object.__new__(Solution)
         vars(solution).update(
-            self._told, span=stretch.span, _rows=(rows, kept.n), _remains=remains, _made=time.time(),
+            self._told, span=stretch.span, _rows=(rows, kept.n), _remains=remains, _trajectory=trajectory,
+            _made=time.time(),
             _seconds={"prepare": began - called, "run": time.perf_counter() - began},
         )  # fmt: skip
         return solution

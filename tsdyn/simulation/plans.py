@@ -50,7 +50,7 @@ def planned(go_on):
 
 def _run(scene, t_span, given):
     """As of `Plan.run`; None also where there is no plan."""
-    if scene._waiting:
+    if scene._waiting or given["events"] is not None or given["store"] is not None:
         return None
     if scene._users:
         scene.refresh()

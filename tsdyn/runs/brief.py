@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import Status
+from ..rows.interface import redundant_of
 from ..workspaces.run_state import Clock, Kernels, Numbers
 from ..workspaces.workspace import Control, Counters
 from . import slices
@@ -69,7 +70,7 @@ def begin(memory, times, stops, limit):
 
 def _room_for_blocks(memory, rows):
     """Points and blocks of dense output, which no later run writes to."""
-    n, redundant = memory.run.now.shape[1], int(memory.context.tangent.dropped[0])
+    n, redundant = memory.run.now.shape[1], len(redundant_of(memory.context.tangent))
     return np.empty((2 * CHART_ROOM, n + redundant)), np.empty((rows, memory.run.block.size))
 
 

@@ -17,7 +17,7 @@ from tests.helpers.calls import by_plan, same_run
 from tsdyn.runs import slices
 from tsdyn.runs.run_memory import Memory
 from tsdyn.runs.step_memory import StepMemory
-from tsdyn.simulation import plans
+from tsdyn.simulation import plans, scene_cache
 from tsdyn.taylor.run_memory import SeriesMemory
 
 I = ts.integrators
@@ -178,6 +178,25 @@ def test_solutions_are_of_their_own():
     part = ts.simulate(top.build(), SPAN)[1:]
     np.testing.assert_array_equal(part.q, expected.q[1:])
     assert part.message == expected.message
+
+
+def test_plans_that_take_turns_have_a_memory_each(monkeypatch):
+    """After some calls; never more than are kept."""
+    scene, laid_out = top.build(), []
+    tolerances = 1e-8 * np.arange(1, 6)
+    expected = [ts.simulate(top.build(), SPAN, rtol=rtol) for rtol in tolerances]
+    for _ in range(8):
+        for rtol in tolerances:
+            ts.simulate(scene, SPAN, rtol=rtol)
+    lay_out = Memory._lay_out
+    monkeypatch.setattr(Memory, "_lay_out", lambda *given: laid_out.append(given) or lay_out(*given))
+    for rtol, each in zip(tolerances, expected, strict=True):
+        same_run(ts.simulate(scene, SPAN, rtol=rtol), each)
+    assert not laid_out
+    for rtol in 1e-8 * np.arange(1, plans.MOST + 1).repeat(8):
+        ts.simulate(scene, SPAN, rtol=rtol)
+    idle = [each for kinds in scene._spare.values() for spare in kinds.values() for each in spare]
+    assert len(idle) <= scene_cache.SPARE
 
 
 def test_plans_are_few_and_keep_nothing_alive():

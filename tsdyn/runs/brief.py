@@ -43,7 +43,6 @@ class Room(NamedTuple):
     most: int  # steps
     history: np.ndarray
     charts: np.ndarray
-    out: np.ndarray  # of every step
 
 
 def limit_of(run, stops, max_steps):
@@ -55,11 +54,11 @@ def begin(memory, times, stops, limit):
     """Make the first slice of a run that has been entered; the `Begun`."""
     most, room = slices.first_slice(memory.weight), memory.room
     if room is None or room.most != most:
-        room = memory.room = _room_for(memory, most)
+        room = memory.room = Room(most, np.empty((most + 2 * TRIES, 3)), np.empty((2 * CHART_ROOM, 5)))
     rows, blocks = min(most, limit), (NO_ROWS, NO_ROWS)
     if memory.run.numbers.dense:
         blocks = _room_for_blocks(memory, rows)
-    out = np.empty((times.size, room.out.shape[1])) if times.size else room.out
+    out = np.empty((times.size or rows + 1, 1 + memory.run.now.size + memory.run.remembered.size))
     log, started = RunLog(times, stops, out, room.history, room.charts, *blocks), time.perf_counter()
     try:
         status = memory.advance(log, rows)
@@ -72,12 +71,6 @@ def _room_for_blocks(memory, rows):
     """Points and blocks of dense output, which no later run writes to."""
     n, redundant = memory.run.now.shape[1], len(redundant_of(memory.context.tangent))
     return np.empty((2 * CHART_ROOM, n + redundant)), np.empty((rows, memory.run.block.size))
-
-
-def _room_for(memory, most):
-    run = memory.run
-    width = 1 + run.now.size + run.remembered.size
-    return Room(most, np.empty((most + 2 * TRIES, 3)), np.empty((2 * CHART_ROOM, 5)), np.empty((most + 1, width)))
 
 
 def has_ended_well(memory, begun):

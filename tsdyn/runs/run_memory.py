@@ -45,6 +45,7 @@ class Memory:
     reason = ""  # of the end of a run: told by its status
     engine = None  # that it is laid out for
     room = None  # of a first slice: a `brief.Room`
+    mark = None  # of the plan that has entered it last
     advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
 
     def __init__(self, prepared, graph, context, run):
@@ -58,7 +59,7 @@ class Memory:
         self._laid_out = [self.run_state, self.state]  # what a run finds as it was laid out,
         self._scratch = [rest] if rest.size else []  # and what it finds zero
         self._images, self._start = [], ()
-        self._mark, self._entered, self._whole = None, (None, None), []  # of the plan that has entered it last
+        self._entered, self._whole = (None, None), []
 
     def settle(self, context, header=()):
         """Let the kernels find this context, behind the integers of a header."""
@@ -72,7 +73,7 @@ class Memory:
 
     def enter(self, engine, task, may_pass):
         """As if it were new, for an engine and a task: what a run before has left behind is gone."""
-        self._mark = None
+        self.mark = None
         self._clear_scratch()
         start = task.q, task.qd, task.constraint_tol
         if self.engine is not engine:
@@ -95,10 +96,10 @@ class Memory:
 
         stretch, start: as of the plan; the same objects as long as they are the same.
         """
-        if self._mark is not plan.mark or self.engine is not engine:
+        if self.mark is not plan.mark or self.engine is not engine:
             self.enter(engine, plan.task_of(stretch, start, plan.task.choose), plan.may_pass)
             self._whole = [(array, array.copy()) for array in self._set() if array.size]
-            self._mark, self._entered = plan.mark, (stretch, start)
+            self.mark, self._entered = plan.mark, (stretch, start)
             return
         if self._scratch:
             self._clear_scratch()

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.holonomic import demand_holonomic
+from ..jit.interrupts import CollectionsDeferred
 from ..observables.kinematics import Anchor
 from ..observables.state import RememberingState, State, remembered
 from ..runs.arguments import state_arrays
@@ -21,6 +22,7 @@ from .solution import Solution
 from .stretch import Stretch
 
 OF_ONE_RUN = {"span", "_rows", "_remains", "_seconds", "_made", "_trajectory"}  # attributes of a solution
+FEW_ENTRIES = 2  # of memories that other plans have used
 FLOAT, STATES = np.dtype(float), (State, RememberingState)
 
 
@@ -63,7 +65,7 @@ class Plan:
     def __init__(self, task, kind, options, solution):
         self.task, self.options, self.kept, self.kind = task, options, task.prepared, kind
         self.may_pass = is_relayed(task, kind) and may_pass(task)
-        self._engines, self._stretch, self._start = {}, None, None
+        self._engines, self._stretch, self._start, self._entries = {}, None, None, 0
         self._derived, self._rows = self.kept.packed.derived, self.kept.packed.derived.engines
         self.mark = object()  # of memories that the plan has entered
         self._told = {name: value for name, value in vars(solution).items() if name not in OF_ONE_RUN}
@@ -84,8 +86,8 @@ class Plan:
             stretch = self._stretch = Stretch.of(stretch, t_span, t_eval, kept, self.task.method)
         engine = self._engines.get(stretch.within or self.task.dense_output)
         start = None if engine is None else self._start_of(scene, state, stretch.span[0])
-        memory = None if start is None else kept.take(engine.kind)
-        if memory is None or not engine.serves(memory):
+        memory = None if start is None else self._memory(engine)
+        if memory is None:
             return None
         memory.enter_again(self, engine, stretch, start)
         began = time.perf_counter()
@@ -104,6 +106,20 @@ class Plan:
             _seconds={"prepare": began - called, "run": time.perf_counter() - began},
         )  # fmt: skip
         return solution
+
+    def _memory(self, engine):
+        """A memory for one run; None if there is none. Plans that take turns have one each after some calls."""
+        kept = self.kept
+        memory = kept.take(engine.kind, self.mark)
+        if memory is None or not engine.serves(memory):
+            return None
+        if memory.mark is not self.mark:
+            self._entries += 1
+            if self._entries > FEW_ENTRIES and kept.has_room(memory):
+                kept.give(engine.kind, memory)
+                with CollectionsDeferred():
+                    memory = engine.memory(kept)
+        return memory
 
     def task_of(self, stretch, start, choose):
         """The `Task` of one run."""

@@ -118,7 +118,10 @@ def test_scenes_with_other_parameters_have_plans_of_their_own():
     for _ in range(2):
         same_run(ts.simulate(other, SPAN), ts.simulate(built, SPAN))
         same_run(by_plan(scene, SPAN), first)
-        same_run(ts.simulate(scene.copy(), SPAN), first)
+        twin = scene.copy()
+        same_run(ts.simulate(twin, SPAN), first)
+        assert ts.simulate(twin, SPAN).scene is twin
+        assert ts.simulate(other, SPAN).scene is other
 
 
 PUSH = 1.0

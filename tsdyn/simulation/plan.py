@@ -7,14 +7,13 @@ Whatever else differs, or is refused, is left to the ordinary way of a call.
 import time
 from typing import NamedTuple
 
-import numpy as np
-
 from ..configuration.holonomic import demand_holonomic
 from ..jit.interrupts import CollectionsDeferred
-from ..observables.kinematics import Anchor
-from ..observables.state import RememberingState, State, remembered
-from ..runs.arguments import state_arrays
+from ..motions.knots import NO_STOPS
+from ..observables.state import remembered
+from ..runs.arguments import NO_TIMES, state_arrays
 from ..runs.brief import Begun, Remains, begin, has_ended_well, limit_of, rows_of, trajectory_of
+from .known_start import Start, bits_of
 from .local_origin import origin_of
 from .rounding_limit import within_rounding
 from .segments import is_relayed, may_pass
@@ -23,18 +22,7 @@ from .stretch import Stretch
 
 OF_ONE_RUN = {"span", "_rows", "_remains", "_seconds", "_made", "_trajectory"}  # attributes of a solution
 FEW_ENTRIES = 2  # of memories that other plans have used
-FLOAT, STATES = np.dtype(float), (State, RememberingState)
-
-
-class Start(NamedTuple):
-    """A start that has been checked and projected."""
-
-    given: object  # q, qd of the scene's bodies, which the scene keeps as long as they are; None for a state
-    bits: tuple  # of a state
-    t: float
-    remembered: np.ndarray
-    q: np.ndarray
-    qd: np.ndarray
+FEW_TIMES = 1 << 12  # output times that are kept to compare those of the next call with
 
 
 class Unfinished(NamedTuple):
@@ -63,7 +51,9 @@ class Plan:
     """
 
     def __init__(self, task, kind, options, solution):
-        self.task, self.options, self.kept, self.kind = task, options, task.prepared, kind
+        self.kept, self.kind, self.options = task.prepared, kind, options._replace(times=NO_TIMES)
+        choose = None if task.choose is None else True
+        self.task = task._replace(times=NO_TIMES, stops=NO_STOPS, choose=choose)
         self.may_pass = is_relayed(task, kind) and may_pass(task)
         self._engines, self._stretch, self._start, self._entries = {}, None, None, 0
         self._derived, self._rows = self.kept.packed.derived, self.kept.packed.derived.engines
@@ -83,7 +73,8 @@ class Plan:
         """Run it: a `Solution` or the `Unfinished` run; None if the call is to go the ordinary way."""
         called, kept, stretch = time.perf_counter(), self.kept, self._stretch
         if stretch is None or t_span is not stretch.t_span or t_eval is not stretch.t_eval:
-            stretch = self._stretch = Stretch.of(stretch, t_span, t_eval, kept, self.task.method)
+            stretch = Stretch.of(stretch, t_span, t_eval, kept, self.task.method)
+            self._stretch = stretch if stretch.times.size <= FEW_TIMES else None
         engine = self._engines.get(stretch.within or self.task.dense_output)
         start = None if engine is None else self._start_of(scene, state, stretch.span[0])
         memory = None if start is None else self._memory(engine)
@@ -136,7 +127,7 @@ class Plan:
             if known is not None and given is known.given and t == known.t:
                 return known
         else:
-            bits, given = _bits_of(state, kept, t), None
+            bits, given = bits_of(state, kept, t), None
             if bits is None or (known is not None and bits == known.bits and t == known.t):
                 return known if bits else None
         arrays = state_arrays(state, kept.n) if given is None else given
@@ -155,30 +146,3 @@ class Plan:
         if not form.basis_free or method.implicit:
             demand_holonomic(packed, q, t, form.name)
         return within_rounding(method, packed, q)[0] is method
-
-
-def _bits_of(state, prepared, t):
-    """All that a run from a state knows of it, as bytes; None for a state of another kind."""
-    if type(state) not in STATES:
-        return None
-    q, qd, memory = state.q, state.qd, getattr(state, "memory", None)
-    if not (_is_plain(q) and _is_plain(qd)):
-        return None
-    if prepared.remembers:
-        return (*_turns_of(state, prepared, t), q.tobytes(), qd.tobytes())
-    if memory is not None and not (_is_plain(memory) and memory.size == 0):
-        return None
-    return q.tobytes(), qd.tobytes()
-
-
-def _turns_of(state, prepared, t):
-    """What a state says of joints and forces beside positions and velocities."""
-    if type(state) is RememberingState and state.handles is prepared.handles and _is_plain(state.memory):
-        anchor = state.anchor
-        if type(anchor) is Anchor and type(anchor.h) is float and all(map(_is_plain, (anchor.angles, *anchor.levels))):
-            return state.memory.tobytes(), anchor.h, *(array.tobytes() for array in (anchor.angles, *anchor.levels))
-    return (remembered(state, prepared, t, state.q).tobytes(),)
-
-
-def _is_plain(array):
-    return type(array) is np.ndarray and array.dtype is FLOAT and array.ndim == 1

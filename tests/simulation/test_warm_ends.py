@@ -64,7 +64,7 @@ def test_a_run_that_turns_to_the_implicit_method():
     for _ in range(2):
         ts.simulate(scene, (0.0, 1e-4), **options)
     found = by_plan(scene, (0.0, 0.3), **options)
-    assert "SDIRK54 took over" in found.message
+    assert "took over" in found.message
     same_run(found, ts.simulate(jointed(), (0.0, 0.3), **options))
 
 

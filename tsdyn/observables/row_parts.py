@@ -1,13 +1,11 @@
 """The workspace in which rows are evaluated and factorised after a run; one that is idle serves the next call."""
 
-import numpy as np
-
-from ..jit.kernels import Record, resident
+from ..jit.kernels import resident
 from ..model.sparse_jacobian import with_short_rows
 from ..rows.interface import redundancy
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import graph_of
-from ..workspaces.carving import words
+from ..workspaces.carving import arrays_of
 from ..workspaces.workspace import parts
 from .tolerances import KEPT_FLOATS
 
@@ -27,7 +25,7 @@ class RowParts:
         self.source, self.graph = system, graph
         self.system = system._replace(reals=system.reals.copy())
         whole = parts(self.system, graph, n)
-        self._images = [(array, array.copy()) for array in _arrays((whole.work, whole.tangent)) if array.size]
+        self._images = [(array, array.copy()) for array in arrays_of((whole.work, whole.tangent)) if array.size]
         self.address, *self._keep = resident(whole)
 
     @property
@@ -40,13 +38,6 @@ class RowParts:
         for array, image in self._images:
             array[...] = image
         self.system.reals[...] = self.source.reals
-
-
-def _arrays(value):
-    """The arrays and records of named tuples, as arrays."""
-    if isinstance(value, np.ndarray):
-        return [value]
-    return [words(value)] if isinstance(value, Record) else [array for part in value for array in _arrays(part)]
 
 
 def taken(packed, n):

@@ -78,6 +78,21 @@ def rows_of(memory, log):
     return rows if log.t_eval.size else rows.copy()
 
 
+def readings_of(memory, task):
+    """How the steps of a run are read, in this process and in others; None, None where nothing asks for it.
+
+    The same for all runs of an engine, so that a reader serves again.
+    """
+    if not memory.run.numbers.dense:
+        return None, None
+    engine, packed, tol = memory.engine, task.prepared.packed, task.constraint_tol
+    of, found = getattr(engine, "readings", (None, None))
+    if of is None or of[0] is not packed or of[1] != tol:
+        found = engine.reading(memory, task.prepared, tol)
+        engine.readings = (packed, tol), found
+    return found
+
+
 def trajectory_of(memory, log, task):
     """The `Trajectory` of a run that has ended; None where none is asked for."""
     numbers, control = memory.run.numbers, memory.work.control
@@ -85,8 +100,7 @@ def trajectory_of(memory, log, task):
         return None
     charts = with_end(log.charts[: numbers.chart_rows + 1].copy(), numbers, control.condition, control.contraction)
     records = log.blocks[: numbers.blocks].copy(), charts, log.points[: len(charts)].copy()
-    readings = memory.engine.reading(memory, task.prepared, task.constraint_tol)
-    return Trajectory(readings, records, task.span[0], memory.run.now.copy(), task.angles, task.stops)
+    return Trajectory(readings_of(memory, task), records, task.span[0], memory.run.now.copy(), task.angles, task.stops)
 
 
 class Brief:

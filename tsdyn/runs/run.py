@@ -18,7 +18,7 @@ import time
 
 from ..errors import Status
 from ..jit.interrupts import CollectionsDeferred
-from .brief import Brief, begin, has_ended_well, limit_of
+from .brief import Brief, begin, has_ended_well, limit_of, readings_of
 from .counts import Counts
 from .run_log import left_open
 from .sampling import Sampled
@@ -51,7 +51,7 @@ def run(task, engine, observe=None, relay=None, past=None, briefly=False, unfini
         began = time.perf_counter()
         begun = begin(memory, task.times, task.stops, limit_of(memory.run, task.stops, task.max_steps))
         return _end(task, memory, begun, began, relay)
-    readings = _readings(memory, task)
+    readings = readings_of(memory, task)
     if observe is not None:
         observe(memory)
     watch = None
@@ -65,6 +65,8 @@ def run(task, engine, observe=None, relay=None, past=None, briefly=False, unfini
     if relay is not None and driven[0] in (PASSAGE, STIFF):
         relay.leave(memory)
     outcome = _outcome(task, engine, memory, driven, readings, watch, began)
+    if watch is not None:
+        readings[0].give(watch.reader)
     if observe is None and outcome.status is not NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give(engine.kind, memory)
     return outcome
@@ -79,17 +81,10 @@ def _end(task, memory, begun, began, relay):
         driven = drive(memory, task, None, begun)
         if relay is not None and driven[0] in (PASSAGE, STIFF):
             relay.leave(memory)
-        outcome = _outcome(task, engine, memory, driven, _readings(memory, task), None, began)
+        outcome = _outcome(task, engine, memory, driven, readings_of(memory, task), None, began)
     if outcome.status is not NOT_FINITE:
         task.prepared.give(engine.kind, memory)
     return outcome
-
-
-def _readings(memory, task):
-    """How the steps of a run are read, in this process and in others, where something asks for it."""
-    return (
-        memory.engine.reading(memory, task.prepared, task.constraint_tol) if memory.run.numbers.dense else (None, None)
-    )
 
 
 def _outcome(task, engine, memory, driven, readings, watch, began):

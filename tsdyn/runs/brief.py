@@ -34,7 +34,9 @@ class Begun(NamedTuple):
 class Room(NamedTuple):
     """Where a memory keeps the records of a first slice."""
 
+    first: int  # slices.FIRST_SLICE
     most: int  # steps
+    width: int  # of a row of outputs
     history: np.ndarray
     charts: np.ndarray
 
@@ -46,19 +48,25 @@ def limit_of(run, stops, max_steps):
 
 def begin(memory, times, stops, limit):
     """Make the first slice of a run that has been entered; the `Begun`."""
-    most, room = slices.first_slice(memory.weight), memory.room
-    if room is None or room.most != most:
-        room = memory.room = Room(most, np.empty((most + 2 * TRIES, 3)), np.empty((2 * CHART_ROOM, 5)))
-    rows, blocks = min(most, limit), (NO_ROWS, NO_ROWS)
+    room = memory.room
+    if room is None or room.first != slices.FIRST_SLICE:
+        room = memory.room = _room_for(memory)
+    rows, blocks = min(room.most, limit), (NO_ROWS, NO_ROWS)
     if memory.run.numbers.dense:
         blocks = _room_for_blocks(memory, rows)
-    out = np.empty((times.size or rows + 1, 1 + memory.run.now.size + memory.run.remembered.size))
+    out = np.empty((times.size or rows + 1, room.width))
     log, started = RunLog(times, stops, out, room.history, room.charts, *blocks), time.perf_counter()
     try:
         status = memory.advance(log, rows)
     except KeyboardInterrupt:
         status = None
     return Begun(log, rows, status, time.perf_counter() - started)
+
+
+def _room_for(memory):
+    most, run = slices.first_slice(memory.weight), memory.run
+    history, charts = np.empty((most + 2 * TRIES, 3)), np.empty((2 * CHART_ROOM, 5))
+    return Room(slices.FIRST_SLICE, most, 1 + run.now.size + run.remembered.size, history, charts)
 
 
 def _room_for_blocks(memory, rows):
@@ -74,8 +82,8 @@ def has_ended_well(memory, begun):
 
 def rows_of(memory, log):
     """The outputs of a run that has ended, in an array of their own."""
-    rows = log.out[: memory.run.numbers.rows]
-    return rows if log.t_eval.size else rows.copy()
+    count, out = memory.run.numbers.rows, log.out
+    return (out if len(out) == count else out[:count]) if log.t_eval.size else out[:count].copy()
 
 
 def readings_of(memory, task):

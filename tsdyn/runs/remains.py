@@ -29,7 +29,7 @@ class Remains:
     __slots__ = ("_charts", "_run", "_steps", "_told", "_work")
 
     def __init__(self, memory, log, keeps):
-        self._told, (self._run, self._work) = memory.told, memory.records()
+        self._told, self._run, self._work = memory.told, memory.run_state.copy(), memory.state.copy()
         self._steps = self._charts = None
         if keeps:
             run = memory.run.numbers

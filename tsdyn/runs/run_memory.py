@@ -129,10 +129,6 @@ class Memory:
             else:
                 _clear(array)
 
-    def records(self):
-        """Copies of what a run leaves: of `Run` and of `Work` what they begin with."""
-        return self.run_state.copy(), self.state.copy()
-
     def _lay_out(self, engine, task):
         """Enter what engine and task say, and load the driver where this process has not called it yet."""
         self.engine = None

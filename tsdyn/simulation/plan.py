@@ -123,7 +123,7 @@ class Plan:
         """The consistent start of a run; None if the call is to go the ordinary way."""
         known, kept = self._start, self.kept
         if state is None:
-            bits, given = None, scene._initial()
+            bits, given = None, scene._start or scene._initial()
             if known is not None and given is known.given and t == known.t:
                 return known
         else:

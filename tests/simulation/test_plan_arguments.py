@@ -165,6 +165,12 @@ def test_wrong_calls_say_what_is_wrong(scene):
     for wrong in (lambda: ts.simulate(scene), lambda: ts.simulate(scene, SPAN, 1e-8), lambda: ts.simulate(None, SPAN)):
         with pytest.raises((ts.InvalidCall, ts.InvalidArgument)):
             wrong()
+    for wrong in ({}, {"t_span": SPAN, "integrator": "rk45", "rtoll": 1.0}):
+        with pytest.raises(ts.InvalidCall):
+            ts.simulate(scene, **wrong)
+    with pytest.raises(ts.InvalidCall):
+        ts.simulate(scene, SPAN, t_span=SPAN)
+    same_run(by_plan(scene, t_span=SPAN), by_plan(scene, SPAN))
     same_run(ts.simulate(scene=scene, t_span=SPAN), ts.simulate(scene, SPAN))
 
 

@@ -33,14 +33,15 @@ def planned(go_on):
         @wraps(function)
         def call(*arguments, **keywords):
             found = None
-            if len(arguments) == 2 and isinstance(arguments[0], Scene):
+            if 0 < len(arguments) < 3 and isinstance(arguments[0], Scene):
                 given = {**defaults, **keywords}
+                t_span = arguments[1] if len(arguments) == 2 else given.pop("t_span", None)
                 if len(given) == len(defaults):
-                    found = _run(*arguments, given)
+                    found = _run(arguments[0], t_span, given)
             if found is None:
                 return function(*arguments, **keywords)
             if type(found) is Unfinished:
-                return go_on({"scene": arguments[0], "t_span": arguments[1], **given}, found)
+                return go_on({"scene": arguments[0], "t_span": t_span, **given}, found)
             return found
 
         return call

@@ -13,11 +13,11 @@ from ..sparse.massless_axes import axis_of
 from .rank import check_rank
 from .start_kernels import (
     DOUBTFUL,
+    HOLDS,
     NONE,
     evaluate_start,
     free_axis,
     go_near_by,
-    holds,
     land_start,
     select_redundant,
     take_start,
@@ -55,6 +55,10 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     """
     packed = scene.packed
     start = _Start(scene, system, q, qd, t, tol)
+    if packed.derived.redundant is None and start.is_regular():
+        settle(packed, start.graph, start.tangent.rows.H)
+        give(packed, start.workspace)
+        return q, qd
     dependent = start.check()
     if dependent >= 0 and not allowed:
         _refuse(scene, start, dependent)
@@ -155,11 +159,11 @@ class _Start:
         workspace.enter(system.reals, self.packed.size, q, tol)
         self.tangent, self.work, self.rates = workspace.tangent, workspace.work, workspace.rates
         self.context, self.at = workspace.address, workspace.at
-        self.far = self.fast = False
+        self.found, self.far, self.fast = None, False, False
 
     def renew(self, q, qd):
         """Take other positions and velocities, and the numbers of the system as they are now."""
-        self.q, self.qd, self.far, self.fast = q, qd, False, False
+        self.q, self.qd, self.found, self.far, self.fast = q, qd, None, False, False
         self.workspace.enter(self.packed.system.reals, self.packed.size, q, self.tol)
 
     def demand_velocities(self):
@@ -195,7 +199,8 @@ class _Start:
     def check(self):
         """Refuse violated rows; return the first row of H that depends on those before it, NONE or DOUBTFUL."""
         scene, graph, tangent, q, qd = self.scene, self.graph, self.tangent, self.q, self.qd
-        dependent = evaluate_start(self.context, q, qd, self.t, self.rates, 1)
+        dependent = self.evaluate() if self.found is None else self.found
+        self.found = None
         rows, real = graph.normals[graph.normals >= 0], graph.row >= 0
         Phi, velocity = np.zeros(self.m), np.zeros(self.m)
         Phi[graph.row[real]], velocity[graph.row[real]] = tangent.b[real], self.rates[real]
@@ -208,16 +213,17 @@ class _Start:
         self.velocity = velocity
         self.far = np.abs(Phi).max(initial=0.0) > ROUNDING * (1.0 + np.abs(q).max())
         self.fast = np.abs(velocity).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max())
-        return dependent
+        return NONE if dependent == HOLDS else dependent
+
+    def evaluate(self, every=1):
+        """As of `evaluate_start`; HOLDS is to rounding."""
+        where, tol = self.workspace.first_parameters, min(ROUNDING, self.tol)
+        return evaluate_start(self.context, self.q, self.qd, self.t, self.rates, every, where, tol)
 
     def is_regular(self):
         """Whether rows are independent and hold to rounding, as `check` finds it, with inertia about every axis."""
-        q, qd, rates, tangent = self.q, self.qd, self.rates, self.tangent
-        if evaluate_start(self.context, q, qd, self.t, rates, 1) != NONE:
-            return False
-        tol = min(ROUNDING, self.tol)
-        held = holds(tangent.b, rates, tangent.rows.H, q, qd, self.workspace.first_parameters, tol)
-        return held == 1 and self.loose_axis() < 0
+        self.found = self.evaluate()
+        return self.found == HOLDS and self.loose_axis() < 0
 
     def redundant_rows(self):
         """Return the rows that are redundant here and nearby; refuse a singular configuration."""
@@ -230,7 +236,7 @@ class _Start:
         way[-1] = way[:, 3] = way[:, 7] = 0.0
         loose = -1
         for share in REDUNDANT_SHARES:
-            evaluate_start(self.context, self.q, self.qd, self.t, self.rates, 1)
+            self.evaluate()
             if select_redundant(self.context, self.t, share) < 0:
                 raise SingularConfiguration(NO_CHOICE)
             loose = self.loose_axis()
@@ -269,7 +275,7 @@ class _Start:
     def serve(self, rows):
         """Take these rows for redundant; return True if S of the others is nonsingular."""
         set_selection(self.tangent, rows)
-        return evaluate_start(self.context, self.q, self.qd, self.t, self.rates, 0) < 0 and self.loose_axis() < 0
+        return self.evaluate(0) < 0 and self.loose_axis() < 0
 
     def hold_near_by(self, way):
         """Return True if the redundant rows hold along the way to a nearby configuration."""

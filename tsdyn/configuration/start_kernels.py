@@ -26,17 +26,24 @@ from .tolerances import DOUBTFUL_SHARE, IMMOBILE, LEAST_SIZE, ROUNDING
 
 # In place of a row that depends on others: there is none; rounding may hide one.
 NONE, DOUBTFUL = -1, -2
+HOLDS = -3  # there is none, and all rows hold
 PLAIN, LANDED = 1, 2  # what `take_start` has done
 
 
-@entry("pvvdvi")
-def evaluate_start(context, q, qd, t, velocity, every):
+@entry("pvvdviwd")
+def evaluate_start(context, q, qd, t, velocity, every, at, tol):
     """f.b = Phi, velocity = Phi_q qd + Phi_t, H of the graph's rows; the first row that depends on others.
 
     With every = 1 of every row, with 0 without the redundant ones. Where no row depends on others, NONE; DOUBTFUL, with
-    every = 1, if a pivot is so small that the rounding errors it causes may hide a redundant row.
+    every = 1, if a pivot is so small that the rounding errors it causes may hide a redundant row. HOLDS in place of
+    NONE if Phi and its rate hold to tol (1 + max |q|) and tol (1 + max |qd|), and H is finite; at: where the Euler
+    parameters of the rigid bodies begin.
     """
-    return _evaluate(load_parts(context), q, qd, t, velocity, every)
+    c = load_parts(context)
+    found = _evaluate(c, q, qd, t, velocity, every)
+    if found == NONE and _hold(c.tangent.b, velocity, c.tangent.rows.H, q, qd, at, tol) == 1:
+        return HOLDS
+    return found
 
 
 @kernel
@@ -60,17 +67,9 @@ def _evaluate(c, q, qd, t, velocity, every):
     return failed
 
 
-@entry("vvvvvwd")
-def holds(b, velocity, H, q, qd, at, tol):
-    """Return 1 if Phi, b, and its rate hold to tol (1 + max |q|) and tol (1 + max |qd|), and H is finite; else 0.
-
-    at: where the Euler parameters of the rigid bodies begin.
-    """
-    return _hold(b, velocity, H, q, qd, at, tol)
-
-
 @kernel
 def _hold(b, velocity, H, q, qd, at, tol):
+    """Return 1 if Phi, b, and its rate hold, and H is finite; else 0."""
     far, fast, size = 0.0, 0.0, 0.0
     for i in range(q.size):
         far, fast = max(far, abs(q[i])), max(fast, abs(qd[i]))

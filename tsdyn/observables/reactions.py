@@ -9,18 +9,17 @@ from ..elements.bodies import rotation_matrix, transform_g
 from ..elements.loops.body_poses import take_loads
 from ..elements.loops.coordinate_rows import INTS
 from ..elements.markers import POINT
-from ..jit.kernels import entry, resident
+from ..jit.kernels import entry
 from ..maths.dense_linalg import copy
 from ..model.equations import constraint_jacobian, set_time
 from ..model.packed import classes, index_of
 from ..model.sparse_jacobian import WIDTH, with_short_rows
 from ..rows.interface import balance_loads, mark_redundant
-from ..sparse.constraint_graph import REDUCED
-from ..sparse.constraint_graphs import graph_of
-from ..workspaces.workspace import load_parts, parts
+from ..workspaces.workspace import load_parts
 from .factorised_rows import factorise_at
 from .friction_reactions import with_normal_loads
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
+from .row_parts import give, taken
 
 MATRIX = np.zeros((0, 0))  # its type
 
@@ -71,14 +70,13 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
     memory (k, slots): memory of forces, zeros by default.
     """
     memory = with_normal_loads(packed, t, q, qd, qdd, memory)
-    system, graph = with_short_rows(packed), graph_of(packed, REDUCED)
-    out = np.zeros((t.size, len(system.segments)))
-    system = system._replace(reals=system.reals.copy())
+    found = taken(packed, q.shape[1])
+    out = np.zeros((t.size, len(found.system.segments)))
     f = applied_loads(packed.system, t, q, qd, memory)
-    f += velocity_forces(system, q, qd)
-    f -= inertial_forces(system, q, qdd)
-    context, *_keep = resident(parts(system, graph, q.shape[1]))
-    solve_multipliers(context, t, q, f, np.zeros((out.shape[1], WIDTH)), out)
+    f += velocity_forces(found.system, q, qd)
+    f -= inertial_forces(found.system, q, qdd)
+    solve_multipliers(found.address, t, q, f, np.zeros((out.shape[1], WIDTH)), out)
+    give(packed, found)
     return out
 
 

@@ -18,3 +18,5 @@ BALANCED = 1e-15
 COMPLEX_STEP = 1e-40
 # The least divisor: nothing that matters is so small.
 LEAST_DIVISOR = 1e-300
+# Floats of a workspace of rows up to which it is kept for the next call (1 MB): a hundred bodies or more.
+KEPT_FLOATS = 1 << 17

@@ -84,9 +84,9 @@ def method_of(integrator, rtol, atol):
     """The method that is given as an instance, a class or a name; tolerances are for a name."""
     known = registered()
     named = isinstance(integrator, str)
-    if named and _key(integrator) not in known:
+    kind = kind_named(integrator) if named else integrator if isinstance(integrator, type) else type(integrator)
+    if kind is None:
         raise unknown_name("integrator", integrator, known)
-    kind = known[_key(integrator)] if named else integrator if isinstance(integrator, type) else type(integrator)
     adapts = getattr(kind, "embedded_order", 0) > 0
     given = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
     if given and not adapts and kind in known.values():
@@ -111,5 +111,6 @@ def method_of(integrator, rtol, atol):
     return integrator
 
 
-def _key(name):
-    return name.lower().replace("-", "").replace("_", "")
+def kind_named(name):
+    """The class of integrators of a name, as it is registered now; None if there is none."""
+    return registered().get(name.lower().replace("-", "").replace("_", ""))

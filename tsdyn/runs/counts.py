@@ -38,19 +38,27 @@ class Counts(Mapping):
 
     Parameters
     ----------
-    memory : Memory
-        At the end of the run; its records are copied.
+    numbers : Numbers
+    counters : Counters
+        Both at the end of the run, and of its own.
+    largest_landing : float, m
     skipped : tuple of int
         What each evaluation skips: torques of bodies with spherical inertia, rotations of bodies that never turn,
         constant columns of markers.
+    has_forces : bool
     """
 
-    def __init__(self, memory, skipped):
-        run = memory.run
-        self.numbers = Numbers.from_buffer_copy(run.numbers)
-        self.counters = Counters.from_buffer_copy(memory.work.counters)
-        self.largest_landing = run.clock.largest_landing
-        self.skipped, self.has_forces = skipped, bool(memory.packed.loads)
+    def __init__(self, numbers, counters, largest_landing, skipped, has_forces):
+        self.numbers, self.counters, self.largest_landing = numbers, counters, largest_landing
+        self.skipped, self.has_forces = skipped, has_forces
+
+    @classmethod
+    def of(cls, memory):
+        """Those of a run that has ended there."""
+        run, told = memory.run, memory.told
+        numbers = Numbers.from_buffer_copy(run.numbers)
+        counters = Counters.from_buffer_copy(memory.work.counters)
+        return cls(numbers, counters, run.clock.largest_landing, told.skipped, told.has_forces)
 
     def __getitem__(self, name):
         return _READ[name](self)

@@ -59,6 +59,10 @@ class Recorder:
         history = np.empty((rows + 2 * TRIES, 3))
         self.log = RunLog(self.times, self.stops, self.out, history, self.charts, self.points, self.blocks)
 
+    def adopt(self, log):
+        """Go on from a first slice whose records are in this log."""
+        self.log, self.out, self.charts, self.points, self.blocks = log, log.out, log.charts, log.points, log.blocks
+
     def close(self):
         """Put the slices together."""
         run = self.run.numbers

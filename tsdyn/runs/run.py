@@ -18,6 +18,7 @@ import time
 
 from ..errors import Status
 from ..jit.interrupts import CollectionsDeferred
+from .brief import Brief, begin, has_ended_well, limit_of, readings_of
 from .counts import Counts
 from .run_log import left_open
 from .sampling import Sampled
@@ -29,23 +30,28 @@ from .trajectory import Trajectory
 NOT_FINITE, PASSAGE, STIFF = Status.NOT_FINITE, Status.PASSAGE, Status.STIFF
 
 
-def run(task, engine, observe=None, relay=None, past=None):
-    """Run a `Task` by a kind of engine; the `Outcome`.
+def run(task, engine, observe=None, relay=None, past=None, briefly=False, unfinished=None):
+    """Run a `Task` by a kind of engine; the `Outcome`, or a `Brief` where a run of which little is asked allows it.
 
     `observe` is given the memory before the run: one of its own. With a `Relay` the run is a segment of one; where
     there is a way past singular configurations, it ends with Status.PASSAGE next to one. `past(memory)` makes what is
     advanced in place of the memory.
     """
     prepared = task.prepared
+    if unfinished is not None:
+        memory = unfinished.memory
+        return _end(task, memory, unfinished.begun, unfinished.began, relay)
     engine = prepared.engine(engine, task.method, task.form, task.within)
     memory = None if observe else prepared.take(engine.kind)
     if memory is None or not engine.serves(memory):
         with CollectionsDeferred():
             memory = engine.memory(prepared)
     memory.enter(engine, task, relay is not None and relay.passes)
-    readings = None, None
-    if memory.run.numbers.dense:
-        readings = engine.reading(memory, prepared, task.constraint_tol)
+    if briefly:
+        began = time.perf_counter()
+        begun = begin(memory, task.times, task.stops, limit_of(memory.run, task.stops, task.max_steps))
+        return _end(task, memory, begun, began, relay)
+    readings = readings_of(memory, task)
     if observe is not None:
         observe(memory)
     watch = None
@@ -60,8 +66,25 @@ def run(task, engine, observe=None, relay=None, past=None):
         relay.leave(memory)
         relay.interrupted = driven[2].interrupted
     outcome = _outcome(task, engine, memory, driven, readings, watch, began)
+    if watch is not None:
+        readings[0].give(watch.reader)
     if observe is None and outcome.status is not NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give(engine.kind, memory)
+    return outcome
+
+
+def _end(task, memory, begun, began, relay):
+    """The outcome of a run that has made its first slice."""
+    engine = memory.engine
+    if has_ended_well(memory, begun):
+        outcome = Brief(memory, begun, task, began)
+    else:
+        driven = drive(memory, task, None, begun)
+        if relay is not None and driven[0] in (PASSAGE, STIFF):
+            relay.leave(memory)
+        outcome = _outcome(task, engine, memory, driven, readings_of(memory, task), None, began)
+    if outcome.status is not NOT_FINITE:
+        task.prepared.give(engine.kind, memory)
     return outcome
 
 
@@ -77,5 +100,5 @@ def _outcome(task, engine, memory, driven, readings, watch, began):
     found = None if watch is None else watch.found(task.prepared.n)
     return Outcome(
         status, reason, recorder.out, recorder.steps, recorder.chart_history(charts), run.clock.t,
-        last, run.remembered.copy(), Counts(memory, engine.skipped), trajectory, found, began,
+        last, run.remembered.copy(), Counts.of(memory), trajectory, found, began,
     )  # fmt: skip

@@ -62,6 +62,10 @@ def close_chart(r, log, condition, contraction):
 
 def left_open(run, charts, condition, contraction):
     """The charts (k, 5) of a log, the last of which the run has not left."""
-    charts = charts[: run.numbers.chart_rows + 1].copy()
-    charts[-1, 2], charts[-1, 3], charts[-1, 4] = condition, contraction, run.numbers.in_chart
+    return with_end(charts[: run.numbers.chart_rows + 1].copy(), run.numbers, condition, contraction)
+
+
+def with_end(charts, numbers, condition, contraction):
+    """Write into the last of some charts how it is where the run has ended."""
+    charts[-1, 2:] = condition, contraction, numbers.in_chart
     return charts

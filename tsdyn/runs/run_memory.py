@@ -2,6 +2,7 @@
 
 import math
 from operator import is_
+from typing import NamedTuple
 
 from ..errors import Status
 from ..jit.kernels import resident
@@ -16,6 +17,15 @@ from .tolerances import LONG_STEPS, PIECE
 
 UNLIMITED = 2**62  # steps wanted of an adaptive run
 STATUSES = {int(status): status for status in Status}
+
+
+class Told(NamedTuple):
+    """What the records of a run don't say."""
+
+    n: int
+    remembered: int  # angles and slots
+    skipped: tuple  # as of an engine
+    has_forces: bool
 
 
 class Memory:
@@ -34,6 +44,8 @@ class Memory:
 
     reason = ""  # of the end of a run: told by its status
     engine = None  # that it is laid out for
+    room = None  # of a first slice: a `brief.Room`
+    mark = None  # of the plan that has entered it last
     advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
 
     def __init__(self, prepared, graph, context, run):
@@ -42,11 +54,12 @@ class Memory:
         self.settle(context)
         self._run, *self._keep_run = resident(run)
         work, tables = context.work, (run.now, run.before, run.remembered, run.frames, run.tableau)
-        state, rest = divided(work.q.base, work.control, work.counters, work.q, work.qd, work.qdd)
-        run_state, self._run_scratch = divided(run.now.base, run.clock, run.numbers, run.kernels, *tables)
-        self._laid_out = [run_state, state]  # what a run finds as it was laid out,
+        self.state, rest = divided(work.q.base, work.control, work.counters, work.q, work.qd, work.qdd)
+        self.run_state, self._run_scratch = divided(run.now.base, run.clock, run.numbers, run.kernels, *tables)
+        self._laid_out = [self.run_state, self.state]  # what a run finds as it was laid out,
         self._scratch = [rest] if rest.size else []  # and what it finds zero
         self._images, self._start = [], ()
+        self._entered, self._whole = (None, None), []
 
     def settle(self, context, header=()):
         """Let the kernels find this context, behind the integers of a header."""
@@ -60,11 +73,8 @@ class Memory:
 
     def enter(self, engine, task, may_pass):
         """As if it were new, for an engine and a task: what a run before has left behind is gone."""
-        for array in self._scratch:
-            if array.size < PIECE:
-                array.fill(0)
-            else:
-                _clear(array)
+        self.mark = None
+        self._clear_scratch()
         start = task.q, task.qd, task.constraint_tol
         if self.engine is not engine:
             self._lay_out(engine, task)
@@ -73,17 +83,51 @@ class Memory:
             for array, image in self._images:
                 array[...] = image
             if not all(map(is_, start, self._start)):
-                self._enter_start(task)
+                self._enter_start(*start[:2])
+                self._hold(task)
         self.context.system.reals[...] = self.reals  # motions, signals and what forces remember are written there
         if task.remembered.size:
-            self._remember(task)
+            self._remember(task.remembered, task.prepared.handles)
         reset_selection(self.graph, self.context.tangent)
         self._set_out(task, may_pass)
 
+    def enter_again(self, plan, engine, stretch, start):
+        """As `enter`, for a run of a `simulation.plan.Plan`: what the plan has entered before is copied from an image.
+
+        stretch, start: as of the plan; the same objects as long as they are the same.
+        """
+        if self.mark is not plan.mark or self.engine is not engine:
+            self.enter(engine, plan.task_of(stretch, start, plan.task.choose), plan.may_pass)
+            self._whole = [(array, array.copy()) for array in self._set() if array.size]
+            self.mark, self._entered = plan.mark, (stretch, start)
+            return
+        if self._scratch:
+            self._clear_scratch()
+        for array, image in self._whole:
+            array[...] = image
+        of_stretch, of_start = self._entered
+        if stretch is not of_stretch:
+            self._enter_span(stretch.span, stretch.steps)
+        if start is not of_start:
+            self._enter_start(start.q, start.qd)
+            if start.remembered.size:
+                self._remember(start.remembered, plan.kept.handles)
+
     def entered(self):
         """The arrays that `enter` sets, laid out."""
+        return [*self._scratch, *self._set()]
+
+    def _set(self):
+        """The same, but for those that it clears."""
         arrays, records = selection_parts(self.context.tangent)
-        return [*self._laid_out, *self._scratch, self.context.system.reals, *arrays, *map(words, records)]
+        return [*self._laid_out, self.context.system.reals, *arrays, *map(words, records)]
+
+    def _clear_scratch(self):
+        for array in self._scratch:
+            if array.size < PIECE:
+                array.fill(0)
+            else:
+                _clear(array)
 
     def _lay_out(self, engine, task):
         """Enter what engine and task say, and load the driver where this process has not called it yet."""
@@ -93,7 +137,9 @@ class Memory:
         self._enter_method(engine.method)
         engine.lay_out(self)
         self.engine = engine
-        self._enter_start(task)
+        self.told = Told(self.run.now.shape[1], self.run.remembered.size, engine.skipped, bool(self.packed.loads))
+        self._enter_start(task.q, task.qd)
+        self._hold(task)
         self.load()
 
     def _enter_method(self, method):
@@ -107,30 +153,38 @@ class Memory:
         else:
             clock.h = method.step
 
-    def _enter_start(self, task):
-        """Positions, velocities, and how closely the constraints are held."""
+    def _enter_start(self, q, qd):
+        """Positions and velocities."""
         work, run = self.work, self.run
-        work.q[...], work.qd[...] = task.q, task.qd
-        run.now[0], run.now[1] = task.q, task.qd
-        hold(work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
+        work.q[...], work.qd[...] = q, qd
+        run.now[0], run.now[1] = q, qd
 
-    def _remember(self, task):
+    def _hold(self, task):
+        """How closely the constraints are held."""
+        hold(self.work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
+
+    def _remember(self, remembered, handles):
         """Angles of joints, and what forces remember."""
         own, run = self.context.system, self.run
-        enter_joints(run, task.prepared.handles, task.remembered)
+        enter_joints(run, handles, remembered)
         if own.memory.size:
-            own.reals[own.memory] = task.remembered[len(run.joints) :]
+            own.reals[own.memory] = remembered[len(run.joints) :]
 
     def _set_out(self, task, may_pass):
         """The interval, and what the run is to do."""
-        method, clock, numbers = task.method, self.run.clock, self.run.numbers
-        clock.t = clock.t_origin = task.span[0]
-        clock.t_end = task.span[1]
-        if method.step is not None:
-            numbers.steps_wanted = step_count(*task.span, method.step)
+        step, numbers = task.method.step, self.run.numbers
+        self._enter_span(task.span, 0 if step is None else step_count(*task.span, step))
         numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
         numbers.may_pass, numbers.chart_interval = may_pass, task.interval
         numbers.leave_when_stiff = task.choose is not None
+
+    def _enter_span(self, span, steps):
+        """The interval, s, and how many fixed steps it takes; 0 of an adaptive method."""
+        clock = self.run.clock
+        clock.t = clock.t_origin = span[0]
+        clock.t_end = span[1]
+        if steps:
+            self.run.numbers.steps_wanted = steps
 
     def saved(self):
         """What is to be saved of it beside its arrays: nothing."""

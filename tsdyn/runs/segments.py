@@ -1,7 +1,6 @@
 """Run segments: state and records passed between the parts of one run that different methods integrate."""
 
 from .event_search import Watch
-from .reader import Reader
 
 
 class Relay:
@@ -36,7 +35,7 @@ class Relay:
         """The `Watch` of the run's events, with a reader for the steps of this part; None where there are none."""
         if task.events is None:
             return None
-        reader = Reader(reading)
+        reader = reading.reader()
         if self.watch is None:
             self.watch = Watch(task.events, task.prepared.packed, reader, task.span[0])
         else:

@@ -23,6 +23,11 @@ SLICE_DONE = Status.SLICE_DONE  # which takes longer to look up than to compare
 FIRST_SLICE, FIRST_WORK = 1024, 1 << 15  # steps; coordinates stepped on, unless that is less than a step
 
 
+def first_slice(weight):
+    """How many steps of this `weight` there are in a first slice."""
+    return min(max(FIRST_WORK // weight, 1), FIRST_SLICE)
+
+
 class Pace:
     """Whether a run gets on: an adaptive one whose steps stay so short that it would never end is ended.
 
@@ -68,7 +73,7 @@ class Slices:
         self.run, self.choose = memory.run, task.choose
         wanted = self.run.numbers.steps_wanted
         self.limit = wanted + len(task.stops) if task.max_steps is None else task.max_steps
-        self.most = min(max(FIRST_WORK // memory.weight, 1), FIRST_SLICE)
+        self.most = first_slice(memory.weight)
         self.status, self.reason = SLICE_DONE, ""
 
     @cached_property
@@ -76,12 +81,16 @@ class Slices:
         """The `Pace` of the run."""
         return Pace(self.task.span[0])
 
-    def drive(self):
-        """Advance until the end."""
-        rows = self._rows()
+    def drive(self, begun=None):
+        """Advance until the end, from the `Begun` of a run on."""
+        rows = self._rows() if begun is None else begun.rows
         while self.status is SLICE_DONE:
-            self.recorder.begin_slice(rows)
-            self._adapt(rows, self._advance(rows))
+            if begun is None:
+                self.recorder.begin_slice(rows)
+                self._adapt(rows, self._advance(rows))
+            else:
+                self._go_on(begun)
+                begun = None
             self._look_up()
             if self.status is SLICE_DONE:
                 rows = self._rows()
@@ -103,12 +112,24 @@ class Slices:
         else:
             status, self.reason = self.watch.advance(self.memory, log, rows)
         seconds = time.perf_counter() - started
+        self._end_slice(status)
+        return seconds
+
+    def _go_on(self, begun):
+        """From the end of a first slice."""
+        self.recorder.adopt(begun.log)
+        if begun.status is None:
+            raise KeyboardInterrupt
+        self._end_slice(begun.status)
+        self._adapt(begun.rows, begun.seconds)
+
+    def _end_slice(self, status):
+        """Take the status of a slice; refuse a run that could not begin."""
         if not self.run.numbers.begun:
             singular = status in (Status.SINGULAR, Status.MASS_SINGULAR)
             kind = SingularConfiguration if singular else InconsistentState
             raise kind(" ".join(filter(None, ("no step could be made from the start.", *self._why(status)))))
         self.status = status
-        return seconds
 
     def _why(self, status):
         """What ends a run at its start: the status, forces that are not finite, the remedy."""
@@ -186,8 +207,8 @@ def _warn_of(error, t):
         )
 
 
-def drive(memory, task, watch):
-    """Drive a run to its end; Status, what there is to say of it, and the closed `Recorder`.
+def drive(memory, task, watch, begun=None):
+    """Drive a run to its end, from its `Begun` on; Status, what there is to say of it, and the closed `Recorder`.
 
     Where `task.choose` says that another method goes on, the run ends with Status.STIFF.
     """
@@ -197,7 +218,7 @@ def drive(memory, task, watch):
         slices.restore(*task.archive.resumed)
         task.archive.resumed = None
     try:
-        slices.drive()
+        slices.drive(begun)
     except OSError as error:
         if task.archive is None:
             raise

@@ -109,3 +109,6 @@ TRIES = 32
 # Legs in which a place between two steps is reached from the start of its chart: more, where one of them takes more
 # than FEW factorisations. From nearby there is one of N, and one of S or of the masses.
 LEGS, FEW = (1, 4, 16), 2
+
+# Floats of the workspace of a reader up to which it is kept for the next one (1 MB): a hundred bodies or more.
+KEPT_FLOATS = 1 << 17

@@ -4,7 +4,6 @@ import numpy as np
 
 from ..errors import Status
 from ..workspaces.run_state import B_END, B_START
-from .reader import Reader
 
 
 class Pieces:
@@ -96,8 +95,9 @@ class Trajectory:
             rows = np.minimum(rows + np.isin(t, self.asked), len(self.blocks) - 1)
         order = np.argsort(rows, kind="stable")  # so that a chart is made once
         out = np.empty((t.size, *self.first.shape))
-        reader = Reader(self.reading)
+        reader = self.reading.reader()
         out[order], status = reader(t[order], rows[order], self.blocks, self.charts, self.points)
+        self.reading.give(reader)
         return out, self.blocks[rows, self.blocks.shape[1] - slots :], status
 
     def anchors(self, t):

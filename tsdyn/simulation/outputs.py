@@ -14,6 +14,15 @@ if TYPE_CHECKING:
     from ..hints import Floats
 
 _COLUMNS = {"t": "time", "q": "q", "qd": "qd", "qdd": "qdd", "anchor": "remembered", "_remembers": "remembered"}
+_REMAINS = {  # of a run that leaves its `brief.Remains`: made when it is asked for
+    "_reached": lambda of, angles: of.reached,
+    "_last": lambda of, angles: of.last,
+    "_angles": lambda of, angles: of.remembered[:angles],
+    "_remembered": lambda of, angles: of.remembered[angles:],
+    "_step_log": lambda of, angles: of.steps,
+    "_chart_log": lambda of, angles: of.charts,
+    "_counts": lambda of, angles: of.counts,
+}
 
 
 class Outputs:
@@ -47,6 +56,8 @@ class Outputs:
             self._unpack(*rows)
         if name in _COLUMNS and name in self.__dict__:  # made now, or by another thread
             return self.__dict__[name]
+        if name in _REMAINS and "_remains" in self.__dict__:
+            return self.__dict__.setdefault(name, _REMAINS[name](self._remains, self.handles.count))
         if stored is None or name not in _COLUMNS:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         found = stored.read(_COLUMNS[name], self._slice)

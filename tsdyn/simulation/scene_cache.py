@@ -23,6 +23,7 @@ SPARE = 8  # idle memories of a kind that are kept: as many runs at once allocat
 OF_NUMBERS = {"implicit", "spheres", "series", "sampled"}  # what `Prepared` derives from them
 KINDS = 8  # kinds of memory, and shapes of a scene, at most
 LARGEST = 1 << 24  # bytes of a memory that is kept, at most
+SMALL = 1 << 20  # the same where several plans have one each
 
 
 def prepared(scene):
@@ -46,6 +47,7 @@ class Prepared:
         self.packed, self.motions = packed, scene.motions()
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
         self._start = (None, None), None
+        self.plans = {}  # of calls of `simulate`; see plans.py
         self.remembers = bool(packed.system.memory.size or handles_of(packed).count)
         every = scene.__dict__.setdefault("_spare", {})
         if len(every) >= KINDS:
@@ -58,7 +60,7 @@ class Prepared:
         other = copy.copy(self)
         for name in OF_NUMBERS & vars(other).keys():
             del vars(other)[name]
-        other.packed, other._start, other._spare = packed, ((None, None), None), {}
+        other.packed, other._start, other._spare, other.plans = packed, ((None, None), None), {}, {}
         other.handles = handles_of(packed)
         return other
 
@@ -165,12 +167,21 @@ class Prepared:
         demand_unique(self.packed, start[0], t)
         return hold(self.packed, *start)
 
-    def take(self, kind):
-        """Return an idle memory of a kind, for one run; None if there is none."""
+    def take(self, kind, mark=None):
+        """Return an idle memory of a kind, for one run; None if there is none. Preferably one with this mark."""
         try:
-            return self._spare[kind].pop()
+            spare = self._spare[kind]
+            if mark is not None and spare[-1].mark is not mark:
+                for i, memory in enumerate(spare[:-1]):
+                    if memory.mark is mark:
+                        return spare.pop(i)  # another one, if a thread has been quicker
+            return spare.pop()
         except (KeyError, IndexError):
             return None
+
+    def has_room(self, memory):
+        """Whether one more memory like this one is kept."""
+        return sum(map(len, [*self._spare.values()])) < KINDS - 1 and memory.nbytes <= SMALL
 
     def give(self, kind, memory):
         """Take back a memory that is no longer in use."""

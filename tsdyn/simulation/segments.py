@@ -31,12 +31,15 @@ GIVEN_UP = (  # by the implicit method: the explicit one goes on
 )  # fmt: skip
 
 
-def run_segments(task, engine, observe=None):
-    """Run a `Task` by the engine of its method; return the `Outcome`. An observed run has one segment."""
-    passes = engine is StepEngine and not task.form.first_order
-    if observe is not None or not (task.choose or (passes and not task.prepared.refusal)):
-        return run(task, engine, observe)
-    relay = Relay(not task.form.first_order and not task.prepared.refusal)
+def run_segments(task, engine, observe=None, unfinished=None):
+    """Run a `Task` by the engine of its method, or what a plan has left `Unfinished` of it; return the `Outcome`.
+
+    An observed run has one segment.
+    """
+    briefly = observe is None and asks_little(task)
+    if observe is not None or not is_relayed(task, engine):
+        return run(task, engine, observe, briefly=briefly, unfinished=unfinished)
+    relay = Relay(may_pass(task))
     passed = task.archive.passed if task.archive else []
     try:
         if passed:  # a run that goes on in a later segment
@@ -45,10 +48,26 @@ def run_segments(task, engine, observe=None):
                 task.choose.restore(passed[-1]["turns"])
             return _Segments(task, engine, relay, [_recalled(known) for known in passed]).go_on()
         first = task if task.report is silent else task._replace(report=_until_its_end(task.report))
-        outcome = run(first, engine, relay=relay)
+        outcome = run(first, engine, relay=relay, briefly=briefly, unfinished=unfinished)
         return _Segments(task, engine, relay, [outcome]).go_on() if outcome.status in (PASSAGE, STIFF) else outcome
     finally:
         task.report(None)
+
+
+def asks_little(task):
+    """Whether nothing is asked of a run between the ends of its slices."""
+    asked = task.events is not None or task.sampling is not None or task.archive is not None
+    return task.report is silent and not asked
+
+
+def is_relayed(task, engine):
+    """Whether a run may have more than one segment."""
+    return task.choose is not None or (engine is StepEngine and may_pass(task))
+
+
+def may_pass(task):
+    """Whether there is a way past singular configurations."""
+    return not task.form.first_order and not task.prepared.refusal
 
 
 def _until_its_end(report):

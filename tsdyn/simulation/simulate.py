@@ -14,6 +14,7 @@ from ..errors import InvalidArgument
 from ..methods.integrator import frozen
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
+from ..runs.brief import Brief
 from ..runs.sampling import Sampling
 from ..runs.step_engine import StepEngine
 from ..runs.task import Task
@@ -21,6 +22,7 @@ from ..taylor.series_engine import SeriesEngine
 from . import method_choice, stored_runs
 from .local_origin import origin_of, run_near
 from .options import checked
+from .plans import keep, planned
 from .rounding_limit import within_rounding
 from .scene import Scene
 from .scene_cache import prepared
@@ -36,6 +38,18 @@ ENGINES = {"steps": StepEngine, "series": SeriesEngine}
 DRIVERS = {name: partial(run_segments, engine=engine) for name, engine in ENGINES.items()}  # by Integrator.driver
 
 
+def _go_on(given, unfinished):
+    """Complete the run of a plan that is longer than its first slice."""
+    plan, scene, stretch = unfinished.plan, given["scene"], unfinished.stretch
+    choose = None
+    if plan.task.choose is not None:
+        options = plan.options._replace(span=stretch.span, times=stretch.times, within=stretch.within)
+        choose = method_choice.turns_of(scene, plan.kept, plan.task.method, options)
+    task = plan.task_of(stretch, unfinished.start, choose)
+    return _solution(given, task, run_segments(task, plan.kind, unfinished=unfinished), unfinished.called)
+
+
+@planned(_go_on)
 @fitting
 def simulate(  # many arguments, by name: each is an option of a run
     scene: Scene,
@@ -150,16 +164,16 @@ def simulate(  # many arguments, by name: each is an option of a run
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     if scene._waiting:
-        warn_of_waiting(scene, 3)
+        warn_of_waiting(scene, 4)
     if store is not None or checkpoint is not None:
         stored_runs.demand_storable(given)
-    return run_from(given)
+    return run_from(given, plans=True)
 
 
-def run_from(given, numbers=None, arrays=None, archive=None):
+def run_from(given, numbers=None, arrays=None, archive=None, plans=False):
     """Run what the arguments of `simulate` ask for; with the numbers and arrays of a checkpoint, from there.
 
-    An archive is that of a run which begins again by another method.
+    An archive is that of a run which begins again by another method. With `plans` the call is kept for later ones.
     """
     scene, options = given["scene"], checked(given)
     method, settings, default = options.method, options.settings, (given["rtol"], given["atol"], options.series)
@@ -176,11 +190,20 @@ def run_from(given, numbers=None, arrays=None, archive=None):
     if given["store"] is not None:
         return _run_stored(task, given, options, (numbers, arrays), archive)
     outcome = run_task(task, scene, settings.initial_tol)
+    solution = _solution(given, task, outcome, started)
+    if plans and type(outcome) is Brief:
+        keep(given, task, ENGINES[method.driver], options, solution)
+    return solution
+
+
+def _solution(given, task, outcome, started):
+    """The `Solution` of a run, or of one by another method if it has failed."""
     ended = time.perf_counter()
     other = method_choice.instead(task, outcome.status)
     if other is not None:
         return run_from(_again(given, other))
-    return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
+    seconds = {"prepare": outcome.began - started, "run": ended - outcome.began}
+    return Solution(given["scene"], task, outcome, seconds)
 
 
 def _again(given, method):

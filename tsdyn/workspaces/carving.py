@@ -32,3 +32,10 @@ def divided(block, *parts):
 def words(record):
     """The numbers of a record as an array of words, which is copied and cleared in less time."""
     return np.frombuffer(record, np.int64)
+
+
+def arrays_of(value):
+    """The arrays of named tuples, and their records as arrays of words."""
+    if isinstance(value, np.ndarray):
+        return [value]
+    return [array for part in value for array in arrays_of(part)] if isinstance(value, tuple) else [words(value)]

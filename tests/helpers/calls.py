@@ -1,0 +1,40 @@
+"""Calls of `simulate` that are like earlier ones, and what they must return."""
+
+import sys
+from unittest import mock
+
+import numpy as np
+
+import tsdyn as ts
+
+MODULE = sys.modules["tsdyn.simulation.simulate"]
+PARTS = ("t", "q", "qd", "qdd", "multipliers")
+
+
+def by_plan(scene, *arguments, **options):
+    """Call `simulate`; fail if the call goes the ordinary way."""
+    with mock.patch.object(MODULE, "run_from", side_effect=AssertionError("the call had no plan")):
+        return ts.simulate(scene, *arguments, **options)
+
+
+def same_run(one, two):
+    """Two solutions of one run: everything but the times of the clock has the same bits."""
+    for name in PARTS:
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name), err_msg=name)
+    for name in ("method", "span", "formulation", "status", "message", "success", "reached"):
+        assert getattr(one, name) == getattr(two, name), name
+    for a, b in zip(one.state, two.state, strict=True):
+        np.testing.assert_array_equal(a, b)
+    counts = [{**vars(each.stats), "seconds": None} for each in (one, two)]
+    assert counts[0] == counts[1]
+    logs = [each._step_log is not None for each in (one, two)]
+    assert logs[0] == logs[1]
+    for name in ("steps", "charts") if logs[0] else ():
+        for a, b in zip(getattr(one, name), getattr(two, name), strict=True):
+            np.testing.assert_array_equal(a, b)
+    dense = [each._trajectory is not None for each in (one, two)]
+    assert dense[0] == dense[1]
+    if dense[0]:
+        t = np.linspace(*one.span, 7)
+        for a, b in zip(one.at(t), two.at(t), strict=True):
+            np.testing.assert_array_equal(a, b)

@@ -132,10 +132,9 @@ def _stability(motion):
 
 def _refuse(descent):
     """Say why none was found."""
-    motion = descent.motion
-    gains = np.linalg.norm(motion.translations(2), axis=1)
+    gains, spins = (np.linalg.norm(each, axis=1) for each in descent.rest.gains)
     turning = np.zeros(len(gains))
-    turning[motion.rigid] = descent.reach * np.linalg.norm(motion.spins(2), axis=1)
+    turning[descent.frame.metric.rigid] = descent.reach * spins
     body = descent.packed.bodies[int((gains + turning).argmax())]
     raise NoEquilibrium(
         f"no equilibrium was found in {descent.steps} steps and {descent.gone:.3g} m of way: {body.name} accelerates "

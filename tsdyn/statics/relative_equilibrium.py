@@ -8,19 +8,17 @@ Newton's method goes to the nearest root. One that is not stable is left by the 
 potential V - Omega . J Omega / 2 (Simo, Lewis, Marsden 1991).
 """
 
-from functools import cached_property
-from types import SimpleNamespace
-
 import numpy as np
 
-from ..errors import InconsistentState, NoEquilibrium, SingularConfiguration
+from ..errors import InconsistentState, NoEquilibrium
 from ..observables.generalised_forces import velocity_forces
 from .coordinates import chosen
-from .descent import Descent, saddle
+from .descent import Descent
 from .eigen import eigenpairs
 from .motion import Motion
-from .reduction import inertia_derivatives, reduce
+from .reduction import reduce
 from .steady import is_invariant
+from .steady_rest import SteadyRest
 from .tolerances import (
     BALANCED,
     GROWING,
@@ -30,7 +28,6 @@ from .tolerances import (
     MOST_SADDLES,
     MOST_TURN,
     NEUTRAL,
-    SOFTEST,
     STEADY,
     TURNED,
 )
@@ -54,17 +51,6 @@ class SteadyMotion(Motion):
         """Those of the steady motion."""
         return self._gains
 
-    @cached_property
-    def derivatives(self):
-        """Those of a `Motion`, K being the whole stiffness and Q_q zero."""
-        found, D = super().derivatives, self.field.D
-        parameters = self._gains[self.system.bodies[self.rigid, :1] + np.arange(3, 7)]
-        levels = self.parameters(0), self.parameters(1), parameters
-        shim = SimpleNamespace(q=self.q, system=self.system, rigid=self.rigid, parameters=lambda level: levels[level])
-        K, C = inertia_derivatives(shim)
-        whole = self.M @ D @ D - (found.Q_qd + C) @ D + K - found.Q_q + found.K
-        return found._replace(K=whole.tocsr(), Q_q=0.0 * found.Q_q)
-
 
 class SteadyDescent(Descent):
     """A configuration in steady motion, moved step by step; arguments of `Descent` after the `SteadyField`."""
@@ -73,39 +59,32 @@ class SteadyDescent(Descent):
         self.field = field
         super().__init__(*start)
 
-    def _at(self, q, memory):
-        return SteadyMotion(self.packed, memory, self.t, q, self.field)
+    def _at(self, q):
+        return SteadyRest(self.frame, self.memory, q, self.field)
+
+    def _motion_at(self, q):
+        return SteadyMotion(self.packed, self.memory, self.t, q, self.field)
 
     def approach(self):
         """Take Newton steps to the nearest root; True if it is reached."""
         for _ in range(MOST_NEWTON):
-            before, motion = self.unbalanced, self.motion
+            before, rest = self.unbalanced, self.rest
             if before <= BALANCED:
                 break
-            way = saddle(motion)(SOFTEST * motion.stiffness, motion.M @ motion.qdd)
-            if way is None:
+            u = rest.quadratic.newton(rest.left)
+            if u is None:
                 break
             self.steps += 1
-            shift, turn = self._extent(way)
+            shift, turn = self.frame.increments.extent(u)
             factor = min(1.0, self.longest / max(shift, LEAST_SHIFT), MOST_TURN / max(turn, LEAST_SHIFT))
-            if not any(self._nearer(factor * 0.5**i * way, before) for i in range(HALVINGS)):
+            if not any(self._nearer(factor * 0.5**i * u) for i in range(HALVINGS)):
                 break
         return self.unbalanced <= TURNED
 
-    def _nearer(self, way, before):
+    def _nearer(self, u):
         """Move if less is unbalanced there."""
-        old, q = self.motion, self._moved(way)
-        if q is None:
-            return False
-        try:
-            self.motion = self._at(q, self.memory)
-        except SingularConfiguration:
-            return False
-        if self.unbalanced < before:
-            self._remember()
-            return True
-        self.motion = old
-        return False
+        q = self.rest.closed(self.frame.increments.moved(self.rest.q, u))
+        return q is not None and self._move(q, u, 0.0)
 
 
 def find_steady(descent):
@@ -120,11 +99,11 @@ def find_steady(descent):
         if way is None:
             return findings
         if unstable is None or not findings[0]:
-            unstable = findings, descent.motion, descent.memory.copy(), descent.angles.copy()
+            unstable = findings, descent.rest, descent.memory.copy(), descent.angles.copy()
         descent.kick(way)
         if not descent.settle():
             break
-    findings, descent.motion, descent.memory, descent.angles = unstable
+    findings, descent.rest, descent.memory, descent.angles = unstable
     return findings
 
 

@@ -60,10 +60,26 @@ TURNED = 1e-9
 # Share of the scene's size, rad: a step that is shorter changes nothing.
 LEAST_STEP = 1e-15
 LEAST_SHIFT = 1e-300
+# Weight of a shift by the scene's size against a turn by a radian, among what takes up loads: forces are passed on by
+# chains of up to the inverse root of it in links.
+MASSLESS = 1e-8
+# Share of the stiffness of a body above which a sign is certain, and the softness of rows of unit length: factors
+# without exchange of rows round by 1e-16 over the latter.
+CLEARLY, SOFTENED = 1e-7, 1e-8
 # rad, of a step: angles are counted by the nearest turn, and the trapezoidal rule holds.
 MOST_TURN = 0.5
-# Factors of mu after a step that is taken, and after one that isn't; its least share of the stiffness.
-SOFTER, STIFFER, SOFTEST = 0.1, 6.0, 1e-10
+# Factors of mu after a step that is taken, and after one that isn't; below the third it is zero, above the fourth D
+# doesn't suffice.
+SOFTER, STIFFER, SOFTEST_MU, STIFF = 0.25, 4.0, 0.02, 60.0
+# Share of the stiffness of a body that a direction without stiffness has.
+SOFTEST = 1e-10
+# Share of the work promised that a step must do; share of what is unbalanced that a short one may leave.
+WORTH, GOOD = 0.1, 0.9
+# rad, or shares of the scene's size: the work of shorter steps is rounding, and steps that fail though they are shorter
+# than the second are the last.
+SHORT, FINAL = 1e-4, 1e-9
+# A step is this many times longer than may be before mu grows; tries of a step.
+TOO_FAR, MOST_TRIES = 4.0, 20
 # Steps at most, and the way in sizes of the scene: what is farther falls.
 MOST_STEPS, FARTHEST = 400, 1e5
 # rad, of all steps: what has turned farther is driven round.

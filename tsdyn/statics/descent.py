@@ -20,10 +20,12 @@ from .frame import Frame
 from .motion import Motion
 from .rest import Rest
 from .tolerances import (
+    AT_SADDLE,
     BALANCED,
     FARTHEST,
     FINAL,
     GOOD,
+    HALVINGS,
     KICKS,
     LEAST_SHIFT,
     LEAST_STEP,
@@ -33,7 +35,7 @@ from .tolerances import (
     MOST_TURNED,
     SHORT,
     SOFTER,
-    SOFTEST_MU,
+    LEAST_MU,
     STIFF,
     STIFFER,
     TOO_FAR,
@@ -62,6 +64,8 @@ class Descent:
     q : ndarray (n,)
         Consistent.
     """
+
+    relative = False  # whether saddles may be stable all the same
 
     def __init__(self, packed, handles, remembered, t, q):
         self.packed, self.handles, self.t = packed, handles, t
@@ -102,12 +106,19 @@ class Descent:
         rest = self.rest
         quadratic, load = rest.quadratic, rest.left
         stiffness = float(quadratic.local.max(initial=0.0))
+        near = self.unbalanced <= AT_SADDLE
+        if near and (self.relative or quadratic.circulatory):
+            u = quadratic.newton(load)
+            if u is not None and self._along(u):
+                return True
         for _ in range(MOST_TRIES):
             least = 0.0 if stiffness > 0.0 else np.abs(load).max() * max(self.mu, 1.0)
             if self.mu > STIFF:
                 least = self.mu * stiffness
             factors = quadratic.factors(self.mu, least)
             u = factors.step(load) if factors.positive else None
+            if near and self.mu > 0.0 and u is not None and self._leave(factors):
+                return True
             if u is not None:
                 shift, turn = self.frame.increments.extent(u)
                 size = max(shift / self.reach, turn)
@@ -117,13 +128,32 @@ class Descent:
                 if not (far > TOO_FAR and self.mu < 1.0 and quadratic.shift.any()):
                     factor = min(1.0, 1.0 / max(far, LEAST_SHIFT))
                     if self._try(factor * u, size * factor):
-                        self.mu = 0.0 if self.mu < SOFTEST_MU else self.mu * SOFTER
+                        self.mu = 0.0 if self.mu < LEAST_MU else self.mu * SOFTER
                         self.longest *= 2.0 if factor < 1.0 and factor * turn < 0.99 * MOST_TURN else 1.0
                         return True
                     if size <= FINAL:
                         return False
-            self.mu = max(self.mu * STIFFER, 0.25)
+            self.mu = max(self.mu * STIFFER, LEAST_MU)
         return False
+
+    def _along(self, u):
+        """Move by Newton's increment, shortened, if less is unbalanced there."""
+        shift, turn = self.frame.increments.extent(u)
+        factor = min(1.0, 1.0 / max(shift / self.longest, turn / MOST_TURN, LEAST_SHIFT))
+        for i in range(HALVINGS):
+            q = self.rest.closed(self.frame.increments.moved(self.rest.q, factor * 0.5**i * u))
+            if q is not None and self._move(q, factor * 0.5**i * u, 0.0):
+                return True
+        return False
+
+    def _leave(self, factors):
+        """Leave what is close to a saddle along a direction of negative stiffness."""
+        u = factors.downhill(self.rest.left, np.random.default_rng(self.steps))
+        if u is None:
+            return False
+        shift, turn = self.frame.increments.extent(u)
+        size = max(turn, shift / self.reach)
+        return any(self._try(share / size * u, share) for share in KICKS)
 
     def _try(self, u, size):
         """Move by an increment if the loads do work on the way."""

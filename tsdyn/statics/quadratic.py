@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from ..maths.sparse_lu import sparse_lu
-from .tolerances import CLEARLY, LEAST_DIVISOR, SOFTENED, SOFTEST
+from .tolerances import CLEARLY, LEAST_DIVISOR, NEUTRAL, SOFTENED, SOFTEST, SWEEPS
 
 
 class Quadratic:
@@ -43,9 +43,10 @@ class Quadratic:
         T = np.zeros((len(whole), 14, 12))
         T[:, :7, :6], T[:, 7:, 6:] = P[frame.by_parts[:, 0]], P[frame.by_parts[:, 1]]
         blocks = T.swapaxes(1, 2) @ whole @ T
-        own = self._normalised()
-        self.K = frame.stiffness(blocks, own)
+        inertial = P[:-1].swapaxes(1, 2) @ rest.own_slopes() @ P[:-1]
+        self.K = frame.stiffness(blocks, inertial + self._normalised())
         self.shift = self._shift(blocks[: frame.constraints], blocks[frame.constraints :])
+        self.shift += np.linalg.norm(inertial.reshape(-1, 2, 3, 6), axis=(2, 3))
         self.whole = frame.blocks.matrix(self.K)
 
     def _normalised(self):
@@ -53,7 +54,6 @@ class Quadratic:
         rest, frame = self.rest, self.frame
         found = np.zeros((len(frame.metric.at) + 1, 7, 7))
         found[frame.normal_bodies, 3:, 3:] = rest.lam[frame.normals][:, None, None] * np.eye(4)
-        found[:-1] += rest.own_slopes()
         P = rest.P[:-1]
         return P.swapaxes(1, 2) @ found[:-1] @ P
 
@@ -98,6 +98,12 @@ class Quadratic:
     def newton(self, load):
         """Newton's increment, to a minimum or not; None where the matrix is singular."""
         return Factors(self, 0.0, 0.0, definite=False).step(load)
+
+    @cached_property
+    def circulatory(self):
+        """Whether loads have no potential: K isn't symmetric."""
+        apart = self.whole - self.whole.T
+        return bool(np.abs(apart.data).max(initial=0.0) > NEUTRAL * np.abs(self.K).max(initial=0.0))
 
     def along(self, u):
         """u.K u."""
@@ -144,6 +150,18 @@ class Factors:
         top = quadratic.K + frame.stiffness(frame.no_pairs, added)
         top = top * scale[frame.blocks.rows] * scale[frame.blocks.columns]
         return frame.matrix(frame.saddle, top, self._A, np.where(self._dropped, -1.0, -below))
+
+    def downhill(self, load, rng):
+        """A unit direction u of negative K by inverse iteration, along which a load does work; None without one."""
+        u = rng.normal(size=load.size)
+        for i in range(SWEEPS):  # the last by K, which leaves neutral directions out
+            u = self.step(u / self._scale**2 if i < SWEEPS - 1 else self._quadratic.whole @ u)
+            if u is None:
+                return None
+            u = u / np.linalg.norm(u / self._scale)
+        if not self._quadratic.along(u) < -CLEARLY:
+            return None
+        return u if load @ u >= 0.0 else -u
 
     def step(self, load):
         """The increment u; None where the matrix is singular."""

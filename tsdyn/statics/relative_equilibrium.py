@@ -22,11 +22,9 @@ from .steady_rest import SteadyRest
 from .tolerances import (
     BALANCED,
     GROWING,
-    HALVINGS,
     LEAST_SHIFT,
     MOST_NEWTON,
     MOST_SADDLES,
-    MOST_TURN,
     NEUTRAL,
     STEADY,
     TURNED,
@@ -55,6 +53,8 @@ class SteadyMotion(Motion):
 class SteadyDescent(Descent):
     """A configuration in steady motion, moved step by step; arguments of `Descent` after the `SteadyField`."""
 
+    relative = True
+
     def __init__(self, field, *start):
         self.field = field
         super().__init__(*start)
@@ -75,16 +75,9 @@ class SteadyDescent(Descent):
             if u is None:
                 break
             self.steps += 1
-            shift, turn = self.frame.increments.extent(u)
-            factor = min(1.0, self.longest / max(shift, LEAST_SHIFT), MOST_TURN / max(turn, LEAST_SHIFT))
-            if not any(self._nearer(factor * 0.5**i * u) for i in range(HALVINGS)):
+            if not self._along(u):
                 break
         return self.unbalanced <= TURNED
-
-    def _nearer(self, u):
-        """Move if less is unbalanced there."""
-        q = self.rest.closed(self.frame.increments.moved(self.rest.q, u))
-        return q is not None and self._move(q, u, 0.0)
 
 
 def find_steady(descent):

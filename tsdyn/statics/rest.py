@@ -155,7 +155,7 @@ class Rest:
 
     def own_slopes(self):
         """What else is by q of each body, (b, 7, 7)."""
-        return 0.0
+        return np.zeros((len(self.frame.metric.at), 7, 7))
 
     def residuals(self, q):
         """Phi (m,) at other positions."""

@@ -70,7 +70,7 @@ CLEARLY, SOFTENED = 1e-7, 1e-8
 MOST_TURN = 0.5
 # Factors of mu after a step that is taken, and after one that isn't; below the third it is zero, above the fourth D
 # doesn't suffice.
-SOFTER, STIFFER, SOFTEST_MU, STIFF = 0.25, 4.0, 0.02, 60.0
+SOFTER, STIFFER, LEAST_MU, STIFF = 0.25, 4.0, 0.06, 60.0
 # Share of the stiffness of a body that a direction without stiffness has.
 SOFTEST = 1e-10
 # Share of the work promised that a step must do; share of what is unbalanced that a short one may leave.
@@ -93,6 +93,9 @@ STALLED = 1e-6
 KICKS = 0.1, 0.03, 0.01
 # Share of the terms of the stiffness below which a direction is neutral, and asymmetry that is no rounding.
 NEUTRAL = 1e-10
+# Share of the loads' own accelerations up to which a configuration without positive stiffness is close to a saddle;
+# sweeps of inverse iteration to a direction down from there.
+AT_SADDLE, SWEEPS = 1e-3, 8
 # Saddles left at most.
 MOST_SADDLES = 12
 # Share of the largest eigenvalue up to which a real part of a circulatory system is rounding: the root of rounding.

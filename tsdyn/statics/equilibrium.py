@@ -15,7 +15,7 @@ from ..observables.state import RememberingState
 from .coordinates import chosen
 from .descent import Descent
 from .eigen import eigenpairs
-from .reduction import reduce
+from .reduction import Reduced
 from .smoothness import demand_continuous, demand_smooth
 from .tolerances import GROWING, MOST_SADDLES, NEUTRAL
 from .variations import Variations
@@ -115,7 +115,7 @@ def _stability(motion):
     """Whether stable, the smallest stiffness, number of neutral directions; and dq of negative stiffness, or None."""
     if not motion.freedom:
         return True, float("nan"), 0, None
-    reduced = reduce(motion, chosen(motion, Variations(motion, np.zeros(3))))
+    reduced = Reduced(motion, chosen(motion, Variations(motion, np.zeros(3))))
     K, size = reduced.K_hat, reduced.scale
     w, vectors = np.linalg.eigh(0.5 * (K + K.T))
     neutral = int((np.abs(w) <= NEUTRAL * size).sum())

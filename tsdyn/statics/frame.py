@@ -62,7 +62,9 @@ class Frame:
         self._across, self._turned = self.rows, turned
         order = [(self.blocks, 0, 0), (self.rows, size, 0), (turned, 0, size), (below, size, size)]
         self.saddle = Pattern.of_parts(order, whole)
-        self.light = Pattern.of_parts([(Pattern(np.arange(size), np.arange(size), (size, size)), 0, 0), *order[1:]], whole)
+        self.light = Pattern.of_parts(
+            [(Pattern(np.arange(size), np.arange(size), (size, size)), 0, 0), *order[1:]], whole
+        )
 
     def stiffness(self, pairs, own):
         """Numbers of the sum of blocks of pairs (e, 12, 12) and of bodies (b, 6, 6), for `blocks`."""

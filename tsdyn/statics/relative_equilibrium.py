@@ -16,7 +16,7 @@ from .coordinates import chosen
 from .descent import Descent
 from .eigen import eigenpairs
 from .motion import Motion
-from .reduction import reduce
+from .reduction import Reduced
 from .steady import is_invariant
 from .steady_rest import SteadyRest
 from .tolerances import (
@@ -114,7 +114,7 @@ def _stability(descent):
         )
     if not motion.freedom:
         return True, float("nan"), 0, None
-    reduced = reduce(motion, chosen(motion, Variations(motion, field.spin)))
+    reduced = Reduced(motion, chosen(motion, Variations(motion, field.spin)))
     w = np.linalg.eigvalsh(0.5 * (reduced.K_hat + reduced.K_hat.T))
     neutral = int((np.linalg.svd(reduced.K_hat, compute_uv=False) <= NEUTRAL * reduced.scale).sum())
     pairs = eigenpairs(reduced)

@@ -103,7 +103,9 @@ class Rest:
     def solve(self, load, bias):
         """The (y, lam) with G y + A^T lam = load and A y = bias."""
         size = load.size
-        found = self._factors.solve(np.concatenate((self._weights * load, self._scales * np.where(self.dropped, 0.0, bias))))
+        found = self._factors.solve(
+            np.concatenate((self._weights * load, self._scales * np.where(self.dropped, 0.0, bias)))
+        )
         return self._weights * found[:size], self._scales * found[size:]
 
     @property

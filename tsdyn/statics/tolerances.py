@@ -23,6 +23,9 @@ HELD = 1e-13
 # Share of the largest pivot of constraints and coordinates, unit rows, above which the coordinates are independent.
 CLEAR = 1e-6
 
+# Candidates that are looked at together: their dense products cost what a sparse factorisation does.
+BATCH = 64
+
 # --- steady motion ---
 # Share of the largest accelerations, speeds and constraint values up to which a motion counts as steady or at rest:
 # states of steady motion may be typed, or come from runs with tolerances.

@@ -19,13 +19,16 @@ from ..model.joint_motion import all_angles, counted
 from .frame import Frame
 from .motion import Motion
 from .rest import Rest
+from .saddle_free import saddle_free
 from .tolerances import (
     AT_SADDLE,
     BALANCED,
     FARTHEST,
     FINAL,
+    FIRST_MU,
     GOOD,
     HALVINGS,
+    IN_VAIN,
     KICKS,
     LEAST_MU,
     LEAST_SHIFT,
@@ -35,6 +38,7 @@ from .tolerances import (
     MOST_TURN,
     MOST_TURNED,
     SHORT,
+    SHORTER,
     SOFTER,
     STIFF,
     STIFFER,
@@ -71,9 +75,9 @@ class Descent:
         self.packed, self.handles, self.t = packed, handles, t
         self.angles, self.memory = remembered[: handles.count].copy(), remembered[handles.count :].copy()
         self.frame, self.steps, self.gone, self.turned = Frame(packed, t, q), 0, 0.0, 0.0
-        self.reach, self.mu = self.frame.reach, 0.0
+        self.reach, self.mu = self.frame.reach, FIRST_MU
         self.rest, self._motion = self._at(q), None
-        self.longest = 0.5 * self.reach
+        self.longest, self.trust = 0.5 * self.reach, 1.0
 
     def _at(self, q):
         return Rest(self.frame, self.memory, q)
@@ -95,45 +99,70 @@ class Descent:
 
     def settle(self):
         """Take steps until the loads are balanced to rounding; True if they are."""
+        vain = 0
         while self.steps < MOST_STEPS and self.gone < FARTHEST * self.reach and self.turned < MOST_TURNED:
-            if self.unbalanced <= BALANCED or not self._step():
+            before = self.unbalanced
+            if before <= BALANCED or not self._step():
                 break
             self.steps += 1
+            vain = vain + 1 if before <= TURNED and not self.unbalanced < 0.5 * before else 0
+            if vain == IN_VAIN:
+                break  # rounding
         return self.unbalanced <= TURNED
 
     def _step(self):
         """Take a step; False if none is left that the loads do work on."""
-        rest = self.rest
-        quadratic, load = rest.quadratic, rest.left
-        stiffness = float(quadratic.local.max(initial=0.0))
-        near = self.unbalanced <= AT_SADDLE
+        quadratic, load = self.rest.quadratic, self.rest.left
+        near, stiffness = self.unbalanced <= AT_SADDLE, float(quadratic.local.max(initial=0.0))
         if near and (self.relative or quadratic.circulatory):
-            u = quadratic.newton(load)
+            u = quadratic.factors(0.0, 0.0).newton(load)
             if u is not None and self._along(u):
                 return True
+        mu = 0.0
         for _ in range(MOST_TRIES):
-            least = 0.0 if stiffness > 0.0 else np.abs(load).max() * max(self.mu, 1.0)
-            if self.mu > STIFF:
-                least = self.mu * stiffness
-            factors = quadratic.factors(self.mu, least)
-            u = factors.step(load) if factors.positive else None
-            if near and self.mu > 0.0 and u is not None and self._leave(factors):
+            least = mu * stiffness if mu > STIFF else 0.0
+            if stiffness == 0.0:
+                least = np.abs(load).max() * max(mu, 1.0)
+            factors = quadratic.factors(mu, least)
+            u = None
+            if factors.positive:
+                u = factors.step(load) if mu > 0.0 else factors.newton(load)
+            elif mu == 0.0 and factors.negative > 0 and self._without_saddle(factors, load):
                 return True
             if u is not None:
                 shift, turn = self.frame.increments.extent(u)
-                size = max(shift / self.reach, turn)
-                if size <= LEAST_STEP:
+                if max(shift / self.reach, turn) <= LEAST_STEP:
                     return False
                 far = max(shift / self.longest, turn / MOST_TURN)
-                if not (far > TOO_FAR and self.mu < 1.0 and quadratic.shift.any()):
-                    factor = min(1.0, 1.0 / max(far, LEAST_SHIFT))
-                    if self._try(factor * u, size * factor):
-                        self.mu = 0.0 if self.mu < LEAST_MU else self.mu * SOFTER
-                        self.longest *= 2.0 if factor < 1.0 and factor * turn < 0.99 * MOST_TURN else 1.0
+                if not (far > TOO_FAR and mu < 1.0 and quadratic.shift.any()):
+                    if (near and mu > 0.0 and self._leave(factors, u)) or self._some_of(u, far):
+                        self.mu = max(mu * SOFTER, LEAST_MU) if mu > 0.0 else self.mu
                         return True
-                    if size <= FINAL:
+                    if max(shift / self.reach, turn) <= FINAL:
                         return False
-            self.mu = max(self.mu * STIFFER, LEAST_MU)
+            mu = max(mu * STIFFER, self.mu)
+        return False
+
+    def _without_saddle(self, factors, load):
+        """Move by the increment that leads down along all directions, if it isn't too far."""
+        u = saddle_free(factors, load)
+        if u is None:
+            return False
+        shift, turn = self.frame.increments.extent(u)
+        far = max(shift / self.longest, turn / MOST_TURN)
+        return bool(far <= TOO_FAR and self._some_of(u, far))
+
+    def _some_of(self, u, far):
+        """Move by an increment, or a share of it if that is too far."""
+        shift, turn = self.frame.increments.extent(u)
+        size, factor = max(shift / self.reach, turn), min(1.0, self.trust / max(far, LEAST_SHIFT))
+        for _ in range(HALVINGS):
+            if self._try(factor * u, factor * size):
+                limited = factor * far > 0.99 * self.trust
+                self.longest *= 2.0 if limited and self.trust == 1.0 and factor * turn < 0.99 * MOST_TURN else 1.0
+                self.trust = min(1.0, self.trust * 2.0) if limited or factor == 1.0 else factor * far
+                return True
+            factor *= SHORTER
         return False
 
     def _along(self, u):
@@ -146,14 +175,17 @@ class Descent:
                 return True
         return False
 
-    def _leave(self, factors):
-        """Leave what is close to a saddle along a direction of negative stiffness."""
-        u = factors.downhill(self.rest.left, np.random.default_rng(self.steps))
+    def _leave(self, factors, step):
+        """Leave what is close to a saddle along a direction of negative stiffness that gains more than a step does."""
+        quadratic, load = self.rest.quadratic, self.rest.left
+        u = factors.downhill(load, np.random.default_rng(self.steps))
         if u is None:
             return False
         shift, turn = self.frame.increments.extent(u)
-        size = max(turn, shift / self.reach)
-        return any(self._try(share / size * u, share) for share in KICKS)
+        u = u / max(turn, shift / self.reach)
+        if not -KICKS[0] ** 2 * quadratic.along(u) > 2.0 * float(load @ step) - quadratic.along(step):
+            return False
+        return any(self._try(share * u, share) for share in KICKS)
 
     def _try(self, u, size):
         """Move by an increment if the loads do work on the way."""
@@ -166,9 +198,9 @@ class Descent:
             work = 0.5 * (old.Q + old.loads_at(q)) @ (q - old.q)
             if not work > WORTH * promised:
                 return False
-        return self._move(q, u, size)
+        return self._move(q, u, size, promised)
 
-    def _move(self, q, u, size):
+    def _move(self, q, u, size, promised=np.inf):
         """Be at q, if less is unbalanced there or the step is not short."""
         old = self.rest
         try:
@@ -176,7 +208,8 @@ class Descent:
         except SingularConfiguration:
             return False
         if size <= SHORT and not rest.unbalanced < GOOD * old.unbalanced:
-            return False
+            if size <= FINAL or not 0.5 * (old.left + rest.left) @ u > WORTH * promised:
+                return False
         shift, turn = self.frame.increments.extent(u)
         self.gone, self.turned, self.rest = self.gone + shift, self.turned + turn, rest
         self._remember()
@@ -205,4 +238,3 @@ class Descent:
                 self.rest = self._at(q)
                 self._remember()
                 break
-        self.mu = 0.0

@@ -81,10 +81,13 @@ class Increments:
         return self.reach * float(shift), float(turn)
 
     def accelerations(self, load):
-        """Accelerations (b, 3), m/s^2, and of turns (b', 3), rad/s^2, by loads (size,) on bodies without joints."""
+        """Accelerations (b, 3), m/s^2, and of turns (b', 3), rad/s^2, by loads (size,) on bodies without joints.
+
+        Bodies turn about any axis alike, so axes without inertia count as others do.
+        """
         metric = self.metric
-        turns = np.einsum("bij,bkj,bk->bi", metric.rise, metric.rise, load[metric.turn])
-        return load[metric.move] / metric.root**2 / self.reach, turns
+        mean = (metric.fall * metric.fall).sum(axis=(1, 2))[:, None] / 3.0
+        return load[metric.move] / metric.root**2 / self.reach, load[metric.turn] / mean
 
     def of(self, q, dq):
         """The increment that displaces q by dq (n,)."""

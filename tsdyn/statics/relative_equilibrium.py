@@ -71,7 +71,7 @@ class SteadyDescent(Descent):
             before, rest = self.unbalanced, self.rest
             if before <= BALANCED:
                 break
-            u = rest.quadratic.newton(rest.left)
+            u = rest.quadratic.factors(0.0, 0.0).newton(rest.left)
             if u is None:
                 break
             self.steps += 1

@@ -71,13 +71,19 @@ MASSLESS = 1e-8
 CLEARLY, SOFTENED = 1e-7, 1e-8
 # rad, of a step: angles are counted by the nearest turn, and the trapezoidal rule holds.
 MOST_TURN = 0.5
-# Factors of mu after a step that is taken, and after one that isn't; below the third it is zero, above the fourth D
-# doesn't suffice.
-SOFTER, STIFFER, LEAST_MU, STIFF = 0.25, 4.0, 0.06, 60.0
+# Factors of mu after a step that is taken, and after one that isn't; where it begins, its least; D doesn't suffice above
+# the last.
+SOFTER, STIFFER, FIRST_MU, LEAST_MU, STIFF = 0.25, 5.0, 1e-2, 1e-9, 60.0
+# Factor of a step that does too little work.
+SHORTER = 0.3
+# Share of the largest stiffness of a body, or of all, below which it has none of its own.
+NOTHING = 1e-12
 # Share of the stiffness of a body that a direction without stiffness has.
 SOFTEST = 1e-10
 # Share of the work promised that a step must do; share of what is unbalanced that a short one may leave.
 WORTH, GOOD = 0.1, 0.9
+# Steps one after the other that leave more than half of what is nearly nothing: it is rounding.
+IN_VAIN = 3
 # rad, or shares of the scene's size: the work of shorter steps is rounding, and steps that fail though they are shorter
 # than the second are the last.
 SHORT, FINAL = 1e-4, 1e-9
@@ -99,6 +105,9 @@ NEUTRAL = 1e-10
 # Share of the loads' own accelerations up to which a configuration without positive stiffness is close to a saddle;
 # sweeps of inverse iteration to a direction down from there.
 AT_SADDLE, SWEEPS = 1e-3, 8
+# Increments up to which all eigenvectors are looked at; negative eigenvalues up to which these alone are; shares of the
+# stiffness tried until it is positive.
+SMALL, FEW_NEGATIVE, SHIFTS = 150, 6, (1e-4, 1e-2, 1.0, 10.0)
 # Saddles left at most.
 MOST_SADDLES = 12
 # Share of the largest eigenvalue up to which a real part of a circulatory system is rounding: the root of rounding.

@@ -2,14 +2,13 @@
 
     K v = lambda S v,  v.S v = 1,  A v = 0:        u = sum of v (v.load) / |lambda|
 
-S is the stiffness of each body by its size. The increment leads down along all eigenvectors, whereas Newton's leads up to
-the saddle (Dauphin et al., Adv. Neural Inf. Process. Syst. 27, 2014). A shift of K by as much as the most negative eigenvalue needs
-would shorten the increment along soft directions, too.
+S is the stiffness of each body by its size. The increment leads down along all eigenvectors, whereas Newton's leads to
+the saddle (Dauphin et al., Adv. Neural Inf. Process. Syst. 27, 2014). A shift of K would make soft directions slow, too.
 """
 
 import numpy as np
 
-from .tolerances import FEW_NEGATIVE, SMALL, SOFTEST
+from .tolerances import CLEARLY, FEW_NEGATIVE, ROUNDED, SMALL, SOFT
 
 
 def saddle_free(factors, load):
@@ -29,7 +28,9 @@ def _by_all(factors, load):
     Z = null_space(A) if A.shape[0] else np.eye(len(K))
     w, v = np.linalg.eigh(0.5 * Z.T @ (K + K.T) @ Z)
     v, scale = Z @ v, factors.scale
-    return scale * (v @ ((v.T @ (scale * load)) / np.maximum(np.abs(w), SOFTEST)))
+    along = v.T @ (scale * load)
+    along[(np.abs(w) <= SOFT) & (np.abs(along) <= ROUNDED * factors.size_of_loads)] = 0.0  # neutral
+    return scale * (v @ (along / np.maximum(np.abs(w), CLEARLY)))
 
 
 def _by_few(factors, load):
@@ -48,4 +49,4 @@ def _by_few(factors, load):
         return None
     v, w = v[:, w < 0.0], w[w < 0.0]
     scale = factors.scale
-    return newton + scale * (v @ (2.0 * (v.T @ (scale * load)) / np.maximum(-w, SOFTEST)))
+    return newton + scale * (v @ (2.0 * (v.T @ (scale * load)) / np.maximum(-w, CLEARLY)))

@@ -49,6 +49,11 @@ class Factors:
         """Whether the matrix is positive on the motions that the constraints admit."""
         return self.negative == 0
 
+    @property
+    def size_of_loads(self):
+        """The size of the loads that are left over, or balance each other, scaled."""
+        return float(np.linalg.norm(self.scale * self._quadratic.rest.load))
+
     def _top(self, share):
         """Numbers for `Frame.blocks` of K + mu D + a share of the stiffness of each body, scaled."""
         quadratic, frame = self._quadratic, self._quadratic.frame

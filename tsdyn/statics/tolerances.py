@@ -108,6 +108,8 @@ AT_SADDLE, SWEEPS = 1e-3, 8
 # Increments up to which all eigenvectors are looked at; negative eigenvalues up to which these alone are; shares of the
 # stiffness tried until it is positive.
 SMALL, FEW_NEGATIVE, SHIFTS = 150, 6, (1e-4, 1e-2, 1.0, 10.0)
+# Share of the stiffness below which a direction without load is neutral.
+SOFT = 1e-5
 # Saddles left at most.
 MOST_SADDLES = 12
 # Share of the largest eigenvalue up to which a real part of a circulatory system is rounding: the root of rounding.

@@ -134,8 +134,8 @@ class Descent:
                 if max(shift / self.reach, turn) <= LEAST_STEP:
                     return False
                 far = max(shift / self.longest, turn / MOST_TURN)
-                if not (far > TOO_FAR and mu < 1.0 and quadratic.shift.any()):
-                    if (near and mu > 0.0 and self._leave(factors, u)) or self._some_of(u, far):
+                if not (far > TOO_FAR * self.trust and mu < 1.0 and quadratic.shift.any()):
+                    if (near and mu > 0.0 and not self.relative and self._leave(factors, u)) or self._some_of(u, far, factors):
                         self.mu = max(mu * SOFTER, LEAST_MU) if mu > 0.0 else self.mu
                         return True
                     if max(shift / self.reach, turn) <= FINAL:
@@ -150,14 +150,14 @@ class Descent:
             return False
         shift, turn = self.frame.increments.extent(u)
         far = max(shift / self.longest, turn / MOST_TURN)
-        return bool(far <= TOO_FAR and self._some_of(u, far))
+        return bool(far <= TOO_FAR * self.trust and self._some_of(u, far, factors))
 
-    def _some_of(self, u, far):
+    def _some_of(self, u, far, factors):
         """Move by an increment, or a share of it if that is too far."""
         shift, turn = self.frame.increments.extent(u)
         size, factor = max(shift / self.reach, turn), min(1.0, self.trust / max(far, LEAST_SHIFT))
         for _ in range(HALVINGS):
-            if self._try(factor * u, factor * size):
+            if self._try(factor * u, factor * size, factors):
                 limited = factor * far > 0.99 * self.trust
                 self.longest *= 2.0 if limited and self.trust == 1.0 and factor * turn < 0.99 * MOST_TURN else 1.0
                 self.trust = min(1.0, self.trust * 2.0) if limited or factor == 1.0 else factor * far
@@ -185,13 +185,15 @@ class Descent:
         u = u / max(turn, shift / self.reach)
         if not -KICKS[0] ** 2 * quadratic.along(u) > 2.0 * float(load @ step) - quadratic.along(step):
             return False
-        return any(self._try(share * u, share) for share in KICKS)
+        return any(self._try(share * u, share, factors) for share in KICKS)
 
-    def _try(self, u, size):
+    def _try(self, u, size, factors):
         """Move by an increment if the loads do work on the way."""
         old = self.rest
         promised = float(old.left @ u) - 0.5 * old.quadratic.along(u)
-        q = old.closed(self.frame.increments.moved(old.q, u))
+        moved = self.frame.increments.moved(old.q, u)
+        q = old.closed(moved, factors.correction)
+        q = old.closed(moved) if q is None else q
         if q is None or not np.isfinite(promised):
             return False
         if size > SHORT:

@@ -89,6 +89,7 @@ def find_equilibrium(packed, handles, remembered, t, q, q0):
     """The `Equilibrium` reached from a consistent q, q0 being where the search began."""
     demand_continuous(packed)
     descent = Descent(packed, handles, remembered, t, q)
+    _demand_held(descent.frame)
     for _ in range(MOST_SADDLES):
         if not descent.settle():
             _refuse(descent)
@@ -128,6 +129,18 @@ def _stability(motion):
 
     way = reduced.T @ solve_triangular(reduced.R, vectors[:, 0])
     return False, float(w[0]), neutral, way
+
+
+def _demand_held(frame):
+    """Refuse scenes of which a part falls, by name."""
+    falling = frame.falling()
+    if falling.size:
+        name = frame.packed.bodies[int(falling[0])].name
+        others = f", joined to {falling.size - 1} more," if falling.size > 1 else ""
+        raise NoEquilibrium(
+            f"no equilibrium: {name}{others} falls freely, as no constraint and no force joins it to the ground. Add "
+            "one, or take gravity away."
+        )
 
 
 def _refuse(descent):

@@ -79,6 +79,22 @@ class Frame:
         halves = rows.reshape(-1, 2, 1, WIDTH // 2) @ P[self._by_rows]
         return self.rows.sum(halves.reshape(-1, 12))
 
+    def falling(self):
+        """Numbers of the bodies of a part that gravity acts on and nothing joins to the ground; none without gravity.
+
+        Constraints and forces of one body join it to the ground.
+        """
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        count, (i, j) = len(self.metric.at), self.by_parts.T
+        if not np.any(self.system.gravity):
+            return np.zeros(0, int)
+        graph = coo_array((np.ones(len(i)), (i, j)), (count + 1, count + 1))
+        parts = connected_components(graph, directed=False)[1]
+        loose = np.flatnonzero(parts[:-1] != parts[-1])
+        return loose[parts[loose] == parts[loose[0]]] if loose.size else loose
+
     def closed(self, q):
         """The consistent configuration next to q by Gauss-Newton steps; None where there is none."""
         q, Phi, _ = close(self.metric, q)

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from .signed_factors import Factors
-from .tolerances import NEUTRAL, NOTHING
+from .tolerances import MASSLESS, NEUTRAL, NOTHING
 
 
 class Quadratic:
@@ -57,7 +57,9 @@ class Quadratic:
         if some.size:
             least[some] = -np.linalg.eigvalsh(0.5 * (elastic[some] + elastic[some].swapaxes(1, 2)))[:, 0]
         least = np.where(least > NOTHING * np.abs(elastic).max(axis=(1, 2), initial=0.0), least, 0.0)
-        sizes = np.concatenate((sizes, np.repeat(least[:, None], 4, axis=1)))
+        parts = np.linalg.norm(elastic.reshape(-1, 4, 3, 12), axis=(2, 3))
+        some = parts > NOTHING * parts.max(axis=1, initial=0.0)[:, None]
+        sizes = np.concatenate((sizes, np.where(some, least[:, None], 0.0)))
         for half in range(2):
             np.add.at(found, self.frame.by_parts[:, half], sizes[:, 2 * half : 2 * half + 2])
         return found[:-1]
@@ -83,8 +85,11 @@ class Quadratic:
         alike = (rows - columns) % 2 == 0
         np.maximum.at(found.reshape(-1), rows[alike], np.abs(self.K[alike]))
         found = np.maximum(found, self.shift)
+        self.own_stiffness = found
         found = np.where(found > NOTHING * found.max(axis=1, initial=0.0)[:, None], found, found[:, ::-1])
-        return np.where(found > NOTHING * found.max(initial=0.0), found, found.max(initial=0.0))
+        found = np.where(found > NOTHING * found.max(initial=0.0), found, found.max(initial=0.0))
+        self.own_stiffness = np.maximum(self.own_stiffness, MASSLESS * found)
+        return found
 
     def factors(self, mu, least):
         """The `Factors` at mu; least (b,), N m, stands for K where there is none."""

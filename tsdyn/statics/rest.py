@@ -134,22 +134,31 @@ class Rest:
         """The `Quadratic` of the work along increments."""
         return Quadratic(self)
 
-    def closed(self, q):
-        """The consistent configuration next to q, by the factors at hand; None where there is none."""
-        frame, before, allowed = self.frame, np.inf, 1.0 + np.abs(q).max()
-        for _ in range(MOST_SWEEPS):  # of simplified Newton
-            Phi = self.residuals(q)
-            size = np.abs(Phi).max(initial=0.0)
-            if size <= CLOSED * allowed or not size < SLOWEST * before:
-                break
-            before = size
-            step = self.solve(np.zeros(frame.increments.size), -Phi[frame.own] / self.lengths)[0]
-            if not np.isfinite(step).all():
-                return None
-            q = frame.increments.moved(q, step)
+    def closed(self, q, correction=None):
+        """The consistent configuration next to q, by corrections with factors at hand; None where there is none."""
+        allowed, correction = 1.0 + np.abs(q).max(), correction or self._shifted
+        q, size = self._swept(q, correction, CLOSED * allowed)
         if size <= TURNED * allowed:
             return q
-        return None if not size <= STALLED * allowed else frame.closed(q)
+        return self.frame.closed(q) if size <= STALLED * allowed else None
+
+    def _swept(self, q, correction, limit):
+        """Positions after sweeps of simplified Newton, and what is left of the constraints."""
+        before = np.inf
+        for _ in range(MOST_SWEEPS):
+            Phi = self.residuals(q)
+            size = np.abs(Phi).max(initial=0.0)
+            if size <= limit or not size < SLOWEST * before:
+                break
+            before, step = size, correction(-Phi[self.frame.own] / self.lengths)
+            if not np.isfinite(step).all():
+                return q, np.inf
+            q = self.frame.increments.moved(q, step)
+        return q, size
+
+    def _shifted(self, bias):
+        """The increment u with A u = bias that turns least."""
+        return self.solve(np.zeros(self.frame.increments.size), bias)[0]
 
     def force_slopes(self, Q_q, Q_qd):
         """The derivative of the forces (forces, 14, 14) by q, of those by q and qd."""

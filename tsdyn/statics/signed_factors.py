@@ -33,9 +33,10 @@ class Factors:
         self.scale = 1.0 / np.sqrt(local[frame.increments.body, 1 * ~frame.increments.translates])
         A = rest.A * self.scale[frame.rows.columns]
         lengths = np.sqrt(np.bincount(frame.rows.rows, A * A, frame.own.size))
-        lengths = np.where(rest.dropped, 1.0, np.maximum(lengths, LEAST_DIVISOR))
-        self._A, self._dropped = A / lengths[frame.rows.rows], rest.dropped
+        self._lengths = np.where(rest.dropped, 1.0, np.maximum(lengths, LEAST_DIVISOR))
+        self._A, self._dropped = A / self._lengths[frame.rows.rows], rest.dropped
         self._factors, self.negative = self._signed(CLEARLY)
+        self._closing = self._factors if self.positive else None
 
     def _signed(self, share):
         """Factors, and how many eigenvalues of K + mu D + a share of S are negative."""
@@ -100,7 +101,22 @@ class Factors:
     def newton(self, load):
         """The same by factors that are accurate down to a smaller floor."""
         factors = splu_of(self._matrix(SOFTEST, 0.0))
-        return None if factors is None else self._solved(factors, load)
+        if factors is None:
+            return None
+        self._closing = factors
+        return self._solved(factors, load)
+
+    def correction(self, bias):
+        """The increment u with A u = bias, (m',), that does least work; by S where the matrix is not positive."""
+        if self._closing is None:
+            quadratic, frame = self._quadratic, self._quadratic.frame
+            kinds = frame.increments.body, 1 * ~frame.increments.translates
+            light = quadratic.own_stiffness[kinds] * self.scale**2
+            self._closing = splu_of(frame.matrix(frame.light, light, self._A, np.where(self._dropped, -1.0, 0.0)))
+        if self._closing is None:
+            return np.full(self.scale.size, np.nan)
+        bias = np.where(self._dropped, 0.0, bias / self._lengths)
+        return self.scale * self._closing.solve(np.concatenate((np.zeros(self.scale.size), bias)))[: self.scale.size]
 
     def _solved(self, factors, load):
         found = factors.solve(np.concatenate((self.scale * load, np.zeros(self._dropped.size))))

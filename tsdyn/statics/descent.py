@@ -134,8 +134,11 @@ class Descent:
                 if max(shift / self.reach, turn) <= LEAST_STEP:
                     return False
                 far = max(shift / self.longest, turn / MOST_TURN)
-                if not (far > TOO_FAR * self.trust and mu < 1.0 and quadratic.shift.any()):
-                    if (near and mu > 0.0 and not self.relative and self._leave(factors, u)) or self._some_of(u, far, factors):
+                slides = self.trust == 1.0 and turn <= TOO_FAR * MOST_TURN
+                if slides or not (far > TOO_FAR * self.trust and mu < 1.0 and quadratic.shift.any()):
+                    if (near and mu > 0.0 and not self.relative and self._leave(factors, u)) or self._some_of(
+                        u, far, factors
+                    ):
                         self.mu = max(mu * SOFTER, LEAST_MU) if mu > 0.0 else self.mu
                         return True
                     if max(shift / self.reach, turn) <= FINAL:
@@ -183,7 +186,7 @@ class Descent:
             return False
         shift, turn = self.frame.increments.extent(u)
         u = u / max(turn, shift / self.reach)
-        if not -KICKS[0] ** 2 * quadratic.along(u) > 2.0 * float(load @ step) - quadratic.along(step):
+        if not -(KICKS[0] ** 2) * quadratic.along(u) > 2.0 * float(load @ step) - quadratic.along(step):
             return False
         return any(self._try(share * u, share, factors) for share in KICKS)
 

@@ -13,11 +13,12 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import SingularConfiguration
-from ..model.sparse_jacobian import WIDTH
+from ..maths.sparse_lu import sparse_lu
+from ..model.sparse_jacobian import WIDTH, as_csr
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays
 from ..observables.generalised_forces import applied_loads
 from .quadratic import Quadratic
-from .tolerances import CLOSED, LEAST_DIVISOR, MASSLESS, MOST_SWEEPS, SINGULAR, SLOWEST, STALLED, TURNED
+from .tolerances import CLOSED, LEAST_DIVISOR, MASSLESS, MOST_SWEEPS, REFINEMENTS, SINGULAR, SLOWEST, STALLED, TURNED
 
 
 class Rest:
@@ -78,22 +79,18 @@ class Rest:
     @property
     def reactions(self):
         """Phi_q^T lam (n,) of rows of Phi, (n,)."""
-        from ..model.sparse_jacobian import as_csr
-
         return as_csr(self.frame.packed, self.rows).T @ self.lam
 
     def _factor(self):
-        from scipy.sparse.linalg import splu
-
         frame = self.frame
         self._weights = np.where(frame.increments.translates, 1.0 / np.sqrt(MASSLESS), 1.0)
         A = self.A * self._weights[frame.rows.columns]
         lengths = np.sqrt(np.bincount(frame.rows.rows, A * A, frame.own.size))
         self._scales = 1.0 / np.where(self.dropped, 1.0, np.maximum(lengths, LEAST_DIVISOR))
         A = A * self._scales[frame.rows.rows]
-        matrix = frame.matrix(frame.light, np.ones(frame.increments.size), A, self.dropped * 1.0)
+        self._matrix = frame.matrix(frame.light, np.ones(frame.increments.size), A, self.dropped * 1.0)
         try:
-            self._factors = splu(matrix)
+            self._factors = sparse_lu(self._matrix)
         except RuntimeError as error:
             raise SingularConfiguration(NOT_UNIQUE) from error
         pivots = np.abs(self._factors.U.diagonal())
@@ -103,9 +100,10 @@ class Rest:
     def solve(self, load, bias):
         """The (y, lam) with G y + A^T lam = load and A y = bias."""
         size = load.size
-        found = self._factors.solve(
-            np.concatenate((self._weights * load, self._scales * np.where(self.dropped, 0.0, bias)))
-        )
+        right = np.concatenate((self._weights * load, self._scales * np.where(self.dropped, 0.0, bias)))
+        found = self._factors.solve(right)
+        for _ in range(REFINEMENTS):
+            found = found + self._factors.solve(right - self._matrix @ found)
         return self._weights * found[:size], self._scales * found[size:]
 
     @property

@@ -36,7 +36,7 @@ class Factors:
         self._lengths = np.where(rest.dropped, 1.0, np.maximum(lengths, LEAST_DIVISOR))
         self._A, self._dropped = A / self._lengths[frame.rows.rows], rest.dropped
         self._factors, self.negative = self._signed(CLEARLY)
-        self._closing = self._factors if self.positive else None
+        self._closing = None
 
     def _signed(self, share):
         """Factors, and how many eigenvalues of K + mu D + a share of S are negative."""
@@ -101,13 +101,10 @@ class Factors:
     def newton(self, load):
         """The same by factors that are accurate down to a smaller floor."""
         factors = splu_of(self._matrix(SOFTEST, 0.0))
-        if factors is None:
-            return None
-        self._closing = factors
-        return self._solved(factors, load)
+        return None if factors is None else self._solved(factors, load)
 
     def correction(self, bias):
-        """The increment u with A u = bias, (m',), that does least work; by S where the matrix is not positive."""
+        """The increment u with A u = bias, (m',), that strains least, by the stiffness of each body of its own."""
         if self._closing is None:
             quadratic, frame = self._quadratic, self._quadratic.frame
             kinds = frame.increments.body, 1 * ~frame.increments.translates

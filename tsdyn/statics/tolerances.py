@@ -66,6 +66,8 @@ LEAST_SHIFT = 1e-300
 # Weight of a shift by the scene's size against a turn by a radian, among what takes up loads: forces are passed on by
 # chains of up to the inverse root of it in links.
 MASSLESS = 1e-8
+# Refinements of what is solved with it, which lose half of the digits at first.
+REFINEMENTS = 2
 # Share of the stiffness of a body above which a sign is certain, and the softness of rows of unit length: factors
 # without exchange of rows round by 1e-16 over the latter.
 CLEARLY, SOFTENED = 1e-7, 1e-8

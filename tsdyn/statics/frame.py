@@ -100,7 +100,7 @@ class Frame:
         q, Phi, _ = close(self.metric, q)
         return q if np.abs(Phi).max(initial=0.0) <= TURNED * (1.0 + np.abs(q).max()) else None
 
-    def dropped(self, A, q):
+    def left_out(self, A, q):
         """Which of the own rows are redundant at q, bool (m',); A are numbers for `rows`."""
         found = np.zeros(self.own.size, bool)
         if not self._known.size:

@@ -77,7 +77,7 @@ class Quadratic:
 
     @cached_property
     def local(self):
-        """The largest entries of K of each body by shifts and by turns, N m (b, 2); those of others where it has none."""
+        """The largest entries of K of each body by shifts and by turns, N m (b, 2); of others where it has none."""
         frame = self.frame
         kinds = 2 * frame.increments.body + ~frame.increments.translates
         rows, columns = kinds[frame.blocks.rows], kinds[frame.blocks.columns]

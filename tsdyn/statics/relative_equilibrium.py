@@ -75,7 +75,7 @@ class SteadyDescent(Descent):
             if u is None:
                 break
             self.steps += 1
-            if not self._along(u):
+            if not self.approach_by(u):
                 break
         return self.unbalanced <= TURNED
 

@@ -48,10 +48,10 @@ class Rest:
         self.Phi, rows, _, _ = constraint_arrays(self.system, q, np.zeros(q.size), self.t, WIDTH)
         self.rows = rows
         A = frame.transformed_rows(self.P, rows[frame.own])
-        self.dropped = frame.dropped(A, q)
-        A = np.where(self.dropped[frame.rows.rows], 0.0, A)
+        self.left_out = frame.left_out(A, q)
+        A = np.where(self.left_out[frame.rows.rows], 0.0, A)
         lengths = np.sqrt(np.bincount(frame.rows.rows, A * A, frame.own.size))
-        self.lengths = np.where(self.dropped, 1.0, np.maximum(lengths, LEAST_DIVISOR))
+        self.lengths = np.where(self.left_out, 1.0, np.maximum(lengths, LEAST_DIVISOR))
         self.A = A / self.lengths[frame.rows.rows]
         self.Q = self.loads_at(q)
         self.load = frame.increments.load(self.P, self.Q)
@@ -86,9 +86,9 @@ class Rest:
         self._weights = np.where(frame.increments.translates, 1.0 / np.sqrt(MASSLESS), 1.0)
         A = self.A * self._weights[frame.rows.columns]
         lengths = np.sqrt(np.bincount(frame.rows.rows, A * A, frame.own.size))
-        self._scales = 1.0 / np.where(self.dropped, 1.0, np.maximum(lengths, LEAST_DIVISOR))
+        self._scales = 1.0 / np.where(self.left_out, 1.0, np.maximum(lengths, LEAST_DIVISOR))
         A = A * self._scales[frame.rows.rows]
-        self._matrix = frame.matrix(frame.light, np.ones(frame.increments.size), A, self.dropped * 1.0)
+        self._matrix = frame.matrix(frame.light, np.ones(frame.increments.size), A, self.left_out * 1.0)
         try:
             self._factors = sparse_lu(self._matrix)
         except RuntimeError as error:
@@ -100,7 +100,7 @@ class Rest:
     def solve(self, load, bias):
         """The (y, lam) with G y + A^T lam = load and A y = bias."""
         size = load.size
-        right = np.concatenate((self._weights * load, self._scales * np.where(self.dropped, 0.0, bias)))
+        right = np.concatenate((self._weights * load, self._scales * np.where(self.left_out, 0.0, bias)))
         found = self._factors.solve(right)
         for _ in range(REFINEMENTS):
             found = found + self._factors.solve(right - self._matrix @ found)

@@ -3,7 +3,7 @@
     K v = lambda S v,  v.S v = 1,  A v = 0:        u = sum of v (v.load) / |lambda|
 
 S is the stiffness of each body by its size. The increment leads down along all eigenvectors, whereas Newton's leads to
-the saddle (Dauphin et al., Adv. Neural Inf. Process. Syst. 27, 2014). A shift of K would make soft directions slow, too.
+the saddle (Dauphin et al., Adv. Neural Inf. Process. Syst. 27, 2014). A shift of K would slow soft directions down.
 """
 
 import numpy as np

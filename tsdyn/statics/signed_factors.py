@@ -33,8 +33,8 @@ class Factors:
         self.scale = 1.0 / np.sqrt(local[frame.increments.body, 1 * ~frame.increments.translates])
         A = rest.A * self.scale[frame.rows.columns]
         lengths = np.sqrt(np.bincount(frame.rows.rows, A * A, frame.own.size))
-        self._lengths = np.where(rest.dropped, 1.0, np.maximum(lengths, LEAST_DIVISOR))
-        self._A, self._dropped = A / self._lengths[frame.rows.rows], rest.dropped
+        self._lengths = np.where(rest.left_out, 1.0, np.maximum(lengths, LEAST_DIVISOR))
+        self._A, self._left_out = A / self._lengths[frame.rows.rows], rest.left_out
         self._factors, self.negative = self._signed(CLEARLY)
         self._closing = None
 
@@ -67,13 +67,13 @@ class Factors:
     def _matrix(self, share, below):
         """The same with rows, and minus `below` in their diagonal."""
         frame = self._quadratic.frame
-        return frame.matrix(frame.saddle, self._top(share), self._A, np.where(self._dropped, -1.0, -below))
+        return frame.matrix(frame.saddle, self._top(share), self._A, np.where(self._left_out, -1.0, -below))
 
     def dense(self):
         """K (size, size) and A (m', size), scaled."""
         frame = self._quadratic.frame
         A = frame.rows.matrix(self._A).toarray()
-        return frame.blocks.matrix(self._top(0.0)).toarray(), A[~self._dropped]
+        return frame.blocks.matrix(self._top(0.0)).toarray(), A[~self._left_out]
 
     def stiffness(self, x):
         """K x, scaled."""
@@ -89,7 +89,7 @@ class Factors:
     def solver(self, share):
         """Return solve(b) = x with (K + a share of S) x + A^T lam = b, A x = 0, scaled."""
         factors = splu_of(self._matrix(share, 0.0))
-        rows = np.zeros(self._dropped.size)
+        rows = np.zeros(self._left_out.size)
         return lambda b: factors.solve(np.concatenate((b.ravel(), rows)))[: b.size]
 
     def step(self, load):
@@ -109,14 +109,14 @@ class Factors:
             quadratic, frame = self._quadratic, self._quadratic.frame
             kinds = frame.increments.body, 1 * ~frame.increments.translates
             light = quadratic.own_stiffness[kinds] * self.scale**2
-            self._closing = splu_of(frame.matrix(frame.light, light, self._A, np.where(self._dropped, -1.0, 0.0)))
+            self._closing = splu_of(frame.matrix(frame.light, light, self._A, np.where(self._left_out, -1.0, 0.0)))
         if self._closing is None:
             return np.full(self.scale.size, np.nan)
-        bias = np.where(self._dropped, 0.0, bias / self._lengths)
+        bias = np.where(self._left_out, 0.0, bias / self._lengths)
         return self.scale * self._closing.solve(np.concatenate((np.zeros(self.scale.size), bias)))[: self.scale.size]
 
     def _solved(self, factors, load):
-        found = factors.solve(np.concatenate((self.scale * load, np.zeros(self._dropped.size))))
+        found = factors.solve(np.concatenate((self.scale * load, np.zeros(self._left_out.size))))
         u = self.scale * found[: load.size]
         return u if np.isfinite(u).all() else None
 

@@ -73,8 +73,8 @@ REFINEMENTS = 2
 CLEARLY, SOFTENED = 1e-7, 1e-8
 # rad, of a step: angles are counted by the nearest turn, and the trapezoidal rule holds.
 MOST_TURN = 0.5
-# Factors of mu after a step that is taken, and after one that isn't; where it begins, its least; D doesn't suffice above
-# the last.
+# Factors of mu after a step that is taken, and after one that isn't; where it begins, its least; D doesn't suffice
+# above the last.
 SOFTER, STIFFER, FIRST_MU, LEAST_MU, STIFF = 0.25, 5.0, 1e-2, 1e-9, 60.0
 # Factor of a step that does too little work.
 SHORTER = 0.3

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..calls import fitting_methods
 from ..errors import InvalidBody, InvalidConstraint, NoEquilibrium
+from ..jit.interrupts import interruptible
 from ..model.packed import member_of
 from ..observables import reactions
 from ..observables.kinematics import Anchor
@@ -118,16 +119,18 @@ def _stability(motion):
         return True, float("nan"), 0, None
     reduced = Reduced(motion, chosen(motion, Variations(motion, np.zeros(3))))
     K, size = reduced.K_hat, reduced.scale
-    w, vectors = np.linalg.eigh(0.5 * (K + K.T))
+    K_s = 0.5 * (K + K.T)
+    w = interruptible(lambda: np.linalg.eigvalsh(K_s))
     neutral = int((np.abs(w) <= NEUTRAL * size).sum())
     if np.abs(K - K.T).max() > NEUTRAL * size:
         values = eigenpairs(reduced).values
         return bool(values.real.max() <= GROWING * np.abs(values).max()), float(w[0]), neutral, None
     if w[0] >= -NEUTRAL * size:
         return True, float(w[0]), neutral, None
-    from scipy.linalg import solve_triangular
+    from scipy.linalg import eigh, solve_triangular
 
-    way = reduced.T @ solve_triangular(reduced.R, vectors[:, 0])
+    softest = interruptible(lambda: eigh(K_s, subset_by_index=[0, 0])[1])
+    way = reduced.T @ solve_triangular(reduced.R, softest[:, 0])
     return False, float(w[0]), neutral, way
 
 

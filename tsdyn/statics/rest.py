@@ -109,7 +109,7 @@ class Rest:
     @property
     def unbalanced(self):
         """The largest acceleration by what is left, m/s^2, over that of the loads by themselves."""
-        return self._largest(self.left) / self.acceleration_scale
+        return float(self._largest(self.left) / self.acceleration_scale)
 
     @property
     def gains(self):

@@ -95,9 +95,9 @@ TOO_FAR, MOST_TRIES = 4.0, 20
 MOST_STEPS, FARTHEST = 400, 1e5
 # rad, of all steps: what has turned farther is driven round.
 MOST_TURNED = 60.0
-# Constraints after a step, relative to 1 + max |q|: sums round several times. Sweeps that stall above the second are
-# left to Gauss-Newton steps; a sweep that leaves more than the third, a share, stalls.
-CLOSED, NEARLY_CLOSED, SLOWEST, MOST_SWEEPS = 1e-15, 1e-13, 0.7, 40
+# Constraints after a step, relative to 1 + max |q|: sums round several times. A sweep that leaves more than the second,
+# a share, stalls.
+CLOSED, SLOWEST, MOST_SWEEPS = 1e-15, 0.7, 40
 # ... and above this the step is too long.
 STALLED = 1e-6
 # rad, or shares of the scene's size: ways off a saddle, tried in turn.

@@ -18,7 +18,7 @@ from .descent import Descent
 from .eigen import eigenpairs
 from .reduction import Reduced
 from .smoothness import demand_continuous, demand_smooth
-from .tolerances import GROWING, MOST_SADDLES, NEUTRAL
+from .tolerances import GROWING, MOST_SADDLES, NEUTRAL, SETTLED
 from .variations import Variations
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def find_equilibrium(packed, handles, remembered, t, q, q0):
         if not descent.settle():
             _refuse(descent)
         demand_smooth(descent.motion)
-        *findings, way = _stability(descent.motion)
+        *findings, way = _stability(descent.motion, descent.unbalanced <= SETTLED)
         if way is None:
             break
         descent.kick(way)
@@ -113,11 +113,11 @@ def find_relative(packed, handles, remembered, t, q, q0, field):
     return Equilibrium(descent, q0, findings, field.spin)
 
 
-def _stability(motion):
+def _stability(motion, balanced):
     """Whether stable, the smallest stiffness, number of neutral directions; and dq of negative stiffness, or None."""
     if not motion.freedom:
         return True, float("nan"), 0, None
-    reduced = Reduced(motion, chosen(motion, Variations(motion, np.zeros(3))))
+    reduced = Reduced(motion, chosen(motion, Variations(motion, np.zeros(3))), balanced)
     K, size = reduced.K_hat, reduced.scale
     K_s = 0.5 * (K + K.T)
     w = interruptible(lambda: np.linalg.eigvalsh(K_s))

@@ -31,31 +31,49 @@ class Reduced:
 
     Attributes
     ----------
-    M, C, K : ndarray (k, k)
     T, T1 : ndarray (n, k)
         dq = T dx, dqd = T dxd + T1 dx.
+
+    Without the accelerations left over if `balanced`.
     """
 
-    def __init__(self, motion, variations):
+    def __init__(self, motion, variations, balanced=False):
         n, k = motion.q.size, len(variations)
         self._motion, self._found, self._inertial = motion, motion.derivatives, inertia_derivatives(motion)
         Z, Zd, Zdd = stacked(variations, n)
-        solve, across = _solvers(motion.H, Z)
+        solve, self._across = _solvers(motion.H, Z)
         G1, G2 = (each[motion.kept] for each in (self._found.G1, self._found.G2))
         self.T = T = solve(np.zeros((motion.kept.size, k)), np.eye(k))
         self.T1 = self._T2 = None
         self._still = not (G1.data.any() or Zd.data.any())
         if not self._still:
             self.T1 = solve(-(G1 @ T), -(Zd @ T))
-        if not (self._still and motion.is_balanced):
+        if not (self._still and (balanced or motion.is_balanced)):
             before = (0.0, 0.0) if self._still else (G1 @ self.T1, Zd @ self.T1)
             self._T2 = solve(-(G2 @ T) - 2.0 * before[0], -(Zdd @ T) - 2.0 * before[1])
-        damping, stiffness = self._parts(T, self.T1, self._T2)
-        self.M, self.C, self.K = (
-            across(sum(parts)) if parts else np.zeros((k, k)) for parts in ([motion.M @ T], damping, stiffness)
-        )
-        self.M = 0.5 * (self.M + self.M.T)
+        self._moving = self.T1, self._T2
         self.T1 = np.zeros((n, k)) if self.T1 is None else self.T1
+
+    @cached_property
+    def M(self):
+        """(k, k)."""
+        M = self._across(self._motion.M @ self.T)
+        return 0.5 * (M + M.T)
+
+    @cached_property
+    def _C_and_K(self):
+        k = self.T.shape[1]
+        return [self._across(sum(parts)) if parts else np.zeros((k, k)) for parts in self._parts(self.T, *self._moving)]
+
+    @property
+    def C(self):
+        """(k, k)."""
+        return self._C_and_K[0]
+
+    @property
+    def K(self):
+        """(k, k)."""
+        return self._C_and_K[1]
 
     def _parts(self, T, T1, T2):
         """What C and K are sums of, (n, k) each, before the product with T^T; None for T1 and T2 that are zero."""
@@ -92,9 +110,8 @@ class Reduced:
         def divided(A):
             return solve_triangular(R, A.T, trans="T").T
 
-        T = divided(T)
-        moving = None if self._still else divided(self.T1), None if self._T2 is None else divided(self._T2)
-        damping, stiffness = self._parts(T, *moving)
+        moving = (None if each is None else divided(each) for each in self._moving)
+        damping, stiffness = self._parts(T := divided(T), *moving)
         damping, stiffness = ([_across(T, part) for part in parts] for parts in (damping, stiffness))
         k = np.zeros(R.shape)
         return sum(damping, k), sum(stiffness, k), sum(float(np.linalg.norm(part)) for part in stiffness)

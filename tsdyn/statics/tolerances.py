@@ -58,6 +58,8 @@ NO_EFFECT = 1e-12
 # --- equilibria ---
 # Share of the loads' own accelerations that counts as balanced: rounding of sums of a few loads. Steps end there.
 BALANCED = 1e-14
+# The same of what the stiffness leaves out.
+SETTLED = 1e-12
 # The same at the end of all steps; also of constraints, relative to 1 + max |q|.
 TURNED = 1e-9
 # Share of the scene's size, rad: a step that is shorter changes nothing.

@@ -28,6 +28,7 @@ from .tolerances import (
     MOST_TRIES,
     MOST_TURN,
     MOST_TURNED,
+    SLIDING,
     SOFTER,
     STIFF,
     STIFFER,
@@ -91,7 +92,7 @@ class Descent(Moves):
         """What stands for K, N m, where there is no stiffness, and where D doesn't suffice."""
         stiffness = self.rest.quadratic.local.max(initial=0.0)
         if stiffness == 0.0:
-            return np.abs(self.rest.left).max() * max(mu, 1.0)
+            return SLIDING * np.abs(self.rest.left).max() * max(mu, 1.0)
         return mu * stiffness if mu > STIFF else 0.0
 
     def _is_fit(self, u, mu):

@@ -4,6 +4,7 @@ import numpy as np
 
 from ..configuration.continuation import close
 from ..configuration.kinetic_metric import Metric
+from ..elements.markers import POINT
 from ..formulations.dependent_rows import dependent_rows
 from ..maths.row_rank import dependent
 from ..model.sparse_jacobian import WIDTH, places, with_short_rows
@@ -12,7 +13,7 @@ from ..sparse.constraint_graphs import graph_of, redundant_rows
 from .increments import Increments
 from .pairwise import Pairs
 from .pattern import Pattern
-from .tolerances import DENSE, REDUNDANT_SHARE, TURNED
+from .tolerances import DENSE, MASSLESS, REDUNDANT_SHARE, TURNED
 
 
 class Frame:
@@ -24,8 +25,9 @@ class Frame:
         Rows of Phi but normalisations; normals : (b',) those.
     parts : ndarray (e,)
         The `Pairs` that aren't normalisations.
-    rows, blocks, saddle : Pattern
-        Of A (m', size), of sums of blocks (e, 12, 12) and (b, 6, 6), and of [[K, A^T], [A, diagonal]].
+    rows, blocks, saddle, light : Pattern
+        Of A (m', size), of sums of blocks (e, 12, 12) and (b, 6, 6), and of [[K, A^T], [A, diagonal]], the last with a
+        diagonal K.
     """
 
     def __init__(self, packed, t, q):
@@ -47,6 +49,7 @@ class Frame:
         self.by_parts = self.increments.bodies_at(self.pairs.columns[self.parts][:, ::half], lengths)
         self.no_pairs = np.zeros((len(self.parts), 12, 12))
         self._make_patterns()
+        self.weights = self._weights()
         self._known = graph_of(packed, REDUCED).row[redundant_rows(packed)]
 
     def _make_patterns(self):
@@ -62,9 +65,26 @@ class Frame:
         self._across, self._turned = self.rows, turned
         order = [(self.blocks, 0, 0), (self.rows, size, 0), (turned, 0, size), (below, size, size)]
         self.saddle = Pattern.of_parts(order, whole)
-        self.light = Pattern.of_parts(
-            [(Pattern(np.arange(size), np.arange(size), (size, size)), 0, 0), *order[1:]], whole
-        )
+        diagonal = Pattern(np.arange(size), np.arange(size), (size, size))
+        self.light = Pattern.of_parts([(diagonal, 0, 0), *order[1:]], whole)
+
+    def _weights(self):
+        """G of rest.py: the pattern of its saddle-point matrix, its numbers, their places, and its diagonal (size,)."""
+        shifts, size = self.increments.translates, self.increments.size
+        diagonal, rods = np.where(shifts, MASSLESS, 1.0), self._rods()
+        if not rods.size:
+            return self.light, diagonal, (np.arange(size), np.arange(size)), diagonal
+        pairs, own = self.no_pairs.copy(), np.zeros((len(self.metric.at), 6, 6))
+        for i, j, sign in ((0, 0, 1.0), (6, 6, 1.0), (0, 6, -1.0), (6, 0, -1.0)):
+            pairs[rods, i : i + 3, j : j + 3] = sign * np.eye(3)
+        own[:, range(6), range(6)] = np.repeat([[MASSLESS, 1.0]], 3, axis=1)
+        top = self.stiffness(pairs, own)
+        return self.saddle, top, (self.blocks.rows, self.blocks.columns), self.blocks.matrix(top).diagonal()
+
+    def _rods(self):
+        """Which parts hold two points at a distance; they turn by the difference of shifts."""
+        kept = [self.packed.constraints[i] for i in self.parts[: self.constraints]]
+        return np.flatnonzero([part.rows == 1 and all(m.code == POINT for m in part.markers) for part in kept])
 
     def stiffness(self, pairs, own):
         """Numbers of the sum of blocks of pairs (e, 12, 12) and of bodies (b, 6, 6), for `blocks`."""

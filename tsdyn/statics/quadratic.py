@@ -2,9 +2,10 @@
 
     load.u - u.(K + mu D + floor) u / 2,    A u = 0        K = (Phi_q^T lam)_q - Q_q by increments
 
-D is isotropic for each body: the size of the geometric stiffness of its joints' reactions, and of the negative part
-of its forces' stiffness. K + mu D is positive for mu near one at the latest, in any scene of any size, whatever the
-number of bodies; D is nothing where nothing can be negative, as of springs that are stretched.
+D is of each constraint and force by itself, for turns of its bodies about any axis and differences of their shifts:
+the size of the geometric stiffness of a reaction, and of the negative part of the stiffness of a force. K + mu D is
+positive for mu near one at the latest, whatever the size of the scene and the number of bodies; D is nothing where
+nothing can be negative, as of springs that are stretched.
 """
 
 from functools import cached_property
@@ -22,8 +23,10 @@ class Quadratic:
     ----------
     K : ndarray
         Numbers for `Frame.blocks`, N m.
+    D : ndarray
+        The same of D.
     shift : ndarray (b, 2)
-        D of shifts and of turns of each body, N m.
+        Its size by shifts and by turns of each body, N m.
     """
 
     def __init__(self, rest):
@@ -36,8 +39,10 @@ class Quadratic:
         blocks = T.swapaxes(1, 2) @ whole @ T
         inertial = P[:-1].swapaxes(1, 2) @ rest.own_slopes() @ P[:-1]
         self.K = frame.stiffness(blocks, inertial + self._normalised())
-        self.shift = self._shift(blocks[: frame.constraints], blocks[frame.constraints :])
-        self.shift += np.linalg.norm(inertial.reshape(-1, 2, 3, 6), axis=(2, 3))
+        norms, negative = self._sizes(blocks)
+        self.shift = self._of_bodies(negative) + np.linalg.norm(inertial.reshape(-1, 2, 3, 6), axis=(2, 3))
+        self.D = frame.stiffness(self._structured(negative), _diagonal(self.shift - self._of_bodies(negative)))
+        self._norms = norms
         self.whole = frame.blocks.matrix(self.K)
 
     def _normalised(self):
@@ -48,21 +53,38 @@ class Quadratic:
         P = rest.P[:-1]
         return P.swapaxes(1, 2) @ found[:-1] @ P
 
-    def _shift(self, geometric, elastic):
-        """D (b, 2)."""
-        found = np.zeros((len(self.frame.metric.at) + 1, 2))
-        sizes = np.linalg.norm(geometric.reshape(-1, 4, 3, 12), axis=(2, 3))
-        least = np.zeros(len(elastic))
-        some = np.flatnonzero(elastic.any(axis=(1, 2)))
+    def _sizes(self, blocks):
+        """Of each part, by shifts and turns of its bodies, N m (e, 4): the size of K, and of what may be negative."""
+        norms, first = np.linalg.norm(blocks.reshape(-1, 4, 3, 12), axis=(2, 3)), self.frame.constraints
+        negative, forces = norms.copy(), blocks[first:]
+        least, some = np.zeros(len(forces)), np.flatnonzero(forces.any(axis=(1, 2)))
         if some.size:
-            least[some] = -np.linalg.eigvalsh(0.5 * (elastic[some] + elastic[some].swapaxes(1, 2)))[:, 0]
-        least = np.where(least > NOTHING * np.abs(elastic).max(axis=(1, 2), initial=0.0), least, 0.0)
-        parts = np.linalg.norm(elastic.reshape(-1, 4, 3, 12), axis=(2, 3))
-        some = parts > NOTHING * parts.max(axis=1, initial=0.0)[:, None]
-        sizes = np.concatenate((sizes, np.where(some, least[:, None], 0.0)))
+            least[some] = -np.linalg.eigvalsh(0.5 * (forces[some] + forces[some].swapaxes(1, 2)))[:, 0]
+        least = np.where(least > NOTHING * np.abs(forces).max(axis=(1, 2), initial=0.0), least, 0.0)
+        has = norms > NOTHING * norms.max(axis=1, initial=0.0)[:, None]
+        negative[first:] = np.where(has[first:], least[:, None], 0.0)
+        return norms, negative
+
+    def _of_bodies(self, sizes):
+        """Sums (b, 2) of sizes (e, 4)."""
+        found = np.zeros((len(self.frame.metric.at) + 1, 2))
         for half in range(2):
             np.add.at(found, self.frame.by_parts[:, half], sizes[:, 2 * half : 2 * half + 2])
         return found[:-1]
+
+    def _structured(self, sizes):
+        """Blocks (e, 12, 12) of sizes (e, 4): of turns, and of the difference of shifts, which alone strains a part."""
+        shifts, one = np.maximum(sizes[:, 0], sizes[:, 2])[:, None, None], np.eye(3)
+        found = np.zeros((len(sizes), 12, 12))
+        found[:, :3, :3] = found[:, 6:9, 6:9] = shifts * one
+        found[:, :3, 6:9] = found[:, 6:9, :3] = -shifts * one
+        found[:, 3:6, 3:6], found[:, 9:, 9:] = sizes[:, 1, None, None] * one, sizes[:, 3, None, None] * one
+        return found
+
+    @cached_property
+    def strain(self):
+        """Numbers for `Frame.blocks` of what exceeds K, in which increments that strain little are small."""
+        return self.frame.stiffness(self._structured(self._norms), _diagonal(MASSLESS * self.local))
 
     @cached_property
     def rate(self):
@@ -85,11 +107,8 @@ class Quadratic:
         alike = (rows - columns) % 2 == 0
         np.maximum.at(found.reshape(-1), rows[alike], np.abs(self.K[alike]))
         found = np.maximum(found, self.shift)
-        self.own_stiffness = found
         found = np.where(found > NOTHING * found.max(axis=1, initial=0.0)[:, None], found, found[:, ::-1])
-        found = np.where(found > NOTHING * found.max(initial=0.0), found, found.max(initial=0.0))
-        self.own_stiffness = np.maximum(self.own_stiffness, MASSLESS * found)
-        return found
+        return np.where(found > NOTHING * found.max(initial=0.0), found, found.max(initial=0.0))
 
     def factors(self, mu, least):
         """The `Factors` at mu; least (b,), N m, stands for K where there is none."""
@@ -104,3 +123,10 @@ class Quadratic:
     def along(self, u):
         """u.K u."""
         return float(u @ (self.whole @ u))
+
+
+def _diagonal(sizes):
+    """Blocks (b, 6, 6) of sizes (b, 2)."""
+    found = np.zeros((len(sizes), 6, 6))
+    found[:, range(6), range(6)] = np.repeat(sizes, 3, axis=1)
+    return found

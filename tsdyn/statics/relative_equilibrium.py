@@ -84,7 +84,12 @@ def find_steady(descent):
     """The findings of a relative equilibrium, the descent being moved there."""
     unstable = None
     for _ in range(MOST_SADDLES):
-        if not (descent.approach() or (descent.settle() and descent.approach())):
+        start = descent.rest, descent.memory.copy(), descent.angles.copy()
+        found = descent.approach()
+        if not found:  # Newton's steps have gone astray
+            descent.rest, descent.memory, descent.angles = start
+            found = descent.settle() and descent.approach()
+        if not found:
             if unstable is None:
                 _refuse(descent)
             break
@@ -138,9 +143,8 @@ def demand_admitted(scene, rates, qd):
 
 
 def _refuse(descent):
-    motion = descent.motion
-    gains = np.linalg.norm(motion.translations(2), axis=1)
-    body = motion.packed.bodies[int(gains.argmax())]
+    gains = np.linalg.norm(descent.rest.gains[0], axis=1)
+    body = descent.packed.bodies[int(gains.argmax())]
     raise NoEquilibrium(
         f"no steady motion with this spin was found in {descent.steps} steps: {body.name} accelerates by "
         f"{gains.max():.3g} m/s^2 still in the turning axes. Start nearer, with guess=, or change the rate."

@@ -18,7 +18,7 @@ from ..model.sparse_jacobian import WIDTH, as_csr
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays
 from ..observables.generalised_forces import applied_loads
 from .quadratic import Quadratic
-from .tolerances import CLOSED, LEAST_DIVISOR, MASSLESS, MOST_SWEEPS, REFINEMENTS, SINGULAR, SLOWEST, STALLED, TURNED
+from .tolerances import CLOSED, LEAST_DIVISOR, MOST_SWEEPS, REFINEMENTS, SINGULAR, SLOWEST, STALLED, TURNED
 
 
 class Rest:
@@ -83,12 +83,13 @@ class Rest:
 
     def _factor(self):
         frame = self.frame
-        self._weights = np.where(frame.increments.translates, 1.0 / np.sqrt(MASSLESS), 1.0)
+        pattern, top, (i, j), diagonal = frame.weights
+        self._weights = 1.0 / np.sqrt(diagonal)
         A = self.A * self._weights[frame.rows.columns]
         lengths = np.sqrt(np.bincount(frame.rows.rows, A * A, frame.own.size))
         self._scales = 1.0 / np.where(self.left_out, 1.0, np.maximum(lengths, LEAST_DIVISOR))
         A = A * self._scales[frame.rows.rows]
-        self._matrix = frame.matrix(frame.light, np.ones(frame.increments.size), A, self.left_out * 1.0)
+        self._matrix = frame.matrix(pattern, top * self._weights[i] * self._weights[j], A, self.left_out * 1.0)
         try:
             self._factors = sparse_lu(self._matrix)
         except RuntimeError as error:

@@ -28,8 +28,8 @@ class Factors:
 
     def __init__(self, quadratic, mu, least):
         frame, rest = quadratic.frame, quadratic.rest
-        self._quadratic, self._D, self._least = quadratic, mu * quadratic.shift, least
-        local = np.maximum(quadratic.local + self._D, LEAST_DIVISOR)
+        self._quadratic, self._mu, self._least = quadratic, mu, least
+        local = np.maximum(quadratic.local + mu * quadratic.shift, LEAST_DIVISOR)
         self.scale = 1.0 / np.sqrt(local[frame.increments.body, 1 * ~frame.increments.translates])
         A = rest.A * self.scale[frame.rows.columns]
         lengths = np.sqrt(np.bincount(frame.rows.rows, A * A, frame.own.size))
@@ -58,10 +58,10 @@ class Factors:
     def _top(self, share):
         """Numbers for `Frame.blocks` of K + mu D + a share of the stiffness of each body, scaled."""
         quadratic, frame = self._quadratic, self._quadratic.frame
-        D = self._D + np.maximum(share * quadratic.local, self._least)
-        added = np.zeros((len(D), 6, 6))
-        added[:, range(6), range(6)] = np.repeat(D, 3, axis=1)
-        top = quadratic.K + frame.stiffness(frame.no_pairs, added)
+        floor = np.maximum(share * quadratic.local, self._least)
+        added = np.zeros((len(floor), 6, 6))
+        added[:, range(6), range(6)] = np.repeat(floor, 3, axis=1)
+        top = quadratic.K + self._mu * quadratic.D + frame.stiffness(frame.no_pairs, added)
         return top * self.scale[frame.blocks.rows] * self.scale[frame.blocks.columns]
 
     def _matrix(self, share, below):
@@ -104,12 +104,11 @@ class Factors:
         return None if factors is None else self._solved(factors, load)
 
     def correction(self, bias):
-        """The increment u with A u = bias, (m',), that strains least, by the stiffness of each body of its own."""
+        """The increment u with A u = bias, (m',), that strains least."""
         if self._closing is None:
             quadratic, frame = self._quadratic, self._quadratic.frame
-            kinds = frame.increments.body, 1 * ~frame.increments.translates
-            light = quadratic.own_stiffness[kinds] * self.scale**2
-            self._closing = splu_of(frame.matrix(frame.light, light, self._A, np.where(self._left_out, -1.0, 0.0)))
+            top = quadratic.strain * self.scale[frame.blocks.rows] * self.scale[frame.blocks.columns]
+            self._closing = splu_of(frame.matrix(frame.saddle, top, self._A, np.where(self._left_out, -1.0, 0.0)))
         if self._closing is None:
             return np.full(self.scale.size, np.nan)
         bias = np.where(self._left_out, 0.0, bias / self._lengths)

@@ -82,6 +82,8 @@ SOFTER, STIFFER, FIRST_MU, LEAST_MU, STIFF = 0.25, 5.0, 1e-2, 1e-9, 60.0
 SHORTER = 0.3
 # Share of the largest stiffness of a body, or of all, below which it has none of its own.
 NOTHING = 1e-12
+# Share of the loads that stands for a stiffness, where there is none: steps are as long as they may be.
+SLIDING = 1e-6
 # Share of the stiffness of a body that a direction without stiffness has.
 SOFTEST = 1e-10
 # Share of the work promised that a step must do; share of what is unbalanced that a short one may leave.

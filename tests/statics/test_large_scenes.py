@@ -51,6 +51,48 @@ def test_links_that_point_anywhere_hang_at_last():
     np.testing.assert_allclose(heights, -0.3 * (np.arange(30) + 0.5), atol=CLOSE)
 
 
+def test_balls_on_rods_hang_in_few_steps():
+    scene, before, count, length = ts.Scene(gravity=DOWN), None, 60, 0.1
+    for i in range(count):
+        ball = scene.add_point_mass(mass=0.1, position=(length * (i + 1), 0.0, 0.0), name=f"ball {i}")
+        scene.add(C.Distance(ball, before or scene.ground, length=length))
+        before = ball
+    found = scene.equilibrium()
+    assert found.stable
+    assert found.steps < 20
+    np.testing.assert_allclose(found.state.q.reshape(-1, 3)[:, 2], -length * np.arange(1, count + 1), atol=CLOSE)
+
+
+def test_springs_that_begin_slack_hang():
+    """Each spring carries what hangs below it."""
+    scene, before, count, stiffness = ts.Scene(gravity=DOWN), None, 30, 200.0
+    for i in range(count):
+        ball = scene.add_point_mass(mass=0.1, position=(0.1 * (i + 1), 0.0, 0.0), name=f"ball {i}")
+        scene.add(F.Spring(before or scene.ground, ball, stiffness=stiffness, free_length=0.1))
+        before = ball
+    found = scene.equilibrium()
+    pulls = 0.1 * G * np.arange(count, 0, -1)
+    np.testing.assert_allclose(found.state.q[2::3], -(0.1 + pulls / stiffness).cumsum(), atol=CLOSE)
+    assert found.steps < 40
+
+
+def test_what_slides_is_seen_soon_and_a_stop_far_away_is_found():
+    scene = ts.Scene(gravity=DOWN)
+    cart = scene.add_body(1.0, (1, 1, 1), name="cart")
+    rail = scene.add(C.Translational.at(scene.ground, cart, point=(0, 0, 0), axis=(1, 0, -1), name="rail"))
+    with pytest.raises(ts.NoEquilibrium, match="cart") as caught:
+        scene.equilibrium()
+    assert int(str(caught.value).split(" steps")[0].split()[-1]) < 30
+    scene.add(F.JointForce(rail, function=stop, name="stop"))
+    found = scene.equilibrium()
+    assert found.state.displacement(rail) == pytest.approx(30.0 + G / np.sqrt(2.0) / 1000.0, rel=CLOSE)
+
+
+def stop(t, way, rate):
+    """A spring from 30 m on."""
+    return -1000.0 * (way - 30.0) if way > 30.0 else 0.0
+
+
 def test_equilibrium_of_springs_and_links_is_that_of_the_least_energy():
     """Six links, each tied to the ground by a spring, against the energy in absolute angles, by SciPy."""
     count, length, mass, stiffness, free = 6, 0.7, 1.3, 40.0, 0.3

@@ -22,10 +22,8 @@ def saddle_free(factors, load):
 
 def _by_all(factors, load):
     """By all eigenvectors, dense."""
-    from scipy.linalg import null_space
-
     K, A = factors.dense()
-    Z = null_space(A) if A.shape[0] else np.eye(len(K))
+    Z = np.linalg.qr(A.T, mode="complete")[0][:, len(A) :]
     w, v = np.linalg.eigh(0.5 * Z.T @ (K + K.T) @ Z)
     v, scale = Z @ v, factors.scale
     along = v.T @ (scale * load)

@@ -140,7 +140,7 @@ class SingularConfiguration(TsdynError, ArithmeticError):
 
 
 class NoEquilibrium(TsdynError, ArithmeticError):
-    """No static equilibrium was found; the message says which body still accelerates.
+    """No static equilibrium was found; the message says which body falls, or accelerates still.
 
     Examples
     --------
@@ -151,7 +151,7 @@ class NoEquilibrium(TsdynError, ArithmeticError):
     >>> try:
     ...     scene.equilibrium()
     ... except ts.NoEquilibrium as error:
-    ...     print("ball accelerates" in str(error))
+    ...     print("ball falls freely" in str(error))
     True
     """
 

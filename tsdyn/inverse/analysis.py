@@ -13,7 +13,7 @@ from ..model.handles import handles_of
 from ..rows.interface import allocate_tangent
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of
-from ..statics.descent import update_memory
+from ..statics.moves import update_memory
 from .branch_steps import branch_of, follow
 from .tolerances import LEAST_STEPS, SHORTEST, SLICE
 

@@ -3,7 +3,7 @@
 from functools import partial
 
 from ..jit.interrupts import interruptible
-from .tolerances import LONG_LU
+from .tolerances import LONG_LU, LONG_SOLVE
 
 
 def sparse_lu(A, **options):
@@ -12,3 +12,13 @@ def sparse_lu(A, **options):
 
     call = partial(splu, A, **options)
     return interruptible(call) if A.shape[0] >= LONG_LU else call()
+
+
+def interruptible_solver(factors):
+    """Return solve(b, trans="N") of some factors; Ctrl-C is answered meanwhile where that may take longer."""
+
+    def solve(b, trans="N"):
+        call = partial(factors.solve, b, trans)
+        return interruptible(call) if b.size >= LONG_SOLVE else call()
+
+    return solve

@@ -16,6 +16,8 @@ ORTHOGONAL, CONVERGED = 1e-15, 1e-10
 
 # Rows of a sparse matrix from which a factorisation may take more than 0.1 s.
 LONG_LU = 1 << 15
+# Numbers of right-hand sides from which a solution may.
+LONG_SOLVE = 1 << 21
 
 # --- isolation of roots by interpolants at Chebyshev nodes, see root_isolation.py ---
 # Error of an interpolant, as a share of the scale: resolved; and not worth one of twice the degree.

@@ -97,6 +97,19 @@ def angle(geometry, own, other, level):
     return second / (E * E + F * F)
 
 
+def all_angles(handles, q):
+    """The angles of all joints of some `Handles` at q (n,), in (-pi, pi], (count,)."""
+    p = []
+    for at, dimension in (handles.joints[:, :2].T, handles.joints[:, 2:].T):
+        own = np.tile(IDENTITY, (handles.count, 1))
+        turns = dimension == 7
+        own[turns] = q[at[turns, None] + np.arange(3, 7)]
+        p.append(tuple(own.T))
+    f, g, h = (tuple(handles.frames[:, i : i + 3].T) for i in (0, 3, 6))
+    v = seen(*p, h)
+    return np.arctan2(dot(g, v), dot(f, v))
+
+
 def displacement(geometry, own, other, level):
     """s of Eq. (2), its rate or its acceleration."""
     total = 0.0

@@ -60,8 +60,9 @@ def linearise(
     are independent; then displacements and rotations of bodies ("ball.x", "top.rotation y"), in axes of the ground.
     Derivatives are exact to rounding: complex steps of laws and primitives, the rest by algebra. In steady motion, axes
     of bodies turn with the motion as a whole, so that all coefficients are constant (Likins 1967; Meirovitch 1970).
-    Functions of time have their values at the time of the state. The cost is O(N) for chains and trees, and that of k
-    solutions for k coordinates.
+    Functions of time have their values at the time of the state. The cost is O(N) for chains and trees, and that of a
+    few solutions for each of k coordinates. In scenes of more than 400 Euler parameters and positions rotations of
+    bodies come before displacements.
 
     Examples
     --------
@@ -138,12 +139,13 @@ def equilibrium(
 
     Notes
     -----
-    Levenberg steps with the exact stiffness, geometric stiffness of reactions included, lower the potential energy on
-    the constraint manifold; the last ones are Newton's, down to rounding. Saddles are left along their direction of
-    most negative stiffness. Work along a step takes the place of energy, so loads need no potential. Redundant rows are
-    allowed. Dampers and friction exert nothing at rest. With a spin, Newton steps lead to the nearest relative
-    equilibrium, a top's steady precession for one; where it is unstable, gyroscopic terms included, it is left along
-    the mode that grows, down to a minimum of the amended potential V - Omega . J Omega / 2.
+    Newton steps with the exact stiffness, geometric stiffness of reactions included, where it is positive on the
+    motions that the constraints admit; elsewhere steps that lead down all the same. They lower the potential energy on
+    the constraint manifold down to rounding, and their number hardly grows with that of bodies. Saddles are left along
+    their direction of most negative stiffness. Work along a step takes the place of energy, so loads need no potential.
+    Redundant rows are allowed. Dampers and friction exert nothing at rest. With a spin, Newton steps lead to the
+    nearest relative equilibrium, a top's steady precession for one; where it is unstable, gyroscopic terms included, it
+    is left along the mode that grows, down to a minimum of the amended potential V - Omega . J Omega / 2.
 
     Examples
     --------

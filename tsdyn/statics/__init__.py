@@ -2,7 +2,8 @@
 
 Imports configuration and below.
 
-Begin with linearise.py (`scene.linearise`) and equilibrium.py (`scene.equilibrium`, by the steps of descent.py; with a
-spin by relative_equilibrium.py). motion.py has the motion that is linearised about, pairwise.py the derivatives of
-constraints and forces, variations.py the rows that coordinates are made of, reduction.py M, C and K.
+Begin with linearise.py (`scene.linearise`; motion.py has the motion, pairwise.py derivatives of constraints and forces,
+variations.py rows of coordinates, reduction.py M, C and K) and equilibrium.py (`scene.equilibrium`): descent.py chooses
+steps, moves.py takes them, rest.py has what acts, quadratic.py and signed_factors.py its stiffness. With a spin:
+relative_equilibrium.py.
 """

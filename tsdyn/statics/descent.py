@@ -1,209 +1,123 @@
 """Descent of the potential energy on the constraint manifold, to a static equilibrium.
 
-    [ K_s + mu M    H^T ] [ dq   ]     [ Q_A - Phi_q^T lam ]
-    [ H             0   ] [ dlam ]  =  [ 0                 ]        K_s = (Phi_q^T lam)_q - Q_A,q
+    [ K + mu D    A^T ] [ u    ]     [ Q - A^T lam ]
+    [ A           0   ] [ dlam ]  =  [ 0           ]        K = (Phi_q^T lam)_q - Q_q by increments u
 
-M a = Q_A - Phi_q^T lam is what isn't balanced, a the acceleration from rest. A step counts if the loads do work on it;
-otherwise mu grows, and the step turns towards a / mu. With mu near zero steps are Newton's. The work along a step is
-that of the trapezoidal rule, so no load needs a potential. The method is Levenberg's, with the multipliers in the
-second derivatives as in sequential quadratic programming (Nocedal and Wright, Numerical Optimization, 2006, ch. 18).
+With mu = 0 steps are Newton's. They are taken from the start on where K is positive on the motions that the constraints
+admit. Elsewhere the signs of negative eigenvalues are changed, or mu grows until K + mu D is positive: no step leads
+up to a saddle, and one that is close is left along a direction of negative stiffness. The method is Levenberg's, with
+the multipliers in the second derivatives as in sequential quadratic programming (Nocedal and Wright, Numerical
+Optimization, 2006, ch. 18).
 """
 
 import numpy as np
 
-from ..configuration.continuation import close
-from ..configuration.kinetic_metric import Metric
-from ..elements.bodies import transform_g
-from ..errors import SingularConfiguration
-from ..jit.kernels import entry
-from ..model import joint_motion
-from ..model.equations import remember, set_time
-from .motion import Motion
+from .moves import Moves
+from .saddle_free import saddle_free
 from .tolerances import (
+    AT_SADDLE,
     BALANCED,
-    CLOSED,
     FARTHEST,
+    FINAL,
+    FIRST_MU,
+    IN_VAIN,
     KICKS,
-    LEAST_SHIFT,
+    LEAST_MU,
     LEAST_STEP,
     MOST_STEPS,
-    MOST_SWEEPS,
+    MOST_TRIES,
     MOST_TURN,
     MOST_TURNED,
-    NEARLY_CLOSED,
-    SLOWEST,
+    SLIDING,
     SOFTER,
-    SOFTEST,
-    STALLED,
+    STIFF,
     STIFFER,
+    TOO_FAR,
     TURNED,
 )
 
 
-@entry
-def update_memory(s, q, qd, t, out):
-    """Let forces and constraints remember a configuration; out (slots,)."""
-    set_time(s, t)
-    remember(s, q, qd, t, out)
+class Descent(Moves):
+    """A configuration at rest, moved step by step; arguments of `Moves`."""
 
+    relative = False  # whether what has no positive stiffness may be stable all the same
 
-class Descent:
-    """A configuration at rest, moved step by step.
-
-    Parameters
-    ----------
-    packed : Packed
-    handles : Handles
-    remembered : ndarray
-        Joint angles, then memory of forces and constraints.
-    t : float, s
-    q : ndarray (n,)
-        Consistent.
-    """
-
-    def __init__(self, packed, handles, remembered, t, q):
-        self.packed, self.handles, self.t = packed, handles, t
-        self.angles, self.memory = remembered[: handles.count].copy(), remembered[handles.count :].copy()
-        self.metric, self.steps, self.gone, self.turned = Metric(packed, None, t), 0, 0.0, 0.0
-        self.reach, self.mu = self.metric.reach(q), 0.0
-        self.motion = self._at(q, self.memory)
-        self.longest = 0.5 * self.reach
-
-    def _at(self, q, memory):
-        return Motion(self.packed, memory, self.t, q, np.zeros(q.size), still=True)
-
-    @property
-    def unbalanced(self):
-        """The largest acceleration from rest, m/s^2, over that of the loads by themselves."""
-        turning = self.reach * np.abs(self.motion.spins(2)).max(initial=0.0)
-        size = max(np.abs(self.motion.translations(2)).max(initial=0.0), turning)
-        return float(size) / self.motion.acceleration_scale(self.reach)
+    def __init__(self, *start):
+        super().__init__(*start)
+        self.steps, self.mu = 0, FIRST_MU
 
     def settle(self):
         """Take steps until the loads are balanced to rounding; True if they are."""
+        vain = 0
         while self.steps < MOST_STEPS and self.gone < FARTHEST * self.reach and self.turned < MOST_TURNED:
-            self.steps += 1
-            if self.unbalanced <= BALANCED or not self._step():
+            before = self.unbalanced
+            if before <= BALANCED or not self._step():
                 break
+            self.steps += 1
+            vain = vain + 1 if before <= TURNED and not self.unbalanced < 0.5 * before else 0
+            if vain == IN_VAIN:
+                break  # rounding
         return self.unbalanced <= TURNED
 
     def _step(self):
         """Take a step; False if none is left that the loads do work on."""
-        motion = self.motion
-        solve, stiffness = saddle(motion), motion.stiffness
-        if stiffness > 0.0:
-            self.mu = min(max(self.mu, SOFTEST * stiffness), stiffness)
-        else:
-            self.mu = self.mu or motion.acceleration_scale(self.reach) / self.reach
-        load, before = motion.M @ motion.qdd, self.unbalanced
-        while True:
-            way = solve(self.mu, load)
-            if way is not None:
-                shift, turn = self._extent(way)
-                if shift <= LEAST_STEP * self.reach and turn <= LEAST_STEP:
+        quadratic, load = self.rest.quadratic, self.rest.left
+        near = self.unbalanced <= AT_SADDLE
+        if near and (self.relative or quadratic.circulatory):
+            u = quadratic.factors(0.0, 0.0).newton(load)
+            if u is not None and self.approach_by(u):
+                return True
+        mu = 0.0
+        for _ in range(MOST_TRIES):
+            factors = quadratic.factors(mu, self._least(mu))
+            if factors.positive:
+                u = factors.step(load) if mu > 0.0 else factors.newton(load)
+                if u is not None and self.size(u) <= LEAST_STEP:
                     return False
-                factor = min(1.0, self.longest / max(shift, LEAST_SHIFT), MOST_TURN / max(turn, LEAST_SHIFT))
-                if self._try(factor * way, load, before):
-                    self.mu *= SOFTER if factor == 1.0 else 1.0
-                    self.longest *= 2.0 if factor < 1.0 and factor * turn < MOST_TURN else 1.0
+                if u is not None and self._is_fit(u, mu):
+                    leaves = near and mu > 0.0 and not self.relative
+                    if (leaves and self._leave(factors, u)) or self.advance(u, factors):
+                        self.mu = max(mu * SOFTER, LEAST_MU) if mu > 0.0 else self.mu
+                        return True
+                    if self.size(u) <= FINAL:
+                        return False
+            elif mu == 0.0 and factors.negative > 0:
+                u = saddle_free(factors, load)
+                if u is not None and self.length(u) <= TOO_FAR * self.trust and self.advance(u, factors):
                     return True
-            self.mu *= STIFFER
+            mu = max(mu * STIFFER, self.mu)
+        return False
 
-    def _try(self, way, load, before):
-        """Move if the loads do work on the way there."""
-        old = self.motion
-        q = self._moved(way)
-        if q is None or not load @ way > 0.0:
+    def _least(self, mu):
+        """What stands for K, N m, where there is no stiffness, and where D doesn't suffice."""
+        stiffness = self.rest.quadratic.local.max(initial=0.0)
+        if stiffness == 0.0:
+            return SLIDING * np.abs(self.rest.left).max() * max(mu, 1.0)
+        return mu * stiffness if mu > STIFF else 0.0
+
+    def _is_fit(self, u, mu):
+        """Whether an increment is to be tried: one that is much too long gets shorter, and straighter, by mu."""
+        slides = self.trust == 1.0 and self.increments.extent(u)[1] <= TOO_FAR * MOST_TURN
+        return slides or mu >= 1.0 or self.length(u) <= TOO_FAR * self.trust or not self.rest.quadratic.shift.any()
+
+    def _leave(self, factors, step):
+        """Leave what is close to a saddle along a direction of negative stiffness that gains more than a step does."""
+        quadratic, load = self.rest.quadratic, self.rest.left
+        u = factors.downhill(load, np.random.default_rng(self.steps))
+        if u is None:
             return False
-        try:
-            motion = self._at(q, self.memory)
-        except SingularConfiguration:
+        u = u / self.size(u)
+        if not -(KICKS[0] ** 2) * quadratic.along(u) > 2.0 * float(load @ step) - quadratic.along(step):
             return False
-        change = q - old.q
-        self.motion = motion
-        work = 0.5 * (load + motion.M @ motion.qdd) @ change
-        if not (work > 0.0 or (self.unbalanced < 0.5 * before and np.isfinite(work) and before < TURNED)):
-            self.motion = old
-            return False
-        shift, turn = self._extent(change)
-        self.gone, self.turned = self.gone + shift, self.turned + turn
-        self._remember()
-        return True
-
-    def _moved(self, way):
-        """The consistent configuration next to that after a displacement; None where there is none."""
-        q, before = self.motion.q + way, np.inf
-        allowed = 1.0 + np.abs(q).max()
-        for _ in range(MOST_SWEEPS):  # of simplified Newton, by the factors at hand
-            Phi = self.motion.residuals(q)
-            size = np.abs(Phi).max(initial=0.0)
-            if size <= CLOSED * allowed or not size < SLOWEST * before:
-                break
-            before, q = size, q + self.motion.solve(np.zeros(q.size), -Phi[self.motion.kept])[0]
-        if not size <= STALLED * allowed:
-            return None  # too long a way
-        if not size <= NEARLY_CLOSED * allowed:
-            q, Phi, _ = close(self.metric, self._unit(self.motion.q + way))
-            size = np.abs(Phi).max(initial=0.0)
-        return self._unit(q) if size <= TURNED * allowed else None
-
-    def _unit(self, q):
-        """q (n,) with Euler parameters of unit length."""
-        q = q.copy()
-        p = q[self.metric.p]
-        q[self.metric.p] = p / np.linalg.norm(p, axis=1)[:, None]
-        return q
-
-    def _extent(self, way):
-        """The largest shift, m, and turn, rad."""
-        metric, q = self.metric, self.motion.q
-        turns = 2.0 * np.einsum("bij,bj->bi", transform_g(q[metric.p]), way[metric.p])
-        return tuple(float(np.linalg.norm(x, axis=1).max(initial=0.0)) for x in (way[metric.r], turns))
-
-    def _remember(self):
-        """Count turns up to here."""
-        q, at = self.motion.q, 0
-        for row in self.handles.rows:
-            for geometry in row.angles:
-                here = joint_motion.angle(geometry, *self.handles.motions(geometry, (q,)), 0)
-                self.angles[at] = joint_motion.counted(here, self.angles[at])
-                at += 1
-        if self.memory.size:
-            out, system = np.zeros(self.memory.size), self.motion.system
-            update_memory(system, q, np.zeros(q.size), self.t, out)
-            if not np.array_equal(out, self.memory):
-                self.memory = out
-                self.motion = self._at(q, out)
+        return any(self.attempt(share * u, factors) for share in KICKS)
 
     def kick(self, way):
         """Leave a saddle along a direction dq by a tenth of a radian, or of the size."""
-        shift, turn = self._extent(way)
+        rest = self.rest
+        u = self.increments.of(rest.q, way)
         for share in KICKS:
-            q = self._moved(share * way / max(turn, shift / self.reach))
+            q = rest.closed(self.increments.moved(rest.q, share / self.size(u) * u))
             if q is not None:
-                self.motion = self._at(q, self.memory)
-                self._remember()
+                self.rest = self._at(q)
+                self.remember()
                 break
-        self.mu = 0.0
-
-
-def saddle(motion):
-    """Return solve(mu, load) -> dq; None where the matrix is singular."""
-    from scipy.sparse import block_array, diags_array
-    from scipy.sparse.linalg import splu
-
-    unit = diags_array(1.0 / motion.root)
-    K, M, H = unit @ (motion.derivatives.K - motion.derivatives.Q_q) @ unit, unit @ motion.M @ unit, motion.H @ unit
-    H = diags_array(1.0 / np.maximum(np.sqrt(H.multiply(H).sum(axis=1)), LEAST_SHIFT)) @ H
-
-    def solve(mu, load):
-        weight = motion.stiffness + mu or 1.0
-        matrix = block_array([[(K + mu * M) / weight, H.T], [H, None]], format="csc")
-        right = np.concatenate((load / motion.root / weight, np.zeros(H.shape[0])))
-        try:
-            found = splu(matrix).solve(right)[: load.size] / motion.root
-        except RuntimeError:
-            return None
-        return found if np.isfinite(found).all() else None
-
-    return solve

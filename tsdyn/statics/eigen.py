@@ -1,13 +1,14 @@
 """Eigenvalues of M xdd + C xd + K x = 0, exact zeros included.
 
 With unit mass, that is in y = R x where M = R^T R. The null space of K is split off: each of its directions has an
-eigenvalue zero, which rounding would otherwise make a pair of the size of its root.
+eigenvalue zero, which rounding would otherwise make a pair of the size of its root. Ctrl-C is answered within LAPACK.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from ..jit.interrupts import interruptible
 from .tolerances import NO_STIFFNESS, SYMMETRIC, ZERO
 
 
@@ -31,12 +32,12 @@ def eigenpairs(reduced):
     values = values + 0.0
     order = np.lexsort((-values.imag, np.abs(values.imag), np.abs(values)))
     values, vectors = values[order], vectors[:, order]
-    return Pairs(values, solve_triangular(reduced.R, vectors))
+    return Pairs(values, interruptible(lambda: solve_triangular(reduced.R, vectors)))
 
 
 def _symmetric(K, scale):
     """Pairs +- of sqrt(-w)."""
-    w, vectors = np.linalg.eigh(0.5 * (K + K.T))
+    w, vectors = interruptible(lambda: np.linalg.eigh(0.5 * (K + K.T)))
     w = np.where(np.abs(w) <= NO_STIFFNESS * scale, 0.0, w)
     roots = np.sqrt(-w.astype(complex))
     return np.concatenate((roots, -roots)), np.concatenate((vectors, vectors), axis=1).astype(complex)
@@ -45,11 +46,11 @@ def _symmetric(K, scale):
 def _general(C, K, scale):
     """Of the first-order form, without the positions in the null space of K."""
     k = len(K)
-    _, s, V = np.linalg.svd(K)
+    _, s, V = interruptible(lambda: np.linalg.svd(K))
     stiff = s > NO_STIFFNESS * scale
     kept, free = V[stiff].T, V[~stiff].T  # K x = (K kept) kept^T x
     A = np.block([[np.zeros((stiff.sum(), stiff.sum())), kept.T], [-K @ kept, -C]])
-    values, vectors = np.linalg.eig(A)
+    values, vectors = interruptible(lambda: np.linalg.eig(A))
     values = np.where(np.abs(values) <= ZERO * np.abs(values).max(initial=0.0), 0.0, values)
     speeds, places = vectors[-k:], kept @ vectors[: len(vectors) - k]
     moving = np.linalg.norm(speeds, axis=0) >= np.linalg.norm(places, axis=0) * np.abs(values) * 0.5

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..calls import fitting_methods
 from ..errors import InvalidBody, InvalidConstraint, NoEquilibrium
+from ..jit.interrupts import interruptible
 from ..model.packed import member_of
 from ..observables import reactions
 from ..observables.kinematics import Anchor
@@ -15,9 +16,9 @@ from ..observables.state import RememberingState
 from .coordinates import chosen
 from .descent import Descent
 from .eigen import eigenpairs
-from .reduction import reduce
+from .reduction import Reduced
 from .smoothness import demand_continuous, demand_smooth
-from .tolerances import GROWING, MOST_SADDLES, NEUTRAL
+from .tolerances import GROWING, MOST_SADDLES, NEUTRAL, SETTLED
 from .variations import Variations
 
 if TYPE_CHECKING:
@@ -89,11 +90,12 @@ def find_equilibrium(packed, handles, remembered, t, q, q0):
     """The `Equilibrium` reached from a consistent q, q0 being where the search began."""
     demand_continuous(packed)
     descent = Descent(packed, handles, remembered, t, q)
+    _demand_held(descent.frame)
     for _ in range(MOST_SADDLES):
         if not descent.settle():
             _refuse(descent)
         demand_smooth(descent.motion)
-        *findings, way = _stability(descent.motion)
+        *findings, way = _stability(descent.motion, descent.unbalanced <= SETTLED)
         if way is None:
             break
         descent.kick(way)
@@ -111,31 +113,44 @@ def find_relative(packed, handles, remembered, t, q, q0, field):
     return Equilibrium(descent, q0, findings, field.spin)
 
 
-def _stability(motion):
+def _stability(motion, balanced):
     """Whether stable, the smallest stiffness, number of neutral directions; and dq of negative stiffness, or None."""
     if not motion.freedom:
         return True, float("nan"), 0, None
-    reduced = reduce(motion, chosen(motion, Variations(motion, np.zeros(3))))
+    reduced = Reduced(motion, chosen(motion, Variations(motion, np.zeros(3))), balanced)
     K, size = reduced.K_hat, reduced.scale
-    w, vectors = np.linalg.eigh(0.5 * (K + K.T))
+    K_s = 0.5 * (K + K.T)
+    w = interruptible(lambda: np.linalg.eigvalsh(K_s))
     neutral = int((np.abs(w) <= NEUTRAL * size).sum())
     if np.abs(K - K.T).max() > NEUTRAL * size:
         values = eigenpairs(reduced).values
         return bool(values.real.max() <= GROWING * np.abs(values).max()), float(w[0]), neutral, None
     if w[0] >= -NEUTRAL * size:
         return True, float(w[0]), neutral, None
-    from scipy.linalg import solve_triangular
+    from scipy.linalg import eigh, solve_triangular
 
-    way = reduced.T @ solve_triangular(reduced.R, vectors[:, 0])
+    softest = interruptible(lambda: eigh(K_s, subset_by_index=[0, 0])[1])
+    way = reduced.T @ solve_triangular(reduced.R, softest[:, 0])
     return False, float(w[0]), neutral, way
+
+
+def _demand_held(frame):
+    """Refuse scenes of which a part falls, by name."""
+    falling = frame.falling()
+    if falling.size:
+        name = frame.packed.bodies[int(falling[0])].name
+        others = f", joined to {falling.size - 1} more," if falling.size > 1 else ""
+        raise NoEquilibrium(
+            f"no equilibrium: {name}{others} falls freely, as no constraint and no force joins it to the ground. Add "
+            "one, or take gravity away."
+        )
 
 
 def _refuse(descent):
     """Say why none was found."""
-    motion = descent.motion
-    gains = np.linalg.norm(motion.translations(2), axis=1)
+    gains, spins = (np.linalg.norm(each, axis=1) for each in descent.rest.gains)
     turning = np.zeros(len(gains))
-    turning[motion.rigid] = descent.reach * np.linalg.norm(motion.spins(2), axis=1)
+    turning[descent.frame.metric.rigid] = descent.reach * spins
     body = descent.packed.bodies[int((gains + turning).argmax())]
     raise NoEquilibrium(
         f"no equilibrium was found in {descent.steps} steps and {descent.gone:.3g} m of way: {body.name} accelerates "

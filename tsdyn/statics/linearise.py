@@ -13,7 +13,7 @@ from .eigen import eigenpairs
 from .modes import Modes, modes_of
 from .motion import Motion
 from .ports import RATE, demand_effective, inputs_of, outputs_of
-from .reduction import reduce
+from .reduction import Reduced
 from .smoothness import demand_smooth
 from .steady import steady_rate
 from .variations import Variations, transform_e
@@ -121,7 +121,7 @@ def linearise(scene, memory, state, inputs, outputs):
     variations = Variations(motion, np.zeros(3) if rate is None else rate)
     ports = inputs_of(scene, variations, inputs)
     every = chosen(motion, variations)
-    reduced = reduce(motion, every)
+    reduced = Reduced(motion, every)
     ports = ports, outputs_of(scene, variations, outputs, every, reduced)
     return Linearisation(motion, every, reduced, ports, rate)
 

@@ -14,6 +14,7 @@ from ..elements.bodies import rotation_matrix, transform_g
 from ..errors import InvalidForce, SingularConfiguration
 from ..formulations.dependent_rows import dependent_rows
 from ..maths.row_rank import dependent
+from ..maths.sparse_lu import sparse_lu
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
@@ -94,27 +95,44 @@ class Motion:
         return known if found is None or found.size != known.size else found
 
     def _factor(self):
-        from scipy.sparse import block_array, diags_array  # imported here, as everywhere: `import tsdyn` is quicker
-        from scipy.sparse.linalg import splu
-
-        unit = diags_array(1.0 / self.root)
-        M, H = unit @ self.M @ unit, self.H @ unit
-        lengths = np.maximum(np.sqrt(H.multiply(H).sum(axis=1)), LEAST_DIVISOR)
-        H = diags_array(1.0 / lengths) @ H
-        self._weights = np.concatenate((1.0 / self.root, 1.0 / lengths))
-        try:
-            self._factors = splu(block_array([[M, H.T], [H, None]], format="csc"))
-        except RuntimeError as error:
-            raise SingularConfiguration(NOT_UNIQUE) from error
+        self._factors, self._weights = self._factored(self.H)
         pivots = np.abs(self._factors.U.diagonal())
         if pivots.min() < SINGULAR * pivots.max():
             raise SingularConfiguration(NOT_UNIQUE)
+
+    def _factored(self, H):
+        """Factors of [M, H^T; H, 0] with unit masses and unit rows, and the weights that make it so."""
+        from scipy.sparse import block_array, diags_array  # imported here, as everywhere: `import tsdyn` is quicker
+
+        unit = diags_array(1.0 / self.root)
+        M, H = unit @ self.M @ unit, H @ unit
+        lengths = np.maximum(np.sqrt(H.multiply(H).sum(axis=1)), LEAST_DIVISOR)
+        H = diags_array(1.0 / lengths) @ H
+        try:
+            factors = sparse_lu(block_array([[M, H.T], [H, None]], format="csc"))
+        except RuntimeError as error:
+            raise SingularConfiguration(NOT_UNIQUE) from error
+        return factors, np.concatenate((1.0 / self.root, 1.0 / lengths))
 
     def solve(self, load, bias):
         """Return (x, lam) with M x + H^T lam = load, H x = bias; vectors, or matrices of as many columns."""
         weights = self._weights if load.ndim == 1 else self._weights[:, None]
         found = weights * self._factors.solve(weights * np.concatenate((load, bias)))
         return found[: self.q.size], found[self.q.size :]
+
+    def holding(self, Z):
+        """Return free(load) = x with M x + H^T lam + Z^T held = load, H x = 0, Z x = 0; loads (n, c) are columns."""
+        from scipy.sparse import vstack
+
+        factors, weights = self._factored(vstack([self.H, Z])) if Z.shape[0] else (self._factors, self._weights)
+        n = self.q.size
+
+        def free(load):
+            whole = np.zeros((weights.size, load.shape[1]))
+            whole[:n] = weights[:n, None] * load
+            return weights[:n, None] * factors.solve(whole)[:n]
+
+        return free
 
     def residuals(self, q):
         """Phi (m,) at other positions."""

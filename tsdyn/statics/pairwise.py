@@ -45,35 +45,66 @@ def fill_blocks(s, x, lam, rows, Q_q, Q_qd, kept):
         call_jacobian(kind.jacobian, kind.count, kind.stride, table, reals, x[0], x[1], t, 14, Q_q, Q_qd, 1, own)
 
 
+class Pairs:
+    """Constraints and forces of a packed scene, each on the 14 coordinates of its two bodies.
+
+    Attributes
+    ----------
+    counts : (int, int)
+        Of constraints and of forces, which follow them.
+    columns, used : ndarray (instances, 14)
+        Coordinates of the two bodies, zero where there are none, and whether there are.
+    """
+
+    def __init__(self, packed):
+        self.packed = packed
+        whole = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
+        system, self._size = whole
+        constraints, forces = _entries(system, system.kinds, INTS), _entries(system, system.forces, FORCE_INTS)
+        constraints = constraints[np.argsort(constraints[:, 1 + ROW], kind="stable")]
+        places = np.concatenate((constraints[:, 1 + AT : 5 + AT], forces[:, 1 + AT : 5 + AT]))
+        table = system.table.copy()
+        table[constraints[:, 0] + STRIDE] = WIDTH
+        first = np.concatenate((constraints[:, 0], forces[:, 0]))
+        for k in range(2):
+            table[first + AT + k] = WIDTH * np.arange(len(first)) + k * (WIDTH // 2)
+        self._system = system._replace(table=table)
+        self.columns, self.used = _columns(places)
+        self.counts = len(constraints), len(forces)
+
+    def blocks(self, motion, lam):
+        """(Phi_q^T lam)_q (constraints, 14, 14); rows of G1 and G2 (2, .); Q_q and Q_qd (forces, 14, 14).
+
+        A motion has q, qd, qdd (n,), t, and the system with its memory.
+        """
+        nc, nf = self.counts
+        x = np.zeros((4, max(self.columns.size, 1)))
+        for level, values in enumerate((motion.q, motion.qd, motion.qdd)):
+            x[level, : self.columns.size] = np.where(self.used, values[self.columns], 0.0).ravel()
+        x[3] = motion.t
+        rows = np.zeros((3, max(STEP * nc, WIDTH * (len(lam) + nc))))
+        Q = np.zeros((2, STEP * (nc + nf)))
+        system = self._system._replace(reals=motion.system.reals.copy())
+        fill_blocks(system, x, lam, rows, *Q, np.zeros(self._size))
+        return _whole(rows[0, : STEP * nc]), rows[1:], *(_whole(one[STEP * nc :]) for one in Q)
+
+
 def derivatives(motion):
     """The `Derivatives` at a `Motion`."""
-    packed = motion.packed
-    whole = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
-    system, size = whole[0]._replace(reals=motion.system.reals.copy()), whole[1]
-    constraints, forces = _entries(system, system.kinds, INTS), _entries(system, system.forces, FORCE_INTS)
-    constraints = constraints[np.argsort(constraints[:, 1 + ROW], kind="stable")]
-    places = np.concatenate((constraints[:, 1 + AT : 5 + AT], forces[:, 1 + AT : 5 + AT]))
-    table = system.table.copy()
-    table[constraints[:, 0] + STRIDE] = WIDTH
-    first = np.concatenate((constraints[:, 0], forces[:, 0]))
-    for k in range(2):
-        table[first + AT + k] = WIDTH * np.arange(len(first)) + k * (WIDTH // 2)
-    columns, used = _columns(places)
-    x = np.zeros((4, max(columns.size, 1)))
-    for level, values in enumerate((motion.q, motion.qd, motion.qdd)):
-        x[level, : columns.size] = np.where(used, values[columns], 0.0).ravel()
-    x[3] = motion.t
-    nc, nf, m = len(constraints), len(forces), len(motion.lam)
-    rows = np.zeros((3, max(STEP * nc, WIDTH * (m + nc))))
-    Q_q, Q_qd = np.zeros((2, STEP * (nc + nf)))
-    fill_blocks(system._replace(table=table), x, motion.lam, rows, Q_q, Q_qd, np.zeros(size))
-    n = motion.q.size
-    K = _scatter(rows[0, : STEP * nc], columns[:nc], used[:nc], n)
+    packed, pairs = motion.packed, Pairs(motion.packed)
+    (nc, _), m, n = pairs.counts, len(motion.lam), motion.q.size
+    K, rows, Q_q, Q_qd = pairs.blocks(motion, motion.lam)
     counts = np.array([packed.constraints[i].rows for i in range(nc)], int)
     lines = np.arange(m) + np.repeat(np.arange(nc), counts)  # of row r in G1 and G2
-    G1, G2 = (as_csr(packed, one[: WIDTH * (m + nc)].reshape(-1, WIDTH)[lines]) for one in rows[1:])
-    Q_q, Q_qd = (_scatter(one[STEP * nc :], columns[nc:], used[nc:], n) for one in (Q_q, Q_qd))
+    G1, G2 = (as_csr(packed, one[: WIDTH * (m + nc)].reshape(-1, WIDTH)[lines]) for one in rows)
+    K = _scatter(K, pairs.columns[:nc], pairs.used[:nc], n)
+    Q_q, Q_qd = (_scatter(one, pairs.columns[nc:], pairs.used[nc:], n) for one in (Q_q, Q_qd))
     return Derivatives(K, G1, G2, Q_q, Q_qd)
+
+
+def _whole(blocks):
+    """Blocks (instances, 14, 14) without the floats between them."""
+    return blocks.reshape(-1, STEP)[:, : WIDTH * WIDTH].reshape(-1, WIDTH, WIDTH)
 
 
 def _entries(system, kinds, width):
@@ -97,7 +128,6 @@ def _scatter(blocks, columns, used, n):
     """Sum of blocks as a sparse (n, n)."""
     from scipy.sparse import csr_array
 
-    blocks = blocks.reshape(-1, STEP)[:, : WIDTH * WIDTH].reshape(-1, WIDTH, WIDTH)
     both = used[:, :, None] & used[:, None, :]
     i, j = np.broadcast_arrays(columns[:, :, None], columns[:, None, :])
     return csr_array((blocks[both], (i[both], j[both])), (n, n))

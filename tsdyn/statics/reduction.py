@@ -14,92 +14,146 @@ the equation M qdd + Phi_q^T lam = Q_A + Q_v gives M_r dxdd + C_r dxd + K_r dx =
 T1 and T2 vanish at rest.
 """
 
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 
 from ..configuration.kinetic_metric import Metric
 from ..elements.bodies import transform_g
 from ..errors import SingularConfiguration
+from ..jit.interrupts import interruptible
+from ..maths.sparse_lu import interruptible_solver, sparse_lu
 from .variations import stacked
 
 
-class Reduced(NamedTuple):
-    """Of k coordinates; hats are of coordinates y = R dx with unit mass."""
+class Reduced:
+    """Of k coordinates given as `Variation`s, at a `Motion`; hats are of coordinates y = R dx with unit mass.
 
-    M: np.ndarray  # (k, k)
-    C: np.ndarray
-    K: np.ndarray
-    T: np.ndarray  # (n, k) dq = T dx
-    T1: np.ndarray  # (n, k) of dqd
-    C_hat: np.ndarray
-    K_hat: np.ndarray
-    R: np.ndarray  # (k, k) upper triangle, M = R^T R
-    scale: float  # size of the terms that K_hat is a sum of
+    Attributes
+    ----------
+    T, T1 : ndarray (n, k)
+        dq = T dx, dqd = T dxd + T1 dx.
 
+    Without the accelerations left over if `balanced`.
+    """
 
-def reduce(motion, variations):
-    """The `Reduced` equations at a `Motion`, in coordinates given as `Variation`s."""
-    from scipy.linalg import solve_triangular
+    def __init__(self, motion, variations, balanced=False):
+        n, k = motion.q.size, len(variations)
+        self._motion, self._found, self._inertial = motion, motion.derivatives, inertia_derivatives(motion)
+        Z, Zd, Zdd = stacked(variations, n)
+        solve, self._across = _solvers(motion.H, Z)
+        G1, G2 = (each[motion.kept] for each in (self._found.G1, self._found.G2))
+        self.T = T = solve(np.zeros((motion.kept.size, k)), np.eye(k))
+        self.T1 = self._T2 = None
+        self._still = not (G1.data.any() or Zd.data.any())
+        if not self._still:
+            self.T1 = solve(-(G1 @ T), -(Zd @ T))
+        if not (self._still and (balanced or motion.is_balanced)):
+            before = (0.0, 0.0) if self._still else (G1 @ self.T1, Zd @ self.T1)
+            self._T2 = solve(-(G2 @ T) - 2.0 * before[0], -(Zdd @ T) - 2.0 * before[1])
+        self._moving = self.T1, self._T2
+        self.T1 = np.zeros((n, k)) if self.T1 is None else self.T1
 
-    n, k = motion.q.size, len(variations)
-    found = motion.derivatives
-    Z, Zd, Zdd = stacked(variations, n)
-    solve = _solver(motion.H, Z)
-    G1, G2 = (each[motion.kept] for each in (found.G1, found.G2))
-    T = solve(np.zeros((motion.kept.size, k)), np.eye(k))
-    still = not (G1.data.any() or Zd.data.any())
-    T1 = np.zeros((n, k)) if still else solve(-(G1 @ T), -(Zd @ T))
-    if still and motion.is_balanced:
-        T2 = np.zeros((n, k))
-    else:
-        T2 = solve(-(G2 @ T) - 2.0 * (G1 @ T1), -(Zdd @ T) - 2.0 * (Zd @ T1))
-    K_inertia, C_inertia = inertia_derivatives(motion)
-    C_all = found.Q_qd + C_inertia
+    @cached_property
+    def M(self):
+        """(k, k)."""
+        M = self._across(self._motion.M @ self.T)
+        return 0.5 * (M + M.T)
 
-    def project(T, T1, T2):
-        moved = 0.0 if still else motion.M @ T1
-        stiffness = [motion.M @ T2 - C_all @ T1, K_inertia @ T, -(found.Q_q @ T), found.K @ T]
-        return _across(T, 2.0 * moved - C_all @ T), [_across(T, part) for part in stiffness]
+    @cached_property
+    def _C_and_K(self):
+        k = self.T.shape[1]
+        return [self._across(sum(parts)) if parts else np.zeros((k, k)) for parts in self._parts(self.T, *self._moving)]
 
-    C, parts = project(T, T1, T2)
-    R = _root(motion, T)
-    C_hat, parts_hat = project(*(solve_triangular(R, A.T, trans="T").T if A.any() else A for A in (T, T1, T2)))
-    scale = sum(float(np.linalg.norm(part)) for part in parts_hat)
-    return Reduced(R.T @ R, C, sum(parts), T, T1, C_hat, sum(parts_hat), R, scale)
+    @property
+    def C(self):
+        """(k, k)."""
+        return self._C_and_K[0]
+
+    @property
+    def K(self):
+        """(k, k)."""
+        return self._C_and_K[1]
+
+    def _parts(self, T, T1, T2):
+        """What C and K are sums of, (n, k) each, before the product with T^T; None for T1 and T2 that are zero."""
+        M, found, (K_inertia, C_inertia) = self._motion.M, self._found, self._inertial
+        C_all = found.Q_qd + C_inertia
+        damping = [] if T1 is None else [2.0 * (M @ T1)]
+        damping += [-(C_all @ T)] * bool(C_all.data.any())
+        moving = [] if T2 is None else [M @ T2]
+        moving += [] if T1 is None else [-(C_all @ T1)]
+        stiffness = [sum(moving)] if moving else []
+        parts = (1.0, K_inertia), (-1.0, found.Q_q), (1.0, found.K)
+        return damping, stiffness + [sign * (part @ T) for sign, part in parts if part.data.any()]
+
+    @cached_property
+    def R(self):
+        """R (k, k), an upper triangle, M = R^T R, by orthogonal factorisation: less is lost than by Cholesky's of M."""
+        motion, T = self._motion, self.T
+        metric, k = Metric(motion.packed), T.shape[1]
+        rows = np.zeros((metric.size, k))
+        rows[metric.move] = metric.root[:, :, None] * T[metric.r]
+        rotations = 2.0 * transform_g(motion.q[metric.p]) @ T[metric.p]
+        rows[metric.turn] = metric.fall @ rotations
+        R = interruptible(lambda: np.linalg.qr(rows, mode="r")) if k else np.zeros((0, 0))
+        if k and np.abs(np.diagonal(R)).min() == 0.0:
+            raise SingularConfiguration("linearise: a coordinate carries no inertia.")
+        return R
+
+    @cached_property
+    def _hats(self):
+        from scipy.linalg import solve_triangular
+
+        R, T = self.R, self.T
+
+        def divided(A):
+            return solve_triangular(R, A.T, trans="T").T
+
+        moving = (None if each is None else divided(each) for each in self._moving)
+        damping, stiffness = self._parts(T := divided(T), *moving)
+        damping, stiffness = ([_across(T, part) for part in parts] for parts in (damping, stiffness))
+        k = np.zeros(R.shape)
+        return sum(damping, k), sum(stiffness, k), sum(float(np.linalg.norm(part)) for part in stiffness)
+
+    @property
+    def C_hat(self):
+        """(k, k)."""
+        return self._hats[0]
+
+    @property
+    def K_hat(self):
+        """(k, k)."""
+        return self._hats[1]
+
+    @property
+    def scale(self):
+        """The size of the terms that K_hat is a sum of."""
+        return self._hats[2]
 
 
 def _across(T, part):
     """T^T part, of rows of the part that aren't zero."""
     rows = np.flatnonzero(part.any(axis=1))
-    return T[rows].T @ part[rows] if rows.size < len(T) else T.T @ part
+    return interruptible(lambda: T[rows].T @ part[rows] if rows.size < len(T) else T.T @ part)
 
 
-def _root(motion, T):
-    """R (k, k) with M = R^T R, by orthogonal factorisation: less is lost than by Cholesky's of M."""
-    metric, k = Metric(motion.packed), T.shape[1]
-    rows = np.zeros((metric.size, k))
-    rows[metric.move] = metric.root[:, :, None] * T[metric.r]
-    rotations = 2.0 * transform_g(motion.q[metric.p]) @ T[metric.p]
-    rows[metric.turn] = metric.fall @ rotations
-    R = np.linalg.qr(rows, mode="r") if k else np.zeros((0, 0))
-    if k and np.abs(np.diagonal(R)).min() == 0.0:
-        raise SingularConfiguration("linearise: a coordinate carries no inertia.")
-    return R
-
-
-def _solver(H, Z):
-    """Return solve(a, b) = x with H x = a, Z x = b."""
+def _solvers(H, Z):
+    """Return solve(a, b) = x with H x = a, Z x = b; and across(X) = T^T X, H T = 0, Z T = I, as cheap."""
     from scipy.sparse import diags_array, vstack
-    from scipy.sparse.linalg import splu
 
-    A = vstack([H, Z], format="csc")
+    A, m = vstack([H, Z], format="csc"), H.shape[0]
     weights = 1.0 / np.maximum(abs(A).max(axis=1).toarray().ravel(), np.finfo(float).tiny)
     try:
-        factors = splu((diags_array(weights) @ A).tocsc())
+        factors = sparse_lu((diags_array(weights) @ A).tocsc())
     except RuntimeError as error:
         raise SingularConfiguration("linearise: the coordinates chosen are not independent here.") from error
-    return lambda a, b: factors.solve(weights[:, None] * np.concatenate((a, b)))
+    weights = weights[:, None]
+    solve = interruptible_solver(factors)
+    return (
+        lambda a, b: solve(weights * np.concatenate((a, b))),
+        lambda X: weights[m:] * solve(X, "T")[m:],
+    )
 
 
 def inertia_derivatives(motion):

@@ -8,29 +8,24 @@ Newton's method goes to the nearest root. One that is not stable is left by the 
 potential V - Omega . J Omega / 2 (Simo, Lewis, Marsden 1991).
 """
 
-from functools import cached_property
-from types import SimpleNamespace
-
 import numpy as np
 
-from ..errors import InconsistentState, NoEquilibrium, SingularConfiguration
+from ..errors import InconsistentState, NoEquilibrium
 from ..observables.generalised_forces import velocity_forces
 from .coordinates import chosen
-from .descent import Descent, saddle
+from .descent import Descent
 from .eigen import eigenpairs
 from .motion import Motion
-from .reduction import inertia_derivatives, reduce
+from .reduction import Reduced
 from .steady import is_invariant
+from .steady_rest import SteadyRest
 from .tolerances import (
     BALANCED,
     GROWING,
-    HALVINGS,
     LEAST_SHIFT,
     MOST_NEWTON,
     MOST_SADDLES,
-    MOST_TURN,
     NEUTRAL,
-    SOFTEST,
     STEADY,
     TURNED,
 )
@@ -54,65 +49,47 @@ class SteadyMotion(Motion):
         """Those of the steady motion."""
         return self._gains
 
-    @cached_property
-    def derivatives(self):
-        """Those of a `Motion`, K being the whole stiffness and Q_q zero."""
-        found, D = super().derivatives, self.field.D
-        parameters = self._gains[self.system.bodies[self.rigid, :1] + np.arange(3, 7)]
-        levels = self.parameters(0), self.parameters(1), parameters
-        shim = SimpleNamespace(q=self.q, system=self.system, rigid=self.rigid, parameters=lambda level: levels[level])
-        K, C = inertia_derivatives(shim)
-        whole = self.M @ D @ D - (found.Q_qd + C) @ D + K - found.Q_q + found.K
-        return found._replace(K=whole.tocsr(), Q_q=0.0 * found.Q_q)
-
 
 class SteadyDescent(Descent):
     """A configuration in steady motion, moved step by step; arguments of `Descent` after the `SteadyField`."""
+
+    relative = True
 
     def __init__(self, field, *start):
         self.field = field
         super().__init__(*start)
 
-    def _at(self, q, memory):
-        return SteadyMotion(self.packed, memory, self.t, q, self.field)
+    def _at(self, q):
+        return SteadyRest(self.frame, self.memory, q, self.field)
+
+    def _motion_at(self, q):
+        return SteadyMotion(self.packed, self.memory, self.t, q, self.field)
 
     def approach(self):
         """Take Newton steps to the nearest root; True if it is reached."""
         for _ in range(MOST_NEWTON):
-            before, motion = self.unbalanced, self.motion
+            before, rest = self.unbalanced, self.rest
             if before <= BALANCED:
                 break
-            way = saddle(motion)(SOFTEST * motion.stiffness, motion.M @ motion.qdd)
-            if way is None:
+            u = rest.quadratic.factors(0.0, 0.0).newton(rest.left)
+            if u is None:
                 break
             self.steps += 1
-            shift, turn = self._extent(way)
-            factor = min(1.0, self.longest / max(shift, LEAST_SHIFT), MOST_TURN / max(turn, LEAST_SHIFT))
-            if not any(self._nearer(factor * 0.5**i * way, before) for i in range(HALVINGS)):
+            if not self.approach_by(u):
                 break
         return self.unbalanced <= TURNED
-
-    def _nearer(self, way, before):
-        """Move if less is unbalanced there."""
-        old, q = self.motion, self._moved(way)
-        if q is None:
-            return False
-        try:
-            self.motion = self._at(q, self.memory)
-        except SingularConfiguration:
-            return False
-        if self.unbalanced < before:
-            self._remember()
-            return True
-        self.motion = old
-        return False
 
 
 def find_steady(descent):
     """The findings of a relative equilibrium, the descent being moved there."""
     unstable = None
     for _ in range(MOST_SADDLES):
-        if not (descent.approach() or (descent.settle() and descent.approach())):
+        start = descent.rest, descent.memory.copy(), descent.angles.copy()
+        found = descent.approach()
+        if not found:  # Newton's steps have gone astray
+            descent.rest, descent.memory, descent.angles = start
+            found = descent.settle() and descent.approach()
+        if not found:
             if unstable is None:
                 _refuse(descent)
             break
@@ -120,11 +97,11 @@ def find_steady(descent):
         if way is None:
             return findings
         if unstable is None or not findings[0]:
-            unstable = findings, descent.motion, descent.memory.copy(), descent.angles.copy()
+            unstable = findings, descent.rest, descent.memory.copy(), descent.angles.copy()
         descent.kick(way)
         if not descent.settle():
             break
-    findings, descent.motion, descent.memory, descent.angles = unstable
+    findings, descent.rest, descent.memory, descent.angles = unstable
     return findings
 
 
@@ -142,7 +119,7 @@ def _stability(descent):
         )
     if not motion.freedom:
         return True, float("nan"), 0, None
-    reduced = reduce(motion, chosen(motion, Variations(motion, field.spin)))
+    reduced = Reduced(motion, chosen(motion, Variations(motion, field.spin)))
     w = np.linalg.eigvalsh(0.5 * (reduced.K_hat + reduced.K_hat.T))
     neutral = int((np.linalg.svd(reduced.K_hat, compute_uv=False) <= NEUTRAL * reduced.scale).sum())
     pairs = eigenpairs(reduced)
@@ -166,9 +143,8 @@ def demand_admitted(scene, rates, qd):
 
 
 def _refuse(descent):
-    motion = descent.motion
-    gains = np.linalg.norm(motion.translations(2), axis=1)
-    body = motion.packed.bodies[int(gains.argmax())]
+    gains = np.linalg.norm(descent.rest.gains[0], axis=1)
+    body = descent.packed.bodies[int(gains.argmax())]
     raise NoEquilibrium(
         f"no steady motion with this spin was found in {descent.steps} steps: {body.name} accelerates by "
         f"{gains.max():.3g} m/s^2 still in the turning axes. Start nearer, with guess=, or change the rate."

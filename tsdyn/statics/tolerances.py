@@ -23,6 +23,9 @@ HELD = 1e-13
 # Share of the largest pivot of constraints and coordinates, unit rows, above which the coordinates are independent.
 CLEAR = 1e-6
 
+# Candidates that are looked at together: their dense products cost what a sparse factorisation does.
+BATCH = 64
+
 # --- steady motion ---
 # Share of the largest accelerations, speeds and constraint values up to which a motion counts as steady or at rest:
 # states of steady motion may be typed, or come from runs with tolerances.
@@ -55,28 +58,64 @@ NO_EFFECT = 1e-12
 # --- equilibria ---
 # Share of the loads' own accelerations that counts as balanced: rounding of sums of a few loads. Steps end there.
 BALANCED = 1e-14
+# The same of what the stiffness leaves out.
+SETTLED = 1e-12
 # The same at the end of all steps; also of constraints, relative to 1 + max |q|.
 TURNED = 1e-9
 # Share of the scene's size, rad: a step that is shorter changes nothing.
 LEAST_STEP = 1e-15
 LEAST_SHIFT = 1e-300
+# Weight of a shift by the scene's size against a turn by a radian, among what takes up loads: forces are passed on by
+# chains of up to the inverse root of it in links.
+MASSLESS = 1e-8
+# Refinements of what is solved with it, which lose half of the digits at first.
+REFINEMENTS = 2
+# Share of the stiffness of a body above which a sign is certain, and the softness of rows of unit length: factors
+# without exchange of rows round by 1e-16 over the latter.
+CLEARLY, SOFTENED = 1e-7, 1e-8
 # rad, of a step: angles are counted by the nearest turn, and the trapezoidal rule holds.
 MOST_TURN = 0.5
-# Factors of mu after a step that is taken, and after one that isn't; its least share of the stiffness.
-SOFTER, STIFFER, SOFTEST = 0.1, 6.0, 1e-10
+# Factors of mu after a step that is taken, and after one that isn't; where it begins, its least; D doesn't suffice
+# above the last.
+SOFTER, STIFFER, FIRST_MU, LEAST_MU, STIFF = 0.25, 5.0, 1e-2, 1e-9, 60.0
+# Factor of a step that does too little work.
+SHORTER = 0.3
+# Share of the largest stiffness of a body, or of all, below which it has none of its own.
+NOTHING = 1e-12
+# Share of the loads that stands for a stiffness, where there is none: steps are as long as they may be.
+SLIDING = 1e-6
+# Share of the stiffness of a body that a direction without stiffness has.
+SOFTEST = 1e-10
+# Share of the work promised that a step must do; share of what is unbalanced that a short one may leave.
+WORTH, GOOD = 0.1, 0.9
+# Steps one after the other that leave more than half of what is nearly nothing: it is rounding.
+IN_VAIN = 3
+# rad, or shares of the scene's size: the work of shorter steps is rounding, and steps that fail though they are shorter
+# than the second are the last.
+SHORT, FINAL = 1e-4, 1e-9
+# A step is this many times longer than may be before mu grows; tries of a step.
+TOO_FAR, MOST_TRIES = 4.0, 20
 # Steps at most, and the way in sizes of the scene: what is farther falls.
 MOST_STEPS, FARTHEST = 400, 1e5
 # rad, of all steps: what has turned farther is driven round.
 MOST_TURNED = 60.0
-# Constraints after a step, relative to 1 + max |q|: sums round several times. Sweeps that stall above the second are
-# left to Gauss-Newton steps; a sweep that leaves more than the third, a share, stalls.
-CLOSED, NEARLY_CLOSED, SLOWEST, MOST_SWEEPS = 1e-15, 1e-13, 0.7, 40
+# Constraints after a step, relative to 1 + max |q|: sums round several times. A sweep that leaves more than the second,
+# a share, stalls.
+CLOSED, SLOWEST, MOST_SWEEPS = 1e-15, 0.7, 40
 # ... and above this the step is too long.
 STALLED = 1e-6
 # rad, or shares of the scene's size: ways off a saddle, tried in turn.
 KICKS = 0.1, 0.03, 0.01
 # Share of the terms of the stiffness below which a direction is neutral, and asymmetry that is no rounding.
 NEUTRAL = 1e-10
+# Share of the loads' own accelerations up to which a configuration without positive stiffness is close to a saddle;
+# sweeps of inverse iteration to a direction down from there.
+AT_SADDLE, SWEEPS = 1e-3, 8
+# Increments up to which all eigenvectors are looked at; negative eigenvalues up to which these alone are; shares of the
+# stiffness tried until it is positive.
+SMALL, FEW_NEGATIVE, SHIFTS = 150, 6, (1e-4, 1e-2, 1.0, 10.0)
+# Share of the stiffness below which a direction without load is neutral.
+SOFT = 1e-5
 # Saddles left at most.
 MOST_SADDLES = 12
 # Share of the largest eigenvalue up to which a real part of a circulatory system is rounding: the root of rounding.

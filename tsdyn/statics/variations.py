@@ -80,13 +80,19 @@ class Variations:
     def of_body(self, body):
         """Of the displacement of the centroid and, of a rigid body, of its rotation."""
         found = self.point(body, np.zeros(3), body.name)
-        if body.dimension == 7:
-            columns = self._place(body)[0] + np.arange(3, 7)
-            rows = 2.0 * product(self.axes, transform_e(self._parameters(body)), "ij,jk->ik")
-            found += [
-                Variation(f"{body.name}.rotation {axis}", columns, rows[:, i], False) for i, axis in enumerate("xyz")
-            ]
-        return found
+        return found + self.rotations([body] if body.dimension == 7 else [])
+
+    def rotations(self, bodies):
+        """Of the rotations of some rigid bodies, all at once."""
+        if not bodies:
+            return []
+        rows = 2.0 * product(self.axes, transform_e(self._all_parameters(bodies)), "ij,bjk->bik")
+        columns = [self._place(body)[0] + np.arange(3, 7) for body in bodies]
+        return [
+            Variation(f"{body.name}.rotation {axis}", columns[k], rows[:, k, i], False)
+            for k, body in enumerate(bodies)
+            for i, axis in enumerate("xyz")
+        ]
 
     def point(self, body, s, title):
         """Of the displacement of a point s of a body."""

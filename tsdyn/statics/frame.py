@@ -1,0 +1,134 @@
+"""What doesn't change while a configuration at rest is moved: kinds of rows, bodies of each part, sparsity."""
+
+import numpy as np
+
+from ..configuration.continuation import close
+from ..configuration.kinetic_metric import Metric
+from ..elements.markers import POINT
+from ..formulations.dependent_rows import dependent_rows
+from ..maths.row_rank import dependent
+from ..model.sparse_jacobian import WIDTH, places, with_short_rows
+from ..sparse.constraint_graph import REDUCED
+from ..sparse.constraint_graphs import graph_of, redundant_rows
+from .increments import Increments
+from .pairwise import Pairs
+from .pattern import Pattern
+from .tolerances import DENSE, MASSLESS, REDUNDANT_SHARE, TURNED
+
+
+class Frame:
+    """Of a packed scene at time t, s; reach is a length of it, m.
+
+    Attributes
+    ----------
+    own : ndarray (m',)
+        Rows of Phi but normalisations; normals : (b',) those.
+    parts : ndarray (e,)
+        The `Pairs` that aren't normalisations.
+    rows, blocks, saddle, light : Pattern
+        Of A (m', size), of sums of blocks (e, 12, 12) and (b, 6, 6), and of [[K, A^T], [A, diagonal]], the last with a
+        diagonal K.
+    """
+
+    def __init__(self, packed, t, q):
+        self.packed, self.t, self.metric = packed, t, Metric(packed, None, t)
+        self.reach = self.metric.reach(q)
+        self.system, self.pairs = with_short_rows(packed), Pairs(packed)
+        self.increments = Increments(self.metric, self.reach)
+        kinds = np.array([part.normalises for part in packed.constraints], bool)
+        self.own = self.metric.own
+        rows = np.repeat(kinds, [part.rows for part in packed.constraints])
+        self.normals = np.flatnonzero(rows)
+        at, length = places(packed)
+        self._by_rows = self.increments.bodies_at(at[self.own], length[self.own])
+        self.normal_bodies = self.increments.bodies_at(at[self.normals, 0], length[self.normals, 0])
+        self.parts = np.flatnonzero(~np.concatenate((kinds, np.zeros(self.pairs.counts[1], bool))))
+        self.constraints = int((~kinds).sum())
+        half = WIDTH // 2
+        lengths = self.pairs.used.reshape(-1, 2, half).sum(axis=2)[self.parts]
+        self.by_parts = self.increments.bodies_at(self.pairs.columns[self.parts][:, ::half], lengths)
+        self.no_pairs = np.zeros((len(self.parts), 12, 12))
+        self._make_patterns()
+        self.weights = self._weights()
+        self._known = graph_of(packed, REDUCED).row[redundant_rows(packed)]
+
+    def _make_patterns(self):
+        each, m, size = self.increments, self.own.size, self.increments.size
+        columns = each.columns_of(self.by_parts)
+        pairs = Pattern.of_blocks(columns, columns, (size, size))
+        self.blocks = Pattern.of_parts([(pairs, 0, 0), (each.own, 0, 0)], (size, size))
+        self._pairs = pairs
+        self.rows = Pattern.of_blocks(np.arange(m)[:, None], each.columns_of(self._by_rows), (m, size))
+        turned = Pattern(self.rows.columns, self.rows.rows, (size, m))
+        below = Pattern(np.arange(m), np.arange(m), (m, m))
+        whole = size + m, size + m
+        self._across, self._turned = self.rows, turned
+        order = [(self.blocks, 0, 0), (self.rows, size, 0), (turned, 0, size), (below, size, size)]
+        self.saddle = Pattern.of_parts(order, whole)
+        diagonal = Pattern(np.arange(size), np.arange(size), (size, size))
+        self.light = Pattern.of_parts([(diagonal, 0, 0), *order[1:]], whole)
+
+    def _weights(self):
+        """G of rest.py: the pattern of its saddle-point matrix, its numbers, their places, and its diagonal (size,)."""
+        shifts, size = self.increments.translates, self.increments.size
+        diagonal, rods = np.where(shifts, MASSLESS, 1.0), self._rods()
+        if not rods.size:
+            return self.light, diagonal, (np.arange(size), np.arange(size)), diagonal
+        pairs, own = self.no_pairs.copy(), np.zeros((len(self.metric.at), 6, 6))
+        for i, j, sign in ((0, 0, 1.0), (6, 6, 1.0), (0, 6, -1.0), (6, 0, -1.0)):
+            pairs[rods, i : i + 3, j : j + 3] = sign * np.eye(3)
+        own[:, range(6), range(6)] = np.repeat([[MASSLESS, 1.0]], 3, axis=1)
+        top = self.stiffness(pairs, own)
+        return self.saddle, top, (self.blocks.rows, self.blocks.columns), self.blocks.matrix(top).diagonal()
+
+    def _rods(self):
+        """Which parts hold two points at a distance; they turn by the difference of shifts."""
+        kept = [self.packed.constraints[i] for i in self.parts[: self.constraints]]
+        return np.flatnonzero([part.rows == 1 and all(m.code == POINT for m in part.markers) for part in kept])
+
+    def stiffness(self, pairs, own):
+        """Numbers of the sum of blocks of pairs (e, 12, 12) and of bodies (b, 6, 6), for `blocks`."""
+        return self.blocks.sum(np.concatenate((self._pairs.sum(pairs), self.increments.own.sum(own))))
+
+    def matrix(self, pattern, top, A, below):
+        """[[top, A^T], [A, below]] by `saddle` or `light`; A are numbers for `rows`."""
+        return pattern.matrix(pattern.sum(np.concatenate((top, A, self._turned.sum(A), below))))
+
+    def transformed_rows(self, P, rows):
+        """Numbers for `rows` of rows (m', 14)."""
+        halves = rows.reshape(-1, 2, 1, WIDTH // 2) @ P[self._by_rows]
+        return self.rows.sum(halves.reshape(-1, 12))
+
+    def falling(self):
+        """Numbers of the bodies of a part that gravity acts on and nothing joins to the ground; none without gravity.
+
+        Constraints and forces of one body join it to the ground.
+        """
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        count, (i, j) = len(self.metric.at), self.by_parts.T
+        if not np.any(self.system.gravity):
+            return np.zeros(0, int)
+        graph = coo_array((np.ones(len(i)), (i, j)), (count + 1, count + 1))
+        parts = connected_components(graph, directed=False)[1]
+        loose = np.flatnonzero(parts[:-1] != parts[-1])
+        return loose[parts[loose] == parts[loose[0]]] if loose.size else loose
+
+    def closed(self, q):
+        """The consistent configuration next to q by Gauss-Newton steps; None where there is none."""
+        q, Phi, _ = close(self.metric, q)
+        return q if np.abs(Phi).max(initial=0.0) <= TURNED * (1.0 + np.abs(q).max()) else None
+
+    def left_out(self, A, q):
+        """Which of the own rows are redundant at q, bool (m',); A are numbers for `rows`."""
+        found = np.zeros(self.own.size, bool)
+        if not self._known.size:
+            return found
+        if self.metric.n <= DENSE:
+            which = self.own[dependent(self.rows.matrix(A).toarray())]
+        else:
+            which = dependent_rows(self.packed, q, self.t, REDUNDANT_SHARE)
+        which = self._known if which is None or which.size != self._known.size else which
+        found[np.searchsorted(self.own, which)] = True
+        return found

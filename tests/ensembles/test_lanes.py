@@ -161,8 +161,8 @@ def redundant():
 
 
 REFUSED = {
-    "lanes must be one of 1, 4, 8, got 3": (spring, {"lanes": 3}),
-    "lanes must be one of 1, 4, 8, got True": (spring, {"lanes": True}),
+    "lanes must be one of 1, 4, got 3": (spring, {"lanes": 3}),
+    "lanes must be one of 1, 4, got True": (spring, {"lanes": True}),
     "the method is DOP853": (spring, {"integrator": "dop853"}),
     "a fixed step": (spring, {"integrator": ts.integrators.Taylor(step=0.01)}),
     "events can't be served": (spring, {"events": lambda t, state: 1.0}),

@@ -70,10 +70,9 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
     threads : int, optional
         Threads of this process. By default one where all cases together are short, else one a processor. The bits are
         the same.
-    lanes : 1, 4 or 8, optional
-        Cases that one thread runs at once, each in a lane of SIMD registers: four fit those of AVX2, eight those of
-        AVX-512. They agree with runs alone to the tolerance. For Taylor's method; what it can't serve is refused by
-        name. By default 1.
+    lanes : 1 or 4, optional
+        Cases that one thread runs at once, each in a lane of SIMD registers: four fit those of AVX2. They agree with
+        runs alone to the tolerance. For Taylor's method; what lanes can't serve is refused by name. By default 1.
     store : str or PathLike, optional
         Stream the results to a file, in constant memory; by its suffix Zarr (.zarr) or HDF5 (.h5, .hdf5, .nc).
     resume : bool

@@ -11,7 +11,7 @@
 
 Numba vectorises loops, and none of ours is long enough. Used with lengths of four throughout, so it is safe.
 
-Arrays of lanes (lanes.py) have the same operations: each of their numbers is that of several cases, in a register.
+Arrays of lanes (lanes.py) have the same operations: each of their numbers is that of several cases.
 """
 
 import numpy as np
@@ -123,7 +123,7 @@ def spread(builder, value, width=_WIDTH):
 @intrinsic
 def splat(typing, value):
     """(value, value, value, value)."""
-    kind = _fours(value)
+    kind = _fours(number_type(value))
 
     def generate(context, builder, signature, arguments):
         return spread(builder, arguments[0]) if kind is FOUR else joined(builder, arguments * kind.count)

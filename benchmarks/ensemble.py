@@ -1,7 +1,8 @@
 """Cases a second of `ts.ensemble`: efficiency of threads, and what a case costs beside the compiled loop.
 
 Each case has another mass. Rounds of one thread, two threads and a loop over `simulate` are interleaved; medians. The
-overhead is the processor's time of one more case in one thread, less that in the compiled loop over cases.
+overhead is the processor's time of one more case in one thread, less that in the compiled loop over cases. "4 lanes" is
+the ratio of cases a second of four lanes to one, of rounds that are interleaved, in the processor's time.
 
 Run it: python -m benchmarks.ensemble
 """
@@ -48,6 +49,16 @@ def overhead(scene, span, count):
     return (outside[1] - outside[0]) / (5 * count)
 
 
+def gain(scene, span, values):
+    """How many times the cases a second four lanes run, in one thread."""
+    spent = []
+    for lanes in (1, 4):
+        began = time.process_time()
+        ts.ensemble(scene, values, span, threads=1, lanes=lanes)
+        spent.append(time.process_time() - began)
+    return spent[0] / spent[1]
+
+
 def looped(scene, values, span):
     """The same by a loop over `simulate`."""
     for i in range(LOOPED):
@@ -59,12 +70,14 @@ def measure(name, end, count, rounds):
     scene, span = SCENES[name].build(), (0.0, end)
     values = table(scene, count)
     calls = {threads: lambda threads=threads: ts.ensemble(scene, values, span, threads=threads) for threads in (1, 2)}
-    found = {1: [], 2: [], "loop": [], "overhead": []}
+    found = {1: [], 2: [], "loop": [], "overhead": [], "lanes": []}
     calls[1]()
+    gain(scene, span, values)
     for _ in range(rounds):
         for threads, call in calls.items():
             found[threads].append(seconds(call, count))
         found["loop"].append(seconds(lambda: looped(scene, values, span), LOOPED))
+        found["lanes"].append(gain(scene, span, values))
         found["overhead"].append(overhead(scene, (0.0, SPANS[name][0]), count))
     return {key: median(times) for key, times in found.items()}
 
@@ -75,7 +88,7 @@ def main():
     parser.add_argument("--cases", type=int, default=CASES)
     parser.add_argument("--rounds", type=int, default=ROUNDS)
     given = parser.parse_args()
-    columns = ("cases/s", "us a case", "2 threads", "efficiency", "loop", "overhead")
+    columns = ("cases/s", "us a case", "2 threads", "efficiency", "loop", "overhead", "4 lanes")
     print(f"{'scene, s':26}" + "".join(f"{column:>11}" for column in columns))
     for name, ends in SPANS.items():
         for end in ends:
@@ -83,7 +96,7 @@ def main():
             found = measure(name, end, count, given.rounds)
             one, two = found[1], found[2]
             times = f"{1e6 * one:11.0f}{1e6 * two:11.0f}{one / two / 2:11.0%}{1e6 * found['loop']:11.0f}"
-            print(f"{f'{name}, {end:g}':26}{1 / one:11.0f}{times}{1e6 * found['overhead']:11.1f}")
+            print(f"{f'{name}, {end:g}':26}{1 / one:11.0f}{times}{1e6 * found['overhead']:11.1f}{found['lanes']:11.2f}")
 
 
 if __name__ == "__main__":

@@ -39,6 +39,7 @@ from .elements.user_functions import (
 )
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
+from .jit.questions import some
 from .maths import vectors
 from .maths.angles import angle_about, angle_near, angle_series
 from .maths.recurrences import (
@@ -184,6 +185,7 @@ __all__ = [
     "sine_cosine",
     "slip",
     "slip_series",
+    "some",
     "specialised",
     "square",
     "stack",

@@ -318,7 +318,7 @@ WRONG = {
     "keep must be": {"keep": "last"},
     "give them": {"keep": "t_eval"},
     "threads must be": {"threads": 0},
-    "one case at a time so far": {"lanes": 4},
+    "lanes must be one of": {"lanes": 2},
     "ensemble\\(\\) has no argument rtool": {"rtool": 1.0},
     "rtol must be": {"rtol": -1.0},
     "has no argument checkpoint": {"checkpoint": 1.0},

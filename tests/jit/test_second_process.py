@@ -217,3 +217,22 @@ report(program=run_program._address is not None, loaded=loaded)
     found, _ = run(code, {})
     assert not found["program"]
     assert not {"driven_series", "far_driven_series", "remember", "drift", "phi_t"} & set(found["loaded"])
+
+
+@pytest.mark.slow
+def test_a_second_process_compiles_nothing_for_lanes(warm):
+    code = (
+        REPORT
+        + """
+import tsdyn as ts
+scene = ts.Scene(gravity=(0, 0, -10))
+rod = scene.add_body(1.0, (0.1, 0.1, 0.05), position=(0.5, 0, 0), name="rod")
+scene.add(ts.constraints.Spherical(scene.ground, rod, point_b=(-0.5, 0, 0)))
+found = ts.ensemble(scene, {"rod.mass": [1.0, 2.0, 3.0, 4.0, 5.0]}, (0, 0.1), lanes=4)
+report(q=found.q.tolist())
+"""
+    )
+    first, environment = warm(code)
+    second, errors = run(code, environment)
+    assert (second["misses"], second["q"]) == (0, first["q"])
+    assert "compiling" not in errors

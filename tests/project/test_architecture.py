@@ -43,6 +43,7 @@ ORDER = [
     "viewer",
     "runs",
     "taylor",
+    "lanes",
     "configuration",
     "statics",
     "inverse",

@@ -136,7 +136,7 @@ class Arena:
             self._chunk = chunk
             self.pen.take(chunk.values, len(chunk.status))
             if self._batch is not None:
-                self._batch.enter(chunk.arrays, chunk.status)
+                self._batch.enter(chunk)
         return True
 
     def run_case(self, chunk, k, scene):
@@ -153,9 +153,15 @@ class Arena:
             self.kept.packed = self.scene.packed = self.packed._replace(size=size)
             start = start[0].copy(), start[1].copy()  # of another size, if of the same numbers
         ran = self._run(start, scene, size is not None)
-        if self._batch is None and ran is not None and isinstance(ran[1], Finished) and Batch.serves(self):
-            self._batch = Batch(self, ran[0], self._slice)
-            self._batch.enter(chunk.arrays, chunk.status)
+        if self._batch is None and ran is not None and Batch.serves(self):
+            if self.study.lanes > 1 and self._slice is not None:
+                from .lane_batch import LaneBatch
+
+                self._batch = LaneBatch(self, ran[0], self._slice, self.study.lanes)
+            elif isinstance(ran[1], Finished):
+                self._batch = Batch(self, ran[0], self._slice)
+            if self._batch is not None:
+                self._batch.enter(chunk)
         return ran
 
     def run_packed(self, packed, start, scene):

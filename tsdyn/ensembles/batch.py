@@ -55,8 +55,9 @@ class Batch:
         moved = still(packed).bodies.size or packed.system.memory.size or not arena.kept.handles.begin_at_zero
         return not (pen.moves and (moved or state is not None))
 
-    def enter(self, arrays, status):
+    def enter(self, chunk):
         """Take the chunk that the arena's pen has laid out, and arrays for its results."""
+        arrays, status = chunk.arrays, chunk.status
         pen, study = self._arena.pen, self._arena.study
         fits, packed = pen.fits, self._arena.packed
         if pen.moves:
@@ -73,20 +74,32 @@ class Batch:
         """Run cases of the chunk from k on; the first that was not."""
         if self._long * FEW_LONG > self._cases > TRIED:  # longer ones hardly notice Python
             return k
-        kept, task = self._arena.kept, self._task
-        engine, places = kept.engine(SeriesEngine, task.method, task.form, task.within), self._arena.pen.places()
-        memory = kept.take(engine.kind)
-        if memory is None or not engine.serves(memory):
+        memory = self._take()
+        if memory is None:
             return k
-        if memory is not self._memory or places is not self._places:
-            self._lay_out(memory, engine, places)
         reached = run_cases(*memory.where, self._plan, self._at, k, end)
         numbers = self._numbers
         self._cases += reached - k + numbers.ran
         self._long += numbers.ran and numbers.status == SLICE_DONE
         if not (numbers.ran and numbers.status == NOT_FINITE):  # NaN may be left
-            kept.give(engine.kind, memory)
+            self._give(memory)
         return reached
+
+    def _take(self):
+        """The memory of runs, laid out for this batch; None where there is none that serves."""
+        kept, task = self._arena.kept, self._task
+        engine, places = kept.engine(SeriesEngine, task.method, task.form, task.within), self._arena.pen.places()
+        memory = kept.take(engine.kind)
+        if memory is None or not engine.serves(memory):
+            return None
+        if memory is not self._memory or places is not self._places:
+            self._lay_out(memory, engine, places)
+        self._kind = engine.kind
+        return memory
+
+    def _give(self, memory):
+        """Let others use the memory."""
+        self._arena.kept.give(self._kind, memory)
 
     def _lay_out(self, memory, engine, places):
         memory.enter(engine, self._task, False)

@@ -69,7 +69,7 @@ load_plan, load_chunk = map(loader, _example())
 
 
 @kernel
-def _enter(plan, chunk, k):
+def enter_case(plan, chunk, k):
     """Memory as a run finds it, with the numbers of case k."""
     for i in range(plan.images.shape[0]):
         address, source, count = plan.images[i]
@@ -89,7 +89,7 @@ def _enter(plan, chunk, k):
 
 
 @kernel
-def _take_start(plan, chunk, k, c, r):
+def take_start(plan, chunk, k, c, r):
     """The start of case k, made consistent; False if that is left to Python."""
     n, start, given = plan.numbers, plan.start, chunk.starts[min(k, chunk.starts.shape[0] - 1)]
     if n.take_start == 0:
@@ -135,8 +135,8 @@ def run_cases(context, run, where, chunk_at, first, end):
     for k in range(first, end):
         if chunk.stopped[0] != 0 or chunk.fits[k] == 0:
             return k
-        _enter(plan, chunk, k)
-        if not _take_start(plan, chunk, k, c, r):
+        enter_case(plan, chunk, k)
+        if not take_start(plan, chunk, k, c, r):
             return k
         status = advance_by_series(context, c, r, plan.log, numbers.most)
         if status != SUCCESS or r.numbers.near_steps != 0:

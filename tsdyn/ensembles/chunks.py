@@ -38,7 +38,7 @@ def run_chunk(runner, first, count, offset=0):
     status, arrays = np.full(count, NOT_RUN), empty(study, count)
     interrupted, k = False, 0
     try:
-        room = runner.room(first, status, arrays)
+        room = runner.room(first, status, arrays, messages)
         while (k := runner.run_many(room, k)) < count:
             if study.stopped:
                 raise KeyboardInterrupt
@@ -46,14 +46,15 @@ def run_chunk(runner, first, count, offset=0):
             said = _enter(arrays, k, record.arrays)
             message = said or record.message
             if message is not PLAIN:
-                messages[offset + first + k] = message
+                messages[k] = message
             status[k] = record.status if said is None else Status.CASE_FAILED
             k += 1
     except KeyboardInterrupt:
         interrupted = True
     done = int(np.argmax(status == NOT_RUN)) if (status == NOT_RUN).any() else count
     parts = {name: array[:done] for name, array in arrays.items()}
-    return Chunk(offset + first, status[:done], messages, parts), interrupted
+    said = {offset + first + k: message for k, message in messages.items()}
+    return Chunk(offset + first, status[:done], said, parts), interrupted
 
 
 def _enter(arrays, k, found):

@@ -46,8 +46,8 @@ def _runners_of(digest):
 
 
 def _study(payload, cases):
-    scene, given, keep, free = pickle.loads(payload)
-    return Study(scene, cases, given, keep, free)
+    scene, given, keep, free, lanes = pickle.loads(payload)
+    return Study(scene, cases, given, keep, free, lanes)
 
 
 def run_executor(study, sink, executor, report):
@@ -103,14 +103,14 @@ class _Sender:
 
     def __init__(self, study, sink, pool, workers, is_dask):
         self.study, self.sink, self.pool, self.most = study, sink, pool, AHEAD * workers
-        self.queue, self.pending, self.again = Queue(sink.first, study.cases.count, SENT_SECONDS), {}, []
+        self.queue, self.pending, self.again = Queue(sink.first, study.cases.count, SENT_SECONDS, study.lanes), {}, []
         self.tries, self.dump = {}, None
         if isinstance(pool, ThreadPoolExecutor):
             self.sent = study
         else:
             self.dump = _pickler(is_dask)
             given = {**study.given, "scene": None}
-            payload = self.dump((study.scene, given, study.keep, study.free))
+            payload = self.dump((study.scene, given, study.keep, study.free, study.lanes))
             self.sent = hashlib.sha256(payload).hexdigest(), payload
 
     def run(self, report):

@@ -43,7 +43,7 @@ class Ensemble:
     parameters : dict
         The table of parameters, name -> (cases, ...).
     lanes : int
-        Cases at once in one thread: 1.
+        Cases that ran at once in one thread.
     threads : int
         Threads of this process that ran the cases; 0 with an executor.
     interrupted : bool
@@ -64,7 +64,7 @@ class Ensemble:
 
     def __init__(self, study: Any, results: Any, threads: int, interrupted: bool) -> None:
         self._study, self._results = study, results
-        self.threads, self.interrupted, self.lanes = threads, bool(interrupted), 1
+        self.threads, self.interrupted, self.lanes = threads, bool(interrupted), getattr(study, "lanes", 1)
 
     def __len__(self) -> int:
         return self._study.cases.count
@@ -218,7 +218,7 @@ class Ensemble:
         return int(i) % len(self)
 
     def case(self, i: int) -> Solution:
-        """Run a case again and return its Solution, of the bits of the ensemble.
+        """Run a case again, alone, and return its Solution: of the bits of the ensemble, but for one in lanes.
 
         Raises
         ------

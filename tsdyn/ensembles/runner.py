@@ -40,6 +40,8 @@ class Study:
     keep : str or callable
     free : sequence of str, optional
         Names of the bodies by which each start is made consistent; None takes starts as they are.
+    lanes : int
+        Cases that run at once in a thread.
 
     Raises
     ------
@@ -47,9 +49,9 @@ class Study:
         As `simulate` does for its options.
     """
 
-    def __init__(self, scene, cases, given, keep, free=None):
+    def __init__(self, scene, cases, given, keep, free=None, lanes=1):
         self.scene, self.cases, self.keep, self.given = scene, cases, keep, {**given, "progress": None}
-        self.free = free
+        self.free, self.lanes = free, lanes
         self.options = options = checked(self.given)
         demand_keep(keep, options.times)
         self.family, self.changes = family_of(scene)
@@ -74,7 +76,7 @@ class Study:
 
     def __reduce__(self):
         """What is analysed is analysed again in another process."""
-        return Study, (self.scene, self.cases, self.given, self.keep, self.free)
+        return Study, (self.scene, self.cases, self.given, self.keep, self.free, self.lanes)
 
     def twin(self, cases):
         """The same for some of the cases."""
@@ -99,6 +101,7 @@ class Room(NamedTuple):
     values: dict  # name -> (k, ...); None where arenas take none
     status: np.ndarray
     arrays: dict
+    messages: dict  # by the number in the chunk
 
 
 class Runner:
@@ -107,7 +110,7 @@ class Runner:
     def __init__(self, study):
         self.study, self._arenas = study, []
 
-    def room(self, first, status, arrays):
+    def room(self, first, status, arrays, messages):
         """The `Room` of the cases from `first` on."""
         study, values = self.study, None
         if study.has_arena and study.names is not None and study.free is None:
@@ -115,7 +118,7 @@ class Runner:
             values = {name: _repeated(value, len(status)) for name, value in given.items()}
             part = slice(first, first + len(status))
             values |= {name: column[part] for name, column in study.cases.columns.items()}
-        return Room(first, values, status, arrays)
+        return Room(first, values, status, arrays, messages)
 
     def run_many(self, room, k):
         """Run cases from k on that need no Python; the first that was not run."""

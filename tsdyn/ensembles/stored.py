@@ -265,7 +265,7 @@ def digest_of(study):
     digest.update(
         repr((sorted(plain.items()), sources_of(functions), study.keep if not callable(study.keep) else "")).encode()
     )
-    digest.update(study.options.times.tobytes())
+    digest.update(study.options.times.tobytes() + (f"{study.lanes} lanes".encode() if study.lanes > 1 else b""))
     digest.update(b"" if study.free is None else repr(study.free).encode())
     state = given["state"]
     digest.update(b"" if state is None else np.asarray(state.q).tobytes() + np.asarray(state.qd).tobytes())

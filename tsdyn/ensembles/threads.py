@@ -10,10 +10,11 @@ from .tolerances import ALONE_SECONDS, CHUNK_SECONDS, GROWTH, LOOK, MOST_CASES
 
 
 class Queue:
-    """Cases that wait, handed out in chunks that take about so many seconds."""
+    """Cases that wait, handed out in chunks that take about so many seconds, multiples of `least` cases."""
 
-    def __init__(self, first, end, seconds=CHUNK_SECONDS):
-        self.next, self.end, self.seconds, self.size, self._lock = first, end, seconds, 1, threading.Lock()
+    def __init__(self, first, end, seconds=CHUNK_SECONDS, least=1):
+        self.next, self.end, self.seconds, self.least, self._lock = first, end, seconds, least, threading.Lock()
+        self.size = least
 
     def take(self):
         """(first, count) of a chunk; None at the end."""
@@ -25,7 +26,8 @@ class Queue:
     def timed(self, count, seconds):
         """Adapt the size of the next chunks to the time that one has taken."""
         wanted = count * self.seconds / max(seconds, 1e-9)
-        self.size = max(1, min(int(wanted), GROWTH * count, MOST_CASES))
+        wanted = min(int(wanted), GROWTH * count, MOST_CASES)
+        self.size = max(wanted // self.least, 1) * self.least
 
 
 def processors():
@@ -39,7 +41,7 @@ def run_threads(study, sink, threads, report):
     None: this thread alone where all cases together are short, else as many as there are processors. `report(cases)` is
     told of progress. Ctrl-C ends it: whether it did.
     """
-    queue = Queue(sink.first, study.cases.count)
+    queue = Queue(sink.first, study.cases.count, least=study.lanes)
     runner, began = Runner(study), time.perf_counter()
     while threads is None:  # the first case makes what all have in common
         pair = queue.take()

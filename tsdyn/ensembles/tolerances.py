@@ -24,5 +24,7 @@ FLUSH = 1.0
 ARENAS = 8
 # studies whose runners a worker keeps
 STUDIES = 4
+# cases that one thread may run at once
+LANES = 1, 4
 # cases after which it is asked whether they are long; the loop of cases runs them if fewer than one in FEW_LONG are
 TRIED, FEW_LONG = 16, 8

@@ -28,6 +28,7 @@ from ..plugins import (
     not_negative,
     product,
     scaled,
+    some,
     square,
 )
 
@@ -47,7 +48,7 @@ def spread(x, k, s):
 @kernel
 def pull(xd, par, k, s, out):
     """The law, from what is in row 5 without damping."""
-    if par[1] != 0.0:
+    if some(par[1]):
         for i in range(3):
             s[6 + i, k] = xd[i] - xd[3 + i]
         s[9, k] = dot(s, 0, 6, k)

@@ -39,7 +39,7 @@ def _literal(value):
     return value.literal_value
 
 
-def _stacker(kind, cell):
+def make_stacker(kind, cell):
     """Make the kernels of vectors and matrices of some kind of number on the stack; their content is undefined."""
 
     @intrinsic(prefer_literal=True)
@@ -69,11 +69,13 @@ def _stacker(kind, cell):
 
 
 # stack(n) is a vector of n floats on the stack, stack2(n, m) a matrix; n and m are constants
-stack, stack2 = _stacker(types.float64, _f64)
-complex_stack, complex_stack2 = _stacker(types.complex128, ir.LiteralStructType([_f64, _f64]))
+stack, stack2 = make_stacker(types.float64, _f64)
+complex_stack, complex_stack2 = make_stacker(types.complex128, ir.LiteralStructType([_f64, _f64]))
 
 
-def _viewer(kind):
+def make_viewer(kind):
+    """Make the kernel that views memory as an array of some kind."""
+
     @intrinsic
     def view(typing, address, *shape):
         def generate(context, builder, signature, arguments):
@@ -86,10 +88,10 @@ def _viewer(kind):
     return view
 
 
-vector = _viewer(_vector)
-matrix = _viewer(_matrix)
-integers = _viewer(_integers)
-complex_vector = _viewer(_complex)
+vector = make_viewer(_vector)
+matrix = make_viewer(_matrix)
+integers = make_viewer(_integers)
+complex_vector = make_viewer(_complex)
 
 
 @intrinsic

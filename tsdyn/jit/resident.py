@@ -29,6 +29,7 @@ from .arrays import array_over
 from .compiled import DEBUG
 
 _i64, _f64 = ir.IntType(64), ir.DoubleType()
+known_types = {}  # dtype: Numba's type of a number, where Numba knows none of itself
 _NUMBERS = {float: (ctypes.c_double, types.float64), int: (ctypes.c_int64, types.int64)}
 
 
@@ -155,7 +156,7 @@ def _word(builder, words, i):
 
 @cache
 def _array_type(dtype, dimensions):
-    return types.Array(numba.from_dtype(dtype), dimensions, "C")
+    return types.Array(known_types.get(dtype) or numba.from_dtype(dtype), dimensions, "C")
 
 
 def _type_of(value):

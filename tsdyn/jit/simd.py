@@ -10,6 +10,8 @@
     fetch(array, i, n)                                        have array[i : i + n] brought into the cache
 
 Numba vectorises loops, and none of ours is long enough. Used with lengths of four throughout, so it is safe.
+
+Arrays of lanes (lanes.py) have the same operations: each of their numbers is that of several cases.
 """
 
 import numpy as np
@@ -38,69 +40,122 @@ class _FourModel(models.PrimitiveModel):
         super().__init__(manager, kind, _quad)
 
 
+def _fours(*kinds):
+    """The type of four of these numbers, or of what the operation on these takes: FOUR, or that of their lanes."""
+    found = [four for kind in kinds if (four := getattr(kind, "four", None)) is not None]
+    return min(found, key=lambda four: four.count, default=FOUR)
+
+
+def number_type(*kinds):
+    """The type of one of four."""
+    return getattr(_fours(*kinds), "lane", types.float64)
+
+
+def _each(builder, kind, operation, values):
+    """What the operation on vectors makes of four numbers: of one register, or of the registers of lanes."""
+    if kind is FOUR:
+        return operation(*values)
+    parts = [operation(*(builder.extract_value(value, i) for value in values)) for i in range(kind.count)]
+    return joined(builder, parts)
+
+
+def joined(builder, parts):
+    """Numbers of lanes from the register of each."""
+    result = ir.Constant(ir.ArrayType(parts[0].type, len(parts)), ir.Undefined)
+    for i, part in enumerate(parts):
+        result = builder.insert_value(result, part, i)
+    return result
+
+
+def _parts(builder, kind, value):
+    """Each of four, or of three."""
+    if kind is FOUR:
+        return [builder.extract_element(value, _i32(i)) for i in range(_WIDTH)]
+    return [builder.extract_value(value, i) for i in range(kind.count)]
+
+
 def _pointer(context, builder, kind, array, index):
     data = context.make_array(kind)(context, builder, value=array).data
-    return builder.bitcast(builder.gep(data, [index]), _quad.as_pointer())
+    place = builder.gep(data, [index])
+    return builder.bitcast(place, _quad.as_pointer()) if _fours(kind.dtype) is FOUR else place
 
 
 @intrinsic
 def four(typing, array, index):
     """The floats array[index : index + 4]; array is one-dimensional and contiguous."""
+    kind = _fours(array.dtype)
 
     def generate(context, builder, signature, arguments):
         pointer = _pointer(context, builder, signature.args[0], *arguments)
-        return builder.load(pointer, align=8)
+        if kind is FOUR:
+            return builder.load(pointer, align=8)
+        return joined(builder, [builder.load(builder.gep(pointer, [_i32(i)])) for i in range(kind.count)])
 
-    return FOUR(array, types.int64), generate
+    return kind(array, types.int64), generate
 
 
 @intrinsic
 def put(typing, array, index, value):
     """array[index : index + 4] = value."""
+    kind = _fours(array.dtype, value)
 
     def generate(context, builder, signature, arguments):
         pointer = _pointer(context, builder, signature.args[0], *arguments[:2])
-        builder.store(arguments[2], pointer, align=8)
+        if kind is FOUR:
+            builder.store(arguments[2], pointer, align=8)
+        else:
+            for i, part in enumerate(_parts(builder, kind, arguments[2])):
+                builder.store(part, builder.gep(pointer, [_i32(i)]))
         return context.get_dummy_value()
 
-    return types.none(array, types.int64, FOUR), generate
+    return types.none(array, types.int64, kind), generate
 
 
-def _spread(builder, value):
-    one = builder.insert_element(ir.Constant(_quad, ir.Undefined), value, _i32(0))
-    return builder.shuffle_vector(one, ir.Constant(_quad, ir.Undefined), ir.Constant(ir.VectorType(_i32, 4), [0] * 4))
+def spread(builder, value, width=_WIDTH):
+    """A register of so many times the value."""
+    kind = ir.VectorType(_f64, width)
+    one = builder.insert_element(ir.Constant(kind, ir.Undefined), value, _i32(0))
+    return builder.shuffle_vector(
+        one, ir.Constant(kind, ir.Undefined), ir.Constant(ir.VectorType(_i32, width), [0] * width)
+    )
 
 
 @intrinsic
 def splat(typing, value):
     """(value, value, value, value)."""
+    kind = _fours(number_type(value))
 
     def generate(context, builder, signature, arguments):
-        return _spread(builder, arguments[0])
+        return spread(builder, arguments[0]) if kind is FOUR else joined(builder, arguments * kind.count)
 
-    return FOUR(types.float64), generate
+    return kind(number_type(value)), generate
 
 
 @intrinsic
 def lanes(typing, a, b, c):
     """(a, b, c, 0)."""
+    kind, number = getattr(_fours(a, b, c), "three", FOUR), number_type(a, b, c)
 
     def generate(context, builder, signature, arguments):
+        if kind is not FOUR:
+            return joined(builder, arguments)
         result = ir.Constant(_quad, [0.0] * 4)
         for i, value in enumerate(arguments):
             result = builder.insert_element(result, value, _i32(i))
         return result
 
-    return FOUR(types.float64, types.float64, types.float64), generate
+    return kind(number, number, number), generate
 
 
 def _binary(name, what):
     @intrinsic
     def operation(typing, f, g):
-        def generate(context, builder, signature, arguments):
-            return getattr(builder, name)(*arguments)
+        kind = _fours(f, g)
 
-        return FOUR(FOUR, FOUR), generate
+        def generate(context, builder, signature, arguments):
+            return _each(builder, kind, getattr(builder, name), arguments)
+
+        return kind(kind, kind), generate
 
     operation.__doc__ = what
     return operation
@@ -112,34 +167,57 @@ add, sub, times = _binary("fadd", "f + g."), _binary("fsub", "f - g."), _binary(
 @intrinsic
 def fma(typing, f, g, h):
     """F g + h."""
+    kind = _fours(f, g, h)
 
     def generate(context, builder, signature, arguments):
-        product = builder.fmul(arguments[0], arguments[1], flags=("contract",))
-        return builder.fadd(product, arguments[2], flags=("contract",))
+        def sum_up(f, g, h):
+            return builder.fadd(builder.fmul(f, g, flags=("contract",)), h, flags=("contract",))
 
-    return FOUR(FOUR, FOUR, FOUR), generate
+        return _each(builder, kind, sum_up, arguments)
+
+    return kind(kind, kind, kind), generate
+
+
+@intrinsic
+def less(typing, f, g, h):
+    """H - f g."""
+    kind = _fours(f, g, h)
+
+    def generate(context, builder, signature, arguments):
+        def subtract(f, g, h):
+            return builder.fsub(h, builder.fmul(f, g, flags=("contract",)), flags=("contract",))
+
+        return _each(builder, kind, subtract, arguments)
+
+    return kind(kind, kind, kind), generate
 
 
 @intrinsic
 def larger(typing, f, g):
     """The larger of |f| and g, one by one."""
+    kind = _fours(f, g)
 
     def generate(context, builder, signature, arguments):
-        bits = ir.VectorType(ir.IntType(64), _WIDTH)
-        all_but_sign = ir.Constant(bits, [(1 << 63) - 1] * _WIDTH)
-        size = builder.bitcast(builder.and_(builder.bitcast(arguments[0], bits), all_but_sign), _quad)
-        return builder.select(builder.fcmp_unordered(">", size, arguments[1]), size, arguments[1])
+        def choose(f, g):
+            bits = ir.VectorType(ir.IntType(64), f.type.count)
+            all_but_sign = ir.Constant(bits, [(1 << 63) - 1] * f.type.count)
+            size = builder.bitcast(builder.and_(builder.bitcast(f, bits), all_but_sign), f.type)
+            return builder.select(builder.fcmp_unordered(">", size, g), size, g)
 
-    return FOUR(FOUR, FOUR), generate
+        return _each(builder, kind, choose, arguments)
+
+    return kind(kind, kind), generate
 
 
 def _extract(place, what):
     @intrinsic
     def operation(typing, f):
-        def generate(context, builder, signature, arguments):
-            return builder.extract_element(arguments[0], _i32(place))
+        kind = _fours(f)
 
-        return types.float64(FOUR), generate
+        def generate(context, builder, signature, arguments):
+            return _parts(builder, kind, arguments[0])[place]
+
+        return number_type(f)(kind), generate
 
     operation.__doc__ = what
     return operation
@@ -151,27 +229,35 @@ first, second, third, fourth = (_extract(i, f"Float {i + 1} of four.") for i in 
 @intrinsic
 def total(typing, f):
     """The sum of the four."""
+    kind = _fours(f)
 
     def generate(context, builder, signature, arguments):
-        a, b, c, d = (builder.extract_element(arguments[0], _i32(i)) for i in range(4))
-        return builder.fadd(builder.fadd(a, c), builder.fadd(b, d))
+        a, b, c, *d = _parts(builder, kind, arguments[0])
+        return builder.fadd(builder.fadd(a, c), builder.fadd(b, d[0]) if d else b)
 
-    return types.float64(FOUR), generate
+    return number_type(f)(kind), generate
 
 
 @intrinsic
 def cross(typing, f, g):
     """F x g of the first three; the fourth is g[3] f[3] - f[3] g[3] = 0 for finite ones."""
+    kind = getattr(_fours(f, g), "three", FOUR)
+
+    def turned(builder, value):
+        places = ir.Constant(ir.VectorType(_i32, 4), [1, 2, 0, 3])
+        return builder.shuffle_vector(value, ir.Constant(_quad, ir.Undefined), places)
 
     def generate(context, builder, signature, arguments):
-        def turned(value):
-            places = ir.Constant(ir.VectorType(_i32, 4), [1, 2, 0, 3])
-            return builder.shuffle_vector(value, ir.Constant(_quad, ir.Undefined), places)
-
         a, b = arguments
-        return turned(builder.fsub(builder.fmul(a, turned(b)), builder.fmul(turned(a), b)))
+        if kind is FOUR:
+            twice = turned(builder, b), turned(builder, a)
+            return turned(builder, builder.fsub(builder.fmul(a, twice[0]), builder.fmul(twice[1], b)))
+        a, b, parts = _parts(builder, kind, a), _parts(builder, kind, b), []
+        for i, j in ((1, 2), (2, 0), (0, 1)):
+            parts.append(builder.fsub(builder.fmul(a[i], b[j]), builder.fmul(a[j], b[i])))
+        return joined(builder, parts)
 
-    return FOUR(FOUR, FOUR), generate
+    return kind(kind, kind), generate
 
 
 @intrinsic
@@ -182,7 +268,7 @@ def get(typing, array, index):
         data = context.make_array(signature.args[0])(context, builder, value=arguments[0]).data
         return builder.load(builder.gep(data, [arguments[1]]))
 
-    return array.dtype(array, types.int64), generate
+    return getattr(array.dtype, "lane", array.dtype)(array, types.int64), generate
 
 
 @intrinsic

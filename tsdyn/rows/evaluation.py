@@ -31,12 +31,18 @@ def clear_welds(graph, out):
 
 
 @kernel
-def _evaluate(graph, reals, f, rows, t):
-    """f.b = Phi and H of every row that is not dropped."""
+def evaluate_without_redundant(graph, reals, f, rows, t):
+    """As `evaluate_rows`, where no row is redundant; reals being System.reals."""
     for i in range(graph.kinds.shape[0]):
         kind = graph.kinds[i]
         _run_loop(graph, reals, f, t, kind, kind.reduced, f.b, rows.H)
     _clear_other_rows(graph, f.b)
+
+
+@kernel
+def _evaluate(graph, reals, f, rows, t):
+    """f.b = Phi and H of every row that is not dropped."""
+    evaluate_without_redundant(graph, reals, f, rows, t)
     if f.dropped[0] > 0:
         leave_redundant_rows(graph, f, f.b, rows.H)
 

@@ -14,6 +14,7 @@ import math
 
 from ..elements.loops.body_poses import POSE, R
 from ..jit.kernels import kernel
+from ..jit.questions import most
 from .redundant_rows import length, square
 from .singularity import is_near_singular
 from .tolerances import FAINT, HELD, NO_RATE, RESTING
@@ -66,7 +67,7 @@ def note_loads(f):
     push = twist = 0.0  # squares
     for i in range(0, f.Z.size, 8):
         push, twist = max(push, square(f.Z, i)), max(twist, square(f.Z, i + 4))
-    f.selection.push, f.selection.twist = math.sqrt(push), math.sqrt(twist)
+    f.selection.push, f.selection.twist = math.sqrt(most(push)), math.sqrt(most(twist))
 
 
 @kernel

@@ -32,7 +32,14 @@ Right-hand sides and multipliers are in the order of the graph; `ConstraintGraph
 
 from .axis_rows import add_axis_multipliers, is_axis
 from .chart_matrix import factorise_chart_matrix, factorise_product, pivot_loss, rotate_rate, solve_product
-from .evaluation import evaluate_bias, evaluate_drift, evaluate_every_row, evaluate_residuals, evaluate_rows
+from .evaluation import (
+    evaluate_bias,
+    evaluate_drift,
+    evaluate_every_row,
+    evaluate_residuals,
+    evaluate_rows,
+    evaluate_without_redundant,
+)
 from .held_rows import accelerations_hold, has_redundant_rows, note_loads, rates_hold, redundant_rows_hold
 from .redundant_rows import (
     clear_redundant,
@@ -94,10 +101,11 @@ from .singularity import (
     refinements,
     singularity_indicator,
 )
-from .tolerances import MOST_ROWS
+from .tolerances import ILL_CONDITIONED, MOST_ROWS
 
 __all__ = [
     "DYNAMICS",
+    "ILL_CONDITIONED",
     "METRIC",
     "MOST_ROWS",
     "Rows",
@@ -119,6 +127,7 @@ __all__ = [
     "evaluate_every_row",
     "evaluate_residuals",
     "evaluate_rows",
+    "evaluate_without_redundant",
     "factorise_chart_matrix",
     "factorise_complex_saddle",
     "factorise_product",

@@ -8,6 +8,7 @@ that failed, or -1. `kept` holds the diagonal before elimination; its sign is th
 import math
 
 from ..jit.kernels import kernel
+from ..jit.questions import serves
 from ..jit.simd import get, let
 
 
@@ -15,7 +16,7 @@ from ..jit.simd import get, let
 def eliminate(u, size, width, n, kept, limit):
     """Eliminate up to three rows of a panel, n columns from the diagonal on; which of them fails, or -1."""
     u00 = u[0]
-    if not limit * kept[0] * kept[0] < u00 * kept[0] < math.inf:
+    if not serves(kept[0], u00, limit):
         return 0
     d0 = 1.0 / u00
     u[0] = d0
@@ -25,7 +26,7 @@ def eliminate(u, size, width, n, kept, limit):
     u01 = u[1]
     f01 = u01 * d0
     u11 = v[1] - f01 * u01
-    if not limit * kept[1] * kept[1] < u11 * kept[1] < math.inf:
+    if not serves(kept[1], u11, limit):
         return 1
     d1 = 1.0 / u11
     v[1] = d1
@@ -40,7 +41,7 @@ def eliminate(u, size, width, n, kept, limit):
     v[2] = u12
     f12 = u12 * d1
     u22 = w[2] - f02 * u02 - f12 * u12
-    if not limit * kept[2] * kept[2] < u22 * kept[2] < math.inf:
+    if not serves(kept[2], u22, limit):
         return 2
     w[2] = 1.0 / u22
     u, v, w = u[3:], v[3:], w[3:]
@@ -113,17 +114,17 @@ def link(values, u, target, stride, kept, limit):
     v, w, p, q = u + 6, u + 12, target + stride, target + 2 * stride
     k0, k1, k2 = get(values, kept), get(values, kept + 1), get(values, kept + 2)
     u00, u01, u02 = get(values, u), get(values, u + 1), get(values, u + 2)
-    if not limit * k0 * k0 < u00 * k0 < math.inf:
+    if not serves(k0, u00, limit):
         return 0
     d0 = 1.0 / u00
     f01, f02 = u01 * d0, u02 * d0
     u11, u12 = get(values, v + 1) - f01 * u01, get(values, v + 2) - f01 * u02
-    if not limit * k1 * k1 < u11 * k1 < math.inf:
+    if not serves(k1, u11, limit):
         return 1
     d1 = 1.0 / u11
     f12 = u12 * d1
     u22 = get(values, w + 2) - f02 * u02 - f12 * u12
-    if not limit * k2 * k2 < u22 * k2 < math.inf:
+    if not serves(k2, u22, limit):
         return 2
     d2 = 1.0 / u22
     _store_pivots(values, u, d0, d1, u12, d2)

@@ -9,6 +9,7 @@ diagonal block is read. The diagonal before elimination is stored after the pane
 """
 
 from ..jit.kernels import kernel
+from ..jit.questions import or_one
 from ..jit.simd import get, let
 from .block_operations import eliminate, eliminate_lu, link, link_lu, subtract_products
 
@@ -24,8 +25,7 @@ def keep_diagonal(pattern, values):
             kept[first + k] = abs(values[head + k * step])
     for i in range(pattern.negative.size):
         row = pattern.negative[i]
-        size = abs(kept[row])
-        kept[row] = -size if size > 0.0 else -1.0
+        kept[row] = -or_one(abs(kept[row]))
 
 
 @kernel

@@ -11,12 +11,13 @@ from .tolerances import FAR_PASSING, LEAST_ORDER, PASSING, STEP_COST, STIFF_RATE
 
 
 @kernel
-def _most(f):
+def largest_of_three(f):
+    """The largest of the first three."""
     return max(first(f), max(second(f), third(f)))
 
 
 @kernel
-def _size(bodies, nb, orders, k, far, fast):
+def size_of_order(bodies, nb, orders, k, far, fast):
     """The largest coefficient k of A and of r over far, and k - 1 of omega' over fast."""
     turn, shift, spin = splat(0.0), splat(0.0), splat(0.0)
     for b in range(nb):
@@ -25,7 +26,7 @@ def _size(bodies, nb, orders, k, far, fast):
             turn = larger(four(bodies, i), turn)
         shift = larger(four(bodies, at + S_R * orders + 4 * k), shift)
         spin = larger(four(bodies, at + S_OMEGA * orders + 4 * (k - 1)), spin)
-    return max(_most(turn), max(_most(shift) * far, _most(spin) * fast))
+    return max(largest_of_three(turn), max(largest_of_three(shift) * far, largest_of_three(spin) * fast))
 
 
 @kernel
@@ -36,7 +37,7 @@ def radius(bodies, nb, orders, top, far, fast):
     """
     rho = math.inf
     for k in range(top + 1, max(top - 3, 1), -1):
-        size = _size(bodies, nb, orders, k, far, fast)
+        size = size_of_order(bodies, nb, orders, k, far, fast)
         if not size < math.inf:
             return 0.0
         if size > 0.0:
@@ -54,10 +55,10 @@ def weights(c, r):
         at = b * orders * BODY_ROW
         far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
         speed = larger(four(x.bodies, at + S_R * orders + 4), speed)
-    far, fast = _most(far), _most(fast)
+    far, fast = largest_of_three(far), largest_of_three(fast)
     c.work.control.floor = ROUNDING * (c.work.control.size + far)
     tol = atol + rtol
-    return tol / (atol + rtol * far), tol / (atol + rtol * fast), 1.0 + max(fast, _most(speed))
+    return tol / (atol + rtol * far), tol / (atol + rtol * fast), 1.0 + max(fast, largest_of_three(speed))
 
 
 @kernel

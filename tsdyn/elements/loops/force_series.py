@@ -22,6 +22,7 @@ Of friction in proportion to a normal load, see friction_series.py.
 """
 
 from ...jit.kernels import ANY, data_of, integers, kernel, matrix, part, stack, vector
+from ...jit.questions import some, whole
 from ...jit.simd import add, cross, fma, four, lanes, put, splat, times
 from ...motions.state_program import LENGTH, ROWS, T, call_order
 from ..markers import PARAMETERS, POINT, TURN
@@ -166,11 +167,11 @@ def series(run, k, orders, count, stride, size, table, reals, bodies, values, po
             at, forces = own[OWNERS[j]] * body_size, first + (MARKERS + j) * wide
             ends = first + own_scratch + rows * orders + j
             wider = CODES[j] == PARAMETERS
-            some = f[c] != 0.0 or f[c + 1] != 0.0 or f[c + 2] != 0.0 or (wider and f[c + 3] != 0.0)
-            if some or RUBS or k == 0:
-                values[ends] = float(k) if some or RUBS else -1.0
+            acts = some(f[c]) or some(f[c + 1]) or some(f[c + 2]) or (wider and some(f[c + 3]))
+            if acts or RUBS or k == 0:
+                values[ends] = float(k) if acts or RUBS else -1.0
             put(values, forces + 4 * k, four(f, c) if wider else lanes(f[c], f[c + 1], f[c + 2]))
-            last = int(values[ends])
+            last = whole(values[ends])
             if last < 0:
                 continue
             if wider:

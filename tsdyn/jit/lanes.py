@@ -1,0 +1,244 @@
+"""Lanes: a number of several cases in one register, and arrays of such numbers, on which kernels run unchanged.
+
+A kernel that is given arrays of lanes is compiled for them: its source is that of one case. What it compares or
+branches on must be the same in all lanes, so numbers of lanes can't be compared.
+
+    lane_type(width)     of a number of so many cases        zeros(count, width)     an array of them, zero
+    makers(width)        stack, vector, matrix, ... of them by the names of what they stand for in arrays.py
+"""
+
+import hashlib
+import math
+import operator
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.imputils import lower_builtin, lower_cast
+from numba.core.typeconv import Conversion
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import models, register_model
+
+from . import aligned_arrays
+from .arrays import make_stacker, make_viewer
+from .resident import known_types
+from .simd import FOUR, joined, spread
+
+_f64 = ir.DoubleType()
+# by which kernels in the cache tell the lowering of lanes, that no function names
+_DIGEST = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
+WIDTHS = 4, 8  # lanes that there are types for
+
+
+class Lane(types.Type):
+    """A number of several cases; `threes`: in arrays of which no more than three of four numbers are used."""
+
+    def __init__(self, width, threes=False):
+        self.width, self.bitwidth, self.threes = width, 64 * width, threes
+        super().__init__(name=f"Lane({width}{', threes' * threes}) {_DIGEST}")
+        self.lane = lane_type(width) if threes else self
+        self.four = FourLanes(self.lane, 3 if threes else 4)
+
+    def can_convert_from(self, typing, other):
+        """Plain numbers are the same in all lanes."""
+        if isinstance(other, Lane):
+            return Conversion.exact
+        return Conversion.safe if isinstance(other, (types.Integer, types.Float)) else None
+
+    def unify(self, typing, other):
+        """A variable that is a plain number and one of lanes is one of lanes."""
+        return self.lane if isinstance(other, (types.Integer, types.Float, Lane)) else None
+
+
+class FourLanes(types.Type):
+    """Four numbers of lanes, or the first three of four."""
+
+    def __init__(self, lane, count):
+        self.lane, self.count, self.four = lane, count, self
+        super().__init__(name=f"FourLanes({lane.width}, {count})")
+
+    @property
+    def three(self):
+        """The type of three."""
+        return FourLanes(self.lane, 3)
+
+    def can_convert_from(self, typing, other):
+        """Four plain numbers are the same in all lanes; a fourth may be left out."""
+        if isinstance(other, FourLanes):
+            return Conversion.safe if other.count > self.count else None
+        return Conversion.safe if other is FOUR else None
+
+    def unify(self, typing, other):
+        """As of `Lane`."""
+        return self if other is FOUR or (isinstance(other, FourLanes) and other.count > self.count) else None
+
+
+@register_model(Lane)
+class _LaneModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, ir.VectorType(_f64, kind.width))
+
+
+@register_model(FourLanes)
+class _FourLanesModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, ir.ArrayType(ir.VectorType(_f64, kind.lane.width), kind.count))
+
+
+@cache
+def lane_type(width, threes=False):
+    """The type of a number of so many cases."""
+    return Lane(width, threes)
+
+
+def _dtype(width, threes):
+    return np.dtype([("threes" if threes else "lanes", np.float64, (width,))])
+
+
+known_types.update({_dtype(width, threes): lane_type(width, threes) for width in WIDTHS for threes in (False, True)})
+
+
+def zeros(count, width, threes=False):
+    """So many numbers of lanes, zero: `values_of` them is (count, width)."""
+    return aligned_arrays.zeros(count * width).view(_dtype(width, threes))
+
+
+def is_laned(array):
+    """Whether it is an array of lanes."""
+    return array.dtype in known_types
+
+
+def values_of(array):
+    """The numbers of an array of lanes as (count, width) floats."""
+    return array[array.dtype.names[0]]
+
+
+@cache
+def makers(width, threes=True):
+    """What makes arrays in kernels, for numbers of lanes: by the names of arrays.py."""
+    kind, cell = lane_type(width, threes), ir.VectorType(_f64, width)
+    stack, stack2 = make_stacker(kind, cell)
+    vector, matrix = (make_viewer(types.Array(kind, n, "C")) for n in (1, 2))
+    return {"stack": stack, "stack2": stack2, "vector": vector, "matrix": matrix}
+
+
+@lower_cast(Lane, Lane)
+def _keep(context, builder, given, kind, value):
+    return value
+
+
+@lower_cast(FourLanes, FourLanes)
+def _leave_fourth(context, builder, given, kind, value):
+    return joined(builder, [builder.extract_value(value, i) for i in range(kind.count)])
+
+
+@lower_cast(types.Integer, Lane)
+@lower_cast(types.Float, Lane)
+def _spread_number(context, builder, given, kind, value):
+    return spread(builder, context.cast(builder, value, given, types.float64), kind.width)
+
+
+@lower_cast(type(FOUR), FourLanes)
+def _spread_four(context, builder, given, kind, value):
+    ones = [builder.extract_element(value, ir.Constant(ir.IntType(32), i)) for i in range(kind.count)]
+    return joined(builder, [spread(builder, one, kind.lane.width) for one in ones])
+
+
+def _typed(function, count):
+    """Let the function take so many numbers, at least one of them of lanes."""
+
+    class Template(AbstractTemplate):
+        def generic(self, arguments, keywords):
+            kind = next((each for each in arguments if isinstance(each, Lane)), None)
+            plain = (Lane, types.Integer, types.Float)
+            if kind is None or keywords or len(arguments) != count or not all(isinstance(a, plain) for a in arguments):
+                return None
+            return signature(kind.lane, *[kind.lane] * count)
+
+    infer_global(function)(Template)
+
+
+def _operation(name, *functions):
+    def generate(context, builder, signature, arguments):
+        return getattr(builder, name)(*arguments)
+
+    for function in functions:
+        _typed(function, 2)
+        lower_builtin(function, Lane, Lane)(generate)
+
+
+_operation("fadd", operator.add, operator.iadd)
+_operation("fsub", operator.sub, operator.isub)
+_operation("fmul", operator.mul, operator.imul)
+_operation("fdiv", operator.truediv, operator.itruediv)
+
+
+def of_register(builder, name, *values):
+    """A function that LLVM has for registers, of these."""
+    kind = values[0].type
+    wanted = ir.FunctionType(kind, [kind] * len(values))
+    return builder.call(cgutils.get_or_insert_function(builder.module, wanted, f"llvm.{name}.v{kind.count}f64"), values)
+
+
+def _of_registers(name, count, *functions):
+    def generate(context, builder, signature, arguments):
+        return of_register(builder, name, *arguments)
+
+    for function in functions:
+        _typed(function, count)
+        lower_builtin(function, *[Lane] * count)(generate)
+
+
+_of_registers("sqrt", 1, math.sqrt, np.sqrt)
+_of_registers("fabs", 1, abs, np.abs)
+
+
+def _larger(sign):
+    def generate(context, builder, signature, arguments):
+        a, b = arguments
+        return builder.select(builder.fcmp_ordered(sign, b, a), b, a)
+
+    return generate
+
+
+for _function, _sign in ((max, ">"), (min, "<")):
+    _typed(_function, 2)
+    lower_builtin(_function, Lane, Lane)(_larger(_sign))
+
+
+def _negate(context, builder, signature, arguments):
+    return builder.fneg(arguments[0])
+
+
+_typed(operator.neg, 1)
+lower_builtin(operator.neg, Lane)(_negate)
+
+
+def _one_by_one(function, count, *same):
+    """Functions that are called for each lane."""
+
+    def generate(context, builder, signature, arguments):
+        typing = context.typing_context
+        known = typing.resolve_value_type(function)
+        called = context.get_function(known, typing.resolve_function_type(known, (types.float64,) * count, {}))
+        result = ir.Constant(arguments[0].type, ir.Undefined)
+        for i in range(signature.return_type.width):
+            at = ir.Constant(ir.IntType(32), i)
+            one = called(builder, [builder.extract_element(a, at) for a in arguments])
+            result = builder.insert_element(result, one, at)
+        return result
+
+    for name in (function, *same):
+        _typed(name, count)
+        lower_builtin(name, *[Lane] * count)(generate)
+
+
+_one_by_one(math.sin, 1, np.sin)
+_one_by_one(math.cos, 1, np.cos)
+_one_by_one(math.exp, 1, np.exp)
+_one_by_one(math.log, 1, np.log)
+_one_by_one(math.atan2, 2, np.arctan2)
+_one_by_one(operator.pow, 2)

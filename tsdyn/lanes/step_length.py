@@ -1,0 +1,69 @@
+"""Length and order of each lane's next step, as taylor/step_length.py has them for one case.
+
+Logarithms to base 2 throughout: the radius of convergence is the least of -log2(size_k) / k over the last orders k.
+"""
+
+import math
+
+from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
+from ..formulations.chart_validity import ROUNDING
+from ..jit.kernels import kernel, long_kernel
+from ..jit.lane_masks import below, binary_log, binary_power, both, choose
+from ..jit.simd import four, get, larger, let, splat
+from ..taylor.step_length import largest_of_three, size_of_order
+from ..taylor.tolerances import STEP_COST, STIFF_RATES
+from .context import FLOOR, NEXT, SIZE, STEPS, TOP, H
+from .tolerances import LEAST_SIZE, NO_STEP
+
+
+@kernel
+def weights(c):
+    """Set the floors of Phi; weights of the coefficients of r and of omega', and 1 + the largest rate, of each lane."""
+    x, nb, orders, n = c.expansion, c.graph.bodies.shape[0], c.expansion.order.room, c.numbers
+    far, fast, speed = splat(0.0), splat(0.0), splat(0.0)
+    for b in range(nb):
+        at = b * orders * BODY_ROW
+        far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
+        speed = larger(four(x.bodies, at + S_R * orders + 4), speed)
+    far, fast, tol = largest_of_three(far), largest_of_three(fast), n.atol + n.rtol
+    let(c.state, FLOOR, ROUNDING * (get(c.state, SIZE) + far))
+    rate = 1.0 + max(fast, largest_of_three(speed))
+    return tol / (n.atol + n.rtol * far), tol / (n.atol + n.rtol * fast), rate
+
+
+@kernel
+def _radii(c, least, most, far, fast):
+    """log2 of the radius of convergence as the coefficients up to top + 1 have it, and up to top - 1."""
+    x, nb, top = c.expansion, c.graph.bodies.shape[0], get(c.state, TOP)
+    rho, lower, finite = 0.0 * top + math.inf, 0.0 * top + math.inf, 0.0 * top + 1.0
+    for k in range(most + 1, max(least - 4, 2) - 1, -1):
+        size = size_of_order(x.bodies, nb, x.order.room, k, far, fast)
+        own = below(k - 1.5, top)
+        finite = choose(both(own, below(-1.0, 0.0 * size)), finite, choose(own, 0.0, finite))
+        here = choose(below(LEAST_SIZE, size), binary_log(max(size, LEAST_SIZE)) * (-1.0 / k), math.inf)
+        rho = choose(both(own, below(top - 2.5, k)), min(rho, here), rho)
+        above = both(below(k - 0.5, top - 1.0), below(top - 4.5, k))
+        lower = choose(above, min(lower, here), lower)
+    return choose(below(0.5, finite), rho, -math.inf), lower
+
+
+@long_kernel
+def propose(c, least, most):
+    """Set H and NEXT of each lane; least and most are the least and the highest TOP."""
+    n, s, top, order = c.numbers, c.state, get(c.state, TOP), c.expansion.order
+    far, fast, rate = weights(c)
+    rho, lower = _radii(c, least, most, far, fast)
+    accuracy = math.log(n.atol + n.rtol) / math.log(2.0)
+    h = rho + accuracy / (top + 2.0)
+    share = binary_log(STIFF_RATES * rate / (top + 2.0)) + h
+    h = binary_power(choose(below(share, 0.0), h + share / (top + 2.0), h))
+    h = choose(below(-math.inf, rho), h, NO_STEP)
+    if order.highest > order.lowest:
+        other = binary_power(lower + accuracy / top)
+        rises = below(other * (top + STEP_COST), h * (top + (STEP_COST - 2.0)))
+        step = choose(rises, 1.0, -1.0 + 0.0 * top)
+        let(s, NEXT, min(max(top + step, float(order.lowest)), float(order.highest)))
+    h = min(h, n.max_step)
+    if n.first_step > 0.0:
+        h = choose(below(get(s, STEPS), 0.5), min(h, n.first_step), h)
+    let(s, H, h)

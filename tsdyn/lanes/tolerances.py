@@ -1,0 +1,8 @@
+"""Thresholds of lanes."""
+
+# Size of a coefficient, over its weight, that counts as zero: it says nothing of the radius of convergence.
+LEAST_SIZE = 1e-300
+# s: the length of a step for which there is no radius of convergence; no run gets on by it.
+NO_STEP = 0.0
+# Times that a step which has missed the manifold is halved before its case is left to be run alone.
+HALVINGS = 4

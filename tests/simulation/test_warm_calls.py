@@ -47,7 +47,7 @@ def calls_of(call):
     return count, found
 
 
-@pytest.mark.slow_for("sdirk54")
+@pytest.mark.slow_for("*sdirk54*")
 @pytest.mark.parametrize("options", WAYS.values(), ids=WAYS)
 @pytest.mark.parametrize("make", [top.build, door.build], ids=["top", "door"])
 def test_a_warm_call_makes_few_calls(make, options):

@@ -97,11 +97,9 @@ def long_kernel(function):
 def twin(function):
     """Return the plain Python function of a kernel, calling the plain functions of the kernels that it calls."""
     function = getattr(function, "py_func", function)
-    inner = {
-        name: twin(value)
-        for name in function.__code__.co_names
-        if hasattr(value := function.__globals__.get(name), "py_func")
-    }
+    known = {name: function.__globals__.get(name) for name in function.__code__.co_names}
+    inner = {name: twin(value) for name, value in known.items() if hasattr(value, "py_func")}
+    inner |= {name: value.plain for name, value in known.items() if hasattr(value, "plain")}
     if not inner:
         return function
     return type(function)(

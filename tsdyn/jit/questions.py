@@ -52,6 +52,9 @@ def some(typing, x):
     return types.boolean(number), generate
 
 
+some.plain = bool  # for the plain Python function of a kernel that asks: `twin`
+
+
 @intrinsic
 def or_one(typing, x):
     """X where it is above zero, else one."""

@@ -4,23 +4,12 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.helpers.rods_on_a_spring import two_rods_on_a_spring as chain
 from tsdyn.ensembles import batch, first_slice, runner
 
 RNG = np.random.default_rng(11)
 SPAN = (0.0, 0.05)
 CASES = 24
-
-
-def chain():
-    """Two rods, the first on a spring."""
-    scene, last = ts.Scene(gravity=(0, 0, -10)), None
-    for i in range(2):
-        rod = scene.add_body(1.0, (0.1, 0.1, 0.05), position=(i + 0.5, 0, 0), name=f"rod {i}")
-        ends = {"point_a": (0.5, 0, 0) if last else (0, 0, 0), "point_b": (-0.5, 0, 0)}
-        scene.add(ts.constraints.Spherical(last or scene.ground, rod, **ends, name=f"joint {i}"))
-        last = rod
-    scene.add(ts.forces.Spring(scene.bodies[0], scene.ground, stiffness=20.0, damping=0.1, name="spring"))
-    return scene
 
 
 def swung(off=0.0):

@@ -5,6 +5,7 @@ import pytest
 
 import tsdyn as ts
 from benchmarks.scenes import SCENES
+from tests.helpers.rods_on_a_spring import two_rods_on_a_spring as spring
 from tsdyn.ensembles import runner
 
 RNG = np.random.default_rng(5)
@@ -15,18 +16,6 @@ SHORT = {"rtol": RTOL, "atol": RTOL, "threads": 1}
 
 def uniform(*shape):
     return RNG.uniform(0.9, 1.1, (CASES, *shape))
-
-
-def spring():
-    """Two rods on a spring."""
-    scene, last = ts.Scene(gravity=(0, 0, -10)), None
-    for i in range(2):
-        rod = scene.add_body(1.0, (0.1, 0.1, 0.05), position=(i + 0.5, 0, 0), name=f"rod {i}")
-        ends = {"point_a": (0.5, 0, 0) if last else (0, 0, 0), "point_b": (-0.5, 0, 0)}
-        scene.add(ts.constraints.Spherical(last or scene.ground, rod, **ends, name=f"joint {i}"))
-        last = rod
-    scene.add(ts.forces.Spring(scene.bodies[0], scene.ground, stiffness=20.0, damping=0.1, name="spring"))
-    return scene
 
 
 def loop():

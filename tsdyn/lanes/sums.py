@@ -6,8 +6,8 @@ where one case has one, and twice as many wouldn't fit into registers.
 
 from ..elements.loops.constraint_series import S_OMEGA, S_SPIN
 from ..jit.kernels import kernel
-from ..jit.simd import first, fma, four, get, lanes, less, put, second, splat, sub, third, times, total
-from ..taylor.coefficients import inverses, put_product
+from ..jit.simd import first, fma, four, get, lanes, less, second, splat, sub, third, total
+from ..taylor.coefficients import inverses, put_momentum, put_product
 
 
 @kernel
@@ -48,10 +48,8 @@ def spin(graph, b, bodies, at, orders, k):
     """As `coefficients.spin`."""
     x, y = splat(0.0), splat(0.0)
     if graph.spins[b] != 0:
-        w, o, spins = 16 * b + 4, at + S_OMEGA * orders, at + S_SPIN * orders
-        f = times(four(graph.mass, w), splat(get(bodies, o + 4 * k)))
-        f = fma(four(graph.mass, w + 4), splat(get(bodies, o + 4 * k + 1)), f)
-        put(bodies, spins + 4 * k, fma(four(graph.mass, w + 8), splat(get(bodies, o + 4 * k + 2)), f))
+        o, spins = at + S_OMEGA * orders, at + S_SPIN * orders
+        put_momentum(graph, b, bodies, o, spins, k)
         for j in range(k + 1):
             f, g = four(bodies, spins + 4 * (k - j)), four(bodies, o + 4 * j)
             x = fma(lanes(second(f), third(f), first(f)), lanes(third(g), first(g), second(g)), x)

@@ -40,7 +40,9 @@ from .tolerances import (
 )
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
-T_LAST, H_LAST, CHART_LAST, H_BEFORE, POINTS, MADE_FOR, OWN = range(7)
+# start, step and chart of the last attempt; the step before, 0 if unknown; points of predictions; step of the matrices,
+# 0 if there are none; contraction of the last step, 0 if unknown; 1 where stiffness is to be renewed; how many
+T_LAST, H_LAST, CHART_LAST, H_BEFORE, POINTS, MADE_FOR, RATE, RENEW, OWN = range(9)
 
 call_take = caller("pi")
 call_balance = caller("pip")
@@ -148,8 +150,20 @@ def _renew_matrices(context, c, r, own, t, h, level):
         if status == 0:
             status = call_factorise(l.kernels.factorise_stages, context, h, r.tableau, i)
     own[MADE_FOR] = h if status == 0 else 0.0
-    l.numbers.g, l.numbers.slow = h * r.tableau[parts_of(r.tableau).shifts] if status == 0 else 0.0, 0.0
+    own[RENEW] = 0.0
+    l.numbers.g = h * r.tableau[parts_of(r.tableau).shifts] if status == 0 else 0.0
     return status
+
+
+@kernel
+def _set_rates(r, h):
+    """vd of every stage from k."""
+    n, stages = r.x.size, int(r.tableau[0]) - 1
+    for i in range(stages):
+        combine(r.tableau[1 + (i + 1) * (3 + stages) + 2 :], stages + 1, h, 2 * n, r.memory, r.memory)
+        vd = r.memory[(2 * i + 4) * n : (2 * i + 5) * n]
+        for e in range(n):
+            vd[e] = r.y[e] + r.memory[n + e]
 
 
 @kernel
@@ -157,11 +171,7 @@ def _sweep(context, c, r, own, t, h, level):  # seven: as _renew_matrices
     """Evaluate the equations of all stages; with level >= 0, matrices are made anew at the middle one. Status."""
     l, w, n, stages = c.linear, c.work, r.x.size, c.saddle.stages.shape[0]
     width, x = 3 + stages, r.memory[:n]
-    for i in range(stages):
-        combine(r.tableau[1 + (i + 1) * width + 2 :], stages + 1, h, 2 * n, r.memory, r.memory)
-        vd = r.memory[(2 * i + 4) * n : (2 * i + 5) * n]
-        for e in range(n):
-            vd[e] = r.y[e] + r.memory[n + e]
+    _set_rates(r, h)
     for i in range(stages):
         row, k = r.tableau[1 + (i + 1) * width :], r.memory[(2 * i + 5) * n :][:n]
         combine(row[2:], stages + 1, h, 2 * n, r.memory, r.memory)
@@ -194,7 +204,7 @@ def _iterate(context, c, r, own, t, h):
         moved[e] = zeros[e] = 0.0
     before, theta, renewals, fresh = math.inf, 0.0, 0, False
     level = -1 if abs(h - own[MADE_FOR]) <= SAME_STEP * h else 0
-    if numbers.slow > 0.0 or own[MADE_FOR] == 0.0 or numbers.known == 0:
+    if own[RENEW] > 0.0 or own[MADE_FOR] == 0.0 or numbers.known == 0:
         level = 1
     most = COUPLED_ITERATIONS if adaptive else FIXED_ITERATIONS
     for left in range(most - 1, -1, -1):
@@ -210,19 +220,18 @@ def _iterate(context, c, r, own, t, h):
             return STAGE_FAILED
         for e in range(n):
             moved[e] += s.e[e]
-        rate = numbers.left if before == math.inf else size / before
+        rate = own[RATE] if 0.0 < own[RATE] <= DIVERGING else GUESS
         if before < math.inf:
+            rate = size / before
             theta = max(theta, rate)
             if size > floor and (rate > DIVERGING or size * rate**left > kappa * (1.0 - rate)):
                 if renewals == MATRICES:
                     return STAGE_FAILED
                 level = 2 if fresh else 1
-        elif rate > DIVERGING:
-            rate = GUESS
         if size <= floor or (level < 0 and size * rate <= kappa * (1.0 - rate)):
             if theta > 0.0:
-                numbers.left = max(theta, LEAST_COUPLED)
-            numbers.slow = 1.0 if theta > SLOW_COUPLED else 0.0
+                own[RATE] = max(theta, LEAST_COUPLED)
+            own[RENEW] = 1.0 if theta > SLOW_COUPLED else 0.0
             if adaptive and not call_norm(l.kernels.distance, context, moved, zeros, l.now, 1.0, 1.0) < TOO_FAR:
                 return STAGE_FAILED
             return 0
@@ -242,23 +251,13 @@ def collocation_step(context, run, t, h):
     _predict(c, r, own, h, known)
     status = _iterate(context, c, r, own, t, h)
     if status != 0:
-        c.linear.numbers.slow = 1.0
+        own[RENEW] = 1.0
         return status
     if known:
         _choose_points(c, r, own, h)
     own[H_LAST] = h
-    _sweep_rates(c, r, h)
+    _set_rates(r, h)
+    combine(r.tableau[1 + stages * (3 + stages) + 2 :], stages + 1, h, 2 * n, r.memory, r.memory)
     copy(r.memory[:n], r.dx)
     copy(r.memory[n : 2 * n], r.dy)
     return 0
-
-
-@kernel
-def _sweep_rates(c, r, h):
-    """vd of every stage from k; the step's increments at the start of the memory."""
-    n, stages = r.x.size, c.saddle.stages.shape[0]
-    for i in range(stages):
-        combine(r.tableau[1 + (i + 1) * (3 + stages) + 2 :], stages + 1, h, 2 * n, r.memory, r.memory)
-        for e in range(n):
-            r.memory[(2 * i + 4) * n + e] = r.y[e] + r.memory[n + e]
-    combine(r.tableau[1 + stages * (3 + stages) + 2 :], stages + 1, h, 2 * n, r.memory, r.memory)

@@ -56,14 +56,21 @@ def begin(graph, system, poses, orders, bodies, Z):
 
 
 @kernel
+def put_momentum(graph, b, bodies, o, spins, k):
+    """(J' omega')_k at bodies[spins + 4 k], from omega' at bodies[o]."""
+    w = 16 * b + 4
+    f = times(four(graph.mass, w), splat(get(bodies, o + 4 * k)))
+    f = fma(four(graph.mass, w + 4), splat(get(bodies, o + 4 * k + 1)), f)
+    put(bodies, spins + 4 * k, fma(four(graph.mass, w + 8), splat(get(bodies, o + 4 * k + 2)), f))
+
+
+@kernel
 def spin(graph, b, bodies, at, orders, k):
     """(J' omega')_k and the gyroscopic torque of order k; the body's series begins at bodies[at]."""
     torque = splat(0.0)
     if graph.spins[b] != 0:
-        w, o, spins = 16 * b + 4, at + S_OMEGA * orders, at + S_SPIN * orders
-        f = times(four(graph.mass, w), splat(get(bodies, o + 4 * k)))
-        f = fma(four(graph.mass, w + 4), splat(get(bodies, o + 4 * k + 1)), f)
-        put(bodies, spins + 4 * k, fma(four(graph.mass, w + 8), splat(get(bodies, o + 4 * k + 2)), f))
+        o, spins = at + S_OMEGA * orders, at + S_SPIN * orders
+        put_momentum(graph, b, bodies, o, spins, k)
         for j in range(k + 1):
             torque = add(torque, cross(four(bodies, spins + 4 * (k - j)), four(bodies, o + 4 * j)))
     return torque

@@ -12,8 +12,7 @@ class StageNumbers(Record):
     chart: int  # counter of charts when P was made, for a form whose P serves one chart only
     every_chart: int  # 1 for one whose P serves every chart
     known: int  # whether there are stiffness and damping
-    left: float  # error norm that a first correction left when last measured, and more with every stage since; or the
-    # contraction of the last step of a collocation method
+    left: float  # error norm that a first correction left when last measured, and more with every stage since
     first: float  # size of that correction
     slow: float  # contraction above which P is rebuilt, if no new one contracts below the usual limit; else 0
     t_before: float  # s, start of the last step; -inf for the first one

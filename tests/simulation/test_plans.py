@@ -41,6 +41,25 @@ def test_a_later_call_has_the_bits_of_a_first_one(make, way):
         same_run(by_plan(scene, SPAN, **options), first)
 
 
+@pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
+def test_a_later_call_of_another_interval_tells_of_itself(make):
+    """Not what the solution that its plan was made from has told, of redundant rows for instance."""
+    scene = make()
+    told = ts.simulate(scene, (0.0, 0.01))
+    assert told.stats.steps < 5
+    assert told.state.t == told.reached == 0.01
+    assert told.constraint_error.position.size == told.t.size
+    later, first = by_plan(scene, SPAN), ts.simulate(make(), SPAN)
+    same_run(later, first)
+    assert vars(later.stats).keys() == vars(first.stats).keys()
+    for name in vars(first.stats).keys() - {"seconds"}:
+        assert getattr(later.stats, name) == getattr(first.stats, name), name
+    assert later.message == first.message
+    assert later.state.t == later.reached == SPAN[1]
+    np.testing.assert_array_equal(later.state.q, first.state.q)
+    np.testing.assert_array_equal(later.constraint_error.position, first.constraint_error.position)
+
+
 def test_calls_of_several_plans_take_turns(rng):
     scene, ways = top.build(), ("default", "tight", "outputs", "more outputs", "fixed", "short steps")
     first = {way: ts.simulate(top.build(), SPAN, **WAYS[way]) for way in ways}

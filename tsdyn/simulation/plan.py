@@ -20,7 +20,10 @@ from .segments import is_relayed, may_pass
 from .solution import Solution
 from .stretch import Stretch
 
-OF_ONE_RUN = {"span", "_rows", "_remains", "_seconds", "_made", "_trajectory"}  # attributes of a solution
+OF_EVERY_RUN = (  # attributes of a solution; others are set, or made when they are asked for
+    "scene", "packed", "formulation", "_method", "_turned", "system", "status", "t_events", "q_events", "qd_events",
+    "handles", "_slice", "_stored", "_energy_error", "_reason", "_message",
+)  # fmt: skip
 FEW_ENTRIES = 2  # of memories that other plans have used
 FEW_TIMES = 1 << 12  # output times that are kept to compare those of the next call with
 
@@ -58,7 +61,7 @@ class Plan:
         self._engines, self._stretch, self._start, self._entries = {}, None, None, 0
         self._derived, self._rows = self.kept.packed.derived, self.kept.packed.derived.engines
         self.mark = object()  # of memories that the plan has entered
-        self._told = {name: value for name, value in vars(solution).items() if name not in OF_ONE_RUN}
+        self._told = {name: vars(solution)[name] for name in OF_EVERY_RUN}
 
     @property
     def serves(self):

@@ -41,7 +41,6 @@ from .tolerances import (
     MATRICES,
     RESIDUAL_FLOOR,
     SAME_G,
-    SAME_G_SPARSE,
     SLOW,
     SLOW_SPARSE,
     TOO_FAR,
@@ -190,7 +189,7 @@ def _solve_stage(context, c, r, i, t, g):
         w.counters.stage_iterations += 1
         off_chart = not sparse and l.numbers.chart != w.counters.charts
         slow_now = measured and theta > max(limit, l.numbers.slow)
-        stale = eager or off_chart or abs(g - l.numbers.g) > (SAME_G_SPARSE if sparse else SAME_G) * g
+        stale = eager or off_chart or abs(g - l.numbers.g) > SAME_G * g
         here = eager or slow_now or not sparse or l.numbers.g == 0.0 or l.numbers.known == 0
         was_eager, eager = eager, False
         if stale or slow_now:

@@ -4,15 +4,23 @@ They belong to a packed scene (`scene_cache.Prepared`) and are gone after any ch
 never taken for what it was: a method is told by its attributes, times and states by their numbers.
 """
 
+from __future__ import annotations
+
 from functools import wraps
 from inspect import unwrap
 from operator import itemgetter
+from typing import TYPE_CHECKING, Any
 
 from ..errors import TsdynError
 from ..methods.integrator import is_plain
 from ..runs.arguments import kind_named
 from .plan import Plan, Unfinished
 from .scene import Scene
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..hints import Function
 
 MOST = 16  # plans of a scene
 _values = itemgetter(
@@ -21,7 +29,7 @@ _values = itemgetter(
 )  # fmt: skip
 
 
-def planned(go_on):
+def planned(go_on: Callable[..., Any]) -> Callable[[Function], Function]:
     """Decorate `simulate`: a call with the arguments of an earlier one is run by its plan.
 
     `go_on(given, unfinished)` completes a run that is longer than its first slice.

@@ -144,3 +144,23 @@ def test_revolute_joints_of_micrometres_don_t_come_apart(method):
             for body, s in zip((joint.a, joint.b), joint.coordinates, strict=False)
         ]
         assert np.linalg.norm(ends[0] - ends[1], axis=-1).max() < ROUNDING * size
+
+
+def test_velocities_hold_along_a_link_that_is_much_shorter_than_a_small_scene(rng):
+    """Two points 4.7 nm apart on links of 0.1 mm: a correction of 1e-15 m turns the line between them by 2e-7."""
+    place = np.full(3, 5.766e-5)
+    for _ in range(10):
+        scene = ts.Scene(gravity=(337.0, 337.0, 337.0))
+        a = scene.add_point_mass(mass=1e-10, position=place, velocity=1e-3 * rng.normal(size=3))
+        beside = place + 4.7e-9 * np.array((0.4, -0.8, 0.4))
+        b = scene.add_point_mass(mass=1e-10, position=beside, velocity=1e-3 * rng.normal(size=3))
+        for body, pin in ((a, (6.7e-6, 6.7e-6, 1.15e-5)), (b, (9.1e-6, 6.8e-6, 6.7e-6))):
+            scene.add(C.Distance(scene.ground, body, point_a=pin))
+            scene.add(F.Spring(scene.ground, body, point_a=2.0 * place, stiffness=1e-3, free_length=1e-4))
+        link = scene.add(C.Distance(a, b))
+        scene.assemble()
+        solution = ts.simulate(scene, (0.0, 1e-4), integrator="taylor")
+        assert solution.success, solution.message
+        line, rate = solution.position(b) - solution.position(a), solution.velocity(b) - solution.velocity(a)
+        along = np.abs((line * rate).sum(axis=1)) / np.linalg.norm(rate, axis=1)
+        assert along.max() < FINE * link.length

@@ -81,7 +81,7 @@ def land(graph, system, w, f, t):
         if worst <= floor or worst > STALLED * before:
             if worst > ROUNDING_AT_MOST * floor:
                 return NEWTON_FAILED
-            if moved <= LEAST_MOVE:
+            if moved <= LEAST_MOVE * lever(w):
                 w.counters.at_rounding += 1 if moved == 0.0 else 0
                 return _settle(graph, w, f)
             renew = True

@@ -3,7 +3,7 @@
 from ..errors import Status
 from ..formulations.chart_coordinates import turned_most
 from ..formulations.chart_validity import AT_START
-from ..jit.kernels import kernel
+from ..jit.kernels import kernel, long_kernel
 from ..maths.dense_linalg import copy
 from ..rows.interface import is_next_to_singular, note_indicator, note_selection
 from .dense_output import call_chart
@@ -13,7 +13,7 @@ from .tolerances import HARDLY_TURNED
 PASSAGE = int(Status.PASSAGE)
 
 
-@kernel
+@long_kernel
 def begin_chart(context, c, r, log, reason):
     """A new chart at the present q, qd, qdd; closes the record of the old one. PASSAGE next to a singular place."""
     w = c.work

@@ -6,7 +6,7 @@ determine it.
 """
 
 from ..errors import Status
-from ..jit.kernels import caller, entry, kernel
+from ..jit.kernels import caller, entry, kernel, long_kernel
 from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import call_accelerate, call_place
 from ..methods.interpolants import call_value
@@ -21,7 +21,7 @@ call_complete = caller("pp")
 call_chart = caller("pdpppp")
 
 
-@kernel
+@long_kernel
 def evaluate(context, w, r, t, x, y, yd, xd):
     """q, qd, qdd, yd (and xd) at (t, x, y). Status."""
     status = call_place(r.kernels.place, context, t, x)

@@ -6,7 +6,7 @@ A step is proposed (where it ends), attempted (x and y at its end, from the meth
 from ..errors import Status
 from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL
 from ..formulations.tolerances import CONTRACTION_LOST
-from ..jit.kernels import caller, entry, kernel
+from ..jit.kernels import caller, entry, kernel, long_kernel
 from ..maths.dense_linalg import copy
 from ..methods.explicit import call_step
 from ..model.equations import is_rheonomic, remember, set_time
@@ -66,7 +66,7 @@ def _enter(context, c, r, log):
     return 0
 
 
-@kernel
+@long_kernel
 def _cross_stop(context, c, r, log, implicit):
     """At a stop: the accelerations after it, for its output and the next step. Status.
 

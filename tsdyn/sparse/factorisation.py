@@ -8,7 +8,7 @@ solves both kinds, and a transposed system is solved with the two arrays exchang
 diagonal block is read. The diagonal before elimination is stored after the panels: each pivot is judged relative to it.
 """
 
-from ..jit.kernels import kernel
+from ..jit.kernels import kernel, long_kernel
 from ..jit.questions import or_one
 from ..jit.simd import get, let
 from .block_operations import eliminate, eliminate_lu, link, link_lu, subtract_products
@@ -38,6 +38,11 @@ def factor(pattern, values, limit):
     if pattern.shape[0] == 1:
         keep_diagonal(pattern, values)
         return eliminate(values, 1, 1, 1, kept, limit)
+    return _factor_blocks(pattern, values, kept, limit)
+
+
+@long_kernel
+def _factor_blocks(pattern, values, kept, limit):
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     keep_diagonal(pattern, values)
     for j in range(heads.size):
@@ -96,6 +101,11 @@ def factor_lu(pattern, lower, upper, limit):
     if pattern.shape[0] == 1:
         kept[0] = upper[0]
         return eliminate_lu(lower, upper, 1, 1, 1, kept, limit)
+    return _factor_lu_blocks(pattern, lower, upper, kept, limit)
+
+
+@long_kernel
+def _factor_lu_blocks(pattern, lower, upper, kept, limit):
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     keep_diagonal(pattern, upper)
     for j in range(heads.size):
@@ -148,6 +158,11 @@ def solve_lu(pattern, lower, upper, b):
     if pattern.shape[0] == 1:
         b[0] *= lower[0]
         return
+    _solve_blocks(pattern, lower, upper, b)
+
+
+@long_kernel
+def _solve_blocks(pattern, lower, upper, b):
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     columns, segments = pattern.columns, pattern.segments
     for j in range(heads.size):

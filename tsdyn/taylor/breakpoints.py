@@ -1,7 +1,7 @@
 """Stops of a Taylor run: continuation after a step that ends at a stop."""
 
 from ..errors import Status
-from ..jit.kernels import kernel
+from ..jit.kernels import kernel, long_kernel
 from ..maths.dense_linalg import is_finite
 from ..runs.breakpoints import amend, take_pieces
 from ..runs.outputs import store_now
@@ -10,7 +10,7 @@ from .step_parts import call_expand, call_reach
 NOT_FINITE = int(Status.NOT_FINITE)
 
 
-@kernel
+@long_kernel
 def cross_stop(context, c, r, log):
     """At a stop: poses and accelerations after it, for its output and the next series. Status."""
     w = c.work

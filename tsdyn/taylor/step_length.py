@@ -4,7 +4,7 @@ import math
 
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..formulations.chart_validity import ROUNDING
-from ..jit.kernels import kernel
+from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import first, four, larger, second, splat, third
 from ..rows.interface import is_near_singular
 from .tolerances import FAR_PASSING, LEAST_ORDER, PASSING, STEP_COST, STIFF_RATES
@@ -29,7 +29,7 @@ def size_of_order(bodies, nb, orders, k, far, fast):
     return max(largest_of_three(turn), max(largest_of_three(shift) * far, largest_of_three(spin) * fast))
 
 
-@kernel
+@long_kernel
 def radius(bodies, nb, orders, top, far, fast):
     """The radius of convergence as the last coefficients up to top + 1 have it (Jorba, Zou, 2005); 0 if not finite.
 
@@ -45,7 +45,7 @@ def radius(bodies, nb, orders, top, far, fast):
     return rho
 
 
-@kernel
+@long_kernel
 def weights(c, r):
     """Set the floor of Phi. Weights of the coefficients of r and of omega' beside those of A; 1 + the largest rate."""
     x, orders = c.expansion, c.expansion.order.room

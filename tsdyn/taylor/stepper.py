@@ -8,7 +8,7 @@ end reached), and taken or tried again with another length: the same series serv
 from ..elements.loops.body_poses import OMEGA, POSE, RD
 from ..errors import Status
 from ..formulations.chart_validity import AT_START, BY_SERIES, ROUNDING
-from ..jit.kernels import entry, kernel
+from ..jit.kernels import entry, kernel, long_kernel
 from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import remember
 from ..model.joint_turns import count_turns
@@ -35,7 +35,7 @@ def _open_chart(w, r, log, t, reason):
     w.counters.charts += 1
 
 
-@kernel
+@long_kernel
 def _stand(context, c, r, log, t):
     """The poses as they are now are the state at t: the series of order zero gives qdd. Status."""
     w, indicator = c.work, c.tangent.indicator

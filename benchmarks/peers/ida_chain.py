@@ -1,0 +1,91 @@
+"""SUNDIALS IDA on the stiff chain of stiff_chain.py, in the plane: poses of all links and multipliers, index 2.
+
+    q' = v - Phi_q^T mu,    M v' = f - Phi_q^T lam,    Phi = 0,    Phi_q v = 0
+
+Of each link (x, z, angle), (vx, vz, rate), lam, mu, one after the other: IDA makes the banded Jacobian by differences.
+The residual is compiled.
+"""
+
+import time
+
+import numba
+import numpy as np
+
+LINK = 10  # unknowns of a link
+BAND = 2 * LINK
+
+
+@numba.njit
+def residual(y, yd, length, mass, stiffness, damping, out):
+    """The residual of all links."""
+    half, inertia, gravity, links = 0.5 * length, mass * length**2 / 12.0, 9.81, y.size // LINK
+    for i in range(links):
+        o, n, p = LINK * i, LINK * (i + 1), LINK * (i - 1)
+        c, s = half * np.cos(y[o + 2]), half * np.sin(y[o + 2])
+        bend, turn = y[o + 2], y[o + 5]
+        if i > 0:
+            bend, turn = bend - y[p + 2], turn - y[p + 5]
+        torque = -stiffness * bend - damping * turn
+        sums = np.zeros((2, 3))  # Phi_q^T lam, Phi_q^T mu
+        for k in range(2):
+            a, b = y[o + 6 + 2 * k], y[o + 7 + 2 * k]
+            sums[k] = a, b, s * a + c * b
+        if i + 1 < links:
+            next_torque = -stiffness * (y[n + 2] - y[o + 2]) - damping * (y[n + 5] - y[o + 5])
+            torque -= next_torque
+            for k in range(2):
+                a, b = y[n + 6 + 2 * k], y[n + 7 + 2 * k]
+                sums[k, 0], sums[k, 1], sums[k, 2] = sums[k, 0] - a, sums[k, 1] - b, sums[k, 2] + s * a + c * b
+        loads = 0.0, -mass * gravity, torque
+        masses = mass, mass, inertia
+        for j in range(3):
+            out[o + j] = yd[o + j] - y[o + 3 + j] + sums[1, j]
+            out[o + 3 + j] = masses[j] * yd[o + 3 + j] - loads[j] + sums[0, j]
+        x, z, vx, vz = y[o] - c, y[o + 1] + s, y[o + 3] + s * y[o + 5], y[o + 4] + c * y[o + 5]  # its first end
+        if i > 0:
+            cp, sp = half * np.cos(y[p + 2]), half * np.sin(y[p + 2])
+            x, z = x - y[p] - cp, z - y[p + 1] + sp
+            vx, vz = vx - y[p + 3] + sp * y[p + 5], vz - y[p + 4] + cp * y[p + 5]
+        out[o + 6], out[o + 7], out[o + 8], out[o + 9] = x, z, vx, vz
+
+
+def start(links, length, mass):
+    """Unknowns and rates at rest, horizontal; accelerations and multipliers by the linear equations there."""
+    y, yd = np.zeros(LINK * links), np.zeros(LINK * links)
+    y[0::LINK] = length * (np.arange(links) + 0.5)
+    half, inertia = 0.5 * length, mass * length**2 / 12.0
+    reach = length * np.tril(np.ones((links, links)), -1) + half * np.eye(links)  # falls of centroids by angles
+    falls = mass * 9.81 * reach.sum(axis=0)
+    angle = np.linalg.solve(mass * reach.T @ reach + inertia * np.eye(links), falls)
+    yd[4::LINK], yd[5::LINK] = -reach @ angle, angle
+    push = mass * (9.81 + yd[4::LINK])  # weight less what accelerates: what the first joint of all carries is their sum
+    y[7::LINK] = -np.cumsum(push[::-1])[::-1]
+    return y, yd
+
+
+def run(links, length, mass, times, tol):
+    """Positions of the centroids (k, links, 3), m, and seconds."""
+    from sksundae.ida import IDA
+
+    constants = length, mass, 1e3 * links**2, 2.0 * links
+    y, yd = start(links, length, mass)
+    algebraic = np.flatnonzero(np.arange(y.size) % LINK >= 6)
+    atol = np.full(y.size, tol)
+    atol[algebraic] = 1e6
+
+    def f(t, y, yd, out):
+        residual(y, yd, *constants, out)
+
+    f(0.0, y, yd, np.empty(y.size))  # compile
+    solver = IDA(
+        f, algebraic_idx=algebraic, rtol=tol, atol=atol, linsolver="band", lband=BAND, uband=BAND, first_step=1e-7,
+        max_num_steps=10_000_000,
+    )  # fmt: skip
+    begun = time.perf_counter()
+    found = solver.solve(times, y, yd)
+    seconds = time.perf_counter() - begun
+    if not found.success:
+        raise RuntimeError(str(found.message))
+    places = np.zeros((len(times), links, 3))
+    places[:, :, 0], places[:, :, 2] = found.y[:, 0::LINK], found.y[:, 1::LINK]
+    return places, seconds

@@ -22,7 +22,7 @@ from tsdyn.stress.gallery import rods
 from tsdyn.stress.gallery.single_bodies import kapitza
 
 DOCS = Path(__file__).parent
-METHODS = ("taylor", "dop853", "rk45", "nystrom4", "sdirk54", "implicittrapezoid")
+METHODS = ("taylor", "dop853", "rk45", "nystrom4", "radau", "sdirk54", "implicittrapezoid")
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 ERRORS = (1e-4, 1e-6, 1e-10)
 MOST = 20_000  # steps of a run; one that needs more is left out

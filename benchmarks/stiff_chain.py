@@ -19,7 +19,8 @@ import numpy as np
 import tsdyn as ts
 
 Y, X = (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
-LENGTH, MASS = 0.1, 1.0  # m, kg
+LENGTH, MASS, GRAVITY = 0.1, 1.0, 9.81  # m, kg, m/s^2
+INERTIA = MASS * LENGTH**2 / 12.0  # kg m^2
 LINKS, TOLERANCES = (4, 16, 64, 256, 1024), (1e-2, 1e-4)
 HEAD = " links     tol  steps  rej.   it. matr.  ms/step       s    error growth     MB"
 ROW = "{:6d} {:7.0e} {:6d} {:5d} {:5.2f} {:5.2f} {:8.3f} {:7.3f} {:8.1e} {:6.2f} {:6.0f}"
@@ -27,16 +28,26 @@ COMPARED = 64  # links up to which a reference is computed
 WORK = 64  # links times seconds of motion at most
 
 
+def spring(links):
+    """Stiffness, N m/rad, and damping, N m s/rad, of a joint."""
+    return 1e3 * links**2, 2.0 * links
+
+
+def reach(links):
+    """Derivatives of the drops of the centroids by the angles of the links, (links, links), in links; horizontal."""
+    return np.tril(np.ones((links, links)), -1) + 0.5 * np.eye(links)
+
+
 def chain(links):
     """The chain."""
-    scene, inertia = ts.Scene(gravity=(0.0, 0.0, -9.81)), MASS * LENGTH**2 / 12.0
+    scene, (stiffness, damping) = ts.Scene(gravity=(0.0, 0.0, -GRAVITY)), spring(links)
     before = scene.ground
     for i in range(links):
-        link = scene.add_body(MASS, (1e-4, inertia, inertia), (LENGTH * (i + 0.5), 0.0, 0.0), name=f"link{i + 1}")
+        link = scene.add_body(MASS, (1e-4, INERTIA, INERTIA), (LENGTH * (i + 0.5), 0.0, 0.0), name=f"link{i + 1}")
         scene.add(ts.constraints.Revolute.at(before, link, point=(LENGTH * i, 0.0, 0.0), axis=Y))
         scene.add(
             ts.forces.TorsionalSpring(
-                before, link, axis_a=Y, reference_a=X, reference_b=X, stiffness=1e3 * links**2, damping=2.0 * links
+                before, link, axis_a=Y, reference_a=X, reference_b=X, stiffness=stiffness, damping=damping
             )
         )
         before = link

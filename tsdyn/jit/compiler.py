@@ -14,7 +14,6 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.registry import CPUDispatcher
-from numba.core.typing import make_concrete_template
 from numba.extending import models, register_model
 
 from .cache import KernelCache
@@ -139,11 +138,7 @@ class _CalleeCompiler(Compiler):
 class _Dispatcher(CPUDispatcher):
     def get_call_template(self, args, kws):
         """One kernel for all constants that it is called with: what LLVM inlines, it makes anew for each of them."""
-        signature, args = self._compiler.fold_argument_types(args, kws)
-        args = tuple(map(types.unliteral, args))
-        self.compile(args)
-        template = make_concrete_template(self.py_func.__name__, self.py_func, self.nopython_signatures)
-        return template, signature, args, {}
+        return super().get_call_template(tuple(map(types.unliteral, args)), kws)
 
     def add_overload(self, found):
         """Keep it from Numba's table of what Python can call."""

@@ -23,7 +23,7 @@ from .breakpoints import cross_stop, lower_order
 from .step_length import radius, weights
 from .step_parts import call_expand, call_reach, hold_accelerations, set_floor, state_within
 from .step_trials import go_to_start, make_step, stand_at
-from .tolerances import SHARP_STEPS, SMALL, SMALL_STEPS, SPARE, TIGHTEST, WARY
+from .tolerances import FASTER, SHARP_STEPS, SMALL, SMALL_STEPS, SPARE, TIGHTEST, TINY, WARY
 from .workspace import load_series
 
 SLICE_DONE, NOT_FINITE = int(Status.SLICE_DONE), int(Status.NOT_FINITE)
@@ -102,15 +102,19 @@ def _mind_singular(c, r):
 @kernel
 def _watch_stiffness(c, r, h):
     """Return True if the motion has just been found stiff: many steps in which nothing rotates or moves far."""
-    far, p = SMALL * c.work.control.floor / (ROUNDING * h), c.tangent.poses
+    far, p, most = c.work.control.floor / (ROUNDING * h), c.tangent.poses, 0.0
     for b in range(c.graph.bodies.shape[0]):
         at = b * POSE
         for i in range(3):
-            if abs(p[at + OMEGA + i]) * h > SMALL or abs(p[at + RD + i]) > far:
-                r.numbers.at_limit = 0
-                return False
-    r.numbers.at_limit += 1
-    if r.numbers.at_limit == (SMALL_STEPS if c.trial.check == 0 else SHARP_STEPS):
+            most = max(most, abs(p[at + OMEGA + i]) * h, abs(p[at + RD + i]) / far)
+        if most > SMALL:
+            r.numbers.at_limit = 0
+            return False
+    before, enough = r.numbers.at_limit, SMALL_STEPS
+    if c.trial.check != 0:
+        enough = SHARP_STEPS
+    r.numbers.at_limit += FASTER if most < TINY and c.trial.check == 0 else 1
+    if before < enough <= r.numbers.at_limit:
         r.numbers.stiff = 1
         return r.numbers.leave_when_stiff == 1
     return False

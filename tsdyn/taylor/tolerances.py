@@ -41,6 +41,8 @@ NO_SPEED = 1e-300
 # rad, and part of the scene's size: a step that turns and moves everything by less is limited by something that can't
 # be seen. So many of them in a row, and the motion may be stiff (docs/design-decisions.md).
 SMALL, SMALL_STEPS = 0.02, 40
+# A step by less than TINY counts for so many.
+TINY, FASTER = 0.002, 4
 # The same in scenes with sharp forces, which need some ten short steps wherever a velocity reverses.
 SHARP_STEPS = 400
 

@@ -6,9 +6,14 @@ mode has |lambda| near 1e4 1/s
 hung      two particles of 1 kg in a row, 1 m apart, on a spring and damper, k = 1e5 N/m and c = 1e5 N s/m, the first at
 the end of a rigid 1 m link; released at rest 45 degrees from hanging. The fast mode is overdamped, |lambda| near 2e5
 1/s, the slow mode of the spring decays with k / c = 1 1/s
+mounted   four blocks in a row on bushings, critically damped or more
+pushed    eight blocks in a row on springs and rough ground, friction 2 N v / |(v, 1 mm/s)|: while a block sticks,
+|lambda| is 2e3 1/s
+net       32 x 32 particles on springs along the lines of a grid
 """
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -79,6 +84,38 @@ def mounted(stiffness, count=4):
         scene.add(ts.forces.Bushing(a, block, point_a=point, point_b=(-0.15, 0.0, 0.0), **mount))
         before = block
     return scene
+
+
+class Row(NamedTuple):
+    """What a row of blocks is made of."""
+
+    stiffness: float = 1e4  # N/m
+    damping: float = 2.0  # N s/m
+    friction: float = 2.0  # N, on each block
+    slip: float = 1e-3  # m/s
+    push: float = 25.0  # N
+    rate: float = 10.0  # rad/s
+
+
+ROW = Row()
+
+
+def pushed(blocks=8):
+    """Blocks of 1 kg on rough ground in a row on springs, the first pushed to and fro: they stick and slip in turn."""
+    scene, last = ts.Scene(gravity=(0.0, 0.0, 0.0)), None
+    for i in range(blocks):
+        block = scene.add_point_mass(1.0, (0.1 * i, 0.0, 0.0))
+        scene.add(ts.forces.CoulombFriction(block, scene.ground, force=ROW.friction, slip_velocity=ROW.slip))
+        if last is None:
+            scene.add(ts.forces.PointForce(block, force=_push))
+        else:
+            scene.add(ts.forces.Spring(last, block, stiffness=ROW.stiffness, damping=ROW.damping))
+        last = block
+    return scene
+
+
+def _push(t):
+    return (ROW.push * np.sin(ROW.rate * t), 0.0, 0.0)
 
 
 def net(side=32):

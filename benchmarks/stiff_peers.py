@@ -1,9 +1,10 @@
 """Stiff scenes in other engines: time to an error, interleaved in one process.
 
 Contenders: tsdyn's default method, and Radau and SDIRK54 by name; Exudyn with generalised-alpha and with the trapezoid
-of index 2; for chains MuJoCo with implicitfast, SciPy's Radau on minimal coordinates, and SUNDIALS IDA on poses and
-multipliers in the plane. Errors are the largest of positions at 50 times, m, against SDIRK54 at 1e-11: at the end many
-scenes are at rest, whatever the method. Exudyn's bushings have angles of another kind, equal for small ones.
+of index 2; for chains MuJoCo with implicitfast, SciPy's Radau on minimal coordinates, and scipy_dae's Radau and
+SUNDIALS IDA on poses and multipliers in the plane; for the rough row SciPy's Radau and SUNDIALS CVODE. Errors are the
+largest of positions at 50 times, m, against SDIRK54 at 1e-11: at the end many scenes are at rest, whatever the method.
+Exudyn's bushings have angles of another kind, equal for small ones.
 
 Run it: python -m benchmarks.stiff_peers [--scenes chain net] [--budget 20] [--figure stiff.png]
 """
@@ -17,8 +18,8 @@ import numpy as np
 
 import tsdyn as ts
 from benchmarks import stiff
-from benchmarks.peers import ida_chain
-from benchmarks.stiff_chain import GRAVITY, INERTIA, LENGTH, MASS, chain, reach, spring
+from benchmarks.peers import dae_chain, stiff_odes
+from benchmarks.stiff_chain import GRAVITY, INERTIA, LENGTH, MASS, chain, spring
 from tsdyn.stress.gallery.governor import governor
 
 OUTPUTS = 50
@@ -29,11 +30,12 @@ LOOSE = tuple(10.0 ** (-k / 2) for k in range(-2, 22))
 
 
 class Stiff(NamedTuple):
-    """A scene, its end, s, and its number of links where it is a chain."""
+    """A scene, its end, s, its number of links where it is a chain, and its kind, by which contenders are chosen."""
 
     build: object
     end: float
     links: int = 0
+    kind: str = "any"
 
     @property
     def times(self):
@@ -42,11 +44,15 @@ class Stiff(NamedTuple):
 
 
 SCENES = {
-    **{f"chain of {n}": Stiff(partial(chain, n), end, n) for n, end in ((4, 1.0), (16, 1.0), (64, 1.0), (256, 0.2))},
+    **{
+        f"chain of {n}": Stiff(partial(chain, n), end, n, "chain")
+        for n, end in ((4, 1.0), (16, 1.0), (64, 1.0), (256, 0.2))
+    },
     "stiff joint": Stiff(partial(stiff.jointed, joint=stiff.revolute), 2.0),
     "stiff springs": Stiff(stiff.hung, 2.0),
     "governor": Stiff(partial(governor, 3e5, 5e3), 2.0),
     **{f"bushings of {k:.0e}": Stiff(partial(stiff.mounted, k), 1.0) for k in (1e4, 1e6, 1e8)},
+    "rough row": Stiff(stiff.pushed, 1.0, kind="row"),
     "net of 32 x 32": Stiff(stiff.net, 0.5),
 }
 
@@ -119,58 +125,51 @@ def run_mujoco(case, divisions):
     return np.array(places), seconds
 
 
-def run_radau(case, tol):
-    """Angles from the horizontal as coordinates, with the Jacobian by differences that SciPy makes."""
-    from scipy.integrate import solve_ivp
+def by(solver):
+    """A contender that is `solver(links, times, tol)` of a chain, or `solver(times, tol)` of another scene."""
 
-    links, drops = case.links, reach(case.links)
-    a, first = MASS * LENGTH**2 * drops.T @ drops, MASS * LENGTH * GRAVITY * drops.sum(axis=0)
-    own, (stiffness, damping) = INERTIA * np.eye(links), spring(links)
+    def run(case, tol):
+        try:
+            return solver(*[case.links] * bool(case.links), case.times, tol)
+        except RuntimeError as error:  # a tolerance that is too tight for it
+            print(f"{solver.__module__}.{solver.__name__} at {tol:.0e}: {error}")
+            return None, 0.0
 
-    def rates(_, y):
-        angle, rate = y[:links], y[links:]
-        between = angle[:, None] - angle
-        bend, turn = np.diff(angle, prepend=0.0), np.diff(rate, prepend=0.0)
-        torque = -stiffness * bend - damping * turn
-        load = first * np.cos(angle) + torque - np.append(torque[1:], 0.0) - (a * np.sin(between)) @ rate**2
-        return np.concatenate((rate, np.linalg.solve(a * np.cos(between) + own, load)))
-
-    begun = time.perf_counter()
-    found = solve_ivp(rates, (0.0, case.end), np.zeros(2 * links), "Radau", t_eval=case.times, rtol=tol, atol=tol)
-    seconds, angle = time.perf_counter() - begun, found.y[:links].T
-    x, z = (LENGTH * f @ drops.T for f in (np.cos(angle), -np.sin(angle)))
-    return np.stack((x, np.zeros_like(x), z), axis=2), seconds
+    return run
 
 
-def run_ida(case, tol):
-    """Poses in the plane and multipliers, the Jacobian banded."""
-    try:
-        return ida_chain.run(case.links, case.times, tol)
-    except RuntimeError as error:  # a tolerance that is too tight for it
-        print(f"IDA at {tol:.0e}: {error}")
-        return None, 0.0
-
-
-CONTENDERS = {
+OURS = {
     "tsdyn": (run_default, TOLERANCES),
     "tsdyn, Radau": (run_collocation, LOOSE),
     "tsdyn, SDIRK54": (run_sdirk, LOOSE),
+}
+EXUDYN = {
     "Exudyn, generalised-alpha": (run_exudyn, DIVISIONS),
     "Exudyn, trapezoid": (run_trapezoid, DIVISIONS),
-    "MuJoCo, implicitfast": (run_mujoco, DIVISIONS),
-    "SciPy, Radau": (run_radau, TOLERANCES),
-    "SUNDIALS IDA": (run_ida, TOLERANCES),
 }
-CHAINS = "MuJoCo, implicitfast", "SciPy, Radau", "SUNDIALS IDA"  # for chains alone
+PEERS = {  # of each kind of scene
+    "any": EXUDYN,
+    "chain": {
+        **EXUDYN,
+        "MuJoCo, implicitfast": (run_mujoco, DIVISIONS),
+        "SciPy, Radau": (by(stiff_odes.chain), TOLERANCES),
+        "scipy_dae, Radau": (by(dae_chain.run_radau), TOLERANCES),
+        "SUNDIALS IDA": (by(dae_chain.run_ida), TOLERANCES),
+    },
+    "row": {
+        "SciPy, Radau": (by(stiff_odes.row), TOLERANCES),
+        "SUNDIALS CVODE": (by(stiff_odes.row_by_cvode), TOLERANCES),
+    },
+}
 
 
 def measure(case, budget):
     """{name: (errors, seconds)} of all settings that take less than the budget, s."""
     options = {"integrator": ts.integrators.SDIRK54(1e-11, 1e-11), "t_eval": case.times}
     reference, points = _places(ts.simulate(case.build(), (0.0, case.end), **options).raise_if_failed()), {}
-    for name, (run, settings) in CONTENDERS.items():
+    for name, (run, settings) in {**OURS, **PEERS[case.kind]}.items():
         found = []
-        for setting in () if name in CHAINS and not case.links else settings:
+        for setting in settings:
             try:
                 places, seconds = run(case, setting)
             except ImportError as error:

@@ -1,9 +1,9 @@
-"""SUNDIALS IDA on the stiff chain of stiff_chain.py, in the plane: poses of all links and multipliers, index 2.
+"""DAE solvers on the stiff chain of stiff_chain.py, in the plane: poses of all links and multipliers, index 2.
 
     q' = v - Phi_q^T mu,    M v' = f - Phi_q^T lam,    Phi = 0,    Phi_q v = 0
 
-Of each link (x, z, angle), (vx, vz, rate), lam, mu, one after the other: IDA makes the banded Jacobian by differences.
-The residual is compiled.
+Of each link (x, z, angle), (vx, vz, rate), lam, mu, one after the other, so that Jacobians are banded. The residual is
+compiled.
 """
 
 import time
@@ -60,19 +60,11 @@ def start(links):
     return y, yd
 
 
-def run(links, times, tol):
-    """Positions of the centroids (k, links, 3), m, and seconds."""
+def run_ida(links, times, tol):
+    """Positions of the centroids (k, links, 3), m, and seconds; SUNDIALS makes the banded Jacobian by differences."""
     from sksundae.ida import IDA
 
-    stiffness, damping = spring(links)
-    y, yd = start(links)
-    algebraic = np.flatnonzero(np.arange(y.size) % LINK >= 6)
-    atol = np.full(y.size, tol)
-    atol[algebraic] = 1e6
-
-    def f(t, y, yd, out):
-        residual(y, yd, stiffness, damping, out)
-
+    f, y, yd, algebraic, atol = _problem(links, tol)
     solver = IDA(
         f, algebraic_idx=algebraic, rtol=tol, atol=atol, linsolver="band", lband=BAND, uband=BAND, first_step=1e-7,
         max_num_steps=10_000_000,
@@ -83,6 +75,51 @@ def run(links, times, tol):
     seconds = time.perf_counter() - begun
     if not found.success:
         raise RuntimeError(str(found.message))
-    places = np.zeros((len(times), links, 3))
-    places[:, :, 0], places[:, :, 2] = found.y[:, 0::LINK], found.y[:, 1::LINK]
-    return places, seconds
+    return _places(found.y), seconds
+
+
+def run_radau(links, times, tol):
+    """The same by Radau of order 5, scipy_dae; its Jacobian by differences of groups of columns."""
+    from scipy.sparse import eye_array
+    from scipy_dae.integrate import solve_dae
+
+    f, y, yd, _, atol = _problem(links, tol)
+
+    def g(t, y, yd):
+        out = np.empty(y.size)
+        f(t, y, yd, out)
+        return out
+
+    near = sum(eye_array(y.size, k=k) for k in range(-BAND, BAND + 1)) if links > 4 else None
+    sparsity = {} if near is None else {"jac_sparsity": (near.tocsc(), eye_array(y.size).tocsc())}
+    g(0.0, y, yd)  # the first call of a process compiles
+    begun = time.perf_counter()
+    found = solve_dae(
+        g, (0.0, times[-1]), y, yd, method="Radau", rtol=max(tol, 1e-13), atol=atol, t_eval=times, first_step=1e-7,
+        **sparsity,
+    )  # fmt: skip
+    seconds = time.perf_counter() - begun
+    if not found.success:
+        raise RuntimeError(str(found.message))
+    return _places(found.y.T), seconds
+
+
+def _problem(links, tol):
+    """The residual f(t, y, yd, out), unknowns and rates at the start, places of the multipliers, tolerances."""
+    stiffness, damping = spring(links)
+    y, yd = start(links)
+    algebraic = np.flatnonzero(np.arange(y.size) % LINK >= 6)
+    atol = np.full(y.size, tol)
+    atol[algebraic] = 1e6
+
+    def f(t, y, yd, out):
+        residual(y, yd, stiffness, damping, out)
+
+    return f, y, yd, algebraic, atol
+
+
+def _places(y):
+    """Of unknowns (k, 10 links)."""
+    places = np.zeros((len(y), y.shape[1] // LINK, 3))
+    places[:, :, 0], places[:, :, 2] = y[:, 0::LINK], y[:, 1::LINK]
+    return places

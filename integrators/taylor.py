@@ -13,6 +13,7 @@ from ..plugins import Integrator, InvalidArgument, positive, whole
 
 LOWEST, HIGHEST = 4, 30
 TIGHT = 1e-12  # mean of rtol and atol: below it rounding counts
+LOOSEST = 0.1  # rtol and atol that are looser are taken for it: fast modes would grow until they are seen
 FINE = 1e-16  # of a step, above TIGHT: less than rounding of a step makes no difference
 FINEST = 1e-20  # of a step: truncation of one sign that stays below the rounding of ten million steps
 REFINED = 3  # orders of the multipliers that are refined where rounding counts
@@ -29,6 +30,7 @@ class Taylor(Integrator):
     tol : float
         Tolerance relative to 1 + size. A step's error is held to tol / 1000, below 1e-12 to less, since errors of one
         sign add up. At 1e-15 the error of a run is rounding, which grows as the square root of the number of steps.
+        More than 0.1 is taken for 0.1.
     order : int, optional
         From 4 to 30; None lets every step have the order that gets furthest for its work.
     rtol, atol : float, optional
@@ -119,7 +121,7 @@ def _is_tight(rtol, atol):
 @lru_cache
 def _step_tolerances(rtol, atol, margin):
     if not _is_tight(rtol, atol):
-        return max(rtol / margin, FINE), max(atol / margin, FINE)
+        return max(min(rtol, LOOSEST) / margin, FINE), max(min(atol, LOOSEST) / margin, FINE)
     share = 0.5 * (rtol + atol) / TIGHT / margin
     return max(rtol * share, FINEST), max(atol * share, FINEST)
 

@@ -224,6 +224,19 @@ def test_steps_follow_the_tolerance_down_to_the_limit_of_rounding():
     assert I.Taylor(1e-12).refined == 0 < I.Taylor(9e-13).refined
 
 
+def test_no_tolerance_is_so_loose_that_fast_modes_grow():
+    """At 10 the chain used to flail, in twice the steps."""
+    counts = []
+    for tol in (0.1, 10.0):
+        scene = ts.Scene()
+        arms = [scene.add_body(1.0, (0.01, 0.01, 0.01), position=(0.5 + i, 0.0, 0.0)) for i in range(4)]
+        for a, b, at in zip(arms, [scene.ground, *arms], range(4), strict=False):
+            scene.add(ts.constraints.Revolute.at(a, b, point=(at, 0.0, 0.0), axis=(0.0, 1.0, 0.0)))
+            scene.add(F.TorsionalSpring(a, b, axis_a=(0.0, 1.0, 0.0), stiffness=1e5, damping=10.0))
+        counts.append(ts.simulate(scene, (0.0, 0.1), integrator=I.Taylor(tol), history=False).stats.steps)
+    assert counts[1] == counts[0]
+
+
 def test_residuals_of_positions_do_not_walk():
     """Windows of a thousand steps: beyond the first one the residual was up to five times as large."""
     scene = load("two_body_pendulum_spatial")[0]

@@ -1,7 +1,8 @@
 """Ensembles beside other engines: milliseconds a case and core to an error, in one interleaved run.
 
-Times are the processor's, of one thread each. tsdyn: `ts.ensemble`, all of its cost counted. heyoka: its batch mode,
-compiled for the top alone. MuJoCo and Exudyn: the loop of one case, which `rollout` and a process pool run a core.
+Times are the processor's, of one thread each. tsdyn: `ts.ensemble`, case by case and in lanes, all of its cost
+counted. heyoka: its batch mode, compiled for the top alone. MuJoCo and Exudyn: the loop of one case, which `rollout`
+and a process pool run a core.
 
 Run it: python -m benchmarks.ensemble_peers
 """
@@ -28,10 +29,11 @@ NAMES = ("sliding top", "two-body pendulum", "chain of 4")
 class OurEnsemble(Contender):
     """Cases of one scene in one thread: each its own mass, here the same."""
 
-    name, calls = "tsdyn, ensemble", 3
+    calls = 3
 
-    def __init__(self, cases):
-        self.cases = cases
+    def __init__(self, cases, lanes):
+        self.cases, self.lanes = cases, lanes
+        self.name = "tsdyn, ensemble" if lanes == 1 else f"tsdyn, {lanes} lanes"
 
     def serves(self, scene):
         """All."""
@@ -44,7 +46,7 @@ class OurEnsemble(Contender):
         table = {f"{body.name}.mass": np.full(self.cases, body.mass)}
 
         def run(tol):
-            options = {"threads": 1, "rtol": tol, "atol": tol}
+            options = {"threads": 1, "lanes": self.lanes, "rtol": tol, "atol": tol}
             seconds, found = timed(lambda: ts.ensemble(built, table, span, **options))
             if not found.success.all():
                 raise RuntimeError(found.message[0])
@@ -85,7 +87,7 @@ def main():
     parser.add_argument("--budget", type=float, default=0.3, help="seconds of a case up to which settings are tried")
     given = parser.parse_args()
     contender.clock = time.process_time  # a call of ours is longer than others', and more often interrupted
-    every = [OurEnsemble(given.cases), HeyokaBatch(), MuJoCoTree(), ExudynTree()]
+    every = [OurEnsemble(given.cases, 1), OurEnsemble(given.cases, 4), HeyokaBatch(), MuJoCoTree(), ExudynTree()]
     missing = [line for one in every if (line := one.missing())]
     every = [one for one in every if not one.missing()]
     for name in NAMES:

@@ -102,8 +102,11 @@ def stiff_scenes(quick):
     for scene, case in scenes.items():
         begin = len(lines)
         lines += [f"**{scene}, {case.end:g} s**", "", f"| | {' | '.join(errors)} |", "|---|" + "---:|" * len(errors)]
-        for name, points in stiff_peers.measure(case, LONGEST_STIFF).items():
-            lines.append(f"| {name} | {' | '.join(_cell(1e3 * s, False) for s in stiff_peers.times(*points))} |")
+        found = {name: stiff_peers.times(*points) for name, points in stiff_peers.measure(case, LONGEST_STIFF).items()}
+        for name, seconds in found.items():
+            lines.append(f"| {name} | {' | '.join(_cell(1e3 * s, False) for s in seconds)} |")
+        if not np.isfinite([*found.values()]).any():
+            lines[begin:] = [f"**{scene}, {case.end:g} s**: no run within {LONGEST_STIFF:g} s is as exact."]
         lines.append("")
         print("\n".join(lines[begin:]), flush=True)
     return "\n".join([*lines, f"Milliseconds to an error of positions, m; {provenance.line()}"])

@@ -63,7 +63,7 @@ class Radau(Collocation):
         super().__init__(rtol, atol, step, max_step, first_step)
         if order is not None and order not in ORDERS:
             raise InvalidArgument(f"Radau: order must be 5, 9 or 13, got {order!r}.")
-        self.order = order or (5 if step is not None else 13 if max(self.rtol, self.atol) < TIGHT else 9)
+        self.order = int(order or 0) or (5 if step is not None else 13 if max(self.rtol, self.atol) < TIGHT else 9)
         self.embedded_order = self.coupled = (self.order + 1) // 2
 
     def __repr__(self) -> str:

@@ -103,6 +103,32 @@ def test_another_ensemble_is_refused(tmp_path):
         ts.ensemble(scene, {"top.mass": MASSES}, SPAN, store=tmp_path / "none" / "study.h5")
 
 
+@pytest.mark.parametrize("column", ["q", "status", "reached", "parameter top.mass"])
+@pytest.mark.parametrize("damage", ["lost", "overwritten"])
+def test_a_damaged_store_is_refused_though_nothing_is_left_to_do(column, damage, tmp_path):
+    """A chunk that isn't there is nan to Zarr: all cases were said to have succeeded."""
+    scene, path = top.build(), tmp_path / "study.zarr"
+    ts.ensemble(scene, {"top.mass": MASSES}, SPAN, store=path)
+    chunk = next(each for each in (path / column / "c").rglob("*") if each.is_file())
+    chunk.unlink() if damage == "lost" else chunk.write_bytes(b"xx")
+    with pytest.raises(ts.StorageError, match="damaged"):
+        ts.ensemble(scene, {"top.mass": MASSES}, SPAN, store=path, resume=True)
+
+
+def test_cases_that_have_all_failed_are_no_damage(tmp_path):
+    scene, path = top.build(), tmp_path / "study.zarr"
+    for resume in (False, True):
+        found = ts.ensemble(scene, {"top.mass": -MASSES}, SPAN, store=path, resume=resume)
+        assert not found.success.any()
+
+
+@pytest.mark.parametrize("suffix", ["h5", "zarr"])
+def test_a_store_is_no_ensemble_to_load(suffix, tmp_path):
+    ts.ensemble(top.build(), {"top.mass": MASSES}, SPAN, store=tmp_path / f"study.{suffix}")
+    with pytest.raises(ts.StorageError, match="resume=True"):
+        ts.load(tmp_path / f"study.{suffix}")
+
+
 def test_all_cases_may_fail(tmp_path):
     found = ts.ensemble(top.build(), {"top.mass": [-1.0, -2.0]}, SPAN, store=tmp_path / "study.h5", keep=lambda s: 1.0)
     assert not found.success.any()

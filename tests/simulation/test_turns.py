@@ -17,7 +17,7 @@ END = 2.0  # s: Taylor, Radau, and so on, five or more segments
 
 
 def level(t, state):
-    return state.q[2] + 0.5
+    return state.q[2] + 0.45
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -177,6 +177,18 @@ def test_joints_whose_coordinates_are_those_of_bodies(kind):
     np.testing.assert_allclose(-np.linalg.solve(linear.M, linear.K), expected, atol=CLOSE * np.abs(expected).max())
 
 
+def test_components_of_a_force_that_joints_take_up():
+    """The force as a whole has a column for each; one alone is refused if it does no work."""
+    scene = pendulums([0.0])
+    push = scene.add(F.PointForce(scene.bodies[0], force=(1.0, 2.0, 3.0), name="push"))
+    whole = scene.linearise(inputs=[push]).state_space().B
+    np.testing.assert_allclose(whole[:, :1], scene.linearise(inputs=["push.x"]).state_space().B, rtol=HELD)
+    assert np.abs(whole[:, 0]).max() > 0.0
+    assert np.abs(whole[:, 1:]).max() <= HELD * np.abs(whole).max()
+    with pytest.raises(ts.InvalidArgument, match=r"push\.y does no work"):
+        scene.linearise(inputs=["push.y"])
+
+
 def test_what_has_no_linearisation_is_refused_by_name():
     scene = pendulums([0.0, 0.0])
     with pytest.raises(ts.InvalidArgument, match="sequence"):

@@ -224,6 +224,19 @@ def test_steps_follow_the_tolerance_down_to_the_limit_of_rounding():
     assert I.Taylor(1e-12).refined == 0 < I.Taylor(9e-13).refined
 
 
+@pytest.mark.parametrize("stiffness", [1e4, 1e6, 1e8, 1e10])
+@pytest.mark.parametrize("tol", [1e-6, 1e-9])
+def test_velocities_of_hard_springs_keep_to_the_tolerance(stiffness, tol):
+    """Eight periods: orders fell, and errors of velocities rose to thousands of tolerances, in ten times the steps."""
+    rate, scene = np.sqrt(stiffness), ts.Scene(gravity=(0.0, 0.0, -9.81))
+    mass = scene.add_point_mass(1.0, (0.0, 0.0, 1.0))
+    scene.add(F.Spring(mass, scene.ground, stiffness=stiffness))
+    solution = ts.simulate(scene, (0.0, 50.0 / rate), integrator=I.Taylor(tol))
+    assert solution.velocity(mass)[-1, 2] == pytest.approx(-9.81 / rate * np.sin(50.0), abs=2.0 * tol)
+    assert solution.position(mass)[-1, 2] == pytest.approx(1.0 - 9.81 / stiffness * (1.0 - np.cos(50.0)), abs=tol)
+    assert solution.stats.steps < 16
+
+
 def test_no_tolerance_is_so_loose_that_fast_modes_grow():
     """At 10 the chain used to flail, in twice the steps."""
     counts = []
@@ -276,8 +289,8 @@ def test_an_implicit_method_is_considered_again_at_times_of_the_motion_alone(sli
     own = turns.Turns._to_implicit
     monkeypatch.setattr(turns.Turns, "_to_implicit", lambda self, *given: asked.append(given[1]) or own(self, *given))
     ts.simulate(mounted(1e6), (0.0, 1.0), rtol=1e-6, atol=1e-6, max_steps=3000)
-    assert len(asked) == 4
-    assert [later / before for before, later in pairwise(asked)] == [4.0, 4.0, 4.0]
+    assert len(asked) == 5
+    assert [later / before for before, later in pairwise(asked)] == [4.0, 4.0, 4.0, 4.0]
 
 
 @pytest.mark.slow

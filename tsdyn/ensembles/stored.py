@@ -23,7 +23,7 @@ from .tolerances import FLUSH, WAITING
 
 GO_ON = "Free space there, and go on: resume=True."
 
-CASE, DIGEST = "case", "ensemble"
+CASE, DIGEST, PARAMETER = "case", "ensemble", "parameter "
 
 
 class StoredResults:
@@ -68,7 +68,11 @@ class StoredResults:
             )
         if callable(self.study.keep) and not any(map(_is_kept, self._format.names(self.path))):
             return 0
-        return self._format.count(self.path, [CASE, "status", "q", "qd"])
+        count = self._format.count(self.path, [CASE, "status", "q", "qd"])
+        if count == self.study.cases.count:  # others are looked at when they are gone on with
+            names = [name for name in self._format.names(self.path) if _is_kept(name) or name.startswith(PARAMETER)]
+            self._format.demand_whole(self.path, [CASE, "status", "reached", "q", "qd", *names], count)
+        return count
 
     def __getstate__(self):
         """Leave out the format, a module."""
@@ -244,7 +248,7 @@ def _said(text, units):
 
 def _column(name):
     """The name of a parameter's column; a slash would make a group of it."""
-    return f"parameter {name}".replace("/", "|")
+    return f"{PARAMETER}{name}".replace("/", "|")
 
 
 def digest_of(study):

@@ -25,7 +25,7 @@ from ..rows.interface import (
     selection_serves,
 )
 from .chart_coordinates import factorise_normal, turned_most
-from .tolerances import CONTRACTION_LIMIT, ROUNDING, SAME, TINY, TURN_LIMIT, TURN_SHARE
+from .tolerances import CONTRACTION_LIMIT, NO_SIZE, ROUNDING, SAME, TINY, TURN_LIMIT, TURN_SHARE
 
 # reasons to leave a chart, as stored; REASONS names them
 STAY, BY_CONTRACTION, BY_TURN, BY_INTERVAL, BY_FAILURE, AT_START, BY_SERIES = range(7)
@@ -38,6 +38,12 @@ REASONS = (
     "start",
     "step of a series",
 )
+
+
+@kernel
+def extent(w):
+    """How large the scene is, m."""
+    return max(w.control.floor / ROUNDING, NO_SIZE if w.control.size == 0.0 else 0.0)
 
 
 @kernel

@@ -5,6 +5,9 @@
 # of these numbers, each rounded by 1.1e-16: 4e-16 as a random walk, 1.3e-15 at worst.
 ROUNDING = 1e-15
 
+# m: size of a scene at least, where no constraint has one, for what counts as hardly moved.
+NO_SIZE = 0.01
+
 # Share of the rounding of Phi above which a residual is corrected: sums over steps walk. Corrections of less would move
 # bodies by the rounding of Phi itself in every step, and energy with them.
 WALK = 0.5

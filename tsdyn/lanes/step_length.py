@@ -47,6 +47,13 @@ def _radii(c, least, most, far, fast):
     return choose(below(0.5, finite), rho, -math.inf), lower
 
 
+@kernel
+def _held(h, rate, k):
+    """As of taylor/step_length.py; h as log2."""
+    share = binary_log(STIFF_RATES * rate / k) + h
+    return binary_power(choose(below(share, 0.0), h + 2.0 * share / k, h))
+
+
 @long_kernel
 def propose(c, least, most):
     """Set H and NEXT of each lane; least and most are the least and the highest TOP."""
@@ -54,12 +61,9 @@ def propose(c, least, most):
     far, fast, rate = weights(c)
     rho, lower = _radii(c, least, most, far, fast)
     accuracy = math.log(n.atol + n.rtol) / math.log(2.0)
-    h = rho + accuracy / (top + 2.0)
-    share = binary_log(STIFF_RATES * rate / (top + 2.0)) + h
-    h = binary_power(choose(below(share, 0.0), h + share / (top + 2.0), h))
-    h = choose(below(-math.inf, rho), h, NO_STEP)
+    h = choose(below(-math.inf, rho), _held(rho + accuracy / (top + 2.0), rate, top + 2.0), NO_STEP)
     if order.highest > order.lowest:
-        other = binary_power(lower + accuracy / top)
+        other = _held(lower + accuracy / top, rate, top)
         rises = below(other * (top + STEP_COST), h * (top + (STEP_COST - 2.0)))
         step = choose(rises, 1.0, -1.0 + 0.0 * top)
         let(s, NEXT, min(max(top + step, float(order.lowest)), float(order.highest)))

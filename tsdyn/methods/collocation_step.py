@@ -27,22 +27,21 @@ from .tolerances import (
     COUPLED_ITERATIONS,
     DIVERGING,
     FIXED_ITERATIONS,
-    GUESS,
     KAPPA,
     KAPPA_COUPLED,
-    LEAST_COUPLED,
     MATRICES,
     RESIDUAL_FLOOR,
     SAME_STEP,
     SAME_TIME,
     SLOW_COUPLED,
     TOO_FAR,
+    TRUSTED,
 )
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
 # start, step and chart of the last attempt; the step before, 0 if unknown; points of predictions; step of the matrices,
-# 0 if there are none; contraction of the last step, 0 if unknown; 1 where stiffness is to be renewed; how many
-T_LAST, H_LAST, CHART_LAST, H_BEFORE, POINTS, MADE_FOR, RATE, RENEW, OWN = range(9)
+# 0 if there are none; 1 where stiffness is to be renewed; how many
+T_LAST, H_LAST, CHART_LAST, H_BEFORE, POINTS, MADE_FOR, RENEW, OWN = range(8)
 
 call_take = caller("pi")
 call_balance = caller("pip")
@@ -202,7 +201,7 @@ def _iterate(context, c, r, own, t, h):
     kappa = KAPPA_COUPLED if adaptive else KAPPA
     for e in range(n):
         moved[e] = zeros[e] = 0.0
-    before, theta, renewals, fresh = math.inf, 0.0, 0, False
+    before, theta, rate, renewals, fresh, newest = math.inf, 0.0, 1.0, 0, False, False
     level = -1 if abs(h - own[MADE_FOR]) <= SAME_STEP * h else 0
     if own[RENEW] > 0.0 or own[MADE_FOR] == 0.0 or numbers.known == 0:
         level = 1
@@ -211,7 +210,7 @@ def _iterate(context, c, r, own, t, h):
         status = _sweep(context, c, r, own, t, h, level)
         if status != 0:
             return status
-        fresh = fresh or level > 0
+        fresh, newest = fresh or level > 0, newest or level > 1
         if level >= 0:
             before, renewals = math.inf, renewals + 1
         level = -1
@@ -220,17 +219,16 @@ def _iterate(context, c, r, own, t, h):
             return STAGE_FAILED
         for e in range(n):
             moved[e] += s.e[e]
-        rate = own[RATE] if 0.0 < own[RATE] <= DIVERGING else GUESS
         if before < math.inf:
             rate = size / before
             theta = max(theta, rate)
-            if size > floor and (rate > DIVERGING or size * rate**left > kappa * (1.0 - rate)):
+            late = rate > DIVERGING or size * rate**left > kappa * (1.0 - rate)
+            if size > floor and (late or (rate > TRUSTED and not newest)):
                 if renewals == MATRICES:
                     return STAGE_FAILED
                 level = 2 if fresh else 1
-        if size <= floor or (level < 0 and size * rate <= kappa * (1.0 - rate)):
-            if theta > 0.0:
-                own[RATE] = max(theta, LEAST_COUPLED)
+        # small corrections say nothing by themselves: where stiffness has gone, old matrices make them so
+        if size <= floor or (before < math.inf and level < 0 and size * rate <= kappa * (1.0 - rate)):
             own[RENEW] = 1.0 if theta > SLOW_COUPLED else 0.0
             if adaptive and not call_norm(l.kernels.distance, context, moved, zeros, l.now, 1.0, 1.0) < TOO_FAR:
                 return STAGE_FAILED

@@ -178,6 +178,7 @@ def _solve_stage(context, c, r, i, t, g):
     before, theta, measured, trusted, first, second = math.inf, GUESS, False, True, 0.0, math.inf
     slow, apart, stuck, renewed = 0, 0, False, False
     eager, sparse = l.numbers.eager > 0, l.numbers.every_chart == 1
+    is_last = i + 1 == int(r.tableau[0])  # its contraction is measured: stiffness that has gone makes corrections small
     # what stages of fixed steps leave adds up over thousands of steps
     limit, kappa = (SLOW_SPARSE, KAPPA_SPARSE) if sparse and r.numbers.adaptive == 1 else (SLOW, KAPPA)
     l.numbers.eager -= 1
@@ -218,7 +219,7 @@ def _solve_stage(context, c, r, i, t, g):
         left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
         if trusted and not measured:
             left = min(left, _expected(l.numbers, size, r.numbers.adaptive == 1))
-        if size <= floor or stuck or left <= kappa:
+        if size <= floor or stuck or (left <= kappa and (measured or not is_last)):
             _learn(l.numbers, first, second, renewed)
             _set_stage(g, k, known, xs, ys)
             return 0 if _is_near(context, c, g, k, guess, f, dx) else STAGE_FAILED

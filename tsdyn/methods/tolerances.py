@@ -70,9 +70,9 @@ TOO_FAR = 0.1
 FIXED_TOL = 1e-13
 
 # --- collocation methods: all stages at once (collocation_step.py) ---
-# Corrections at most; error norm that the iteration may leave; the least contraction that is remembered for the next
-# step's first correction; contraction from which the next step has new matrices.
-COUPLED_ITERATIONS, KAPPA_COUPLED, LEAST_COUPLED, SLOW_COUPLED = 12, 3e-3, 1e-3, 0.1
+# Corrections at most; error norm that the iteration may leave; contraction from which the next step has new matrices,
+# and from which stages don't count as solved before matrices have had new derivatives.
+COUPLED_ITERATIONS, KAPPA_COUPLED, SLOW_COUPLED, TRUSTED = 12, 3e-3, 0.1, 0.3
 
 # Relative change of the step up to which matrices are kept.
 SAME_STEP = 0.02

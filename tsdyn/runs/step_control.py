@@ -2,6 +2,7 @@
 
 import math
 
+from ..formulations.chart_validity import extent
 from ..jit.kernels import kernel
 from ..methods.diagonally_implicit import call_soften
 from ..methods.explicit import call_error, call_norm
@@ -13,6 +14,7 @@ from .tolerances import (
     FIRST_PART,
     FROM_ZERO,
     GROW,
+    HARDLY,
     LEAST_BEFORE,
     LEAST_ERROR,
     MILD_STEPS,
@@ -27,6 +29,7 @@ from .tolerances import (
     SHORTEST,
     SHRINK,
     STIFF_STEPS,
+    STILL_STEPS,
     STRETCH,
     TOO_SMALL,
     TRIAL,
@@ -123,8 +126,8 @@ def accept(context, l, r, h):
 
 
 @kernel
-def watch_stiffness(r, h):
-    """Whether the motion has just been found stiff: many steps at the method's limit of stability.
+def watch_stiffness(bodies, w, r, h):
+    """Whether the motion has just been found stiff: many steps at the method's limit of stability, or too many.
 
     h |lambda| from the last stage and the step's end, both at the same time (Hairer, Wanner, Solving ODEs II, IV.2).
     """
@@ -134,14 +137,35 @@ def watch_stiffness(r, h):
         speed, rate = r.memory[at + c] - r.y[c], r.memory[at + n + c] - r.yd[c]
         speeds += speed * speed
         rates += rate * rate
+    found = False
     if h * h * rates > limit * limit * speeds:
         r.numbers.at_limit += 1
         r.numbers.below_limit = 0
-        if r.numbers.at_limit == STIFF_STEPS:
-            r.numbers.stiff = 1
-            return True
+        found = r.numbers.at_limit == STIFF_STEPS
     elif r.numbers.at_limit > 0:
         r.numbers.below_limit += 1
         if r.numbers.below_limit == MILD_STEPS:
             r.numbers.at_limit = 0
-    return False
+    if r.numbers.leave_when_stiff == 1 and h < AT_LONGEST * r.clock.max_step:
+        r.numbers.still = r.numbers.still + 1 if _hardly_moves(bodies, w, h) else 0
+        if r.numbers.still == STILL_STEPS:
+            r.numbers.at_limit = max(r.numbers.at_limit, 1)
+            found = True
+    if found:
+        r.numbers.stiff = 1
+    return found
+
+
+@kernel
+def _hardly_moves(bodies, w, h):
+    """Whether nothing turns or moves by more than HARDLY in a step of h."""
+    far = HARDLY * extent(w) / h
+    for b in range(bodies.shape[0]):
+        at = bodies[b, 0]
+        for c in range(3):
+            if abs(w.qd[at + c]) > far:
+                return False
+        for c in range(3, bodies[b, 1]):
+            if 2.0 * abs(w.qd[at + c]) * h > HARDLY:
+                return False
+    return True

@@ -273,14 +273,14 @@ def advance(context, run, log, most):
         note_accepted(r, log)
         if adaptive and t1 == stop and h < CUT_SHORT * wanted:
             r.clock.h, r.clock.error_before = max(r.clock.h, wanted), before
-        leave = r.numbers.last_stage > 0 and watch_stiffness(r, h) and r.numbers.leave_when_stiff == 1
+        stiff = r.numbers.last_stage > 0 and watch_stiffness(c.system.bodies, c.work, r, h)
         _move_on(c, r, t1, cut, implicit)
         status = _finish(context, run, c, r, log, t0, last, reason)
         if status == 0 and t1 == stop:
             if is_sampled(r, log, t1):
                 break
             status = _cross_stop(context, c, r, log, implicit)
-        if leave:
+        if stiff and r.numbers.leave_when_stiff == 1:
             break
     if status != 0:
         return status

@@ -53,6 +53,9 @@ HALVED, QUARTERED = 0.5, 0.25
 # Steps at the limit of stability until a motion is called stiff; below it until they are forgotten: Solving ODEs II,
 # IV.2, takes 15 and 6.
 STIFF_STEPS, MILD_STEPS = 15, 6
+# rad, and part of the scene's size: so many steps in a row in which nothing turns or moves by more are many for what
+# can be seen: the default method tries an implicit one. Rounding and chattering friction don't show as h |lambda|.
+HARDLY, STILL_STEPS = 0.002, 40
 
 # --- charts ----------------------------------------------------------------------------------------------------------
 # |d| of all bodies, the sine of half the turn since q0: a step that turns bodies by less (11 degrees) is no long one,

@@ -85,8 +85,14 @@ def resume(
 def ended_run(path: Place, scene: Scene | None) -> Solution:
     """Return the solution of a store whose run has ended; raises StorageError that names the call for any other."""
     from ..storage import checkpoint
+    from ..storage.formats import format_of
 
     if not any(place.exists() for place in checkpoint.place(path)):
+        if "ensemble" in format_of(path).attributes(path):
+            raise StorageError(
+                f"{path} is the store of an ensemble. The call of ts.ensemble that made it, with resume=True, reads it "
+                "and goes on with it; ensemble.save(path) writes an ensemble as a whole."
+            )
         raise StorageError(
             f"{path} is the store of a run and has no checkpoint: it holds outputs, not what a solution needs beside "
             "them. Read the outputs by xarray (xarray.open_zarr, or xarray.open_dataset with engine='h5netcdf'), or "

@@ -148,12 +148,8 @@ def _demand_held(frame):
 
 def _refuse(descent):
     """Say why none was found."""
-    gains, spins = (np.linalg.norm(each, axis=1) for each in descent.rest.gains)
-    turning = np.zeros(len(gains))
-    turning[descent.frame.metric.rigid] = descent.reach * spins
-    body = descent.packed.bodies[int((gains + turning).argmax())]
     raise NoEquilibrium(
-        f"no equilibrium was found in {descent.steps} steps and {descent.gone:.3g} m of way: {body.name} accelerates "
-        f"by {gains.max():.3g} m/s^2 still. If nothing holds it, add a constraint or a spring; if a load drives it on, "
+        f"no equilibrium was found in {descent.steps} steps and {descent.gone:.3g} m of way: {descent.rest.fastest}. "
+        "If nothing holds it, add a constraint or a spring; if a load drives it on, "
         "there is none; otherwise start nearer, with guess=."
     )

@@ -28,6 +28,7 @@ class Input(NamedTuple):
     name: str
     columns: np.ndarray  # of q
     load: np.ndarray  # generalised force, N or N m
+    whole: str = ""  # the load of which it is a component, where all of them were asked for
 
 
 def inputs_of(scene, variations, given):
@@ -38,17 +39,20 @@ def inputs_of(scene, variations, given):
         if not same:
             item, axis = item_of(scene, one, [*scene.forces, *scene.constraints], "force or joint")
             same = [load for load in _loads_of(variations, item) if axis is None or load.name.endswith(axis)]
+            same = [load._replace(whole=item.name) for load in same] if len(same) > 1 else same
         found += same
     return found
 
 
 def demand_effective(inputs, F):
-    """Refuse inputs that constraints take up: columns of F (k, inputs) that are zero."""
-    for one, column in zip(inputs, F.T, strict=True):
-        if np.abs(column).max(initial=0.0) <= NO_EFFECT * np.abs(one.load).max(initial=0.0):
+    """Refuse inputs that constraints take up: columns of F (k, inputs) that are zero, but for some of a vector's."""
+    works = np.abs(F).max(axis=0, initial=0.0) > [NO_EFFECT * np.abs(one.load).max(initial=0.0) for one in inputs]
+    vectors = {one.whole for one, moves in zip(inputs, works, strict=True) if moves}
+    for one, moves in zip(inputs, works, strict=True):
+        if not moves and not (one.whole and one.whole in vectors):
             raise InvalidArgument(
-                f"the input {one.name} does no work on any motion that the constraints admit, as one along a "
-                "coordinate that a motor drives. Replace the motor by a JointTorque or JointForce."
+                f"the input {one.whole or one.name} does no work on any motion that the constraints admit. Where a "
+                "motor drives its coordinate, replace the motor by a JointTorque or JointForce."
             )
 
 

@@ -143,9 +143,7 @@ def demand_admitted(scene, rates, qd):
 
 
 def _refuse(descent):
-    gains = np.linalg.norm(descent.rest.gains[0], axis=1)
-    body = descent.packed.bodies[int(gains.argmax())]
     raise NoEquilibrium(
-        f"no steady motion with this spin was found in {descent.steps} steps: {body.name} accelerates by "
-        f"{gains.max():.3g} m/s^2 still in the turning axes. Start nearer, with guess=, or change the rate."
+        f"no steady motion with this spin was found in {descent.steps} steps: {descent.rest.fastest} in the "
+        "turning axes. Start nearer, with guess=, or change the rate."
     )

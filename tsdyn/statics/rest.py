@@ -117,6 +117,17 @@ class Rest:
         """Accelerations (b, 3), m/s^2, and of turns (b', 3), rad/s^2, by what is left, on bodies without joints."""
         return self.frame.increments.accelerations(self.left)
 
+    @property
+    def fastest(self):
+        """The body that accelerates most by what is left, and how much: for messages."""
+        shifts, spins = (np.linalg.norm(each, axis=1) for each in self.gains)
+        turns = np.zeros(len(shifts))
+        turns[self.frame.metric.rigid] = spins
+        worst = int((shifts + self.frame.reach * turns).argmax())
+        shift, turn = shifts[worst], turns[worst]
+        much = f"{shift:.3g} m/s^2" if shift >= self.frame.reach * turn else f"{turn:.3g} rad/s^2"
+        return f"without its joints {self.frame.packed.bodies[worst].name} would accelerate by {much}"
+
     def _largest(self, load):
         shifts, turns = self.frame.increments.accelerations(load)
         return max(np.abs(shifts).max(initial=0.0), self.frame.reach * np.abs(turns).max(initial=0.0))

@@ -14,6 +14,7 @@ BUFFER, how many floats are gathered before they are written, and functions for 
 
     read(path, column, part)                   a slice of a column
     count(path, columns)                       rows that all of these columns have
+    demand_whole(path, columns, count)         raises StorageError unless so many rows can be read of each
 
 and for what is written at once, beside the tables
 

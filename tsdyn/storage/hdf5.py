@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from ..errors import StorageError
-from .formats import CHUNK, demand_rows, reading
+from .formats import CHUNK, LONGEST, demand_rows, reading
 from .write_errors import code_of
 
 BUFFER = CHUNK
@@ -130,6 +130,15 @@ def count(path, columns):
     """As formats.py says."""
     with reading(path), _opened(path) as file:
         return min(len(file[column]) for column in columns)
+
+
+def demand_whole(path, columns, count):
+    """As formats.py says."""
+    with reading(path), _opened(path) as file:
+        for column in columns:
+            demand_rows(path, column, len(file[column]), count)
+            for at in range(0, count, LONGEST):
+                _ = file[column][at : at + LONGEST]
 
 
 def put(path, group, arrays):

@@ -62,18 +62,25 @@ def weights(c, r):
 
 
 @kernel
+def _held(h, rate, k):
+    """A step h whose error is term k, or a shorter one, so that rates are held to the tolerance, too.
+
+    share: of what the error of rates, that of places over h / k, may be; squared, since short steps are many.
+    """
+    share = STIFF_RATES * rate * h / k
+    return h * share ** (2.0 / k) if share < 1.0 else h
+
+
+@kernel
 def step_length(c, r):
-    """h = rho tol^(1 / (top + 2)); and the order of the next step, that with the longer step for the work."""
+    """h = rho tol^(1 / (top + 2)), at most; and the order of the next step, that with the longer step for the work."""
     x, nb = c.expansion, c.graph.bodies.shape[0]
     top, orders = x.order.top, x.order.room
     tol = r.clock.atol + r.clock.rtol
     far, fast, rate = weights(c, r)
-    h = radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2))
-    share = STIFF_RATES * rate * h / (top + 2)  # of what the error of rates, that of places over h / (top + 2), may be
-    if share < 1.0:
-        h *= share ** (1.0 / (top + 2))
+    h = _held(radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2)), rate, top + 2)
     if x.order.highest > x.order.lowest:
-        lower = radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top)
+        lower = _held(radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top), rate, top)
         change = 1 if h * (top + STEP_COST - 2) > lower * (top + STEP_COST) else -1
         x.order.next = min(max(top + change, x.order.lowest), x.order.highest)
     return h

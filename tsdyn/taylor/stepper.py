@@ -7,7 +7,7 @@ end reached), and taken or tried again with another length: the same series serv
 
 from ..elements.loops.body_poses import OMEGA, POSE, RD
 from ..errors import Status
-from ..formulations.chart_validity import AT_START, BY_SERIES, ROUNDING
+from ..formulations.chart_validity import AT_START, BY_SERIES, extent
 from ..jit.kernels import entry, kernel, long_kernel
 from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import remember
@@ -102,7 +102,7 @@ def _mind_singular(c, r):
 @kernel
 def _watch_stiffness(c, r, h):
     """Return True if the motion has just been found stiff: many steps in which nothing rotates or moves far."""
-    far, p, most = c.work.control.floor / (ROUNDING * h), c.tangent.poses, 0.0
+    far, p, most = extent(c.work) / h, c.tangent.poses, 0.0
     for b in range(c.graph.bodies.shape[0]):
         at = b * POSE
         for i in range(3):

@@ -59,6 +59,7 @@ class Numbers(Record):
     stage_at: int  # where in memory an implicit method leaves its last stage; 0 for others
     at_limit: int  # steps at the limit of stability, or in which little moves
     below_limit: int
+    still: int  # steps of a stage method in which hardly anything moves
     stiff: int
 
 

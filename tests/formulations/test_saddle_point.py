@@ -163,7 +163,7 @@ def test_the_motion_is_that_of_the_null_space_form(make, end):
 @pytest.mark.slow_but("SDIRK54")
 @pytest.mark.parametrize("method", [SDIRK54, ImplicitTrapezoid], **by_name)
 def test_iterations_and_memory_of_a_stiff_chain(method):
-    """In a transient hardly more than one correction a stage, few matrices, and memory in proportion to the bodies.
+    """In a transient hardly more than one correction a stage, two at the last, few matrices, memory as of the bodies.
 
     Factors of S are made at the ends of steps, those of N there, too, and with iteration matrices.
     """
@@ -172,7 +172,7 @@ def test_iterations_and_memory_of_a_stiff_chain(method):
         scene = chain(links)
         stats = ts.simulate(scene, (0.0, 0.1), integrator=method(1e-4, 1e-4)).raise_if_failed().stats
         tried = stats.steps + stats.rejected
-        assert stats.stage_iterations <= 1.2 * (len(method.tableau.c) - 1) * tried
+        assert stats.stage_iterations <= (1.2 * (len(method.tableau.c) - 2) + 2) * tried
         assert stats.iteration_matrices < 0.7 * tried
         assert stats.factorizations - stats.iteration_matrices < 3 * tried
         assert stats.jacobians == 1

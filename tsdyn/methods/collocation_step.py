@@ -34,6 +34,7 @@ from .tolerances import (
     SAME_STEP,
     SAME_TIME,
     SLOW_COUPLED,
+    STALLED,
     TOO_FAR,
     TRUSTED,
 )
@@ -197,8 +198,8 @@ def _iterate(context, c, r, own, t, h):
     """Newton's method for the stages, predicted on entry. Status."""
     l, s, n, numbers = c.linear, c.saddle, r.x.size, c.linear.numbers
     moved, zeros, adaptive = r.memory[_rest(r) :][:n], r.memory[_rest(r) + n :][:n], r.numbers.adaptive == 1
-    floor = RESIDUAL_FLOOR / (numbers.rtol + numbers.atol)
-    kappa = KAPPA_COUPLED if adaptive else KAPPA
+    tol = numbers.rtol + numbers.atol
+    floor, stalled, kappa = RESIDUAL_FLOOR / tol, STALLED / tol, KAPPA_COUPLED if adaptive else KAPPA
     for e in range(n):
         moved[e] = zeros[e] = 0.0
     before, theta, rate, renewals, fresh, newest = math.inf, 0.0, 1.0, 0, False, False
@@ -221,7 +222,10 @@ def _iterate(context, c, r, own, t, h):
             moved[e] += s.e[e]
         if before < math.inf:
             rate = size / before
-            theta = max(theta, rate)
+            if rate > TRUSTED and size <= stalled:  # rounding of large forces
+                floor = stalled
+            else:
+                theta = max(theta, rate)
             late = rate > DIVERGING or size * rate**left > kappa * (1.0 - rate)
             if size > floor and (late or (rate > TRUSTED and not newest)):
                 if renewals == MATRICES:

@@ -74,5 +74,8 @@ FIXED_TOL = 1e-13
 # and from which stages don't count as solved before matrices have had new derivatives.
 COUPLED_ITERATIONS, KAPPA_COUPLED, SLOW_COUPLED, TRUSTED = 12, 3e-3, 0.1, 0.3
 
+# Corrections, relative to 1 + size, that contract no more, below which that is the rounding of large forces.
+STALLED = 2e-12
+
 # Relative change of the step up to which matrices are kept.
 SAME_STEP = 0.02

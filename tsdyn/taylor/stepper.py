@@ -17,7 +17,7 @@ from ..runs.breakpoints import is_sampled, next_stop, take_pieces
 from ..runs.outputs import record, store_now
 from ..runs.run_log import close_chart, is_full, no_log, note_accepted, open_chart
 from ..runs.step_outputs import head_block, is_wanted_before, record_end, store_block
-from ..runs.tolerances import TRIES
+from ..runs.tolerances import AT_LONGEST, TRIES
 from ..workspaces.run_state import B_DATA, load_run
 from .breakpoints import cross_stop, lower_order
 from .step_length import radius, weights
@@ -201,9 +201,9 @@ def advance_by_series(context, c, r, log, most):
         if adaptive:
             r.clock.h = t1 - t0
         leave = False
-        if t1 != stop:
+        if t1 != stop and t1 - t0 < AT_LONGEST * r.clock.max_step:
             leave = _watch_stiffness(c, r, t1 - t0)
-        elif adaptive:  # a step that is cut is no sign of stiffness
+        elif adaptive and t1 == stop:  # a step that is cut is no sign of stiffness
             _mind_stop(c, r, t1 - t0)
         if r.numbers.dense != 0:
             _fill_block(c, r, log, t0, t1)

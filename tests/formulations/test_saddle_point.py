@@ -149,14 +149,14 @@ def net(count=3):
     ],
 )
 def test_the_motion_is_that_of_the_null_space_form(make, end):
-    """Within the tolerance, on all three levels of the constraints, in as many steps."""
+    """Within the tolerance, on all three levels of the constraints, in no more steps."""
     one, two = (
         ts.simulate(make(), (0.0, end), integrator=SDIRK54(1e-7, 1e-7), formulation=form).raise_if_failed()
         for form in ("tangent", "null-space")
     )
     np.testing.assert_allclose(one.q[-1], two.q[-1], rtol=0, atol=1e-7)
     demand_on_the_manifold(one, one)
-    assert abs(one.stats.steps - two.stats.steps) <= 3 + 0.1 * two.stats.steps
+    assert one.stats.steps <= 3 + 1.1 * two.stats.steps
     assert one.stats.stage_iterations <= 1.3 * two.stats.stage_iterations  # with matrices that are kept longer
 
 

@@ -167,7 +167,7 @@ def test_singular_configurations(method, count, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("short_slices")
-@pytest.mark.parametrize("count", [2, 5, 8, 11, 14, 17])
+@pytest.mark.parametrize("count", [2, 5, 8, 11, 13, 15])
 def test_runs_that_turn_to_an_implicit_method(count, tmp_path, monkeypatch):
     """Stopped in segments of either method, of which there are five or more."""
     monkeypatch.setattr(turns, "PATIENCE", 1)

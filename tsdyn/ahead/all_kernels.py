@@ -8,6 +8,7 @@ from ..integrators import Taylor
 from ..jit import cache
 from ..jit.code_hash import is_ours
 from ..jit.compiled import DEBUG, is_declared, is_stored
+from ..rows.interface import ELIMINATION
 from .first_run import of_constraint, of_force, of_method
 from .workers import compile_ahead, name_of
 
@@ -28,6 +29,7 @@ def compile_kernels(everything=False):
 
 
 def _default():
+    yield from ELIMINATION
     form = FORMULATIONS["tangent"]
     for rough in (False, True):
         yield from of_method(Taylor(1e-8), form, True, rough=rough)

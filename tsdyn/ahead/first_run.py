@@ -8,6 +8,7 @@ from ..jit.compiled import DEBUG
 from ..methods.plug_in import called_for
 from ..motions import program, state_program
 from ..motions.signals import Signal
+from ..rows.interface import ELIMINATION
 from ..runs.arguments import adaptive
 from ..runs.stepper import advance
 from ..taylor import step_parts
@@ -39,6 +40,8 @@ def prepare_first_run(scene, method, form, within, default):
 def of_scene(scene, method, form, far):
     """The kernels of constraints and forces."""
     series, implicit = isinstance(method, Taylor), method.implicit
+    if implicit or sum(one.rows for one in scene.primitives if not one.normalises) > 1:
+        yield from ELIMINATION
     for kind, moving in _kinds(scene).items():
         yield from of_constraint(kind, moving, series, far, implicit)
     if series and any(force.sharp or _moves(force) for force in scene.forces):

@@ -15,7 +15,7 @@ from ..sparse.constraint_graph import (
     WEIGHTS,
     WELDS,
 )
-from ..sparse.factorisation import factor_lu, solve_lu
+from ..sparse.elimination import factor_lu, solve_lu
 from .axis_rows import leave_axes_out, multiply_axes_both
 from .redundant_rows import set_redundant_diagonal
 from .schur_complement import inner, inner_both, more

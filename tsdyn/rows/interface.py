@@ -27,9 +27,12 @@ Ask:
     mark_redundant, self_stress                               of redundant rows
     singularity_indicator, is_near_singular, refinements      of the distance to a singular configuration
 
+ELIMINATION are the kernels that factorise and solve.
+
 Right-hand sides and multipliers are in the order of the graph; `ConstraintGraph.row` names the rows of Phi.
 """
 
+from ..sparse.elimination import KERNELS as ELIMINATION
 from .axis_rows import add_axis_multipliers, is_axis
 from .chart_matrix import factorise_chart_matrix, factorise_product, pivot_loss, rotate_rate, solve_product
 from .evaluation import (
@@ -105,6 +108,7 @@ from .tolerances import ILL_CONDITIONED, MOST_ROWS
 
 __all__ = [
     "DYNAMICS",
+    "ELIMINATION",
     "ILL_CONDITIONED",
     "METRIC",
     "MOST_ROWS",

@@ -14,7 +14,7 @@ from ..sparse.constraint_graph import (
     WEIGHTS,
     WELD_ROWS,
 )
-from ..sparse.factorisation import factor, solve
+from ..sparse.elimination import factor, solve
 from .axis_rows import gather_axes, leave_axes_out, multiply_axes, weigh_axes
 from .redundant_rows import set_redundant_diagonal
 from .tolerances import ZERO_PIVOT

@@ -89,7 +89,7 @@ def _move(part, store, i, out):
     return i + part.size
 
 
-@kernel
+@long_kernel
 def _warm(c, store, out):
     w, l, f, friction, i = c.work, c.chart, c.tangent, c.tangent.friction, 0
     for part in (w.u, w.v, friction.lam, friction.load):

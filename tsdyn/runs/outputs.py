@@ -1,11 +1,11 @@
 """Outputs of a driver: the records of accepted states."""
 
-from ..jit.kernels import kernel
+from ..jit.kernels import long_kernel
 from ..maths.dense_linalg import copy
 from ..model.joint_turns import angle_after
 
 
-@kernel
+@long_kernel
 def record(r, log, t, q, qd, qdd):
     """Record one output, at the last accepted state or inside the step."""
     n, i = q.size, r.numbers.rows
@@ -21,7 +21,7 @@ def record(r, log, t, q, qd, qdd):
     r.numbers.rows = i + 1
 
 
-@kernel
+@long_kernel
 def store_now(w, r):
     """q, qd, qdd as those of the last accepted point."""
     copy(w.q, r.now[0])
@@ -29,7 +29,7 @@ def store_now(w, r):
     copy(w.qdd, r.now[2])
 
 
-@kernel
+@long_kernel
 def restore_now(w, r):
     """Put them back."""
     copy(r.now[0], w.q)

@@ -34,15 +34,22 @@ def factor(pattern, values, limit):
 
     Returns -1, or the row of the eliminated vector where elimination leaves less than `limit` of a diagonal entry.
     """
-    kept = values[pattern.shape[1] :]
     if pattern.shape[0] == 1:
-        keep_diagonal(pattern, values)
-        return eliminate(values, 1, 1, 1, kept, limit)
-    return _factor_blocks(pattern, values, kept, limit)
+        return factor_row(pattern, values, limit)
+    return factor_blocks(pattern, values, limit)
+
+
+@kernel
+def factor_row(pattern, values, limit):
+    """Factor a matrix of one row."""
+    keep_diagonal(pattern, values)
+    return eliminate(values, 1, 1, 1, values[pattern.shape[1] :], limit)
 
 
 @long_kernel
-def _factor_blocks(pattern, values, kept, limit):
+def factor_blocks(pattern, values, limit):
+    """Factor a matrix block by block."""
+    kept = values[pattern.shape[1] :]
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     keep_diagonal(pattern, values)
     for j in range(heads.size):
@@ -97,15 +104,23 @@ def factor_lu(pattern, lower, upper, limit):
     Returns -1, or the row of the eliminated vector where elimination leaves less than `limit` of a diagonal entry's
     size, or a number that is not finite.
     """
-    kept = upper[pattern.shape[1] :]
     if pattern.shape[0] == 1:
-        kept[0] = upper[0]
-        return eliminate_lu(lower, upper, 1, 1, 1, kept, limit)
-    return _factor_lu_blocks(pattern, lower, upper, kept, limit)
+        return factor_lu_row(pattern, lower, upper, limit)
+    return factor_lu_blocks(pattern, lower, upper, limit)
+
+
+@kernel
+def factor_lu_row(pattern, lower, upper, limit):
+    """Factor a matrix of one row."""
+    kept = upper[pattern.shape[1] :]
+    kept[0] = upper[0]
+    return eliminate_lu(lower, upper, 1, 1, 1, kept, limit)
 
 
 @long_kernel
-def _factor_lu_blocks(pattern, lower, upper, kept, limit):
+def factor_lu_blocks(pattern, lower, upper, limit):
+    """Factor a matrix block by block."""
+    kept = upper[pattern.shape[1] :]
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     keep_diagonal(pattern, upper)
     for j in range(heads.size):
@@ -158,11 +173,12 @@ def solve_lu(pattern, lower, upper, b):
     if pattern.shape[0] == 1:
         b[0] *= lower[0]
         return
-    _solve_blocks(pattern, lower, upper, b)
+    solve_blocks(pattern, lower, upper, b)
 
 
 @long_kernel
-def _solve_blocks(pattern, lower, upper, b):
+def solve_blocks(pattern, lower, upper, b):
+    """Solve block by block."""
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     columns, segments = pattern.columns, pattern.segments
     for j in range(heads.size):

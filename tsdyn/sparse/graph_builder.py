@@ -28,6 +28,7 @@ from .constraint_graph import (
     Product,
     RowKind,
 )
+from .elimination import with_kernels
 from .massless_axes import Share, axes_of, inverses, lean_bodies
 from .symbolic import analyse
 
@@ -283,7 +284,7 @@ class _Builder:
             inverse=inverse,
             mass=mass,
             spins=spins,
-            pattern=self.pattern,
+            pattern=with_kernels(self.pattern),
             turns=self._turns(),
             normals=self.normals,
             parts=parts,

@@ -27,6 +27,7 @@ class Pattern(NamedTuple):
     updates: np.ndarray  # of each block, the first of its records, and the end
     records: np.ndarray  # sixes: row column, rows, first column, columns in its own panel; target, target's row length
     negative: np.ndarray  # rows of late nodes, whose pivots are below zero
+    kernels: np.ndarray  # (4,): addresses of elimination.KERNELS and of all this; without any until they are asked for
 
 
 def lay_out(sizes, cliques, groups):
@@ -145,7 +146,7 @@ class _Layout:
             records += self._updates(g)
             updates.append(len(records))
         shape = self.starts[-1], self.length, self.length + self.starts[-1]
-        lists = shape, self.starts, self.heads, self.widths, self.columns, self.segments, updates, records, ()
+        lists = shape, self.starts, self.heads, self.widths, self.columns, self.segments, updates, records, (), ()
         return Pattern(*(np.array(numbers, np.int64).reshape(-1) for numbers in lists))
 
 

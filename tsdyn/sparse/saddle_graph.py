@@ -17,6 +17,7 @@ from ..elements.loops.forces import kept_size
 from ..elements.loops.template import AT, DIMENSION
 from ..jit.kernels import Record, records
 from ..model.packed_forces import members_of
+from .elimination import with_kernels
 from .massless_axes import lean_bodies
 from .panels import Pattern
 from .saddle_order import GROUND, order_saddle
@@ -202,7 +203,7 @@ class _Builder:
                         target, stride, transposed = self.where(node, int(b))
                         sides[e, k] = (target + r, stride) if transposed else (target + r * stride, 1)
         return SaddleGraph(
-            self.pattern, records(Block, self.blocks), records(Instance, self.forces),
+            with_kernels(self.pattern), records(Block, self.blocks), records(Instance, self.forces),
             records(Instance, self.constraints), self.starts[: self.nb].copy(), row_at, sides, diagonal,
             records(LeanAxis, self._axes()),
         )  # fmt: skip

@@ -1,0 +1,84 @@
+"""Factorisation and solution of real matrices by kernels of their own, which all others call by address.
+
+Where it is linked in, factorisation.py is most of the code of a kernel, and the longest to compile. A pattern has the
+addresses; a matrix of one row needs none.
+"""
+
+import numpy as np
+
+from ..jit.kernels import DEBUG, callback, caller, image_of, kernel, loader, vector
+from .factorisation import factor_blocks, factor_lu_blocks, factor_lu_row, factor_row, solve_blocks
+from .symbolic import analyse
+
+FACTOR, FACTOR_LU, SOLVE = "ppd", "pppd", "pppp"
+_load_pattern = loader(analyse([], [])[1])
+_call_factor, _call_factor_lu, _call_solve = caller(FACTOR), caller(FACTOR_LU), caller(SOLVE)
+
+
+@callback(FACTOR)
+def factor_values(pattern, values, limit):
+    """Factor S in place; which row fails, or -1."""
+    p = _load_pattern(pattern)
+    return factor_blocks(p, vector(values, p.shape[2]), limit)
+
+
+@callback(FACTOR_LU)
+def factor_lu_values(pattern, lower, upper, limit):
+    """Factor N in place; which row fails, or -1."""
+    p = _load_pattern(pattern)
+    return factor_lu_blocks(p, vector(lower, p.shape[2]), vector(upper, p.shape[2]), limit)
+
+
+@callback(SOLVE)
+def solve_values(pattern, lower, upper, b):
+    """Solve N x = b, or S x = b, in place."""
+    p = _load_pattern(pattern)
+    solve_blocks(p, vector(lower, p.shape[2]), vector(upper, p.shape[2]), vector(b, p.shape[0]))
+    return 0
+
+
+KERNELS = (factor_values, factor_lu_values, solve_values)
+
+
+def with_kernels(pattern):
+    """The pattern, for the functions below, with the addresses of the kernels in this process."""
+    if DEBUG or pattern.shape[0] < 2:
+        return pattern
+    words = len(image_of(pattern))
+    whole = np.zeros(words + 4, np.int64)  # what the view `kernels` keeps alive
+    pattern = pattern._replace(kernels=whole[words:])
+    whole[:words] = image_of(pattern)
+    pattern.kernels[:] = *(kernel.address for kernel in KERNELS), whole.ctypes.data
+    return pattern
+
+
+if DEBUG:
+    from .factorisation import factor, factor_lu, solve, solve_lu
+else:
+
+    @kernel
+    def factor(pattern, values, limit):
+        """`factorisation.factor`."""
+        if pattern.shape[0] < 2:
+            return factor_row(pattern, values, limit) if pattern.shape[0] else -1
+        return _call_factor(pattern.kernels[0], pattern.kernels[3], values, limit)
+
+    @kernel
+    def factor_lu(pattern, lower, upper, limit):
+        """`factorisation.factor_lu`."""
+        if pattern.shape[0] < 2:
+            return factor_lu_row(pattern, lower, upper, limit) if pattern.shape[0] else -1
+        return _call_factor_lu(pattern.kernels[1], pattern.kernels[3], lower, upper, limit)
+
+    @kernel
+    def solve_lu(pattern, lower, upper, b):
+        """`factorisation.solve_lu`."""
+        if pattern.shape[0] > 1:
+            _call_solve(pattern.kernels[2], pattern.kernels[3], lower, upper, b)
+        elif pattern.shape[0] == 1:
+            b[0] *= lower[0]
+
+    @kernel
+    def solve(pattern, values, b):
+        """`factorisation.solve`."""
+        solve_lu(pattern, values, values, b)

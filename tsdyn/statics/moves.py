@@ -12,7 +12,7 @@ from ..model.joint_motion import all_angles, counted
 from .frame import Frame
 from .motion import Motion
 from .rest import Rest
-from .tolerances import FINAL, GOOD, HALVINGS, LEAST_SHIFT, MOST_TURN, SHORT, SHORTER, WORTH
+from .tolerances import FINAL, GOOD, HALVINGS, LEAST_SHIFT, MOST_TURN, NO_STIFFNESS, SHORT, SHORTER, WORTH
 
 
 @entry
@@ -73,6 +73,11 @@ class Moves:
     def unbalanced(self):
         """The largest acceleration from rest, m/s^2, over that of the loads by themselves."""
         return self.rest.unbalanced
+
+    def nothing(self, reduced):
+        """The stiffness, 1/s^2, that is none: rounding of its terms, and what loads left over seem to have."""
+        left = self.unbalanced * self.rest.acceleration_scale / self.reach
+        return NO_STIFFNESS * reduced.scale + len(reduced.K_hat) * left
 
     def size(self, u):
         """The largest shift, as a share of the reach, or turn, rad, of an increment."""

@@ -106,8 +106,8 @@ CLOSED, SLOWEST, MOST_SWEEPS = 1e-15, 0.7, 40
 STALLED = 1e-6
 # rad, or shares of the scene's size: ways off a saddle, tried in turn.
 KICKS = 0.1, 0.03, 0.01
-# Share of the terms of the stiffness below which a direction is neutral, and asymmetry that is no rounding.
-NEUTRAL = 1e-10
+# Share of the terms of the stiffness up to which an asymmetry is rounding.
+NEUTRAL_ASYMMETRY = 1e-10
 # Share of the loads' own accelerations up to which a configuration without positive stiffness is close to a saddle;
 # sweeps of inverse iteration to a direction down from there.
 AT_SADDLE, SWEEPS = 1e-3, 8

@@ -10,6 +10,7 @@ from ..observables.not_finite import not_finite
 from ..sparse.constraint_graphs import redundant_rows
 from ..taylor.layout import without_series
 from ..validation import counted
+from .step_limits import step_limit
 from .tolerances import BLOW_UP, MOST_SINGULAR, NEARLY_SINGULAR
 
 FEW = 3  # items named in a message
@@ -23,10 +24,11 @@ def account(solution, scene, reason, goes_on=""):
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
     steps = counted(solution.stats.steps, "step")
     where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
-    found = suspect(solution, scene)
-    remedy = Status.SINGULAR.remedy if found else solution.status.remedy
-    if solution.status == Status.INTERRUPTED and goes_on:
-        remedy = f"Continue with {goes_on}."
+    found, limit = suspect(solution, scene), step_limit(solution)
+    remedy = Status.SINGULAR.remedy if found else limit.remedy or solution.status.remedy
+    if solution.status == Status.INTERRUPTED:
+        go_on = f"Continue with {goes_on}." if goes_on else solution.status.remedy
+        remedy = " ".join(part for part in (limit.remedy, go_on) if part)
     lacking = without_series(solution.packed)[:FEW] if found else ()
     if lacking:
         remedy += f" Without a series: {'; '.join(lacking)}."
@@ -34,7 +36,7 @@ def account(solution, scene, reason, goes_on=""):
         found = _not_finite(solution)
     if not found and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
         found = _growth(solution)
-    parts = (solution.status.sentence, reason, where, found, remedy)
+    parts = (limit.sentence or solution.status.sentence, reason, where, found, remedy)
     return " ".join(part for part in parts if part)
 
 

@@ -42,6 +42,10 @@ NEARLY_SINGULAR, MOST_SINGULAR = 0.05, 600
 # Growth of the largest velocity at which a failure is put down to a motion that runs away.
 BLOW_UP = 1e4
 
+# Of the time in which forces vary: steps of a run that rounding of the forces keeps short are shorter. Changes of the
+# positions by a last digit, of random signs, by which that rounding is measured; tolerances that are CLEAR of it.
+SHORTENED, TRIALS, CLEAR = 0.1, 3, 10.0
+
 # --- energy ---
 # Of the largest kinetic energy per second: power below it is rounding.
 NO_POWER = 1e-9

@@ -46,6 +46,10 @@ BLOW_UP = 1e4
 # positions by a last digit, of random signs, by which that rounding is measured; tolerances that are CLEAR of it.
 SHORTENED, TRIALS, CLEAR = 0.1, 3, 10.0
 
+# --- progress ---
+# s: a calculation that takes less shows no bar.
+BAR_AFTER = 1.0
+
 # --- energy ---
 # Of the largest kinetic energy per second: power below it is rounding.
 NO_POWER = 1e-9

@@ -90,10 +90,10 @@ class Equilibrium:
         return f"<Equilibrium{moving}: {kind}{neutral}, {which} {self.smallest_stiffness:.4g} 1/s^2>"
 
 
-def find_equilibrium(packed, handles, remembered, t, q, q0):
-    """The `Equilibrium` reached from a consistent q, q0 being where the search began."""
+def find_equilibrium(packed, handles, remembered, t, q, q0, report):
+    """The `Equilibrium` reached from a consistent q, q0 being where the search began; report(fraction, said)."""
     demand_continuous(packed)
-    descent = Descent(packed, handles, remembered, t, q)
+    descent = Descent(packed, handles, remembered, t, q, report)
     _demand_held(descent.frame)
     for _ in range(MOST_SADDLES):
         if not descent.settle():
@@ -106,12 +106,12 @@ def find_equilibrium(packed, handles, remembered, t, q, q0):
     return Equilibrium(descent, q0, findings)
 
 
-def find_relative(packed, handles, remembered, t, q, q0, field):
+def find_relative(packed, handles, remembered, t, q, q0, field, report):
     """The same in steady motion with the velocities of a `SteadyField`."""
     from .relative_equilibrium import SteadyDescent, find_steady
 
     demand_continuous(packed)
-    descent = SteadyDescent(field, packed, handles, remembered, t, q)
+    descent = SteadyDescent(field, packed, handles, remembered, t, q, report)
     findings = find_steady(descent)
     demand_smooth(descent.motion)
     return Equilibrium(descent, q0, findings, field.spin)
@@ -122,8 +122,12 @@ def _stability(descent):
     motion = descent.motion
     if not motion.freedom:
         return True, float("nan"), 0, None
-    reduced = Reduced(motion, chosen(motion, Variations(motion, np.zeros(3))), descent.unbalanced <= SETTLED)
+    descent.report(0.7, f"balanced in {descent.steps} steps, {motion.freedom} coordinates are chosen for its stability")
+    every = chosen(motion, Variations(motion, np.zeros(3)))
+    descent.report(0.8, f"balanced in {descent.steps} steps, the stiffness is reduced to {motion.freedom} coordinates")
+    reduced = Reduced(motion, every, descent.unbalanced <= SETTLED)
     nothing = descent.nothing(reduced)
+    descent.report(0.9, f"balanced in {descent.steps} steps, eigenvalues of {motion.freedom} coordinates")
     found = stiffnesses(reduced, nothing)
     smallest = found.smallest
     if not found.symmetric:

@@ -34,6 +34,8 @@ class Moves:
     t : float, s
     q : ndarray (n,)
         Consistent.
+    report : callable (fraction, said)
+        Is told how far the search is.
 
     Attributes
     ----------
@@ -48,7 +50,8 @@ class Moves:
         The share of the longest move that the last one did its work on.
     """
 
-    def __init__(self, packed, handles, remembered, t, q):
+    def __init__(self, packed, handles, remembered, t, q, report):
+        self.report = report
         self.packed, self.handles, self.t = packed, handles, t
         self.angles, self.memory = remembered[: handles.count].copy(), remembered[handles.count :].copy()
         self.frame = Frame(packed, t, q)

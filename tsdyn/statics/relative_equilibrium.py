@@ -68,6 +68,7 @@ class SteadyDescent(Descent):
         """Take Newton steps to the nearest root; True if it is reached."""
         for _ in range(MOST_NEWTON):
             before, rest = self.unbalanced, self.rest
+            self.tell()
             if before <= BALANCED:
                 break
             u = rest.quadratic.factors(0.0, 0.0).newton(rest.left)
@@ -118,8 +119,10 @@ def _stability(descent):
         )
     if not motion.freedom:
         return True, float("nan"), 0, None
+    descent.report(0.7, f"balanced in {descent.steps} steps, {motion.freedom} coordinates are chosen for its stability")
     reduced = Reduced(motion, chosen(motion, Variations(motion, field.spin)))
     nothing = descent.nothing(reduced)
+    descent.report(0.9, f"balanced in {descent.steps} steps, eigenvalues of {motion.freedom} coordinates")
     found, pairs = stiffnesses(reduced, nothing), eigenpairs(reduced, nothing)
     worst = int(pairs.values.real.argmax())
     if pairs.values.real[worst] <= GROWING * np.abs(pairs.values).max(initial=0.0):

@@ -95,6 +95,8 @@ IN_VAIN = 3
 SHORT, FINAL = 1e-4, 1e-9
 # A step is this many times longer than may be before mu grows; tries of a step.
 TOO_FAR, MOST_TRIES = 4.0, 20
+# The share of a search that steps take, of what progress reports; stability takes the rest.
+SEARCH = 0.7
 # Steps at most, and the way in sizes of the scene: what is farther falls.
 MOST_STEPS, FARTHEST = 400, 1e5
 # rad, of all steps: what has turned farther is driven round.

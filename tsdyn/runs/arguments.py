@@ -82,6 +82,8 @@ def state_arrays(state, n):
     """Positions and velocities (n,) of a state given to start from."""
     if not (hasattr(state, "q") and hasattr(state, "qd")):
         raise InvalidArgument(f"state must have q and qd, such as solution.state, got {state!r}.")
+    if np.ndim(state.q) == 2 and hasattr(state, "state"):
+        raise InvalidArgument(f"state must be one State: give the .state of {state!r}.")
     return finite_vector(state.q, n, "state.q"), finite_vector(state.qd, n, "state.qd")
 
 

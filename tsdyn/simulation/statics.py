@@ -194,7 +194,7 @@ def _equilibrium(scene, guess, t, spin, about, rotors, report):
     if guess is None:
         given = scene._initial()[0]
     else:
-        given = finite_vector(getattr(guess, "q", guess), kept.n, "guess (q, or a State)")
+        given = _positions(kept.packed, guess, kept.n)
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     metric = Metric(kept.packed, None, float(t))
@@ -220,9 +220,30 @@ def _equilibrium(scene, guess, t, spin, about, rotors, report):
     return find_equilibrium(*arguments, report) if field is None else find_relative(*arguments, field, report)
 
 
+def _positions(packed, guess, n):
+    """The positions (n,) of a guess."""
+    if isinstance(guess, Mapping):
+        raise InvalidArgument(
+            f"guess must be positions q ({n},) or a State, got {guess!r}. scene.set(joint, ...) places joints, and "
+            "the pose of the scene is the guess then."
+        )
+    if hasattr(guess, "state") and np.ndim(getattr(guess, "q", 0)) == 2:
+        raise InvalidArgument(f"guess must be one State, or positions q ({n},): give the .state of {guess!r}.")
+    q = finite_vector(getattr(guess, "q", guess), n, "guess (q, or a State)")
+    for body, (at, dimension) in zip(packed.bodies, packed.system.bodies.tolist(), strict=True):
+        if dimension == 7 and not q[at + 3 : at + 7].any():
+            raise InvalidArgument(
+                f"guess: the Euler parameters of {body.name} (q[{at + 3}:{at + 7}]) are zero, which is no orientation; "
+                "(1, 0, 0, 0) is that of the ground."
+            )
+    return q
+
+
 def _field(packed, spin, about, rotors):
     """The `SteadyField` of a spin; None without one."""
     if spin is None and rotors is None:
+        if np.any(vector3(about, "equilibrium: about (m)", InvalidArgument)):
+            raise InvalidArgument(f"equilibrium: about={about!r} is a point of the axis of a spin; give spin=, too.")
         return None
     from ..statics.steady_field import SteadyField, rotors_of
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from ..errors import Status, TsdynError
 from ..maths.root_isolation import EPS
+from ..observables.generalised_forces import applied_loads
 from ..runs.tolerances import AT_LONGEST
-from .tolerances import CLEAR, SHORTENED, TRIALS
+from .tolerances import CLEAR, COARSE, LEAST, SHORTENED, TRIALS
 
 
 class StepLimit(NamedTuple):
@@ -34,7 +35,8 @@ def step_limit(solution):
             return StepLimit(None, "Raise max_steps, or give a longer max_step.")
         sentence = f"The steps are as long as max_step={longest:g} s allows."
         return StepLimit(sentence, "Give a longer max_step, or leave it out: the tolerances choose the steps then.")
-    said = _rounding(solution, method)
+    with np.errstate(all="ignore"):
+        said = _rounding(solution, method) if min(method.rtol, method.atol) < COARSE else ""
     if said:
         return StepLimit(None, said)
     return StepLimit(None, "Raise max_steps, or loosen rtol and atol." if status is Status.MAX_STEPS else None)
@@ -47,33 +49,59 @@ def _mean(solution):
 
 def _rounding(solution, method):
     """Say that rounding of the forces is above the tolerances; "" where it isn't."""
-    from ..statics.motion import Motion  # imported here: few runs end early
-
     packed, h = solution.packed, _mean(solution)
-    t, (q, qd, qdd), slots = solution._reached, solution._last, solution._remembered
-    at = np.repeat(np.arange(len(packed.bodies)), packed.system.bodies[:, 1])
-    dq = EPS * np.maximum.reduceat(np.abs(q), packed.system.bodies[:, 0])[at] if q.size else q
-    if not (h > 0.0 and np.isfinite((q, qd, qdd)).all()):
+    t, (q, qd, qdd) = solution._reached, solution._last
+    if not (len(packed.system.forces) and h > 0.0 and np.isfinite((q, qd, qdd)).all()):
         return ""
-    rng, da = np.random.default_rng(0), np.zeros(q.size)
-    try:
-        before = Motion(packed, slots, t, q, qd).qdd
-        for _ in range(TRIALS):
-            near = Motion(packed, slots, t, q + rng.choice((-1.0, 1.0), q.size) * dq, qd).qdd
-            da = np.maximum(da, np.abs(near - before))
-    except (TsdynError, ArithmeticError):
+    bodies = packed.system.bodies
+    at = np.repeat(np.arange(len(bodies)), bodies[:, 1])
+    dq = EPS * np.maximum.reduceat(np.abs(q), bodies[:, 0])[at]
+    near = q + np.random.default_rng(0).choice((-1.0, 1.0), (TRIALS, q.size)) * dq
+
+    def compared(da):
+        """Rates w (n,), and changes of velocities da / w over the tolerances (n,)."""
+        rates = np.sqrt(da / np.maximum(dq, LEAST))
+        own = np.where(rates > 0.0, rates, np.inf)
+        return rates, da / own / (method.atol + method.rtol * np.hypot(qd, qdd / own))
+
+    if _norm(compared(_of_loads(solution, t, q, qd, near))[1]) < 1.0:  # without constraints: most are told apart by it
         return ""
-    if not (da.any() and np.isfinite(da).all()):
-        return ""
-    rates = np.sqrt(np.where(dq > 0.0, da / np.where(dq > 0.0, dq, 1.0), 0.0))
-    own = np.where(rates > 0.0, rates, np.inf)
-    sizes = np.hypot(qd, qdd / own)
-    ratios = da / own / (method.atol + method.rtol * sizes)
-    worst, share = int(ratios.argmax()), float(np.sqrt((ratios * ratios).mean() / 2.0))
-    if share < 1.0 or h * rates[worst] > SHORTENED:
+    da = _of_motion(solution, t, q, qd, near)
+    rates, ratios = compared(da)
+    worst, share = int(ratios.argmax()), _norm(ratios)
+    if not 1.0 <= share < np.inf or h * rates[worst] > SHORTENED:
         return ""
     return (
         "The tolerances are below what rounding of the forces allows: a last digit of the positions changes the "
         f"acceleration of {packed.bodies[at[worst]].name} by {da[worst]:.1e}, and steps are {h:.1e} s long. Loosen to "
         f"rtol={CLEAR * share * method.rtol:.0e} and atol={CLEAR * share * method.atol:.0e}, or soften the forces."
     )
+
+
+def _norm(ratios):
+    """Of ratios of velocities, those of positions being zero."""
+    return float(np.sqrt((ratios * ratios).mean() / 2.0))
+
+
+def _of_loads(solution, t, q, qd, near):
+    """The largest changes of accelerations (n,) of bodies without joints."""
+    system, count = solution.packed.system, len(near) + 1
+    places, rates = np.concatenate((q[None], near)), np.tile(qd, (count, 1))
+    Q = applied_loads(system, np.full(count, t), places, rates, np.tile(solution._remembered, (count, 1)))
+    least = [
+        np.repeat((mass, 4.0 * np.linalg.eigvalsh(J.reshape(3, 3))[0]), (3, length - 3))
+        for (_, length), mass, J in zip(system.bodies, system.mass, system.inertia, strict=True)
+    ]
+    return np.abs(Q[1:] - Q[0]).max(axis=0) / np.maximum(np.concatenate(least), LEAST)
+
+
+def _of_motion(solution, t, q, qd, near):
+    """The same with the constraints; zero where accelerations can't be found."""
+    from ..statics.motion import Motion  # imported here: few runs end early
+
+    packed, slots = solution.packed, solution._remembered
+    try:
+        here = Motion(packed, slots, t, q, qd).qdd
+        return np.max([np.abs(Motion(packed, slots, t, place, qd).qdd - here) for place in near], axis=0)
+    except (TsdynError, ArithmeticError):
+        return np.zeros(q.size)

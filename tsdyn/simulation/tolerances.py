@@ -44,7 +44,8 @@ BLOW_UP = 1e4
 
 # Of the time in which forces vary: steps of a run that rounding of the forces keeps short are shorter. Changes of the
 # positions by a last digit, of random signs, by which that rounding is measured; tolerances that are CLEAR of it.
-SHORTENED, TRIALS, CLEAR = 0.1, 3, 10.0
+# COARSE ones are above it, w EPS of a size, for rates w of 5e6 / s: it is not measured then. LEAST divisor.
+SHORTENED, TRIALS, CLEAR, COARSE, LEAST = 0.1, 3, 10.0, 1e-9, 1e-300
 
 # --- progress ---
 # s: a calculation that takes less shows no bar.

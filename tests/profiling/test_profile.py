@@ -49,7 +49,22 @@ def test_phases_add_up(name, request):
     assert found.accounted == pytest.approx(compiled / found.driver)
     assert all(phase.seconds >= 0.0 and phase.calls > 0 for phase in found.phases)
     assert sum(found.groups().values()) == pytest.approx(sum(phase.seconds for phase in found.phases))
-    assert sum(map(found.share, found.groups())) == pytest.approx(sum(p.seconds for p in found.phases) / found.seconds)
+    assert sum(map(found.share, found.groups())) == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+def test_shares_of_a_run_that_turns_add_up():
+    scene = ts.Scene()
+    cart = scene.add_body(1.0, (0.1, 0.1, 0.1), (0.5, 0, 0), name="cart")
+    scene.add(ts.constraints.Translational.at(scene.ground, cart, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(ts.forces.Spring(scene.ground, cart, stiffness=1e8, damping=1e4, free_length=0.6))
+    found = ts.profile(scene, (0.0, 1.0), advice=False)
+    assert found.solution.method.startswith("Radau")
+    assert sum(map(found.share, found.groups())) == pytest.approx(1.0)
+    groups = [line for line in str(found).split("\n\n")[1].splitlines()[1:] if not line.startswith(" ")]
+    shares = [float(line.split(" %")[0].split()[-1]) for line in groups]
+    assert sum(shares) == pytest.approx(100.0, abs=0.5)
+    assert "calls and phases are those of Radau alone" in str(found)
 
 
 @pytest.mark.slow

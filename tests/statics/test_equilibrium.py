@@ -162,7 +162,28 @@ def test_two_balls_in_space_have_five_neutral_directions():
     found = scene.equilibrium()
     assert found.stable
     assert found.neutral == 5
+    assert found.smallest_stiffness == pytest.approx(30.0 * (1.0 + 0.5), rel=CLOSE)
     assert np.linalg.norm(found.state.position(one) - found.state.position(two)) == pytest.approx(1.0, abs=HELD)
+
+
+def test_pendulum_beside_a_hard_spring_is_not_neutral():
+    scene = pendulums([0.0])
+    ball = scene.add_point_mass(mass=1.0, position=(5.0, 0, -1))
+    scene.add(F.Spring(scene.ground, ball, stiffness=1e12, free_length=1.0, point_a=(5.0, 0, 0)))
+    found = scene.equilibrium()
+    assert found.stable
+    assert found.neutral == 0
+    inertia, moment = 0.02 + 1.3 * 0.35**2, 1.3 * G * 0.35
+    assert found.smallest_stiffness == pytest.approx(min(G, moment / inertia), rel=1e-3)
+
+
+def test_all_directions_neutral():
+    scene = ts.Scene(gravity=DOWN)
+    cart = scene.add_body(mass=1.0, inertia=(1, 1, 1), name="cart")
+    scene.add(C.Translational.at(scene.ground, cart, point=(0, 0, 0), axis=(1, 0, 0)))
+    found = scene.equilibrium()
+    assert (found.stable, found.neutral, found.smallest_stiffness) == (True, 1, 0.0)
+    assert repr(found) == "<Equilibrium: stable, 1 neutral>"
 
 
 def test_hanging_chain_of_rigid_links_from_a_rough_guess():

@@ -114,6 +114,31 @@ def test_sleeping_top_falls_below_its_critical_spin(spin, upright):
     assert found.state.position("top")[2] == pytest.approx(0.3 if upright else -0.3, abs=CLOSE)
 
 
+@pytest.mark.parametrize("rate", [0.5, 2.0])
+@pytest.mark.parametrize("stiffness", [0.0, 1e8])
+def test_neutral_directions_are_none_of_the_stiffness(rate, stiffness):
+    """A shaft that turns freely, with a hanging arm: the stiffness is that of the arm, not rounding."""
+    mass, length, offset, own = 1.2, 0.5, 0.1, 0.01
+    scene = ts.Scene(gravity=DOWN)
+    shaft = scene.add_body(1.0, (0.3, 0.3, 0.3), name="shaft")
+    scene.add(C.Revolute.at(scene.ground, shaft, point=(0, 0, 0), axis=Z))
+    ball = scene.add_body(mass, (own, own, own), (offset, 0, -length), name="ball")
+    scene.add(C.Revolute.at(shaft, ball, point=(offset, 0, 0), axis=Y, name="arm"))
+    if stiffness:
+        damper = scene.add_point_mass(1.0, (0, 0, 2.0), name="damper")
+        for normal in (X, Y):
+            scene.add(C.PlaneContact(damper, scene.ground, normal_b=normal))
+        scene.add(F.Spring(damper, scene.ground, stiffness=stiffness, point_b=(0, 0, 1.0)))
+    found = scene.equilibrium(spin=(0, 0, rate))
+    theta = found.state.angle("arm")
+    sine, cosine = abs(np.sin(theta)), np.cos(theta)
+    moment = G * cosine - rate**2 * ((offset + length * sine) * -sine + length * cosine**2)
+    assert found.stable
+    assert found.neutral == 1
+    assert found.smallest_stiffness == pytest.approx(mass * length * moment / (mass * length**2 + own), rel=CLOSE)
+    assert ": stable, 1 neutral, smallest other stiffness " in repr(found)
+
+
 def test_free_body_leaves_its_middle_axis():
     """It spins about the axis of largest moment at last; nearly about the smallest it stays, for that is stable too."""
     for start, settled in ((1, 2), (0, 0)):

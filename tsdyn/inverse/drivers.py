@@ -17,14 +17,15 @@ from ..elements.joint_coordinates import AngleGeometry
 from ..errors import InvalidArgument
 from ..model import joint_motion
 from ..model.handles import handles_of
-from ..motions.elementary import Polynomial
+from ..motions.elementary import Polynomial, Smooth
 from ..motions.prescribed import Motion
 from ..statics.ports import AXES, item_of
 from ..statics.variations import named_coordinates
-from ..validation import vector3
+from ..validation import nearest, vector3
 from .tolerances import THERE
 
 WHO = "inverse_dynamics"
+MOST_NAMED = 10  # coordinates and bodies in a message
 
 
 class Driven(NamedTuple):
@@ -77,7 +78,12 @@ def driven_copy(scene, motion):
     named = named_coordinates(handles)
     joints = [named[id(row.item)] for row in handles.rows if not isinstance(row.item, Force)]
     by_name = {name: geometry for own in joints for name, geometry in own}
-    return twin, [_driven(scene, twin, by_name, named, key, value) for key, value in motion.items()]
+    driven = [_driven(scene, twin, by_name, named, key, value) for key, value in motion.items()]
+    names = [one.name for one in driven]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InvalidArgument(f"{WHO}: the motion of {twice} is given twice; give it once.")
+    return twin, driven
 
 
 def _driven(scene, twin, by_name, named, key, value):
@@ -89,7 +95,12 @@ def _driven(scene, twin, by_name, named, key, value):
         item, _ = item_of(scene, key, scene.bodies, "body")
         point = vector3(point, f"{WHO}: point of {item.name} (m, body frame)", InvalidArgument)
         return Driven(f"{item.name}{tuple(point.tolist())}", twin[item], point, None, _path(value, item.name))
-    item, axis = item_of(scene, key, [*scene.bodies, *scene.constraints], "joint, body or coordinate")
+    things = [*scene.bodies, *scene.constraints]
+    if isinstance(key, str) and key.removesuffix(key[-2:] if key[-2:] in AXES else "") not in {x.name for x in things}:
+        known = [*by_name, *(body.name for body in scene.bodies)]
+        said = f"there are {', '.join(map(repr, known[:MOST_NAMED]))}{', ...' * (len(known) > MOST_NAMED)}"
+        raise InvalidArgument(f"{WHO}: no coordinate, joint or body is named {key!r}; {said}{nearest(key, known)}")
+    item, axis = item_of(scene, key, things, "joint, body or coordinate")
     if isinstance(item, PointMass):
         if axis is None:
             return Driven(item.name, twin[item], np.zeros(3), None, _path(value, item.name))
@@ -116,6 +127,11 @@ def _path(value, name):
     what = f"motion of {name} (x, y, z)"
     if isinstance(value, (tuple, list)) and len(value) == 3:
         return tuple(Motion.always(each, what) for each in value)
+    if isinstance(value, Smooth):
+        raise InvalidArgument(
+            f"{WHO}: the {what} must be three motions, such as (ts.motions.Sine(0.1, 2.0), 0.0, 0.0), a ts.Table or a "
+            f"function of time with three values, got one, {value!r}. For one component give {name + '.x'!r}."
+        )
     return tuple(Motion.always(each, what) for each in Motion.components(value, 3, what))
 
 

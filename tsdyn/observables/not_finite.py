@@ -1,24 +1,40 @@
-"""Which forces are not finite: what a run that ends there can name."""
+"""Which forces are not finite, or raise an exception: what a run that ends there can name."""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ..validation import counted
 from .generalised_forces import force_loads
+from .raised import raised
 
 FEW = 3  # forces named in a message
 
 
+class NotFinite(NamedTuple):
+    """What there is to say, "" for nothing, and the exception of a user's function that is behind it, or None."""
+
+    said: str
+    cause: Exception | None
+
+
 def not_finite(packed, t, q, qd, slots):
-    """Say which forces give inf or nan at a state, "" for none; slots: what forces remember."""
+    """Which forces give inf or nan at a state, a `NotFinite`; slots: what forces remember."""
     state = np.array([t]), q[None], qd[None], np.asarray(slots, float)[None]
     with np.errstate(all="ignore"):
         struck = _struck(packed, force_loads(packed.system, *state)[0])
-        found = [load.force.name for load in packed.loads if _strikes(packed, load, struck, state)]
+        forces = [load.force for load in packed.loads if _strikes(packed, load, struck, state)]
+    found = [force.name for force in forces]
     if not found:
-        return ""
+        return NotFinite("", None)
+    for force in forces[:FEW]:
+        error = raised(packed, force, t, q, qd)
+        if error is not None:
+            said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+            return NotFinite(f"The function of {force.name!r} raises {said.rstrip('.')}, at t = {t:.9g} s.", error)
     more = f" and {counted(len(found) - FEW, 'other force')}" if len(found) > FEW else ""
     verb = "is" if len(found) == 1 else "are"
-    return f"{', '.join(map(repr, found[:FEW]))}{more} {verb} inf or nan at t = {t:.9g} s."
+    return NotFinite(f"{', '.join(map(repr, found[:FEW]))}{more} {verb} inf or nan at t = {t:.9g} s.", None)
 
 
 def _struck(packed, Q):

@@ -69,8 +69,8 @@ def advise(profile, simulate, plain, options):
 
 def _outputs(profile):
     for phase in profile.phases:
-        if phase.group == "outputs" and phase.seconds >= OUTPUTS * profile.seconds:
-            share, each = _percent(phase.seconds / profile.seconds), duration(phase.each)
+        if phase.group == "outputs" and phase.seconds >= OUTPUTS * profile.total:
+            share, each = _percent(phase.seconds / profile.total), duration(phase.each)
             if phase.part.startswith("times"):
                 yield f"t_eval with {phase.calls} outputs costs {share} of the call, {each} each: ask for fewer."
             elif phase.part == "every step":
@@ -85,9 +85,9 @@ def _outputs(profile):
 
 def _around(profile):
     outside = sum(p.seconds for p in profile.phases if p.group == "Python")
-    if outside >= PYTHON * profile.seconds:
+    if outside >= PYTHON * profile.total:
         yield (
-            f"Python's part of each call is {duration(outside)}, {_percent(outside / profile.seconds)}: one call over "
+            f"Python's part of each call is {duration(outside)}, {_percent(outside / profile.total)}: one call over "
             "a longer interval has it once."
         )
     once = sum(profile.once.values())
@@ -104,8 +104,8 @@ def _forces(profile):
         if phase.part.startswith("force: "):
             parts[phase.part[7:]] = parts.get(phase.part[7:], 0.0) + phase.seconds
     for name, seconds in parts.items():
-        if seconds >= FORCE * profile.seconds:
-            yield f"{name} takes {_percent(seconds / profile.seconds)} of the call: a cheaper law would pay."
+        if seconds >= FORCE * profile.total:
+            yield f"{name} takes {_percent(seconds / profile.total)} of the call: a cheaper law would pay."
 
 
 def _steps(profile):

@@ -12,7 +12,7 @@ def figure(profile):
     phases = profile.phases
     with new_figure(8.0, 1.4 + 0.28 * len(phases)) as drawn:
         ax = drawn.subplots()
-        shares = [100.0 * phase.seconds / profile.seconds for phase in phases]
+        shares = [100.0 * phase.seconds / profile.total for phase in phases]
         ax.barh(range(len(phases)), shares, color=[colours[phase.group] for phase in phases], height=0.7)
         for i, (phase, share) in enumerate(zip(phases, shares, strict=True)):
             ax.annotate(

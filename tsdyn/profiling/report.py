@@ -36,6 +36,8 @@ class Profile(Drawn):
         group, part, calls, seconds; and `each`, seconds per call.
     orders : tuple of (int, float)
         Taylor method: calls and seconds of each order from zero, without loops over constraints and forces.
+    total : float
+        Seconds of all phases, of which `share` and the table give shares.
     once : dict
         Seconds of work of the first call alone, by name.
     skipped : dict
@@ -72,9 +74,14 @@ class Profile(Drawn):
         """Skipped work, by its name in `Solution.stats`."""
         return {name: getattr(self.solution.stats, name) for name in SKIPPED}
 
+    @property
+    def total(self) -> float:
+        """Seconds of all phases; errors of timers aside those of a call. Shares are of this, and add up to one."""
+        return sum(phase.seconds for phase in self.phases) or self.seconds
+
     def share(self, group: str, part: str | None = None) -> float:
         """The share of a group in the call, or of a part of a group."""
-        return sum(p.seconds for p in self.phases if p.group == group and part in (None, p.part)) / self.seconds
+        return sum(p.seconds for p in self.phases if p.group == group and part in (None, p.part)) / self.total
 
     def groups(self) -> dict[str, float]:
         """Seconds of each group."""
@@ -94,7 +101,7 @@ class Profile(Drawn):
 
     def _cells(self, name, seconds, calls):
         each = duration(seconds / calls) if calls else ""
-        return name, f"{100.0 * seconds / self.seconds:.1f} %", duration(seconds), str(calls or ""), each
+        return name, f"{100.0 * seconds / self.total:.1f} %", duration(seconds), str(calls or ""), each
 
     def _facts(self):
         s, solution = self.solution.stats, self.solution
@@ -102,6 +109,8 @@ class Profile(Drawn):
         yield f"{solution.method}, formulation {solution.formulation}"
         counts = "steps", "rejected", "evaluations", "placements", "factorizations", "charts"
         yield ", ".join(f"{getattr(s, name)} {name}" for name in counts)
+        if " and " in solution.method:
+            yield f"it turns from one to the other; calls and phases are those of {type(self.method).__name__} alone"
         yield f"the phases add up to {100.0 * self.accounted:.0f} % of the compiled driver's {duration(self.driver)}"
 
     def _notes(self):
@@ -133,7 +142,7 @@ class Profile(Drawn):
         largest = max(self.groups().items(), key=lambda pair: pair[1])
         return (
             f"<Profile: {duration(self.seconds)} a call by {self.solution.method}, {largest[0]} "
-            f"{100.0 * largest[1] / self.seconds:.0f} %, {len(self.advice)} to change>"
+            f"{100.0 * largest[1] / self.total:.0f} %, {len(self.advice)} to change>"
         )
 
     def _repr_html_(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import InvalidArgument
 from ..methods.integrator import Integrator, is_own, registered
 from ..validation import checked_once, finite_vector, floats, number, unknown_name
-from .tolerances import SAME_COUNT
+from .tolerances import FROM_ZERO, SAME_COUNT, SHORTEST
 
 TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
 FEW = 50  # times that a list serves faster than an array: 0.4 us instead of 2
@@ -62,10 +62,28 @@ def step_count(t0, t1, step):
     return max(1, math.ceil(count * (1.0 - SAME_COUNT)))
 
 
+def demand_steps_seen(method, t0, t1):
+    """Refuse steps given to an adaptive method that are no more than the rounding of the times."""
+    if not getattr(method, "embedded_order", 0) or method.step is not None:
+        return
+    for name, value, latest in (
+        ("max_step", method.max_step, max(abs(t0), abs(t1))),
+        ("first_step", method.first_step, abs(t0)),
+    ):
+        least = SHORTEST * max(latest, FROM_ZERO * (t1 - t0))
+        if value is not None and not value > least:
+            raise InvalidArgument(
+                f"{name}={value:g} s is too small for the interval ({t0:g}, {t1:g}): the rounding of its times is "
+                f"{least:.1g} s. Give a longer one, or leave it out."
+            )
+
+
 def state_arrays(state, n):
     """Positions and velocities (n,) of a state given to start from."""
     if not (hasattr(state, "q") and hasattr(state, "qd")):
         raise InvalidArgument(f"state must have q and qd, such as solution.state, got {state!r}.")
+    if np.ndim(state.q) == 2 and hasattr(state, "state"):
+        raise InvalidArgument(f"state must be one State: give the .state of {state!r}.")
     return finite_vector(state.q, n, "state.q"), finite_vector(state.qd, n, "state.qd")
 
 

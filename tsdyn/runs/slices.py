@@ -128,16 +128,17 @@ class Slices:
         if not self.run.numbers.begun:
             singular = status in (Status.SINGULAR, Status.MASS_SINGULAR)
             kind = SingularConfiguration if singular else InconsistentState
-            raise kind(" ".join(filter(None, ("no step could be made from the start.", *self._why(status)))))
+            *why, cause = self._why(status)
+            raise kind(" ".join(filter(None, ("no step could be made from the start.", *why)))) from cause
         self.status = status
 
     def _why(self, status):
-        """What ends a run at its start: the status, forces that are not finite, the remedy."""
-        task, found = self.task, ""
+        """What ends a run at its start: the status, forces that are not finite, the remedy; an exception or None."""
+        task, found, cause = self.task, "", None
         if status is Status.NOT_FINITE:
             slots = task.remembered[len(task.angles) :]
-            found = not_finite(task.prepared.packed, task.span[0], task.q, task.qd, slots)
-        return status.sentence, found, status.remedy
+            found, cause = not_finite(task.prepared.packed, task.span[0], task.q, task.qd, slots)
+        return status.sentence, found, status.remedy, cause
 
     def _adapt(self, rows, seconds):
         """The length of the next slice, from the time of this one."""

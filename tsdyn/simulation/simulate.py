@@ -13,7 +13,7 @@ from ..elements.membership import warn_of_waiting
 from ..errors import InvalidArgument
 from ..methods.integrator import frozen
 from ..observables.state import remembered
-from ..runs.arguments import state_arrays
+from ..runs.arguments import demand_steps_seen, state_arrays
 from ..runs.brief import Brief
 from ..runs.sampling import Sampling
 from ..runs.step_engine import StepEngine
@@ -183,6 +183,7 @@ def run_from(given, numbers=None, arrays=None, archive=None, plans=False):
         method = method_choice.explicit(kept, *default)
     if settings.max_step is not None:
         method = frozen(method.bounded(settings.max_step))
+    demand_steps_seen(method, *options.span)
 
     started = time.perf_counter()
     choose = method_choice.turns_of(scene, kept, method, options) if given["integrator"] is None else None

@@ -26,7 +26,7 @@ from .conservation import energy_error
 from .outputs import Outputs
 from .records import Records
 from .showing import Showing
-from .termination import account
+from .termination import account, cause_of
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Bools, ConstraintError, Floats, Integers, ItemLike, Scene
@@ -154,7 +154,7 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
     def raise_if_failed(self) -> Self:
         """Raise StepFailure, with this solution as `.solution`, if the run ended early; return self otherwise."""
         if not self.success:
-            raise StepFailure(self.message, self)
+            raise StepFailure(self.message, self) from cause_of(self)
         return self
 
     @property

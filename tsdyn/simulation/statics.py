@@ -13,16 +13,22 @@ from ..observables.state import remembered
 from ..runs.arguments import state_arrays
 from ..validation import finite_vector, number, vector3
 from .scene_cache import prepared
+from .stage_progress import StageProgress
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, BodyLike, Equilibrium, Linearisation, Scene, State
+    from ..hints import ArrayLike, BodyLike, Equilibrium, Linearisation, Progress, Scene, State
 
 INITIAL_TOL = 1e-9  # of residuals of a state, as in `simulate`
 
 
 @fitting
 def linearise(
-    scene: Scene, state: State | None = None, inputs: Sequence[Any] = (), outputs: Sequence[Any] = ()
+    scene: Scene,
+    state: State | None = None,
+    inputs: Sequence[Any] = (),
+    outputs: Sequence[Any] = (),
+    *,
+    progress: Progress | None = None,
 ) -> Linearisation:
     """Linearise the equations of motion about a state, in named minimal coordinates.
 
@@ -37,6 +43,9 @@ def linearise(
         Joints (their coordinates), bodies (position of the centroid; "ball.x" for one component), pairs (body, point in
         the body frame), names of coordinates; followed by " rate" in a name, their rates. Default: all coordinates and
         rates.
+    progress : bool or callable, optional
+        True shows a bar after a second (needs tqdm); a callable receives the fraction done, 0 to 1. What it raises is
+        passed on. A Ctrl-C says what has been reached.
 
     Returns
     -------
@@ -83,12 +92,15 @@ def linearise(
     for given, what in ((inputs, "inputs"), (outputs, "outputs")):
         if isinstance(given, str) or not isinstance(given, Sequence):
             raise InvalidArgument(f"{what} must be a sequence of handles or names, such as [motor], got {given!r}.")
-    kept = prepared(scene)
-    q, qd = scene._initial() if state is None else state_arrays(state, kept.n)
-    t = 0.0 if state is None else number(getattr(state, "t", 0.0))
-    memory = remembered(state, kept, t, q)
-    q, qd = kept.start(scene, (q, qd), t, INITIAL_TOL, memory, True)
-    return find(scene, memory[kept.handles.count :], (t, q.copy(), qd.copy()), tuple(inputs), tuple(outputs))
+    with StageProgress(progress, "linearise") as report:
+        report(0.0, "the start is looked at")
+        kept = prepared(scene)
+        q, qd = scene._initial() if state is None else state_arrays(state, kept.n)
+        t = 0.0 if state is None else number(getattr(state, "t", 0.0))
+        memory = remembered(state, kept, t, q)
+        q, qd = kept.start(scene, (q, qd), t, INITIAL_TOL, memory, True)
+        memory = memory[kept.handles.count :]
+        return find(scene, memory, (t, q.copy(), qd.copy()), tuple(inputs), tuple(outputs), report)
 
 
 @fitting
@@ -99,6 +111,8 @@ def equilibrium(
     spin: ArrayLike | None = None,
     about: ArrayLike = (0.0, 0.0, 0.0),
     rotors: Mapping[BodyLike, ArrayLike] | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> Equilibrium:
     """Find a static equilibrium: from the scene's pose, or a guess, down to a minimum of the potential energy.
 
@@ -118,6 +132,9 @@ def equilibrium(
         Bodies that spin about their own axis of symmetry besides, relative to the turning axes: rad/s about that axis,
         or an angular velocity (3,) in the body frame. A number counts about the direction of the axis whose largest
         component in the body frame is positive.
+    progress : bool or callable, optional
+        True shows a bar after a second (needs tqdm); a callable receives the fraction done, 0 to 1. What it raises is
+        passed on. A Ctrl-C says what has been reached.
 
     Returns
     -------
@@ -161,6 +178,12 @@ def equilibrium(
     >>> print(found.state.position(rod).round(6) + 0.0, found.reaction(pin)[0].round(6) + 0.0)
     [ 0.   0.  -0.5] [ 0.  0. 27.]
     """
+    with StageProgress(progress, "equilibrium") as report:
+        report(0.0, "the start is looked at")
+        return _equilibrium(scene, guess, t, spin, about, rotors, report)
+
+
+def _equilibrium(scene, guess, t, spin, about, rotors, report):
     from ..configuration.continuation import nearest
     from ..configuration.kinetic_metric import Metric
     from ..statics.equilibrium import find_equilibrium, find_relative  # imported here: a run needs none of it
@@ -171,7 +194,7 @@ def equilibrium(
     if guess is None:
         given = scene._initial()[0]
     else:
-        given = finite_vector(getattr(guess, "q", guess), kept.n, "guess (q, or a State)")
+        given = _positions(kept.packed, guess, kept.n)
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     metric = Metric(kept.packed, None, float(t))
@@ -194,12 +217,33 @@ def equilibrium(
     memory = remembered(state, kept, float(t), q)
     q, _ = kept.start(scene, (q, qd), float(t), INITIAL_TOL, memory, True)
     arguments = kept.packed, kept.handles, memory, float(t), q.copy(), given
-    return find_equilibrium(*arguments) if field is None else find_relative(*arguments, field)
+    return find_equilibrium(*arguments, report) if field is None else find_relative(*arguments, field, report)
+
+
+def _positions(packed, guess, n):
+    """The positions (n,) of a guess."""
+    if isinstance(guess, Mapping):
+        raise InvalidArgument(
+            f"guess must be positions q ({n},) or a State, got {guess!r}. scene.set(joint, ...) places joints, and "
+            "the pose of the scene is the guess then."
+        )
+    if hasattr(guess, "state") and np.ndim(getattr(guess, "q", 0)) == 2:
+        raise InvalidArgument(f"guess must be one State, or positions q ({n},): give the .state of {guess!r}.")
+    q = finite_vector(getattr(guess, "q", guess), n, "guess (q, or a State)")
+    for body, (at, dimension) in zip(packed.bodies, packed.system.bodies.tolist(), strict=True):
+        if dimension == 7 and not q[at + 3 : at + 7].any():
+            raise InvalidArgument(
+                f"guess: the Euler parameters of {body.name} (q[{at + 3}:{at + 7}]) are zero, which is no orientation; "
+                "(1, 0, 0, 0) is that of the ground."
+            )
+    return q
 
 
 def _field(packed, spin, about, rotors):
     """The `SteadyField` of a spin; None without one."""
     if spin is None and rotors is None:
+        if np.any(vector3(about, "equilibrium: about (m)", InvalidArgument)):
+            raise InvalidArgument(f"equilibrium: about={about!r} is a point of the axis of a spin; give spin=, too.")
         return None
     from ..statics.steady_field import SteadyField, rotors_of
 

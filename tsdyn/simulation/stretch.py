@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..runs.arguments import interval, output_times, step_count
+from ..runs.arguments import demand_steps_seen, interval, output_times, step_count
 from ..runs.task import between
 from ..validation import floats
 
@@ -36,6 +36,7 @@ class Stretch(NamedTuple):
         if is_known and _say(t_eval, known):
             return known
         times, step = output_times(t_eval, *span), method.step
+        demand_steps_seen(method, *span)
         return cls(
             t_span if _is_fixed(t_span) else MUTABLE, t_eval if t_eval is None or _is_fixed(t_eval) else MUTABLE, span,
             times, times.tobytes(), prepared.stops(*span), 0 if step is None else step_count(*span, step),

@@ -6,14 +6,16 @@ from ..configuration.rank import weakest_row
 from ..errors import Status
 from ..formulations.dependent_rows import dependent_rows
 from ..observables.evaluate import constraint_arrays
-from ..observables.not_finite import not_finite
+from ..observables.not_finite import NotFinite, not_finite
 from ..sparse.constraint_graphs import redundant_rows
 from ..taylor.layout import without_series
 from ..validation import counted
+from .step_limits import step_limit
 from .tolerances import BLOW_UP, MOST_SINGULAR, NEARLY_SINGULAR
 
 FEW = 3  # items named in a message
-AHEAD = 10.0 ** np.arange(-12, 1)  # parts of a step
+NO_NUMBERS = Status.NOT_FINITE, Status.STEP_COLLAPSED
+AHEAD = 10.0 ** np.arange(-12, 2)  # parts of a usual step; the last ones may be longer
 
 
 def account(solution, scene, reason, goes_on=""):
@@ -23,18 +25,19 @@ def account(solution, scene, reason, goes_on=""):
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
     steps = counted(solution.stats.steps, "step")
     where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
-    found = suspect(solution, scene)
-    remedy = Status.SINGULAR.remedy if found else solution.status.remedy
-    if solution.status == Status.INTERRUPTED and goes_on:
-        remedy = f"Continue with {goes_on}."
+    found, limit = suspect(solution, scene), step_limit(solution)
+    remedy = Status.SINGULAR.remedy if found else limit.remedy or solution.status.remedy
+    if solution.status == Status.INTERRUPTED:
+        go_on = f"Continue with {goes_on}." if goes_on else solution.status.remedy
+        remedy = " ".join(part for part in (limit.remedy, go_on) if part)
     lacking = without_series(solution.packed)[:FEW] if found else ()
     if lacking:
         remedy += f" Without a series: {'; '.join(lacking)}."
-    if not found and solution.status in (Status.NOT_FINITE, Status.STEP_COLLAPSED):
-        found = _not_finite(solution)
+    if not found and solution.status in NO_NUMBERS:
+        found = not_finite_of(solution).said
     if not found and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
         found = _growth(solution)
-    parts = (solution.status.sentence, reason, where, found, remedy)
+    parts = (limit.sentence or solution.status.sentence, reason, where, found, remedy)
     return " ".join(part for part in parts if part)
 
 
@@ -59,8 +62,13 @@ def _locked(solution):
     return "The mechanism is immobile: the constraints, some of them redundant, leave no degree of freedom."
 
 
-def _not_finite(solution):
-    """Name the forces that are not finite at the last state, or soonest ahead of it within a usual step."""
+def cause_of(solution):
+    """The exception of a user's function that has ended a run, raised once more in plain Python; None without one."""
+    return not_finite_of(solution).cause if solution.status in NO_NUMBERS else None
+
+
+def not_finite_of(solution):
+    """The `NotFinite` of the last state, or of what is soonest ahead of it within a usual step."""
     t, (q, qd, qdd) = solution._reached, solution._last
     usual = (t - solution.span[0]) / max(solution.stats.steps, 1)
     for ahead in (0.0, *usual * AHEAD):
@@ -69,9 +77,9 @@ def _not_finite(solution):
         if not (np.isfinite(x).all() and np.isfinite(xd).all()):
             break
         found = not_finite(solution.packed, t + ahead, x, xd, solution._remembered)
-        if found:
+        if found.said:
             return found
-    return ""
+    return NotFinite("", None)
 
 
 def _growth(solution):

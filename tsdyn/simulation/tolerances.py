@@ -42,6 +42,15 @@ NEARLY_SINGULAR, MOST_SINGULAR = 0.05, 600
 # Growth of the largest velocity at which a failure is put down to a motion that runs away.
 BLOW_UP = 1e4
 
+# Of the time in which forces vary: steps of a run that rounding of the forces keeps short are shorter. Changes of the
+# positions by a last digit, of random signs, by which that rounding is measured; tolerances that are CLEAR of it.
+# COARSE ones are above it, w EPS of a size, for rates w of 5e6 / s: it is not measured then. LEAST divisor.
+SHORTENED, TRIALS, CLEAR, COARSE, LEAST = 0.1, 3, 10.0, 1e-9, 1e-300
+
+# --- progress ---
+# s: a calculation that takes less shows no bar.
+BAR_AFTER = 1.0
+
 # --- energy ---
 # Of the largest kinetic energy per second: power below it is rounding.
 NO_POWER = 1e-9

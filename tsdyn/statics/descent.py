@@ -28,6 +28,7 @@ from .tolerances import (
     MOST_TRIES,
     MOST_TURN,
     MOST_TURNED,
+    SEARCH,
     SLIDING,
     SOFTER,
     STIFF,
@@ -46,11 +47,20 @@ class Descent(Moves):
         super().__init__(*start)
         self.steps, self.mu = 0, FIRST_MU
 
+    def tell(self):
+        """Report the steps so far: the fraction is of the digits that are to be gained."""
+        left = self.unbalanced
+        digits = np.log(left) / np.log(BALANCED) if left > 0.0 else 1.0
+        self.report(
+            SEARCH * min(max(digits, 0.0), 1.0), f"{self.steps} steps, {left:.1e} of the loads are not balanced"
+        )
+
     def settle(self):
         """Take steps until the loads are balanced to rounding; True if they are."""
         vain = 0
         while self.steps < MOST_STEPS and self.gone < FARTHEST * self.reach and self.turned < MOST_TURNED:
             before = self.unbalanced
+            self.tell()
             if before <= BALANCED or not self._step():
                 break
             self.steps += 1

@@ -15,10 +15,10 @@ from ..observables.kinematics import Anchor
 from ..observables.state import RememberingState
 from .coordinates import chosen
 from .descent import Descent
-from .eigen import eigenpairs
+from .eigen import eigenpairs, stiffnesses
 from .reduction import Reduced
 from .smoothness import demand_continuous, demand_smooth
-from .tolerances import GROWING, MOST_SADDLES, NEUTRAL, SETTLED
+from .tolerances import GROWING, MOST_SADDLES, SETTLED
 from .variations import Variations
 
 if TYPE_CHECKING:
@@ -36,13 +36,14 @@ class Equilibrium:
         `scene.linearise(report.state)` has its modes.
     stable : bool
         No direction has negative stiffness, the potential energy being a minimum. In steady motion, or with loads that
-        have no potential: no eigenvalue has a positive real part.
+        have no potential: no eigenvalue has a positive real part. Neutral directions don't count.
     smallest_stiffness : float, 1/s^2
-        Of the reduced stiffness in the metric of kinetic energy: the square of the lowest angular frequency; negative
-        if unstable, NaN without freedom. In steady motion centrifugal terms are in it, but no gyroscopic ones, which
-        may stabilise.
+        Of the reduced stiffness in the metric of kinetic energy, neutral directions left out: the square of the lowest
+        angular frequency that isn't zero; negative if unstable, zero if all directions are neutral, NaN without
+        freedom. In steady motion centrifugal terms are in it, but no gyroscopic ones, which may stabilise.
     neutral : int
-        Number of directions without stiffness.
+        Number of directions without stiffness, in which the scene may turn or slide freely: what they have is rounding
+        of the terms that the stiffness is a sum of, or due to `unbalanced`.
     moved : float
         Largest change of a coordinate from the start: m for positions, 1 for Euler parameters.
     rotation_rate : ndarray (3,), rad/s
@@ -83,55 +84,63 @@ class Equilibrium:
         kind = "stable" if self.stable else "unstable"
         neutral = f", {self.neutral} neutral" if self.neutral else ""
         moving = " in steady motion" if self.state.qd.any() else ""
-        return f"<Equilibrium{moving}: {kind}{neutral}, smallest stiffness {self.smallest_stiffness:.4g} 1/s^2>"
+        if neutral and self.smallest_stiffness == 0.0:
+            return f"<Equilibrium{moving}: {kind}{neutral}>"
+        which = "smallest other stiffness" if neutral else "smallest stiffness"
+        return f"<Equilibrium{moving}: {kind}{neutral}, {which} {self.smallest_stiffness:.4g} 1/s^2>"
 
 
-def find_equilibrium(packed, handles, remembered, t, q, q0):
-    """The `Equilibrium` reached from a consistent q, q0 being where the search began."""
+def find_equilibrium(packed, handles, remembered, t, q, q0, report):
+    """The `Equilibrium` reached from a consistent q, q0 being where the search began; report(fraction, said)."""
     demand_continuous(packed)
-    descent = Descent(packed, handles, remembered, t, q)
+    descent = Descent(packed, handles, remembered, t, q, report)
     _demand_held(descent.frame)
     for _ in range(MOST_SADDLES):
         if not descent.settle():
             _refuse(descent)
         demand_smooth(descent.motion)
-        *findings, way = _stability(descent.motion, descent.unbalanced <= SETTLED)
+        *findings, way = _stability(descent)
         if way is None:
             break
         descent.kick(way)
     return Equilibrium(descent, q0, findings)
 
 
-def find_relative(packed, handles, remembered, t, q, q0, field):
+def find_relative(packed, handles, remembered, t, q, q0, field, report):
     """The same in steady motion with the velocities of a `SteadyField`."""
     from .relative_equilibrium import SteadyDescent, find_steady
 
     demand_continuous(packed)
-    descent = SteadyDescent(field, packed, handles, remembered, t, q)
+    descent = SteadyDescent(field, packed, handles, remembered, t, q, report)
     findings = find_steady(descent)
     demand_smooth(descent.motion)
     return Equilibrium(descent, q0, findings, field.spin)
 
 
-def _stability(motion, balanced):
+def _stability(descent):
     """Whether stable, the smallest stiffness, number of neutral directions; and dq of negative stiffness, or None."""
+    motion = descent.motion
     if not motion.freedom:
         return True, float("nan"), 0, None
-    reduced = Reduced(motion, chosen(motion, Variations(motion, np.zeros(3))), balanced)
-    K, size = reduced.K_hat, reduced.scale
-    K_s = 0.5 * (K + K.T)
-    w = interruptible(lambda: np.linalg.eigvalsh(K_s))
-    neutral = int((np.abs(w) <= NEUTRAL * size).sum())
-    if np.abs(K - K.T).max() > NEUTRAL * size:
-        values = eigenpairs(reduced).values
-        return bool(values.real.max() <= GROWING * np.abs(values).max()), float(w[0]), neutral, None
-    if w[0] >= -NEUTRAL * size:
-        return True, float(w[0]), neutral, None
+    descent.report(0.7, f"balanced in {descent.steps} steps, {motion.freedom} coordinates are chosen for its stability")
+    every = chosen(motion, Variations(motion, np.zeros(3)))
+    descent.report(0.8, f"balanced in {descent.steps} steps, the stiffness is reduced to {motion.freedom} coordinates")
+    reduced = Reduced(motion, every, descent.unbalanced <= SETTLED)
+    nothing = descent.nothing(reduced)
+    descent.report(0.9, f"balanced in {descent.steps} steps, eigenvalues of {motion.freedom} coordinates")
+    found = stiffnesses(reduced, nothing)
+    smallest = found.smallest
+    if not found.symmetric:
+        values = eigenpairs(reduced, nothing).values
+        return bool(values.real.max() <= GROWING * np.abs(values).max()), smallest, found.neutral, None
+    if smallest >= 0.0:
+        return True, smallest, found.neutral, None
     from scipy.linalg import eigh, solve_triangular
 
+    K_s = 0.5 * (reduced.K_hat + reduced.K_hat.T)
     softest = interruptible(lambda: eigh(K_s, subset_by_index=[0, 0])[1])
     way = reduced.T @ solve_triangular(reduced.R, softest[:, 0])
-    return False, float(w[0]), neutral, way
+    return False, smallest, found.neutral, way
 
 
 def _demand_held(frame):

@@ -113,15 +113,22 @@ class Linearisation:
         return f"<Linearisation {where}: {', '.join(self.coordinates) or 'no coordinates'}>"
 
 
-def linearise(scene, memory, state, inputs, outputs):
-    """The `Linearisation` of a scene at a consistent (t, q, qd), with the memory of forces and constraints."""
+def linearise(scene, memory, state, inputs, outputs, report):
+    """The `Linearisation` of a scene at a consistent (t, q, qd), with the memory of forces and constraints.
+
+    report(fraction, said) is told of what comes next.
+    """
+    report(0.05, "accelerations and reactions are solved for")
     motion = Motion(scene.packed, memory, *state)
     demand_smooth(motion)
     rate = steady_rate(motion)
     variations = Variations(motion, np.zeros(3) if rate is None else rate)
     ports = inputs_of(scene, variations, inputs)
+    report(0.2, f"{motion.freedom} coordinates are chosen")
     every = chosen(motion, variations)
+    report(0.4, f"the equations are reduced to {motion.freedom} coordinates")
     reduced = Reduced(motion, every)
+    report(0.8, "masses, damping and stiffness are multiplied out")
     ports = ports, outputs_of(scene, variations, outputs, every, reduced)
     return Linearisation(motion, every, reduced, ports, rate)
 

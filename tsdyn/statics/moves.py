@@ -12,7 +12,7 @@ from ..model.joint_motion import all_angles, counted
 from .frame import Frame
 from .motion import Motion
 from .rest import Rest
-from .tolerances import FINAL, GOOD, HALVINGS, LEAST_SHIFT, MOST_TURN, SHORT, SHORTER, WORTH
+from .tolerances import FINAL, GOOD, HALVINGS, LEAST_SHIFT, MOST_TURN, NO_STIFFNESS, SHORT, SHORTER, WORTH
 
 
 @entry
@@ -34,6 +34,8 @@ class Moves:
     t : float, s
     q : ndarray (n,)
         Consistent.
+    report : callable (fraction, said)
+        Is told how far the search is.
 
     Attributes
     ----------
@@ -48,7 +50,8 @@ class Moves:
         The share of the longest move that the last one did its work on.
     """
 
-    def __init__(self, packed, handles, remembered, t, q):
+    def __init__(self, packed, handles, remembered, t, q, report):
+        self.report = report
         self.packed, self.handles, self.t = packed, handles, t
         self.angles, self.memory = remembered[: handles.count].copy(), remembered[handles.count :].copy()
         self.frame = Frame(packed, t, q)
@@ -73,6 +76,11 @@ class Moves:
     def unbalanced(self):
         """The largest acceleration from rest, m/s^2, over that of the loads by themselves."""
         return self.rest.unbalanced
+
+    def nothing(self, reduced):
+        """The stiffness, 1/s^2, that is none: rounding of its terms, and what loads left over seem to have."""
+        left = self.unbalanced * self.rest.acceleration_scale / self.reach
+        return NO_STIFFNESS * reduced.scale + len(reduced.K_hat) * left
 
     def size(self, u):
         """The largest shift, as a share of the reach, or turn, rad, of an increment."""

@@ -38,7 +38,11 @@ def inputs_of(scene, variations, given):
         same = [Input(joint.name, joint.columns, joint.jet[0]) for joint in variations.joints if joint.name == one]
         if not same:
             item, axis = item_of(scene, one, [*scene.forces, *scene.constraints], "force or joint")
-            same = [load for load in _loads_of(variations, item) if axis is None or load.name.endswith(axis)]
+            loads = _loads_of(variations, item)
+            same = [load for load in loads if axis is None or load.name.endswith(axis)]
+            if not same:
+                names = ", ".join(repr(load.name) for load in loads)
+                raise InvalidArgument(f"{item.name!r} has no component {axis[1:]!r}: its input is {names}.")
             same = [load._replace(whole=item.name) for load in same] if len(same) > 1 else same
         found += same
     return found

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from .signed_factors import Factors
-from .tolerances import MASSLESS, NEUTRAL, NOTHING
+from .tolerances import MASSLESS, NEUTRAL_ASYMMETRY, NOTHING
 
 
 class Quadratic:
@@ -118,7 +118,7 @@ class Quadratic:
     def circulatory(self):
         """Whether loads have no potential: K isn't symmetric."""
         apart = self.whole - self.whole.T
-        return bool(np.abs(apart.data).max(initial=0.0) > NEUTRAL * np.abs(self.K).max(initial=0.0))
+        return bool(np.abs(apart.data).max(initial=0.0) > NEUTRAL_ASYMMETRY * np.abs(self.K).max(initial=0.0))
 
     def along(self, u):
         """u.K u."""

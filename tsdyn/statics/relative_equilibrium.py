@@ -14,7 +14,7 @@ from ..errors import InconsistentState, NoEquilibrium
 from ..observables.generalised_forces import velocity_forces
 from .coordinates import chosen
 from .descent import Descent
-from .eigen import eigenpairs
+from .eigen import eigenpairs, stiffnesses
 from .motion import Motion
 from .reduction import Reduced
 from .steady import is_invariant
@@ -25,7 +25,6 @@ from .tolerances import (
     LEAST_SHIFT,
     MOST_NEWTON,
     MOST_SADDLES,
-    NEUTRAL,
     STEADY,
     TURNED,
 )
@@ -69,6 +68,7 @@ class SteadyDescent(Descent):
         """Take Newton steps to the nearest root; True if it is reached."""
         for _ in range(MOST_NEWTON):
             before, rest = self.unbalanced, self.rest
+            self.tell()
             if before <= BALANCED:
                 break
             u = rest.quadratic.factors(0.0, 0.0).newton(rest.left)
@@ -119,16 +119,17 @@ def _stability(descent):
         )
     if not motion.freedom:
         return True, float("nan"), 0, None
+    descent.report(0.7, f"balanced in {descent.steps} steps, {motion.freedom} coordinates are chosen for its stability")
     reduced = Reduced(motion, chosen(motion, Variations(motion, field.spin)))
-    w = np.linalg.eigvalsh(0.5 * (reduced.K_hat + reduced.K_hat.T))
-    neutral = int((np.linalg.svd(reduced.K_hat, compute_uv=False) <= NEUTRAL * reduced.scale).sum())
-    pairs = eigenpairs(reduced)
+    nothing = descent.nothing(reduced)
+    descent.report(0.9, f"balanced in {descent.steps} steps, eigenvalues of {motion.freedom} coordinates")
+    found, pairs = stiffnesses(reduced, nothing), eigenpairs(reduced, nothing)
     worst = int(pairs.values.real.argmax())
     if pairs.values.real[worst] <= GROWING * np.abs(pairs.values).max(initial=0.0):
-        return True, float(w[0]), neutral, None
+        return True, found.smallest, found.neutral, None
     shape = pairs.vectors[:, worst]
     real = shape.real if np.linalg.norm(shape.real) >= np.linalg.norm(shape.imag) else shape.imag
-    return False, float(w[0]), neutral, reduced.T @ real
+    return False, found.smallest, found.neutral, reduced.T @ real
 
 
 def demand_admitted(scene, rates, qd):

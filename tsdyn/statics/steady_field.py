@@ -82,6 +82,10 @@ def _own_spin(body, rate):
             )
         axis = axes[1][:, -1]
         values = float(values) * axis * np.sign(axis[np.abs(axis).argmax()])
+    if values.size not in (1, 3) or not np.isfinite(values).all():
+        raise InvalidArgument(
+            f"rotors: the rate of {body.name} must be a number in rad/s, or an angular velocity (3,), got {rate!r}."
+        )
     spin = vector3(values, f"rotors: angular velocity of {body.name} (rad/s, body frame)", InvalidArgument)
     if np.linalg.norm(across @ spin) > ON_AXIS * np.linalg.norm(spin):
         raise InvalidArgument(

@@ -95,6 +95,8 @@ IN_VAIN = 3
 SHORT, FINAL = 1e-4, 1e-9
 # A step is this many times longer than may be before mu grows; tries of a step.
 TOO_FAR, MOST_TRIES = 4.0, 20
+# The share of a search that steps take, of what progress reports; stability takes the rest.
+SEARCH = 0.7
 # Steps at most, and the way in sizes of the scene: what is farther falls.
 MOST_STEPS, FARTHEST = 400, 1e5
 # rad, of all steps: what has turned farther is driven round.
@@ -106,8 +108,8 @@ CLOSED, SLOWEST, MOST_SWEEPS = 1e-15, 0.7, 40
 STALLED = 1e-6
 # rad, or shares of the scene's size: ways off a saddle, tried in turn.
 KICKS = 0.1, 0.03, 0.01
-# Share of the terms of the stiffness below which a direction is neutral, and asymmetry that is no rounding.
-NEUTRAL = 1e-10
+# Share of the terms of the stiffness up to which an asymmetry is rounding.
+NEUTRAL_ASYMMETRY = 1e-10
 # Share of the loads' own accelerations up to which a configuration without positive stiffness is close to a saddle;
 # sweeps of inverse iteration to a direction down from there.
 AT_SADDLE, SWEEPS = 1e-3, 8

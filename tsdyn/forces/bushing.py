@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import Force, Parameters, Point, Turn, cross, floats, kernel, rotated, rotated_back, rotation
+from ..plugins import Force, Parameters, Point, Turn, cross, floats, kernel, rotated, rotated_back, rotation, shown
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike
@@ -30,7 +30,7 @@ def _three(value, what, error):
     if result.shape == ():
         result = np.full(3, float(result))
     if result.shape != (3,) or not np.isfinite(result).all() or (result < 0.0).any():
-        raise error(f"{what} must be a number or three numbers, finite and not negative, got {value!r}.")
+        raise error(f"{what} must be a number or three numbers, finite and not negative, got {shown(value)}.")
     result.setflags(write=False)
     return result
 

@@ -100,6 +100,7 @@ OF_ALL = {  # message: arguments
     r"event 0 \(<lambda>\) is called with \(t, state\)": {"events": [lambda t: 1.0]},
     r"the function of cases is called with \(case\)": {"parameters": lambda: MASSES, "cases": 2},
     "unknown integrator 'rk46'.* did you mean rk45": {"integrator": "rk46"},
+    "Taylor series are .* need no other form": {"integrator": "taylor", "formulation": "null-space"},
     "rtol must be a positive finite number, got 'fine'": {"rtol": "fine"},
     "has no argument keeep; did you mean keep": {"keeep": "final"},
     "resume must be True or False, got 'yes'": {"resume": "yes"},

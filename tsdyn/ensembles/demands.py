@@ -10,6 +10,7 @@ from ..elements.bodies import Body, PointMass
 from ..errors import InvalidArgument, TsdynError
 from ..runs.arguments import state_arrays
 from ..simulation.variants import start_names
+from ..taylor.series_engine import SeriesEngine
 
 
 def demand_whole(study):
@@ -29,6 +30,9 @@ def demand_whole(study):
         _demand_arguments(event.function, event.name, ("t", "state"))
     if given["state"] is not None:
         _demand_state(study, given["state"])
+    form = study.options.settings.form
+    if study.method.driver == "series" and form.name != "tangent":
+        SeriesEngine(study.kept, study.method, form, study.options.within)  # says which methods serve the form
     if cases.names is not None:
         table = (*cases.columns.values(), *cases.fixed.values())
         is_of_numbers = all(np.asarray(values).dtype.kind == "f" for values in table)

@@ -103,6 +103,10 @@ OF_ALL = {  # message: arguments
     "Taylor series are .* need no other form": {"integrator": "taylor", "formulation": "null-space"},
     "rtol must be a positive finite number, got 'fine'": {"rtol": "fine"},
     "has no argument keeep; did you mean keep": {"keeep": "final"},
+    "the scene has no parameter 'bob'; there are bob.mass, bob.position": {"parameters": {"bob": [1.0, 2.0]}},
+    "the scene has no parameter 'rod.axes'; there are .*rod.length": {"parameters": {"rod.axes": [1.0, 2.0]}},
+    r"of mappings, one for each case, make a DataFrame": {"parameters": [{"bob.mass": 1.0}, {"bob.mass": 2.0}]},
+    r"progress is called with \(fraction\)": {"progress": lambda done, total: None},
     "resume must be True or False, got 'yes'": {"resume": "yes"},
     "threads and executor": {"threads": 2, "executor": object()},
 }  # fmt: skip

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..elements.bodies import Body
 from ..errors import InvalidArgument, TsdynError
-from ..parameters.fields import fields_of
+from ..parameters.fields import fields_of, unknown_field
 from ..simulation.variants import start_of
-from ..validation import counted, nearest, shown, whole
+from ..validation import counted, shown, whole
 
 MATRIX = 2  # dimensions of an inertia
 NO_NUMBERS = "USbcmM"  # kinds of arrays: text, truth values, complex, times
@@ -102,9 +102,7 @@ def cases_of(scene, parameters, count):
     columns, fixed = {}, {}
     for name, given in _listed(parameters).items():
         if name not in fields:
-            raise InvalidArgument(
-                f"the scene has no parameter {name!r}{nearest(name, fields)} scene.parameters() lists them."
-            )
+            raise unknown_field(name, fields)
         values, several = _column(name, given, fields[name])
         (columns if several else fixed)[name] = values
     lengths = {name: len(column) for name, column in columns.items()}
@@ -129,9 +127,10 @@ def _listed(parameters):
         if not len(parameters):
             raise InvalidArgument("the table has no cases: the DataFrame has no rows. Has a selection left none?")
         return {str(name): list(parameters[name]) for name in parameters.columns}
+    several = "; of mappings, one for each case, make a DataFrame: pandas.DataFrame(parameters)"
     raise InvalidArgument(
         "parameters must be a mapping of names to arrays, a DataFrame, or a function of the case, got "
-        f"{type(parameters).__name__}."
+        f"{type(parameters).__name__}{several if isinstance(parameters, (list, tuple)) else ''}."
     )
 
 

@@ -23,11 +23,11 @@ def demand_whole(study):
     """
     given, cases = study.given, study.cases
     if callable(study.keep):
-        _demand_arguments(study.keep, "keep", ("solution",))
+        demand_arguments(study.keep, "keep", ("solution",))
     if cases.names is None:
-        _demand_arguments(cases.function, "the function of cases", ("case",))
+        demand_arguments(cases.function, "the function of cases", ("case",))
     for event in study.options.events or ():
-        _demand_arguments(event.function, event.name, ("t", "state"))
+        demand_arguments(event.function, event.name, ("t", "state"))
     if given["state"] is not None:
         _demand_state(study, given["state"])
     form = study.options.settings.form
@@ -42,7 +42,7 @@ def demand_whole(study):
         _demand_fixed(study)
 
 
-def _demand_arguments(function, what, names):
+def demand_arguments(function, what, names):
     """Raise InvalidArgument unless a function can be called with so many arguments by position."""
     try:
         signature = inspect.signature(function)

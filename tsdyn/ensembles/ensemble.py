@@ -15,7 +15,7 @@ from ..simulation.simulate import simulate
 from ..validation import sequence
 from .cases import cases_of
 from .chunks import Collected
-from .demands import demand_whole
+from .demands import demand_arguments, demand_whole
 from .executors import run_executor
 from .progress import CaseProgress
 from .results import Ensemble
@@ -131,6 +131,8 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
         scene, cases_of(scene, parameters, cases), given, keep, free_of(scene, assemble, given["state"]), lanes
     )
     demand_whole(study)
+    if callable(progress):
+        demand_arguments(progress, "progress", ("fraction",))
     if lanes > 1:
         from .lane_refusal import prepare_lanes
 

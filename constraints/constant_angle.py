@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import Joint, Smooth, Vector, number, rotation_matrix
+from ..plugins import Joint, Smooth, Vector, number, rotation_matrix, shown
 from .dot1 import Dot1
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class ConstantAngle(Joint):
         angle = number(self.angle(0.0) if isinstance(self.angle, Smooth) else self.angle)
         if not (0.0 < angle < math.pi and abs(math.cos(angle)) < 1.0):
             raise self.error(
-                f"{self.name}: angle must lie between 0 and pi rad, got {self.angle!r}; to keep two directions "
+                f"{self.name}: angle must lie between 0 and pi rad, got {shown(self.angle)}; to keep two directions "
                 "parallel use Parallel."
             )
 

@@ -33,6 +33,7 @@ from ..plugins import (
     quotient,
     rotation_matrix,
     scaled,
+    shown,
     square,
     vectors,
 )
@@ -139,7 +140,7 @@ class Gear(Primitive):
                 f"{self.ratio!r}; it is negative if the wheels rotate in opposite directions."
             )
         if "offset" in self.__dict__ and not np.isfinite(number(self.offset)):
-            raise self.error(f"{self.name}: offset must be a finite angle in rad, got {self.offset!r}.")
+            raise self.error(f"{self.name}: offset must be a finite angle in rad, got {shown(self.offset)}.")
 
     def parameters(self):
         """(ratio, offset); what is remembered is theta_a."""

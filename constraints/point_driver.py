@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import Joint, Motion, Point, is_data
+from ..plugins import Joint, Motion, Point, is_data, shown
 from .dot2 import Dot2
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class PointDriver(Joint):
             if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 3:
                 raise self.error(
                     f"{self.name}: path must be three motions or numbers, the coordinates along the axes of a, got "
-                    f"{value!r}."
+                    f"{shown(value)}."
                 )
             value = tuple(Motion.wrap(part, f"{self.name}: path[{i}]") for i, part in enumerate(value))
         super().__setattr__(name, value)

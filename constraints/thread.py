@@ -31,6 +31,7 @@ from ..plugins import (
     product,
     rotation_matrix,
     scaled,
+    shown,
     sine_cosine,
 )
 from .angle_driver import sine_cosine_rates
@@ -178,7 +179,7 @@ def demand_lead(constraint, word, value):
     if not (np.isfinite(result) and result != 0.0):
         raise InvalidConstraint(
             f"{constraint.name}: {word} is the travel over the rotation (m/rad) and must be a finite number other than "
-            f"zero, got {value!r}; a screw without travel is a Revolute joint."
+            f"zero, got {shown(value)}; a screw without travel is a Revolute joint."
         )
     return result
 

@@ -85,7 +85,7 @@ from .motions.keywords import numbers_of
 from .motions.prescribed import Motion
 from .motions.signals import Signal
 from .motions.tables import is_data
-from .validation import finite, floats, not_negative, number, positive, vector3, whole
+from .validation import finite, floats, not_negative, number, positive, shown, vector3, whole
 
 __all__ = [
     "AXIS",
@@ -182,6 +182,7 @@ __all__ = [
     "rotation_matrix",
     "scaled",
     "second_embedded_error",
+    "shown",
     "sine_cosine",
     "slip",
     "slip_series",

@@ -9,6 +9,7 @@ import numpy as np
 from .errors import InvalidArgument, UnknownAttribute
 
 EXACT = 2**53  # integers below it are floats
+LONG = 200  # characters of a value that a message shows
 
 
 def checked_once(function):
@@ -59,10 +60,22 @@ def finite(value, what, error=InvalidArgument):
     return _fitting(value, math.isfinite, f"{what} must be a finite number", error)
 
 
+def shown(value):
+    """Return what a message shows of a wrong value: numbers of NumPy as plain ones, of long ones the beginning."""
+    text = repr(_plain(value))
+    return text if len(text) <= LONG else f"{text[:LONG]} ..."
+
+
+def _plain(value):
+    if isinstance(value, np.generic) or type(value) is np.ndarray:
+        value = value.tolist()
+    return type(value)(map(_plain, value)) if type(value) in (list, tuple) else value
+
+
 def _fitting(value, fits, rule, error):
     result = number(value)
     if not (math.isfinite(result) and fits(result)):
-        raise error(f"{rule}, got {value!r}.")
+        raise error(f"{rule}, got {shown(value)}.")
     return result
 
 
@@ -70,7 +83,7 @@ def vector3(value, what, error):
     """Return three finite floats as an array (3,), or raise `error`."""
     array = floats(value)
     if array.shape != (3,) or not np.isfinite(array).all():
-        raise error(f"{what} must be three finite numbers, got {value!r}.")
+        raise error(f"{what} must be three finite numbers, got {shown(value)}.")
     return array
 
 
@@ -78,7 +91,7 @@ def finite_vector(value, n, what):
     """Return n finite floats as an array (n,), or raise InvalidArgument."""
     array = floats(value)
     if array.shape != (n,) or not np.isfinite(array).all():
-        raise InvalidArgument(f"{what} must be {n} finite numbers, one for each coordinate, got {value!r}.")
+        raise InvalidArgument(f"{what} must be {n} finite numbers, one for each coordinate, got {shown(value)}.")
     return array
 
 
@@ -86,7 +99,7 @@ def finite_times(value, what):
     """Return one or more finite times as an array (k,), or raise InvalidArgument."""
     array = np.atleast_1d(floats(value))
     if array.ndim != 1 or not array.size or not np.isfinite(array).all():
-        raise InvalidArgument(f"{what} must be a finite time in s, or a vector of them, got {value!r}.")
+        raise InvalidArgument(f"{what} must be a finite time in s, or a vector of them, got {shown(value)}.")
     return array
 
 
@@ -95,7 +108,7 @@ def whole(value, what):
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value < 2**63:
-        raise InvalidArgument(f"{what} must be a positive whole number, got {value!r}.")
+        raise InvalidArgument(f"{what} must be a positive whole number, got {shown(value)}.")
     return int(value)
 
 
@@ -106,13 +119,13 @@ def sequence(value, what, error):
             return list(value)
     except TypeError:
         pass
-    raise error(f"{what}, got {value!r}.")
+    raise error(f"{what}, got {shown(value)}.")
 
 
 def one_of(value, options, what, error=InvalidArgument):
     """Return one of some names, or raise `error`."""
     if not isinstance(value, str) or value not in options:
-        raise error(f"{what} must be {' or '.join(map(repr, options))}, got {value!r}.")
+        raise error(f"{what} must be {' or '.join(map(repr, options))}, got {shown(value)}.")
     return value
 
 

@@ -6,6 +6,10 @@ import pytest
 import tsdyn as ts
 from tests.helpers.rods_on_a_spring import two_rods_on_a_spring as chain
 from tsdyn.ensembles import batch, first_slice, runner
+from tsdyn.ensembles.tolerances import TRIED
+from tsdyn.runs.recorder import CHART_ROOM
+from tsdyn.taylor.run_memory import SeriesMemory
+from tsdyn.taylor.series_engine import SeriesEngine
 
 RNG = np.random.default_rng(11)
 SPAN = (0.0, 0.05)
@@ -184,3 +188,32 @@ def test_motions_that_turn_stiff_or_singular_are_left_to_python():
     table = {f"{wall.name}.damping": np.geomspace(1e-3, 1e7, CASES)}
     found = ts.ensemble(scene, table, SPAN, threads=1)
     compare(scene, table, found)
+
+
+def test_runs_with_a_chart_in_each_step_need_no_python(by_python):
+    """A slice had room for a hundred charts, and each case was begun twice."""
+    scene, span = chain(), (0.0, 30.0)
+    table = {"rod 0.mass": uniform(), "gravity": RNG.normal(size=(CASES, 3))}
+    found = ts.ensemble(scene, table, span, threads=1)
+    assert by_python == [0]
+    for i in (1, CASES - 1):
+        solution = ts.simulate(scene.with_parameters({name: array[i] for name, array in table.items()}), span)
+        assert solution.stats.charts > 2 * CHART_ROOM
+        assert found.q[i].tobytes() == solution.state.q.tobytes()
+
+
+def test_longer_runs_share_a_memory_and_are_not_begun_twice(monkeypatch):
+    """Each case made a memory of its own, and ran its first steps twice."""
+    made, begun, enter = [], [], SeriesMemory.enter
+    memory = SeriesEngine.memory
+    monkeypatch.setattr(SeriesEngine, "memory", lambda *given: made.append(0) or memory(*given))
+    monkeypatch.setattr(SeriesMemory, "enter", lambda *given: begun.append(0) or enter(*given))
+    scene, table, options = chain(), {"rod 0.mass": uniform()}, {"max_step": 2e-3}
+    found = ts.ensemble(scene, table, (0.0, 3.0), threads=1, **options)
+    assert found.success.all(), found.message
+    assert len(made) <= 2
+    assert len(begun) <= CASES + TRIED + 2
+    for i in (0, TRIED, CASES - 1):
+        solution = ts.simulate(scene.with_parameters({"rod 0.mass": table["rod 0.mass"][i]}), (0.0, 3.0), **options)
+        assert solution.stats.steps > first_slice.FIRST_SLICE
+        assert found.q[i].tobytes() == solution.state.q.tobytes()

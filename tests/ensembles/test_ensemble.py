@@ -206,7 +206,7 @@ def test_a_function_that_raises_is_told():
         return 1.0
 
     found = ts.ensemble(ball(), {"bob.mass": [1.0, 2.0]}, SPAN, keep=odd)
-    assert found.message == ["The run reached the end of the interval.", "ValueError: too heavy"]
+    assert found.message == ["The run reached the end of the interval.", "keep raised ValueError: too heavy."]
     assert found.kept[0] == 1.0
     assert np.isnan(found.kept[1])
 
@@ -310,7 +310,7 @@ def test_tables_and_reprs():
 WRONG = {
     "did you mean bob.mass": {"parameters": {"bob.mas": [1.0]}},
     "as many values as there are cases": {"parameters": {"bob.mass": [1.0, 2.0], "gravity": np.zeros((3, 3))}},
-    "have no values": {"parameters": {"bob.mass": []}},
+    "the table has no cases": {"parameters": {"bob.mass": []}},
     "a mapping of names to arrays": {"parameters": 3},
     "needs the number of cases": {"parameters": lambda i: {}},
     "neither one for all cases": {"parameters": {"bob.mass": np.ones((2, 2))}},

@@ -112,3 +112,38 @@ def test_a_handshake_that_fails_is_tried_again(monkeypatch):
 def test_what_is_no_executor():
     with pytest.raises(ts.InvalidArgument, match=r"an Executor of concurrent\.futures"):
         ts.ensemble(top.build(), TABLE, SPAN, executor=3)
+
+
+@pytest.mark.parametrize("kind", [ThreadPoolExecutor, ProcessPoolExecutor])
+def test_an_executor_that_has_been_shut_down(kind, tmp_path):
+    with kind(1) as pool:
+        pass
+    for store in (None, tmp_path / "study.h5"):
+        with pytest.raises(
+            ts.InvalidArgument, match=r"executor: it takes no work: .*after shutdown\. Give one that is open"
+        ):
+            ts.ensemble(top.build(), TABLE, SPAN, executor=pool, store=store)
+    assert not [*tmp_path.iterdir()]
+    with pytest.raises(ts.InvalidArgument, match=r"must be an Executor of concurrent\.futures"):
+        ts.ensemble(top.build(), TABLE, SPAN, executor=kind)
+
+
+def test_an_executor_that_is_shut_down_meanwhile_keeps_what_has_come_back():
+    pool = ThreadPoolExecutor(1)
+
+    def keep(solution):
+        pool.shutdown(wait=False)
+        return solution.state.q[2]
+
+    with pytest.warns(UserWarning, match="The executor broke: .*after shutdown"):
+        found = ts.ensemble(top.build(), TABLE, SPAN, executor=pool, keep=keep)
+    assert found.interrupted
+    assert 0 < found.success.sum() < 40
+
+
+def test_a_client_of_dask_that_is_closed():
+    distributed = pytest.importorskip("distributed")
+    with distributed.Client(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as client:
+        pass
+    with pytest.raises(ts.InvalidArgument, match="executor: it takes no work: the client of Dask is closed"):
+        ts.ensemble(top.build(), TABLE, SPAN, executor=client)

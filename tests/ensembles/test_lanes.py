@@ -29,6 +29,21 @@ def loop():
     return scene
 
 
+def damped():
+    """A body on a bushing, with friction, of coefficients that are zero in some cases."""
+    scene = ts.Scene(gravity=(0, 0, -10))
+    body = scene.add_body(1.0, (0.3, 0.4, 0.5), velocity=(0.1, 0.2, 0), angular_velocity=(1, 2, 3), name="body")
+    scene.add(ts.forces.Bushing(body, scene.ground, stiffness=(4, 5, 6), torsional_stiffness=3, name="bush"))
+    scene.add(ts.forces.ViscousFriction(body, scene.ground, damping=1, torsional_damping=1, name="oil"))
+    return scene
+
+
+def damping(scene):
+    whether = np.arange(CASES) % 2
+    table = {f"bush.{name}": whether[:, None] * uniform(3) for name in ("damping", "torsional_damping")}
+    return table | {f"oil.{name}": whether[::-1] * uniform() for name in ("damping", "torsional_damping")}
+
+
 STUDIES = {
     "sliding top": (SCENES["sliding top"].build, 3.0, lambda scene: {f"{scene.bodies[0].name}.mass": 30 * uniform()}),
     "two-body pendulum": (
@@ -42,6 +57,7 @@ STUDIES = {
         0.5,
         lambda scene: {"spring.stiffness": 20 * uniform(), "rod 1.inertia": (0.1, 0.1, 0.05) * uniform(1)},
     ),
+    "damped": (damped, 0.5, damping),
     "loop": (loop, 0.3, lambda scene: {"a.mass": uniform(), "b.mass": 2 * uniform()}),
 }
 
@@ -159,9 +175,14 @@ REFUSED = {
     "a function keep=": (spring, {"keep": lambda solution: 1.0}),
     "function of the case": (spring, {"parameters": lambda i: {"rod 0.mass": 1.0}, "cases": 4}),
     "assemble= can't": (spring, {"assemble": True}),
+    "max_steps can't": (spring, {"max_steps": 100}),
+    "chart_interval=3 can't be served in lanes": (spring, {"chart_interval": 3}),
+    "formulation='null-space' and redundancy='refuse' can't": (
+        spring, {"formulation": "null-space", "redundancy": "refuse"},
+    ),
     "wind is a function of time": (pushed, {}),
     "some rows are redundant": (redundant, {}),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("message", REFUSED)

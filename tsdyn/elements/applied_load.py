@@ -49,12 +49,6 @@ class Given:
         if value is None:
             raise InvalidForce(f"{self.name}: no {self.given} given; set {self.given}={hint}, or a function of time.")
         setattr(self, self.given, value)
-        self.check()
-
-    def check(self) -> None:
-        """It must do something."""
-        if Signal.is_zero(getattr(self, self.given)):
-            raise self.error(f"{self.name}: it is zero at all times; set {self.given}.")
 
     def parameters(self) -> tuple[Any, ...]:
         """The vector."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Generic, Never, TypeVar
 import numpy as np
 
 from ..errors import InvalidBody
-from ..validation import demand_known, floats, positive, vector3
+from ..validation import demand_known, floats, positive, shown, vector3
 from .tolerances import INERTIA_ROUNDING, LEAST_MASS, TRIANGLE, UNIT_LENGTH
 
 if TYPE_CHECKING:
@@ -71,7 +71,9 @@ class Attribute(Generic[Given, Kept]):
 def _mass(value, body):
     mass = np.float64(positive(value, f"{body.name}: mass (kg)", InvalidBody))
     if mass < LEAST_MASS:
-        raise InvalidBody(f"{body.name}: mass (kg) must be at least {LEAST_MASS:g}, got {value!r}: 1 / mass overflows.")
+        raise InvalidBody(
+            f"{body.name}: mass (kg) must be at least {LEAST_MASS:g}, got {shown(value)}: 1 / mass overflows."
+        )
     return mass
 
 
@@ -82,7 +84,7 @@ def _inertia(value, body):
     if given.shape != (3, 3) or not np.isfinite(given).all():
         raise InvalidBody(
             f"{body.name}: inertia must be 3 principal values or a symmetric 3 x 3 matrix, finite, kg m^2, "
-            f"got {value!r}."
+            f"got {shown(value)}."
         )
     scale = np.abs(given).max()
     unit = given / (scale or 1.0)  # no square or sum of its entries overflows
@@ -113,7 +115,7 @@ def _orientation(value, body):
     if p.shape != (4,) or not np.isfinite(p).all():
         raise InvalidBody(
             f"{body.name}: orientation must be four finite Euler parameters (e0, e1, e2, e3), scalar first, or one "
-            f"scipy Rotation, got {value!r}."
+            f"scipy Rotation, got {shown(value)}."
         )
     known = body.values.get("orientation")
     if known is not None and p.tobytes() == known.tobytes():

@@ -227,6 +227,9 @@ class Attachment:
                 return place
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
+    def demand_effect(self) -> None:
+        """Raise an error where one that is made would do nothing, as if an argument had been forgotten."""
+
     def check(self) -> None:
         """Raise an error where an attribute has an impossible value; asked again when one is set."""
 

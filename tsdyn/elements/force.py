@@ -74,7 +74,7 @@ class Force(Attachment):
     loads : tuple of str
         The attributes whose work is applied power.
     sources : tuple of str
-        The attributes of which one at least must differ from zero.
+        The attributes of which one at least must differ from zero when it is made; all may be zero later.
     conservative : bool
         Whether all but the loads' work is in potential and dissipation, however the bodies move.
     a, b : Body or ground
@@ -148,9 +148,14 @@ class Force(Attachment):
         """The callbacks that run it; forces with the same ones are run together."""
         return self.own_kernels
 
-    def check(self) -> None:
-        """Refuse a force all of whose sources are zero."""
-        if self.sources and all(Signal.is_zero(getattr(self, name)) for name in self.sources):
+    @property
+    def is_idle(self) -> bool:
+        """Whether all of its sources are zero at all times."""
+        return bool(self.sources) and all(Signal.is_zero(getattr(self, name)) for name in self.sources)
+
+    def demand_effect(self) -> None:
+        """Refuse a force all of whose sources are zero when it is made; values that are set later may be."""
+        if self.is_idle:
             raise self.error(f"{self.name}: it is zero at all times; set {' or '.join(self.sources)}.")
 
     @classmethod

@@ -81,6 +81,7 @@ class JointFriction:
     """
 
     joints: tuple[type, ...] = ()
+    sources = ("kinetic", "static")
     markers: tuple[Marker, ...] = ()
     particles = True
     sharp = True  # at rest, and where a part of the normal load passes zero
@@ -141,7 +142,7 @@ class JointFriction:
         super().__setattr__(name, value)
 
     def check(self) -> None:
-        """It must do something, and be no smaller at rest than sliding."""
+        """A joint that the scene has, and friction no smaller at rest than sliding."""
         if not self.joint.added:
             raise self.error(f"{self.name}: add its joint {self.joint.name!r} to the scene first.")
         if self.__dict__.get("static") is not None and self.static < self.kinetic:
@@ -149,8 +150,6 @@ class JointFriction:
                 f"{self.name}: static must be at least kinetic = {self.kinetic:g}, got {self.static:g}; leave it out "
                 "where they are the same."
             )
-        if self.kinetic == 0.0 and not self.static:
-            raise self.error(f"{self.name}: it is zero at all times; set kinetic.")
 
     def parameters(self) -> tuple[Any, ...]:
         """(mu, mu_s, v_s, v_0, preload), then the geometry."""

@@ -1,13 +1,29 @@
 """Bookkeeping of the constraints and forces made for a scene: which were added, and under which names."""
 
+import contextlib
 import warnings
+from contextvars import ContextVar
 
 SHOWN = 5
+
+_may_be_idle = ContextVar("whether forces that are made may be zero", default=False)
+
+
+@contextlib.contextmanager
+def idle_forces(admitted):
+    """A block in which a force may be made whose numbers are all zero: a file says what it says."""
+    token = _may_be_idle.set(admitted)
+    try:
+        yield
+    finally:
+        _may_be_idle.reset(token)
 
 
 def note(item):
     """A constraint or force has been made: it waits to be added to its scene, or to become a part of a joint."""
     if "a" in vars(item):  # its __init__ has called that of its base
+        if not _may_be_idle.get():
+            item.demand_effect()
         item.scene._waiting[id(item)] = item
 
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import inspect
+from collections.abc import Mapping, Set
 
 import numpy as np
 
 from ..elements.bodies import Body
-from ..errors import InvalidArgument
-from ..parameters.fields import fields_of
+from ..errors import InvalidArgument, TsdynError
+from ..parameters.fields import fields_of, unknown_field
 from ..simulation.variants import start_of
-from ..validation import counted, nearest
+from ..validation import counted, shown, whole
 
 MATRIX = 2  # dimensions of an inertia
+NO_NUMBERS = "USbcmM"  # kinds of arrays: text, truth values, complex, times
 
 
 class Cases:
@@ -61,7 +63,12 @@ class CalledCases:
 
     def values(self, i):
         """As of `Cases`."""
-        found = self.function(self.first + i)
+        try:
+            found = self.function(self.first + i)
+        except TsdynError:
+            raise
+        except Exception as error:
+            raise InvalidArgument(f"the function of cases raised {type(error).__name__}: {error}.") from error
         if not isinstance(found, Mapping):
             raise InvalidArgument(f"the function of cases must return a mapping of names to values, it gave {found!r}.")
         return dict(found)
@@ -86,17 +93,16 @@ def cases_of(scene, parameters, count):
     InvalidArgument
         If a name is unknown, lengths differ, or the number of cases can't be told.
     """
+    count = whole(count, "cases")
     if callable(parameters):
-        if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
-            raise InvalidArgument(f"a function of the case needs the number of cases: cases=1000; got cases={count!r}.")
-        return CalledCases(parameters, int(count))
+        if count is None:
+            raise InvalidArgument("a function of the case needs the number of cases: cases=1000.")
+        return CalledCases(parameters, count)
     fields = fields_of(scene)
     columns, fixed = {}, {}
     for name, given in _listed(parameters).items():
         if name not in fields:
-            raise InvalidArgument(
-                f"the scene has no parameter {name!r}{nearest(name, fields)} scene.parameters() lists them."
-            )
+            raise unknown_field(name, fields)
         values, several = _column(name, given, fields[name])
         (columns if several else fixed)[name] = values
     lengths = {name: len(column) for name, column in columns.items()}
@@ -105,10 +111,12 @@ def cases_of(scene, parameters, count):
         raise InvalidArgument(f"parameters must have as many values as there are cases, got {said}.")
     known = next(iter(lengths.values()), None)
     if known == 0:
-        raise InvalidArgument(f"parameters have no values: {', '.join(lengths)}; give an array with one for each case.")
+        raise InvalidArgument(
+            f"the table has no cases: there are no values of {', '.join(lengths)}. Give arrays with one for each case."
+        )
     if count is not None and known not in (None, count):
         raise InvalidArgument(f"cases={count!r}, but the parameters have {counted(known, 'value')} each.")
-    return Cases(columns, fixed, known if known is not None else int(count or 1))
+    return Cases(columns, fixed, known if known is not None else count or 1)
 
 
 def _listed(parameters):
@@ -116,10 +124,13 @@ def _listed(parameters):
     if isinstance(parameters, Mapping):
         return dict(parameters)
     if hasattr(parameters, "columns") and hasattr(parameters, "__getitem__"):
-        return {str(name): np.array(list(parameters[name])) for name in parameters.columns}
+        if not len(parameters):
+            raise InvalidArgument("the table has no cases: the DataFrame has no rows. Has a selection left none?")
+        return {str(name): list(parameters[name]) for name in parameters.columns}
+    several = "; of mappings, one for each case, make a DataFrame: pandas.DataFrame(parameters)"
     raise InvalidArgument(
         "parameters must be a mapping of names to arrays, a DataFrame, or a function of the case, got "
-        f"{type(parameters).__name__}."
+        f"{type(parameters).__name__}{several if isinstance(parameters, (list, tuple)) else ''}."
     )
 
 
@@ -127,25 +138,41 @@ def _column(name, given, field):
     """Values of a parameter as an array, and whether it has one value a case."""
     if hasattr(given, "as_quat") and not isinstance(given, type):  # rotations of SciPy: the scalar is last
         given = np.roll(given.as_quat(), 1, axis=-1)
+    if isinstance(given, (Set, Mapping)) or inspect.isgenerator(given):
+        raise InvalidArgument(f"{name}: give the values of the cases as a list or an array, not as {given!r}.")
     array = _array(given)
+    if field.is_numeric and array.dtype.kind not in "iuf":
+        _demand_numbers(name, given, array)
     if array.dtype.kind not in "iuf":  # functions of time, for instance
         return (array, True) if array.ndim else (given, False)
     array = array.astype(float)
-    whole = np.ndim(field.value) if field.is_numeric else 0
+    dimensions = np.ndim(field.value) if field.is_numeric else 0
     if field.attribute == "inertia" and isinstance(field.owner, Body) and array.ndim == MATRIX:
         if array.shape == (3, 3) and (array == array.T).all():
             raise InvalidArgument(
                 f"{name}: three cases of principal values, or one matrix? Give an array (cases, 3, 3)."
             )
         return array, True
-    least = 1 if whole == MATRIX else whole  # principal values do for a matrix
-    if array.ndim not in range(least, whole + 2):
+    least = 1 if dimensions == MATRIX else dimensions  # principal values do for a matrix
+    if array.ndim not in range(least, dimensions + 2):
         raise InvalidArgument(
-            f"{name}: values of shape {array.shape} are neither one for all cases nor one for each; a value has "
-            f"{counted(whole, 'dimension')}."
+            f"{name}: values of shape {array.shape} are neither one for all cases nor one for each; a value is "
+            f"{'a number' if dimensions == 0 else f'an array of shape {np.shape(field.value)}'}."
         )
     array.setflags(write=False)
-    return (array, True) if array.ndim > whole else (float(array) if whole == 0 else array, False)
+    return (array, True) if array.ndim > dimensions else (float(array) if dimensions == 0 else array, False)
+
+
+def _demand_numbers(name, given, array):
+    """Raise InvalidArgument where values of a number are text, truth values, dates or complex; functions may be."""
+    for i, value in enumerate(given if array.ndim else [given]):
+        if _array(value).dtype.kind not in NO_NUMBERS:
+            continue
+        where = f" in case {i}" if array.ndim else ""
+        raise InvalidArgument(
+            f"{name} must be numbers, got {shown(value)}{where}. Convert the values first, such as by "
+            "np.asarray(values, float)."
+        )
 
 
 def started(scene, values, t, free):

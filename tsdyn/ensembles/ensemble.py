@@ -15,6 +15,7 @@ from ..simulation.simulate import simulate
 from ..validation import sequence
 from .cases import cases_of
 from .chunks import Collected
+from .demands import demand_arguments, demand_whole
 from .executors import run_executor
 from .progress import CaseProgress
 from .results import Ensemble
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from ..hints import CaseTable, Keep, Place, Progress, Span
 
 OWN = ("scene", "t_span", "store", "checkpoint", "progress")  # arguments of `simulate` that are no options here
+NAMED = ("keep", "cases", "assemble", "executor", "threads", "lanes", "store", "resume", "progress")
 
 
 @fitting
@@ -90,7 +92,8 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
     Raises
     ------
     TsdynError
-        A subclass, before the first run: an unknown parameter, lengths that differ, an option that isn't admissible.
+        A subclass, before the first run, for what is wrong with all cases: an unknown parameter, lengths that differ, a
+        table without cases, values that are text, an option that isn't admissible, a function with other arguments.
 
     Notes
     -----
@@ -121,10 +124,15 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
     lanes = demand_lanes(lanes)
     if threads is not None and (isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1):
         raise InvalidArgument(f"threads must be a positive whole number, got {threads!r}.")
+    if threads is not None and executor is not None:
+        raise InvalidArgument("threads and executor: the cases run on the one or the other; leave one of them out.")
     given = given_of(t_span, options)
     study = Study(
         scene, cases_of(scene, parameters, cases), given, keep, free_of(scene, assemble, given["state"]), lanes
     )
+    demand_whole(study)
+    if callable(progress):
+        demand_arguments(progress, "progress", ("fraction",))
     if lanes > 1:
         from .lane_refusal import prepare_lanes
 
@@ -156,6 +164,8 @@ def free_of(scene, assemble, state):
 
 def sink_of(study, store, resume):
     """Where the results go: memory, or a store."""
+    if not isinstance(resume, (bool, np.bool_)):
+        raise InvalidArgument(f"resume must be True or False, got {resume!r}.")
     if store is None:
         if resume:
             raise InvalidArgument(
@@ -184,5 +194,5 @@ def given_of(t_span, options):
     known = [name for name in defaults if name not in OWN]
     for name in options:
         if name not in known:
-            raise unknown_argument("ensemble", name, known)
+            raise unknown_argument("ensemble", name, [*NAMED, *known])
     return {**defaults, **options, "scene": None, "t_span": t_span}

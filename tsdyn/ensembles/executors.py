@@ -13,6 +13,8 @@ from .runner import Runner, Study
 from .threads import Queue
 from .tolerances import AHEAD, LOOK, RETRIES, SENT_SECONDS, STUDIES
 
+CLOSED = "executor: it takes no work: {}. Give one that is open, such as within `with ProcessPoolExecutor() as pool:`."
+
 _idle = {}  # of a worker: digest of what was sent -> runners that no thread uses
 
 
@@ -71,6 +73,8 @@ def _opened(executor):
         except ImportError as error:
             raise MissingDependency("an address of a scheduler needs Dask: pip install 'tsdyn[cluster]'.") from error
         client = _connected(Client, executor) if isinstance(executor, str) else executor
+        if isinstance(client, Client) and client.status not in ("running", "connecting"):
+            raise InvalidArgument(CLOSED.format(f"the client of Dask is {client.status}"))
         pool = client.get_executor(pure=False, retries=RETRIES)
         try:
             yield pool, sum(client.nthreads().values()) or 1, True
@@ -78,7 +82,7 @@ def _opened(executor):
             pool.shutdown(wait=False)
             if client is not executor:
                 client.close()
-    elif callable(getattr(executor, "submit", None)):
+    elif callable(getattr(executor, "submit", None)) and not isinstance(executor, type):
         yield executor, getattr(executor, "_max_workers", None) or 4, False
     else:
         raise InvalidArgument(
@@ -143,7 +147,18 @@ class _Sender:
                 return
             part = self.study.cases.part(slice(pair[0], sum(pair)))
             part = part if self.dump is None else self.dump(part)
-            self.pending[self.pool.submit(run_job, self.sent, part, pair[0])] = pair
+            self.pending[self._submit(part, pair[0])] = pair
+
+    def _submit(self, part, first):
+        """The future of a chunk; raises InvalidArgument if the executor has been shut down before the first one."""
+        try:
+            return self.pool.submit(run_job, self.sent, part, first)
+        except BrokenExecutor:
+            raise
+        except RuntimeError as error:
+            if self.pending or first > self.sink.first:
+                raise BrokenExecutor(str(error)) from error
+            raise InvalidArgument(CLOSED.format(error)) from error
 
     def _collect(self, future):
         """Take over a chunk, or send it again if its worker is lost; how many cases have come back."""

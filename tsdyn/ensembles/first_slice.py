@@ -12,6 +12,7 @@ from ..runs.slices import FIRST_SLICE, FIRST_WORK
 from ..runs.tolerances import TRIES
 from ..simulation.local_origin import origin_of
 from ..taylor.series_engine import SeriesEngine
+from .tolerances import MOSTLY, TRIED
 
 SUCCESS = Status.SUCCESS
 
@@ -37,7 +38,8 @@ class FirstSlice:
         self.rows = min(max(FIRST_WORK // n, 1), FIRST_SLICE)
         width = 1 + 3 * n + study.kept.handles.count + study.family.packed.system.memory.size
         self.out = np.empty((times.size or self.rows + 1, width))
-        history, charts = np.empty((self.rows + 2 * TRIES, 3)), np.empty((2 * CHART_ROOM, 5))
+        history, charts = np.empty((self.rows + 2 * TRIES, 3)), np.empty((self.rows + CHART_ROOM, 5))  # one a step
+        self._long = self._tried = 0
         self.log = RunLog(times, study.stops, self.out, history, charts, NO_ROWS, NO_ROWS)
 
     @staticmethod
@@ -48,9 +50,9 @@ class FirstSlice:
         return plain and study.method.driver == "series" and not len(study.stops) and not callable(study.keep)
 
     def run(self, task):
-        """The `Finished` run; None if it hasn't ended well within the slice."""
+        """The `Finished` run; None if it hasn't ended well within the slice, or most haven't: it begins again then."""
         kept = task.prepared
-        if origin_of(kept.packed, task.q) is not None:
+        if self._long * MOSTLY > self._tried > TRIED or origin_of(kept.packed, task.q) is not None:
             return None
         engine = kept.engine(SeriesEngine, task.method, task.form, task.within)
         memory = kept.take(engine.kind)
@@ -59,8 +61,11 @@ class FirstSlice:
                 memory = engine.memory(kept)
         memory.enter(engine, task, False)
         status, run = memory.advance(self.log, self.rows), memory.run
-        if status is not SUCCESS or run.numbers.near_steps:
-            return None
-        found = Finished(run.clock.t, run.now[:2].copy(), self.out[: run.numbers.rows])
-        kept.give(engine.kind, memory)
+        self._tried += 1
+        self._long += status is Status.SLICE_DONE
+        found = None
+        if status is SUCCESS and not run.numbers.near_steps:
+            found = Finished(run.clock.t, run.now[:2].copy(), self.out[: run.numbers.rows])
+        if status is not Status.NOT_FINITE:  # NaN may be left
+            kept.give(engine.kind, memory)
         return found

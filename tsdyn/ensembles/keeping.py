@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..errors import InvalidArgument
-from ..validation import floats
+from ..errors import InvalidArgument, TsdynError
+from ..validation import floats, shown
 
 FINAL, TIMES = "final", "t_eval"
 
@@ -30,12 +30,19 @@ def record_of(keep, outcome, n, times):
 
 def reduced(keep, solution):
     """What a user's function makes of a solution: arrays by name; "" stands for one without a name."""
-    found = keep(solution)
+    try:
+        found = keep(solution)
+    except TsdynError:
+        raise
+    except Exception as error:
+        raise InvalidArgument(f"keep raised {type(error).__name__}: {error}.") from error
     found = dict(found) if isinstance(found, Mapping) else {"": found}
     arrays = {}
     for name, value in found.items():
         array = np.asarray(value, float) if isinstance(value, (bool, np.bool_)) else floats(value)
-        if array.dtype != float or (array.size == 0 and np.size(value) != 0) or array.size == 0:
-            raise InvalidArgument(f"keep must return numbers, arrays of numbers or a mapping of them, got {value!r}.")
+        if array.dtype != float or array.size == 0:
+            raise InvalidArgument(
+                f"keep must return numbers, arrays of numbers or a mapping of them, got {shown(value)}."
+            )
         arrays[f"kept {name}".rstrip()] = array
     return arrays

@@ -14,6 +14,7 @@ from .first_slice import FirstSlice
 from .lane_loop import lane_runner
 
 INSTEAD = "Leave lanes out: one case at a time serves every scene and method."
+PLAIN = {"formulation": "tangent", "chart_interval": None, "redundancy": "drop"}  # what lanes have of these options
 
 
 def prepare_lanes(study):
@@ -42,6 +43,9 @@ def _of_options(study):
     given = study.given
     if DEBUG:
         return "TSDYN_DEBUG=1 runs kernels as plain Python, which has no lanes"
+    changed = [f"{name}={given[name]!r}" for name, plain in PLAIN.items() if given[name] != plain]
+    if changed:
+        return f"{' and '.join(changed)} can't be served in lanes"
     if study.method.driver != "series":
         return f"lanes are for Taylor series, and the method is {study.method!r}"
     if study.method.step is not None:

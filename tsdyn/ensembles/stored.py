@@ -16,12 +16,12 @@ from .._version import __version__
 from ..errors import Status, StorageError
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
 from ..storage.formats import Column, Table, format_of
-from ..storage.write_errors import writing
+from ..storage.write_errors import demand_writable, writing
 from .chunks import empty, fitted
 from .keeping import TIMES
 from .tolerances import FLUSH, WAITING
 
-GO_ON = "Free space there, and go on: resume=True."
+GO_ON = "Free space there, and go on: resume=True.", "Mend that, and go on: resume=True."
 
 CASE, DIGEST, PARAMETER = "case", "ensemble", "parameter "
 
@@ -41,17 +41,17 @@ class StoredResults:
 
     def __init__(self, study, path, resume):
         demand_path(path, "store")
+        self._format, self._store, self._table = format_of(path), None, None
         self.study, self.path = study, Path(path).absolute()
-        self._format, self._store, self._table = format_of(self.path), None, None
         self._said = self.path.with_name(f"{self.path.name}.messages")
         self._waiting, self._due = {}, time.perf_counter() + FLUSH
         with writing(self.path):
-            has_folder, taken = self.path.parent.is_dir(), self.path.exists()
-        if not has_folder:
-            raise StorageError(f"there is no folder {self.path.parent} to write {self.path.name} to.")
+            taken = self.path.exists()
         if taken and not resume:
             raise StorageError(f"{self.path} exists. Delete it, take another name, or go on with it: resume=True.")
         self.first = self._found() if taken else 0
+        if self.first < study.cases.count:
+            demand_writable(self.path)
         if not self.first:  # a store of this ensemble may be there, without results
             for path in (self.path, self._said):
                 _remove(path)

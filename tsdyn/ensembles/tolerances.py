@@ -28,3 +28,5 @@ STUDIES = 4
 LANES = 1, 4
 # cases after which it is asked whether they are long; the loop of cases runs them if fewer than one in FEW_LONG are
 TRIED, FEW_LONG = 16, 8
+# the first slice of a run is tried alone, and run again if it doesn't suffice, unless one in MOSTLY is long
+MOSTLY = 2

@@ -90,6 +90,8 @@ def _item(item, refused):
             continue
         if value is not None and not _is_left_out(value, argument):
             found[name] = value
+    if getattr(item, "is_idle", False):  # says so, for nothing is left out by mistake
+        found |= {name: encode(vars(item)[name]) for name in item.sources if vars(item)[name] is not None}
     return found | _history(item)
 
 

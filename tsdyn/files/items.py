@@ -6,6 +6,7 @@ import numpy as np
 
 from ..elements.joint import Joint
 from ..elements.joint_coordinates import Angle
+from ..elements.membership import idle_forces
 from . import types
 from .describe import BUILT
 from .expressions import Misread
@@ -43,7 +44,8 @@ def add_item(reading, scene, path, table, kinds):
     if len(reading.mistakes.found) > before or positions is None:
         return
     make = cls if placed is None else cls.at
-    item = made(reading, path, what, make, positions, {**given, **(placed or {}), "name": name})
+    with idle_forces(any(source in given for source in getattr(cls, "sources", ()))):
+        item = made(reading, path, what, make, positions, {**given, **(placed or {}), "name": name})
     if item is None:
         return
     _restore(reading, path, item, given, table)

@@ -18,7 +18,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import Force, Parameters, Point, Turn, cross, floats, kernel, rotated, rotated_back, rotation
+from ..plugins import (
+    Force,
+    Parameters,
+    Point,
+    Turn,
+    cross,
+    floats,
+    kernel,
+    rotated,
+    rotated_back,
+    rotation,
+    shown,
+    some,
+)
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike
@@ -30,7 +43,7 @@ def _three(value, what, error):
     if result.shape == ():
         result = np.full(3, float(result))
     if result.shape != (3,) or not np.isfinite(result).all() or (result < 0.0).any():
-        raise error(f"{what} must be a number or three numbers, finite and not negative, got {value!r}.")
+        raise error(f"{what} must be a number or three numbers, finite and not negative, got {shown(value)}.")
     result.setflags(write=False)
     return result
 
@@ -207,9 +220,9 @@ def separation_rate(x, xd):
 @kernel
 def force_series(s, par, k):
     """Order k of F, Eq. (1); row 23 has Dd."""
-    stiff = par[0] != 0.0 or par[1] != 0.0 or par[2] != 0.0
-    damped = par[3] != 0.0 or par[4] != 0.0 or par[5] != 0.0
-    f0, f1, f2 = 0.0, 0.0, 0.0
+    stiff = some(par[0]) or some(par[1]) or some(par[2])
+    damped = some(par[3]) or some(par[4]) or some(par[5])
+    f0, f1, f2 = 0.0 * par[0], 0.0 * par[1], 0.0 * par[2]  # of lanes, too
     if not (stiff or damped):
         return f0, f1, f2
     if stiff:
@@ -229,16 +242,16 @@ def force_series(s, par, k):
 @kernel
 def torque_series(s, par, k):
     """Order k of N, Eq. (2)."""
-    stiff = par[6] != 0.0 or par[7] != 0.0 or par[8] != 0.0
-    damped = par[9] != 0.0 or par[10] != 0.0 or par[11] != 0.0
-    n0, n1, n2 = 0.0, 0.0, 0.0
+    stiff = some(par[6]) or some(par[7]) or some(par[8])
+    damped = some(par[9]) or some(par[10]) or some(par[11])
+    n0, n1, n2 = 0.0 * par[6], 0.0 * par[7], 0.0 * par[8]
     if not (stiff or damped):
         return n0, n1, n2
     if damped:
         w0, w1, w2 = rotated_back(s, 8, 42, k)
         n0, n1, n2 = par[9] * w0, par[10] * w1, par[11] * w2
     if stiff:
-        relative_series(s, k)
+        relative_series(0.0 * par[6], k, s)
         for i in range(3):
             s[36 + i, k] = 2.0 * par[6 + i] * s[33 + i, k]
         for l in range(k + 1):
@@ -252,9 +265,9 @@ def torque_series(s, par, k):
 
 
 @kernel
-def relative_series(s, k):
-    """Rows 32 to 35 = order k of p_a^* p_b."""
-    e0, e1, e2, e3 = 0.0, 0.0, 0.0, 0.0
+def relative_series(zero, k, s):
+    """Rows 32 to 35 = order k of p_a^* p_b; zero: of all lanes."""
+    e0, e1, e2, e3 = zero, zero, zero, zero
     for l in range(k + 1):
         a0, a1, a2, a3 = s[0, l], s[1, l], s[2, l], s[3, l]
         b0, b1, b2, b3 = s[4, k - l], s[5, k - l], s[6, k - l], s[7, k - l]

@@ -44,7 +44,7 @@ class PointForce(Given, Force):
 
     markers = (Point("a"),)
     quantities = MappingProxyType({"force": vector_load})
-    loads = ("force",)
+    loads = sources = ("force",)
     given = "force"
 
     def __init__(

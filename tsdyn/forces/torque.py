@@ -52,7 +52,7 @@ class Torque(Given, Force):
 
     markers = (Turn("a"),)
     quantities = MappingProxyType({"torque": vector_load})
-    loads = ("torque",)
+    loads = sources = ("torque",)
     given = "torque"
 
     def __init__(

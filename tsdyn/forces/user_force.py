@@ -28,6 +28,7 @@ from ..plugins import (
     fill_state_series,
     floats,
     numbers_of,
+    shown,
     stack,
 )
 
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 def _numbers(value, what, error):
     result = floats(value)
     if result.ndim != 1 or result.size != np.size(value) or not np.isfinite(result).all():
-        raise error(f"{what} must be a list of finite numbers, got {value!r}.")
+        raise error(f"{what} must be a list of finite numbers, got {shown(value)}.")
     result.setflags(write=False)
     return result
 

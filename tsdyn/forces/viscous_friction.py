@@ -12,7 +12,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import BodyFriction, Force, act, act_series, not_negative, slip, slip_series
+from ..plugins import BodyFriction, Force, act, act_series, not_negative, slip, slip_series, some
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
@@ -59,7 +59,7 @@ class ViscousFriction(BodyFriction, Force):
         for i in range(3):
             out[3 + i] = -par[1] * (xd[3 + i] - xd[9 + i])
             out[9 + i] = -out[3 + i]
-        if par[0] != 0.0:
+        if some(par[0]):
             slip_series(x, xd, k, s)
             for i in range(3):
                 s[6 + i, k] *= -par[0]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..calls import fitting
 from ..errors import InvalidArgument
-from ..validation import floats, number
+from ..validation import floats, number, shown
 from .expressions import Smooth
 from .tables import Table, is_data, pieces_of
 
@@ -182,7 +182,7 @@ def _demand(motion, **given):
     """Return the numbers; refuse, by name, a value that is not a finite number."""
     for name, value in given.items():
         if not math.isfinite(number(value)):
-            raise InvalidArgument(f"{type(motion).__name__}: {name} must be a finite number, got {value!r}.")
+            raise InvalidArgument(f"{type(motion).__name__}: {name} must be a finite number, got {shown(value)}.")
     return [number(value) for value in given.values()]
 
 

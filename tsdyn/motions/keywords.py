@@ -4,7 +4,7 @@ import math
 from types import FunctionType
 
 from ..errors import InvalidArgument
-from ..validation import number
+from ..validation import number, shown
 
 
 def numbers_of(function):
@@ -44,7 +44,7 @@ def with_number(function, name, value, what):
         If the value is no finite number; `what` it is in the message.
     """
     if not math.isfinite(number(value)):
-        raise InvalidArgument(f"{what} must be a finite number, got {value!r}.")
+        raise InvalidArgument(f"{what} must be a finite number, got {shown(value)}.")
     plain = getattr(function, "py_func", function)
     twin = FunctionType(plain.__code__, plain.__globals__, plain.__name__, plain.__defaults__, plain.__closure__)
     twin.__kwdefaults__ = {**plain.__kwdefaults__, name: number(value)}

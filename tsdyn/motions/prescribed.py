@@ -15,7 +15,7 @@ from ..errors import InvalidArgument, InvalidConstraint
 from ..jit.compiled_once import compiled_once
 from ..jit.complaints import complaint
 from ..jit.kernels import Callback, caller, kernel, specialised
-from ..validation import number
+from ..validation import number, shown
 from .elementary import Constant, Piecewise, time
 from .expressions import FUNCTIONS, Smooth
 from .knots import demand_covered, demand_followed
@@ -136,7 +136,7 @@ class Motion:
         if not math.isfinite(result):
             raise InvalidConstraint(
                 f"{what} must be a finite number, one of ts.motions, a ts.Table, a spline of SciPy's, arrays (t, x), a "
-                f"function of time f or three functions of time (f, fd, fdd), got {value!r}."
+                f"function of time f or three functions of time (f, fd, fdd), got {shown(value)}."
             )
         return result
 

@@ -11,7 +11,7 @@ from ..errors import InvalidArgument
 from ..jit.compiled_once import compiled_once
 from ..jit.complaints import complaint
 from ..jit.kernels import Callback, caller, kernel, specialised, vector
-from ..validation import floats, number
+from ..validation import floats, number, shown
 from .elementary import Constant, Piecewise, Polynomial
 from .expressions import Smooth
 from .keywords import numbers_of
@@ -91,13 +91,13 @@ class Signal:
             if len(parts) == width and all(isinstance(part, Smooth) or math.isfinite(part) for part in parts):
                 parts = tuple(part if isinstance(part, Smooth) else Constant(part) for part in parts)
                 return cls(parts, width, what, error)
-            raise error(f"{what} must be {width} of ts.motions or finite numbers, got {value!r}.")
+            raise error(f"{what} must be {width} of ts.motions or finite numbers, got {shown(value)}.")
         if callable(value):
             return cls(value, width, what, error)
         result = number(value) if width == 1 else floats(value)
         if np.shape(result) != (() if width == 1 else (3,)) or not np.isfinite(result).all():
             kind = "a finite number" if width == 1 else "three finite numbers"
-            raise error(f"{what} must be {kind}, a function of time or a ts.Table, got {value!r}.")
+            raise error(f"{what} must be {kind}, a function of time or a ts.Table, got {shown(value)}.")
         if width == 3:
             result.setflags(write=False)
         return result

@@ -6,14 +6,12 @@ as functions of time, or a joint whose coordinate a force measures, asks for the
 """
 
 from ..elements.joint import Joint
-from ..errors import InvalidArgument
 from ..jit.code_hash import is_ours
 from ..model.handles import handles_of
 from ..model.lengths import reaches_of
 from ..model.packed import classes
-from ..validation import nearest
 from .edit import Edit
-from .fields import fields_of
+from .fields import fields_of, unknown_field
 
 
 class Family:
@@ -54,9 +52,7 @@ class Family:
         try:
             return self.fields[name]
         except (KeyError, TypeError):
-            raise InvalidArgument(
-                f"the scene has no parameter {name!r}{nearest(name, self.fields)} scene.parameters() lists them."
-            ) from None
+            raise unknown_field(name, self.fields) from None
 
     def load_of(self, owner):
         """The `Load` of a force of the template; None for a constraint."""

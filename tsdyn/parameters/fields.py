@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.bodies import Attribute, PointMass
+from ..errors import InvalidArgument
 from ..motions.elementary import Constant
 from ..motions.keywords import numbers_of, with_number
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
-from ..validation import number
+from ..validation import close, nearest, number
 from .units import units_of
 
 GRAVITY = "gravity"
@@ -69,6 +70,14 @@ def fields_of(scene):
             for keyword in numbers_of(function_of(getattr(owner, attribute))):
                 found[f"{name}.{keyword}"] = Field(owner, attribute, "", keyword)
     return {name: field for name, field in found.items() if name not in several}
+
+
+def unknown_field(name, fields):
+    """The error of a name that no field has: similar names, or what the object has that it begins with."""
+    own = [known for known in fields if known.partition(".")[0] == str(name).partition(".")[0]]
+    near = close(name, fields)
+    said = nearest(name, fields) if near or not own else f"; there are {', '.join(own)}."
+    return InvalidArgument(f"the scene has no parameter {name!r}{said} scene.parameters() lists them.")
 
 
 def function_of(value):

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..methods.integrator import Integrator, is_own, registered
-from ..validation import checked_once, finite_vector, floats, number, unknown_name
+from ..validation import checked_once, finite_vector, floats, number, shown, unknown_name
 from .tolerances import FROM_ZERO, SAME_COUNT, SHORTEST
 
 TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
@@ -81,7 +81,7 @@ def demand_steps_seen(method, t0, t1):
 def state_arrays(state, n):
     """Positions and velocities (n,) of a state given to start from."""
     if not (hasattr(state, "q") and hasattr(state, "qd")):
-        raise InvalidArgument(f"state must have q and qd, such as solution.state, got {state!r}.")
+        raise InvalidArgument(f"state must have q and qd, such as solution.state, got {shown(state)}.")
     if np.ndim(state.q) == 2 and hasattr(state, "state"):
         raise InvalidArgument(f"state must be one State: give the .state of {state!r}.")
     return finite_vector(state.q, n, "state.q"), finite_vector(state.qd, n, "state.qd")

@@ -39,7 +39,7 @@ def demand_storable(given):
 
 def demand_path(path, name):
     """Raise InvalidArgument unless a value is a path."""
-    if not isinstance(path, (str, os.PathLike)):
+    if not isinstance(path, (str, os.PathLike)) or "\0" in str(path):
         raise InvalidArgument(f"{name} must be a path such as 'run.zarr' or 'run.h5', got {path!r}.")
 
 

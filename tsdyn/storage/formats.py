@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import InvalidArgument, MissingDependency, StorageError
-from .write_errors import writing
+from .write_errors import demand_folder, writing
 
 HDF5, ZARR = (".h5", ".hdf5", ".nc"), (".zarr",)  # suffixes of paths
 SUFFIXES = *HDF5, *ZARR
@@ -97,8 +97,7 @@ def demand_free(path):
     """Raise StorageError where there is something already, or no folder to write to."""
     path = Path(path)
     with writing(path):
-        taken, has_folder = path.exists(), path.parent.is_dir()
+        taken = path.exists()
     if taken:
         raise StorageError(f"{path} exists. Delete it, take another name, or go on with it: ts.resume({str(path)!r}).")
-    if not has_folder:
-        raise StorageError(f"there is no folder {path.parent} to write {path.name} to.")
+    demand_folder(path)

@@ -177,7 +177,8 @@ def _opened(path):
             return h5py.File(path, "r", **options)
         except OSError as error:
             reason = error
-    raise StorageError(f"{path} can't be read as HDF5: {reason}.") from reason
+    said = "it is a folder" if os.path.isdir(path) else str(reason).partition(" (")[0]
+    raise StorageError(f"{path} can't be read as HDF5: {said}.") from reason
 
 
 def _is_being_written(path):

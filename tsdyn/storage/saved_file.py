@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import InvalidArgument, StorageError
 from .formats import SUFFIXES, format_of
-from .write_errors import unwritable, writing
+from .write_errors import demand_folder, unwritable, writing
 
 FORMAT, VERSION = "tsdyn solution", 1
 STORE = "store"  # what `simulate(store=...)` writes, which names no format
@@ -92,9 +92,8 @@ def _columns(tables):
 
 def _demand_replaceable(path, form, kind):
     """Raise StorageError unless a path is free, or that of a saved solution, or what `kind` says."""
+    demand_folder(path)
     with writing(path):
-        if not path.parent.is_dir():
-            raise StorageError(f"there is no folder {path.parent} to write {path.name} to.")
         if not path.exists():
             return
     try:

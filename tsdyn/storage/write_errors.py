@@ -4,12 +4,15 @@ import contextlib
 import errno
 import os
 import re
+import tempfile
 from pathlib import Path
 
 from ..errors import StorageError
 
 FORBIDDEN = (errno.EACCES, errno.EPERM, errno.EROFS)
-ELSEWHERE = "Free space there, or take another path."
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+NO_FOLDER = (errno.ENOENT, errno.ENOTDIR)
+ELSEWHERE = "Free space there, or take another path.", "Take another path."  # where a disk is full, and else
 
 
 def code_of(error):
@@ -24,22 +27,49 @@ def reason_of(error):
     return os.strerror(code) if code else f"{type(error).__name__}: {str(error).partition(' (')[0]}"
 
 
-def unwritable(path, error, remedy=ELSEWHERE):
-    """The StorageError of a path that can't be written; the remedy is that of a full disk."""
-    reason, path = reason_of(error), Path(path)
-    if code_of(error) not in FORBIDDEN:
-        return StorageError(f"{path} can't be written: {reason}. {remedy}")
-    if not os.path.exists(path):  # False, too, where the folder can't be searched
+def unwritable(path, error, remedies=ELSEWHERE):
+    """The StorageError of a path that can't be written; remedies: where the disk is full, and where none is known."""
+    reason, code, path = reason_of(error), code_of(error), Path(path)
+    remedy = remedies[code not in FULL]
+    if code in NO_FOLDER:
+        with contextlib.suppress(StorageError):
+            demand_folder(path)
+            reason = f"no file can be made in {path.parent} ({reason})"
+    if code in FORBIDDEN and not os.path.exists(path):  # False, too, where the folder can't be searched
         reason = f"the folder {path.parent} can't be written to ({reason})"
-    return StorageError(f"{path} can't be written: {reason}. Take another path, or change the permissions.")
+    if code in FORBIDDEN:
+        remedy = "Take another path, or change the permissions."
+    elif code == errno.ENAMETOOLONG:
+        remedy = "Take a shorter name."
+    return StorageError(f"{path} can't be written: {reason}. {remedy}")
+
+
+def demand_folder(path):
+    """Raise StorageError unless the folder that a path is in exists."""
+    path = Path(path)
+    with writing(path):
+        if path.parent.is_dir():
+            return
+        in_the_way = next((each for each in path.parents if each.exists()), path.parent)
+        is_folder = in_the_way.is_dir()
+    if is_folder:
+        raise StorageError(f"there is no folder {path.parent} to write {path.name} to. Make it, or take another path.")
+    raise StorageError(f"{path.name} can't be written to {path.parent}: {in_the_way} is a file. Take another path.")
+
+
+def demand_writable(path):
+    """Raise StorageError unless files can be made in the folder that a path is in."""
+    demand_folder(path)
+    with writing(path), tempfile.NamedTemporaryFile(dir=Path(path).parent):
+        pass
 
 
 @contextlib.contextmanager
-def writing(path, remedy=ELSEWHERE):
+def writing(path, remedies=ELSEWHERE):
     """A block in which an OSError is that of writing a path."""
     try:
         yield
     except StorageError:
         raise
     except OSError as error:
-        raise unwritable(path, error, remedy) from error
+        raise unwritable(path, error, remedies) from error

@@ -29,7 +29,7 @@ def compile_kernels(everything=False):
 
 
 def _default():
-    yield from ELIMINATION
+    yield from ELIMINATION["symmetric"]
     form = FORMULATIONS["tangent"]
     for rough in (False, True):
         yield from of_method(Taylor(1e-8), form, True, rough=rough)

@@ -33,15 +33,18 @@ def prepare_first_run(scene, method, form, within, default):
     method = method or _default_method(scene, *default)
     rough = any("normal_load" in force.kernels for force in scene.forces)
     far = isinstance(method, Taylor) and len(scene.bodies) * room(method.orders()[2]) > FAR
-    compile_ahead(dict.fromkeys([*of_scene(scene, method, form, far), *of_method(method, form, within, far, rough)]))
+    compile_ahead(
+        dict.fromkeys([*of_scene(scene, method, form, far, rough), *of_method(method, form, within, far, rough)])
+    )
     _known.add((*key[:3], rough))
 
 
-def of_scene(scene, method, form, far):
-    """The kernels of constraints and forces."""
+def of_scene(scene, method, form, far, rough):
+    """The kernels of constraints and forces, far and rough as of `of_method`, and those for several rows."""
     series, implicit = isinstance(method, Taylor), method.implicit
     if implicit or sum(one.rows for one in scene.primitives if not one.normalises) > 1:
-        yield from ELIMINATION
+        yield from ELIMINATION["symmetric"]
+        yield from () if series and not rough else ELIMINATION["unsymmetric"]
     for kind, moving in _kinds(scene).items():
         yield from of_constraint(kind, moving, series, far, implicit)
     if series and any(force.sharp or _moves(force) for force in scene.forces):

@@ -27,7 +27,7 @@ Ask:
     mark_redundant, self_stress                               of redundant rows
     singularity_indicator, is_near_singular, refinements      of the distance to a singular configuration
 
-ELIMINATION are the kernels that factorise and solve.
+ELIMINATION are the kernels that factorise and solve, lu_factors the arrays of N.
 
 Right-hand sides and multipliers are in the order of the graph; `ConstraintGraph.row` names the rows of Phi.
 """

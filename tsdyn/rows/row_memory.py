@@ -4,6 +4,7 @@ import numpy as np
 
 from ..elements.loops.body_poses import POSE
 from ..jit.aligned_arrays import zeros
+from ..sparse.elimination import lu_factors
 from .reselection import choosing_anew
 from .row_workspace import Friction, Indicator, Landing, Left, Rows, Selection, TangentWorkspace
 from .tolerances import MOST_ROWS
@@ -39,8 +40,9 @@ def allocate_rows(graph):
 
 def _allocate_friction(graph, n, basis):
     k, rows = len(graph.frictions), len(graph.row) + int((graph.normals >= 0).sum())
-    m, nb, size = (len(graph.row), len(graph.bodies), graph.pattern.shape[2]) if k else (0, -1, 0)
-    free = zeros(16 * k), zeros(7 * k), zeros(m), zeros(8 * (nb + 1)), zeros(16 * m), zeros(size), zeros(size)
+    m, nb = (len(graph.row), len(graph.bodies)) if k else (0, -1)
+    factors = lu_factors(graph.pattern) if k else (zeros(0), zeros(0))
+    free = zeros(16 * k), zeros(7 * k), zeros(m), zeros(8 * (nb + 1)), zeros(16 * m), *factors
     if not basis:
         k = n = rows = 0
     matrices = np.zeros((k, n + rows)), np.zeros((k, k)), np.zeros(k, np.int64)

@@ -6,6 +6,7 @@ addresses; a matrix of one row needs none.
 
 import numpy as np
 
+from ..jit.aligned_arrays import zeros
 from ..jit.kernels import DEBUG, callback, caller, image_of, kernel, loader, vector
 from .factorisation import factor_blocks, factor_lu_blocks, factor_lu_row, factor_row, solve_blocks
 from .symbolic import analyse
@@ -37,19 +38,28 @@ def solve_values(pattern, lower, upper, b):
     return 0
 
 
-KERNELS = (factor_values, factor_lu_values, solve_values)
+KERNELS = {"symmetric": (factor_values, solve_values), "unsymmetric": (factor_lu_values,)}
 
 
-def with_kernels(pattern):
-    """The pattern, for the functions below, with the addresses of the kernels in this process."""
+def with_kernels(pattern, unsymmetric=False):
+    """The pattern, for the functions below, with addresses of this process."""
     if DEBUG or pattern.shape[0] < 2:
         return pattern
     words = len(image_of(pattern))
     whole = np.zeros(words + 4, np.int64)  # what the view `kernels` keeps alive
     pattern = pattern._replace(kernels=whole[words:])
     whole[:words] = image_of(pattern)
-    pattern.kernels[:] = *(kernel.address for kernel in KERNELS), whole.ctypes.data
+    pattern.kernels[:] = factor_values.address, 0, solve_values.address, whole.ctypes.data
+    if unsymmetric:
+        lu_factors(pattern)
     return pattern
+
+
+def lu_factors(pattern):
+    """Arrays for `lower` and `upper`; from now on the pattern serves `factor_lu`."""
+    if pattern.kernels.size and not pattern.kernels[1]:
+        pattern.kernels[1] = factor_lu_values.address
+    return zeros(pattern.shape[2]), zeros(pattern.shape[2])
 
 
 if DEBUG:

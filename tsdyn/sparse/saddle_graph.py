@@ -203,7 +203,7 @@ class _Builder:
                         target, stride, transposed = self.where(node, int(b))
                         sides[e, k] = (target + r, stride) if transposed else (target + r * stride, 1)
         return SaddleGraph(
-            with_kernels(self.pattern), records(Block, self.blocks), records(Instance, self.forces),
+            with_kernels(self.pattern, unsymmetric=True), records(Block, self.blocks), records(Instance, self.forces),
             records(Instance, self.constraints), self.starts[: self.nb].copy(), row_at, sides, diagonal,
             records(LeanAxis, self._axes()),
         )  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..jit.aligned_arrays import zeros
 from ..jit.kernels import Record
-from ..rows.interface import Rows, allocate_rows
+from ..rows.interface import Rows, allocate_rows, lu_factors
 
 
 class ChartState(Record):
@@ -43,10 +43,9 @@ class ChartWorkspace(NamedTuple):
 def allocate_chart(graph):
     """Lay it out; the ground doesn't move, nor does a point mass turn."""
     nb, m = len(graph.bodies), len(graph.row)
-    size = graph.pattern.shape[2]
     base = zeros(8 * (nb + 1))
     base[4::8] = 1.0
     return ChartWorkspace(
         base, zeros(4 * (nb + 1)), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)),
-        allocate_rows(graph), zeros(16 * m), zeros(size), zeros(size), zeros(m), ChartState(),
+        allocate_rows(graph), zeros(16 * m), *lu_factors(graph.pattern), zeros(m), ChartState(),
     )  # fmt: skip

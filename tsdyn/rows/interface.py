@@ -33,6 +33,7 @@ Right-hand sides and multipliers are in the order of the graph; `ConstraintGraph
 """
 
 from ..sparse.elimination import KERNELS as ELIMINATION
+from ..sparse.elimination import lu_factors
 from .axis_rows import add_axis_multipliers, is_axis
 from .chart_matrix import factorise_chart_matrix, factorise_product, pivot_loss, rotate_rate, solve_product
 from .evaluation import (
@@ -147,6 +148,7 @@ __all__ = [
     "is_singular_within_a_step",
     "keep_every_row",
     "list_redundant",
+    "lu_factors",
     "mark_redundant",
     "more",
     "multiply_rates",

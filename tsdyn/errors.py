@@ -390,7 +390,7 @@ _SENTENCES = {
     Status.PASSAGE: ("A singular configuration is near; the Taylor integrator takes over.", ""),
     Status.STORE_FAILED: (
         "The store could not be written any further.",
-        "Free some space there; ts.resume goes on from the last checkpoint.",
+        "When that is mended, ts.resume goes on from the last checkpoint.",
     ),
     Status.CASE_FAILED: (
         "The case could not be run, or what was to be kept of it could not be found.",

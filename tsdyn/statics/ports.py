@@ -45,6 +45,10 @@ def inputs_of(scene, variations, given):
                 raise InvalidArgument(f"{item.name!r} has no component {axis[1:]!r}: its input is {names}.")
             same = [load._replace(whole=item.name) for load in same] if len(same) > 1 else same
         found += same
+    names = [one.name for one in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidArgument(f"the input {name} is given twice; give it once.")
     return found
 
 

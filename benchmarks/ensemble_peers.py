@@ -1,8 +1,8 @@
 """Ensembles beside other engines: milliseconds a case and core to an error, in one interleaved run.
 
 Times are the processor's, of one thread each. tsdyn: `ts.ensemble`, case by case and in lanes, all of its cost
-counted. heyoka: its batch mode, compiled for the top alone. MuJoCo and Exudyn: the loop of one case, which `rollout`
-and a process pool run a core.
+counted. heyoka: its batch mode, compiled for the top alone. MuJoCo, Exudyn and Drake: the loop of one case, which
+`rollout` and process pools run a core.
 
 Run it: python -m benchmarks.ensemble_peers
 """
@@ -16,12 +16,14 @@ import tsdyn as ts
 from benchmarks import contender
 from benchmarks.contender import Contender, Outcome, rotation, timed
 from benchmarks.measure import measure
+from benchmarks.peers.drake import DrakeTree
 from benchmarks.peers.exudyn import ExudynTree
 from benchmarks.peers.heyoka import Heyoka, batch, start_of
 from benchmarks.peers.mujoco import MuJoCoTree
 from benchmarks.scenes import SCENES
 
 CASES, ROUNDS = 400, 7
+BUDGET = 0.3  # s
 ERRORS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 NAMES = ("sliding top", "two-body pendulum", "chain of 4")
 
@@ -79,20 +81,34 @@ class HeyokaBatch(Heyoka):
         return run
 
 
+def contenders(cases=CASES):
+    """Those that are installed, and lines that say what is missing."""
+    every = [OurEnsemble(cases, lanes) for lanes in (1, 4)]
+    every += [HeyokaBatch(), MuJoCoTree(), ExudynTree(), DrakeTree()]
+    missing = [line for one in every if (line := one.missing())]
+    return [one for one in every if not one.missing()], missing
+
+
+def measured(every, rounds=ROUNDS, budget=BUDGET, names=NAMES):
+    """The `Measured` of each scene."""
+    before, contender.clock = contender.clock, time.process_time  # a call of ours is long, and more often interrupted
+    try:
+        for name in names:
+            yield measure(SCENES[name], every, repeats=rounds, budget=budget, report=lambda _: None)
+    finally:
+        contender.clock = before
+
+
 def main():
     """Print a table a scene."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=CASES)
     parser.add_argument("--rounds", type=int, default=ROUNDS)
-    parser.add_argument("--budget", type=float, default=0.3, help="seconds of a case up to which settings are tried")
+    parser.add_argument("--budget", type=float, default=BUDGET, help="seconds of a case up to which settings are tried")
     given = parser.parse_args()
-    contender.clock = time.process_time  # a call of ours is longer than others', and more often interrupted
-    every = [OurEnsemble(given.cases, 1), OurEnsemble(given.cases, 4), HeyokaBatch(), MuJoCoTree(), ExudynTree()]
-    missing = [line for one in every if (line := one.missing())]
-    every = [one for one in every if not one.missing()]
-    for name in NAMES:
-        found = measure(SCENES[name], every, repeats=given.rounds, budget=given.budget, report=lambda _: None)
-        print(f"\n{name}, ms a case and core", found.table(ERRORS), sep="\n", flush=True)
+    every, missing = contenders(given.cases)
+    for found in measured(every, given.rounds, given.budget):
+        print(f"\n{found.scene}, ms a case and core", found.table(ERRORS), sep="\n", flush=True)
     print(*missing, sep="\n")
 
 

@@ -1,9 +1,9 @@
 """Measure again what the pages have as tables, and write it between their marks.
 
-    python -m docs.measure [methods] [benchmarks] [stiff] [stress] [--quick]
+    python -m docs.measure [methods] [benchmarks] [stiff] [ensembles] [stress] [--quick]
 
-methods: choosing-a-method.md; benchmarks, stiff: benchmarks.md; stress: stress.md and its figure. All of them take an
-hour or two, with --quick some minutes. Milliseconds are those of your machine: compare ratios.
+methods: choosing-a-method.md; benchmarks, stiff: benchmarks.md; ensembles: ensembles.md; stress: stress.md and
+its figure. All of them take some hours, with --quick some minutes. Milliseconds are those of your machine: compare ratios.
 """
 
 import argparse
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import tsdyn as ts
-from benchmarks import provenance, stiff, stiff_peers, work_precision
+from benchmarks import ensemble_peers, provenance, stiff, stiff_peers, work_precision
 from examples import drive_train, four_bar, stick_slip, top
 from tsdyn.benchmarking.reference_solution import agreed
 from tsdyn.cli import main as tsdyn
@@ -84,15 +84,29 @@ def _cell(spent, best):
 
 def benchmarks(quick):
     """The table of benchmarks.md: milliseconds to an error, of tsdyn and other programs."""
-    lines = []
-    for one in work_precision.run(Path("benchmarks") / "results", quick=quick):
-        lines += [f"**{one.scene}**", "", "| | 1e-4 | 1e-6 | 1e-8 | 1e-10 | 1e-12 |", "|---|---:|---:|---:|---:|---:|"]
-        for name in one.contenders():
-            times = [1e3 * one.seconds_to(name, 10.0**-k) for k in (4, 6, 8, 10, 12)]
-            if any(map(math.isfinite, times)):
-                lines.append(f"| {name} | {' | '.join(_cell(spent, False) for spent in times)} |")
-        lines.append("")
-    return "\n".join([*lines, f"Milliseconds to an error; {provenance.line()}"])
+    found = work_precision.run(Path("benchmarks") / "results", quick=quick)
+    return "\n".join([*map(_table, found), f"Milliseconds to an error; {provenance.line()}"])
+
+
+def ensembles(quick):
+    """The table of ensembles.md: milliseconds a case and core to an error, of tsdyn and other programs."""
+    names, rounds = (ensemble_peers.NAMES[:1], 3) if quick else (ensemble_peers.NAMES, ensemble_peers.ROUNDS)
+    found = ensemble_peers.measured(ensemble_peers.contenders()[0], rounds, names=names)
+    tables = [_table(one, ensemble_peers.ERRORS) for one in found]
+    return "\n".join([*tables, f"Milliseconds of processor time a case and core to an error; {provenance.line()}"])
+
+
+def _table(measured, errors=(1e-4, 1e-6, 1e-8, 1e-10, 1e-12)):
+    """A scene's title and table."""
+    head = " | ".join(f"{error:.0e}".replace("e-0", "e-") for error in errors)
+    lines = [f"**{measured.scene}**", "", f"| | {head} |", "|---|" + "---:|" * len(errors)]
+    for name in measured.contenders():
+        times = [1e3 * measured.seconds_to(name, error) for error in errors]
+        if any(map(math.isfinite, times)):
+            lines.append(f"| {name} | {' | '.join(_cell(spent, False) for spent in times)} |")
+    text = "\n".join([*lines, ""])
+    print(text, flush=True)
+    return text
 
 
 def stiff_scenes(quick):
@@ -133,20 +147,20 @@ TABLES = {
     "methods": (methods, "choosing-a-method.md"),
     "benchmarks": (benchmarks, "benchmarks.md"),
     "stiff": (stiff_scenes, "benchmarks.md"),
+    "ensembles": (ensembles, "ensembles.md"),
 }
+PARTS = ", ".join([*TABLES, "stress"])
 
 
 def main():
     """Measure what is named, or everything."""
     parser = argparse.ArgumentParser(prog="python -m docs.measure", description=__doc__.partition("\n")[0])
-    parser.add_argument(
-        "parts", nargs="*", metavar="part", help="methods, benchmarks, stiff, stress; all where none is named"
-    )
+    parser.add_argument("parts", nargs="*", metavar="part", help=f"{PARTS}; all where none is named")
     parser.add_argument("--quick", action="store_true", help="few scenes and settings")
     given = parser.parse_args()
     unknown = {*given.parts} - {*TABLES, "stress"}
     if unknown:
-        parser.error(f"no part {', '.join(sorted(unknown))}; there are methods, benchmarks, stiff, stress")
+        parser.error(f"no part {', '.join(sorted(unknown))}; there are {PARTS}")
     for name, (measure, page) in TABLES.items():
         if not given.parts or name in given.parts:
             text = measure(given.quick)

@@ -16,6 +16,7 @@ PEERS = (
     "ida.IDA",
     "radau.Radau",
     "heyoka.Heyoka",
+    "drake.DrakeTree",
 )
 
 

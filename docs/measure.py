@@ -3,7 +3,8 @@
     python -m docs.measure [methods] [benchmarks] [stiff] [ensembles] [stress] [--quick]
 
 methods: choosing-a-method.md; benchmarks, stiff: benchmarks.md; ensembles: ensembles.md; stress: stress.md and
-its figure. All of them take some hours, with --quick some minutes. Milliseconds are those of your machine: compare ratios.
+its figure. All of them take some hours, with --quick some minutes. Milliseconds are those of your machine: compare
+ratios.
 """
 
 import argparse

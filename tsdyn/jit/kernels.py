@@ -34,7 +34,7 @@ from .arrays import (
 from .code_hash import is_ours
 from .compiled import DEBUG, Callback, callback, entry, letters, table
 from .compiler import OPTIONS, Callee
-from .resident import Record, image_of, loader, records, resident, row_of
+from .resident import Record, Seen, image_of, loader, records, resident, row_of
 
 __all__ = [  # what is to be found here, too
     "ANY",
@@ -59,6 +59,7 @@ __all__ = [  # what is to be found here, too
     "stack2",
     "vector",
 ]
+_FLOAT = letters["d"]
 RAISE = dis.opmap["RAISE_VARARGS"]
 
 
@@ -135,8 +136,12 @@ def specialised(template, name, owner, make=kernel, **constants):
     return copy
 
 
-def caller(signature, result="i"):
-    """Make the kernel that calls a `Callback` of this signature: call(address, *arguments), arrays as they are."""
+def caller(signature, result="i", linked=None):
+    """Make the kernel that calls a `Callback` of this signature: call(address, *arguments).
+
+    Arrays, and what a loader gives, are passed as they are. Where an array isn't of floats, but of lanes or complex
+    numbers, the kernel `linked` is called with the same arguments.
+    """
     if DEBUG:
         return lambda address, *arguments: table[address](*arguments)
     native = {"i": ir.IntType(64), "d": ir.DoubleType(), "p": ir.IntType(64)}
@@ -144,17 +149,22 @@ def caller(signature, result="i"):
     @intrinsic
     def call(typing, address, *arguments):
         wanted = [
-            given if isinstance(given, types.Array) else letters[letter]
+            given if isinstance(given, (types.Array, Seen)) else letters[letter]
             for letter, given in zip(signature, arguments, strict=True)
         ]
+        own = None
+        if linked is not None and any(isinstance(kind, types.Array) and kind.dtype != _FLOAT for kind in wanted):
+            own = linked._numba_type_.get_call_type(typing, tuple(wanted), {})
 
         def generate(context, builder, sig, values):
             given = cgutils.unpack_tuple(builder, values[1])
+            if own is not None:
+                return context.get_function(linked._numba_type_, own)(builder, given)
             words = []
             for kind, value in zip(wanted, given, strict=True):
                 if isinstance(kind, types.Array):
                     data = context.make_array(kind)(context, builder, value=value).data
-                    value = builder.ptrtoint(data, native["p"])
+                    value = builder.ptrtoint(data, native["p"])  # something seen is its address
                 words.append(value)
             target = ir.FunctionType(native[result], [native[c] for c in signature]).as_pointer()
             return builder.call(builder.inttoptr(values[0], target), words)

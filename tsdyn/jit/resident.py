@@ -107,7 +107,7 @@ def _words(kind):
     return 1 if isinstance(kind, types.Record) else sum(map(_words, kind))
 
 
-class _Seen(types.Type):
+class Seen(types.Type):
     """A named tuple of arrays and records that is in memory; a kernel reads of it what it uses, when it uses it."""
 
     def __init__(self, kind):
@@ -115,7 +115,7 @@ class _Seen(types.Type):
         super().__init__(name=f"Seen({kind.instance_class.__name__} {sha256(str(kind).encode()).hexdigest()[:12]})")
 
 
-@register_model(_Seen)
+@register_model(Seen)
 class _SeenModel(models.PrimitiveModel):
     def __init__(self, manager, kind):
         super().__init__(manager, kind, _i64)
@@ -123,17 +123,17 @@ class _SeenModel(models.PrimitiveModel):
 
 @infer_getattr
 class _SeenFields(AttributeTemplate):
-    key = _Seen
+    key = Seen
 
     def generic_resolve(self, seen, name):
         """The type of a field: an array, a record, or again something seen."""
         if name in seen.kind.fields:
             field = seen.kind.types[seen.kind.fields.index(name)]
-            return _Seen(field) if isinstance(field, types.BaseTuple) else field
+            return Seen(field) if isinstance(field, types.BaseTuple) else field
         return None
 
 
-@lower_getattr_generic(_Seen)
+@lower_getattr_generic(Seen)
 def _seen_field(context, builder, seen, address, name):
     at = seen.kind.fields.index(name)
     field = seen.kind.types[at]
@@ -175,7 +175,7 @@ def loader(example):
     """
     if DEBUG:
         return lambda value: value
-    kind = _Seen(_type_of(example))
+    kind = Seen(_type_of(example))
 
     @intrinsic
     def load(typing, address):

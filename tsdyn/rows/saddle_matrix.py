@@ -6,8 +6,6 @@ s is a `SaddleWorkspace`; the blocks of bodies are added by the caller.
 from ..jit.kernels import complex_vector, data_of, kernel, stack
 from ..jit.simd import let
 from ..sparse.elimination import factor_lu, solve_lu
-from ..sparse.factorisation import factor_lu as factor_complex
-from ..sparse.factorisation import solve_lu as solve_complex
 from .schur_complement import more
 from .tolerances import SADDLE_PIVOT
 
@@ -74,7 +72,7 @@ def factorise_complex_saddle(s, pair):
     size = s.graph.pattern.shape[2]
     lower = complex_vector(data_of(s.complex_lower[pair]), size)
     upper = complex_vector(data_of(s.complex_upper[pair]), size)
-    return factor_complex(s.graph.pattern, lower, upper, SADDLE_PIVOT) < 0
+    return factor_lu(s.graph.pattern, lower, upper, SADDLE_PIVOT) < 0
 
 
 @kernel
@@ -83,4 +81,4 @@ def solve_complex_saddle(s, pair):
     size, x = s.graph.pattern.shape[2], complex_vector(data_of(s.complex_x), s.x.size)
     lower = complex_vector(data_of(s.complex_lower[pair]), size)
     upper = complex_vector(data_of(s.complex_upper[pair]), size)
-    solve_complex(s.graph.pattern, lower, upper, x)
+    solve_lu(s.graph.pattern, lower, upper, x)

@@ -1,19 +1,18 @@
-"""Factorisation and solution of real matrices by kernels of their own, which all others call by address.
+"""Factorisation and solution by kernels of their own, which all others call by address; a pattern has the addresses.
 
-Where it is linked in, factorisation.py is most of the code of a kernel, and the longest to compile. A pattern has the
-addresses; a matrix of one row needs none.
+Where it is linked in, factorisation.py is most of the code of a kernel, and the longest to compile. That is done for
+lanes and complex numbers alone, and for a matrix of one row.
 """
 
 import numpy as np
 
 from ..jit.aligned_arrays import zeros
-from ..jit.kernels import DEBUG, callback, caller, image_of, kernel, loader, vector
+from ..jit.kernels import DEBUG, callback, caller, kernel, loader, long_kernel, vector
 from .factorisation import factor_blocks, factor_lu_blocks, factor_lu_row, factor_row, solve_blocks
 from .symbolic import analyse
 
 FACTOR, FACTOR_LU, SOLVE = "ppd", "pppd", "pppp"
 _load_pattern = loader(analyse([], [])[1])
-_call_factor, _call_factor_lu, _call_solve = caller(FACTOR), caller(FACTOR_LU), caller(SOLVE)
 
 
 @callback(FACTOR)
@@ -38,6 +37,12 @@ def solve_values(pattern, lower, upper, b):
     return 0
 
 
+@long_kernel
+def _solve_linked(pattern, lower, upper, b):
+    solve_blocks(pattern, lower, upper, b)
+    return 0
+
+
 KERNELS = {"symmetric": (factor_values, solve_values), "unsymmetric": (factor_lu_values,)}
 
 
@@ -45,11 +50,7 @@ def with_kernels(pattern, unsymmetric=False):
     """The pattern, for the functions below, with addresses of this process."""
     if DEBUG or pattern.shape[0] < 2:
         return pattern
-    words = len(image_of(pattern))
-    whole = np.zeros(words + 4, np.int64)  # what the view `kernels` keeps alive
-    pattern = pattern._replace(kernels=whole[words:])
-    whole[:words] = image_of(pattern)
-    pattern.kernels[:] = factor_values.address, 0, solve_values.address, whole.ctypes.data
+    pattern = pattern._replace(kernels=np.array([factor_values.address, 0, solve_values.address]))
     if unsymmetric:
         lu_factors(pattern)
     return pattern
@@ -65,26 +66,29 @@ def lu_factors(pattern):
 if DEBUG:
     from .factorisation import factor, factor_lu, solve, solve_lu
 else:
+    _call_factor = caller(FACTOR, linked=factor_blocks)
+    _call_factor_lu = caller(FACTOR_LU, linked=factor_lu_blocks)
+    _call_solve = caller(SOLVE, linked=_solve_linked)
 
     @kernel
     def factor(pattern, values, limit):
         """`factorisation.factor`."""
         if pattern.shape[0] < 2:
             return factor_row(pattern, values, limit) if pattern.shape[0] else -1
-        return _call_factor(pattern.kernels[0], pattern.kernels[3], values, limit)
+        return _call_factor(pattern.kernels[0], pattern, values, limit)
 
     @kernel
     def factor_lu(pattern, lower, upper, limit):
         """`factorisation.factor_lu`."""
         if pattern.shape[0] < 2:
             return factor_lu_row(pattern, lower, upper, limit) if pattern.shape[0] else -1
-        return _call_factor_lu(pattern.kernels[1], pattern.kernels[3], lower, upper, limit)
+        return _call_factor_lu(pattern.kernels[1], pattern, lower, upper, limit)
 
     @kernel
     def solve_lu(pattern, lower, upper, b):
         """`factorisation.solve_lu`."""
         if pattern.shape[0] > 1:
-            _call_solve(pattern.kernels[2], pattern.kernels[3], lower, upper, b)
+            _call_solve(pattern.kernels[2], pattern, lower, upper, b)
         elif pattern.shape[0] == 1:
             b[0] *= lower[0]
 

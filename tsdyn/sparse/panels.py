@@ -27,7 +27,7 @@ class Pattern(NamedTuple):
     updates: np.ndarray  # of each block, the first of its records, and the end
     records: np.ndarray  # sixes: row column, rows, first column, columns in its own panel; target, target's row length
     negative: np.ndarray  # rows of late nodes, whose pivots are below zero
-    kernels: np.ndarray  # (4,): addresses of elimination.KERNELS and of all this; without any until they are asked for
+    kernels: np.ndarray  # (3,): addresses of elimination.py's kernels of factor, factor_lu, solve; (0,) without them
 
 
 def lay_out(sizes, cliques, groups):

@@ -16,7 +16,6 @@ class DrakeTree(Contender):
     """Trees of hinges and slides."""
 
     name = f"Drake, {SCHEME}"
-    package = "pydrake"
     values = tuple(10.0**-k for k in range(1, 13))
     calls = 3
     get = "pip install drake"

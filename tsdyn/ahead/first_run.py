@@ -44,7 +44,8 @@ def of_scene(scene, method, form, far, rough):
     series, implicit = isinstance(method, Taylor), method.implicit
     if implicit or sum(one.rows for one in scene.primitives if not one.normalises) > 1:
         yield from ELIMINATION["symmetric"]
-        yield from () if series and not rough else ELIMINATION["unsymmetric"]
+        if rough or not series:
+            yield from ELIMINATION["unsymmetric"]
     for kind, moving in _kinds(scene).items():
         yield from of_constraint(kind, moving, series, far, implicit)
     if series and any(force.sharp or _moves(force) for force in scene.forces):

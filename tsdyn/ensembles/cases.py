@@ -8,10 +8,11 @@ from collections.abc import Mapping, Set
 import numpy as np
 
 from ..elements.bodies import Body
-from ..errors import InvalidArgument, TsdynError
+from ..errors import InvalidArgument
 from ..parameters.fields import fields_of, unknown_field
 from ..simulation.variants import start_of
 from ..validation import counted, shown, whole
+from .user_functions import called
 
 MATRIX = 2  # dimensions of an inertia
 NO_NUMBERS = "USbcmM"  # kinds of arrays: text, truth values, complex, times
@@ -63,12 +64,7 @@ class CalledCases:
 
     def values(self, i):
         """As of `Cases`."""
-        try:
-            found = self.function(self.first + i)
-        except TsdynError:
-            raise
-        except Exception as error:
-            raise InvalidArgument(f"the function of cases raised {type(error).__name__}: {error}.") from error
+        found = called(self.function, "the function of cases", self.first + i)
         if not isinstance(found, Mapping):
             raise InvalidArgument(f"the function of cases must return a mapping of names to values, it gave {found!r}.")
         return dict(found)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-
 import numpy as np
 
 from ..elements.bodies import Body, PointMass
@@ -11,6 +9,7 @@ from ..errors import InvalidArgument, TsdynError
 from ..runs.arguments import state_arrays
 from ..simulation.variants import start_names
 from ..taylor.series_engine import SeriesEngine
+from .user_functions import demand_arguments
 
 
 def demand_whole(study):
@@ -40,22 +39,6 @@ def demand_whole(study):
             raise InvalidArgument(study.kept.refusal)
         _demand_shapes(study)
         _demand_fixed(study)
-
-
-def demand_arguments(function, what, names):
-    """Raise InvalidArgument unless a function can be called with so many arguments by position."""
-    try:
-        signature = inspect.signature(function)
-    except (TypeError, ValueError):  # of a builtin
-        return
-    try:
-        signature.bind(*names)
-    except TypeError as error:
-        name = getattr(function, "__name__", type(function).__name__)
-        raise InvalidArgument(
-            f"{what} is called with ({', '.join(names)}), and {name}{signature} can't be: {error}. Others than "
-            f"{'this argument' if len(names) == 1 else 'these arguments'} need defaults."
-        ) from None
 
 
 def _demand_state(study, state):

@@ -12,16 +12,17 @@ from ..elements.names import named
 from ..errors import InvalidArgument
 from ..simulation.scene import Scene
 from ..simulation.simulate import simulate
-from ..validation import sequence
+from ..validation import sequence, whole
 from .cases import cases_of
 from .chunks import Collected
-from .demands import demand_arguments, demand_whole
+from .demands import demand_whole
 from .executors import run_executor
 from .progress import CaseProgress
 from .results import Ensemble
 from .runner import Study
 from .threads import run_threads
 from .tolerances import LANES
+from .user_functions import demand_arguments
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -122,8 +123,7 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     lanes = demand_lanes(lanes)
-    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1):
-        raise InvalidArgument(f"threads must be a positive whole number, got {threads!r}.")
+    threads = whole(threads, "threads")
     if threads is not None and executor is not None:
         raise InvalidArgument("threads and executor: the cases run on the one or the other; leave one of them out.")
     given = given_of(t_span, options)

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..errors import InvalidArgument, TsdynError
+from ..errors import InvalidArgument
 from ..validation import floats, shown
+from .user_functions import called
 
 FINAL, TIMES = "final", "t_eval"
 
@@ -30,12 +31,7 @@ def record_of(keep, outcome, n, times):
 
 def reduced(keep, solution):
     """What a user's function makes of a solution: arrays by name; "" stands for one without a name."""
-    try:
-        found = keep(solution)
-    except TsdynError:
-        raise
-    except Exception as error:
-        raise InvalidArgument(f"keep raised {type(error).__name__}: {error}.") from error
+    found = called(keep, "keep", solution)
     found = dict(found) if isinstance(found, Mapping) else {"": found}
     arrays = {}
     for name, value in found.items():

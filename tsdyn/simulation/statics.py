@@ -10,7 +10,7 @@ import numpy as np
 from ..calls import fitting
 from ..errors import InconsistentState, InvalidArgument
 from ..observables.state import remembered
-from ..runs.arguments import state_arrays
+from ..runs.arguments import demand_one_state, state_arrays
 from ..validation import finite_vector, number, vector3
 from .scene_cache import prepared
 from .stage_progress import StageProgress
@@ -227,8 +227,7 @@ def _positions(packed, guess, n):
             f"guess must be positions q ({n},) or a State, got {guess!r}. scene.set(joint, ...) places joints, and "
             "the pose of the scene is the guess then."
         )
-    if hasattr(guess, "state") and np.ndim(getattr(guess, "q", 0)) == 2:
-        raise InvalidArgument(f"guess must be one State, or positions q ({n},): give the .state of {guess!r}.")
+    demand_one_state(guess, f"guess must be one State, or positions q ({n},)")
     q = finite_vector(getattr(guess, "q", guess), n, "guess (q, or a State)")
     for body, (at, dimension) in zip(packed.bodies, packed.system.bodies.tolist(), strict=True):
         if dimension == 7 and not q[at + 3 : at + 7].any():

@@ -50,10 +50,8 @@ def with_kernels(pattern, unsymmetric=False):
     """The pattern, for the functions below, with addresses of this process."""
     if DEBUG or pattern.shape[0] < 2:
         return pattern
-    pattern = pattern._replace(kernels=np.array([factor_values.address, 0, solve_values.address]))
-    if unsymmetric:
-        lu_factors(pattern)
-    return pattern
+    addresses = factor_values.address, factor_lu_values.address if unsymmetric else 0, solve_values.address
+    return pattern._replace(kernels=np.array(addresses))
 
 
 def lu_factors(pattern):

@@ -1,18 +1,27 @@
 """Calls of public functions and classes: a wrong call is refused with the nearest match.
 
-`fitting` wraps a function and costs nothing for a valid call; `Placing` is the descriptor of `.at`, which gives every
-class its own signature.
+`fitting` wraps a function and costs nothing for a valid call: a call is compared with its signature, and its arguments
+with their annotations, once it has raised what is no TsdynError. `Placing` is the descriptor of `.at`, which gives
+every class its own signature.
 """
 
 from __future__ import annotations
 
+import collections.abc
 import inspect
-from functools import wraps
+import os
+import sys
+import types
+import typing
+from functools import cache, wraps
+from importlib import import_module
 from types import FunctionType, MethodType
 from typing import TYPE_CHECKING, Any
 
-from .errors import InvalidCall
-from .validation import nearest
+import numpy as np
+
+from .errors import InvalidArgument, InvalidCall, TsdynError
+from .validation import floats, nearest, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +41,8 @@ def unknown_argument(title, name, known):
 def fitting(function: Function, then: Callable[[Any], None] | None = None) -> Function:
     """Wrap a public function, or an `__init__`: a call that doesn't fit its signature raises InvalidCall.
 
-    `then` is called with an instance after the `__init__` of its own class.
+    An argument of another kind than its annotation says raises InvalidArgument. `then` is called with an instance after
+    the `__init__` of its own class.
     """
 
     @wraps(function)
@@ -44,13 +54,13 @@ def fitting(function: Function, then: Callable[[Any], None] | None = None) -> Fu
             if type(arguments[0]).__init__ is call:
                 then(arguments[0])
             return None
-        except TypeError as error:
-            if isinstance(error, InvalidCall):
-                raise
+        except TsdynError:
+            raise
+        except Exception:
             title, known = function.__qualname__, inspect.signature(call)
             if function.__name__ == "__init__":
                 title = getattr(arguments[0], "_kind", lambda: type(arguments[0]).__name__)()
-            misfit = misfit_of(title, known, arguments, keywords)
+            misfit = misfit_of(title, known, arguments, keywords) or _unfit(title, function, known, arguments, keywords)
             if misfit is None:
                 raise
         raise misfit
@@ -91,6 +101,104 @@ def misfit_of(title, signature, arguments, keywords):
         first = f"takes {', '.join(places)} by position" if places else "takes nothing by position"
         return InvalidCall(f"{title}() {first}, got {given} arguments there; name the others: {others or 'none'}.")
     return InvalidCall(f"{title}(): {reason}. Its arguments are {', '.join(names)}.")
+
+
+class Numbers:
+    """Stands for ArrayLike: real numbers in an array, or what NumPy makes one of."""
+
+
+class FilePath:
+    """Stands for Place: the path of a file."""
+
+
+LONGEST = 255  # bytes of a part of a path, in most file systems
+WORDS = {
+    Numbers: "numbers",
+    FilePath: "the path of a file (parts of at most 255 bytes)",
+    bool: "True or False",
+    int: "a whole number",
+    float: "a number",
+    str: "text",
+    type(None): "None",
+}
+
+
+def _unfit(title, owner, signature, arguments, keywords):
+    """Return the InvalidArgument of the first argument that isn't what its annotation says, or None."""
+    given = signature.bind(*arguments, **keywords).arguments
+    for name, value in given.items():
+        hint = _hint(owner.__module__, signature.parameters[name].annotation)
+        if name not in ("self", "cls") and hint is not None and not _fits(value, hint):
+            return InvalidArgument(f"{title}(): {name} must be {_words(hint)}, got {shown(value)}.")
+    return None
+
+
+@cache
+def _hint(module, annotation):
+    """Return the type that an annotation of a module names; None if it can't be told."""
+    if not isinstance(annotation, str):
+        return None
+    hints = vars(import_module(".hints", __package__))  # by name: all of tsdyn stands below it
+    try:
+        known = {
+            **vars(collections.abc),
+            **vars(sys.modules[module]),
+            **hints,
+            "ArrayLike": Numbers,
+            "Floats": Numbers,
+            "Place": FilePath,
+        }
+        return eval(annotation, known)  # the source's own, as typing.get_type_hints evaluates it
+    except (KeyError, NameError, TypeError, AttributeError):
+        return None
+
+
+def _fits(value, hint):
+    """Whether a value is of a type; True where that can't be told."""
+    origin, parts = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType):
+        return any(_fits(value, part) for part in parts)
+    if origin is typing.Literal:
+        return isinstance(value, str) and value in parts
+    if origin is type:
+        return isinstance(value, type)
+    if hint in (Numbers, float):
+        numbers = floats(value)
+        return numbers.shape == () if hint is float else bool(numbers.size)
+    if hint is FilePath:
+        return _is_path(value)
+    if hint is int:
+        return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if hint is bool:
+        return isinstance(value, (bool, np.bool_))
+    if hint is None:
+        return value is None
+    if origin is collections.abc.Sequence:
+        return not isinstance(value, str) and isinstance(value, origin)
+    if origin in (collections.abc.Callable, collections.abc.Mapping):
+        return isinstance(value, origin)
+    closed = isinstance(hint, type) and hint is not Any and not getattr(hint, "_is_protocol", False)
+    return isinstance(value, hint) if closed else True
+
+
+def _is_path(value):
+    if not isinstance(value, (str, os.PathLike)):
+        return False
+    path = os.fspath(value)
+    return bool(path) and "\0" not in path and all(len(os.fsencode(part)) <= LONGEST for part in path.split(os.sep))
+
+
+def _words(hint):
+    origin, parts = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType):
+        return " or ".join(dict.fromkeys(map(_words, parts)))
+    if origin is typing.Literal:
+        return " or ".join(map(repr, parts))
+    if hint in WORDS:
+        return WORDS[hint]
+    kind = getattr(origin or hint, "__name__", str(hint))
+    known = {"Callable": "a function", "Mapping": "a mapping", "Sequence": "a sequence", "type": "a class"}
+    return known.get(kind, f"{'an' if kind[0] in 'AEIOU' else 'a'} {kind}")
 
 
 def complete_signature(cls):
@@ -139,8 +247,11 @@ class Placing:
         def at(cls, *arguments, **keywords):
             try:
                 return self.function(cls, *arguments, **keywords)
-            except TypeError:
-                misfit = misfit_of(f"{cls._kind()}.at", at.__signature__, (cls, *arguments), keywords)
+            except TsdynError:
+                raise
+            except Exception:
+                title, whole, known = f"{cls._kind()}.at", (cls, *arguments), at.__signature__
+                misfit = misfit_of(title, known, whole, keywords) or _unfit(title, owner, known, whole, keywords)
                 if misfit is None:
                     raise
             raise misfit

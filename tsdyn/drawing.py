@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .calls import fitting
 from .errors import InvalidArgument, MissingDependency
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ class Drawn:
         return drawn
 
 
+@fitting
 def save(figure: Any, path: str | Path) -> Path:
     """Write a figure to a file, in the format that its suffix names, PNG if it has none; return the file's path.
 

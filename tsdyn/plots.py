@@ -10,6 +10,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from .benchmarking.haug_tables import DURATION, LEVELS
+from .calls import fitting
 from .drawing import BLUE, GREY, VERMILION, new_figure, save
 from .errors import InvalidArgument
 from .figures.axes import ZERO, largest
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 UNITS = ("m", "m/s", "m/s²")
 
 
+@fitting
 def tables_figure(tables: Sequence[Any]) -> Any:
     """Draw constraint errors over time at the tightest tolerance: scenes side by side, a panel for each level.
 

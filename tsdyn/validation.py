@@ -62,7 +62,10 @@ def finite(value, what, error=InvalidArgument):
 
 def shown(value):
     """Return what a message shows of a wrong value: numbers of NumPy as plain ones, of long ones the beginning."""
-    text = repr(_plain(value))
+    try:
+        text = repr(_plain(value))
+    except Exception as error:  # a list that holds itself, a repr that raises
+        text = f"<{type(value).__name__} without a repr: {type(error).__name__}>"
     return text if len(text) <= LONG else f"{text[:LONG]} ..."
 
 

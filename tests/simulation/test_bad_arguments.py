@@ -135,7 +135,49 @@ ARGUMENTS = [
 ]
 
 
-@pytest.mark.parametrize(("call", "error", "words"), ARGUMENTS)
+THREE = np.zeros(3)
+INSIDE = []
+INSIDE.append(INSIDE)
+UNFIT = [  # arguments of another kind than their annotations say
+    case("scene None", lambda w: ts.compare(None, (0, 1), with_="mujoco", step=1e-3), ts.InvalidArgument, "scene"),
+    case("order an array", lambda w: ts.integrators.Radau(order=THREE), ts.InvalidArgument, "order", "whole number"),
+    *(
+        case(f"{name} progress an array", call, ts.InvalidArgument, "progress", "True or False")
+        for name, call in {
+            "equilibrium": lambda w: w.scene.equilibrium(progress=THREE),
+            "linearise": lambda w: w.scene.linearise(progress=THREE),
+            "ensemble": lambda w: ts.ensemble(w.scene, {"rod.mass": [1.0, 2.0]}, (0, 0.01), progress=THREE),
+        }.items()
+    ),
+    case(
+        "assemble a matrix",
+        lambda w: ts.ensemble(w.scene, {"rod.mass": [1.0, 2.0]}, (0, 0.01), assemble=np.eye(3)),
+        ts.InvalidArgument,
+        "assemble",
+    ),
+    *(
+        case(f"path {text(path)} of {call.__name__}", lambda w, f=call, p=path: f(p), ts.InvalidArgument, word)
+        for path in ("", "a" * 1000, "\0", 3.0)
+        for call, word in ((ts.resume, "path"), (ts.load, ""))
+    ),
+    case("source with a null byte", lambda w: ts.shapes.Mesh("\0"), ts.InvalidArgument, "source"),
+    case("a list that holds itself", run(integrator=None, rtol=INSIDE), ts.InvalidArgument, "rtol"),
+    case("times that are ragged", lambda w: run(dense_output=True)(w).at([[1, 2], [3]]), ts.InvalidArgument, "t must"),
+    case("spin zero", lambda w: w.scene.equilibrium(spin=(0, 0, 0)), ts.InvalidArgument, "spin", "at rest"),
+    case("no rotors", lambda w: w.scene.equilibrium(rotors={}), ts.InvalidArgument, "rotors", "at rest"),
+    *(
+        case(f"name {text(name)}", lambda w, name=name: setattr(w.rod, "name", name), ts.InvalidBody, "rod", "name")
+        for name in (None, "", 3, "ground", "bead")
+    ),
+    *(
+        case(f"name {text(name)} of a joint", lambda w, n=name: setattr(w.pivot, "name", n), ts.InvalidConstraint)
+        for name in (None, "", b"x")
+    ),
+    case("a file's title", lambda w: ts.plots.save(), ts.InvalidCall, "path"),
+]
+
+
+@pytest.mark.parametrize(("call", "error", "words"), ARGUMENTS + UNFIT)
 def test_arguments(call, error, words):
     refuse(lambda: call(build()), error, words)
 

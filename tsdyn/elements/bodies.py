@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InvalidBody
 from ..validation import demand_known, floats, positive, shown, vector3
+from .names import new_name
 from .tolerances import INERTIA_ROUNDING, LEAST_MASS, TRIANGLE, UNIT_LENGTH
 
 if TYPE_CHECKING:
@@ -163,6 +164,7 @@ class PointMass:
         """Set an attribute that there is; a misspelt one is refused."""
         demand_known(self, name, ("scene", "index", "name", "values"))
         if name == "name" and "name" in self.__dict__:
+            value = new_name(value, self, (*self.scene.bodies, self.scene.ground), InvalidBody)
             self.scene._names = None
             self.scene.touch()  # parameters go by names
         super().__setattr__(name, value)

@@ -19,7 +19,7 @@ from ..validation import demand_known, floats, label, number
 from .bodies import Ground, PointMass, rotation_matrix
 from .markers import PARAMETERS, POINT, TURN, Marker, entries
 from .membership import note
-from .names import named
+from .names import named, new_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -210,6 +210,7 @@ class Attachment:
             return
         demand_known(self, name, (*self.__dict__, *slots))
         if name == "name":
+            value = new_name(value, self, (*self.scene.constraints, *self.scene.forces), self.error)
             self.scene._titles = None
         before = self.__dict__[name]
         super().__setattr__(name, value)

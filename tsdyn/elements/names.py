@@ -1,7 +1,7 @@
 """Lookup of bodies, constraints and forces by name or handle."""
 
 from ..errors import InvalidArgument
-from ..validation import close
+from ..validation import close, shown
 
 
 def named(things, name, what, error=InvalidArgument):
@@ -24,6 +24,15 @@ def named(things, name, what, error=InvalidArgument):
     near = close(name, known)
     there = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {_some(known)}."
     raise error(f"no {what} is named {name!r}; {there}")
+
+
+def new_name(value, thing, others, error):
+    """Return a name that a thing may be given in its scene: text, which none of some others has; or raise `error`."""
+    if not isinstance(value, str) or not value:
+        raise error(f"{thing.name}: name must be text that is not empty, got {shown(value)}.")
+    if any(other is not thing and other.name == value for other in others):
+        raise error(f"{thing.name}: the scene has another named {value!r}; choose another name.")
+    return value
 
 
 def _some(names):

@@ -14,7 +14,9 @@ from ..validation import floats, positive, vector3
 from .mesh_files import read
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, Floats
+    from collections.abc import Sequence
+
+    from ..hints import ArrayLike, Floats, Place
 
 AXES = {  # name -> frame whose third column is the axis
     "x": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
@@ -172,7 +174,7 @@ class Mesh(Geometry):
     0.001
     """
 
-    source: Any
+    source: Place | Sequence[ArrayLike]
     scale: float = 1.0
     vertices: Floats = field(init=False, repr=False)
     faces: Any = field(init=False, repr=False)

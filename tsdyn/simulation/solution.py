@@ -300,9 +300,10 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
         solution whose multipliers of redundant rows (NaN in `multipliers`) are zero.
         """
         item = self.handles.item(item)
+        body = self._acted(item, on)
         if id(item) in reactions.loads_of(self.packed):
             return np.ones(self.t.size, bool)
-        return uniqueness.unique(self, self._member(item).rows, self._acted(item, on))
+        return uniqueness.unique(self, self._member(item).rows, body)
 
     def rows(self, constraint: ItemLike) -> slice:
         """Return the columns of `multipliers` of a constraint, as a slice."""

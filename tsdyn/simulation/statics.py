@@ -248,7 +248,12 @@ def _field(packed, spin, about, rotors):
 
     spin = vector3(np.zeros(3) if spin is None else spin, "equilibrium: spin (rad/s)", InvalidArgument)
     about = vector3(about, "equilibrium: about (m)", InvalidArgument)
-    return SteadyField(packed, spin, about, rotors_of(packed, rotors))
+    rotors = rotors_of(packed, rotors)
+    if not any(map(np.any, (spin, *rotors.values()))):
+        raise InvalidArgument(
+            "equilibrium: spin and rotors are zero, so nothing turns; leave them out for an equilibrium at rest."
+        )
+    return SteadyField(packed, spin, about, rotors)
 
 
 def _demand_rest(scene, Phi_t, t):

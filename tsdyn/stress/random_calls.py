@@ -12,15 +12,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import constraints, forces, integrators, motions
+from .. import constraints, forces, integrators, motions, shapes
+from ..comparison.compare import compare
 from ..elements.bodies import PointMass
 from ..elements.force import Force
 from ..elements.joint import Joint
 from ..elements.primitive import Primitive
+from ..ensembles.ensemble import ensemble
 from ..errors import TsdynError
 from ..methods.integrator import Integrator
 from ..motions.prescribed import Motion
 from ..motions.tables import Table
+from ..profiling.profile import profile
+from ..simulation.load import load
+from ..simulation.resume import resume
 from ..simulation.scene import Scene
 from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
@@ -56,6 +61,8 @@ def targets(w):
                 if "of" in vars(thing):
                     found.append((f"{name}.of", thing.of))
     found += [("Scene", Scene), ("Table", Table), ("Motion", Motion), ("Integrator", Integrator)]
+    found += [(name, thing) for name, thing in sorted(vars(shapes).items()) if callable(thing) and name[0] != "_"]
+    found += [(call.__name__, call) for call in (load, resume, ensemble, compare, profile)]
     for owner, label in ((w.scene, "scene"), (w.solution, "solution")):
         for name, _ in inspect.getmembers(type(owner), inspect.isfunction):
             if not name.startswith("_") and name not in (*INNER, *WRITE):

@@ -129,7 +129,7 @@ def stiff_scenes(quick):
 
 def stress(quick):
     """The table and the figure of stress.md, by its own command."""
-    words = ["squeezer", "governor"] if quick else ["--figure", str(DOCS / "images" / "stress.png")]
+    words = ["squeezer", "governor"] if quick else ["--plot", str(DOCS / "images" / "stress.png")]
     if tsdyn(["stress", *words, "--markdown", str(DOCS / "stress.md")]):
         raise SystemExit("tsdyn stress found faults; the table shows which.")
 

@@ -9,8 +9,8 @@ from tsdyn.cli.command import main
 def test_command_on_an_example(capsys, tmp_path):
     pytest.importorskip("matplotlib")
     figure = tmp_path / "profile.png"
-    arguments = ["--t-end", "1", "--method", "dop853", "--rtol", "1e-6", "--atol", "1e-6", "--outputs", "20"]
-    assert main(["profile", "top", *arguments, "--no-advice", "--figure", str(figure)]) == 0
+    arguments = ["--to", "1", "--method", "dop853", "--rtol", "1e-6", "--atol", "1e-6", "--every", "0.05"]
+    assert main(["profile", "top", *arguments, "--no-advice", "--plot", str(figure)]) == 0
     out = capsys.readouterr().out
     assert out.startswith("<Scene of 1 rigid body")
     assert "DOP853(rtol=1e-06, atol=1e-06)" in out
@@ -26,7 +26,7 @@ def test_command_on_a_file(capsys, tmp_path):
         "scene = build()\nnumber = 3\ndef needs(x):\n    return x\n"
     )
     for where in (str(file), f"{file}:scene"):
-        assert main(["profile", where, "--t-end", "0.1", "--no-advice"]) == 0
+        assert main(["profile", where, "--to", "0.1", "--no-advice"]) == 0
         assert "<Scene of 1 point mass: 3 coordinates" in capsys.readouterr().out
     for where, words in (
         (f"{file}:number", "must give a ts.Scene, got 3"),
@@ -61,7 +61,7 @@ def test_command_names_the_examples(capsys):
     assert "pendulum_chain" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("arguments", [["profile"], ["profile", "top", "--t-end", "soon"]], ids=" ".join)
+@pytest.mark.parametrize("arguments", [["profile"], ["profile", "top", "--to", "soon"]], ids=" ".join)
 def test_wrong_arguments(arguments, capsys):
     with pytest.raises(SystemExit) as stop:
         main(arguments)

@@ -123,9 +123,46 @@ def test_convert(folder, capsys):
     assert called(capsys, "convert", "bars.toml", "bars.h5")[0] == 1
 
 
+def test_convert_keeps_a_scene_file_as_it_stands(folder, capsys):
+    called(capsys, "new", "a.toml")
+    before = (folder / "a.toml").read_text()
+    assert "[parameters]" in before
+    assert called(capsys, "convert", "a.toml", "b.toml")[0] == 0
+    assert (folder / "b.toml").read_text() == before
+
+
+def test_nothing_is_overwritten_unless_asked(folder, capsys):
+    (folder / "cases.csv").write_text("stone.mass\n1.0\n2.0\n")
+    (folder / "page.html").write_text("kept")
+    kept = {path: path.read_bytes() for path in folder.iterdir()}
+    for words in (
+        ["convert", "bars.toml", "bars.toml"],
+        ["convert", "four_bar", "bars.toml"],
+        ["run", "fall.toml", "--to", "0.1", "--output", "cases.csv"],
+        ["ensemble", "fall.toml", "--to", "0.1", "--parameters", "cases.csv", "--output", "cases.csv"],
+        ["view", "fall.toml", "--to", "0.1", "--output", "page.html"],
+    ):
+        code, _, err = called(capsys, *words)
+        assert (code, "exists" in err, "--force" in err) == (1, True, True)
+    assert {path: path.read_bytes() for path in folder.iterdir()} == kept
+    assert called(capsys, "run", "fall.toml", "--to", "0.1", "--output", "cases.csv", "--force")[0] == 0
+    assert (folder / "cases.csv").read_text().startswith("time (s)")
+
+
+@pytest.mark.parametrize("command", ["run", "ensemble", "profile", "benchmark"])
+def test_commands_have_one_vocabulary(command, capsys):
+    words = called(capsys, command, "--help")[1]
+    assert all(option in words for option in ("--to S", "--plot [PATH]", "--formulation NAME", "--json"))
+    assert ("--every S" in words) == (command != "benchmark")
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
+        (["profile", "fall.toml", "--t-end", "1"], 2, "the end of the run is --to"),
+        (["profile", "fall.toml", "--outputs", "5"], 2, "--every"),
+        (["tables", "--no-figure"], 2, "drawn with --plot only"),
+        (["run", "fall.toml", "--integrator", "rk45"], 2, "the integrator is --method"),
         (["rnu", "fall.toml"], 2, "did you mean run?"),
         (["run", "fall.toml", "--methd=rk45"], 2, "did you mean --method"),
         (["run", "fall.toml", "--methd", "rk45"], 2, "did you mean --method"),

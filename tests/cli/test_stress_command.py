@@ -17,10 +17,10 @@ from tsdyn.stress.judgement import Outcome
     [
         (["tpo"], "no case of the gallery contains 'tpo'; there are: four-bars, one loop;"),
         (["--fuzz", "top"], "--fuzz runs no case"),
-        (["--fuzz", "--figure", "x.png"], "show the gallery"),
+        (["--fuzz", "--plot", "x.png"], "show the gallery"),
         (["--scenes", "-1"], "--scenes must be a whole number from 0 on, got -1"),
         (["--processes", "0"], "--processes must be a whole number from 1 on"),
-        (["--figure", "/no/such/folder/x.png"], "there is no folder"),
+        (["--plot", "/no/such/folder/x.png"], "there is no folder"),
     ],
     ids=lambda x: " ".join(x) if isinstance(x, list) else "",
 )
@@ -35,7 +35,7 @@ def test_wrong_options(arguments, words, capsys):
 def test_a_case_as_text_figure_and_markdown(capsys, tmp_path):
     pytest.importorskip("matplotlib")
     paths = {name: tmp_path / name for name in ("figure.png", "table.md")}
-    arguments = ["--figure", str(paths["figure.png"]), "--markdown", str(paths["table.md"])]
+    arguments = ["--plot", str(paths["figure.png"]), "--markdown", str(paths["table.md"])]
     assert main(["stress", "sleeping", "--processes", "1", *arguments]) == 0
     head, row, *_ = capsys.readouterr().out.splitlines()
     assert len(head) == len(row)

@@ -35,6 +35,9 @@ def test_a_saved_solution_is_shown(folder):
 
 def test_what_cannot_be_shown_is_said(folder, capsys):
     assert main(["view", "bars.toml", "--to", "0.1", "--output", "nowhere/bars.html"]) == 1
-    assert "can't be written" in capsys.readouterr().err
+    assert "there is no folder" in capsys.readouterr().err
+    (folder / "there.html").write_text("")
+    assert main(["view", "bars.toml", "--output", "there"]) == 1
+    assert "--force" in capsys.readouterr().err
     assert main(["view", "absent.toml"]) == 1
     assert "absent.toml" in capsys.readouterr().err

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InvalidArgument, Status
 from .case_table import table_of
 from .output import print_json
-from .run import add_json, add_method, add_scene, destinations, options_of, progress_of
+from .run import add_json, add_method, add_output, add_plot, add_scene, destinations, options_of, progress_of
 from .scene_file import load_document
 
 SHOWN, LOW, HIGH = 12, 0.05, 0.95  # coordinates in the summary; its quantiles
@@ -28,11 +28,8 @@ def add_ensemble_options(parser):
     parser.add_argument("--threads", type=int, metavar="N", help="threads (default: one a processor)")
     parser.add_argument("--store", metavar="PATH", help="stream results to .zarr or .h5, in constant memory")
     parser.add_argument("--resume", action="store_true", help="go on with the cases that are missing in the store")
-    parser.add_argument(
-        "--output", action="append", default=[], metavar="PATH",
-        help="where to write results, again for more: .h5, .nc or .zarr (ts.load reads them), or .csv",
-    )  # fmt: skip
-    parser.add_argument("--plot", nargs="?", const="", metavar="PATH", help="draw the first coordinate (default PNG)")
+    add_output(parser)
+    add_plot(parser, "the first coordinate")
     add_json(parser)
 
 

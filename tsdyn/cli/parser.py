@@ -6,6 +6,22 @@ import re
 from ..validation import close
 from .output import print_json
 
+ELSEWHERE = {  # options of other programs, and of earlier versions
+    "--figure": "a figure is drawn with --plot [PATH]",
+    "--no-figure": "a figure is drawn with --plot only",
+    "--t-end": "the end of the run is --to",
+    "--end": "the end of the run is --to",
+    "--duration": "the end of the run is --to",
+    "--t-start": "the start of the run stands in the file: [run] start",
+    "--outputs": "the interval of outputs is --every",
+    "--dt": "the interval of outputs is --every; a fixed step stands in the file: [run] method",
+    "--integrator": "the integrator is --method",
+    "--solver": "the integrator is --method",
+    "--tol": "tolerances are --rtol and --atol",
+    "-o": "results are written with --output",
+    "--overwrite": "files are overwritten with --force",
+}
+
 
 class Parser(argparse.ArgumentParser):
     """An `ArgumentParser` whose errors end with the nearest right words."""
@@ -26,7 +42,7 @@ class Parser(argparse.ArgumentParser):
             return _meant(choice[1], [word.strip(" '") for word in choice[2].split(",")])
         unknown = re.search(r"unrecognized arguments: (.*)", message)
         words = [word.partition("=")[0] for word in unknown[1].split() if word.startswith("-")] if unknown else []
-        return "".join(_meant(word, self._options()) for word in words)
+        return "".join(f"; {ELSEWHERE[word]}" if word in ELSEWHERE else _meant(word, self._options()) for word in words)
 
     def _options(self):
         """Options of the command that is given."""

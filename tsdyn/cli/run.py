@@ -20,22 +20,43 @@ def add_run_options(parser):
     """Add the options of `tsdyn run` to its parser."""
     add_scene(parser)
     add_method(parser)
-    parser.add_argument(
-        "--output", action="append", default=[], metavar="PATH",
-        help="where to write results, again for more: .h5, .nc or .zarr (ts.load reads them), or .csv",
-    )  # fmt: skip
-    parser.add_argument("--plot", nargs="?", const="", metavar="PATH", help="draw the constraint errors (default PNG)")
+    add_output(parser)
+    add_plot(parser, "the constraint errors")
     add_json(parser)
 
 
 def add_method(parser):
     """Add how a scene is run: what the arguments of `simulate` are called here."""
-    parser.add_argument("--to", type=float, metavar="S", help="end of the run (default: that of the file, or 10 s)")
+    add_end(parser)
     parser.add_argument("--method", metavar="NAME", help="an integrator, such as dop853")
     parser.add_argument("--rtol", type=float, metavar="TOL", help="relative tolerance")
     parser.add_argument("--atol", type=float, metavar="TOL", help="absolute tolerance")
     parser.add_argument("--formulation", metavar="NAME", help="tangent, null-space or maggi-kane")
     parser.add_argument("--every", type=float, metavar="S", help="interval of outputs instead of every step")
+
+
+def add_end(parser):
+    """Add the end of a run."""
+    parser.add_argument("--to", type=float, metavar="S", help="end of the run (default: that of the file, or 10 s)")
+
+
+def add_output(parser):
+    """Add where results are written."""
+    parser.add_argument(
+        "--output", action="append", default=[], metavar="PATH",
+        help="where to write results, again for more: .h5, .nc or .zarr (ts.load reads them), or .csv",
+    )  # fmt: skip
+    add_force(parser)
+
+
+def add_force(parser):
+    """Add the option without which nothing is overwritten."""
+    parser.add_argument("--force", action="store_true", help="overwrite files that exist")
+
+
+def add_plot(parser, what):
+    """Add where a figure is drawn; "" stands for a name that the command chooses."""
+    parser.add_argument("--plot", nargs="?", const="", metavar="PATH", help=f"draw {what} (default PNG)")
 
 
 def add_scene(parser, metavar="SCENE"):
@@ -104,25 +125,40 @@ def progress_of(parsed):
 
 
 def destinations(parsed, document):
-    """Files of the results, and where to draw, by the options, else by the file; refused at once if not writable."""
+    """Files of the results, and where to draw, by the options, else by the file; refused at once if not writable.
+
+    What the file itself names is written anew by each run of it.
+    """
     outputs, plot = parsed.output or document.output["files"], document.output["plot"]
-    if parsed.plot is not None:
-        plot = parsed.plot or Path(parsed.scene).with_suffix(".png").name
-    _demand_writable(outputs, plot)
-    return outputs, plot
-
-
-def _demand_writable(outputs, plot):
-    """Refuse at once, not after the run, what can't be written at its end."""
-    for path in (*outputs, *([plot] if plot else [])):
-        if not Path(path).resolve().parent.is_dir():
-            raise InvalidArgument(f"there is no folder {Path(path).resolve().parent} to write {Path(path).name} to.")
     for path in outputs:
         demand_format(path)
-    if plot is not None:
-        from ..drawing import demand_matplotlib
+        demand_new(path, parsed.force or not parsed.output)
+    return outputs, plotted(parsed, Path(parsed.scene).stem) or plot
 
-        demand_matplotlib()
+
+def plotted(parsed, stem):
+    """Where to draw a figure, None without one; refused at once, not after the run, if it can't be drawn."""
+    if parsed.plot is None:
+        return None
+    from ..drawing import demand_matplotlib
+
+    demand_matplotlib()
+    path = parsed.plot or f"{stem}.png"
+    demand_folder(path)
+    return path
+
+
+def demand_folder(path):
+    """Refuse a path in a folder that there isn't."""
+    if not Path(path).resolve().parent.is_dir():
+        raise InvalidArgument(f"there is no folder {Path(path).resolve().parent} to write {Path(path).name} to.")
+
+
+def demand_new(path, force):
+    """Refuse a path that can't be written to, or is that of a file, unless that may be overwritten."""
+    demand_folder(path)
+    if Path(path).exists() and not force:
+        raise InvalidArgument(f"{path} exists; choose another name, or overwrite it with --force.")
 
 
 def demand_format(path):

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from ..errors import InvalidArgument, TsdynError
 from .output import print_json
-from .run import SOLUTIONS, add_json, add_scene, demand_format, write
-from .scene_file import load_run, load_scene
+from .run import SOLUTIONS, add_force, add_json, add_scene, demand_format, demand_new, write
+from .scene_file import load_document, load_run, load_scene
 
 SCENES = (".toml",)
 
@@ -34,6 +34,7 @@ def add_convert_options(parser):
     """Add the options of `tsdyn convert`."""
     add_scene(parser, "FROM")
     parser.add_argument("target", metavar="TO", help="where to write; the suffix is the format")
+    add_force(parser)
     add_json(parser)
 
 
@@ -169,10 +170,12 @@ def _new(parsed):
 def _convert(parsed):
     """Write a scene, or a solution, in another format.
 
-    A scene (.toml, URDF, MJCF, SDF, or a Python file) becomes .toml, without comments, expressions of parameters, and
-    shapes; a solution or ensemble (.h5, .nc, .zarr) becomes another of these, or .csv.
+    A scene (URDF, MJCF, SDF, or a Python file) becomes .toml, without shapes; a .toml is checked and copied as it
+    stands, with comments and all tables. A solution or ensemble (.h5, .nc, .zarr) becomes another of these, or .csv.
+    What exists is overwritten with --force only.
     """
     source, target = Path(parsed.scene).suffix.lower(), Path(parsed.target).suffix.lower()
+    demand_new(parsed.target, parsed.force)
     if source in SOLUTIONS:
         from ..ensembles.results import Ensemble
         from ..simulation.load import load
@@ -181,6 +184,11 @@ def _convert(parsed):
         demand_format(parsed.target)
         found = load(parsed.scene)
         written = (write_ensemble if isinstance(found, Ensemble) else write)(found, parsed.target)
+    elif source in SCENES and target in SCENES:
+        from ..simulation.scene_saving import write_text
+
+        load_document(parsed.scene, parsed.allow_code, free_base=parsed.free_base)  # refuses mistakes
+        written = write_text(parsed.target, Path(parsed.scene).read_text(encoding="utf-8-sig"))
     elif target in SCENES:
         scene = load_scene(parsed.scene, parsed.allow_code, parsed.free_base)
         written = scene.save(parsed.target)

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from ..errors import InvalidArgument
+from .run import add_json, add_plot, demand_folder, plotted
 
 BESIDE = {"scenes": 200, "calls": 400}  # random ones beside the gallery
 ALONE = {"scenes": 1000, "calls": 4000}  # with --fuzz
@@ -24,8 +25,8 @@ def add_options(parser):
         "--seed", type=int, default=0, metavar="N", help="of the first random scene and calls (default 0)"
     )
     parser.add_argument("--processes", type=int, metavar="N", help="worker processes (default: one a processor)")
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
-    parser.add_argument("--figure", metavar="PATH", help="where to draw the gallery; the suffix says how")
+    add_json(parser)
+    add_plot(parser, "the gallery")
     parser.add_argument(
         "--markdown", metavar="PATH", help="where to write the table as Markdown; in a page with marks, between them"
     )
@@ -41,7 +42,9 @@ def _stress(parsed):
     """
     counts, processes = _counts(parsed)
     indices = [] if parsed.fuzz else _cases(parsed.case)
-    _demand_writable(parsed)
+    figure = plotted(parsed, "stress")
+    if parsed.markdown:
+        demand_folder(parsed.markdown)
 
     from ..stress import campaign, report
 
@@ -63,8 +66,8 @@ def _stress(parsed):
         print(json.dumps(report.as_data(found, tally, parsed.seed), indent=1))
     if parsed.markdown:
         _write(parsed.markdown, report.as_markdown(found, tally), report.MARKS)
-    if parsed.figure:
-        _draw(found, parsed.figure)
+    if figure:
+        _draw(found, figure)
     failed = any(report.wrong(figures) for figures in found) or bool(tally and tally.faults)
     return 0 if complete and not failed else 1
 
@@ -74,8 +77,8 @@ def _counts(parsed):
     usual = ALONE if parsed.fuzz else BESIDE
     if parsed.fuzz and parsed.case:
         raise InvalidArgument(f"--fuzz runs no case of the gallery; leave out {' '.join(parsed.case)} or --fuzz.")
-    if parsed.fuzz and (parsed.figure or parsed.markdown):
-        raise InvalidArgument("--figure and --markdown show the gallery, which --fuzz doesn't run.")
+    if parsed.fuzz and (parsed.plot is not None or parsed.markdown):
+        raise InvalidArgument("--plot and --markdown show the gallery, which --fuzz doesn't run.")
     counts = {kind: usual[kind] if getattr(parsed, kind) is None else getattr(parsed, kind) for kind in usual}
     if parsed.case and parsed.scenes is None and parsed.calls is None:
         counts = dict.fromkeys(counts, 0)
@@ -85,18 +88,6 @@ def _counts(parsed):
         if value < least:
             raise InvalidArgument(f"{name} must be a whole number from {least} on, got {value}.")
     return counts, processes
-
-
-def _demand_writable(parsed):
-    """Refuse at once, not after minutes, what can't be written at the end."""
-    for name in ("figure", "markdown"):
-        path = getattr(parsed, name)
-        if path and not Path(path).resolve().parent.is_dir():
-            raise InvalidArgument(f"--{name}: there is no folder {Path(path).resolve().parent}.")
-    if parsed.figure:
-        from ..drawing import demand_matplotlib
-
-        demand_matplotlib()
 
 
 def _cases(words):

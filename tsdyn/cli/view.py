@@ -4,8 +4,9 @@ import sys
 from pathlib import Path
 
 from ..errors import InvalidArgument
+from ..viewer.view import page_path
 from .output import print_json
-from .run import SOLUTIONS, add_json, add_method, add_scene, options_of
+from .run import SOLUTIONS, add_force, add_json, add_method, add_scene, demand_new, options_of
 from .scene_file import load_run
 
 
@@ -14,6 +15,7 @@ def add_view_options(parser):
     add_scene(parser)
     add_method(parser)
     parser.add_argument("--output", metavar="PATH", help="where to write the page (default: the browser opens it)")
+    add_force(parser)
     add_json(parser)
 
 
@@ -23,6 +25,8 @@ def _view(parsed):
     A scene is run first, as `tsdyn run` does; a solution (.h5, .nc, .zarr) is shown as it is. The exit code is 0 only
     if the run reached its end.
     """
+    if parsed.output is not None:
+        demand_new(page_path(parsed.output), parsed.force)
     solution = _solution(parsed)
     path = solution.view(parsed.output)
     if parsed.json:

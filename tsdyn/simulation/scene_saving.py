@@ -54,9 +54,13 @@ def save(scene: Scene, path: Place) -> Path:
 
     if not isinstance(path, (str, os.PathLike)) or Path(path).suffix.lower() != ".toml":
         raise InvalidArgument(f"a scene is saved to a path that ends in .toml, got {path!r}.")
+    return write_text(path, scene_text.write(scene, type(scene)))
+
+
+def write_text(path: Place, text: str) -> Path:
+    """Write a text file whole or not at all; raises StorageError."""
     path = Path(path)
     partial = path.with_name(f"{path.name}-partial-{os.getpid()}")
-    text = scene_text.write(scene, type(scene))
     try:
         partial.write_text(text, encoding="utf-8", newline="\n")
         os.replace(partial, path)

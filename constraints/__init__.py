@@ -1,6 +1,6 @@
 """Constraints, one file each: primitives, and joints composed of them; a new file here is registered automatically."""
 
-from .._discovery import export_all, listing
+from .._discovery import export_all, listing, refusing
 from ..elements import joint as _joint
 from ..elements import primitive as _primitive
 
@@ -8,6 +8,7 @@ __all__ = [*export_all(__name__, __path__, globals(), "Primitive", "Joint"), "re
 
 registered = listing(_primitive.registered, "Primitive", "ts.constraints.Distance in ts.constraints.registered()")
 registered_joints = listing(_joint.registered, "Joint", "ts.constraints.Revolute in ts.constraints.registered_joints()")
+__getattr__ = refusing("ts.constraints", __all__)
 
 
 def __dir__() -> list[str]:

@@ -9,7 +9,7 @@ _here = _Path(__file__).parent
 if not (_here / "constraints").is_dir():  # a checkout: they stand beside this folder
     __path__.append(str(_here.parent))
 
-from . import _moved, constraints, forces, integrators, motions, shapes  # noqa: E402
+from . import constraints, forces, integrators, motions, shapes  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402
 from .elements.bodies import Body, PointMass  # noqa: E402
 from .elements.force import Force  # noqa: E402
@@ -58,8 +58,6 @@ from .simulation.resume import resume  # noqa: E402
 from .simulation.scene import Scene  # noqa: E402
 from .simulation.simulate import simulate  # noqa: E402
 from .simulation.solution import Solution  # noqa: E402
-
-_moved.install()
 
 
 def _ensemble_of(*given):
@@ -143,6 +141,9 @@ if TYPE_CHECKING:
     from .ensembles.results import Ensemble
     from .profiling.profile import profile
 else:
+    from ._discovery import refusing as _refusing
+
+    _refuse = _refusing("ts", __all__)
     _LATER = {
         "Ensemble": ".ensembles.results",
         "benchmark": ".benchmarking.benchmark",
@@ -156,7 +157,7 @@ else:
     def __getattr__(name):
         """What is loaded when it is asked for: no run needs it."""
         if name not in _LATER:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+            return _refuse(name)
         from importlib import import_module
 
         found = import_module(_LATER[name], __name__)

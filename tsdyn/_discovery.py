@@ -3,6 +3,9 @@
 import pkgutil
 from importlib import import_module
 
+from .errors import UnknownAttribute
+from .other_names import hint
+
 
 def export_all(package, path, namespace, *bases):
     """Put into `namespace` each class of the package's modules that descends from a class named in `bases`."""
@@ -15,6 +18,17 @@ def export_all(package, path, namespace, *bases):
                 namespace[name] = value
                 names.append(name)
     return names
+
+
+def refusing(where, known):
+    """Make the `__getattr__` of a module: what is missing is refused with what may have been meant."""
+
+    def __getattr__(name):
+        if name.startswith("_"):
+            raise AttributeError(f"{where} has no {name}")
+        raise UnknownAttribute(f"{where} has no {name}{hint(where, name, known)}")
+
+    return __getattr__
 
 
 def listing(known, kind, example):

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import other_names
 from .errors import InvalidArgument, InvalidCall, TsdynError
 from .validation import floats, nearest, shown
 
@@ -35,7 +36,11 @@ BY_POSITION = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_O
 
 def unknown_argument(title, name, known):
     """Return the error of an unknown keyword."""
-    return InvalidCall(f"{title}() has no argument {name}{nearest(name, known)} It has {', '.join(known)}.")
+    here = other_names.argument(name, known)
+    said = f"; here it is {here}=." if here else nearest(name, known)
+    if {f"{name}_a", f"{name}_b", "a", "b"} <= {*known}:
+        said = f"; {title}.at(a, b, {name}=...) takes one for both bodies, in the ground frame."
+    return InvalidCall(f"{title}() has no argument {name}{said} It has {', '.join(known)}.")
 
 
 def fitting(function: Function, then: Callable[[Any], None] | None = None) -> Function:
@@ -127,6 +132,8 @@ def _unfit(title, owner, signature, arguments, keywords):
     """Return the InvalidArgument of the first argument that isn't what its annotation says, or None."""
     given = signature.bind(*arguments, **keywords).arguments
     for name, value in given.items():
+        if signature.parameters[name].kind in (OPEN, inspect.Parameter.VAR_POSITIONAL):
+            continue
         hint = _hint(owner.__module__, signature.parameters[name].annotation)
         if name not in ("self", "cls") and hint is not None and not _fits(value, hint):
             return InvalidArgument(f"{title}(): {name} must be {_words(hint)}, got {shown(value)}.")

@@ -66,7 +66,7 @@ ORDER = [
     "__main__",
 ]
 FLAT = 14  # modules at most that lie flat in tsdyn/
-LONGEST = 350  # lines of a file
+LONGEST = 700  # lines of a file, without examples
 ELIMINATION = ("elimination", "factorisation", "block_operations")  # of tsdyn.sparse, for tsdyn.rows alone
 
 

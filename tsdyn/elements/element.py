@@ -13,7 +13,6 @@ from numba.core.errors import NumbaError
 from ..calls import Placing, complete_signature, fitting
 from ..docstrings import complete_docstring
 from ..errors import InvalidConstraint
-from ..jit.complaints import complaint
 from ..jit.kernels import kernel
 from ..validation import demand_known, floats, label, number
 from .bodies import Ground, PointMass, rotation_matrix
@@ -311,7 +310,7 @@ def address(kernels, name, what, error):
     except NumbaError as reason:
         raise error(
             f"{what}: Numba can't compile {name}; use plain arithmetic, NumPy functions of scalars and constants in "
-            f"it, and allocate nothing. {complaint(reason)}"
+            "it, and allocate nothing."
         ) from reason
 
 

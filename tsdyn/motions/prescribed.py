@@ -13,7 +13,6 @@ from numba.core.errors import NumbaError
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidConstraint
 from ..jit.compiled_once import compiled_once
-from ..jit.complaints import complaint
 from ..jit.kernels import Callback, caller, kernel, specialised
 from ..validation import number, shown
 from .elementary import Constant, Piecewise, time
@@ -241,7 +240,7 @@ class Motion:
         except NumbaError as error:
             raise InvalidConstraint(
                 f"{self.what}: Numba can't compile the motion; use plain arithmetic, NumPy functions and constants "
-                f"in it. {complaint(error)}"
+                "in it."
             ) from error
 
 

@@ -9,7 +9,6 @@ from numba.core.errors import NumbaError
 
 from ..errors import InvalidArgument
 from ..jit.compiled_once import compiled_once
-from ..jit.complaints import complaint
 from ..jit.kernels import Callback, caller, kernel, specialised, vector
 from ..validation import floats, number, shown
 from .elementary import Constant, Piecewise, Polynomial
@@ -190,7 +189,7 @@ class Signal:
         except NumbaError as error:
             raise self.error(
                 f"{self.what}: Numba can't compile the function; use plain arithmetic, NumPy functions and constants "
-                f"in it{', and return a tuple of three' if self.width == 3 else ''}. {complaint(error)}"
+                f"in it{', and return a tuple of three' if self.width == 3 else ''}."
             ) from error
 
     def __getstate__(self):

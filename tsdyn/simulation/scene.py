@@ -21,6 +21,7 @@ from ..elements.names import named
 from ..elements.primitive import Primitive
 from ..errors import InvalidArgument, InvalidBody, InvalidConstraint
 from ..jit.cache import deep_hash
+from ..model.compilable import demand_compilable
 from ..model.handles import handles_of
 from ..model.packed import pack, user_functions
 from ..motions.prescribed import Motion
@@ -234,7 +235,8 @@ class Scene(OfFile):
         Raises
         ------
         InvalidConstraint, InvalidForce
-            If the item is neither, belongs to another scene, or was added before.
+            If the item is neither, belongs to another scene, or was added before; if Numba can't compile a function of
+            it, which is compiled here.
 
         Examples
         --------
@@ -267,6 +269,7 @@ class Scene(OfFile):
             return self._normalisations[item.a]
         if item.added and any(item is other for other in members):
             raise item.error(f"{item.name}: it has been added to this scene before; add each {word} once.")
+        demand_compilable(item)
         admit(self, item)
         item.added = True
         members.append(item)

@@ -9,6 +9,7 @@ import numpy as np
 from .errors import InvalidArgument, UnknownAttribute
 
 EXACT = 2**53  # integers below it are floats
+MANY = 30  # names that a message lists
 LONG = 200  # characters of a value that a message shows
 
 
@@ -153,6 +154,13 @@ def nearest(name, known):
     """Return the end of a sentence on a wrong name: similar known names."""
     near = close(name, known)
     return f"; did you mean {' or '.join(near)}?" if near else "."
+
+
+def unknown_parameter(name, known):
+    """Return the end of a sentence on a name of no parameter: similar ones, and those that there are."""
+    names = list(known)
+    more = f" and {len(names) - MANY} more; tsdyn info --parameters lists all" if len(names) > MANY else ""
+    return f"{nearest(name, names)} It has {', '.join(names[:MANY])}{more}."
 
 
 def unknown_name(what, name, known):

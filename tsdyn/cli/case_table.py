@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from ..errors import InvalidArgument
-from ..validation import counted, nearest
+from ..validation import counted, unknown_parameter
 
 _INDEXED = re.compile(r"(.*)\[([^\[\]]*)\]")  # bob.velocity[2]; bodies may have names such as link[3]
 
@@ -61,9 +61,7 @@ def _meant(where, word, fields):
     if not word:
         raise InvalidArgument(f"{where} has no name; write that of a parameter, or remove the column.")
     if name not in fields:
-        raise InvalidArgument(
-            f"{where}: the scene has no parameter {name!r}{nearest(name, fields)} tsdyn info --parameters lists them."
-        )
+        raise InvalidArgument(f"{where}: the scene has no parameter {name!r}{unknown_parameter(name, fields)}")
     own = _own(where, name, fields[name])
     if own is None:
         if index is not None:

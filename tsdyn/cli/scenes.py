@@ -75,7 +75,10 @@ def _info(parsed):
     from ..simulation.method_choice import reason
     from ..simulation.scene_cache import prepared
 
-    scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
+    document = load_document(
+        parsed.scene, parsed.allow_code, False, parsed.free_base
+    )  # a study may name what isn't there
+    scene, given = document.scene, document.run
     mobility, why = scene.mobility(), reason(prepared(scene))
     if parsed.json:
         print_json(_facts(scene, mobility, why, given))

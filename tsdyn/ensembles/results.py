@@ -286,12 +286,19 @@ class Ensemble:
         count = Counter(self.status.tolist())
         return ", ".join(f"{many} {Status(code)}" for code, many in sorted(count.items()))
 
+    def _reason(self):
+        """Why the first case that failed did, as a list of one; empty where none has."""
+        failed = np.flatnonzero(~self.success)
+        return [f"case {i}: {self.message[i]}" for i in failed[:1]]
+
     def __repr__(self) -> str:
-        return f"<Ensemble of {counted(len(self), 'case')}: {self._facts()}>"
+        reason = "".join(f"; {reason}" for reason in self._reason())
+        return f"<Ensemble of {counted(len(self), 'case')}: {self._facts()}{reason}>"
 
     def _repr_html_(self) -> str:
         """Return a table, for notebooks."""
         facts = {"cases": len(self), "ended": self._facts(), "parameters": ", ".join(self.parameters)}
+        facts |= {"first failure": reason for reason in self._reason()}
         rows = "".join(f"<tr><th>{name}</th><td>{html.escape(str(fact))}</td></tr>" for name, fact in facts.items())
         return f"<table><caption>Ensemble</caption>{rows}</table>"
 

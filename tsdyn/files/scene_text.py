@@ -52,6 +52,8 @@ def read(text, name, make, simulate, allow_code=False):
 def read_all(text, name, make, simulate, allow_code=False, study=None):
     """The `Document` of a text; `name` is that of the file, `study` has other values of keys of the table ensemble.
 
+    A study of False leaves that table unread.
+
     Raises
     ------
     InvalidFile
@@ -61,7 +63,7 @@ def read_all(text, name, make, simulate, allow_code=False, study=None):
     scene, names = build(document, make, mistakes, allow_code)
     given = run_table.options(document["run"], simulate, mistakes, names) if "run" in document else {}
     cases = {}
-    if "ensemble" in document:
+    if "ensemble" in document and study is not False:
         table = document["ensemble"]
         if isinstance(table, dict):
             table = table | {key: value for key, value in (study or {}).items() if value is not None}

@@ -4,7 +4,7 @@ from pathlib import PurePath
 
 import numpy as np
 
-from ..validation import nearest
+from ..validation import unknown_parameter
 from .expressions import Misread
 from .reading import known_keys
 from .values import decode_array
@@ -88,9 +88,7 @@ class _Cases:
     def add(self, name, value, names):
         """Add a parameter."""
         if name not in self.known:
-            raise Misread(
-                f"the scene has no such parameter{nearest(name, self.known)} tsdyn info --parameters lists them."
-            )
+            raise Misread(f"the scene has no such parameter{unknown_parameter(name, self.known)}")
         shape = np.shape(self.known[name])
         if isinstance(value, dict):
             self.spread[name] = self._spread(value, names), shape

@@ -109,10 +109,11 @@ def scene_file(path: Place, allow_code: bool = False, free_base: bool = False) -
     return document_of(path, allow_code)[:2]
 
 
-def document_of(path: Place, allow_code: bool = False, study: Mapping[str, Any] | None = None) -> Any:
+def document_of(path: Place, allow_code: bool = False, study: Mapping[str, Any] | bool | None = None) -> Any:
     """Return the `Document` of a TOML file: its scene, and what its tables run, ensemble and output ask for.
 
-    `study` has keys of the table ensemble, such as cases, in place of those of the file, where they are not None.
+    `study` has keys of the table ensemble, such as cases, in place of those of the file, where they are not None; a
+    study of False leaves the table unread.
     """
     from ..files import scene_text
 

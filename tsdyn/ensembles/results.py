@@ -287,18 +287,19 @@ class Ensemble:
         return ", ".join(f"{many} {Status(code)}" for code, many in sorted(count.items()))
 
     def _reason(self):
-        """Why the first case that failed did, as a list of one; empty where none has."""
+        """Why the first case that failed did; empty where none has."""
         failed = np.flatnonzero(~self.success)
-        return [f"case {i}: {self.message[i]}" for i in failed[:1]]
+        return f"case {failed[0]}: {self.message[failed[0]]}" if failed.size else ""
 
     def __repr__(self) -> str:
-        reason = "".join(f"; {reason}" for reason in self._reason())
-        return f"<Ensemble of {counted(len(self), 'case')}: {self._facts()}{reason}>"
+        reason = self._reason()
+        return f"<Ensemble of {counted(len(self), 'case')}: {self._facts()}{reason and f'; {reason}'}>"
 
     def _repr_html_(self) -> str:
         """Return a table, for notebooks."""
         facts = {"cases": len(self), "ended": self._facts(), "parameters": ", ".join(self.parameters)}
-        facts |= {"first failure": reason for reason in self._reason()}
+        if reason := self._reason():
+            facts["first failure"] = reason
         rows = "".join(f"<tr><th>{name}</th><td>{html.escape(str(fact))}</td></tr>" for name, fact in facts.items())
         return f"<table><caption>Ensemble</caption>{rows}</table>"
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..calls import fitting
+from ..calls import fitting, fitting_constructor
 from ..errors import InvalidArgument
 from ..maths.mesh_integrals import moments
 from ..validation import number, positive, vector3
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 DRAWN_RADIUS = 0.02  # of a rod, which has none, per length
 
 
+@fitting_constructor
 @dataclass(frozen=True, eq=False)
 class Shape:
     """Mass, centroid and inertia of a shape; unpacked by `**` it is the mass and inertia of `Scene.add_body`.

@@ -20,6 +20,7 @@ ORDER = [
     "_discovery",
     "_moved",
     "_version",
+    "regular_files",
     "validation",
     "calls",
     "docstrings",

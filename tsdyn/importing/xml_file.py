@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import MissingDependency, StorageError
+from ..errors import MissingDependency
 from ..files.mistakes import Mistakes
+from ..regular_files import content
 
 LARGEST = 1 << 26  # bytes of a file
 
@@ -30,7 +31,7 @@ def read(path: Any, data: bytes | None = None) -> tuple[Node, Mistakes]:
     InvalidFile
         If it is no XML, or has a document type, which could define entities.
     StorageError
-        If it can't be read or is too large.
+        If it can't be read, is too large or no regular file.
     MissingDependency
         If lxml is not installed.
     """
@@ -39,7 +40,7 @@ def read(path: Any, data: bytes | None = None) -> tuple[Node, Mistakes]:
     except ImportError as error:
         raise MissingDependency("URDF, MJCF and SDF files need lxml: pip install 'tsdyn[import]'.") from error
     mistakes = Mistakes(str(path), Lines)
-    data = content(path) if data is None else data
+    data = content(path, LARGEST) if data is None else data
     parser = etree.XMLParser(
         resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=True, remove_pis=True
     )
@@ -53,18 +54,6 @@ def read(path: Any, data: bytes | None = None) -> tuple[Node, Mistakes]:
         mistakes.add((1, 1), "the file has a DOCTYPE, which could define entities; remove it.")
         mistakes.demand_none()
     return Node(root, mistakes), mistakes
-
-
-def content(path: Any) -> bytes:
-    """The bytes of a file of admissible size."""
-    try:
-        with open(path, "rb") as file:
-            data = file.read(LARGEST + 1)
-    except OSError as error:
-        raise StorageError(f"{path} can't be read: {error.strerror or error}.") from error
-    if len(data) > LARGEST:
-        raise StorageError(f"{path} is too large for a description of a robot: more than {LARGEST} bytes.")
-    return data
 
 
 class Node:

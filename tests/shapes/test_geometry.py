@@ -88,16 +88,16 @@ def test_meshes_are_regular_files_of_bounded_size(tmp_path, monkeypatch):
     (tmp_path / "device.stl").symlink_to("/dev/zero")
     (tmp_path / "folder.stl").mkdir()
     for name, words in {
-        "pipe": "no regular file",
-        "device": "no regular file",
-        "folder": "directory",
+        "pipe": "not a regular file",
+        "device": "not a regular file",
+        "folder": "a folder",
         "absent": "No such",
     }.items():
         with pytest.raises(ts.StorageError, match=words):
             S.Mesh(tmp_path / f"{name}.stl")
     monkeypatch.setattr("tsdyn.shapes.mesh_files.LARGEST", 100)
     (tmp_path / "part.stl").write_bytes(binary_stl(CORNERS))
-    with pytest.raises(ts.StorageError, match="100 bytes at most"):
+    with pytest.raises(ts.StorageError, match="100 are as many"):
         S.Mesh(tmp_path / "part.stl")
 
 

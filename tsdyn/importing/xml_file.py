@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from .. import regular_files
 from ..errors import MissingDependency
 from ..files.mistakes import Mistakes
-from ..regular_files import content
 
 LARGEST = 1 << 26  # bytes of a file
 
@@ -40,7 +40,7 @@ def read(path: Any, data: bytes | None = None) -> tuple[Node, Mistakes]:
     except ImportError as error:
         raise MissingDependency("URDF, MJCF and SDF files need lxml: pip install 'tsdyn[import]'.") from error
     mistakes = Mistakes(str(path), Lines)
-    data = content(path, LARGEST) if data is None else data
+    data = regular_files.read(path, LARGEST) if data is None else data
     parser = etree.XMLParser(
         resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=True, remove_pis=True
     )

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import regular_files
 from ..errors import InvalidArgument, InvalidFile
-from ..regular_files import content
 
 if TYPE_CHECKING:
     from ..hints import Floats
@@ -42,7 +42,7 @@ def read(path: Any) -> tuple[Floats, Any]:
     kind = path.suffix.lower()
     if kind not in (".stl", ".obj"):
         raise InvalidArgument(f"Mesh: {path.name} must be an .stl or .obj file; other formats can be converted.")
-    data = content(path, LARGEST)
+    data = regular_files.read(path, LARGEST)
     try:
         vertices, faces = _obj(data) if kind == ".obj" else _stl(data)
     except (ValueError, IndexError, OverflowError) as error:

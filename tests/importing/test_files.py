@@ -133,7 +133,58 @@ def test_mimicking_joints_are_gears(tmp_path):
     scene.body("one").angular_velocity = (0, 0, 1)
     scene.assemble(fixed=["one"])
     state = ts.simulate(scene, (0.0, 0.5)).state
-    assert np.isclose(state.angle("two"), -2.0 * state.angle("one"), rtol=CLOSE)
+    assert np.isclose(state.angle("two"), 0.3 - 2.0 * state.angle("one"), rtol=CLOSE)
+    assert np.isclose(state.angle("three"), 0.3, rtol=0.5)  # starts at its offset, and falls freely
+
+
+LINK = "<link name='{0}'>" + BODY + "</link>"
+ON_BASE = (
+    "<joint name='{0} hinge' type='{1}'><parent link='base'/><child link='{0}'/><origin xyz='{2} 0 0'/>"
+    "<axis xyz='0 0 {3}'/>{4}</joint>"
+)
+
+
+def test_offsets_of_mimicking_joints(tmp_path):
+    """A chain of them, one beyond half a turn, with axes that are opposed; what hangs from them starts there, too."""
+    content = "<link name='base'/>" + "".join(map(LINK.format, ("a", "b", "c", "slide", "tip")))
+    content += ON_BASE.format("a", "continuous", 0, 1, "")
+    content += ON_BASE.format("c", "continuous", 2, -1, "<mimic joint='b hinge' multiplier='0.5' offset='-1'/>")
+    content += ON_BASE.format("b", "continuous", 1, 1, "<mimic joint='a hinge' multiplier='-1' offset='4'/>")
+    content += ON_BASE.format("slide", "prismatic", 3, 1, "<mimic joint='a hinge' multiplier='2' offset='0.2'/>")
+    content += "<joint name='j' type='fixed'><parent link='b'/><child link='tip'/><origin xyz='1 0 0'/></joint>"
+    scene = load(text(tmp_path, f"<robot name='r'>{content}</robot>"))
+    assert left_out(scene) == {"joint that mimics another one": ["slide hinge mimics a hinge"]}
+    assert "offset 0.2" in str(scene.imported)
+    assert scene.imported.frames["tip"].body == "b"
+    assert np.isclose(scene.body("b").position[0], 1 + 0.5 * np.cos(4.0), rtol=ROUNDING)
+    scene = ts.load(scene.save(tmp_path / "r.toml"))
+    scene.set("a hinge", rate=1.0)
+    solution = ts.simulate(scene, (0.0, 2.0), t_eval=[0.0, 1.0, 2.0])
+    one = solution.angle("a hinge")
+    assert np.allclose(one, [0.0, 1.0, 2.0], atol=CLOSE)
+    assert np.abs(solution.angle("b hinge") - (4.0 - one)).max() < CLOSE
+    assert np.abs(solution.angle("c hinge") - (0.5 * (4.0 - one) - 1.0)).max() < CLOSE
+    assert np.isclose(solution.displacement("slide hinge")[0], 0.2, rtol=ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "reason"), [("b", "a", "in a circle"), ("b", "gone", "no other joint 'gone'")]
+)
+def test_mimics_that_lead_nowhere_are_listed(one, other, reason, tmp_path):
+    content = "<link name='base'/>" + "".join(map(LINK.format, "ab"))
+    for x, (name, driver) in enumerate((("a", one), ("b", other))):
+        content += ON_BASE.format(name, "continuous", x, 1, f"<mimic joint='{driver} hinge' offset='1'/>")
+    assert reason.replace("gone", "gone hinge") in str(
+        load(text(tmp_path, f"<robot name='r'>{content}</robot>")).imported
+    )
+
+
+def test_a_default_namespace_is_left_out(tmp_path):
+    content = (MODELS / "arm.urdf").read_text().replace("<robot ", '<robot xmlns="http://a.b" xmlns:x="http://c.d" ')
+    content = content.replace("</robot>", "<x:property name='y'/></robot>")
+    scene, plain = load(text(tmp_path, content)), load(MODELS / "arm.urdf")
+    assert (scene.evaluate().qdd == plain.evaluate().qdd).all()
+    assert {"element <{http://c.d}property>"} == set(left_out(scene)) - set(left_out(plain))
 
 
 def test_links_without_mass_at_the_end_are_held(tmp_path):

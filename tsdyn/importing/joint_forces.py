@@ -20,7 +20,7 @@ SUFFIX = " spring"  # of names
 
 def unused(scene, name):
     """The name, or with a number behind it where the scene has it already."""
-    taken = {item.name for item in (*scene._added, *scene._forces)}
+    taken = scene._titles or ()
     return next(one for one in chain([name], (f"{name} {i}" for i in count(2))) if one not in taken)
 
 

@@ -80,7 +80,7 @@ def _two_hinges(found, joint):
     """Axes that aren't perpendicular: two hinges, with a link without mass between them."""
     between = f"{joint.name}/1"
     frame = found.frame_of(joint.b)
-    found.links = {**found.links, between: Link(between, frame)}
+    found.links[between] = Link(between, frame)
     found.joints += [
         JointItem(joint.name, "revolute", joint.a, between, joint.point, joint.axis),
         JointItem(f"{joint.name} 2", "revolute", between, joint.b, joint.point, joint.axis_b),

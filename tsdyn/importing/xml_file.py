@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .. import regular_files
-from ..errors import MissingDependency
+from ..errors import InvalidFile, MissingDependency
 from ..files.mistakes import Mistakes
 
 LARGEST = 1 << 26  # bytes of a file
+MOST = 1 << 19  # elements and attributes of a file: up to a gigabyte once they are read
 
 
 class Lines:
@@ -23,13 +25,15 @@ class Lines:
         return path
 
 
-def read(path: Any, data: bytes | None = None) -> tuple[Node, Mistakes]:
+def read(path: Any) -> tuple[Node, Mistakes]:
     """The root element of a file, and the `Mistakes` to be found in it.
+
+    A namespace of the root element is left out of the tags; elements of other ones keep theirs.
 
     Raises
     ------
     InvalidFile
-        If it is no XML, or has a document type, which could define entities.
+        If it is no XML, has too many elements, or a document type, which could define entities.
     StorageError
         If it can't be read, is too large or no regular file.
     MissingDependency
@@ -40,24 +44,37 @@ def read(path: Any, data: bytes | None = None) -> tuple[Node, Mistakes]:
     except ImportError as error:
         raise MissingDependency("URDF, MJCF and SDF files need lxml: pip install 'tsdyn[import]'.") from error
     mistakes = Mistakes(str(path), Lines)
-    data = regular_files.read(path, LARGEST) if data is None else data
-    parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=True, remove_pis=True
+    options = {"resolve_entities": False, "no_network": True, "load_dtd": False, "huge_tree": False}
+    elements = etree.iterparse(
+        BytesIO(regular_files.read(path, LARGEST)), ("start",), remove_comments=True, remove_pis=True, **options
     )
     try:
-        root = etree.fromstring(data, parser)
+        count = 0
+        for _, element in elements:
+            count += 1 + len(element.attrib)
+            if count > MOST:
+                mistakes.add((element.sourceline or 1, 1), f"the file has more than {MOST} elements and attributes.")
+                mistakes.demand_none()
+        root = elements.root
     except (etree.XMLSyntaxError, ValueError) as error:
+        if isinstance(error, InvalidFile):
+            raise
         place = getattr(error, "position", None) or (1, 1)
         mistakes.add((max(place[0], 1), max(place[1], 1)), f"this is no XML: {getattr(error, 'msg', None) or error}.")
         mistakes.demand_none()
     if root.getroottree().docinfo.doctype:
         mistakes.add((1, 1), "the file has a DOCTYPE, which could define entities; remove it.")
         mistakes.demand_none()
+    space, brace, _ = root.tag.partition("}")
+    for element in root.iter(f"{space}}}*") if brace else ():
+        element.tag = element.tag.partition("}")[2]
     return Node(root, mistakes), mistakes
 
 
 class Node:
     """An element; attributes and children that are asked for count as read."""
+
+    __slots__ = ("_nodes", "_read", "_whole", "element", "line", "mistakes", "tag")
 
     def __init__(self, element: Any, mistakes: Mistakes) -> None:
         self.element, self.mistakes = element, mistakes

@@ -101,8 +101,11 @@ def test_meshes_are_found(tmp_path):
     (tmp_path / "arm" / "meshes").mkdir(parents=True)
     (tmp_path / "arm" / "meshes" / "arm.stl").write_text(TRIANGLE)
     (tmp_path / "arm" / "urdf").mkdir()
-    scene = load(text(tmp_path / "arm" / "urdf", (MODELS / "arm.urdf").read_text()))
-    assert "mesh that is not found" not in left_out(scene)
+    path = text(tmp_path / "arm" / "urdf", (MODELS / "arm.urdf").read_text())
+    (said,) = [what for what in left_out(load(path)) if "mesh" in what]
+    assert said == "mesh that is outside the folder of the file; ts.load(path, outside=True) reads it"
+    scene = load(path, outside=True)
+    assert not [what for what in left_out(scene) if "mesh" in what]
     assert np.isclose(scene.shapes["arm"][0].vertices.max(), 1.0)
 
 
@@ -234,7 +237,7 @@ def test_loops_of_mjcf(tmp_path):
     content = (
         (MODELS / "leg.xml").read_text().replace('active="false"', "").replace("ball.xml", str(MODELS / "ball.xml"))
     )
-    scene = load(text(tmp_path, content, "leg.xml"))
+    scene = load(text(tmp_path, content, "leg.xml"), outside=True)
     assert type(scene["loop"]).__name__ == "Spherical"
     assert "are closed by assembly" in str(scene.imported)
     assert np.abs(scene.evaluate().Phi).max() < CLOSE
@@ -291,3 +294,48 @@ def test_screws_and_universal_joints_of_sdf(tmp_path):
     scene = load(text(tmp_path, f"<sdf version='1.10'><model name='m'>{content}</model></sdf>", "m.sdf"))
     assert np.isclose(scene["s"].lead, 0.02 / (2 * np.pi))
     assert scene.mobility().degrees_of_freedom == 1 + 2 + 2
+
+
+HINGED = "<mujoco>{0}<worldbody>{1}<body name='b'><joint {2}/><geom size='.1' pos='1 0 0'/></body></worldbody></mujoco>"
+
+
+def test_lights_with_textures_are_left_out(tmp_path):
+    mujoco()
+    assets = "<asset><texture name='t' type='2d' builtin='checker' width='8' height='8'/></asset>"
+    content = HINGED.format(assets, "<light name='sun' type='image' texture='t'/>", "axis='0 1 0'")
+    scene = load(text(tmp_path, content, "m.xml"))
+    assert {"light": ["sun"], "texture": ["t"]}.items() <= left_out(scene).items()
+    assert np.isclose(scene.evaluate().qdd[2], -9.81 / (1.0 + 0.4 * 0.1**2), rtol=CLOSE)  # of a ball on a rod
+
+
+def test_names_that_others_have_by_default(tmp_path):
+    """Of a kind: the one without a name gets another; of several kinds, the later one."""
+    mujoco()
+    content = HINGED.format("<asset/>", "", "axis='0 1 0'").replace(
+        "</body>",
+        "<body><joint name='joint0'/><geom size='.1'/></body><body name='body2'><joint name='eq'/><joint axis='1 0 0'/>"
+        "<geom size='.1'/></body><body name='body2/eq'><joint name='c'/><geom size='.1'/></body></body>",
+    )
+    content = content.replace("</mujoco>", "<equality><joint name='eq' joint1='eq' joint2='c'/></equality></mujoco>")
+    scene = load(text(tmp_path, content, "m.xml"))
+    assert [body.name for body in scene.bodies] == ["b", "body2 2", "body2/eq 2", "body2", "body2/eq"]
+    hinges = [item for item in scene.constraints if isinstance(item, ts.constraints.Revolute)]
+    assert [(one.name, one.b.name) for one in hinges] == [
+        ("joint0 2", "b"), ("joint0", "body2 2"), ("eq", "body2/eq 2"), ("joint3", "body2"), ("c", "body2/eq"),
+    ]  # fmt: skip
+
+
+def test_whatever_mjcf_has_and_nobody_reads_is_listed(tmp_path):
+    mujoco()
+    (tmp_path / "part.xml").write_text("<mujocoinclude>\n<option wind='1 0 0' timestep='.01'/></mujocoinclude>")
+    drive = "<actuator><general name='a' joint='j' dyntype='filter' dynprm='1' gainprm='2'/></actuator>"
+    content = HINGED.format("<include file='part.xml'/><visual/>" + drive, "", "name='j' user='3' margin='1'")
+    scene = load(text(tmp_path, content, "m.xml"))
+    lost = left_out(scene)
+    del lost["contact shape"], lost["motor"]
+    assert lost == {
+        "attribute <option wind>": ["part.xml, line 2"], "element <visual>": ["line 1"],
+        "attribute <general dyntype>": ["line 1"], "attribute <general dynprm>": ["line 1"],
+        "attribute <joint user>": ["line 1"], "attribute <joint margin>": ["line 1"],
+    }  # fmt: skip
+    assert "timestep" in str(scene.imported)

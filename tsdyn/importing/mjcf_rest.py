@@ -2,24 +2,43 @@
 
 import numpy as np
 
-COUNTED = {  # of objects with names
-    "ncam": ("camera", "camera"),
-    "nlight": ("light", "light"),
-    "nsensor": ("sensor", "sensor"),
-    "nkey": ("keyframe", "key"),
-    "npair": ("contact pair", "pair"),
-    "nexclude": ("pair of bodies without contact", "exclude"),
-    "nflex": ("flexible body", "flex"),
-    "nplugin": ("plugin", "plugin"),
-    "nnumeric": ("number of the user's", "numeric"),
-    "ntext": ("text of the user's", "text"),
-    "ntuple": ("tuple of the user's", "tuple"),
+DROPPED = {  # before the compiler sees them: objects, what they are, and the names of those without one
+    "keys": ("keyframe", "key"),
+    "tuples": ("tuple of the user's", "tuple"),
+    "numerics": ("number of the user's", "numeric"),
+    "texts": ("text of the user's", "text"),
+    "sensors": ("sensor", "sensor"),
+    "cameras": ("camera", "camera"),
+    "lights": ("light", "light"),
+    "pairs": ("contact pair", "pair"),
+    "excludes": ("pair of bodies without contact", "exclude"),
+    "skins": ("skin", "skin"),
+    "textures": ("texture", "texture"),
 }
+ROOMS = ("memory", "nstack", "njmax", "nconmax", "nkey", "nuserdata", "nuser_body", "nuser_jnt", "nuser_geom",
+         "nuser_site", "nuser_cam", "nuser_tendon", "nuser_actuator", "nuser_sensor")  # fmt: skip
+LEFT = {"nflex": ("flexible body", "flex"), "nplugin": ("plugin", "plugin")}
 
 
-def leave_rest(mujoco, model, names, report):
+def drop(spec, report):
+    """Delete and list what has no counterpart; leave no room for data of the user's."""
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
+    for name, (what, kind) in DROPPED.items():
+        for i, one in enumerate(list(getattr(spec, name))):
+            report.leave(what, one.name or f"{kind}{i}")
+            spec.delete(one)
+    for name in ROOMS:
+        setattr(spec, name, 0 if name in ("nkey", "nuserdata") else -1)
+    for name in ("bodies", "joints", "geoms", "sites", "tendons", "actuators"):
+        for one in getattr(spec, name):
+            if len(one.userdata):
+                one.userdata = []
+
+
+def leave_rest(model, names, report):
     """List objects, and options of the physics, that have no counterpart."""
-    for count, (what, kind) in COUNTED.items():
+    for count, (what, kind) in LEFT.items():
         for i in range(int(getattr(model, count, 0))):
             report.leave(what, names.of(kind, i))
     for i in np.flatnonzero(model.body_gravcomp):

@@ -7,26 +7,29 @@ import numpy as np
 from .description import GROUND
 from .frames import posed, shifted
 from .meshes import DrawnShape, hexadecimal
-from .xml_file import exists
+from .xml_file import OUTSIDE, exists
 
 SHOWN = 3  # groups of geoms that are drawn: 0, 1, 2
 
 
-def drop_missing_meshes(spec, path, root, report):
-    """Delete geoms of meshes that are not found; where a body's inertia is that of its geoms, this is a mistake."""
-    folder = Path(path).parent / (spec.meshdir or "")
+def drop_missing_meshes(spec, sources, root, report):
+    """Delete geoms of meshes that can't be read; where a body's inertia is that of its geoms, this is a mistake."""
+    folder = sources.path.parent / (spec.meshdir or "")
     missing = {
-        mesh.name or Path(mesh.file).stem: mesh for mesh in spec.meshes if mesh.file and not _is_there(mesh, folder)
+        mesh.name or Path(mesh.file).stem: mesh
+        for mesh in spec.meshes
+        if mesh.file and (mesh.file in sources.hidden or not _is_there(mesh, folder))
     }
     if not missing:
         return
     for geom in list(spec.geoms):
         if geom.meshname not in missing:
             continue
-        body = geom.parent
+        body, file = geom.parent, missing[geom.meshname].file
         if not body.explicitinertial and body.name != "world":
-            root.wrong(f"mesh {missing[geom.meshname].file!r} is not found; the inertia of {body.name!r} needs it.")
-        report.leave("mesh that is not found", body.name or "body", missing[geom.meshname].file)
+            reason = OUTSIDE if file in sources.hidden else "is not found"
+            root.wrong(f"mesh {file!r} {reason}; the inertia of {body.name!r} needs it.")
+        report.leave(f"mesh that {OUTSIDE if file in sources.hidden else 'is not found'}", body.name or "body", file)
         spec.delete(geom)
     for mesh in missing.values():
         spec.delete(mesh)

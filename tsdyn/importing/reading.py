@@ -16,7 +16,7 @@ from .merging import merge
 from .report import ImportReport
 from .slides import gather
 from .tolerances import NO_MASS, OPEN
-from .xml_file import read
+from .xml_file import OutsideFiles, read
 
 if TYPE_CHECKING:
     from ..hints import Callable, Place, Scene
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FORMATS = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF", "gazebo": "SDF"}
 
 
-def load(path: Place, make: Callable[..., Scene], free_base: bool) -> Scene:
+def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool) -> Scene:
     """The scene of a URDF, MJCF or SDF file; arguments and errors as of `ts.load`.
 
     Parameters
@@ -34,9 +34,12 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool) -> Scene:
         Of an empty scene: `Scene`.
     free_base : bool
         Whether the root link of a URDF is free.
+    outside : bool
+        Whether files outside the folder of this one may be read.
     """
     root, mistakes = read(path)
-    kind, folder = FORMATS.get(root.tag), Path(path).parent
+    kind, path = FORMATS.get(root.tag), Path(path)
+    files = OutsideFiles(path.parent, outside)
     if kind is None:
         known = "<robot> of URDF, <mujoco> of MJCF, <sdf> of SDF"
         root.wrong(f"the root element <{root.tag}> is of no known format; there are {known}.")
@@ -45,11 +48,11 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool) -> Scene:
         raise InvalidArgument(f"free_base is for URDF, where the file doesn't say it; {path} is {kind}.")
     report = ImportReport(str(path), kind)
     if kind == "URDF":
-        description = urdf.describe(root, folder, report, free_base)
+        description = urdf.describe(root, files, report, free_base)
     elif kind == "SDF":
-        description = sdf.describe(root, folder, report)
+        description = sdf.describe(root, files, report)
     else:
-        description = mjcf.describe(root, Path(path), report)
+        description = mjcf.describe(root, path, report, files)
     mistakes.demand_none()
     return _scene(description, make, report, mistakes)
 

@@ -74,10 +74,10 @@ class ImportReport:
         """Note what is carried over in another way, once."""
         self._notes[text] = None
 
-    def leave_unread(self, root: Any) -> None:
-        """Note what nobody has asked a root element for."""
+    def leave_unread(self, root: Any, file: str = "") -> None:
+        """Note what nobody has asked a root element for; `file` stands before the line of an included one."""
         for name, line in root.unread():
-            self.leave(f"element {name}" if " " not in name else f"attribute {name}", f"line {line}")
+            self.leave(f"element {name}" if " " not in name else f"attribute {name}", f"{file}line {line}")
 
     def groups(self) -> dict[str, list[LeftOut]]:
         """What is left out, by what it is."""

@@ -3,6 +3,7 @@
 import numpy as np
 
 from .description import GROUND, JointItem, Link
+from .names import fresh
 from .tolerances import ORTHOGONAL
 
 KINDS = {
@@ -78,7 +79,7 @@ def _add(found, node, joint, frames, report):
 
 def _two_hinges(found, joint):
     """Axes that aren't perpendicular: two hinges, with a link without mass between them."""
-    between = f"{joint.name}/1"
+    between = fresh(f"{joint.name}/1", found.links)
     frame = found.frame_of(joint.b)
     found.links[between] = Link(between, frame)
     found.joints += [

@@ -13,3 +13,8 @@ SOLID = 1e-9  # least eigenvalue of second moments per largest, below which a bo
 HALVINGS = 30  # of a share, until a body keeps half of its least moment of inertia
 REACH = 0.1  # m: of a rod on an axis of the ground, where its length changes nothing
 TRIFLE = 1e-7  # of the median mass: errors of the motion and of rounding, 1e-16 / TRIFLE, are about equal
+
+OBJECTS = 1 << 16  # elements of MJCF, copies included: half a gigabyte in MuJoCo's compiler and in the scene
+CELLS = 1 << 22  # of a height field: 16 MB
+TEXT = 1000  # characters of attributes that count as one object more
+PARTS = 8  # objects a body of <composite> or <flexcomp>: joint, geom, edges, elements

@@ -23,14 +23,14 @@ KINDS = {
 WORLD = "world"  # a root link of this name is the ground
 
 
-def describe(root, folder, report, free_base):
+def describe(root, outside, report, free_base):
     """The `Description` of a root element <robot>.
 
     Parameters
     ----------
     root : Node
-    folder : Path
-        Of the file, for meshes.
+    outside : OutsideFiles
+        For meshes.
     report : ImportReport
     free_base : bool
         Whether the root link is free to move.
@@ -40,7 +40,7 @@ def describe(root, folder, report, free_base):
     materials = colours(root)
     nodes = {}
     for node in root.all("link"):
-        _add_link(found, nodes, node, folder, report, materials)
+        _add_link(found, nodes, node, outside, report, materials)
     joints = _joints(root, found, report)
     _couple(found, [(joint, mimic) for joint, _, _, mimic in joints], report)
     _placed(found, [entry[:3] for entry in joints], root)
@@ -52,7 +52,7 @@ def describe(root, folder, report, free_base):
     return found
 
 
-def _add_link(found, nodes, node, folder, report, materials):
+def _add_link(found, nodes, node, outside, report, materials):
     name = node.demand("name")
     if name in found.links:
         node.wrong(f"there are two links named {name!r}; rename one.")
@@ -63,7 +63,7 @@ def _add_link(found, nodes, node, folder, report, materials):
     inertial = node.one("inertial")
     if inertial is not None:
         link.mass, link.centroid, link.inertia = mass_of(inertial, name)
-    add_shapes(link, node, folder, report, materials)
+    add_shapes(link, node, outside, report, materials)
 
 
 def mass_of(node, name):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from .. import regular_files
 from ..errors import InvalidFile, MissingDependency
 from ..files.mistakes import Mistakes
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+OUTSIDE = "is outside the folder of the file; ts.load(path, outside=True) reads it"
 LARGEST = 1 << 26  # bytes of a file
 MOST = 1 << 19  # elements and attributes of a file: up to a gigabyte once they are read
 
@@ -90,6 +94,14 @@ class Node:
         if self._nodes is None:
             self._nodes = [Node(one, self.mistakes) for one in self.element if isinstance(one.tag, str)]
         return self._nodes
+
+    def walk(self) -> Iterator[Node]:
+        """Itself and all elements below it, in the order of the file."""
+        ahead = [self]
+        while ahead:
+            node = ahead.pop()
+            yield node
+            ahead += reversed(node.nodes)
 
     def all(self, *tags: str) -> list[Node]:
         """The children of some tags."""
@@ -173,6 +185,26 @@ class Node:
             known = f"<{node.tag}>" in self._read
             found += node.unread() if known else [(f"<{node.tag}>", node.line)]
         return found
+
+
+class OutsideFiles:
+    """Which files an imported one may name: those of its folder and of folders in it, links followed; or all.
+
+    Parameters
+    ----------
+    folder : Path
+    admitted : bool
+        Whether files outside may be read.
+    """
+
+    def __init__(self, folder: Path, admitted: bool) -> None:
+        self.folder, self.admitted = folder.resolve(), admitted
+
+    def reason(self, path: Path) -> str:
+        """Why a file may not be read; empty if it may."""
+        if self.admitted or path.resolve().is_relative_to(self.folder):
+            return ""
+        return OUTSIDE
 
 
 def exists(path: Path) -> bool:

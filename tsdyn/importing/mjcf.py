@@ -98,7 +98,7 @@ def _compiled(mujoco, root, sources, report):
     """The model of a file, without what a scene has no counterpart for; missing meshes don't matter."""
     try:
         spec = mujoco.MjSpec.from_file(str(sources.path))
-        mjcf_rest.drop(spec, report)
+        mjcf_rest.strip(mujoco, spec, report)
         mjcf_shapes.drop_missing_meshes(spec, sources, root, report)
         spec.compiler.fusestatic = spec.compiler.discardvisual = False
         return spec.compile()

@@ -15,6 +15,7 @@ from .tolerances import CELLS, OBJECTS, PARTS, TEXT
 from .xml_file import LARGEST, Node, OutsideFiles, read
 
 NEEDED = ("mesh", "hfield", "flexcomp")  # elements whose files the compiler reads; textures and skins are dropped
+ROOM = ("actdim", "nsample", "num")  # numbers that an object has room for
 COUNTED = ("composite", "flexcomp")  # that make as many bodies as `count` says
 
 
@@ -70,6 +71,9 @@ class Sources:
         objects = sum(attached) + _objects(root, included, max(attached))
         if objects > OBJECTS:
             self._refuse(root, f"the file makes {objects:.3g} objects, and {OBJECTS} are as many as are read")
+        keys = sum(node.tag == "key" for tree, _ in self.trees[first:] for node in tree.walk())
+        if keys * objects > CELLS:
+            self._refuse(root, f"{keys} keyframes of {objects:.3g} objects are more than are read")
         self._objects[path.resolve()] = objects
         return objects
 
@@ -132,7 +136,7 @@ class Sources:
 def _objects(node, included, attached):
     """The number of objects that an element makes."""
     inside = sum(_objects(child, included, attached) for child in included.get(node, node).nodes)
-    own = 1.0 + sum(map(len, node.element.values())) // TEXT
+    own = 1.0 + sum(map(len, node.element.values())) // TEXT + sum(_number(node, name) for name in ROOM)
     if node.tag == "replicate":
         return own + inside * max(_number(node, "count"), 1.0)
     if node.tag in COUNTED:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-DROPPED = {  # before the compiler sees them: objects, what they are, and the names of those without one
+OBJECTS = {  # of the model before it is compiled: what they are, and the names of those without one
     "keys": ("keyframe", "key"),
     "tuples": ("tuple of the user's", "tuple"),
     "numerics": ("number of the user's", "numeric"),
@@ -15,22 +15,28 @@ DROPPED = {  # before the compiler sees them: objects, what they are, and the na
     "skins": ("skin", "skin"),
     "textures": ("texture", "texture"),
 }
-ROOMS = ("memory", "nstack", "njmax", "nconmax", "nkey", "nuserdata", "nuser_body", "nuser_jnt", "nuser_geom",
-         "nuser_site", "nuser_cam", "nuser_tendon", "nuser_actuator", "nuser_sensor")  # fmt: skip
+ROOMS = ("memory", "nstack", "njmax", "nconmax", "nuser_body", "nuser_jnt", "nuser_geom", "nuser_site", "nuser_cam",
+         "nuser_tendon", "nuser_actuator", "nuser_sensor")  # fmt: skip
 LEFT = {"nflex": ("flexible body", "flex"), "nplugin": ("plugin", "plugin")}
 
 
-def drop(spec, report):
-    """Delete and list what has no counterpart; leave no room for data of the user's."""
-    for material in spec.materials:
-        material.textures = [""] * len(material.textures)
-    for name, (what, kind) in DROPPED.items():
-        for i, one in enumerate(list(getattr(spec, name))):
+def strip(mujoco, spec, report):
+    """List objects without counterpart; leave no pictures, and no room for data of the user's, to be compiled."""
+    for name, (what, kind) in OBJECTS.items():
+        for i, one in enumerate(getattr(spec, name)):
             report.leave(what, one.name or f"{kind}{i}")
-            spec.delete(one)
+    for texture in spec.textures:
+        texture.file, texture.content_type, texture.cubefiles = "", "", 6 * [""]
+        texture.builtin, texture.gridsize = int(mujoco.mjtBuiltin.mjBUILTIN_FLAT), [1, 1]
+        texture.width = texture.height = 1
+    for camera in spec.cameras:
+        camera.resolution = [1, 1]
+    for skin in list(spec.skins):
+        spec.delete(skin)
     for name in ROOMS:
-        setattr(spec, name, 0 if name in ("nkey", "nuserdata") else -1)
-    for name in ("bodies", "joints", "geoms", "sites", "tendons", "actuators"):
+        setattr(spec, name, -1)
+    spec.nkey = spec.nuserdata = 0
+    for name in ("bodies", "joints", "geoms", "sites", "cameras", "tendons", "actuators", "sensors"):
         for one in getattr(spec, name):
             if len(one.userdata):
                 one.userdata = []

@@ -15,7 +15,7 @@ from .massless import complete
 from .merging import merge
 from .report import ImportReport
 from .slides import gather
-from .tolerances import NO_MASS, OPEN
+from .tolerances import HUGE, NO_MASS, OPEN
 from .xml_file import OutsideFiles, read
 
 if TYPE_CHECKING:
@@ -47,12 +47,17 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool
     if free_base and kind != "URDF":
         raise InvalidArgument(f"free_base is for URDF, where the file doesn't say it; {path} is {kind}.")
     report = ImportReport(str(path), kind)
-    if kind == "URDF":
-        description = urdf.describe(root, files, report, free_base)
-    elif kind == "SDF":
-        description = sdf.describe(root, files, report)
-    else:
-        description = mjcf.describe(root, path, report, files)
+    with np.errstate(over="ignore", invalid="ignore"):
+        if kind == "URDF":
+            description = urdf.describe(root, files, report, free_base)
+        elif kind == "SDF":
+            description = sdf.describe(root, files, report)
+        else:
+            description = mjcf.describe(root, path, report, files)
+    for link in description.links.values():
+        numbers = (link.mass, *link.centroid, *link.inertia.flat, *link.frame.p, *link.start.p)
+        if not np.abs(numbers).max() < HUGE:
+            mistakes.add((link.line or 1, 1), f"link {link.name!r}: mass, inertia or place is beyond {HUGE:g}.")
     mistakes.demand_none()
     return _scene(description, make, report, mistakes)
 

@@ -2,6 +2,7 @@
 
 NO_MASS = 1e-12  # kg; below, a link is a frame: drivers of CAD write 1e-15 or less for none
 NO_INERTIA = 1e-15  # kg m^2, of the largest entry: a cube of steel with edges of 0.6 mm
+HUGE = 1e50  # kg, kg m^2 or m: mass times length squared, and its square, are finite below
 SLIGHT = 1e-6  # of the median mass: links with less are given a share of their neighbours', or rounding would grow
 SHARE = 0.5  # of what a donor could give: both keep what is well-conditioned
 TRIANGLE = 1e-9  # relative excess of a principal moment over the sum of the others, above which it is noted

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 OUTSIDE = "is outside the folder of the file; ts.load(path, outside=True) reads it"
 LARGEST = 1 << 26  # bytes of a file
-MOST = 1 << 19  # elements and attributes of a file: up to a gigabyte once they are read
+MOST = 1 << 19  # elements and attributes of a file: half a gigabyte once they are read
 
 
 class Lines:

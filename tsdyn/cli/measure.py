@@ -59,10 +59,10 @@ def _profile(parsed):
 
     from ..profiling.profile import profile
     from ..validation import whole
-    from .scene_file import load_scene
+    from .scene_file import load_scene, robot_options
 
     began = time.perf_counter()
-    scene = load_scene(parsed.scene, parsed.allow_code, parsed.free_base)
+    scene = load_scene(parsed.scene, parsed.allow_code, robot_options(parsed))
     if not parsed.json:
         print(f"{scene!r}, built in {1e3 * (time.perf_counter() - began):.3g} ms", flush=True)
     span, count = (parsed.t_start, parsed.t_end), whole(parsed.outputs, "--outputs")
@@ -87,11 +87,11 @@ def _benchmark(parsed):
     a run of each method reached its end.
     """
     from ..benchmarking.benchmark import benchmark
-    from .scene_file import load_scene
+    from .scene_file import load_scene, robot_options
 
     tolerances, steps = _numbers(parsed.tolerances, "--tolerances"), _numbers(parsed.steps, "--steps")
     methods = None if parsed.methods is None else [word.strip() for word in parsed.methods.split(",")]
-    scene = load_scene(parsed.scene, parsed.allow_code, parsed.free_base)
+    scene = load_scene(parsed.scene, parsed.allow_code, robot_options(parsed))
     if not parsed.json:
         print(f"{parsed.scene}: {scene!r}", flush=True)
     found = benchmark(scene, methods, tolerances, (0.0, parsed.to), steps=steps, repeats=parsed.repeats,

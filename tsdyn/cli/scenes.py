@@ -6,7 +6,7 @@ from pathlib import Path
 from ..errors import InvalidArgument, TsdynError
 from .output import print_json
 from .run import SOLUTIONS, add_json, add_scene, demand_format, write
-from .scene_file import load_run, load_scene
+from .scene_file import load_run, load_scene, robot_options
 
 SCENES = (".toml",)
 
@@ -47,7 +47,7 @@ def _check(parsed):
 
     found = {"file": parsed.scene, "ok": True, "mistakes": [], "message": "It can start."}
     try:
-        scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
+        scene, given = load_run(parsed.scene, parsed.allow_code, robot_options(parsed))
         demand_startable(scene, given)
         report = scene.imported
         if report:
@@ -74,7 +74,7 @@ def _info(parsed):
     from ..simulation.method_choice import reason
     from ..simulation.scene_cache import prepared
 
-    scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
+    scene, given = load_run(parsed.scene, parsed.allow_code, robot_options(parsed))
     mobility, why = scene.mobility(), reason(prepared(scene))
     if parsed.json:
         print_json(_facts(scene, mobility, why, given))
@@ -182,7 +182,7 @@ def _convert(parsed):
         found = load(parsed.scene)
         written = (write_ensemble if isinstance(found, Ensemble) else write)(found, parsed.target)
     elif target in SCENES:
-        scene = load_scene(parsed.scene, parsed.allow_code, parsed.free_base)
+        scene = load_scene(parsed.scene, parsed.allow_code, robot_options(parsed))
         written = scene.save(parsed.target)
         if scene.imported and not parsed.json:
             print(scene.imported)

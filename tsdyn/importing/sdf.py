@@ -68,13 +68,14 @@ def _link(node, name, frames, outside, report):
         link.mass, link.inertia = 1.0, np.eye(3)  # what the specification says
         report.note(f"{name}: mass 1 kg and inertia 1 kg m^2, the defaults of SDF")
     else:
-        _set_mass(link, inertial, frames, name)
+        _set_mass(link, inertial, frames, name, report)
     add_sdf_shapes(link, node, frames, outside, report)
     return link
 
 
-def _set_mass(link, node, frames, name):
-    node.get("auto")
+def _set_mass(link, node, frames, name, report):
+    if node.get("auto", "false").lower() in ("1", "true"):
+        report.leave("inertia of the densities of contact shapes", name)
     at, inertia = frames.pose(node), node.one("inertia")
     link.mass = node.scalar("mass", 1.0)
     if link.mass < 0.0:

@@ -17,8 +17,6 @@ def colours(root):
 def _colour(node, known):
     """The colour of an element <material>."""
     named, colour = node.get("name") or "", node.one("color")
-    for texture in node.all("texture"):
-        texture.skip()
     return known.get(named, "") if colour is None else hexadecimal(colour.attribute("rgba", 4, [0.5, 0.5, 0.5, 1.0]))
 
 
@@ -99,7 +97,6 @@ def _sdf_shape(node, name, frames, outside, report):
             child = material.one(tag)
             if child is not None and not colour:
                 colour = hexadecimal(child.numbers(" ".join(child.text.split()[:3]), 3, np.full(3, 0.5), f"<{tag}>"))
-        material.skip()
     if geometry is None or not geometry.nodes:
         return None
     shape = geometry.nodes[0]
@@ -112,7 +109,6 @@ def _sdf_primitive(shape, name, outside, report):
     """Kind and arguments of a shape; capsules are drawn as cylinders."""
     if shape.tag == "mesh":
         uri, scale = shape.one("uri"), shape.value("scale", 3, np.ones(3))
-        shape.skip()
         return None if report is None or uri is None else mesh(uri.text, scale, outside, report, name)
     sizes = {
         "box": lambda: (shape.value("size", 3, np.ones(3)),),

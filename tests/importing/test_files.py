@@ -339,3 +339,23 @@ def test_whatever_mjcf_has_and_nobody_reads_is_listed(tmp_path):
         "attribute <joint user>": ["line 1"], "attribute <joint margin>": ["line 1"],
     }  # fmt: skip
     assert "timestep" in str(scene.imported)
+
+
+def test_whatever_urdf_and_sdf_have_and_nobody_reads_is_listed(tmp_path):
+    finish = "<material name='m'><texture filename='t.png'/></material>"
+    shape = f"<visual><geometry><box size='1 1 1'/></geometry>{finish}</visual>"
+    content = f"<link name='base'/><link name='a' mode='x'>{BODY}{shape}</link>"
+    content += ON_BASE.format("a", "continuous", 0, 1, "")
+    scene = load(text(tmp_path, f"<robot name='r'>{content}</robot>"))
+    assert left_out(scene) == {"element <texture>": ["line 1"], "attribute <link mode>": ["line 1"]}
+    finish = "<material><specular>1 1 1 1</specular></material>"
+    shape = f"<visual name='v'><geometry><box><size>1 1 1</size></box></geometry>{finish}</visual>"
+    inertial = "<inertial auto='true'><mass>1</mass><density>3</density></inertial>"
+    ends = "<parent>world</parent><child>a</child>"
+    hinge = f"<joint name='j' type='revolute'>{ends}<axis><xyz>0 1 0</xyz><mimic joint='k'/></axis></joint>"
+    content = f"<link name='a'>{inertial}{shape}<gravity>false</gravity></link>{hinge}"
+    scene = load(text(tmp_path, f"<sdf version='1.10'><model name='m'>{content}</model></sdf>", "m.sdf"))
+    assert left_out(scene) == {
+        "inertia of the densities of contact shapes": ["a"],
+        **{f"element <{tag}>": ["line 1"] for tag in ("density", "specular", "gravity", "mimic")},
+    }

@@ -13,6 +13,7 @@ import tsdyn as ts
 
 pytest.importorskip("lxml")
 MODELS = Path(__file__).parent / "models"
+LEG = (MODELS / "leg.xml").read_text().replace('<include file="ball.xml"/>', "")
 ARM, FOUR_BAR = (MODELS / "arm.urdf").read_text(), (MODELS / "four_bar.sdf").read_text()
 
 
@@ -92,6 +93,8 @@ def test_sdf(wrong, message, tmp_path):
         ("<mujoco><include file='nothing.xml'/></mujoco>", "nothing.xml"),
         ("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "mass and inertia"),
         ("<mujoco/>", "no link moves"),
+        (LEG.replace('pos="0 0.01 0"', 'pos="1e308 1e308 1e308"'), "joint 'hip_y': its place is beyond 1e+50 m"),
+        (LEG.replace('kp="30"', 'kp="30" gear="1e200"'), "stiffness"),
         (
             "<mujoco><asset><mesh name='m' file='gone.stl'/></asset><worldbody><body name='b'><joint/>"
             "<geom type='mesh' mesh='m'/></body></worldbody></mujoco>",
@@ -258,3 +261,15 @@ def test_fuzzed_files(name, tmp_path):
         path.write_bytes(wrong)
         with warnings.catch_warnings(action="ignore", category=ts.ImportLosses), suppress(ts.TsdynError):
             ts.load(path)
+
+
+def test_files_outside_by_the_command_line(tmp_path, capsys):
+    from tsdyn.cli import main
+
+    (tmp_path / "inside").mkdir()
+    (tmp_path / "part.xml").write_text("<mujocoinclude><visual/></mujocoinclude>")
+    path = tmp_path / "inside" / "m.xml"
+    path.write_text(LEG.replace("<worldbody>", "<include file='../part.xml'/><worldbody>"))
+    assert main(["info", str(path)]) != 0
+    assert "outside=True" in capsys.readouterr().err
+    assert main(["info", str(path), "--outside"]) == 0

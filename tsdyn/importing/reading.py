@@ -58,6 +58,9 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool
         numbers = (link.mass, *link.centroid, *link.inertia.flat, *link.frame.p, *link.start.p)
         if not np.abs(numbers).max() < HUGE:
             mistakes.add((link.line or 1, 1), f"link {link.name!r}: mass, inertia or place is beyond {HUGE:g}.")
+    for joint in description.joints:
+        if joint.point is not None and not np.abs(joint.point).max() < HUGE:
+            mistakes.add((1, 1), f"joint {joint.name!r}: its place is beyond {HUGE:g} m.")
     mistakes.demand_none()
     return _scene(description, make, report, mistakes)
 

@@ -99,7 +99,7 @@ def _compiled(mujoco, root, sources, report):
     try:
         spec = mujoco.MjSpec.from_file(str(sources.path))
         mjcf_rest.strip(mujoco, spec, report)
-        mjcf_shapes.drop_missing_meshes(spec, sources, root, report)
+        mjcf_shapes.drop_missing_meshes(mujoco, spec, sources, root, report)
         spec.compiler.fusestatic = spec.compiler.discardvisual = False
         return spec.compile()
     except (ValueError, TypeError, OSError, mujoco.FatalError, mujoco.UnexpectedError) as error:

@@ -9,11 +9,15 @@ from .frames import posed, shifted
 from .meshes import DrawnShape, hexadecimal
 from .xml_file import OUTSIDE, exists
 
+TETRAHEDRON = (0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1)  # vertices
 SHOWN = 3  # groups of geoms that are drawn: 0, 1, 2
 
 
-def drop_missing_meshes(spec, sources, root, report):
-    """Delete geoms of meshes that can't be read; where a body's inertia is that of its geoms, this is a mistake."""
+def drop_missing_meshes(mujoco, spec, sources, root, report):
+    """Replace meshes that can't be read, undrawn; where a body's inertia is that of its geoms, this is a mistake.
+
+    Each deletion would take the compiler a time in proportion to the file.
+    """
     folder = sources.path.parent / (spec.meshdir or "")
     missing = {
         mesh.name or Path(mesh.file).stem: mesh
@@ -30,9 +34,10 @@ def drop_missing_meshes(spec, sources, root, report):
             reason = OUTSIDE if file in sources.hidden else "is not found"
             root.wrong(f"mesh {file!r} {reason}; the inertia of {body.name!r} needs it.")
         report.leave(f"mesh that {OUTSIDE if file in sources.hidden else 'is not found'}", body.name or "body", file)
-        spec.delete(geom)
+        geom.type, geom.meshname, geom.size = int(mujoco.mjtGeom.mjGEOM_SPHERE), "", (1.0, 0.0, 0.0)
+        geom.mass, geom.contype, geom.conaffinity, geom.group = 0.0, 0, 0, SHOWN
     for mesh in missing.values():
-        spec.delete(mesh)
+        mesh.file, mesh.content_type, mesh.uservert = "", "", TETRAHEDRON
     root.mistakes.demand_none()
 
 

@@ -101,8 +101,11 @@ def test_meshes_are_found(tmp_path):
     (tmp_path / "arm" / "meshes").mkdir(parents=True)
     (tmp_path / "arm" / "meshes" / "arm.stl").write_text(TRIANGLE)
     (tmp_path / "arm" / "urdf").mkdir()
-    scene = load(text(tmp_path / "arm" / "urdf", (MODELS / "arm.urdf").read_text()))
-    assert "mesh that is not found" not in left_out(scene)
+    path = text(tmp_path / "arm" / "urdf", (MODELS / "arm.urdf").read_text())
+    (said,) = [what for what in left_out(load(path)) if "mesh" in what]
+    assert said == "mesh that is outside the folder of the file; ts.load(path, outside=True) reads it"
+    scene = load(path, outside=True)
+    assert not [what for what in left_out(scene) if "mesh" in what]
     assert np.isclose(scene.shapes["arm"][0].vertices.max(), 1.0)
 
 
@@ -133,7 +136,58 @@ def test_mimicking_joints_are_gears(tmp_path):
     scene.body("one").angular_velocity = (0, 0, 1)
     scene.assemble(fixed=["one"])
     state = ts.simulate(scene, (0.0, 0.5)).state
-    assert np.isclose(state.angle("two"), -2.0 * state.angle("one"), rtol=CLOSE)
+    assert np.isclose(state.angle("two"), 0.3 - 2.0 * state.angle("one"), rtol=CLOSE)
+    assert np.isclose(state.angle("three"), 0.3, rtol=0.5)  # starts at its offset, and falls freely
+
+
+LINK = "<link name='{0}'>" + BODY + "</link>"
+ON_BASE = (
+    "<joint name='{0} hinge' type='{1}'><parent link='base'/><child link='{0}'/><origin xyz='{2} 0 0'/>"
+    "<axis xyz='0 0 {3}'/>{4}</joint>"
+)
+
+
+def test_offsets_of_mimicking_joints(tmp_path):
+    """A chain of them, one beyond half a turn, with axes that are opposed; what hangs from them starts there, too."""
+    content = "<link name='base'/>" + "".join(map(LINK.format, ("a", "b", "c", "slide", "tip")))
+    content += ON_BASE.format("a", "continuous", 0, 1, "")
+    content += ON_BASE.format("c", "continuous", 2, -1, "<mimic joint='b hinge' multiplier='0.5' offset='-1'/>")
+    content += ON_BASE.format("b", "continuous", 1, 1, "<mimic joint='a hinge' multiplier='-1' offset='4'/>")
+    content += ON_BASE.format("slide", "prismatic", 3, 1, "<mimic joint='a hinge' multiplier='2' offset='0.2'/>")
+    content += "<joint name='j' type='fixed'><parent link='b'/><child link='tip'/><origin xyz='1 0 0'/></joint>"
+    scene = load(text(tmp_path, f"<robot name='r'>{content}</robot>"))
+    assert left_out(scene) == {"joint that mimics another one": ["slide hinge mimics a hinge"]}
+    assert "offset 0.2" in str(scene.imported)
+    assert scene.imported.frames["tip"].body == "b"
+    assert np.isclose(scene.body("b").position[0], 1 + 0.5 * np.cos(4.0), rtol=ROUNDING)
+    scene = ts.load(scene.save(tmp_path / "r.toml"))
+    scene.set("a hinge", rate=1.0)
+    solution = ts.simulate(scene, (0.0, 2.0), t_eval=[0.0, 1.0, 2.0])
+    one = solution.angle("a hinge")
+    assert np.allclose(one, [0.0, 1.0, 2.0], atol=CLOSE)
+    assert np.abs(solution.angle("b hinge") - (4.0 - one)).max() < CLOSE
+    assert np.abs(solution.angle("c hinge") - (0.5 * (4.0 - one) - 1.0)).max() < CLOSE
+    assert np.isclose(solution.displacement("slide hinge")[0], 0.2, rtol=ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "reason"), [("b", "a", "in a circle"), ("b", "gone", "no other joint 'gone'")]
+)
+def test_mimics_that_lead_nowhere_are_listed(one, other, reason, tmp_path):
+    content = "<link name='base'/>" + "".join(map(LINK.format, "ab"))
+    for x, (name, driver) in enumerate((("a", one), ("b", other))):
+        content += ON_BASE.format(name, "continuous", x, 1, f"<mimic joint='{driver} hinge' offset='1'/>")
+    assert reason.replace("gone", "gone hinge") in str(
+        load(text(tmp_path, f"<robot name='r'>{content}</robot>")).imported
+    )
+
+
+def test_a_default_namespace_is_left_out(tmp_path):
+    content = (MODELS / "arm.urdf").read_text().replace("<robot ", '<robot xmlns="http://a.b" xmlns:x="http://c.d" ')
+    content = content.replace("</robot>", "<x:property name='y'/></robot>")
+    scene, plain = load(text(tmp_path, content)), load(MODELS / "arm.urdf")
+    assert (scene.evaluate().qdd == plain.evaluate().qdd).all()
+    assert {"element <{http://c.d}property>"} == set(left_out(scene)) - set(left_out(plain))
 
 
 def test_links_without_mass_at_the_end_are_held(tmp_path):
@@ -183,7 +237,7 @@ def test_loops_of_mjcf(tmp_path):
     content = (
         (MODELS / "leg.xml").read_text().replace('active="false"', "").replace("ball.xml", str(MODELS / "ball.xml"))
     )
-    scene = load(text(tmp_path, content, "leg.xml"))
+    scene = load(text(tmp_path, content, "leg.xml"), outside=True)
     assert type(scene["loop"]).__name__ == "Spherical"
     assert "are closed by assembly" in str(scene.imported)
     assert np.abs(scene.evaluate().Phi).max() < CLOSE
@@ -240,3 +294,68 @@ def test_screws_and_universal_joints_of_sdf(tmp_path):
     scene = load(text(tmp_path, f"<sdf version='1.10'><model name='m'>{content}</model></sdf>", "m.sdf"))
     assert np.isclose(scene["s"].lead, 0.02 / (2 * np.pi))
     assert scene.mobility().degrees_of_freedom == 1 + 2 + 2
+
+
+HINGED = "<mujoco>{0}<worldbody>{1}<body name='b'><joint {2}/><geom size='.1' pos='1 0 0'/></body></worldbody></mujoco>"
+
+
+def test_lights_with_textures_are_left_out(tmp_path):
+    mujoco()
+    assets = "<asset><texture name='t' type='2d' builtin='checker' width='8' height='8'/></asset>"
+    content = HINGED.format(assets, "<light name='sun' type='image' texture='t'/>", "axis='0 1 0'")
+    scene = load(text(tmp_path, content, "m.xml"))
+    assert {"light": ["sun"], "texture": ["t"]}.items() <= left_out(scene).items()
+    assert np.isclose(scene.evaluate().qdd[2], -9.81 / (1.0 + 0.4 * 0.1**2), rtol=CLOSE)  # of a ball on a rod
+
+
+def test_names_that_others_have_by_default(tmp_path):
+    """Of a kind: the one without a name gets another; of several kinds, the later one."""
+    mujoco()
+    content = HINGED.format("<asset/>", "", "axis='0 1 0'").replace(
+        "</body>",
+        "<body><joint name='joint0'/><geom size='.1'/></body><body name='body2'><joint name='eq'/><joint axis='1 0 0'/>"
+        "<geom size='.1'/></body><body name='body2/eq'><joint name='c'/><geom size='.1'/></body></body>",
+    )
+    content = content.replace("</mujoco>", "<equality><joint name='eq' joint1='eq' joint2='c'/></equality></mujoco>")
+    scene = load(text(tmp_path, content, "m.xml"))
+    assert [body.name for body in scene.bodies] == ["b", "body2 2", "body2/eq 2", "body2", "body2/eq"]
+    hinges = [item for item in scene.constraints if isinstance(item, ts.constraints.Revolute)]
+    assert [(one.name, one.b.name) for one in hinges] == [
+        ("joint0 2", "b"), ("joint0", "body2 2"), ("eq", "body2/eq 2"), ("joint3", "body2"), ("c", "body2/eq"),
+    ]  # fmt: skip
+
+
+def test_whatever_mjcf_has_and_nobody_reads_is_listed(tmp_path):
+    mujoco()
+    (tmp_path / "part.xml").write_text("<mujocoinclude>\n<option wind='1 0 0' timestep='.01'/></mujocoinclude>")
+    drive = "<actuator><general name='a' joint='j' dyntype='filter' dynprm='1' gainprm='2'/></actuator>"
+    content = HINGED.format("<include file='part.xml'/><visual/>" + drive, "", "name='j' user='3' margin='1'")
+    scene = load(text(tmp_path, content, "m.xml"))
+    lost = left_out(scene)
+    del lost["contact shape"], lost["motor"]
+    assert lost == {
+        "attribute <option wind>": ["part.xml, line 2"], "element <visual>": ["line 1"],
+        "attribute <general dyntype>": ["line 1"], "attribute <general dynprm>": ["line 1"],
+        "attribute <joint user>": ["line 1"], "attribute <joint margin>": ["line 1"],
+    }  # fmt: skip
+    assert "timestep" in str(scene.imported)
+
+
+def test_whatever_urdf_and_sdf_have_and_nobody_reads_is_listed(tmp_path):
+    finish = "<material name='m'><texture filename='t.png'/></material>"
+    shape = f"<visual><geometry><box size='1 1 1'/></geometry>{finish}</visual>"
+    content = f"<link name='base'/><link name='a' mode='x'>{BODY}{shape}</link>"
+    content += ON_BASE.format("a", "continuous", 0, 1, "")
+    scene = load(text(tmp_path, f"<robot name='r'>{content}</robot>"))
+    assert left_out(scene) == {"element <texture>": ["line 1"], "attribute <link mode>": ["line 1"]}
+    finish = "<material><specular>1 1 1 1</specular></material>"
+    shape = f"<visual name='v'><geometry><box><size>1 1 1</size></box></geometry>{finish}</visual>"
+    inertial = "<inertial auto='true'><mass>1</mass><density>3</density></inertial>"
+    ends = "<parent>world</parent><child>a</child>"
+    hinge = f"<joint name='j' type='revolute'>{ends}<axis><xyz>0 1 0</xyz><mimic joint='k'/></axis></joint>"
+    content = f"<link name='a'>{inertial}{shape}<gravity>false</gravity></link>{hinge}"
+    scene = load(text(tmp_path, f"<sdf version='1.10'><model name='m'>{content}</model></sdf>", "m.sdf"))
+    assert left_out(scene) == {
+        "inertia of the densities of contact shapes": ["a"],
+        **{f"element <{tag}>": ["line 1"] for tag in ("density", "specular", "gravity", "mimic")},
+    }

@@ -17,6 +17,7 @@ PLACES = {"tsdyn": ROOT / "tsdyn", "tsdyn.constraints": ROOT / "constraints", "t
 ORDER = [
     "errors",
     "_version",
+    "regular_files",
     "validation",
     "other_names",
     "_discovery",

@@ -1,5 +1,6 @@
 """Shapes to draw: files of meshes, placement, and arguments that are wrong."""
 
+import os
 import struct
 
 import numpy as np
@@ -63,15 +64,41 @@ def test_obj_files_are_read(tmp_path):
         ("part.stl", binary_stl(CORNERS)[:-1], "can be read"),
         ("part.obj", b"v 0 0 0\nf 1 2 3", "indices from 0 to 0"),
         ("part.obj", b"v 0 0 a", "can be read"),
-        ("part.dae", b"", r"must be an \.stl or \.obj file"),
-        ("absent.stl", None, "No such file"),
+        ("part.obj", b"v 0 0\nf 1 1 1", "can be read"),
+        ("part.obj", b"v nan 0 0\nf 1 1 1", "finite"),
+        ("part.obj", b"f 1 1 " + b"9" * 100, "can be read"),
+        ("part.obj", b"v 0 0 0\nf" + b" 1" * 2**16, "a line has more than 65536 bytes"),
     ],
 )
 def test_files_that_are_no_meshes_are_refused(name, data, words, tmp_path):
-    if data is not None:
-        (tmp_path / name).write_bytes(data)
-    with pytest.raises(ts.InvalidArgument, match=words):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(ts.InvalidFile, match=words):
         S.Mesh(tmp_path / name)
+
+
+def test_polygons_make_a_bounded_number_of_triangles(tmp_path, monkeypatch):
+    monkeypatch.setattr("tsdyn.shapes.mesh_files.MOST", 100)
+    (tmp_path / "part.obj").write_text("v 0 0 0\n" + f"f{' 1' * 40}\n" * 3)
+    with pytest.raises(ts.InvalidFile, match="more than 100"):
+        S.Mesh(tmp_path / "part.obj")
+
+
+def test_meshes_are_regular_files_of_bounded_size(tmp_path, monkeypatch):
+    os.mkfifo(tmp_path / "pipe.stl")
+    (tmp_path / "device.stl").symlink_to("/dev/zero")
+    (tmp_path / "folder.stl").mkdir()
+    for name, words in {
+        "pipe": "not a regular file",
+        "device": "not a regular file",
+        "folder": "a folder",
+        "absent": "No such",
+    }.items():
+        with pytest.raises(ts.StorageError, match=words):
+            S.Mesh(tmp_path / f"{name}.stl")
+    monkeypatch.setattr("tsdyn.shapes.mesh_files.LARGEST", 100)
+    (tmp_path / "part.stl").write_bytes(binary_stl(CORNERS))
+    with pytest.raises(ts.StorageError, match="100 are as many"):
+        S.Mesh(tmp_path / "part.stl")
 
 
 @pytest.mark.parametrize(
@@ -89,6 +116,7 @@ def test_files_that_are_no_meshes_are_refused(name, data, words, tmp_path):
         (lambda: S.Mesh((VERTICES[:, :2], FACES)), "vertices"),
         (lambda: S.Mesh((VERTICES, FACES + 0.5)), "whole numbers"),
         (lambda: S.Mesh(7), "can't be read"),
+        (lambda: S.Mesh("part.dae"), r"must be an \.stl or \.obj file"),
     ],
 )
 def test_wrong_shapes_are_refused(make, words):

@@ -10,7 +10,7 @@ from ..errors import InvalidArgument, Status
 from .case_table import table_of
 from .output import print_json
 from .run import add_json, add_method, add_output, add_plot, add_scene, destinations, options_of, progress_of
-from .scene_file import load_document
+from .scene_file import load_document, robot_options
 
 SHOWN, LOW, HIGH = 12, 0.05, 0.95  # coordinates in the summary; its quantiles
 REASONS = 10  # failed cases that are told
@@ -42,7 +42,7 @@ def _ensemble(parsed):
     from ..ensembles.ensemble import ensemble
 
     document = load_document(
-        parsed.scene, parsed.allow_code, {"cases": parsed.cases, "seed": parsed.seed}, parsed.free_base
+        parsed.scene, parsed.allow_code, {"cases": parsed.cases, "seed": parsed.seed}, robot_options(parsed)
     )
     if parsed.parameters is None:
         study = dict(document.ensemble)

@@ -46,10 +46,10 @@ def _profile(parsed):
     are not given are those of the file, else of ts.simulate.
     """
     from ..profiling.profile import profile
-    from .scene_file import load_run
+    from .scene_file import load_run, robot_options
 
     began = time.perf_counter()
-    scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
+    scene, given = load_run(parsed.scene, parsed.allow_code, robot_options(parsed))
     (span, options), figure = options_of(parsed, given), plotted(parsed, "profile")
     if not parsed.json:
         print(f"{scene!r}, built in {1e3 * (time.perf_counter() - began):.3g} ms", flush=True)
@@ -71,11 +71,11 @@ def _benchmark(parsed):
     a run of each method reached its end.
     """
     from ..benchmarking.benchmark import benchmark
-    from .scene_file import load_run
+    from .scene_file import load_run, robot_options
 
     tolerances, steps = _numbers(parsed.tolerances, "--tolerances"), _numbers(parsed.steps, "--steps")
     methods = None if parsed.methods is None else [word.strip() for word in parsed.methods.split(",")]
-    scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
+    scene, given = load_run(parsed.scene, parsed.allow_code, robot_options(parsed))
     start, end = given.get("t_span", (0.0, END))
     span, figure = (start, end if parsed.to is None else parsed.to), plotted(parsed, "benchmark")
     if not parsed.json:

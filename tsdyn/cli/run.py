@@ -11,7 +11,7 @@ from ..errors import InvalidArgument
 from ..files import run_table
 from ..storage.formats import SUFFIXES as SOLUTIONS
 from .output import print_json
-from .scene_file import load_document
+from .scene_file import load_document, robot_options
 
 TABLES = (".csv",)
 
@@ -68,6 +68,7 @@ def add_scene(parser, metavar="SCENE"):
         "executed; file.py:name takes another one; or an example's name",
     )
     parser.add_argument("--free-base", action="store_true", help="the root link of a URDF is free to move")
+    parser.add_argument("--outside", action="store_true", help="a file of a robot may name files outside its folder")
     parser.add_argument("--allow-code", action="store_true", help="import modules that the file names for plug-ins")
 
 
@@ -84,7 +85,7 @@ def _run(parsed):
     """
     from ..simulation.simulate import simulate
 
-    document = load_document(parsed.scene, parsed.allow_code, free_base=parsed.free_base)
+    document = load_document(parsed.scene, parsed.allow_code, robot=robot_options(parsed))
     scene, (span, options) = document.scene, options_of(parsed, document.run)
     outputs, plot = destinations(parsed, document)
     if not parsed.json:

@@ -4,41 +4,47 @@ import importlib.util
 import sys
 import warnings
 from pathlib import Path
+from types import MappingProxyType
 
 from ..errors import ImportLosses, InvalidArgument
 from ..simulation.load import SCENES
 from ..simulation.scene import Scene
 
 
-def load_run(where, allow_code=False, free_base=False):
+def robot_options(parsed):
+    """What the command line says of a file of a robot."""
+    return {"free_base": parsed.free_base, "outside": parsed.outside}
+
+
+def load_run(where, allow_code=False, robot=MappingProxyType({})):
     """The scene of a file, and the arguments of `simulate` that it asks for; arguments as for `load_scene`."""
     if Path(where).suffix.lower() in SCENES:
         from ..simulation.load import scene_file
 
         with warnings.catch_warnings(action="ignore", category=ImportLosses):
-            scene, given = scene_file(where, allow_code, free_base)
+            scene, given = scene_file(where, allow_code, **robot)
         if scene.imported and scene.imported.left_out:
             lost = scene.imported.summary()
             print(f"tsdyn: {where}: not carried over: {lost}; tsdyn check lists each.", file=sys.stderr)
         return scene, given
-    if free_base:
-        raise InvalidArgument("--free-base is for URDF files.")
+    if any(robot.values()):
+        raise InvalidArgument("--free-base is for URDF files, and --outside for URDF, MJCF and SDF files.")
     return load_scene(where), {}
 
 
-def load_document(where, allow_code=False, study=None, free_base=False):
+def load_document(where, allow_code=False, study=None, robot=MappingProxyType({})):
     """What a file holds, as `scene_text.Document`; `study`: keys of its table ensemble that others replace."""
     from ..files.scene_text import Document
 
-    if Path(where).suffix.lower() == ".toml" and not free_base:
+    if Path(where).suffix.lower() == ".toml" and not any(robot.values()):
         from ..simulation.load import document_of
 
         return document_of(where, allow_code, study)
-    scene, given = load_run(where, allow_code, free_base)
+    scene, given = load_run(where, allow_code, robot)
     return Document(scene, given, {}, {"files": [], "plot": None})
 
 
-def load_scene(where, allow_code=False, free_base=False):
+def load_scene(where, allow_code=False, robot=MappingProxyType({})):
     """The scene of a TOML, URDF, MJCF or SDF file; or, of a Python file, that of its `build()`, or its `scene`.
 
     Parameters
@@ -47,8 +53,8 @@ def load_scene(where, allow_code=False, free_base=False):
         A path, or the name of an example; a name behind a colon is of another function, or scene, in the file.
     allow_code : bool
         Whether a TOML file may import modules of plug-ins.
-    free_base : bool
-        Whether the root link of a URDF is free to move.
+    robot : dict
+        Options of `ts.load` for files of robots: free_base and outside.
 
     Raises
     ------
@@ -56,7 +62,7 @@ def load_scene(where, allow_code=False, free_base=False):
         If there is no such file or name, it can't be run, or what it gives is no scene.
     """
     if Path(where).suffix.lower() in SCENES:
-        return load_run(where, allow_code, free_base)[0]
+        return load_run(where, allow_code, robot)[0]
     path, _, name = where.partition(":") if not Path(where).exists() else (where, "", "")
     file = _file(path)
     module = _module(file)

@@ -6,7 +6,7 @@ from pathlib import Path
 from ..errors import InvalidArgument, TsdynError
 from .output import print_json
 from .run import SOLUTIONS, add_force, add_json, add_scene, demand_format, demand_new, write
-from .scene_file import load_document, load_run, load_scene
+from .scene_file import load_document, load_run, load_scene, robot_options
 
 SCENES = (".toml",)
 
@@ -48,7 +48,7 @@ def _check(parsed):
 
     found = {"file": parsed.scene, "ok": True, "mistakes": [], "message": "It can start."}
     try:
-        scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
+        scene, given = load_run(parsed.scene, parsed.allow_code, robot_options(parsed))
         demand_startable(scene, given)
         report = scene.imported
         if report:
@@ -75,9 +75,8 @@ def _info(parsed):
     from ..simulation.method_choice import reason
     from ..simulation.scene_cache import prepared
 
-    document = load_document(
-        parsed.scene, parsed.allow_code, False, parsed.free_base
-    )  # a study may name what isn't there
+    # the table of a study is left unread: what it names may not be there
+    document = load_document(parsed.scene, parsed.allow_code, False, robot_options(parsed))
     scene, given = document.scene, document.run
     mobility, why = scene.mobility(), reason(prepared(scene))
     if parsed.json:
@@ -190,10 +189,10 @@ def _convert(parsed):
     elif source in SCENES and target in SCENES:
         from ..simulation.scene_saving import write_text
 
-        load_document(parsed.scene, parsed.allow_code, free_base=parsed.free_base)  # refuses mistakes
+        load_document(parsed.scene, parsed.allow_code, robot=robot_options(parsed))  # refuses mistakes
         written = write_text(parsed.target, Path(parsed.scene).read_text(encoding="utf-8-sig"))
     elif target in SCENES:
-        scene = load_scene(parsed.scene, parsed.allow_code, parsed.free_base)
+        scene = load_scene(parsed.scene, parsed.allow_code, robot_options(parsed))
         written = scene.save(parsed.target)
         if scene.imported and not parsed.json:
             print(scene.imported)

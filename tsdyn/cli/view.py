@@ -7,7 +7,7 @@ from ..errors import InvalidArgument
 from ..viewer.view import page_path
 from .output import print_json
 from .run import SOLUTIONS, add_force, add_json, add_method, add_scene, demand_new, options_of
-from .scene_file import load_run
+from .scene_file import load_run, robot_options
 
 
 def add_view_options(parser):
@@ -50,6 +50,6 @@ def _solution(parsed):
         return found
     from ..simulation.simulate import simulate
 
-    scene, given = load_run(parsed.scene, parsed.allow_code, parsed.free_base)
+    scene, given = load_run(parsed.scene, parsed.allow_code, robot_options(parsed))
     span, options = options_of(parsed, given)
     return simulate(scene, span, **options, dense_output=True)

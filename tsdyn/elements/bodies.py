@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Generic, Never, TypeVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..errors import InvalidBody
 from ..validation import demand_known, floats, positive, shown, vector3
@@ -113,10 +114,12 @@ def _orientation(value, body):
         p = np.roll(value.as_quat(), 1, axis=-1)
     else:
         p = floats(value)
+    if p.shape == (3, 3) and np.isfinite(p).all():
+        return _of_matrix(p, body)
     if p.shape != (4,) or not np.isfinite(p).all():
         raise InvalidBody(
-            f"{body.name}: orientation must be four finite Euler parameters (e0, e1, e2, e3), scalar first, or one "
-            f"scipy Rotation, got {shown(value)}."
+            f"{body.name}: orientation must be four finite Euler parameters (e0, e1, e2, e3), scalar first, a rotation "
+            f"matrix (3, 3), or one scipy Rotation, got {shown(value)}."
         )
     known = body.values.get("orientation")
     if known is not None and p.tobytes() == known.tobytes():
@@ -128,6 +131,23 @@ def _orientation(value, body):
             + (", or give a rotation: they are zero." if length == 0.0 else ".")
         )
     return p / length
+
+
+def _of_matrix(A, body):
+    """Euler parameters of a rotation matrix, e0 >= 0."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        skew = np.abs(A.T @ A - np.eye(3)).max()
+    if not skew <= UNIT_LENGTH:
+        raise InvalidBody(
+            f"{body.name}: orientation is no rotation matrix: its columns must be orthogonal unit vectors, and "
+            f"A^T A - I is up to {skew:.3g}."
+        )
+    if np.linalg.det(A) < 0.0:
+        raise InvalidBody(
+            f"{body.name}: orientation is a reflection, of determinant -1; reverse one of its axes: they must be "
+            "right-handed."
+        )
+    return np.roll(Rotation.from_matrix(A).as_quat(canonical=True), 1)
 
 
 def _vector(what, unit):
@@ -215,7 +235,8 @@ class Body(PointMass):
         _inertia, "Inertia about the centroid, body frame, kg m^2, shape (3, 3)."
     )
     orientation: Attribute[Orientation, Floats] = Attribute(
-        _orientation, "Euler parameters at the start, body to ground, scalar first, shape (4,)."
+        _orientation,
+        "Euler parameters at the start, body to ground, scalar first, shape (4,); set by a rotation matrix, too.",
     )
     angular_velocity: Attribute[ArrayLike, Floats] = Attribute(
         _vector("angular velocity", "rad/s"), "Angular velocity at the start, body frame, rad/s, shape (3,)."

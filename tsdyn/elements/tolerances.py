@@ -13,7 +13,7 @@ INERTIA_ROUNDING = 1e-12
 TRIANGLE = 1e-9
 
 # | |p| - 1 | of Euler parameters as they are given: those written with seven digits pass, degrees in place of radians
-# do not. They are made of unit length afterwards.
+# do not. They are made of unit length afterwards. Of A^T A - I of a rotation matrix likewise.
 UNIT_LENGTH = 1e-6
 
 # Sine of an angle. Of a reference the part across an axis gives a direction; at 1e-6 ten digits of it are left.

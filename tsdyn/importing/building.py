@@ -44,6 +44,8 @@ def build(description, make, report):
             )
         )  # fmt: skip
     couple(scene, description, bodies, report)
+    if any(joint.start for joint in description.joints):
+        _start(scene, description, bodies)
     for name, (owner, at) in description.frames.items():
         body = bodies[owner]
         centroid = np.zeros(3) if owner == GROUND else description.links[owner].centroid
@@ -82,11 +84,21 @@ def _add_body(scene, link, report):
     return body
 
 
+def _start(scene, description, bodies):
+    """Move bodies to where they start; joints count their coordinates from where they were added."""
+    for name, link in description.links.items():
+        bodies[name].position = link.start.point(link.centroid)
+        bodies[name].orientation = Rotation.from_matrix(link.start.R)
+
+
 def _add_joint(scene, joint, bodies):
-    """Add the constraints of a joint."""
-    a, b, name = bodies[joint.a], bodies[joint.b], joint.name
+    """Add the constraints of a joint; a force or another constraint may have its name."""
+    a, b = bodies[joint.a], bodies[joint.b]
+    name = joint.name = unused(scene, joint.name)
     if joint.kind in ONE_AXIS:
-        scene.add(ONE_AXIS[joint.kind].at(a, b, point=joint.point, axis=joint.axis, name=name))
+        made = scene.add(ONE_AXIS[joint.kind].at(a, b, point=joint.point, axis=joint.axis, name=name))
+        if joint.start and joint.kind == "revolute":
+            made.__dict__["angle_near"] = (joint.start,)  # near which turns are counted
     elif joint.kind == "screw":
         scene.add(Screw.at(a, b, point=joint.point, axis=joint.axis, lead=joint.lead, name=name))
     elif joint.kind == "universal":

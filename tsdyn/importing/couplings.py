@@ -11,7 +11,7 @@ WHAT = "joint that mimics another one"
 
 def couple(scene, description, bodies, report):
     """Add what can be a gear pair; list the rest."""
-    joints = {joint.name: joint for joint in description.joints}
+    joints = {joint.name: joint for joint in description.joints if not joint.loop}
     for coupling in description.couplings:
         one, other = joints.get(coupling.driver), joints.get(coupling.follower)
         reason = _reason(one, other, coupling)
@@ -22,11 +22,12 @@ def couple(scene, description, bodies, report):
                     bodies[one.b], bodies[other.b], point_a=one.point, point_b=other.point, axis_a=one.axis,
                     ratio=coupling.ratio * parallel, name=coupling.name,
                 )  # fmt: skip
+                gear.offset += coupling.offset * parallel
                 scene.add(gear)
             except InvalidConstraint as error:
                 reason = str(error)
         if reason:
-            report.leave(WHAT, coupling.name, f"(ratio {coupling.ratio:g}: {reason})")
+            report.leave(WHAT, coupling.name, f"(ratio {coupling.ratio:g}, offset {coupling.offset:g}: {reason})")
 
 
 def _reason(one, other, coupling):

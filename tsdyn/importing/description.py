@@ -1,4 +1,4 @@
-"""What a file describes: links, joints and forces, at the start, in the ground frame."""
+"""What a file describes: links, joints and forces, at zero joint coordinates, in the ground frame."""
 
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -15,12 +15,13 @@ class Link:
     """A rigid body, or a frame without mass."""
 
     name: str
-    frame: Frame = HERE  # in the ground frame
+    frame: Frame = HERE  # in the ground frame, at zero joint coordinates
     mass: float = 0.0  # kg
     centroid: Any = field(default_factory=lambda: np.zeros(3))  # (3,), m, own frame
     inertia: Any = field(default_factory=lambda: np.zeros((3, 3)))  # about the centroid, kg m^2, own frame
     shapes: list = field(default_factory=list)  # `shapes.DrawnShape`s, own frame
     line: int = 0  # of the file
+    start: Frame = HERE  # in the ground frame, at the start, where joints have one
 
 
 class Slide(NamedTuple):
@@ -60,6 +61,7 @@ class JointItem:
     free: float = 0.0  # coordinate at which the spring is relaxed, from the start: rad or m
     load: float = 0.0  # constant torque or force on b, N m or N
     lead: float = 0.0  # of a screw, m/rad
+    start: float = 0.0  # coordinate at the start, rad or m
     loop: bool = False  # holds beside the tree, so it is never merged
     frame_a: Any = None  # of a loop: frames of a and b that coincide, ground frame
     frame_b: Any = None
@@ -88,12 +90,13 @@ class SpringItem:
 
 @dataclass(eq=False)
 class Coupling:
-    """The coordinate of one joint in proportion to that of another."""
+    """q_follower = ratio q_driver + offset."""
 
     name: str
     driver: str
     follower: str
     ratio: float
+    offset: float = 0.0  # rad
 
 
 @dataclass(eq=False)
@@ -112,3 +115,10 @@ class Description:
     def frame_of(self, name):
         """The frame of a link, or of the ground."""
         return HERE if name == GROUND else self.links[name].frame
+
+    def joints_by_link(self):
+        """The joints of each link and of the ground, by name, in order."""
+        found = {name: {} for name in (GROUND, *self.links)}
+        for joint in self.joints:
+            found[joint.a][joint] = found[joint.b][joint] = None
+        return found

@@ -5,7 +5,6 @@ ball viscous friction in rotation.
 """
 
 from dataclasses import replace
-from itertools import chain, count
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from ..elements.bodies import rotation_matrix
 from ..forces.bushing import Bushing
 from ..forces.torsional_spring import TorsionalSpring
 from ..forces.viscous_friction import ViscousFriction
+from .names import fresh
 from .tolerances import ORTHOGONAL
 
 SUFFIX = " spring"  # of names
@@ -20,8 +20,7 @@ SUFFIX = " spring"  # of names
 
 def unused(scene, name):
     """The name, or with a number behind it where the scene has it already."""
-    taken = {item.name for item in (*scene._added, *scene._forces)}
-    return next(one for one in chain([name], (f"{name} {i}" for i in count(2))) if one not in taken)
+    return fresh(name, scene._titles or ())
 
 
 def add_joint_forces(scene, joint, bodies, report):

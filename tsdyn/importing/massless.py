@@ -21,21 +21,20 @@ from .tolerances import HALVINGS, NO_INERTIA, NO_MASS, REACH, SHARE, SLIGHT, SOL
 
 def complete(description, report):
     """Hold joints of leaves without mass, then give mass to the links between joints that have none."""
-    while held := _idle_joints(description):
-        for joint in held:
-            report.leave("joint of a link without mass, held", joint.name)
-            joint.kind = "fixed"
+    if _hold_idle_joints(description, report):
         frames = description.frames
         merge(description, report)
         description.frames = frames | _deeper(frames, description.frames)
-    lone = [link for link in description.links.values() if link.mass <= 0.0 and not _joints_of(description, link)]
-    for link in lone:
+    joints = description.joints_by_link()
+    for link in [link for link in description.links.values() if link.mass <= 0.0 and not joints[link.name]]:
         report.leave("link without mass", link.name)
         del description.links[link.name]
     usual = _usual_mass(description)
     all_poor = poor = [link for link in reversed(description.links.values()) if is_poor(link, SLIGHT * usual)]
-    for _ in all_poor:  # one may have to wait for its neighbour
-        poor = [link for link in poor if not _endow(description, link, SLIGHT * usual)]
+    waiting = None
+    while poor != waiting:  # one may have to wait for its neighbour
+        waiting = poor
+        poor = [link for link in poor if not _endow(description, joints[link.name], link, usual)]
     poor = [link for link in poor if is_poor(link)]
     given = [link.name for link in all_poor if link not in poor]
     if given:
@@ -43,7 +42,7 @@ def complete(description, report):
             f"without mass or inertia, given a share of what their neighbours carry for them: {', '.join(given)}"
         )
     for link in poor:
-        _add_trifle(description, link, report)
+        _add_trifle(link, usual, report)
 
 
 def _deeper(before, now):
@@ -56,23 +55,28 @@ def is_poor(link, least=NO_MASS):
     return link.mass <= least or not np.abs(link.inertia).max() > NO_INERTIA
 
 
-def _joints_of(description, link):
-    return [joint for joint in description.joints if link.name in (joint.a, joint.b)]
-
-
-def _idle_joints(description):
-    """Joints that nothing with mass hangs from on one side."""
-    found = []
-    for link in description.links.values():
-        joints = _joints_of(description, link)
-        if link.mass <= NO_MASS and len(joints) == 1 and joints[0].kind not in ("free", "fixed"):
-            found += joints
+def _hold_idle_joints(description, report):
+    """Fix joints that nothing with mass hangs from on one side; whether there are any."""
+    joints, found = description.joints_by_link(), False
+    ahead = [link for link in description.links.values() if link.mass <= NO_MASS]
+    while ahead:
+        link = ahead.pop()
+        joint = next(iter(joints[link.name]), None)
+        if link.mass > NO_MASS or len(joints[link.name]) != 1 or joint.kind in ("free", "fixed"):
+            continue
+        report.leave("joint of a link without mass, held", joint.name)
+        joint.kind, joint.loop, found = "fixed", False, True
+        for name in (joint.a, joint.b):
+            del joints[name][joint]
+            if name not in (GROUND, link.name):
+                ahead.append(description.links[name])
     return found
 
 
-def _endow(description, link, least):
-    """Move mass to a link from its neighbours; whether it has enough then."""
-    for joint in _joints_of(description, link):
+def _endow(description, joints, link, usual):
+    """Move mass to a link from its neighbours at its joints; whether it has enough then."""
+    least = SLIGHT * usual
+    for joint in joints:
         name = joint.a if joint.b == link.name else joint.b
         donor = None if name == GROUND else description.links[name]
         if donor is not None and is_poor(donor, least):
@@ -81,7 +85,7 @@ def _endow(description, link, least):
         if common is None:
             continue
         if donor is None:
-            share, size = common, _usual_mass(description)
+            share, size = common, usual
         else:
             there = moments(donor)
             moved = _between(link, donor, common)
@@ -94,10 +98,9 @@ def _endow(description, link, least):
     return not is_poor(link, least)
 
 
-def _add_trifle(description, link, report):
+def _add_trifle(link, usual, report):
     """Give a link that no neighbour can share with as little as rounding allows; that is no longer exact."""
-    mass = max(link.mass, TRIFLE * _usual_mass(description))
-    inertia = TRIFLE * _usual_mass(description) * REACH**2
+    mass, inertia = max(link.mass, TRIFLE * usual), TRIFLE * usual * REACH**2
     link.mass, link.inertia = mass, link.inertia + inertia * np.eye(3)
     report.leave("link without mass or inertia, given a trifle", link.name, f"{mass:.2g} kg, {inertia:.2g} kg m^2")
 

@@ -14,6 +14,7 @@ def merge(description, report):
 
     def top(name):
         while head[name] != name:
+            head[name] = head[head[name]]
             name = head[name]
         return name
 

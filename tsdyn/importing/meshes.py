@@ -12,10 +12,11 @@ import numpy as np
 
 from .. import shapes
 from .frames import HERE, Frame
-from .xml_file import exists
+from .xml_file import OUTSIDE, exists
 
 if TYPE_CHECKING:
     from .report import ImportReport
+    from .xml_file import OutsideFiles
 
 FORMATS = (".stl", ".obj")  # that `shapes.Mesh` reads
 FOLDERS = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
@@ -46,11 +47,12 @@ class DrawnShape(NamedTuple):
         return shapes.Mesh((mesh.vertices * scale, faces), **placed)
 
 
-def mesh(uri: str, scale: Any, folder: Path, report: ImportReport, where: str) -> tuple[str, tuple] | None:
+def mesh(uri: str, scale: Any, outside: OutsideFiles, report: ImportReport, where: str) -> tuple[str, tuple] | None:
     """Kind and arguments of the mesh of a URI; None, with an entry in the report, where it can't be drawn."""
-    path = find(uri, folder)
+    there = find(uri, outside.folder)
+    path = next((path for path in there if not outside.reason(path)), None)
     if path is None:
-        report.leave("mesh that is not found", where, uri)
+        report.leave(f"mesh that {OUTSIDE}" if there else "mesh that is not found", where, uri)
         return None
     if path.suffix.lower() not in FORMATS:
         report.leave("mesh of another format than STL and OBJ", where, uri)
@@ -62,8 +64,8 @@ def mesh(uri: str, scale: Any, folder: Path, report: ImportReport, where: str) -
     return "Mesh", (str(path), float(scale[0]) if (scale == scale[0]).all() and scale[0] > 0.0 else scale)
 
 
-def find(uri: str, folder: Path) -> Path | None:
-    """The file of a URI: package:// and model:// are looked for above the folder of the description."""
+def find(uri: str, folder: Path) -> list[Path]:
+    """Files that a URI may mean, best first: package:// and model:// are looked for above the folder of the file."""
     scheme, mark, rest = unquote(uri.strip()).partition("://")
     if not mark:
         tried = [folder / scheme]
@@ -72,8 +74,8 @@ def find(uri: str, folder: Path) -> Path | None:
     elif scheme in ("package", "model"):
         tried = _in_packages(rest, folder)
     else:
-        return None
-    return next((path for path in tried if exists(path)), None)
+        return []
+    return [path for path in tried if exists(path)]
 
 
 def _in_packages(rest, folder):

@@ -13,16 +13,21 @@ from ..errors import MissingDependency
 from . import mjcf_forces, mjcf_joints, mjcf_loops, mjcf_rest, mjcf_shapes
 from .description import GROUND, Description, Link
 from .frames import of_body, of_quaternion, posed
+from .mjcf_files import Sources
+from .mjcf_unread import leave_unread
+from .names import fresh
 
 
-def describe(root, path, report):
+def describe(root, path, report, outside):
     """The `Description` of a file with the root element <mujoco>."""
     try:
         import mujoco
     except ImportError as error:
         raise MissingDependency("MJCF files need MuJoCo's compiler: pip install 'tsdyn[import]'.") from error
+    sources = Sources(path, outside)
+    sources.judge(root)
     with _warnings(mujoco, report):
-        model = _compiled(mujoco, root, path, report)
+        model = _compiled(mujoco, root, sources, report)
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
     names = Names(mujoco, model)
@@ -36,8 +41,22 @@ def describe(root, path, report):
     mjcf_forces.add_forces(mujoco, model, data, found, names, report)
     mjcf_loops.add_loops(mujoco, model, data, found, names, report)
     mjcf_shapes.add_shapes(mujoco, model, found, names, report)
-    mjcf_rest.leave_rest(mujoco, model, names, report)
+    mjcf_rest.leave_rest(model, names, report)
+    leave_unread(sources, report)
     return found
+
+
+COUNTS = {  # fields of a model, by kind of objects
+    "body": "nbody",
+    "joint": "njnt",
+    "site": "nsite",
+    "geom": "ngeom",
+    "actuator": "nactuator",
+    "tendon": "ntendon",
+    "equality": "neq",
+    "flex": "nflex",
+    "plugin": "nplugin",
+}
 
 
 class Names:
@@ -49,10 +68,12 @@ class Names:
 
     def of(self, kind, i):
         """The name of object i of a kind, such as "joint"."""
-        if (kind, i) not in self._made:
-            name = self._find(self.model, getattr(self._kinds, f"mjOBJ_{kind.upper()}"), i)
-            self._made[kind, i] = name or f"{kind}{i}"
-        return self._made[kind, i]
+        if kind not in self._made:
+            code = getattr(self._kinds, f"mjOBJ_{kind.upper()}")
+            given = [self._find(self.model, code, i) for i in range(getattr(self.model, COUNTS[kind]))]
+            taken = set(given)
+            self._made[kind] = [name or fresh(f"{kind}{i}", taken) for i, name in enumerate(given)]
+        return self._made[kind][i]
 
     def body(self, i):
         """The name of a body, empty for the world."""
@@ -73,25 +94,17 @@ def _warnings(mujoco, report):
         report.note(f"MuJoCo: {one.message}")
 
 
-def _compiled(mujoco, root, path, report):
-    """The model of a file, whose missing textures and meshes don't matter."""
+def _compiled(mujoco, root, sources, report):
+    """The model of a file, without what a scene has no counterpart for; missing meshes don't matter."""
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        _drop_pictures(spec)
-        mjcf_shapes.drop_missing_meshes(spec, path, root, report)
+        spec = mujoco.MjSpec.from_file(str(sources.path))
+        mjcf_rest.strip(mujoco, spec, report)
+        mjcf_shapes.drop_missing_meshes(mujoco, spec, sources, root, report)
         spec.compiler.fusestatic = spec.compiler.discardvisual = False
         return spec.compile()
     except (ValueError, TypeError, OSError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         root.wrong(f"MuJoCo: {' '.join(str(error).split())}")
         root.mistakes.demand_none()
-
-
-def _drop_pictures(spec):
-    """Textures and skins are not drawn; colours of materials are."""
-    for material in spec.materials:
-        material.textures = [""] * len(material.textures)
-    for one in (*spec.textures, *spec.skins):
-        spec.delete(one)
 
 
 def _gravity(mujoco, model):

@@ -41,8 +41,8 @@ def _add_actuator(mujoco, model, i, joints, names, report):
     g = np.array(model.actuator_gainprm[i, :3]) * (1.0, *(2 * [gain != int(mujoco.mjtGain.mjGAIN_FIXED)]))
     constant, stiffness, damping = (
         gear * (b[0] + g[0] * u),
-        -(gear**2) * (b[1] + g[1] * u),
-        -(gear**2) * (b[2] + g[2] * u),
+        -gear * gear * (b[1] + g[1] * u),
+        -gear * gear * (b[2] + g[2] * u),
     )
     if model.actuator_forcelimited[i]:
         low, high = model.actuator_forcerange[i]

@@ -3,6 +3,7 @@
 import numpy as np
 
 from .description import JointItem, Link
+from .names import fresh
 
 KINDS = {"mjJNT_FREE": "free", "mjJNT_BALL": "spherical", "mjJNT_SLIDE": "prismatic", "mjJNT_HINGE": "revolute"}
 
@@ -18,7 +19,7 @@ def add_joints(mujoco, model, data, found, names, report):
         if not count:
             found.joints.append(JointItem(f"{name} weld", "fixed", last, name))
         for j in range(first, first + count):
-            follower = name if j == first + count - 1 else f"{name}/{names.of('joint', j)}"
+            follower = name if j == first + count - 1 else fresh(f"{name}/{names.of('joint', j)}", found.links)
             if follower != name:
                 found.links[follower] = Link(follower, found.links[name].frame)
             joint = JointItem(

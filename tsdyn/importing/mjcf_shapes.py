@@ -7,29 +7,37 @@ import numpy as np
 from .description import GROUND
 from .frames import posed, shifted
 from .meshes import DrawnShape, hexadecimal
-from .xml_file import exists
+from .xml_file import OUTSIDE, exists
 
+TETRAHEDRON = (0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1)  # vertices
 SHOWN = 3  # groups of geoms that are drawn: 0, 1, 2
 
 
-def drop_missing_meshes(spec, path, root, report):
-    """Delete geoms of meshes that are not found; where a body's inertia is that of its geoms, this is a mistake."""
-    folder = Path(path).parent / (spec.meshdir or "")
+def drop_missing_meshes(mujoco, spec, sources, root, report):
+    """Replace meshes that can't be read, undrawn; where a body's inertia is that of its geoms, this is a mistake.
+
+    Each deletion would take the compiler a time in proportion to the file.
+    """
+    folder = sources.path.parent / (spec.meshdir or "")
     missing = {
-        mesh.name or Path(mesh.file).stem: mesh for mesh in spec.meshes if mesh.file and not _is_there(mesh, folder)
+        mesh.name or Path(mesh.file).stem: mesh
+        for mesh in spec.meshes
+        if mesh.file and (mesh.file in sources.hidden or not _is_there(mesh, folder))
     }
     if not missing:
         return
     for geom in list(spec.geoms):
         if geom.meshname not in missing:
             continue
-        body = geom.parent
+        body, file = geom.parent, missing[geom.meshname].file
         if not body.explicitinertial and body.name != "world":
-            root.wrong(f"mesh {missing[geom.meshname].file!r} is not found; the inertia of {body.name!r} needs it.")
-        report.leave("mesh that is not found", body.name or "body", missing[geom.meshname].file)
-        spec.delete(geom)
+            reason = OUTSIDE if file in sources.hidden else "is not found"
+            root.wrong(f"mesh {file!r} {reason}; the inertia of {body.name!r} needs it.")
+        report.leave(f"mesh that {OUTSIDE if file in sources.hidden else 'is not found'}", body.name or "body", file)
+        geom.type, geom.meshname, geom.size = int(mujoco.mjtGeom.mjGEOM_SPHERE), "", (1.0, 0.0, 0.0)
+        geom.mass, geom.contype, geom.conaffinity, geom.group = 0.0, 0, 0, SHOWN
     for mesh in missing.values():
-        spec.delete(mesh)
+        mesh.file, mesh.content_type, mesh.uservert = "", "", TETRAHEDRON
     root.mistakes.demand_none()
 
 

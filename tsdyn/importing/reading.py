@@ -15,8 +15,8 @@ from .massless import complete
 from .merging import merge
 from .report import ImportReport
 from .slides import gather
-from .tolerances import NO_MASS, OPEN
-from .xml_file import read
+from .tolerances import HUGE, NO_MASS, OPEN
+from .xml_file import OutsideFiles, read
 
 if TYPE_CHECKING:
     from ..hints import Callable, Place, Scene
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FORMATS = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF", "gazebo": "SDF"}
 
 
-def load(path: Place, make: Callable[..., Scene], free_base: bool) -> Scene:
+def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool) -> Scene:
     """The scene of a URDF, MJCF or SDF file; arguments and errors as of `ts.load`.
 
     Parameters
@@ -34,9 +34,12 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool) -> Scene:
         Of an empty scene: `Scene`.
     free_base : bool
         Whether the root link of a URDF is free.
+    outside : bool
+        Whether files outside the folder of this one may be read.
     """
     root, mistakes = read(path)
-    kind, folder = FORMATS.get(root.tag), Path(path).parent
+    kind, path = FORMATS.get(root.tag), Path(path)
+    files = OutsideFiles(path.parent, outside)
     if kind is None:
         known = "<robot> of URDF, <mujoco> of MJCF, <sdf> of SDF"
         root.wrong(f"the root element <{root.tag}> is of no known format; there are {known}.")
@@ -44,12 +47,20 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool) -> Scene:
     if free_base and kind != "URDF":
         raise InvalidArgument(f"free_base is for URDF, where the file doesn't say it; {path} is {kind}.")
     report = ImportReport(str(path), kind)
-    if kind == "URDF":
-        description = urdf.describe(root, folder, report, free_base)
-    elif kind == "SDF":
-        description = sdf.describe(root, folder, report)
-    else:
-        description = mjcf.describe(root, Path(path), report)
+    with np.errstate(over="ignore", invalid="ignore"):
+        if kind == "URDF":
+            description = urdf.describe(root, files, report, free_base)
+        elif kind == "SDF":
+            description = sdf.describe(root, files, report)
+        else:
+            description = mjcf.describe(root, path, report, files)
+    for link in description.links.values():
+        numbers = (link.mass, *link.centroid, *link.inertia.flat, *link.frame.p, *link.start.p)
+        if not np.abs(numbers).max() < HUGE:
+            mistakes.add((link.line or 1, 1), f"link {link.name!r}: mass, inertia or place is beyond {HUGE:g}.")
+    for joint in description.joints:
+        if joint.point is not None and not np.abs(joint.point).max() < HUGE:
+            mistakes.add((1, 1), f"joint {joint.name!r}: its place is beyond {HUGE:g} m.")
     mistakes.demand_none()
     return _scene(description, make, report, mistakes)
 

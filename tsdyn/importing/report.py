@@ -52,30 +52,37 @@ class ImportReport:
 
     def __init__(self, source: str, format: str) -> None:
         self.source, self.format = source, format
-        self.left_out: tuple[LeftOut, ...] = ()
-        self.notes: tuple[str, ...] = ()
+        self._left: dict[LeftOut, None] = {}  # once each, in order
+        self._notes: dict[str, None] = {}
         self.frames: dict[str, FrameOn] = {}
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What the scene lacks."""
+        return tuple(self._left)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was carried over in another way."""
+        return tuple(self._notes)
 
     def leave(self, what: str, where: str, detail: str = "") -> None:
         """Note what is left out, once."""
-        entry = LeftOut(what, where, detail)
-        if entry not in self.left_out:
-            self.left_out += (entry,)
+        self._left[LeftOut(what, where, detail)] = None
 
     def note(self, text: str) -> None:
         """Note what is carried over in another way, once."""
-        if text not in self.notes:
-            self.notes += (text,)
+        self._notes[text] = None
 
-    def leave_unread(self, root: Any) -> None:
-        """Note what nobody has asked a root element for."""
+    def leave_unread(self, root: Any, file: str = "") -> None:
+        """Note what nobody has asked a root element for; `file` stands before the line of an included one."""
         for name, line in root.unread():
-            self.leave(f"element {name}" if " " not in name else f"attribute {name}", f"line {line}")
+            self.leave(f"element {name}" if " " not in name else f"attribute {name}", f"{file}line {line}")
 
     def groups(self) -> dict[str, list[LeftOut]]:
         """What is left out, by what it is."""
         found: dict[str, list[LeftOut]] = {}
-        for entry in self.left_out:
+        for entry in self._left:
             found.setdefault(entry.what, []).append(entry)
         return found
 
@@ -86,19 +93,19 @@ class ImportReport:
 
     def warn(self) -> None:
         """Warn where something is left out."""
-        if self.left_out:
+        if self._left:
             said = f"{self.source}: not carried over: {self.summary()}. print(scene.imported) lists each."
             warnings.warn(ImportLosses(said), stacklevel=6)
 
     def __str__(self) -> str:
         lines = [f"{self.source} ({self.format})"]
-        if not self.left_out:
+        if not self._left:
             lines.append("everything is carried over")
         else:
-            lines.append(f"not carried over: {counted(len(self.left_out), 'entry', 'entries')}")
+            lines.append(f"not carried over: {counted(len(self._left), 'entry', 'entries')}")
         for what, entries in self.groups().items():
             lines.append(f"  {what} ({len(entries)}): {_listed(entries)}")
-        return "\n".join([*lines, *(f"  note: {text}" for text in self.notes)])
+        return "\n".join([*lines, *(f"  note: {text}" for text in self._notes)])
 
     def __repr__(self) -> str:
         return f"<ImportReport of {self.source}: {self.summary() or 'everything is carried over'}>"

@@ -13,7 +13,7 @@ from .sdf_joints import add_joints
 from .urdf_shapes import add_sdf_shapes
 
 
-def describe(root, folder, report):
+def describe(root, outside, report):
     """The `Description` of a root element <sdf>."""
     root.get("version")
     worlds = root.all("world")
@@ -30,12 +30,12 @@ def describe(root, folder, report):
         root.wrong("<sdf> has no <model>.")
     for model in models:
         prefix = f"{model.get('name')}::" if len(models) > 1 else ""
-        _add_model(found, model, HERE, prefix, folder, report)
+        _add_model(found, model, HERE, prefix, outside, report)
     report.leave_unread(root)
     return found
 
 
-def _add_model(found, model, outer, prefix, folder, report):
+def _add_model(found, model, outer, prefix, outside, report):
     """Add links and joints of a model, and of the models in it."""
     frames = Frames(model, outer, report)
     model.get("canonical_link")
@@ -44,11 +44,11 @@ def _add_model(found, model, outer, prefix, folder, report):
         name = prefix + node.demand("name")
         if name in found.links:
             node.wrong(f"there are two links named {name!r}; rename one.")
-        found.links[name] = _link(node, name, frames, folder, report)
+        found.links[name] = _link(node, name, frames, outside, report)
         names[node.get("name")] = name
     for inner in model.all("model"):
         here = f"{inner.demand('name')}::"
-        within = _add_model(found, inner, frames.resolve(inner.get("name")), prefix + here, folder, report)
+        within = _add_model(found, inner, frames.resolve(inner.get("name")), prefix + here, outside, report)
         names |= {here + one: name for one, name in within.items()}
     for node in model.all("frame"):
         name, owner = node.get("name"), frames.link_of(node.get("name"))
@@ -60,7 +60,7 @@ def _add_model(found, model, outer, prefix, folder, report):
     return names
 
 
-def _link(node, name, frames, folder, report):
+def _link(node, name, frames, outside, report):
     """A link at the start."""
     link = Link(name, frames.resolve(node.get("name")), line=node.line)
     inertial = node.one("inertial")
@@ -68,13 +68,14 @@ def _link(node, name, frames, folder, report):
         link.mass, link.inertia = 1.0, np.eye(3)  # what the specification says
         report.note(f"{name}: mass 1 kg and inertia 1 kg m^2, the defaults of SDF")
     else:
-        _set_mass(link, inertial, frames, name)
-    add_sdf_shapes(link, node, frames, folder, report)
+        _set_mass(link, inertial, frames, name, report)
+    add_sdf_shapes(link, node, frames, outside, report)
     return link
 
 
-def _set_mass(link, node, frames, name):
-    node.get("auto")
+def _set_mass(link, node, frames, name, report):
+    if node.get("auto", "false").lower() in ("1", "true"):
+        report.leave("inertia of the densities of contact shapes", name)
     at, inertia = frames.pose(node), node.one("inertia")
     link.mass = node.scalar("mass", 1.0)
     if link.mass < 0.0:

@@ -20,7 +20,7 @@ class Frames:
 
     def __init__(self, model, outer, report):
         self.report, self._known, self._parents = report, {}, {}
-        self._busy = set()
+        self._owners = {}  # of frames that have been asked for
         for node in (*model.all("link"), *model.all("model")):
             self._add(node, MODEL)
         for node in model.all("frame"):
@@ -57,21 +57,24 @@ class Frames:
     def resolve(self, name, node=None):
         """A frame, by name, in the ground frame."""
         name = name or ""  # of what lacks one, which is a mistake already
-        if name in self._at:
-            return self._at[name]
-        if name in ("world", "") or (name not in self._known and "::" in name):
-            return HERE if name in ("world", "") else self._inner(name, node)
-        if name not in self._known or name in self._busy:
-            what = "there is no frame" if name not in self._known else "poses form a circle at"
-            (node or self._known.get(name) or self.node).wrong(f"{what} {name!r}.")
-            return HERE
-        self._busy.add(name)
-        own = self._known[name]
-        child = own.one("pose")
-        named = None if child is None else child.get("relative_to") or child.get("frame")
-        self._at[name] = self.resolve(named or self._parents[name], own) @ self.pose(own)
-        self._busy.discard(name)
-        return self._at[name]
+        waiting, at = {}, None
+        while at is None and (at := self._at.get(name)) is None:
+            if name in ("world", ""):
+                at = HERE
+            elif name not in self._known and "::" in name:
+                at = self._inner(name, node)
+            elif name not in self._known or name in waiting:
+                what = "there is no frame" if name not in self._known else "poses form a circle at"
+                (node or self.node).wrong(f"{what} {name!r}.")
+                at = HERE
+            else:
+                node = waiting[name] = self._known[name]
+                child = node.one("pose")
+                named = None if child is None else child.get("relative_to") or child.get("frame")
+                name = named or self._parents[name]
+        for name, node in reversed(waiting.items()):
+            at = self._at[name] = at @ self.pose(node)
+        return at
 
     def _inner(self, name, node):
         (node or self.node).wrong(f"the frame {name!r} of an inner model can't be referred to; give the pose itself.")
@@ -79,8 +82,9 @@ class Frames:
 
     def link_of(self, name):
         """The link that a frame is attached to; the name itself where it is none."""
-        seen = set()
+        seen = {}
         while name in self._known and self._known[name].tag in ("frame", "joint") and name not in seen:
-            seen.add(name)
-            name = self._parents[name]
+            seen[name] = None
+            name = self._owners.get(name) or self._parents[name]
+        self._owners.update(dict.fromkeys(seen, name))
         return name

@@ -3,6 +3,7 @@
 import numpy as np
 
 from .description import GROUND, JointItem, Link
+from .names import fresh
 from .tolerances import ORTHOGONAL
 
 KINDS = {
@@ -78,9 +79,9 @@ def _add(found, node, joint, frames, report):
 
 def _two_hinges(found, joint):
     """Axes that aren't perpendicular: two hinges, with a link without mass between them."""
-    between = f"{joint.name}/1"
+    between = fresh(f"{joint.name}/1", found.links)
     frame = found.frame_of(joint.b)
-    found.links = {**found.links, between: Link(between, frame)}
+    found.links[between] = Link(between, frame)
     found.joints += [
         JointItem(joint.name, "revolute", joint.a, between, joint.point, joint.axis),
         JointItem(f"{joint.name} 2", "revolute", between, joint.b, joint.point, joint.axis_b),

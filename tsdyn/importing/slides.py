@@ -15,28 +15,36 @@ from .tolerances import ORTHOGONAL, PARALLEL
 
 def gather(description, report):
     """Replace chains of prismatic joints."""
-    while (pair := _next(description, _joins)) is not None:
-        _join(description, *pair)
-    while (pair := _next(description, _is_planar)) is not None:
-        first, link, second = pair
-        second.kind, second.a, second.slides = "planar", first.a, first.slides
+    joints = description.joints_by_link()
+    for first, link, second in _pairs(description, joints, _joins):
+        slides = [*_slides(first), *_slides(second)]
+        second.kind, second.slides = "translations", slides
+        second.servos = first.servos + second.servos  # without counterpart there, so listed
+        second.stiffness = second.damping = second.free = second.load = 0.0
+        second.name = ", ".join(slide.name for slide in slides)
+        _drop(description, joints, first, link)
+    for first, link, second in _pairs(description, joints, _is_planar):
+        second.kind, second.slides = "planar", first.slides
         for servo in first.servos:
             report.leave("actuator", servo.name)
-        _drop(description, first, link)
+        _drop(description, joints, first, link)
         report.note(f"{first.name}, {second.name}: one planar joint")
     for joint in [joint for joint in description.joints if len(joint.slides) == 3]:
-        _free(description, joint, report)
+        _free(description, joints, joint, report)
+    description.joints = [joint for joint in description.joints if joint in joints[joint.a]]
+    description.frames = {
+        name: (owner, at) for name, (owner, at) in description.frames.items() if owner in joints
+    }  # fmt: skip
 
 
-def _next(description, fits):
-    """(joint, massless link, next joint), of which `fits` is true."""
-    for link in description.links.values():
-        joints = [joint for joint in description.joints if link.name in (joint.a, joint.b)]
-        if len(joints) == 2 and is_poor(link) and link.mass <= 0.0:
-            first, second = sorted(joints, key=lambda joint: joint.a == link.name)
+def _pairs(description, joints, fits):
+    """(joint, massless link, next joint), of which `fits` is true; each is dropped before the next one."""
+    for link in list(description.links.values()):
+        pair = sorted(joints[link.name], key=lambda joint: joint.a == link.name)
+        if len(pair) == 2 and is_poor(link) and link.mass <= 0.0:
+            first, second = pair
             if first.b == link.name and second.a == link.name and fits(first, second):
-                return first, link, second
-    return None
+                yield first, link, second
 
 
 def _joins(first, second):
@@ -51,21 +59,13 @@ def _slides(joint):
     return joint.slides or [Slide(joint.name, joint.axis, joint.stiffness, joint.damping, joint.free, joint.load)]
 
 
-def _join(description, first, link, second):
-    slides = [*_slides(first), *_slides(second)]
-    second.kind, second.a, second.slides = "translations", first.a, slides
-    second.servos = first.servos + second.servos  # without counterpart there, so listed
-    second.stiffness = second.damping = second.free = second.load = 0.0
-    second.name = ", ".join(slide.name for slide in slides)
-    _drop(description, first, link)
-
-
-def _drop(description, joint, link):
-    description.joints.remove(joint)
+def _drop(description, joints, joint, link):
+    """Drop a joint and the link beyond it; what hangs from the link hangs from the one before."""
+    del joints[joint.a][joint], joints[link.name][joint]
+    for following in joints.pop(link.name):
+        following.a = joint.a
+        joints[joint.a][following] = None
     del description.links[link.name]
-    description.frames = {
-        name: (owner, at) for name, (owner, at) in description.frames.items() if owner != link.name
-    }  # fmt: skip
 
 
 def _is_planar(first, second):
@@ -75,12 +75,12 @@ def _is_planar(first, second):
     return abs(abs(first.normal() @ second.axis) - 1.0) < ORTHOGONAL
 
 
-def _free(description, joint, report):
+def _free(description, joints, joint, report):
     """Three slides, then a ball or three hinges, hold nothing."""
     chain = [joint]
     while chain[-1].b != GROUND and sum(3 if one.kind == "spherical" else 1 for one in chain[1:]) < 3:
         link = description.links[chain[-1].b]
-        following = [one for one in description.joints if one.a == link.name]
+        following = [one for one in joints[link.name] if one.a == link.name]
         if not is_poor(link) or len(following) != 1 or following[0].kind not in ("revolute", "spherical"):
             return
         chain.append(following[0])
@@ -91,6 +91,6 @@ def _free(description, joint, report):
         return
     for one in chain:
         report.note(f"{one.name}: the link {chain[-1].b} is free")
-        if one is not chain[-1]:
-            _drop(description, one, description.links[one.b])
-    chain[-1].kind, chain[-1].a = "free", joint.a
+    for one in chain[:-1]:
+        _drop(description, joints, one, description.links[one.b])
+    chain[-1].kind = "free"

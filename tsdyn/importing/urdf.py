@@ -23,14 +23,14 @@ KINDS = {
 WORLD = "world"  # a root link of this name is the ground
 
 
-def describe(root, folder, report, free_base):
+def describe(root, outside, report, free_base):
     """The `Description` of a root element <robot>.
 
     Parameters
     ----------
     root : Node
-    folder : Path
-        Of the file, for meshes.
+    outside : OutsideFiles
+        For meshes.
     report : ImportReport
     free_base : bool
         Whether the root link is free to move.
@@ -40,18 +40,19 @@ def describe(root, folder, report, free_base):
     materials = colours(root)
     nodes = {}
     for node in root.all("link"):
-        _add_link(found, nodes, node, folder, report, materials)
+        _add_link(found, nodes, node, outside, report, materials)
     joints = _joints(root, found, report)
-    order = _placed(found, joints, root)
-    _couple(found, order, report)
-    base = [name for name in found.links if not any(joint.b == name for joint in found.joints)]
+    _couple(found, [(joint, mimic) for joint, _, _, mimic in joints], report)
+    _placed(found, [entry[:3] for entry in joints], root)
+    children = {joint.b for joint in found.joints}
+    base = [name for name in found.links if name not in children]
     if base and (not free_base or base[0] == WORLD):
         found.joints.insert(0, JointItem("base", "fixed", GROUND, base[0]))
     report.leave_unread(root)
     return found
 
 
-def _add_link(found, nodes, node, folder, report, materials):
+def _add_link(found, nodes, node, outside, report, materials):
     name = node.demand("name")
     if name in found.links:
         node.wrong(f"there are two links named {name!r}; rename one.")
@@ -62,7 +63,7 @@ def _add_link(found, nodes, node, folder, report, materials):
     inertial = node.one("inertial")
     if inertial is not None:
         link.mass, link.centroid, link.inertia = mass_of(inertial, name)
-    add_shapes(link, node, folder, report, materials)
+    add_shapes(link, node, outside, report, materials)
 
 
 def mass_of(node, name):
@@ -92,7 +93,7 @@ def origin(node):
 
 
 def _joints(root, found, report):
-    """(JointItem, frame in that of the parent, axis, mimicked joint, factor, offset) of each joint."""
+    """(JointItem, frame in that of the parent, axis, what it mimics) of each joint."""
     joints, names = [], set()
     for node in root.all("joint"):
         name, kind = node.demand("name"), node.demand("type")
@@ -110,7 +111,7 @@ def _joints(root, found, report):
             axis.wrong(f"joint {name!r}: the axis has length zero.")
             u = np.array([1.0, 0.0, 0.0])
         _dynamics(node, joint, kind, report)
-        joints.append((joint, origin(node), u, *_mimic(node, report)))
+        joints.append((joint, origin(node), u, _mimic(node)))
     return joints
 
 
@@ -150,21 +151,21 @@ def _dynamics(node, joint, kind, report):
             report.leave(f"<{tag}>", joint.name)
 
 
-def _mimic(node, report):
+def _mimic(node):
+    """(joint, multiplier, offset); None if it mimics none."""
     mimic = node.one("mimic")
-    if mimic is None:
-        return None, 1.0, 0.0
-    return mimic.demand("joint"), mimic.number("multiplier", 1.0), mimic.number("offset")
+    return None if mimic is None else (mimic.demand("joint"), mimic.number("multiplier", 1.0), mimic.number("offset"))
 
 
 def _placed(found, joints, root):
-    """Place links from the root on; joints that mimic another one begin at their offset."""
-    parents = {}
+    """Place links from the root on, at zero coordinates and at the start; the joints that are reached."""
+    parents, beyond = {}, {}
     for entry in joints:
         joint = entry[0]
         if joint.b in parents:
             root.wrong(f"link {joint.b!r} has two parents, by the joints {parents[joint.b]!r} and {joint.name!r}.")
         parents[joint.b] = joint.name
+        beyond.setdefault(joint.a, []).append(entry)
     roots = [name for name in found.links if name not in parents]
     if not found.links:
         root.wrong("<robot> has no links.")
@@ -173,37 +174,40 @@ def _placed(found, joints, root):
             f"a robot has one root link, this one has {len(roots)}: {', '.join(roots[:5])}."
             if roots else "the joints form a circle: no link is without a parent."
         )  # fmt: skip
-    order, placed, waiting = [], set(roots), joints
-    while waiting:
-        ready = [entry for entry in waiting if entry[0].a in placed]
-        if not ready:
-            root.wrong(f"the joints form a circle at {waiting[0][0].name!r}.")
-            break
-        for joint, at, u, *mimicked in ready:
-            frame = found.links[joint.a].frame @ at
+    placed, ahead = set(), roots
+    while ahead:
+        name = ahead.pop()
+        for joint, at, u in beyond.pop(name, ()):
+            one, other = found.links[joint.a], found.links[joint.b]
             axis = u / (np.linalg.norm(u) or 1.0)
-            start = mimicked[2] if mimicked[0] else 0.0
-            moved = {"revolute": turned(start * axis), "prismatic": shifted(start * axis)}.get(joint.kind, HERE)
-            joint.point, joint.axis = frame.p, frame.R @ axis
-            found.links[joint.b].frame = frame @ moved
-            placed.add(joint.b)
-            order.append((joint, *mimicked))
-        waiting = [entry for entry in waiting if entry not in ready]
-    found.joints = [joint for joint, *_ in sorted(order, key=lambda pair: _index(joints, pair[0]))]
-    return order
+            moved = {"revolute": turned, "prismatic": shifted}.get(joint.kind, lambda _: HERE)(joint.start * axis)
+            other.frame, other.start = one.frame @ at, one.start @ at @ moved
+            joint.point, joint.axis = other.frame.p, other.frame.R @ axis
+            placed.add(joint)
+            ahead.append(joint.b)
+    if beyond:
+        root.wrong(f"the joints form a circle at {next(iter(beyond.values()))[0][0].name!r}.")
+    found.joints = [joint for joint, *_ in joints if joint in placed]
 
 
-def _index(joints, joint):
-    return next(i for i, entry in enumerate(joints) if entry[0] is joint)
+def _couple(found, joints, report):
+    """Couple joints that mimic others to the first of their chain, and start them there.
 
-
-def _couple(found, order, report):
-    """Joints that mimic others."""
-    names = {joint.name for joint, *_ in order}
-    for joint, driver, ratio, _ in order:
-        if driver is None:
+    q = c q' + d,  q' = c' q'' + d'  ->  q = c c' q'' + c d' + d
+    """
+    mimics = {joint.name: mimic for joint, mimic in joints}
+    for joint, mimic in joints:
+        if mimic is None:
             continue
-        if driver not in names or driver == joint.name:
-            report.leave("joint that mimics another one", joint.name, f"there is no other joint {driver!r}")
+        driver, ratio, offset = mimic
+        seen = {joint.name}
+        while driver not in seen and mimics.get(driver) is not None:
+            seen.add(driver)
+            driver, c, d = mimics[driver]
+            ratio, offset = ratio * c, ratio * d + offset
+        if driver in seen or driver not in mimics:
+            reason = "they mimic each other in a circle" if driver in seen else f"there is no other joint {driver!r}"
+            report.leave("joint that mimics another one", joint.name, reason)
         else:
-            found.couplings.append(Coupling(f"{joint.name} mimics {driver}", driver, joint.name, ratio))
+            joint.start = offset
+            found.couplings.append(Coupling(f"{joint.name} mimics {mimic[0]}", driver, joint.name, ratio, offset))

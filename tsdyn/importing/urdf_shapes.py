@@ -17,14 +17,12 @@ def colours(root):
 def _colour(node, known):
     """The colour of an element <material>."""
     named, colour = node.get("name") or "", node.one("color")
-    for texture in node.all("texture"):
-        texture.skip()
     return known.get(named, "") if colour is None else hexadecimal(colour.attribute("rgba", 4, [0.5, 0.5, 0.5, 1.0]))
 
 
-def add_shapes(link, node, folder, report, materials):
+def add_shapes(link, node, outside, report, materials):
     """Add the shapes of an element <link>; contact shapes are listed."""
-    _add(link, node, report, lambda one, report: _shape(one, link.name, folder, report, materials))
+    _add(link, node, report, lambda one, report: _shape(one, link.name, outside, report, materials))
 
 
 def _add(link, node, report, shape_of):
@@ -38,7 +36,7 @@ def _add(link, node, report, shape_of):
             link.shapes.append(shape)
 
 
-def _shape(node, name, folder, report, materials):
+def _shape(node, name, outside, report, materials):
     """The `DrawnShape` of an element <visual> or <collision>, or None."""
     node.get("name")
     at, geometry, material = node.one("origin"), node.one("geometry"), node.one("material")
@@ -48,7 +46,7 @@ def _shape(node, name, folder, report, materials):
         return None
     place, shape = HERE if at is None else placed(at), geometry.nodes[0]
     geometry.all(shape.tag)
-    made = _primitive(shape, name, folder, report)
+    made = _primitive(shape, name, outside, report)
     return None if made is None else DrawnShape(*made, place, colour)
 
 
@@ -57,11 +55,11 @@ def placed(node):
     return Frame(node.attribute("xyz", 3, np.zeros(3)), roll_pitch_yaw(node.attribute("rpy", 3, np.zeros(3))))
 
 
-def _primitive(shape, name, folder, report):
+def _primitive(shape, name, outside, report):
     """Kind and arguments of a shape."""
     if shape.tag == "mesh":
         uri, scale = shape.demand("filename"), shape.attribute("scale", 3, np.ones(3))
-        return None if report is None else mesh(uri, scale, folder, report, name)
+        return None if report is None else mesh(uri, scale, outside, report, name)
     if shape.tag == "box":
         kind, sizes = "Box", shape.attribute("size", 3, np.ones(3))
         arguments = (sizes,)
@@ -83,14 +81,14 @@ def _primitive(shape, name, folder, report):
     return kind, arguments
 
 
-def add_sdf_shapes(link, node, frames, folder, report):
+def add_sdf_shapes(link, node, frames, outside, report):
     """Add the shapes of an SDF element <link>."""
-    _add(link, node, report, lambda one, report: _sdf_shape(one, link.name, frames, folder, report))
+    _add(link, node, report, lambda one, report: _sdf_shape(one, link.name, frames, outside, report))
     for one in node.all("collision"):
         one.skip()
 
 
-def _sdf_shape(node, name, frames, folder, report):
+def _sdf_shape(node, name, frames, outside, report):
     node.get("name")
     place, geometry, material = frames.pose(node), node.one("geometry"), node.one("material")
     colour = ""
@@ -99,21 +97,19 @@ def _sdf_shape(node, name, frames, folder, report):
             child = material.one(tag)
             if child is not None and not colour:
                 colour = hexadecimal(child.numbers(" ".join(child.text.split()[:3]), 3, np.full(3, 0.5), f"<{tag}>"))
-        material.skip()
     if geometry is None or not geometry.nodes:
         return None
     shape = geometry.nodes[0]
     geometry.all(shape.tag)
-    made = _sdf_primitive(shape, name, folder, report)
+    made = _sdf_primitive(shape, name, outside, report)
     return None if made is None else DrawnShape(*made, place, colour)
 
 
-def _sdf_primitive(shape, name, folder, report):
+def _sdf_primitive(shape, name, outside, report):
     """Kind and arguments of a shape; capsules are drawn as cylinders."""
     if shape.tag == "mesh":
         uri, scale = shape.one("uri"), shape.value("scale", 3, np.ones(3))
-        shape.skip()
-        return None if report is None or uri is None else mesh(uri.text, scale, folder, report, name)
+        return None if report is None or uri is None else mesh(uri.text, scale, outside, report, name)
     sizes = {
         "box": lambda: (shape.value("size", 3, np.ones(3)),),
         "cylinder": lambda: (shape.scalar("radius", 1.0), shape.scalar("length", 1.0)),

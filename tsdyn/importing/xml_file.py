@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import MissingDependency, StorageError
+from .. import regular_files
+from ..errors import InvalidFile, MissingDependency
 from ..files.mistakes import Mistakes
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+OUTSIDE = "is outside the folder of the file; ts.load(path, outside=True) reads it"
 LARGEST = 1 << 26  # bytes of a file
+MOST = 1 << 19  # elements and attributes of a file: half a gigabyte once they are read
 
 
 class Lines:
@@ -22,15 +29,17 @@ class Lines:
         return path
 
 
-def read(path: Any, data: bytes | None = None) -> tuple[Node, Mistakes]:
+def read(path: Any) -> tuple[Node, Mistakes]:
     """The root element of a file, and the `Mistakes` to be found in it.
+
+    A namespace of the root element is left out of the tags; elements of other ones keep theirs.
 
     Raises
     ------
     InvalidFile
-        If it is no XML, or has a document type, which could define entities.
+        If it is no XML, has too many elements, or a document type, which could define entities.
     StorageError
-        If it can't be read or is too large.
+        If it can't be read, is too large or no regular file.
     MissingDependency
         If lxml is not installed.
     """
@@ -39,36 +48,37 @@ def read(path: Any, data: bytes | None = None) -> tuple[Node, Mistakes]:
     except ImportError as error:
         raise MissingDependency("URDF, MJCF and SDF files need lxml: pip install 'tsdyn[import]'.") from error
     mistakes = Mistakes(str(path), Lines)
-    data = content(path) if data is None else data
-    parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=True, remove_pis=True
+    options = {"resolve_entities": False, "no_network": True, "load_dtd": False, "huge_tree": False}
+    elements = etree.iterparse(
+        BytesIO(regular_files.read(path, LARGEST)), ("start",), remove_comments=True, remove_pis=True, **options
     )
     try:
-        root = etree.fromstring(data, parser)
+        count = 0
+        for _, element in elements:
+            count += 1 + len(element.attrib)
+            if count > MOST:
+                mistakes.add((element.sourceline or 1, 1), f"the file has more than {MOST} elements and attributes.")
+                mistakes.demand_none()
+        root = elements.root
     except (etree.XMLSyntaxError, ValueError) as error:
+        if isinstance(error, InvalidFile):
+            raise
         place = getattr(error, "position", None) or (1, 1)
         mistakes.add((max(place[0], 1), max(place[1], 1)), f"this is no XML: {getattr(error, 'msg', None) or error}.")
         mistakes.demand_none()
     if root.getroottree().docinfo.doctype:
         mistakes.add((1, 1), "the file has a DOCTYPE, which could define entities; remove it.")
         mistakes.demand_none()
+    space, brace, _ = root.tag.partition("}")
+    for element in root.iter(f"{space}}}*") if brace else ():
+        element.tag = element.tag.partition("}")[2]
     return Node(root, mistakes), mistakes
-
-
-def content(path: Any) -> bytes:
-    """The bytes of a file of admissible size."""
-    try:
-        with open(path, "rb") as file:
-            data = file.read(LARGEST + 1)
-    except OSError as error:
-        raise StorageError(f"{path} can't be read: {error.strerror or error}.") from error
-    if len(data) > LARGEST:
-        raise StorageError(f"{path} is too large for a description of a robot: more than {LARGEST} bytes.")
-    return data
 
 
 class Node:
     """An element; attributes and children that are asked for count as read."""
+
+    __slots__ = ("_nodes", "_read", "_whole", "element", "line", "mistakes", "tag")
 
     def __init__(self, element: Any, mistakes: Mistakes) -> None:
         self.element, self.mistakes = element, mistakes
@@ -84,6 +94,14 @@ class Node:
         if self._nodes is None:
             self._nodes = [Node(one, self.mistakes) for one in self.element if isinstance(one.tag, str)]
         return self._nodes
+
+    def walk(self) -> Iterator[Node]:
+        """Itself and all elements below it, in the order of the file."""
+        ahead = [self]
+        while ahead:
+            node = ahead.pop()
+            yield node
+            ahead += reversed(node.nodes)
 
     def all(self, *tags: str) -> list[Node]:
         """The children of some tags."""
@@ -167,6 +185,26 @@ class Node:
             known = f"<{node.tag}>" in self._read
             found += node.unread() if known else [(f"<{node.tag}>", node.line)]
         return found
+
+
+class OutsideFiles:
+    """Which files an imported one may name: those of its folder and of folders in it, links followed; or all.
+
+    Parameters
+    ----------
+    folder : Path
+    admitted : bool
+        Whether files outside may be read.
+    """
+
+    def __init__(self, folder: Path, admitted: bool) -> None:
+        self.folder, self.admitted = folder.resolve(), admitted
+
+    def reason(self, path: Path) -> str:
+        """Why a file may not be read; empty if it may."""
+        if self.admitted or path.resolve().is_relative_to(self.folder):
+            return ""
+        return OUTSIDE
 
 
 def exists(path: Path) -> bool:

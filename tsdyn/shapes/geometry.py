@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..calls import fitting_constructor
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, InvalidFile
 from ..validation import floats, positive, vector3
 from .mesh_files import read
 
@@ -163,7 +163,11 @@ class Mesh(Geometry):
     Raises
     ------
     InvalidArgument
-        If the file can't be read, or an index is out of range.
+        If an array has another shape, or an index is out of range.
+    StorageError
+        If the file can't be read, is too large (256 MB) or no regular file.
+    InvalidFile
+        If its content is wrong.
 
     Examples
     --------
@@ -181,17 +185,18 @@ class Mesh(Geometry):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        pair = self.source if isinstance(self.source, (tuple, list)) else read(self.source)
+        given = isinstance(self.source, (tuple, list))
+        pair, wrong = (self.source, InvalidArgument) if given else (read(self.source), InvalidFile)
         if len(pair) != 2:
             raise InvalidArgument(f"Mesh: source must be a file or (vertices, faces), got {len(pair)} parts.")
         vertices, indices = floats(pair[0]), floats(pair[1])
         if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
-            raise InvalidArgument(f"Mesh: vertices must be finite and have the shape (v, 3), got {vertices.shape}.")
+            raise wrong(f"Mesh: vertices must be finite and have the shape (v, 3), got {vertices.shape}.")
         faces = indices.astype(int) if np.isfinite(indices).all() else np.zeros(0)
         if faces.ndim != 2 or faces.shape[1] != 3 or (faces != indices).any():
-            raise InvalidArgument(f"Mesh: faces must be whole numbers of the shape (f, 3), got {indices.shape}.")
+            raise wrong(f"Mesh: faces must be whole numbers of the shape (f, 3), got {indices.shape}.")
         if not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
-            raise InvalidArgument(f"Mesh: faces must have indices from 0 to {len(vertices) - 1}, one triangle or more.")
+            raise wrong(f"Mesh: faces must have indices from 0 to {len(vertices) - 1}, one triangle or more.")
         self._set(vertices=positive(self.scale, "Mesh: scale") * vertices, faces=faces)
 
 

@@ -25,7 +25,14 @@ LOADERS = {}  # of files of packages above: by the name of the format, a functio
 
 
 @fitting
-def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, free_base: bool = False) -> Any:
+def load(
+    path: Place,
+    scene: Scene | None = None,
+    *,
+    allow_code: bool = False,
+    free_base: bool = False,
+    outside: bool = False,
+) -> Any:
     """Return the scene, solution or ensemble of a file; nothing in it is executed.
 
     Parameters
@@ -41,6 +48,9 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, f
         before are found anyway.
     free_base : bool
         Whether the root link of a URDF is free to move; else it is fixed to the ground.
+    outside : bool
+        Whether a URDF, MJCF or SDF file may name files outside its folder, such as meshes in a folder beside it, or
+        files to include. Otherwise only those in its folder and in folders below are read; links are followed first.
 
     Returns
     -------
@@ -75,13 +85,14 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, f
         raise InvalidArgument(f"allow_code must be True or False, got {allow_code!r}.")
     if not isinstance(free_base, bool):
         raise InvalidArgument(f"free_base must be True or False, got {free_base!r}.")
+    if not isinstance(outside, bool):
+        raise InvalidArgument(f"outside must be True or False, got {outside!r}.")
     suffix = Path(path).suffix.lower()
     if suffix in SCENES:
         if scene is not None:
             raise InvalidArgument("scene= is for solutions; a scene file holds its own.")
-        return scene_file(path, allow_code, free_base)[0]
-    if free_base:
-        raise InvalidArgument("free_base= is for URDF files.")
+        return scene_file(path, allow_code, free_base, outside)[0]
+    _demand_robot(free_base, outside)
     if suffix == ".xacro":
         raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
     from ..storage.formats import SUFFIXES
@@ -98,15 +109,24 @@ def load(path: Place, scene: Scene | None = None, *, allow_code: bool = False, f
     return load_solution(path, scene, allow_code, (Scene, Solution))
 
 
-def scene_file(path: Place, allow_code: bool = False, free_base: bool = False) -> tuple[Scene, dict[str, Any]]:
+def scene_file(
+    path: Place, allow_code: bool = False, free_base: bool = False, outside: bool = False
+) -> tuple[Scene, dict[str, Any]]:
     """Return the scene of a file, and the arguments of `simulate` that the table `run` of a TOML file asks for."""
     if Path(path).suffix.lower() != ".toml":
         from ..importing.reading import load as imported
 
-        return imported(path, Scene, free_base), {}
+        return imported(path, Scene, free_base, outside), {}
+    _demand_robot(free_base, outside)
+    return document_of(path, allow_code)[:2]
+
+
+def _demand_robot(free_base, outside):
+    """Refuse options of the files of other programs."""
     if free_base:
         raise InvalidArgument("free_base= is for URDF files.")
-    return document_of(path, allow_code)[:2]
+    if outside:
+        raise InvalidArgument("outside= is for URDF, MJCF and SDF files.")
 
 
 def document_of(path: Place, allow_code: bool = False, study: Mapping[str, Any] | bool | None = None) -> Any:

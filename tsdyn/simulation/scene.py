@@ -168,8 +168,9 @@ class Scene(OfFile):
             About the centroid, body frame; not negative, and no principal value above the sum of the other two.
         position, velocity : array_like (3,), m and m/s
             Of the centroid, ground frame.
-        orientation : array_like (4,) or scipy.spatial.transform.Rotation
-            Euler parameters (e0, e1, e2, e3), scalar first, body to ground; of unit length to 1e-6, then scaled.
+        orientation : array_like (4,) or (3, 3), or scipy.spatial.transform.Rotation
+            Euler parameters (e0, e1, e2, e3), scalar first; or the rotation matrix, as `solution.rotation` gives it.
+            Body to ground; of unit length, or orthogonal, to 1e-6, then scaled.
         angular_velocity : array_like (3,), rad/s
             Body frame.
         name : str, optional

@@ -3,12 +3,12 @@
 import numpy as np
 
 from ..formulations.locked_orientations import keep_turning
-from ..methods.integrator import registered
 from ..runs import step_engine
 from ..runs.trajectory import Pieces, Trajectory
 from ..sparse.constraint_graphs import set_redundant
 from ..taylor import series_engine
 from . import local_origin
+from .run_requests import method_of, own_record
 from .scene_cache import prepared
 
 ARRAYS = ("blocks", "charts", "points", "first", "angles", "asked")
@@ -28,7 +28,7 @@ def record_of(trajectory):
         found = {"kind": "series", "highest": int(rest[0])}
     else:
         method, form, constraint_tol = rest
-        found = {"kind": "steps", "method": _method_record(method), "form": form, "constraint_tol": constraint_tol}
+        found = {"kind": "steps", "method": own_record(method), "form": form, "constraint_tol": constraint_tol}
     arrays = {name: np.asarray(getattr(trajectory, name)) for name in ARRAYS}
     return {**found, "start": float(trajectory.start), "derived": derived_record(packed)}, arrays
 
@@ -47,22 +47,6 @@ def take_derived(packed, record):
         set_redundant(packed, np.array(rows, np.int64))
     if record["turning"]:
         keep_turning(packed, record["turning"])
-
-
-def _method_record(method):
-    """The class and the settings of a method."""
-    settings = {name: value.item() if isinstance(value, np.generic) else value for name, value in vars(method).items()}
-    if not all(value is None or isinstance(value, (bool, int, float, str)) for value in settings.values()):
-        raise TypeError(f"the settings of {method!r} are not numbers")
-    return [type(method).__name__.lower().replace("_", ""), settings]
-
-
-def _method(record):
-    name, settings = record
-    kind = registered()[name]
-    method = kind.__new__(kind)
-    vars(method).update(settings)
-    return method
 
 
 def trajectory_of(numbers, arrays, scene, packed):
@@ -88,7 +72,7 @@ def trajectory_of(numbers, arrays, scene, packed):
     if kind == "series":
         again = series_engine.read_again, packed, numbers["highest"]
     else:
-        again = step_engine.read_again, packed, _method(numbers["method"]), numbers["form"], numbers["constraint_tol"]
+        again = step_engine.read_again, packed, method_of(numbers["method"]), numbers["form"], numbers["constraint_tol"]
     blocks, charts, points, first, angles, asked = (arrays[name] for name in ARRAYS)
     stops = np.stack([asked, np.ones(asked.size)], axis=1)
     return Trajectory((None, again), (blocks, charts, points), numbers["start"], first, angles, stops)

@@ -36,6 +36,7 @@ from .write_errors import demand_folder, writing
 HDF5, ZARR = (".h5", ".hdf5", ".nc"), (".zarr",)  # suffixes of paths
 SUFFIXES = *HDF5, *ZARR
 CHUNK, LONGEST = 1 << 15, 1 << 14  # floats of a chunk, and rows at most
+NUMBERS = "<f8", "<i8", "|b1", "|u1"  # types of the arrays that files hold, by NumPy's names
 
 
 class Column(NamedTuple):
@@ -64,6 +65,13 @@ def demand_rows(path, column, found, count):
     """Raise StorageError if a column has fewer rows than were written."""
     if found < count:
         raise StorageError(f"{path}: {column} has {found} rows of {count} that were written.")
+
+
+def demand_record(record, kinds):
+    """Raise ValueError or TypeError unless a table of JSON has these names, each of its type."""
+    for name, kind in kinds.items():
+        if not isinstance(record[name], kind) or (isinstance(record[name], bool) and kind is not bool):
+            raise TypeError(f"{name} is {type(record[name]).__name__}")
 
 
 @contextlib.contextmanager

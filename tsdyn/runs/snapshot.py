@@ -84,7 +84,7 @@ def restore(memory, arrays, limits):
             if isinstance(part, Record):
                 _restore_record(name, part, given, limits)
             elif own.dtype.kind == "i" and own.size:
-                demand(given.min() >= 0 and given.max() <= most and given[0] < max(own.size, 2), name)
+                demand(given.min() >= 0 and given.max() <= max(most, own.size) and given[0] < max(own.size, 2), name)
         for at, program in _programs(memory.context):
             arrays["context.expansion.loads"][at : at + len(program)] = program
         for name, part in found.items():
@@ -100,8 +100,9 @@ def _restore_record(name, record, given, limits):
         if field in own:
             setattr(found, field, getattr(record, field))
             continue
-        most = record.highest if (kind.__name__, field) == ("Orders", "next") else limits.get(field, MOST)
-        demand(what is float or -1 <= getattr(found, field) <= most, f"{name}.{field}")
+        low, high = (0, limits[field]) if field in limits else (-MOST, MOST)
+        high = record.highest if (kind.__name__, field) == ("Orders", "next") else high
+        demand(what is float or low <= getattr(found, field) <= high, f"{name}.{field}")
     given[...] = np.frombuffer(found, np.uint8)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..files import scene_text
+from ..jit.code_hash import is_ours
 from ..methods.integrator import is_own, registered
 from ..observables.kinematics import Anchor
 from ..observables.state import RememberingState, State
@@ -50,10 +51,13 @@ def request_of(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
         found["angles"] = state.angles if getattr(state, "anchor", None) is not None else None
         arrays |= {f"state.{name}": np.asarray(array, float) for name, array in found.items() if array is not None}
         numbers["t"] = float(getattr(state, "t", given["t_span"][0]))
-    try:
-        arrays["scene"] = np.frombuffer(scene_text.write(scene, type(scene)).encode(), np.uint8)
-    except InvalidArgument as error:
-        numbers["lacks"] = str(error)
+    foreign = {type(item) for item in (*scene._added, *scene.forces) if not is_ours(type(item).__module__)}
+    numbers["lacks"] = ", ".join(sorted(f"{kind.__module__}.{kind.__qualname__}" for kind in foreign))
+    if not foreign:
+        try:
+            arrays["scene"] = np.frombuffer(scene_text.write(scene, type(scene)).encode(), np.uint8)
+        except InvalidArgument as error:
+            numbers["lacks"] = str(error)
     return numbers, arrays
 
 

@@ -9,7 +9,7 @@ from ..elements.force import Force
 from ..errors import InvalidArgument, InvalidFile
 from . import run_table, study_tables, toml_text
 from .build import build
-from .describe import describe
+from .describe import describe, outline
 from .mistakes import Mistakes
 from .places import Places
 from .values import encode
@@ -33,6 +33,17 @@ def write(scene, make):
         raise InvalidArgument(f"the scene can't be written: read again, {error} {KEEP}") from error
     _demand_same(scene, twin)
     return text
+
+
+def write_outline(scene, make):
+    """The text of a scene without what only its owner can pass again, which is named; "" where that is no scene."""
+    document, left = outline(scene)
+    text = toml_text.write(document)
+    try:
+        read(text, "the outline", make, None)
+    except InvalidFile:
+        return "", left
+    return text, left
 
 
 class Document(NamedTuple):

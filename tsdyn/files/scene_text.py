@@ -1,5 +1,6 @@
 """A scene as TOML text, and the text as a scene."""
 
+import re
 import tomllib
 from typing import Any, NamedTuple
 
@@ -15,7 +16,9 @@ from .places import Places
 from .values import encode
 
 KEEP = "A class of your own must keep each argument of its __init__ as an attribute of the same name."
-LARGEST = 1 << 28  # bytes of a file that is read
+LARGEST = 1 << 26  # bytes of a file that is read: what Python makes of it takes some thirty times as many
+DEEP = 64  # parts of a key between dots: reading one takes time and memory by their square
+DOTTED = re.compile(rf"""\.(?:[ \t]*(?:[\w-]{{1,999}}|"[^"\n]{{0,999}}"|'[^'\n]{{0,999}}')[ \t]*\.){{{DEEP}}}""")
 
 
 def write(scene, make):
@@ -85,6 +88,9 @@ def read_all(text, name, make, simulate, allow_code=False, study=None):
 def parsed(text, name):
     """The document of a TOML text, and the `Mistakes` to be found in it; raises InvalidFile if it is no TOML."""
     try:
+        deep = DOTTED.search(text)
+        if deep:
+            raise ValueError(f"a key has more than {DEEP} parts between dots")
         document = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         mistakes = Mistakes(name, Places(""))

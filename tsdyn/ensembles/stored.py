@@ -15,7 +15,7 @@ import numpy as np
 from .._version import __version__
 from ..errors import Status, StorageError
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
-from ..storage.formats import Column, Table, format_of
+from ..storage.formats import Column, Table, demand_shapes, format_of
 from ..storage.write_errors import demand_writable, writing
 from .chunks import empty, fitted
 from .keeping import TIMES
@@ -67,6 +67,8 @@ class StoredResults:
             raise StorageError(
                 f"{self.path} is the store of another ensemble: scene, parameters, options or functions differ."
             )
+        parameters = self.study.cases.part(slice(0, 1)).table
+        demand_shapes(self.path, {CASE: table_of(self.study, parameters, {})})
         if callable(self.study.keep) and not any(map(_is_kept, self._format.shapes(self.path))):
             return 0
         count = self._format.count(self.path, [CASE, "status", "q", "qd"])

@@ -215,7 +215,7 @@ def _outlined(path, record, arrays, why, kind):
     columns = [i for i, name in enumerate(known["angles"]) if name in here]
     demand(0 <= len(known["angles"]) <= known["width"], "the angles of joints")
     found = _solution(path, {**record, "trajectory": None}, arrays, scene, Outline, known["width"])
-    held_arrays = {f"held_{name}": arrays[f"held_{name}"] for name in HELD}
+    held_arrays = {f"held_{name}": arrays[f"held_{name}"].astype(float) for name in HELD}
     count = found._length()
     for name, array in held_arrays.items():
         demand(array.shape == (count, *([len(known["rows"])] if name == "held_multipliers" else [])), name)
@@ -243,8 +243,13 @@ def _solution(path, record, arrays, scene, kind, width=None):
     demand(record["tables"] == {name: [c.name for c in table.columns] for name, table in tables.items()}, "its tables")
     demand_shapes(path, tables)
     n = int(packed.system.bodies[:, 1].sum())
+    arrays = {name: array if name in ("scene", "outline") else array.astype(float) for name, array in arrays.items()}
     demand(arrays["last"].shape == (3, n) and arrays["angles"].size + arrays["memory"].size == width, "its last state")
     demand_counts(record["counts"], counts.NAMES)
+    demand_counts(record["seconds"], ("prepare", "run"))
+    start, end = record["span"]
+    demand_counts({"start": start, "end": end, "error": record["energy_error"]}, ("start", "end", "error"))
+    demand(all(isinstance(said, (str, int, float)) for said in record["provenance"].values()), "its provenance")
     events = None, None, None
     if record["events"] is not None:
         events = [[arrays[f"event_{i}_{name}"] for i in range(record["events"])] for name in ("t", "q", "qd")]

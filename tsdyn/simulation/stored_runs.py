@@ -46,6 +46,7 @@ def demand_path(path, name):
 def archive_of(given, kept, history, numbers, arrays):
     """The `Archive` of a run, made or, with the numbers and arrays of a checkpoint, gone on with."""
     from ..storage.archive import Archive, tables_of
+    from ..storage.formats import demand_shapes, format_of
     from ..storage.write_errors import writing
 
     facts = _facts(given, kept)
@@ -54,6 +55,9 @@ def archive_of(given, kept, history, numbers, arrays):
     remembered = kept.handles.count + kept.packed.system.memory.size
     tables = tables_of(kept.packed.bodies, remembered, history)
     attributes = {"source": f"tsdyn {__version__}", "scene": facts["scene"]}
+    if numbers is not None:
+        format_of(given["store"]).demand_plain(given["store"])
+        demand_shapes(given["store"], tables)
     archive = Archive(Path(given["store"]).absolute(), tables, attributes, facts["interval"], _asked(given), facts)
     with writing(archive.path):
         if numbers is None:
@@ -162,8 +166,8 @@ def demand_same_place(path, numbers):
         )
     if numbers["machine"] != here["machine"]:
         raise StorageError(
-            f"{path} was written on another machine ({', '.join(numbers['machine'][:3])}): the bits would differ. "
-            "Go on there, or start anew from the last output: simulate(state=...)."
+            f"{path} was written on another machine ({', '.join(map(str, numbers['machine'][:3]))}): the bits would "
+            "differ. Go on there, or start anew from the last output: simulate(state=...)."
         )
 
 

@@ -16,7 +16,7 @@ BUFFER, how many floats are gathered before they are written, and functions for 
                                                numbers within it, of sizes that it holds
     read(path, column, part)                   a slice of a column
     count(path, columns)                       rows that all of these columns have
-    shapes(path)                               of all columns, by name
+    shapes(path)                               of all columns of floats, by name
     demand_whole(path, columns, count)         raises StorageError unless so many rows can be read of each
 
 and for what is written at once, beside the tables

@@ -164,7 +164,11 @@ def attributes(path):
 def shapes(path):
     """As formats.py says."""
     with reading(path), _opened(path) as file:
-        return {name: array.shape for name, array in file.items() if isinstance(array, h5py.Dataset)}
+        return {
+            name: array.shape
+            for name, array in file.items()
+            if isinstance(array, h5py.Dataset) and array.dtype == float
+        }
 
 
 def demand_plain(path):

@@ -115,7 +115,7 @@ def get(path, group):
 def shapes(path):
     """As formats.py says."""
     with reading(path):
-        return {name: array.shape for name, array in _group(path, "r").arrays()}
+        return {name: array.shape for name, array in _group(path, "r").arrays() if array.dtype == float}
 
 
 def _demand_chunks(path, array):

@@ -16,8 +16,8 @@ PLACES = {"tsdyn": ROOT / "tsdyn", "tsdyn.constraints": ROOT / "constraints", "t
 # lowest first: a module imports from its own package and those (or modules that lie flat in tsdyn/) before it
 ORDER = [
     "errors",
-    "_version",
     "regular_files",
+    "_version",
     "validation",
     "other_names",
     "_discovery",

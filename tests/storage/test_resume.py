@@ -302,10 +302,19 @@ def test_no_checkpoint(tmp_path):
     refuse(lambda: ts.resume(3), ts.InvalidArgument, ("path must be a path", "3"))
 
 
-def test_a_file_runs_no_code(stopped):
+def test_a_file_runs_no_code(stopped, tmp_path):
+    """A pickle that would run a command, in each array of a checkpoint, and in place of it."""
     import pickle
 
-    numbers, arrays = checkpoint.read(stopped)
-    arrays["scene"] = np.frombuffer(pickle.dumps(os.getcwd), np.uint8)
-    checkpoint.write(stopped, numbers, arrays)
-    refuse(lambda: ts.resume(stopped), ts.StorageError, ("getcwd", "scene="))
+    class Evil:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "executed"),)
+
+    payload, (numbers, arrays) = pickle.dumps(Evil()), checkpoint.read(stopped)
+    for name in arrays:
+        checkpoint.write(stopped, numbers, arrays | {name: np.frombuffer(payload, np.uint8)})
+        refuse(lambda: ts.resume(stopped), ts.StorageError, (), name)
+    for content in (payload, checkpoint.FORMAT + b"0" * 64 + b"\n" + payload):
+        checkpoint.place(stopped)[0].write_bytes(content)
+        refuse(lambda: ts.resume(stopped), ts.StorageError, ("checkpoint",))
+    assert not (tmp_path / "executed").exists()

@@ -22,7 +22,7 @@ def compile_kernels(everything=False):
         return 0, None, {"everything": "TSDYN_DEBUG is set, so nothing is compiled"}
     names = {name: kernel for kernel in (_all() if everything else _default()) if (name := name_of(kernel))}
     if cache.folder() is None:
-        return len(names), None, {"everything": "no folder can be written to; set NUMBA_CACHE_DIR to one"}
+        return len(names), None, {"everything": "no folder can be written to; set TSDYN_CACHE_DIR to one"}
     failed = compile_ahead(names.values(), asked=True)
     absent = {name: "the file could not be written" for name, kernel in names.items() if not is_stored(kernel)}
     return len(names), cache.folder(), absent | failed

@@ -6,13 +6,22 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from ..errors import InvalidArgument, InvalidFile, StorageError, TsdynError
+from ..errors import InvalidArgument, InvalidFile, Status, StorageError
 from ..files import scene_text
+from ..runs.snapshot import demand
 from ..simulation.scene import Scene
 from ..simulation.stored_runs import hash_of
+from ..storage.formats import damaged, demand_record
 from .cases import Cases, started
+from .keeping import FINAL, TIMES
 from .results import Ensemble
 from .saving import FORMAT, REDUCED
+
+RECORD = {  # of every file, with the types of it
+    "count": int, "keep": str, "is_single": bool, "kept": list, "parameters": list, "coordinates": list,
+    "messages": dict, "reason": str, "threads": int, "lanes": int, "interrupted": bool, "options": dict,
+    "lacking": list,
+}  # fmt: skip
 
 
 def load(path: Path, scene: Scene | None, allow_code: bool) -> Ensemble:
@@ -21,18 +30,15 @@ def load(path: Path, scene: Scene | None, allow_code: bool) -> Ensemble:
 
     path = Path(path).absolute()
     record, arrays = saved_file.read(path, FORMAT)
-    try:
+    with damaged(path):
         return SavedEnsemble(path, record, arrays, (scene, allow_code))
-    except TsdynError:
-        raise
-    except (KeyError, ValueError, IndexError, TypeError, AttributeError) as error:
-        raise StorageError(f"{path} is damaged, or lacks something: {type(error).__name__}: {error}.") from error
 
 
 class SavedEnsemble(Ensemble):
     """An ensemble of a file."""
 
     def __init__(self, path, record, arrays, given):
+        _demand_whole(record, arrays)
         names = [name for name, _ in record["parameters"]]
         columns = {name: arrays[f"parameter_{i}"] for i, name in enumerate(names)}
         kept = {name: arrays[f"kept_{i}"] for i, name in enumerate(record["kept"])}
@@ -93,6 +99,32 @@ class SavedEnsemble(Ensemble):
     def _values(self, i):
         study = self._study
         return started(study.scene, study.cases.values(i), study.given["t_span"][0], study.free)
+
+
+def _demand_whole(record, arrays):
+    """Raise ValueError unless all arrays have a row for each case, and coordinates a column each."""
+    demand_record(record, RECORD)
+    count, names = record["count"], record["coordinates"]
+    pairs, messages = record["parameters"], record["messages"]
+    words = [
+        *names,
+        *record["kept"],
+        *(word for pair in pairs for word in pair),
+        *messages.values(),
+        *record["lacking"],
+    ]
+    demand(all(isinstance(word, str) for word in words), "words")
+    times = arrays["times"]
+    grid = times.shape if record["keep"] == TIMES else ()
+    demand(count >= 0 and times.ndim == 1 and record["keep"] in (FINAL, TIMES, REDUCED), "cases")
+    for name in ("q", "qd"):
+        demand(arrays[name].shape == (count, *grid, len(names)), name)
+    demand(arrays["status"].shape == arrays["reached"].shape == (count,), "status")
+    demand(set(arrays["status"].tolist()) <= {*map(int, Status)}, "status")
+    for name in (
+        f"{kind}_{i}" for kind, known in (("parameter", pairs), ("kept", record["kept"])) for i in range(len(known))
+    ):
+        demand(arrays[name].shape[:1] == (count,), name)
 
 
 def _lost(solution):

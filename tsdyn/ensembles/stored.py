@@ -15,7 +15,7 @@ import numpy as np
 from .._version import __version__
 from ..errors import Status, StorageError
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
-from ..storage.formats import Column, Table, format_of
+from ..storage.formats import Column, Table, demand_shapes, format_of
 from ..storage.write_errors import demand_writable, writing
 from .chunks import empty, fitted
 from .keeping import TIMES
@@ -62,15 +62,18 @@ class StoredResults:
         Cases of a store without arrays of `keep` have all failed, and run again: the shapes are still to be known.
         """
         attributes = self._format.attributes(self.path)
+        self._format.demand_plain(self.path)
         if attributes.get(DIGEST) != digest_of(self.study):
             raise StorageError(
                 f"{self.path} is the store of another ensemble: scene, parameters, options or functions differ."
             )
-        if callable(self.study.keep) and not any(map(_is_kept, self._format.names(self.path))):
+        parameters = self.study.cases.part(slice(0, 1)).table
+        demand_shapes(self.path, {CASE: table_of(self.study, parameters, {})})
+        if callable(self.study.keep) and not any(map(_is_kept, self._format.shapes(self.path))):
             return 0
         count = self._format.count(self.path, [CASE, "status", "q", "qd"])
         if count == self.study.cases.count:  # others are looked at when they are gone on with
-            names = [name for name in self._format.names(self.path) if _is_kept(name) or name.startswith(PARAMETER)]
+            names = [name for name in self._format.shapes(self.path) if _is_kept(name) or name.startswith(PARAMETER)]
             self._format.demand_whole(self.path, [CASE, "status", "reached", "q", "qd", *names], count)
         return count
 
@@ -104,7 +107,7 @@ class StoredResults:
 
     def _names(self):
         """What is kept in a store that is there."""
-        return filter(_is_kept, self._format.names(self.path)) if self.first else ()
+        return filter(_is_kept, self._format.shapes(self.path)) if self.first else ()
 
     def _open(self, chunk, last=False):
         """Make or open the store; False if the shapes of what is kept aren't known yet."""

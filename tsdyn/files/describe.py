@@ -4,6 +4,7 @@ import numpy as np
 
 from ..elements.bodies import IDENTITY, Body
 from ..errors import InvalidArgument
+from ..jit.code_hash import is_ours
 from . import types
 from .values import Unwritable, encode
 
@@ -35,6 +36,29 @@ def describe(scene):
             "of time with ts.motions, such as 0.1 * np.sin(2.0 * ts.motions.time), or as a ts.Table."
         )
     return {key: value for key, value in document.items() if value != []}
+
+
+def outline(scene):
+    """The document of a scene without the parts that a file can't hold, or that are of classes not tsdyn's own.
+
+    Returns
+    -------
+    dict, list of str
+        The document; the names of the parts that are left out.
+    """
+    left, document = [], {"version": VERSION, "gravity": scene.gravity.tolist()}
+    document["body"] = [_body(body) for body in scene.bodies]
+    for key, items in (("constraint", scene._added), ("force", scene.forces)):
+        document[key] = []
+        for item in items:
+            refused = [] if is_ours(type(item).__module__) else [item.name]
+            found = {} if refused else _item(item, refused)
+            named = [name for value in found.values() for name in (value if isinstance(value, list) else [value])]
+            if refused or any(isinstance(name, str) and name in left for name in named):
+                left.append(item.name)
+            else:
+                document[key].append(found)
+    return {key: value for key, value in document.items() if value != []}, left
 
 
 def _shared(names, what):

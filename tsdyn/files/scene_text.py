@@ -1,5 +1,6 @@
 """A scene as TOML text, and the text as a scene."""
 
+import re
 import tomllib
 from typing import Any, NamedTuple
 
@@ -9,13 +10,15 @@ from ..elements.force import Force
 from ..errors import InvalidArgument, InvalidFile
 from . import run_table, study_tables, toml_text
 from .build import build
-from .describe import describe
+from .describe import describe, outline
 from .mistakes import Mistakes
 from .places import Places
 from .values import encode
 
 KEEP = "A class of your own must keep each argument of its __init__ as an attribute of the same name."
-LARGEST = 1 << 28  # bytes of a file that is read
+LARGEST = 1 << 26  # bytes of a file that is read: what Python makes of it takes some thirty times as many
+DEEP = 64  # parts of a key between dots: reading one takes time and memory by their square
+DOTTED = re.compile(rf"""\.(?:[ \t]*(?:[\w-]{{1,999}}|"[^"\n]{{0,999}}"|'[^'\n]{{0,999}}')[ \t]*\.){{{DEEP}}}""")
 
 
 def write(scene, make):
@@ -33,6 +36,17 @@ def write(scene, make):
         raise InvalidArgument(f"the scene can't be written: read again, {error} {KEEP}") from error
     _demand_same(scene, twin)
     return text
+
+
+def write_outline(scene, make):
+    """The text of a scene without what only its owner can pass again, which is named; "" where that is no scene."""
+    document, left = outline(scene)
+    text = toml_text.write(document)
+    try:
+        read(text, "the outline", make, None)
+    except InvalidFile:
+        return "", left
+    return text, left
 
 
 class Document(NamedTuple):
@@ -76,6 +90,9 @@ def read_all(text, name, make, simulate, allow_code=False, study=None):
 def parsed(text, name):
     """The document of a TOML text, and the `Mistakes` to be found in it; raises InvalidFile if it is no TOML."""
     try:
+        deep = DOTTED.search(text)
+        if deep:
+            raise ValueError(f"a key has more than {DEEP} parts between dots")
         document = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         mistakes = Mistakes(name, Places(""))

@@ -1,9 +1,10 @@
 """A kernel cache on disk that never answers with a stale or damaged kernel.
 
 Each file holds one compiled function. The file name contains a hash of everything that determines the machine code
-(code_hash.py); the file starts with a checksum of its content. Writes are atomic. A file that fails its checksum is
-deleted and its function is compiled again. A complete cache in a read-only folder is used in place. Numba's own
-settings and classes are not modified.
+(code_hash.py); the file starts with a checksum of its name and content. Writes are atomic. A file that fails its
+checksum is deleted and its function is compiled again. A complete cache in a read-only folder is used in place. Numba's
+own settings and classes are not modified. Kernels are pickles with machine code: folders that others than the user and
+root can write to are refused.
 """
 
 import contextlib
@@ -11,6 +12,7 @@ import hashlib
 import os
 import pickle
 import platform
+import stat
 import sys
 import tempfile
 import time
@@ -27,6 +29,8 @@ from numba.core.compiler import CompileResult
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 
+from .. import regular_files
+from ..errors import StorageError
 from .code_hash import deep_hash, is_ours, platform_hash
 
 statistics = Counter()  # "hits", "misses", "damaged", "seconds" of this process
@@ -34,12 +38,16 @@ _DAY = 86400.0
 _KEEP = 30 * _DAY  # files that nothing has read for so long are deleted
 _told = []
 _CHECKSUM = hashlib.sha256().digest_size
+FORMAT = 2  # of the files
+NO_LINKS = getattr(os, "O_NOFOLLOW", 0)
 
 
 def _bases():
     bases = []
     with contextlib.suppress(RuntimeError):  # no home folder
-        if numba.config.CACHE_DIR:
+        if os.environ.get("TSDYN_CACHE_DIR"):
+            bases.append(Path(os.environ["TSDYN_CACHE_DIR"]).expanduser().absolute())
+        elif numba.config.CACHE_DIR:
             bases.append(Path(numba.config.CACHE_DIR) / "tsdyn")
         elif sys.platform == "win32" and "LOCALAPPDATA" in os.environ:
             bases.append(Path(os.environ["LOCALAPPDATA"]) / "tsdyn" / "Cache")
@@ -51,20 +59,44 @@ def _bases():
     return [*bases, Path(tempfile.gettempdir()) / f"tsdyn-{owner}"]
 
 
+def _within(base):
+    return base / f"{platform_hash()}-{FORMAT}"
+
+
 @cache
 def folders():
-    """Return the folders that kernels are read from; those that others may write to hold pickles not to be trusted."""
+    """Return the folders that kernels are read from: pickles, so those alone that nobody else can write to."""
     folder()  # makes one, if it can
-    return tuple(path for base in _bases() if (path := base / platform_hash()).is_dir() and _trusted(base, path))
+    return tuple(path for base in _bases() if (path := _within(base)).is_dir() and not _stranger(path))
 
 
-def _trusted(base, path):
+def _stranger(path):
+    """Which folder, of a path and those above it, somebody else than the user and root can write to; None for none.
+
+    In a folder with the sticky bit, such as /tmp, everybody can write, and nobody can replace what is another's.
+    """
     if not hasattr(os, "getuid"):
-        return True
-    return all(
-        found.st_uid == os.getuid() or (found.st_uid == 0 and not found.st_mode & 0o022)
-        for found in (base.stat(), path.stat())
-    )
+        return None
+    path = path.resolve()
+    for each in (path, *path.parents):
+        found = each.stat()
+        writable = found.st_mode & (0o002 if _is_private(found.st_gid) else 0o022)
+        sticky = each != path and found.st_mode & stat.S_ISVTX
+        if found.st_uid not in (os.getuid(), 0) or (writable and not sticky):
+            return each
+    return None
+
+
+@cache
+def _is_private(group):
+    """Whether a group is root's, or has the user's name, as systems give one to each user."""
+    import grp
+    import pwd
+
+    try:
+        return group == 0 or grp.getgrgid(group).gr_name == pwd.getpwuid(os.getuid()).pw_name
+    except KeyError:
+        return False
 
 
 @cache
@@ -72,11 +104,20 @@ def folder():
     """Return the folder that kernels are written to, or None where there is none."""
     for base in _bases():
         with contextlib.suppress(OSError):
-            path = base / platform_hash()
+            path = _within(base)
             new = not path.is_dir()
             path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
             path.mkdir(exist_ok=True, mode=0o700)
-            if hasattr(os, "getuid") and {base.stat().st_uid, path.stat().st_uid} != {os.getuid()}:
+            stranger = _stranger(path)
+            if stranger is not None:
+                warnings.warn(
+                    f"tsdyn doesn't use {base} for its compiled kernels: they are code, and others than you can write "
+                    f"to {stranger}. Take the permission away (chmod go-w), or set TSDYN_CACHE_DIR to another folder.",
+                    RuntimeWarning,
+                    stacklevel=2,
+                )
+                continue
+            if hasattr(os, "getuid") and path.stat().st_uid != os.getuid():
                 continue
             tempfile.TemporaryFile(dir=path).close()
             os.utime(path)
@@ -189,11 +230,11 @@ class KernelCache(_Cache):
 
     def _load(self, name, target_context):
         for path in folders():
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(OSError, StorageError):
                 file = path / name
-                content = file.read_bytes()
+                content = regular_files.read(file, flags=NO_LINKS)
                 try:
-                    if hashlib.sha256(content[_CHECKSUM:]).digest() != content[:_CHECKSUM]:
+                    if _seal(name, content[_CHECKSUM:]) != content[:_CHECKSUM]:
                         raise ValueError("checksum")
                     found = CompileResult._rebuild(target_context, *pickle.loads(content[_CHECKSUM:]))
                 except Exception:  # whatever a damaged file makes of the loader
@@ -215,11 +256,16 @@ def _without_bodies(bitcode):
     ).as_bitcode()
 
 
+def _seal(name, payload):
+    """The checksum of a file: of its content and its name, so that a kernel under another's name is none."""
+    return hashlib.sha256(name.encode() + b"\0" + payload).digest()
+
+
 def _write(path, payload):
     """Write a file whole or not at all."""
     partial = path.with_name(f"{path.name}.{os.getpid()}-{uuid.uuid4().hex[:12]}")
     try:
-        partial.write_bytes(hashlib.sha256(payload).digest() + payload)
+        partial.write_bytes(_seal(path.name, payload) + payload)
         os.replace(partial, path)
     except OSError:
         with contextlib.suppress(OSError):
@@ -252,7 +298,7 @@ def tell(line="tsdyn: compiling kernels, once for this version and machine ...")
 @cache
 def _warn(what):
     warnings.warn(
-        f"{what}, so every process compiles them again; free some space there, or set NUMBA_CACHE_DIR to a folder that "
+        f"{what}, so every process compiles them again; free some space there, or set TSDYN_CACHE_DIR to a folder that "
         "you can write to.",
         RuntimeWarning,
         stacklevel=2,

@@ -94,7 +94,8 @@ def _weight(tableau, ratio, points, i, j):
 def _predict(c, r, own, h, known):
     """Set k, u, z and lam of every stage."""
     s, n, m, stages = c.saddle, r.x.size, c.saddle.z.size, c.saddle.stages.shape[0]
-    before, ratio, points = r.memory[_rest(r) + 2 * n :], own[H_BEFORE] / h, max(int(own[POINTS]), 1)
+    before, ratio = r.memory[_rest(r) + 2 * n :], own[H_BEFORE] / h
+    points = min(max(int(own[POINTS]), 1), stages)
     for i in range(stages):
         k = r.memory[(2 * i + 5) * n :][:n]
         if not known:

@@ -81,7 +81,7 @@ def _time(tableau, i):
 @kernel
 def extrapolated(own, i):
     """The number of points for stage i: the last of a step are within the earlier ones, or close."""
-    return max(int(own[POINTS]), LEAST_POINTS) if i < LEAST_POINTS + 1 else MOST_POINTS
+    return min(max(int(own[POINTS]), LEAST_POINTS), MOST_POINTS) if i < LEAST_POINTS + 1 else MOST_POINTS
 
 
 @kernel

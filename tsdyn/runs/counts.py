@@ -31,6 +31,7 @@ _READ = {
     "columns_skipped": lambda of: of.skipped[2] * of.counters.evaluations,
     "forces_skipped": lambda of: 0 if of.has_forces else of.counters.evaluations,
 }
+NAMES = tuple(_READ)
 
 
 class Counts(Mapping):

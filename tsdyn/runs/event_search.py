@@ -17,6 +17,7 @@ from ..model.handles import handles_of
 from ..workspaces.run_state import B_END, STORED
 from .event_states import Inside
 from .events import Failed, Instant
+from .snapshot import demand, demand_counts
 from .tolerances import FAST_TURN, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
 
 
@@ -114,9 +115,12 @@ class Watch:
     def restore(self, numbers, arrays):
         """As it was when it was saved."""
         self.t, self.state, self.memory = numbers["t"], arrays["watch.state"], arrays["watch.memory"]
+        demand(self.state.shape == (3, self._signs.shape[2]) and len(self.memory) >= self.angles, "the state of events")
         self.tracks = [Track(0.0) for _ in self.events]
         for track, known in zip(self.tracks, numbers["tracks"], strict=True):
-            vars(track).update(known | {"significant": known["significant"] and tuple(known["significant"])})
+            significant = known.pop("significant")
+            demand_counts(known | {"significant": None}, vars(track))
+            vars(track).update(known | {"significant": significant and tuple(map(float, significant))})
         self.list = [[] for _ in self.events]
         for (t, index), state in zip(numbers["found"], arrays["watch.found"], strict=True):
             self.list[index].append(Occurrence(t, index, state))

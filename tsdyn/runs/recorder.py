@@ -5,6 +5,7 @@ import numpy as np
 from ..workspaces.run_state import STORED
 from .history import ChartLog, StepLog
 from .run_log import RunLog
+from .snapshot import demand, demand_noted
 from .tolerances import TRIES
 
 CHART_ROOM = 64  # charts of a slice at first, half of what there is room for
@@ -86,9 +87,12 @@ class Recorder:
         rows = self.run.numbers.chart_rows + 1
         return self._count, {"recorder.charts": self.charts[:rows].copy(), "recorder.points": self.points[:rows].copy()}
 
-    def restore(self, count, arrays):
-        """As it was when it was saved."""
+    def restore(self, count, arrays, rows):
+        """As it was when it was saved; rows: how many there are to select from."""
         self._count, charts, points = count, arrays["recorder.charts"], arrays["recorder.points"]
+        demand(charts.dtype == points.dtype == float and charts[0].shape == self.charts[0].shape, "the charts")
+        demand(points.shape == (len(charts) if len(self.points) else 0, self.points.shape[1]), "the points of charts")
+        demand_noted(points[:, self.run.now.shape[1] :], rows)
         while len(self.charts) < len(charts) + CHART_ROOM:
             self.charts, self.points = _doubled(self.charts), _doubled(self.points)
         self.charts[: len(charts)], self.points[: len(points)] = charts, points

@@ -186,14 +186,18 @@ class Slices:
 
     def restore(self, numbers, arrays):
         """Begin between two slices of a run that was left there."""
-        snapshot.restore(self.memory, arrays)
-        self.recorder.restore(numbers["outputs"], arrays)
-        if self.choose is not None:
-            self.choose.restore(numbers["turns"])
-        vars(self.pace).update(numbers["pace"])
-        self.memory.restore(numbers["memory"])
-        if self.watch is not None:
-            self.watch.restore(numbers["watch"], arrays)
+        with snapshot.restoring():
+            self.recorder.restore(numbers["outputs"], arrays, len(self.memory.context.graph.row))
+            limits = {"next_eval": self.task.times.size, "next_stop": len(self.task.stops)}
+            limits["chart_rows"] = len(arrays["recorder.charts"]) - 1
+            snapshot.restore(self.memory, arrays, limits)
+            if self.choose is not None:
+                self.choose.restore(numbers["turns"])
+            snapshot.demand_counts(numbers["pace"], vars(self.pace))
+            vars(self.pace).update(numbers["pace"])
+            self.memory.restore(numbers["memory"])
+            if self.watch is not None:
+                self.watch.restore(numbers["watch"], arrays)
 
 
 def _warn_of(error, t):

@@ -1,14 +1,58 @@
 """The state of a run between two slices: what a run that goes on begins with, to the bit.
 
-All that kernels see is in the context and in the `Run` of a memory: arrays and records. Tables of records and what
-holds addresses are made anew by the process that goes on; all else is saved.
+All that kernels see is in the context and in the `Run` of a memory: arrays and records. What follows from the scene and
+the method (tables, programs, addresses, places in memory) is laid out anew by the process that goes on; all else is
+saved. What comes from a file is checked before kernels see it: shapes, and each number that is a place or a count.
 """
+
+import contextlib
 
 import numpy as np
 
+from ..errors import StorageError
 from ..jit.kernels import Record
+from ..motions.state_program import LENGTH
 
-ADDRESSES = ("kernels", "rub", "anew")  # fields of them
+LAID_OUT = (  # fields that follow from scene and method, or are filled in before they are read
+    "system", "graph", "kernels", "rub", "anew", "joints", "tableau", "block", "own", "trial",
+    "table",
+)  # fmt: skip
+OWN = {  # numbers of records, likewise
+    "Orders": ("top", "room", "lowest", "highest", "refined", "sweeps"),
+    "Numbers": (
+        "first_order", "adaptive", "steps_wanted", "chart_interval", "dense", "last_stage", "stage_at", "rows",
+        "history", "blocks",
+    ),
+}  # fmt: skip
+MOST = 1 << 53  # of a count
+REMEMBERED = "context.system.remembered"  # reals of the forces that remember something
+
+
+@contextlib.contextmanager
+def restoring():
+    """A block that takes what a file holds: StorageError where it doesn't fit."""
+    try:
+        yield
+    except (KeyError, ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
+        said = f"{type(error).__name__}: {error}"
+        raise StorageError(f"the checkpoint is damaged, or of another run ({said}).") from error
+
+
+def demand(fits, what):
+    """Raise ValueError unless something of a file fits."""
+    if not fits:
+        raise ValueError(f"{what} has values that no run leaves")
+
+
+def demand_counts(numbers, known):
+    """Raise ValueError unless numbers have these names, and each is a number, a truth value or None."""
+    demand(isinstance(numbers, dict) and numbers.keys() == set(known), "a table of numbers")
+    demand(all(value is None or isinstance(value, (bool, int, float)) for value in numbers.values()), "a number")
+
+
+def demand_noted(noted, rows):
+    """Raise ValueError unless each line names rows (of so many), or none by -1: what `note_selection` writes."""
+    demand((((noted >= 0.0) & (noted < rows)).all(axis=1) | (noted == -1.0).all(axis=1)).all(), "the redundant rows")
 
 
 def parts(memory):
@@ -18,22 +62,67 @@ def parts(memory):
 
 def saved(memory):
     """Copies of them."""
-    return {name: array.copy() for name, array in parts(memory).items()}
+    system = memory.context.system
+    found = {name: _array(part).copy() for name, part in parts(memory).items()}
+    return {**found, REMEMBERED: system.reals[system.memory]}
 
 
-def restore(memory, arrays):
-    """Write them back."""
-    for name, array in parts(memory).items():
-        array[...] = arrays[name]
+def restore(memory, arrays, limits):
+    """Write them back; limits: of numbers of the `Run`, by name.
+
+    Raises
+    ------
+    StorageError
+        If shapes differ, or a place is beyond an array.
+    """
+    system, rows = memory.context.system, len(memory.context.graph.row)
+    found, most = {**parts(memory), REMEMBERED: system.reals[system.memory]}, max(rows, memory.context.work.Phi.size)
+    with restoring():
+        for name, part in found.items():
+            given, own = arrays[name], _array(part)
+            demand(given.shape == own.shape and given.dtype == own.dtype, name)
+            if isinstance(part, Record):
+                _restore_record(name, part, given, limits)
+            elif own.dtype.kind == "i" and own.size:
+                demand(given.min() >= 0 and given.max() <= max(most, own.size) and given[0] < max(own.size, 2), name)
+        for at, program in _programs(memory.context):
+            arrays["context.expansion.loads"][at : at + len(program)] = program
+        for name, part in found.items():
+            _array(part)[...] = arrays[name]
+        system.reals[system.memory] = arrays[REMEMBERED]
+
+
+def _restore_record(name, record, given, limits):
+    """Check the numbers of a record, and put its own ones in the place of those that a file has no say in."""
+    kind, own = type(record), OWN.get(type(record).__name__, ())
+    found = kind.from_buffer_copy(given)
+    for field, what in kind.__annotations__.items():
+        if field in own:
+            setattr(found, field, getattr(record, field))
+            continue
+        low, high = (0, limits[field]) if field in limits else (-MOST, MOST)
+        high = record.highest if (kind.__name__, field) == ("Orders", "next") else high
+        demand(what is float or low <= getattr(found, field) <= high, f"{name}.{field}")
+    given[...] = np.frombuffer(found, np.uint8)
+
+
+def _programs(context):
+    """The programs of traced functions among the series of loads: where each begins, and a copy of it."""
+    expansion = getattr(context, "expansion", None)
+    for kind in () if expansion is None else expansion.forces[expansion.forces["run"] != 0]:
+        at = int(kind["values"])
+        yield at, expansion.loads[at : at + int(expansion.loads[at + LENGTH])].copy()
+
+
+def _array(part):
+    return np.frombuffer(part, np.uint8) if isinstance(part, Record) else part
 
 
 def _parts(name, value):
     if isinstance(value, tuple):
         found = {}
         for field, part in value._asdict().items():
-            if field not in ADDRESSES:
+            if field not in LAID_OUT:
                 found.update(_parts(f"{name}.{field}", part))
         return found
-    if isinstance(value, Record):
-        return {name: np.frombuffer(value, np.uint8)}
-    return {} if value.dtype.names else {name: value}
+    return {} if not isinstance(value, Record) and value.dtype.names else {name: value}

@@ -4,6 +4,7 @@ import numpy as np
 
 from ..errors import MissingDependency
 from ..storage.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
+from .outline_solution import labelled_rows
 from .saved_solutions import provenance
 
 ERRORS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
@@ -30,16 +31,7 @@ def _columns(solution):
 
 def _rows(solution):
     """Names of the rows of Phi as they were run."""
-    return [f"{title}{label}" for title, label in _labelled(solution)]
-
-
-def _labelled(solution):
-    seen = {}
-    for member in solution.packed.members:
-        title = member.constraint.title
-        seen[title] = seen.get(title, 0) + 1
-        again = "" if seen[title] == 1 else f" #{seen[title]}"
-        yield from ((title + again, label) for label in member.constraint.row_labels)
+    return [f"{title}{label}" for title, label in labelled_rows(solution)]
 
 
 def _library(name):

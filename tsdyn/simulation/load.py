@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import regular_files
 from ..calls import fitting
 from ..errors import InvalidArgument, StorageError
 from .resume import ended_run
@@ -138,11 +139,7 @@ def document_of(path: Place, allow_code: bool = False, study: Mapping[str, Any] 
     from ..files import scene_text
 
     try:
-        if os.path.getsize(path) > scene_text.LARGEST:
-            raise StorageError(f"{path} is too large for a scene file: {os.path.getsize(path)} bytes.")
-        text = Path(path).read_text(encoding="utf-8-sig")
+        text = regular_files.read(path, scene_text.LARGEST).decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise StorageError(f"{path} is no text in UTF-8: {error}.") from error
-    except OSError as error:
-        raise StorageError(f"{path} can't be read: {error.strerror or error}.") from error
     return scene_text.read_all(text, os.fspath(path), Scene, simulate, allow_code, study)

@@ -5,7 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..calls import fitting
-from ..errors import InvalidArgument, StorageError
+from ..errors import InvalidArgument, InvalidFile, StorageError
+from ..files import scene_text
+from ..runs.snapshot import restoring
+from .run_requests import arguments_of
 from .scene import Scene
 from .simulate import run_from
 from .stored_runs import demand_path, demand_same_place
@@ -60,26 +63,33 @@ def resume(
     >>> ts.resume(path).reached
     2.0
     """
-    from ..storage import checkpoint, restricted_pickle
+    from ..storage import checkpoint
 
     demand_path(path, "path")
     numbers, arrays = checkpoint.read(path)
     demand_same_place(path, numbers)
-    try:
-        given = restricted_pickle.loads(arrays["arguments"].tobytes())
-        if scene is None:
-            if numbers["functions"] or "scene" not in arrays:
-                raise restricted_pickle.Foreign(", ".join(numbers["functions"]) or "classes of your own")
-            scene = restricted_pickle.loads(arrays["scene"].tobytes())
-    except restricted_pickle.Foreign as foreign:
-        raise StorageError(
-            f"{path}: the scene has functions or classes of yours ({foreign}), and a file keeps no code. Pass "
-            "the scene: ts.resume(path, scene=scene)."
-        ) from None
+    if scene is None:
+        scene = _scene_of(path, numbers, arrays)
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
-    given |= {"scene": scene, "events": events, "progress": progress, "store": path}
-    return run_from(given | {"checkpoint": numbers["interval"]}, numbers, arrays)
+    with restoring():
+        given = arguments_of(numbers["arguments"], arrays, scene)
+    given |= {"events": events, "progress": progress, "store": path, "checkpoint": numbers["interval"]}
+    return run_from(given, numbers, arrays)
+
+
+def _scene_of(path, numbers, arrays):
+    """The scene that a checkpoint holds."""
+    foreign = ", ".join(numbers["functions"]) or str(numbers["arguments"].get("lacks", ""))
+    if not foreign and "scene" in arrays:
+        try:
+            return scene_text.read(arrays["scene"].tobytes().decode(), "its scene", Scene, None)[0]
+        except (InvalidFile, UnicodeDecodeError) as error:
+            foreign = str(error)
+    raise StorageError(
+        f"{path}: the scene has functions or classes of yours ({foreign}), and a file keeps no code. Pass "
+        "the scene: ts.resume(path, scene=scene)."
+    )
 
 
 def ended_run(path: Place, scene: Scene | None) -> Solution:

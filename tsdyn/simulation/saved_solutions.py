@@ -11,16 +11,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._version import __version__
-from ..errors import InvalidArgument, InvalidFile, Status, StorageError, TsdynError
+from ..errors import InvalidArgument, InvalidFile, Status, StorageError
 from ..files import scene_text
 from ..jit.cache import machine
-from .scene_cache import prepared
+from ..model.handles import handles_of
+from ..runs import counts
+from ..runs.snapshot import demand, demand_counts
+from ..storage.formats import damaged, demand_record
+from .outline_solution import HELD, Outline, held, labelled_rows
 from .stored_runs import demand_path, hash_of
 from .trajectory_records import derived_record, record_of, take_derived, trajectory_of
 
 if TYPE_CHECKING:
     from ..hints import Place, Scene, Solution
 
+RECORD = {  # of every file, with the types of it
+    "provenance": dict, "formulation": str, "span": list, "method": str, "status": int, "reason": str, "message": str,
+    "reached": (int, float), "counts": dict, "seconds": dict, "derived": dict, "tables": dict,
+}  # fmt: skip
 LOGS = {"steps": "_step_log", "charts": "_chart_log"}
 SETTINGS = ("rtol", "atol", "step", "max_step")
 
@@ -55,14 +63,23 @@ def save(solution: Solution, path: Place) -> Path:
     demand_path(path, "path")
     path = Path(path).absolute()
     saved_file.format_at(path)
-    remembered = solution.handles.count + solution.packed.system.memory.size
+    if isinstance(solution, Outline):
+        remembered = solution._width
+        content = solution._content
+    else:
+        remembered, content = _width(solution.packed), _content(solution)
     tables = tables_of(solution.packed.bodies, remembered, solution._step_log is not None)
     logs = {name: _columns_of(getattr(solution, log)) for name, log in LOGS.items() if name in tables}
     counts = {"outputs": solution._length(), **{name: len(log[0]) for name, log in logs.items()}}
     tables = {name: table._replace(longest=min(table.longest, counts[name])) for name, table in tables.items()}
     rows = partial(_rows, solution, tables, logs)
-    saved_file.write(path, tables, rows, provenance(solution), _content(solution))
+    saved_file.write(path, tables, rows, provenance(solution), content)
     return path
+
+
+def _width(packed):
+    """How many numbers are remembered with each output: angles of joints, and what forces remember."""
+    return handles_of(packed).count + packed.system.memory.size
 
 
 def _columns_of(log):
@@ -76,7 +93,8 @@ def _rows(solution, tables, logs, table, start, count):
         return {name: column[start : start + count] for name, column in zip(names, logs[table], strict=True)}
     part = solution[start : start + count]
     found = {"time": part.t, "q": part.q, "qd": part.qd, "qdd": part.qdd}
-    remembered = np.concatenate((part.anchor.angles, part._remembers), axis=1)
+    angles = part.anchor.angles
+    remembered = part._all_remembered if isinstance(part, Outline) else np.concatenate((angles, part._remembers), 1)
     return found | ({"remembered": remembered} if remembered.shape[1] else {})
 
 
@@ -115,8 +133,21 @@ def _content(solution):
             scene_text.write(_scene_as_run(solution), type(solution.scene)).encode(), np.uint8
         )
     except InvalidArgument as error:
-        numbers["lacks"] = str(error)
-    return numbers, arrays
+        numbers["lacks"] = str(error).rstrip(".")
+    return numbers, arrays | _outline(solution, numbers)
+
+
+def _outline(solution, numbers):
+    """The arrays of an `Outline`, and its numbers entered, of a scene with parts that only their owner has."""
+    if hash_of(solution.scene.packed) != provenance(solution)["scene"]:
+        return {}
+    text, left = scene_text.write_outline(solution.scene, type(solution.scene))
+    if not left or not text:
+        return {}
+    angles = [row.item.name for row in solution.handles.rows for _ in row.angles]
+    rows = [list(labels) for labels in labelled_rows(solution)]
+    numbers["outline"] = {"left_out": left, "angles": angles, "rows": rows, "width": _width(solution.packed)}
+    return {"outline": np.frombuffer(text.encode(), np.uint8), **held(solution, len(rows))}
 
 
 def _scene_as_run(solution):
@@ -135,54 +166,101 @@ def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[type[S
     from ..storage import saved_file
 
     path = Path(path).absolute()
+    if scene is not None and not isinstance(scene, kinds[0]):
+        raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     record, arrays = saved_file.read(path)
-    try:
-        scene = _scene(path, record, arrays, scene, allow_code, kinds[0])
+    with damaged(path):
+        demand_record(record, RECORD)
+        try:
+            scene = _scene(path, record, arrays, scene, allow_code, kinds[0])
+        except Lacking as lacking:
+            if "outline" not in arrays:
+                raise StorageError(str(lacking)) from None
+            return _outlined(path, record, arrays, str(lacking), kinds[0])
         packed = scene.packed
         if hash_of(packed) != record["provenance"]["scene"]:
             raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
         take_derived(packed, record["derived"])
         return _solution(path, record, arrays, scene, kinds[1])
-    except TsdynError:
-        raise
-    except (KeyError, ValueError, IndexError, TypeError, AttributeError) as error:
-        raise StorageError(f"{path} is damaged, or lacks something: {type(error).__name__}: {error}.") from error
+
+
+class Lacking(Exception):
+    """Why a file alone doesn't give the scene."""
 
 
 def _scene(path, record, arrays, scene, allow_code, kind):
     """The scene that a solution is of."""
     if scene is not None:
-        if not isinstance(scene, kind):
-            raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
         return scene
     if "scene" not in arrays:
-        raise StorageError(
+        raise Lacking(
             f"{path} holds no scene, as a file holds no code: {record['lacks']}. Pass the scene: "
             f"ts.load({str(path)!r}, scene=scene)."
         )
     try:
         return scene_text.read(arrays["scene"].tobytes().decode(), "its scene", kind, None, allow_code)[0]
     except InvalidFile as error:
-        raise StorageError(
+        raise Lacking(
             f"{path}: {error}\nImport the modules of its classes before, or pass the scene: ts.load(path, scene=scene)."
         ) from error
 
 
-def _solution(path, record, arrays, scene, kind):
-    """The solution of a record that fits the scene."""
+def _outlined(path, record, arrays, why, kind):
+    """The `Outline` of a file."""
+    known = record["outline"]
+    demand_record(known, {"left_out": list, "angles": list, "rows": list, "width": int})
+    scene = scene_text.read(arrays["outline"].tobytes().decode(), "its outline", kind, None)[0]
+    scene._lacks = f"{why} Without it there is no {', '.join(map(str, known['left_out']))}."
+    here = {row.item.name for row in handles_of(scene.packed).rows}
+    columns = [i for i, name in enumerate(known["angles"]) if name in here]
+    demand(0 <= len(known["angles"]) <= known["width"], "the angles of joints")
+    found = _solution(path, {**record, "trajectory": None}, arrays, scene, Outline, known["width"])
+    held_arrays = {f"held_{name}": arrays[f"held_{name}"].astype(float) for name in HELD}
+    count = found._length()
+    for name, array in held_arrays.items():
+        demand(array.shape == (count, *([len(known["rows"])] if name == "held_multipliers" else [])), name)
+    labels = [[str(title), str(label)] for title, label in known["rows"]]
+    found._held, found._columns, found.lacks, found._row_labels = held_arrays, columns, scene._lacks, labels
+    found._width, found._content = known["width"], (_again(record), arrays)
+    return found
+
+
+def _again(record):
+    """The numbers of a record that `saved_file.write` doesn't add itself."""
+    return {name: value for name, value in record.items() if name not in ("tables", "sums")}
+
+
+def _solution(path, record, arrays, scene, kind, width=None):
+    """The solution of a record that fits the scene; width: of what it remembers, if not that of the scene."""
+    from ..storage.archive import tables_of
+    from ..storage.formats import demand_shapes
     from ..storage.stored_outputs import StoredLog, StoredOutputs
 
     found, packed = kind.__new__(kind), scene.packed
     outputs = StoredOutputs(path, record["tables"])
+    width = _width(packed) if width is None else width
+    tables = tables_of(packed.bodies, width, "steps" in record["tables"])
+    demand(record["tables"] == {name: [c.name for c in table.columns] for name, table in tables.items()}, "its tables")
+    demand_shapes(path, tables)
+    n = int(packed.system.bodies[:, 1].sum())
+    arrays = {name: array if name in ("scene", "outline") else array.astype(float) for name, array in arrays.items()}
+    demand(arrays["last"].shape == (3, n) and arrays["angles"].size + arrays["memory"].size == width, "its last state")
+    demand_counts(record["counts"], counts.NAMES)
+    demand_counts(record["seconds"], ("prepare", "run"))
+    start, end = record["span"]
+    demand_counts({"start": start, "end": end, "error": record["energy_error"]}, ("start", "end", "error"))
+    demand(all(isinstance(said, (str, int, float)) for said in record["provenance"].values()), "its provenance")
     events = None, None, None
     if record["events"] is not None:
         events = [[arrays[f"event_{i}_{name}"] for i in range(record["events"])] for name in ("t", "q", "qd")]
+        for t, q, qd in zip(*events, strict=True):
+            demand(q.shape == qd.shape == (t.size, n) and t.ndim == 1, "its events")
     trajectory = None
-    if "trajectory" in record:
+    if record.get("trajectory") is not None:
         dense = {name.removeprefix("dense_"): array for name, array in arrays.items() if name.startswith("dense_")}
         trajectory = trajectory_of(record["trajectory"], dense, scene, packed)
     vars(found).update(
-        scene=scene, packed=packed, system=packed.system, handles=prepared(scene).handles,
+        scene=scene, packed=packed, system=packed.system, handles=handles_of(packed),
         formulation=record["formulation"], span=tuple(record["span"]), status=Status(record["status"]),
         t_events=events[0], q_events=events[1], qd_events=events[2],
         _method=record["method"], _trajectory=trajectory, _reached=record["reached"], _last=arrays["last"],
@@ -191,5 +269,5 @@ def _solution(path, record, arrays, scene, kind):
         _energy_error=record["energy_error"], _reason=record["reason"], _message=record["message"],
         _provenance=record["provenance"],
     )  # fmt: skip
-    found._take(outputs, packed.system.bodies[:, 1].sum())
+    found._take(outputs, n)
     return found

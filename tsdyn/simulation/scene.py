@@ -100,6 +100,7 @@ class Scene(OfFile):
         self.gravity = gravity
 
     ground: AnyBody
+    _lacks = ""  # what is to be passed before it can be run; of the outline of a scene in a file
 
     def __setattr__(self, name: str, value: Never) -> None:
         """Set an existing attribute; refuse a misspelt one."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..configuration.initial_conditions import consistent
 from ..configuration.mirrored_branches import demand_aligned
+from ..errors import StorageError
 from ..formulations.locked_orientations import hold, still
 from ..jit.interrupts import CollectionsDeferred
 from ..methods.integrator import is_plain
@@ -28,6 +29,8 @@ SMALL = 1 << 20  # the same where several plans have one each
 
 def prepared(scene):
     """Return the `Prepared` of the present scene."""
+    if scene._lacks:
+        raise StorageError(scene._lacks)
     if scene._users:
         scene.refresh()
     kept = scene._prepared

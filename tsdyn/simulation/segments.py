@@ -12,9 +12,11 @@ import numpy as np
 
 from ..configuration.holonomic import demand_holonomic
 from ..errors import Status, TsdynError
+from ..runs import counts
 from ..runs.history import ChartLog, StepLog
 from ..runs.run import run
 from ..runs.segments import Relay
+from ..runs.snapshot import MOST, demand, demand_counts, restoring
 from ..runs.step_engine import StepEngine
 from ..runs.task import Outcome
 from ..runs.trajectory import Pieces
@@ -43,10 +45,12 @@ def run_segments(task, engine, observe=None, unfinished=None):
     passed = task.archive.passed if task.archive else []
     try:
         if passed:  # a run that goes on in a later segment
-            relay.share, relay.largest, relay.h = passed[-1]["relay"]
-            if passed[-1]["turns"] is not None:
-                task.choose.restore(passed[-1]["turns"])
-            return _Segments(task, engine, relay, [_recalled(known) for known in passed]).go_on()
+            with restoring():
+                relay.share, relay.largest, relay.h = map(float, passed[-1]["relay"])
+                if passed[-1]["turns"] is not None:
+                    task.choose.restore(passed[-1]["turns"])
+                segments = _Segments(task, engine, relay, [_recalled(known, task) for known in passed])
+            return segments.go_on()
         first = task if task.report is silent else task._replace(report=_until_its_end(task.report))
         outcome = run(first, engine, relay=relay, briefly=briefly, unfinished=unfinished)
         return _Segments(task, engine, relay, [outcome]).go_on() if outcome.status in (PASSAGE, STIFF) else outcome
@@ -75,11 +79,15 @@ def _until_its_end(report):
     return lambda fraction, *more: None if fraction is None else report(fraction, *more)
 
 
-def _recalled(known):
+def _recalled(known, task):
     """The `Outcome` of a segment that had ended when a checkpoint was written."""
+    last, remembered = np.array(known["last"], float), np.array(known["remembered"], float)
+    demand(last.shape == (3, task.q.size) and remembered.shape == task.remembered.shape, "the end of a segment")
+    demand(known["next"] in (METHOD, IMPLICIT, CROSSING) and 0 <= known["rows"] <= MOST, "the parts of the run")
+    demand_counts(known["counts"], counts.NAMES)
     return Outcome(
-        Status(known["status"]), "", range(known["rows"]), None, None, known["reached"], np.array(known["last"]),
-        np.array(known["remembered"]), known["counts"], None, None, time.perf_counter(),
+        Status(known["status"]), "", range(known["rows"]), None, None, float(known["reached"]), last, remembered,
+        known["counts"], None, None, time.perf_counter(),
     )  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from ..observables.state import remembered
 from ..runs.arguments import demand_steps_seen, state_arrays
 from ..runs.brief import Brief
 from ..runs.sampling import Sampling
+from ..runs.snapshot import restoring
 from ..runs.step_engine import StepEngine
 from ..runs.task import Task
 from ..taylor.series_engine import SeriesEngine
@@ -218,7 +219,9 @@ def _run_stored(task, given, options, found, archive):
     archive = archive or stored_runs.archive_of(given, kept, options.history, numbers, arrays)
     started = time.perf_counter()
     if numbers is not None and numbers.get("ended"):
-        outcome = stored_runs.ended_outcome(numbers, arrays, archive)
+        with restoring():
+            slots = kept.handles.count + kept.packed.system.memory.size
+            outcome = stored_runs.ended_outcome(numbers, arrays, archive, kept.n, slots)
         return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
     try:
         outcome = run_task(task._replace(archive=archive), scene, options.settings.initial_tol)

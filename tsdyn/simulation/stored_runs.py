@@ -14,11 +14,11 @@ from ..errors import InvalidArgument, Status, StorageError
 from ..jit.cache import machine
 from ..jit.code_hash import platform_hash
 from ..model.packed import user_functions
+from ..runs import counts
+from ..runs.snapshot import demand, demand_counts
 from ..runs.task import Outcome
 from ..validation import number
-
-PASSED_AGAIN = ("events", "progress")  # arguments that are functions
-OWN = ("scene", "store", "checkpoint", *PASSED_AGAIN)  # arguments that are kept apart
+from .run_requests import request_of
 
 
 def demand_storable(given):
@@ -46,6 +46,7 @@ def demand_path(path, name):
 def archive_of(given, kept, history, numbers, arrays):
     """The `Archive` of a run, made or, with the numbers and arrays of a checkpoint, gone on with."""
     from ..storage.archive import Archive, tables_of
+    from ..storage.formats import demand_shapes, format_of
     from ..storage.write_errors import writing
 
     facts = _facts(given, kept)
@@ -54,7 +55,10 @@ def archive_of(given, kept, history, numbers, arrays):
     remembered = kept.handles.count + kept.packed.system.memory.size
     tables = tables_of(kept.packed.bodies, remembered, history)
     attributes = {"source": f"tsdyn {__version__}", "scene": facts["scene"]}
-    archive = Archive(Path(given["store"]).absolute(), tables, attributes, facts["interval"], _request(given), facts)
+    if numbers is not None:
+        format_of(given["store"]).demand_plain(given["store"])
+        demand_shapes(given["store"], tables)
+    archive = Archive(Path(given["store"]).absolute(), tables, attributes, facts["interval"], _asked(given), facts)
     with writing(archive.path):
         if numbers is None:
             archive.begin()
@@ -68,8 +72,14 @@ def begin_again(archive, given):
     from ..storage.write_errors import writing
 
     with writing(archive.path):
-        archive.begin_again(_request(given))
+        archive.begin_again(_asked(given))
     return archive
+
+
+def _asked(given):
+    """What the checkpoints of a run say of its arguments: nothing where there are none."""
+    numbers, arrays = ({}, {}) if given["checkpoint"] is None else request_of(given)
+    return {"arguments": numbers}, arrays
 
 
 def ended(archive, outcome, seconds):
@@ -92,7 +102,7 @@ def call_to_go_on(archive):
 
     if not any(path.exists() for path in place(archive.path)):
         return ""
-    needs_scene = archive.facts["functions"] or "scene" not in archive.request
+    needs_scene = archive.facts["functions"] or "scene" not in archive.request[1]
     passed = {"scene": needs_scene, "events": archive.facts["events"]}
     return f"ts.resume({', '.join([repr(str(archive.path)), *(f'{name}={name}' for name in passed if passed[name])])})"
 
@@ -117,14 +127,27 @@ def _ending(outcome, seconds):
     return numbers | {"statistics": dict(outcome.counts), "seconds": seconds}, arrays
 
 
-def ended_outcome(numbers, arrays, archive):
-    """The `Outcome` of a run that had ended when its checkpoint was written."""
-    events = None
+def ended_outcome(numbers, arrays, archive, n, memory):
+    """The `Outcome` of a run that had ended when its checkpoint was written; n coordinates, so many remembered numbers.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If they are none of such a run.
+    """
+    from ..storage.formats import demand_record
+
+    events, (last, remembered) = None, (arrays[name].astype(float) for name in ("last", "remembered"))
     if "watched" in numbers:
         events = tuple([arrays[f"event {i}.{name}"] for i in range(numbers["watched"])] for name in ("t", "q", "qd"))
+        shapes = [[each.shape for each in found] for found in zip(*events, strict=True)]
+        demand(all(found == [(found[0][0],), *[(found[0][0], n)] * 2] for found in shapes), "the events")
+    demand(last.shape == (3, n) and remembered.shape == (memory,), "the end of the run")
+    demand_counts(numbers["statistics"], counts.NAMES)
+    demand_record(numbers, {"reason": str, "method": str, "seconds": (int, float)})
     return Outcome(
-        Status(numbers["status"]), numbers["reason"], *_stored(archive), numbers["t"], arrays["last"],
-        arrays["remembered"], numbers["statistics"], None, events, 0.0, numbers["method"],
+        Status(numbers["status"]), numbers["reason"], *_stored(archive), float(numbers["t"]), last, remembered,
+        numbers["statistics"], None, events, 0.0, numbers["method"],
     )  # fmt: skip
 
 
@@ -143,8 +166,8 @@ def demand_same_place(path, numbers):
         )
     if numbers["machine"] != here["machine"]:
         raise StorageError(
-            f"{path} was written on another machine ({', '.join(numbers['machine'][:3])}): the bits would differ. "
-            "Go on there, or start anew from the last output: simulate(state=...)."
+            f"{path} was written on another machine ({', '.join(map(str, numbers['machine'][:3]))}): the bits would "
+            "differ. Go on there, or start anew from the last output: simulate(state=...)."
         )
 
 
@@ -163,23 +186,6 @@ def _demand_same_run(path, facts, numbers):
         changed = [name for name, source in found.items() if source != known[name]]
         if changed:
             raise StorageError(f"{path}: the source of {', '.join(changed)} has changed since the run.")
-
-
-def _request(given):
-    """The arguments of a run and its scene as arrays of bytes; what holds code isn't kept."""
-    from ..storage.restricted_pickle import Foreign, dumps
-
-    rest = {name: value for name, value in given.items() if name not in OWN}
-    found = {}
-    for name, value in (("scene", given["scene"]), ("arguments", rest)):
-        try:
-            found[name] = np.frombuffer(dumps(value), np.uint8)
-        except Foreign as foreign:
-            if name == "arguments":
-                raise InvalidArgument(
-                    f"a run by a method of your own can't go on from a file, which keeps no code: {foreign}."
-                ) from None
-    return found
 
 
 def _facts(given, kept):

@@ -3,14 +3,21 @@
 import numpy as np
 
 from ..formulations.locked_orientations import keep_turning
-from ..methods.integrator import registered
+from ..formulations.registry import formulation
+from ..model.handles import handles_of
+from ..rows.interface import redundancy
 from ..runs import step_engine
+from ..runs.snapshot import demand, demand_noted
 from ..runs.trajectory import Pieces, Trajectory
-from ..sparse.constraint_graphs import set_redundant
+from ..sparse.constraint_graphs import graph_of, set_redundant
 from ..taylor import series_engine
+from ..taylor.layout import series_width
+from ..workspaces.run_state import B_CHART, B_DATA, B_END
 from . import local_origin
+from .run_requests import method_of, own_record
 from .scene_cache import prepared
 
+HIGHEST, CHART = 64, 5  # order of series without a step, and numbers of a chart
 ARRAYS = ("blocks", "charts", "points", "first", "angles", "asked")
 
 
@@ -28,7 +35,7 @@ def record_of(trajectory):
         found = {"kind": "series", "highest": int(rest[0])}
     else:
         method, form, constraint_tol = rest
-        found = {"kind": "steps", "method": _method_record(method), "form": form, "constraint_tol": constraint_tol}
+        found = {"kind": "steps", "method": own_record(method), "form": form, "constraint_tol": constraint_tol}
     arrays = {name: np.asarray(getattr(trajectory, name)) for name in ARRAYS}
     return {**found, "start": float(trajectory.start), "derived": derived_record(packed)}, arrays
 
@@ -42,27 +49,13 @@ def derived_record(packed):
 
 def take_derived(packed, record):
     """Enter it into a packed scene."""
-    rows = record["redundant"]
+    rows, most = record["redundant"], len(graph_of(packed).row)
     if rows is not None:
+        demand(all(type(row) is int and 0 <= row < most for row in rows), "the redundant rows")
         set_redundant(packed, np.array(rows, np.int64))
     if record["turning"]:
+        demand(set(record["turning"]) <= set(range(len(packed.bodies))), "the turning bodies")
         keep_turning(packed, record["turning"])
-
-
-def _method_record(method):
-    """The class and the settings of a method."""
-    settings = {name: value.item() if isinstance(value, np.generic) else value for name, value in vars(method).items()}
-    if not all(value is None or isinstance(value, (bool, int, float, str)) for value in settings.values()):
-        raise TypeError(f"the settings of {method!r} are not numbers")
-    return [type(method).__name__.lower().replace("_", ""), settings]
-
-
-def _method(record):
-    name, settings = record
-    kind = registered()[name]
-    method = kind.__new__(kind)
-    vars(method).update(settings)
-    return method
 
 
 def trajectory_of(numbers, arrays, scene, packed):
@@ -81,14 +74,44 @@ def trajectory_of(numbers, arrays, scene, packed):
         return Pieces([trajectory_of(part, found, scene, packed) for part, found in zip(parts, own, strict=True)])
     if kind == "moved":
         shift = arrays["shift"]
+        demand(shift.shape == (int(packed.system.bodies[:, 1].sum()),), "the origin")
         local = local_origin._local(prepared(scene), scene, shift[:3]).packed
         return local_origin._Moved(trajectory_of(numbers["inner"], arrays, scene, local), shift)
     if numbers["derived"] != derived_record(packed):
         take_derived(packed, numbers["derived"])
+    blocks, charts, points, first, angles, asked = found = [arrays[name] for name in ARRAYS]
+    demand(all(array.dtype == float for array in found), "dense output")
+    n, handles = int(packed.system.bodies[:, 1].sum()), handles_of(packed)
     if kind == "series":
-        again = series_engine.read_again, packed, numbers["highest"]
+        highest = numbers["highest"]
+        again = series_engine.read_again, packed, highest
+        demand(type(highest) is int and 0 < highest <= max(blocks.shape[1], HIGHEST), "the order")
+        width, graph = series_width(packed, highest), None
     else:
-        again = step_engine.read_again, packed, _method(numbers["method"]), numbers["form"], numbers["constraint_tol"]
-    blocks, charts, points, first, angles, asked = (arrays[name] for name in ARRAYS)
+        method, form = method_of(numbers["method"]), formulation(numbers["form"])
+        again = step_engine.read_again, packed, method, form.name, float(numbers["constraint_tol"])
+        form = form.serving(method)
+        graph = form.graph(packed)
+        width = method.interpolant(form.first_order).size(n, *form.sizes(n, len(packed.system.segments), graph))
+        if method.coupled and len(blocks):
+            demand((blocks[:, B_DATA] == method.kernel(form.first_order)[1][0]).all(), "the stages of steps")
+    width += B_DATA + handles.count + packed.system.memory.size
+    demand(first.shape == (3, n) and angles.shape == (handles.count,) and asked.ndim == 1, "the start")
+    demand(blocks.ndim == charts.ndim == points.ndim == 2, "dense output")
+    if len(blocks):
+        _demand_steps(blocks, charts, points, width, highest if graph is None else None)
+    if graph is not None and len(blocks):
+        demand(points.shape[1] == n + redundancy(graph) and charts.shape[1] == CHART, "the charts")
+        demand(np.isin(blocks[:, B_CHART], np.arange(len(charts))).all(), "the charts of steps")
+        demand_noted(points[:, n:], len(graph.row))
     stops = np.stack([asked, np.ones(asked.size)], axis=1)
-    return Trajectory((None, again), (blocks, charts, points), numbers["start"], first, angles, stops)
+    return Trajectory((None, again), (blocks, charts, points), float(numbers["start"]), first, angles, stops)
+
+
+def _demand_steps(blocks, charts, points, width, highest):
+    """Raise ValueError unless blocks are those of steps one after the other; highest: order of series, or None."""
+    demand(blocks.shape[1] == width and len(points) in (len(charts), 0), "the steps")
+    ends = blocks[:, B_END]
+    demand(np.isfinite(ends).all() and (np.diff(ends) >= 0.0).all(), "the ends of steps")
+    orders = np.arange(1, 1 + (highest or 0))
+    demand(highest is None or np.isin(blocks[:, B_DATA], orders).all(), "the orders of steps")

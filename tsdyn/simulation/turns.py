@@ -12,6 +12,7 @@ from functools import cached_property
 from ..ahead.first_run import prepare_first_run
 from ..integrators import SDIRK54, Radau, Taylor
 from ..methods.integrator import frozen
+from ..runs.snapshot import demand_counts
 from .tolerances import (
     AGAIN,
     COST,
@@ -154,4 +155,6 @@ class Turns:
 
     def restore(self, numbers):
         """As it was when it was saved."""
+        window = numbers["window"]
+        demand_counts(numbers | dict(zip(("window", "work"), window, strict=True)), (*KEPT, "work"))
         vars(self).update(numbers)

@@ -70,8 +70,8 @@ class Archive:
         Of the store as a whole.
     interval : float, s
         Between checkpoints; None for no checkpoints.
-    request : dict
-        Arrays that a checkpoint begins with: what the run was asked.
+    request : (dict, dict)
+        Numbers and arrays that a checkpoint begins with: what the run was asked.
     facts : dict
         Numbers that it begins with.
     """
@@ -152,7 +152,8 @@ class Archive:
         self._write()
         self._store.sync()
         facts = {**self.facts, "counts": self.counts, "passed": self.passed, "size": self._store.size}
-        checkpoint.write(self.path, {**facts, **numbers}, {**self.request, **arrays})
+        asked, held = self.request
+        checkpoint.write(self.path, {**facts, **asked, **numbers}, {**held, **arrays})
         self._written = time.perf_counter()
         self._due = self._written + READERS
 

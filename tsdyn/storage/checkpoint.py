@@ -1,25 +1,32 @@
-"""Checkpoint files: versioned, checksummed, replaced as a whole; the one before is kept.
+"""Checkpoint files: versioned, checksummed, replaced as a whole; the one before is kept. Data alone.
 
-A file is a line with its format, a line with the SHA-256 of the rest, and an archive of arrays as NumPy's `savez` makes
-it, one of them the numbers and names as JSON. It is written beside the one before, brought to the disk (fsync) and
-renamed, so that at any moment there is a whole one.
+A file is a line with its format, a line with the SHA-256 of the rest, a line of JSON, and the bytes of arrays one after
+the other. The JSON has numbers and names, and of each array its name, type and shape. It is written beside the one
+before, brought to the disk (fsync) and renamed, so that at any moment there is a whole one.
 """
 
 import contextlib
+import errno
 import hashlib
-import io
 import json
+import math
 import os
 from pathlib import Path
 
 import numpy as np
 
+from .. import regular_files
 from ..errors import StorageError
 from ..validation import nearest
-from .formats import SUFFIXES
+from .formats import NUMBERS, SUFFIXES, demand_record
 
-FORMAT = b"tsdyn checkpoint 1\n"
-NUMBERS = "numbers"  # the array of the JSON
+FORMAT = b"tsdyn checkpoint 2\n"
+SEAL = 65  # bytes of a checksum and its line end
+LONGEST = 1 << 26  # bytes of the JSON: what Python makes of it takes some twenty times as many
+FACTS = {  # what every one says, with the types of it
+    "version": str, "kernels": str, "machine": list, "scene": str, "functions": dict, "events": dict,
+    "interval": (int, float), "counts": dict, "size": int, "passed": list, "t": (int, float), "arguments": dict,
+}  # fmt: skip
 
 
 def place(store):
@@ -31,10 +38,12 @@ def place(store):
 def write(store, numbers, arrays):
     """Write a checkpoint: `numbers` as JSON, arrays by name. Raises OSError, and leaves the one before as it was."""
     newest, before = place(store)
-    payload = io.BytesIO()
-    words = np.frombuffer(json.dumps(numbers).encode(), np.uint8)
-    np.savez(payload, **{NUMBERS: words}, **arrays)
-    content = payload.getbuffer()
+    arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    known = [[name, array.dtype.str, array.shape] for name, array in arrays.items()]
+    words = json.dumps({"numbers": numbers, "arrays": known}).encode()
+    if len(words) > LONGEST:
+        raise OSError(errno.EFBIG, f"a checkpoint of {len(words)} bytes of numbers is more than is read again")
+    content = b"".join([words, b"\n", *(array.tobytes() for array in arrays.values())])
     partial = newest.with_name(f"{newest.name}-partial")
     try:
         with open(partial, "wb") as file:
@@ -98,18 +107,39 @@ def remove(store):
 
 
 def _read(path):
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise StorageError(f"{path} can't be read: {error}.") from error
-    head, checksum, payload = content[: len(FORMAT)], content[len(FORMAT) :][:64], content[len(FORMAT) + 65 :]
+    content = regular_files.read(path)
+    head, checksum = content[: len(FORMAT)], content[len(FORMAT) :][: SEAL - 1]
     if head != FORMAT:
         raise StorageError(f"{path} is no checkpoint of this format, {FORMAT.decode().strip()!r}.")
+    payload = memoryview(content)[len(FORMAT) + SEAL :]
     if hashlib.sha256(payload).hexdigest().encode() != checksum:
         raise StorageError(f"{path} is damaged: its checksum is not that of its content.")
-    with np.load(io.BytesIO(payload), allow_pickle=False) as found:
-        arrays = dict(found)
-    return json.loads(arrays.pop(NUMBERS).tobytes()), arrays
+    try:
+        begin = content.index(b"\n", len(FORMAT) + SEAL, len(FORMAT) + SEAL + LONGEST + 1)
+        found = json.loads(content[len(FORMAT) + SEAL : begin])
+        numbers, arrays = found["numbers"], _arrays(content, begin + 1, found["arrays"])
+        demand_record(numbers, FACTS)
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError, MemoryError) as error:
+        raise StorageError(f"{path} is damaged: {type(error).__name__}: {error}.") from error
+    return numbers, arrays
+
+
+def _arrays(content, begin, known):
+    """The arrays of the bytes from `begin` on; raises ValueError unless they are all there is."""
+    found = {}
+    for name, code, shape in known:
+        kind = np.dtype(str(code))
+        count = math.prod(shape)
+        if kind.str not in NUMBERS or not all(type(size) is int and size >= 0 for size in shape):
+            raise ValueError(f"the array {name!r} is of no numbers")
+        if count * kind.itemsize > len(content) - begin:
+            raise ValueError(f"the array {name!r} is longer than the file")
+        content_of = np.frombuffer(content, np.uint8, count * kind.itemsize, begin)
+        found[str(name)] = content_of.copy().view(kind).reshape(shape)
+        begin += count * kind.itemsize
+    if begin != len(content):
+        raise ValueError("there are more bytes than the arrays have")
+    return found
 
 
 def _keep(path, before):

@@ -12,8 +12,11 @@ A format is a module with a class `Store`, which has
 
 BUFFER, how many floats are gathered before they are written, and functions for stores that may still be written
 
+    demand_plain(path)                         raises StorageError unless a store is such as this module writes: plain
+                                               numbers within it, of sizes that it holds
     read(path, column, part)                   a slice of a column
     count(path, columns)                       rows that all of these columns have
+    shapes(path)                               of all columns of floats, by name
     demand_whole(path, columns, count)         raises StorageError unless so many rows can be read of each
 
 and for what is written at once, beside the tables
@@ -21,7 +24,8 @@ and for what is written at once, beside the tables
     put(path, group, arrays)                   arrays by name, into a new group of a closed store
     get(path, group)                           the arrays of a group, by name; none where there is no such group
     attributes(path)                           what `create` was given
-    names(path)                                of all columns
+
+demand_plain comes first, before any function but `attributes` is asked about a file that others may have written.
 """
 
 import contextlib
@@ -36,6 +40,8 @@ from .write_errors import demand_folder, writing
 HDF5, ZARR = (".h5", ".hdf5", ".nc"), (".zarr",)  # suffixes of paths
 SUFFIXES = *HDF5, *ZARR
 CHUNK, LONGEST = 1 << 15, 1 << 14  # floats of a chunk, and rows at most
+ROOM = 1 << 20  # bytes that a column may have beyond those of its file while it is written, and of a file's head
+NUMBERS = "<f8", "<i8", "|b1", "|u1"  # types of the arrays that files hold, by NumPy's names
 
 
 class Column(NamedTuple):
@@ -64,6 +70,33 @@ def demand_rows(path, column, found, count):
     """Raise StorageError if a column has fewer rows than were written."""
     if found < count:
         raise StorageError(f"{path}: {column} has {found} rows of {count} that were written.")
+
+
+def demand_shapes(path, tables):
+    """Raise StorageError unless a store has the columns of these tables, of their shapes but for the rows."""
+    found = format_of(path).shapes(path)
+    for column, shape in ((column, table.shapes(column)[0]) for table in tables.values() for column in table.columns):
+        if found.get(column.name, ())[1:] != shape[1:] or column.name not in found:
+            said = f"of the shape {found[column.name]}" if column.name in found else "not there"
+            raise StorageError(f"{path} is damaged, or of another scene: {column.name} is {said}.")
+
+
+def demand_record(record, kinds):
+    """Raise ValueError or TypeError unless a table of JSON has these names, each of its type."""
+    for name, kind in kinds.items():
+        if not isinstance(record[name], kind) or (isinstance(record[name], bool) and kind is not bool):
+            raise TypeError(f"{name} is {type(record[name]).__name__}")
+
+
+@contextlib.contextmanager
+def damaged(path):
+    """A block that takes what a file holds: StorageError in place of what Python says where something doesn't fit."""
+    try:
+        yield
+    except StorageError:
+        raise
+    except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:
+        raise StorageError(f"{path} is damaged, or lacks something: {type(error).__name__}: {error}.") from error
 
 
 @contextlib.contextmanager

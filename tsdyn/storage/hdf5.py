@@ -13,8 +13,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from .. import regular_files
 from ..errors import StorageError
-from .formats import CHUNK, LONGEST, demand_rows, reading
+from .formats import CHUNK, LONGEST, NUMBERS, ROOM, demand_rows, reading
 from .write_errors import code_of
 
 BUFFER = CHUNK
@@ -157,13 +158,47 @@ def get(path, group):
 def attributes(path):
     """As formats.py says."""
     with reading(path), _opened(path) as file:
-        return dict(file.attrs)
+        return {name: value for name, value in file.attrs.items() if isinstance(value, (str, int, np.integer))}
 
 
-def names(path):
+def shapes(path):
     """As formats.py says."""
     with reading(path), _opened(path) as file:
-        return list(file)
+        return {
+            name: array.shape
+            for name, array in file.items()
+            if isinstance(array, h5py.Dataset) and array.dtype == float
+        }
+
+
+def demand_plain(path):
+    """As formats.py says; every function that reads asks for it, for it takes a millisecond."""
+    with reading(path), _opened(path):
+        pass
+
+
+def _demand_plain(path, group, within=False):
+    """Raise StorageError unless a group has plain arrays alone; the bytes of those of numbers.
+
+    Links lead into other files, as do virtual and external arrays; filters unpack, and may be code.
+    """
+    size = 0
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise StorageError(f"{path}: {name} is a link to elsewhere, which is not followed.")
+        array = group[name]
+        if isinstance(array, h5py.Group) and not within:
+            size += _demand_plain(path, array, within=True)
+            continue
+        if not isinstance(array, h5py.Dataset):
+            raise StorageError(f"{path}: {name} is no array.")
+        if array.dtype.str in NUMBERS or array.dtype.kind == "b":
+            size += array.size * array.dtype.itemsize
+        elif within or h5py.check_string_dtype(array.dtype) is None:
+            raise StorageError(f"{path}: {name} holds {array.dtype}, no numbers.")
+        if array.is_virtual or array.external or array.id.get_create_plist().get_nfilters():
+            raise StorageError(f"{path}: {name} is compressed, or its numbers are elsewhere; neither is read.")
+    return size
 
 
 def _opened(path):
@@ -172,11 +207,21 @@ def _opened(path):
     Of a damaged file that nobody writes, HDF5 would wait for the missing part for ever.
     """
     written = ({"libver": "latest", "swmr": True, "locking": False},) if _is_being_written(path) else ()
+    regular_files.demand(path)
     for options in (*written, {"locking": False}, {}):
         try:
-            return h5py.File(path, "r", **options)
-        except OSError as error:
+            file = h5py.File(path, "r", **options)
+        except (OSError, RuntimeError) as error:
             reason = error
+            continue
+        try:
+            size, held = _demand_plain(path, file), os.path.getsize(path)
+            if size > held + (ROOM * len(file) if written else ROOM):
+                raise StorageError(f"{path}: its arrays say that they have {size} bytes, and the file has {held}.")
+        except BaseException:
+            file.close()
+            raise
+        return file
     said = "it is a folder" if os.path.isdir(path) else str(reason).partition(" (")[0]
     raise StorageError(f"{path} can't be read as HDF5: {said}.") from reason
 

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidArgument, StorageError
-from .formats import SUFFIXES, format_of
+from .checkpoint import LONGEST
+from .formats import SUFFIXES, damaged, format_of
 from .write_errors import demand_folder, unwritable, writing
 
 FORMAT, VERSION = "tsdyn solution", 1
@@ -156,16 +157,19 @@ def read(path, kind=FORMAT):
             f"{path} has the format {kind} {attributes.get('format_version')}, and this tsdyn reads {VERSION}: "
             f"{attributes.get('source', 'another tsdyn')} has written it. Install that, or a later one."
         )
+    form.demand_plain(path)
     arrays = form.get(path, GROUP)
-    try:
-        record = json.loads(_unsealed(arrays.pop(RECORD).tobytes()))
+    with damaged(path):
+        words = arrays.pop(RECORD)
+        if words.size > LONGEST:
+            raise ValueError(f"its record has {words.size} bytes")
+        record = json.loads(_unsealed(words.tobytes()))
         tables, sums = record["tables"], record["sums"]
         found = _sums(arrays) | {c: _sum_of(form, path, c) for columns in tables.values() for c in columns}
-    except (KeyError, ValueError, AttributeError, TypeError) as error:
-        raise StorageError(f"{path} is damaged: its record can't be read ({type(error).__name__}: {error}).") from error
-    wrong = [name for name in sums if sums[name] != found.get(name)]
+        wrong = [name for name in sums.keys() | found.keys() if sums.get(name) != found.get(name)]
     if wrong:
-        raise StorageError(f"{path} is damaged: {', '.join(wrong[:5])} has another checksum than when it was written.")
+        names = ", ".join(sorted(wrong)[:5])
+        raise StorageError(f"{path} is damaged: {names} has another checksum than when it was written.")
     return record, arrays
 
 

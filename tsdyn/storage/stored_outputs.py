@@ -2,6 +2,10 @@
 
 from functools import cached_property
 
+import numpy as np
+
+from ..errors import StorageError
+from ..formulations.chart_validity import REASONS
 from .archive import OUTPUTS, STEPS
 from .formats import format_of
 
@@ -51,4 +55,6 @@ class StoredLog:
         found = [kind.read(path, column, whole) for column in columns]
         if self._name == STEPS:
             found[2] = found[2] == 1.0
+        elif not np.isin(found[1], np.arange(len(REASONS))).all():
+            raise StorageError(f"{path} is damaged: the reasons of its charts are none.")
         return found

@@ -108,6 +108,12 @@ def room(highest):
     return (highest + 3) | 1  # odd: parts that are powers of two apart would share their places in the cache
 
 
+def series_width(packed, highest):
+    """Floats of a step's series as dense output keeps them: the order, q, the series of bodies and the ground."""
+    n = int(packed.system.bodies[:, 1].sum())
+    return 1 + n + (len(packed.bodies) + 1) * BODY_ROW * room(highest)
+
+
 def is_far(graph, highest):
     """Return True if the series exceed the near caches."""
     return len(graph.bodies) * room(highest) > FAR

@@ -82,8 +82,8 @@ START_ZERO = 64.0 * EPS
 # largest change it is taken for: three changes of random signs are tried.
 SHAKEN, NOISE = 4.0 * EPS, 4.0
 
-# s, and relative: how near to a zero Brent's method comes.
-ROOT = 4.0 * EPS
+# Of the time: how near to a zero Brent's method comes, as near as it can. s: the least distance there, a normal number.
+ROOT, LEAST_TIME = 4.0 * EPS, 2.0**-1022
 
 # --- slices ----------------------------------------------------------------------------------------------------------
 # s between returns to Python: progress bars and Ctrl-C answer at once, at a cost of 0.1 ms a slice.

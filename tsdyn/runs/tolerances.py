@@ -43,7 +43,7 @@ LEAST_ERROR, LEAST_BEFORE = 1e-10, 1e-4
 SECOND_ESTIMATE = 0.1
 
 # First step (Solving ODEs I, II.4): norms below TOO_SMALL don't tell it, and it is the part TRIAL of the run; its error
-# is to be FIRST_ERROR; x' and x'' below NO_SLOPE count as zero, times the length of the run; it is FIRST_GROWTH times the
+# is to be FIRST_ERROR; x' and x'' below NO_SLOPE count as zero, times the run's length; it is FIRST_GROWTH times the
 # trial at most, and the trial FIRST_PART of the run.
 TOO_SMALL, TRIAL, FIRST_ERROR, NO_SLOPE, FIRST_GROWTH, FIRST_PART = 1e-5, 1e-6, 0.01, 1e-15, 100.0, 0.1
 

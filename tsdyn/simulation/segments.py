@@ -5,13 +5,13 @@ Status.PASSAGE where series go on past a singular configuration, or have done so
 runs have one segment.
 """
 
-import time
 from itertools import pairwise
 
 import numpy as np
 
 from ..configuration.holonomic import demand_holonomic
 from ..errors import Status, TsdynError
+from ..jit.compiled import clock
 from ..runs.history import ChartLog, StepLog
 from ..runs.run import run
 from ..runs.segments import Relay
@@ -79,7 +79,7 @@ def _recalled(known):
     """The `Outcome` of a segment that had ended when a checkpoint was written."""
     return Outcome(
         Status(known["status"]), "", range(known["rows"]), None, None, known["reached"], np.array(known["last"]),
-        np.array(known["remembered"]), known["counts"], None, None, time.perf_counter(),
+        np.array(known["remembered"]), known["counts"], None, None, clock(),
     )  # fmt: skip
 
 

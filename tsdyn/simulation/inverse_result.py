@@ -12,6 +12,7 @@ from ..drawing import Drawn, new_figure
 from ..elements.force import Force
 from ..jit.compiled import clock
 from ..observables import power, reactions
+from ..observables.exerted import acted
 from ..validation import unknown_name
 from .given_motion import GivenMotion
 
@@ -81,7 +82,7 @@ class InverseDynamics(Drawn, GivenMotion):
         load, found = reactions.loads_of(self.packed).get(id(item)), [one for one in self._every if one.item is item]
         if load is None or not found:
             return super().reaction(item, on)
-        body = self._acted(item, on)
+        body = acted(self.packed, item, on)
         at, dimension = self.handles.where(body)
         whole = np.zeros_like(self.q)
         for one in found:

@@ -15,7 +15,7 @@ from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of
 from ..statics.moves import update_memory
 from .branch_steps import branch_of, follow
-from .tolerances import LEAST_STEPS, SHORTEST, SLICE
+from .tolerances import LEAST_STEPS, SEEN, SHORTEST, SLICE
 
 
 class Followed(NamedTuple):
@@ -52,7 +52,7 @@ def analyse(packed, t0, q, remembered, times, stops):
     way.t, way.size = t0, Metric(packed, None, t0).reach(q)
     span = float(np.ptp(np.append(times, t0)))
     way.longest = way.h = max(span / LEAST_STEPS, np.finfo(float).tiny)
-    way.least = SHORTEST * max(span, np.abs(times).max())
+    way.least = max(SHORTEST * span, SEEN * max(abs(t0), np.abs(times).max()))
     every, asked = _with_stops(t0, times, stops)
     out = np.zeros((every.size, 1 + 3 * q.size + remembered.size))
     started, done, status = clock(), 0, Status.SLICE_DONE

@@ -102,7 +102,7 @@ PACED, HOPELESS = 1000, 1e10
 # A run whose pace, in s a step, has more than doubled since it was taken last gets on.
 GETTING_ON = 2.0
 
-# Relative rounding error of (t1 - t0) / step that counts no step more.
+# Relative rounding error of (t1 - t0) / step that counts no step more, beside that of t0 and t1.
 SAME_COUNT = 1e-12
 
 # Tries of a Taylor step, at most, that are kept in the history of a slice beyond one for each of its steps.

@@ -5,7 +5,7 @@ reversal at v = 0, that of |v| at v > 0 is v, and a pulse is zero to any order l
 program of a traced function, is therefore evaluated at x(tau) and xd(tau), and must be f(tau). What f lacks may be as
 large as
 
-    OFF (atol / max(h, 1 s) + rtol |xd|) / (w h)    w: what the force accelerates by, so that w f h is a velocity
+    OFF (atol + rtol |xd|) / (w h)      w: what the force accelerates by, so that w f h is a velocity
     a small part of the terms of f      rounding
 """
 
@@ -49,9 +49,8 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
         if not gap <= off:  # or not a number
             off = gap
         speed = max(speed, abs(xd[c + i]))
-    far = max(limits[LENGTH], 1.0)
-    tol = limits[ATOL] / far + limits[RTOL] * speed
-    if weight * off * limits[LENGTH] <= max(OFF * tol, LAW_TOLERANCE / far):
+    tol = limits[ATOL] + limits[RTOL] * speed
+    if weight * off * limits[LENGTH] <= max(OFF * tol, LAW_TOLERANCE):
         return False
     for i in range(size):
         power = 1.0

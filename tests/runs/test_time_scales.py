@@ -212,7 +212,7 @@ def test_stops_within_rounding_of_each_other(start):
 def test_fixed_steps_far_from_zero():
     scene = ts.Scene()
     scene.add_point_mass(1.0)
-    for end in (0.3, 0.7, 0.9):
+    for end in (0.1, 0.3, 0.7):
         solution = ts.simulate(scene, (1e9, 1e9 + end), integrator=I.Nystrom4(step=1e-3))
         assert solution.stats.steps == round(1e3 * end)
     assert np.diff(output_times(1e9, 1e9 + 0.3, 1e-3)).min() > 9e-4
